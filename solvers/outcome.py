@@ -1,0 +1,89 @@
+"""What every solver takes and gives: one request, one outcome, one status with advice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Status(Enum):
+    """How a solve ended, as the solver saw it; whether the problem is solved is judged afterwards."""
+
+    MET = "met"
+    CONVERGED = "converged"
+    BUDGET = "budget"
+    STALLED = "stalled"
+    NOT_FINITE = "not_finite"
+    NOT_APPLICABLE = "not_applicable"
+    FAILED = "failed"
+    INTERRUPTED = "interrupted"
+
+
+@dataclass
+class Counts:
+    """Work done: each rollout, gradient, residual Jacobian, Hessian that was evaluated, line searches included."""
+
+    rollouts: int = 0
+    gradients: int = 0
+    jacobians: int = 0
+    hessians: int = 0
+
+
+@dataclass(frozen=True)
+class TraceRow:
+    """One iteration.
+
+    Attributes:
+        iteration: from 0, the guess.
+        rollouts, gradients, jacobians, hessians: cumulative counts.
+        seconds: since the solve began (all earlier sessions of a continued solve included).
+        objective: at this iterate (for a population: its best).
+        best: lowest so far.
+        miss: largest of the normalised errors of targets and constraints; met at 1 or below; nan without any.
+        gradient_norm: nan where the solver has none.
+        step: length of the step in z (CMA-ES: sigma); nan for none.
+        smoothing: the knob in force.
+    """
+
+    iteration: int
+    rollouts: int
+    gradients: int
+    jacobians: int
+    hessians: int
+    seconds: float
+    objective: float
+    best: float
+    miss: float
+    gradient_norm: float
+    step: float
+    smoothing: float
+
+
+Monitor = Callable[[TraceRow], None]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a solver found.
+
+    Attributes:
+        status: how it ended.
+        advice: one sentence: what that means and what to try; empty when all is well.
+        z: (n,) the best point.
+        trace: one row per iteration.
+        counts: total work.
+        checkpoint: what the solver needs to go on exactly here; JSON-able numbers, strings and lists of numbers.
+    """
+
+    status: Status
+    advice: str
+    z: Array
+    trace: tuple[TraceRow, ...]
+    counts: Counts
+    checkpoint: dict[str, object] = field(default_factory=dict)

@@ -1,0 +1,30 @@
+"""Many steps: a horizon as one casadi call, without Python in the time loop."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+
+Expr = Any
+"""casadi MX, SX or DM"""
+
+
+def roll_out(step: ca.Function, steps: int, x0: Expr, u: Expr, p: Expr, smoothing: Expr) -> tuple[Expr, ...]:
+    """``steps`` steps from x0; the inputs change with each, parameters and smoothing do not.
+
+    Args:
+        step: a function (x, u, p, smoothing) -> (x_next, ...).
+        steps: how many, N.
+        x0: (nx,) the state at t = 0.
+        u: (nu, N) inputs of each step.
+        p: (np,) parameters.
+        smoothing: scalar [m/s].
+
+    Returns:
+        The states (nx, N + 1) that include x0, then each further output of ``step``, N columns of them.
+    """
+    horizon = step.mapaccum(f"{step.name()}_{steps}", steps)
+    outputs = horizon(x0, u, ca.repmat(p, 1, steps), ca.repmat(ca.MX(smoothing), 1, steps))
+    outputs = outputs if isinstance(outputs, tuple) else (outputs,)
+    return (ca.horzcat(x0, outputs[0]), *outputs[1:])

@@ -1,0 +1,59 @@
+"""Rotations for casadi types (SX, MX, DM): unit quaternions (w, x, y, z) that turn body into world coordinates."""
+
+from __future__ import annotations
+
+from math import factorial
+from typing import Any
+
+import casadi as ca
+
+Expr = Any
+"""casadi SX, MX or DM"""
+
+SERIES_TERMS = 9
+"""Terms of the series of cos and sinc: full double precision up to rotations of about 2 rad in one step."""
+
+
+def cross_matrix(a: Expr) -> Expr:
+    """(3, 3): the matrix A with A b = a x b."""
+    return ca.skew(a)
+
+
+def multiply(p: Expr, q: Expr) -> Expr:
+    """(4,): the quaternion product p q, which turns by q first."""
+    scalar = p[0] * q[0] - ca.dot(p[1:4], q[1:4])
+    return ca.vertcat(scalar, p[0] * q[1:4] + q[0] * p[1:4] + ca.cross(p[1:4], q[1:4]))
+
+
+def matrix(q: Expr) -> Expr:
+    """(3, 3): the rotation matrix R_wb of a unit quaternion."""
+    w, x, y, z = (q[i] for i in range(4))
+    return ca.vertcat(
+        ca.horzcat(1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        ca.horzcat(2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        ca.horzcat(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+
+
+def exponential(r: Expr) -> Expr:
+    """(4,): the quaternion that turns by |r| [rad] about r, world frame.
+
+    cos(|r|/2) and sin(|r|/2)/|r| as polynomials in |r|^2: no square root, so every derivative is finite at r = 0.
+    """
+    h2 = ca.dot(r, r) / 4
+    cos, sinc = 0.0, 0.0
+    for k in reversed(range(SERIES_TERMS)):
+        sign = (-1) ** k
+        cos = cos * h2 + sign / factorial(2 * k)
+        sinc = sinc * h2 + sign / factorial(2 * k + 1)
+    return ca.vertcat(cos, sinc * r / 2)
+
+
+def turn(q: Expr, r: Expr) -> Expr:
+    """(4,): orientation ``q`` after a rotation by the vector ``r`` [rad], world frame."""
+    return multiply(exponential(r), q)
+
+
+def rotate(q: Expr, a: Expr) -> Expr:
+    """(3,): the body-frame vector ``a`` in world coordinates."""
+    return ca.mtimes(matrix(q), a)

@@ -1,0 +1,48 @@
+"""Regularised primitives: each one's width is an argument, and width 0 is the exact function.
+
+All have finite values and finite first and second derivatives everywhere, for every width >= 0.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+
+Expr = Any
+"""casadi SX, MX or DM, or a float"""
+
+TINY_SQUARE = 1e-24
+"""Added under square roots of lengths: keeps the slope finite at zero length; 1e-12 in the length's own unit."""
+TINY_WIDTH_SQUARE = 1e-120
+"""Added under the square root of ``positive``, so that its second derivative exists at x = w = 0."""
+
+
+def positive(x: Expr, width: Expr) -> Expr:
+    """max(x, 0); for width w > 0 (x + sqrt(x^2 + w^2)) / 2, which lies above it by at most w / 2, at x = 0.
+
+    The fixed point of y = positive(y - c, w) is y c = w^2 / 4: the central path of y >= 0, c >= 0, y c = 0.
+    """
+    soft = (x + ca.sqrt(x * x + width * width + TINY_WIDTH_SQUARE)) / 2
+    return ca.if_else(width > 0, soft, ca.fmax(x, 0))
+
+
+def clip(x: Expr, low: Expr, high: Expr, width: Expr) -> Expr:
+    """X held in [low, high]; leaves it by at most ``width`` / 2 at either end when smooth."""
+    return low + positive(x - low, width) - positive(x - high, width)
+
+
+def length(a: Expr) -> Expr:
+    """|a| of a vector, with slope 0 at a = 0 (width 1e-12)."""
+    return ca.sqrt(ca.dot(a, a) + TINY_SQUARE)
+
+
+def onto_disc(y: Expr, radius: Expr, width: Expr, knob: Expr) -> Expr:
+    """The point of the disc |y| <= radius nearest to ``y``; with knob > 0 pulled inside over ``width``.
+
+    Exact: y radius / |y| outside, y inside. Smooth: y radius / (radius + positive(|y| - radius, width)).
+    """
+    norm = length(y)
+    soft = radius / (radius + positive(norm - radius, width) + 1e-30)
+    outside = ca.dot(y, y) >= radius * radius
+    return y * ca.if_else(knob > 0, soft, ca.if_else(outside, radius / norm, 1))

@@ -1,0 +1,130 @@
+"""Projected Gauss-Seidel over contact rows, on linear velocities and angular momenta.
+
+Cost of a sweep: one visit to each row; nothing but V, L and the impulses is accumulated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from symphys.motion import apply
+from symphys.smooth import onto_disc, positive
+from symphys.step.rows import ContactRow, Side
+
+Expr = Any
+"""casadi SX, MX or DM"""
+
+
+@dataclass
+class Momenta:
+    """The sweeps' unknowns, changed in place: V (3,) [m/s] and L (3,) [N m s] of each body at mid-step."""
+
+    velocity: list[Expr]
+    angular: list[Expr]
+
+
+@dataclass(frozen=True)
+class Impulse:
+    """What a contact has given so far, on the pair's first body, world frame.
+
+    Attributes:
+        normal: along the normal [N s], >= 0.
+        tangent: (3,) friction [N s].
+        spin: torque impulse about the normal [N m s].
+        roll: (3,) torque impulse across the normal [N m s].
+    """
+
+    normal: Expr
+    tangent: Expr
+    spin: Expr
+    roll: Expr
+
+    def linear(self, n: Expr) -> Expr:
+        """(3,) [N s]."""
+        return n * self.normal + self.tangent
+
+    def angular(self, n: Expr) -> Expr:
+        """(3,) [N m s]: the torque impulse beside that of the linear one."""
+        return n * self.spin + self.roll
+
+    def minus(self, other: Impulse) -> Impulse:
+        """The difference."""
+        return Impulse(
+            self.normal - other.normal, self.tangent - other.tangent, self.spin - other.spin, self.roll - other.roll
+        )
+
+
+ZERO = Impulse(ca.SX(0), ca.SX.zeros(3), ca.SX(0), ca.SX.zeros(3))
+
+
+def sweep(rows: Sequence[ContactRow], momenta: Momenta, impulses: Sequence[Impulse]) -> list[Impulse]:
+    """One pass over all rows; returns the new impulses."""
+    return [_visit(row, momenta, impulse) for row, impulse in zip(rows, impulses, strict=True)]
+
+
+def give(row: ContactRow, momenta: Momenta, impulse: Impulse) -> None:
+    """Apply an impulse to the row's bodies."""
+    linear, angular = impulse.linear(row.impulse_normal), impulse.angular(row.impulse_normal)
+    for side in row.sides:
+        momenta.velocity[side.body] += side.sign * side.inverse_mass * linear
+        momenta.angular[side.body] += side.sign * (ca.cross(side.impulse_arm, linear) + angular)
+
+
+def _visit(row: ContactRow, momenta: Momenta, old: Impulse) -> Impulse:
+    normal = _normal(row, momenta, old)
+    tangent = _tangent(row, momenta, old, normal)
+    spin, roll = _torques(row, momenta, old, normal)
+    return Impulse(normal, tangent, spin, roll)
+
+
+def _normal(row: ContactRow, momenta: Momenta, old: Impulse) -> Expr:
+    """ln <- max(ln - (n.u - b + gamma ln) / (k + gamma), 0)."""
+    k = row.normal_mass + row.softness
+    wanted = ca.dot(row.normal, _slip(row, momenta)) - row.target + row.softness * old.normal
+    new = positive(old.normal * k - wanted, row.width) / k
+    give(row, momenta, Impulse(new - old.normal, ca.SX.zeros(3), ca.SX(0), ca.SX.zeros(3)))
+    return new
+
+
+def _tangent(row: ContactRow, momenta: Momenta, old: Impulse, normal: Expr) -> Expr:
+    """The friction impulse, onto the disc of radius mu ln."""
+    slip = _slip(row, momenta) - row.slip_target
+    wanted = old.tangent - _across(slip, row.normal) / row.tangent_mass
+    new = onto_disc(wanted, row.law.friction * normal, row.knob / row.tangent_mass, row.knob)
+    give(row, momenta, Impulse(ca.SX(0), new - old.tangent, ca.SX(0), ca.SX.zeros(3)))
+    return new
+
+
+def _torques(row: ContactRow, momenta: Momenta, old: Impulse, normal: Expr) -> tuple[Expr, Expr]:
+    """Torsional friction (an interval) and rolling friction (a disc), both limited by the normal impulse."""
+    if not row.law.spins:
+        return old.spin, old.roll
+    n = row.normal
+    spin_width, roll_width = row.knob / row.spin_mass, row.knob / row.roll_mass
+    rate = sum(side.sign * _spin(momenta, side) for side in row.sides)
+    twist = n * (old.spin - ca.dot(n, rate) / row.spin_mass)
+    spin = ca.dot(n, onto_disc(twist, row.law.torsion * normal, spin_width, row.knob))
+    wanted = old.roll - _across(rate, n) / row.roll_mass
+    roll = onto_disc(wanted, row.law.rolling * normal, roll_width, row.knob)
+    give(row, momenta, Impulse(ca.SX(0), ca.SX.zeros(3), spin - old.spin, roll - old.roll))
+    return spin, roll
+
+
+def _across(a: Expr, n: Expr) -> Expr:
+    return a - n * ca.dot(n, a)
+
+
+def _spin(momenta: Momenta, side: Side) -> Expr:
+    return apply(side.inverse_inertia, momenta.angular[side.body])
+
+
+def _slip(row: ContactRow, momenta: Momenta) -> Expr:
+    """(3,) [m/s]: relative velocity of the touching points."""
+    total = ca.SX.zeros(3)
+    for side in row.sides:
+        total += side.sign * (momenta.velocity[side.body] + ca.cross(_spin(momenta, side), side.arm))
+    return total

@@ -1,0 +1,68 @@
+"""The one yardstick: how a candidate does in the exact rollout."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.problem import Problem
+from symphys.transcription.terms import goal_error
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing that should hold.
+
+    Attributes:
+        kind: "target", "constraint" or "goal".
+        name: as in the file.
+        error: norm of a target's value, largest violation of a constraint, the objective for a goal.
+        tolerance: largest error that counts as met.
+        ratio: 1 at the tolerance, smaller is better.
+    """
+
+    kind: str
+    name: str
+    error: float
+    tolerance: float
+    ratio: float
+
+    @property
+    def met(self) -> bool:
+        """Whether it holds; NaN never does."""
+        return isfinite(self.ratio) and self.ratio <= 1
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Objective, each cost and each check of one candidate, by name."""
+
+    objective: float
+    costs: dict[str, float]
+    checks: tuple[Check, ...]
+
+    @property
+    def solved(self) -> bool:
+        """Whether all checks are met, true also when there are none; a result that is not finite never is."""
+        return isfinite(self.objective) and all(check.met for check in self.checks)
+
+    @property
+    def worst(self) -> float:
+        """The largest ratio; NaN without checks."""
+        return max((check.ratio for check in self.checks), default=float("nan"))
+
+
+def verdict(problem: Problem, objective: float, costs: NDArray[np.float64], errors: NDArray[np.float64]) -> Verdict:
+    """The verdict from the numbers of the exact rollout; ``errors`` as in ``Terms``."""
+    checks = []
+    held = [("target", t.name, t.tolerance) for t in problem.targets]
+    held += [("constraint", c.name, c.tolerance) for c in problem.constraints]
+    for (kind, name, tolerance), ratio in zip(held, errors, strict=False):
+        checks.append(Check(kind, name, float(ratio) * tolerance, tolerance, float(ratio)))
+    if problem.goal is not None:
+        checks.append(Check("goal", "objective", objective, problem.goal, float(goal_error(objective, problem.goal))))
+    named = {cost.name: float(value) for cost, value in zip(problem.costs, costs, strict=True)}
+    return Verdict(objective, named, tuple(checks))

@@ -1,0 +1,57 @@
+"""The exact rollout of one z with everything that happened in it, as plain arrays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.rollout import roll_out
+from symphys.state import GIVEN, Layout
+from symphys.step import report_function
+from symphys.trajectory import Trajectory
+from symphys.transcription.along import Rollout
+
+Array = NDArray[np.float64]
+
+
+def recorder(rollout: Rollout) -> ca.Function:
+    """(z, smoothing) -> (x, u, forces, gaps, residual, crowded) of the whole horizon."""
+    scheme = rollout.problem.simulation.scheme()
+    step = report_function(rollout.world, scheme, rollout.inputs, rollout.parameters.symbols)
+    x0 = rollout.x[:, 0]
+    outputs = roll_out(step, rollout.steps, x0, rollout.u, rollout.p, rollout.smoothing)
+    return ca.Function("record", [rollout.z, rollout.smoothing], [outputs[0], rollout.u, *outputs[1:]])
+
+
+def simulate(rollout: Rollout, record: ca.Function, z: Array, smoothing: float) -> Trajectory:
+    """The trajectory of z; NotFinite where it has none."""
+    x, u, forces, gaps, residual, crowded = (np.array(part).T for part in record(z, smoothing))
+    world, steps = rollout.world, rollout.steps
+    layout = Layout(world)
+    bodies = {field: _stack([x[:, layout[f"{b.name}.{field}"]] for b in world.bodies]) for field in GIVEN}
+    return Trajectory(
+        time=np.arange(steps + 1) * rollout.dt,
+        body_names=tuple(body.name for body in world.bodies),
+        **bodies,
+        force=_applied(rollout, u, "force"),
+        torque=_applied(rollout, u, "torque"),
+        contact_names=tuple(pair.name for pair in world.pairs),
+        contact_force=forces.reshape(steps, len(world.pairs), 3),
+        contact_gap=np.concatenate([gaps, gaps[-1:]]),
+        residual=residual.ravel(),
+        crowded=crowded.ravel(),
+    ).require_finite()
+
+
+def _stack(parts: list[Any]) -> Array:
+    return np.stack(parts, axis=1)
+
+
+def _applied(rollout: Rollout, u: Array, field: str) -> Array:
+    """(N, B, 3): the inputs of this kind, zero for bodies without any."""
+    zero = np.zeros((rollout.steps, 3))
+    columns = {name: u[:, 3 * i : 3 * i + 3] for i, name in enumerate(rollout.inputs)}
+    return _stack([columns.get(f"{body.name}.{field}", zero) for body in rollout.world.bodies])

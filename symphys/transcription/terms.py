@@ -1,0 +1,119 @@
+"""Costs, targets and constraints along a rollout: the objective, its residuals, and the errors it is judged by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from symphys.problem import Constraint, Cost, Target
+from symphys.smooth import length
+from symphys.transcription.along import Rollout
+
+Expr = Any
+"""casadi MX"""
+
+
+@dataclass(frozen=True)
+class Terms:
+    """Everything that a problem asks of a rollout, as expressions of z.
+
+    Attributes:
+        costs: (k,) weighted cost of each [[cost]].
+        objective: scalar: costs and weighted squares of targets.
+        residuals: (m,) with objective + penalties = r . r; None where a cost is no sum of squares.
+        penalties: scalar: quadratic penalties of violated constraints.
+        errors: (e,) error / tolerance of each target, constraint and the goal: met where <= 1.
+        constraints: (c,) values, with ``lower`` and ``upper`` (c,) as numbers and ``names`` one an entry.
+    """
+
+    costs: Expr
+    objective: Expr
+    residuals: Expr | None
+    penalties: Expr
+    errors: Expr
+    constraints: Expr
+    lower: np.ndarray[Any, np.dtype[np.float64]]
+    upper: np.ndarray[Any, np.dtype[np.float64]]
+    names: tuple[str, ...]
+
+
+def terms(rollout: Rollout) -> Terms:
+    """The terms of the rollout's problem."""
+    problem = rollout.problem
+    costs = [_cost(rollout, cost) for cost in problem.costs]
+    targets = [(target, rollout.at(target.formula, target.at)) for target in problem.targets]
+    limits = [_Limit(rollout, constraint) for constraint in problem.constraints]
+    aims = [np.sqrt(target.weight) * value for target, value in targets]
+    objective = sum((value for value, _ in costs), ca.MX(0)) + sum((ca.sumsqr(aim) for aim in aims), ca.MX(0))
+    errors = [_miss(target, value) for target, value in targets] + [limit.error for limit in limits]
+    if problem.goal is not None:
+        errors.append(goal_error(objective, problem.goal))
+    squares = [residual for _, residual in costs]
+    penalties = [limit.penalty for limit in limits]
+    whole = None if any(r is None for r in squares) else _stack([*squares, *aims, *penalties])
+    return Terms(
+        costs=_stack([value for value, _ in costs]),
+        objective=objective,
+        residuals=whole,
+        penalties=sum((ca.sumsqr(penalty) for penalty in penalties), ca.MX(0)),
+        errors=_stack(errors),
+        constraints=_stack([limit.value for limit in limits]),
+        lower=np.concatenate([limit.lower for limit in limits] or [np.zeros(0)]),
+        upper=np.concatenate([limit.upper for limit in limits] or [np.zeros(0)]),
+        names=tuple(limit.name for limit in limits for _ in range(limit.lower.size)),
+    )
+
+
+def goal_error(objective: Any, goal: float) -> Any:
+    """Error / tolerance of a goal for the objective: 1 at the goal, below it where the objective is lower."""
+    return 1 + (objective - goal) / max(abs(goal), 1e-9)
+
+
+def _stack(parts: list[Expr]) -> Expr:
+    return ca.vertcat(ca.MX(0, 1), *(ca.vec(part) for part in parts))
+
+
+def _cost(rollout: Rollout, cost: Cost) -> tuple[Expr, Expr | None]:
+    """(weighted cost, residuals whose squares sum to it, or None)."""
+    if cost.at == "always":
+        samples = rollout.over_steps(cost.formula)
+        weight = cost.weight * rollout.dt * rollout.steps / samples.shape[1]
+    else:
+        samples, weight = rollout.at(cost.formula, cost.at), cost.weight
+    if cost.squares:
+        residual = np.sqrt(weight) * ca.vec(samples)
+        return ca.sumsqr(residual), residual
+    return weight * ca.sum2(samples), None
+
+
+def _miss(target: Target, value: Expr) -> Expr:
+    return length(value) / target.tolerance
+
+
+class _Limit:
+    """One constraint: its values, bounds, penalty residuals and error."""
+
+    def __init__(self, rollout: Rollout, constraint: Constraint) -> None:
+        always = constraint.at == "always"
+        values = rollout.after_steps(constraint.formula) if always else rollout.at(constraint.formula, constraint.at)
+        count = values.shape[1]
+        self.name = constraint.name
+        self.value = ca.vec(values)
+        size = values.shape[0]
+        self.lower = np.tile(np.broadcast_to(constraint.lower, (size,)), count)
+        self.upper = np.tile(np.broadcast_to(constraint.upper, (size,)), count)
+        violation = self._violation()
+        self.penalty = np.sqrt(constraint.penalty * (rollout.dt if always else 1.0)) * violation
+        self.error = ca.mmax(violation) / constraint.tolerance
+
+    def _violation(self) -> Expr:
+        """(c,) >= 0: how far each value lies outside its bounds."""
+        total = ca.MX.zeros(self.value.shape[0])
+        for bound, sign in ((self.lower, -1), (self.upper, 1)):
+            finite = np.isfinite(bound)
+            distance = ca.fmax(sign * (self.value - ca.DM(np.where(finite, bound, 0.0))), 0)
+            total += ca.DM(finite.astype(float)) * distance
+        return total

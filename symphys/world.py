@@ -1,0 +1,210 @@
+"""What the physics is about: bodies, static planes, and which of their surfaces meet under which law.
+
+Everything here is frozen. A number may be a float or a casadi symbol: a symbol makes the step a function of it,
+so a mass, a radius or a coefficient of friction becomes a parameter with exact derivatives.
+SI units; vectors are in world coordinates unless a field says "body frame".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+Scalar = Any
+"""float or casadi.SX"""
+Vector = Sequence[Any]
+"""three of them"""
+
+GRAVITY = (0.0, 0.0, -9.81)
+SOLID_SPHERE = 2 / 5
+HOLLOW_SPHERE = 2 / 3
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """A ball-shaped part of a body's surface.
+
+    Attributes:
+        radius: [m].
+        centre: (3,) [m], body frame, from the centre of mass.
+    """
+
+    radius: Scalar
+    centre: tuple[Scalar, ...] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body.
+
+    Attributes:
+        name: how states, inputs and parameters refer to it.
+        mass: [kg].
+        inertia: about the centre of mass [kg m^2]: a scalar (the same about every axis),
+            (3,) principal moments along the body's axes, or a symmetric (3, 3) tensor, body frame.
+        shapes: the parts of its surface.
+    """
+
+    name: str
+    mass: Scalar
+    inertia: Scalar
+    shapes: tuple[Sphere, ...] = ()
+
+    @classmethod
+    def ball(cls, name: str, radius: Scalar, mass: Scalar, hollow: bool = False) -> Body:
+        """A uniform solid sphere, or a thin hollow one: I = 2/5 m r^2 or 2/3 m r^2."""
+        share = HOLLOW_SPHERE if hollow else SOLID_SPHERE
+        return cls(name, mass, share * mass * radius * radius, (Sphere(radius),))
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A static half space {x: normal . x < offset}; bodies stay on the other side.
+
+    Attributes:
+        name: how formulas and pairs refer to it.
+        normal: (3,) unit vector, out of the solid.
+        offset: [m].
+    """
+
+    name: str
+    normal: tuple[Scalar, ...] = (0.0, 0.0, 1.0)
+    offset: Scalar = 0.0
+
+    @classmethod
+    def ground(cls, height: Scalar = 0.0) -> Plane:
+        """The floor: everything below ``height`` is solid."""
+        return cls("ground", offset=height)
+
+
+@dataclass(frozen=True)
+class Law:
+    """How two surfaces act on each other.
+
+    Attributes:
+        friction: Coulomb's coefficient mu; |tangential impulse| <= mu * normal impulse, on the exact disc.
+        restitution: Newton's e in [0, 1].
+        torsion: radius [m] of the torque about the normal: |torque| <= torsion * normal force.
+        rolling: radius [m] of the torque across the normal: |torque| <= rolling * normal force.
+        frequency: [Hz] of a soft contact (Catto, GDC 2011); 0 is a rigid contact. A soft contact has no restitution.
+        damping: damping ratio of a soft contact.
+    """
+
+    friction: Scalar = 0.5
+    restitution: Scalar = 0.0
+    torsion: Scalar = 0.0
+    rolling: Scalar = 0.0
+    frequency: Scalar = 0.0
+    damping: Scalar = 1.0
+
+    @property
+    def soft(self) -> bool:
+        """Whether the contact is a spring and damper; a matter of structure, so never a symbol's value."""
+        return not is_zero(self.frequency)
+
+    @property
+    def spins(self) -> bool:
+        """Whether the contact resists spinning or rolling."""
+        return not (is_zero(self.torsion) and is_zero(self.rolling))
+
+
+@dataclass(frozen=True)
+class Side:
+    """One side of a pair: a body's shape, or (``body`` None) the static plane with index ``shape``."""
+
+    body: int | None
+    shape: int
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two surfaces that may touch; ``first`` always belongs to a body."""
+
+    name: str
+    first: Side
+    second: Side
+    law: Law
+
+
+@dataclass(frozen=True)
+class World:
+    """Bodies, planes, the pairs that may touch, and gravity.
+
+    Attributes:
+        bodies: the order gives the state's columns.
+        planes: static.
+        pairs: every pair of surfaces that is looked at; see ``all_pairs``.
+        gravity: (3,) [m/s^2].
+    """
+
+    bodies: tuple[Body, ...]
+    planes: tuple[Plane, ...] = ()
+    pairs: tuple[Pair, ...] = ()
+    gravity: tuple[Scalar, ...] = GRAVITY
+
+    def body_index(self, name: str) -> int:
+        """The index of the body called ``name``; KeyError if there is none."""
+        for index, body in enumerate(self.bodies):
+            if body.name == name:
+                return index
+        raise KeyError(f"no body is called {name!r}; there are {', '.join(b.name for b in self.bodies)}")
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """How a step is taken; the switches exist so that a study can show what each trick buys.
+
+    Attributes:
+        dt: time step [s].
+        sweeps: projected Gauss-Seidel sweeps over the velocity rows.
+        position_sweeps: sweeps of the position pass, which removes penetration without adding velocity.
+        push_out: share of a penetration that one step removes.
+        warm_start: start each step from the contact forces of the last one.
+        time_of_impact: resolve the instant of each impact inside the step; without it gradients through bounces
+            are wrong at any step size.
+        impact_friction: let friction at an impact aim at the velocity at the instant of impact.
+    """
+
+    dt: float = 0.01
+    sweeps: int = 10
+    position_sweeps: int = 2
+    push_out: float = 1.0
+    warm_start: bool = True
+    time_of_impact: bool = True
+    impact_friction: bool = True
+
+
+def make_world(
+    bodies: Sequence[Body],
+    planes: Sequence[Plane] = (),
+    law: Law | None = None,
+    gravity: Vector = GRAVITY,
+) -> World:
+    """A world where everything may touch everything under one law; change ``pairs`` for anything finer."""
+    bodies, planes = tuple(bodies), tuple(planes)
+    return World(bodies, planes, all_pairs(bodies, planes, law or Law()), tuple(gravity))
+
+
+def all_pairs(bodies: Sequence[Body], planes: Sequence[Plane], law: Law) -> tuple[Pair, ...]:
+    """Every shape of every body against every plane, then against every shape of every later body."""
+    sides = [(body.name, Side(i, j)) for i, body in enumerate(bodies) for j in range(len(body.shapes))]
+    statics = [(plane.name, Side(None, k)) for k, plane in enumerate(planes)]
+    pairs = [(a, b) for a in sides for b in statics]
+    pairs += [(a, b) for i, a in enumerate(sides) for b in sides[i + 1 :] if a[1].body != b[1].body]
+    return tuple(Pair(pair_name(a, b, bodies), a[1], b[1], law) for a, b in pairs)
+
+
+def pair_name(a: tuple[str, Side], b: tuple[str, Side], bodies: Sequence[Body]) -> str:
+    """``ball-ground``; a body with several shapes adds the index of the shape: ``dumbbell[1]-ground``."""
+
+    def label(name: str, side: Side) -> str:
+        several = side.body is not None and len(bodies[side.body].shapes) > 1
+        return f"{name}[{side.shape}]" if several else name
+
+    return f"{label(*a)}-{label(*b)}"
+
+
+def is_zero(value: Scalar) -> bool:
+    """Whether a number is structurally zero: a plain 0, or a casadi expression that is the constant 0."""
+    return bool(value.is_zero()) if hasattr(value, "is_zero") else value == 0
