@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -118,9 +118,7 @@ def _arguments(world: World, inputs: Sequence[str], parameters: Sequence[Any]) -
     return x, u, ca.vertcat(ca.SX(0, 1), *parameters), ca.SX.sym("smoothing")
 
 
-def _motions(
-    world: World, scheme: Scheme, layout: Layout, inputs: Sequence[str], x: Expr, u: Expr
-) -> list[Motion]:
+def _motions(world: World, scheme: Scheme, layout: Layout, inputs: Sequence[str], x: Expr, u: Expr) -> list[Motion]:
     """Each body's free motion; the stored velocities are freed from the last half step's persistent forces."""
     applied = {name: u[3 * i : 3 * i + 3] for i, name in enumerate(inputs)}
     zero, lag = ca.SX.zeros(3), x[layout["lag"]]

@@ -22,9 +22,7 @@ def displacements(
 ) -> dict[int, Shift]:
     """Dt times the new velocities, less t* times the velocity change of each impact: until t* it had not happened."""
     linear = [scheme.dt * v for v in momenta.velocity]
-    angular = [
-        scheme.dt * apply(m.inverse_mid, momentum) for m, momentum in zip(motions, momenta.angular, strict=True)
-    ]
+    angular = [scheme.dt * apply(m.inverse_mid, momentum) for m, momentum in zip(motions, momenta.angular, strict=True)]
     for row, impulse in zip(rows, impulses, strict=True):
         if not scheme.time_of_impact:
             continue
@@ -60,6 +58,4 @@ def _push(row: ContactRow, shifts: dict[int, Shift], amount: Expr) -> None:
     for side in row.sides:
         shift = shifts[side.body]
         turn = apply(side.inverse_inertia, ca.cross(side.arm, step))
-        shifts[side.body] = Shift(
-            shift.linear + side.sign * side.inverse_mass * step, shift.angular + side.sign * turn
-        )
+        shifts[side.body] = Shift(shift.linear + side.sign * side.inverse_mass * step, shift.angular + side.sign * turn)

@@ -1,6 +1,6 @@
 """From a problem to a shooting problem: the rollout, its costs and their derivatives as casadi functions."""
 
 from symphys.transcription.judge import Check, Verdict
-from symphys.transcription.transcribe import Transcription, transcribe
+from symphys.transcription.transcribe import Transcription, judge_for, transcribe
 
-__all__ = ["Check", "Transcription", "Verdict", "transcribe"]
+__all__ = ["Check", "Transcription", "Verdict", "judge_for", "transcribe"]

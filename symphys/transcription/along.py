@@ -73,7 +73,7 @@ class Rollout:
         return self._mapped(formula, self.x[:, 1:], np.arange(1, self.steps + 1))
 
     def over_steps(self, formula: Formula) -> Expr:
-        """(m, N or 2N): samples whose mean over N, or 2N, is the time average (trapezoid if it depends on the state)."""
+        """(m, N or 2N): samples whose mean is the time average; 2N for what moves (trapezoid)."""
         before = self._mapped(formula, self.x[:, :-1], np.arange(self.steps))
         if not _moves(formula):
             return before

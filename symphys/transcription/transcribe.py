@@ -22,6 +22,7 @@ from symphys.transcription.simulate import recorder, simulate
 from symphys.transcription.terms import Terms, terms
 
 Array = NDArray[np.float64]
+Judge = Callable[[Array], Verdict]
 PRICING_CALLS = 5
 """How often a function is timed; the fastest call counts."""
 
@@ -38,8 +39,7 @@ class Transcription:
 
     def judge(self, z: Array) -> Verdict:
         """How ``z`` does in the exact rollout."""
-        objective, costs, errors = self._judged(z, 0.0)
-        return verdict(self.problem, float(objective), np.array(costs).ravel(), np.array(errors).ravel())
+        return self._judge(z)
 
     def simulate(self, z: Array, smoothing: float = 0.0) -> Trajectory:
         """The motion; NotFinite if there is none."""
@@ -47,19 +47,19 @@ class Transcription:
 
     def prices(self, kinds: Iterable[str] = ("gradient", "jacobian")) -> dict[str, float]:
         """Measured cost of one "gradient", "jacobian" or "hessian" in rollouts, at the guess."""
-        functions = {
-            "gradient": self.shooting.gradient,
-            "jacobian": self.shooting.jacobian,
-            "hessian": self._hessian if "hessian" in kinds else None,
-        }
         z = self.shooting.start(0)
-        one = _fastest(lambda: self.shooting.value(z, 0.0))
-        chosen = {kind: functions[kind] for kind in kinds if functions[kind] is not None}
-        return {kind: _fastest(lambda f=f: f(z, 0.0)) / one for kind, f in chosen.items()}
+        one = _fastest(self.shooting.value, z)
+        functions = {kind: self._priced(kind) for kind in kinds}
+        return {kind: _fastest(f, z) / one for kind, f in functions.items() if f is not None}
+
+    def _priced(self, kind: str) -> ca.Function | None:
+        if kind == "hessian":
+            return self._hessian
+        return {"gradient": self.shooting.gradient, "jacobian": self.shooting.jacobian}[kind]
 
     @cached_property
-    def _judged(self) -> ca.Function:
-        return _function(self.rollout, "judged", [self.terms.objective, self.terms.costs, self.terms.errors])
+    def _judge(self) -> Judge:
+        return judge_of(self.rollout, self.terms)
 
     @cached_property
     def _recorder(self) -> ca.Function:
@@ -68,6 +68,23 @@ class Transcription:
     @cached_property
     def _hessian(self) -> ca.Function:
         return _function(self.rollout, "hessian", [ca.hessian(self.terms.objective, self.rollout.z)[0]])
+
+
+def judge_of(rollout: Rollout, asked: Terms) -> Judge:
+    """A judge of candidates by the exact rollout, without the functions that solvers need."""
+    numbers = _function(rollout, "judge", [asked.objective, asked.costs, asked.errors])
+
+    def judge(z: Array) -> Verdict:
+        objective, costs, errors = numbers(z, 0.0)
+        return verdict(rollout.problem, float(objective), np.array(costs).ravel(), np.array(errors).ravel())
+
+    return judge
+
+
+def judge_for(problem: Problem) -> Judge:
+    """The judge of a problem."""
+    rollout = symbolic_rollout(problem)
+    return judge_of(rollout, terms(rollout))
 
 
 def transcribe(problem: Problem) -> Transcription:
@@ -106,11 +123,11 @@ def _function(rollout: Rollout, name: str, outputs: list[Any]) -> ca.Function:
     return ca.Function(name, [rollout.z, rollout.smoothing], [ca.densify(output) for output in outputs])
 
 
-def _fastest(call: Callable[[], object]) -> float:
+def _fastest(function: ca.Function, z: Array) -> float:
     """Seconds of the fastest of a few calls."""
     times = []
     for _ in range(PRICING_CALLS):
         began = perf_counter()
-        call()
+        function(z, 0.0)
         times.append(perf_counter() - began)
     return min(times)

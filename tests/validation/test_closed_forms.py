@@ -24,8 +24,7 @@ def test_v8_49_bouncing_balls_keep_their_energy():
     world = World(world.bodies, world.planes, tuple(p for p in world.pairs if p.second.body is None))
     states = Lab(world, Scheme(sweeps=4)).states({f"b{i}{j}.position": [i, j, 5.0] for i, j in grid}, 20.0)
     energy = sum(
-        10 * G * states[f"{b.name}.position"][:, 2] + 5 * (states[f"{b.name}.velocity"] ** 2).sum(axis=1)
-        for b in balls
+        10 * G * states[f"{b.name}.position"][:, 2] + 5 * (states[f"{b.name}.velocity"] ** 2).sum(axis=1) for b in balls
     )
     assert energy == pytest.approx(24034.5, rel=1e-9)
 
@@ -123,9 +122,7 @@ def test_v11_projectile():
     ball = Lab(ball_world(Law()), Scheme())
     states = ball.states({"ball.position": [0, 0, 100], "ball.velocity": [1, 2, 3]}, 2.0)
     t = np.arange(201) * 0.01
-    assert states["ball.position"] == pytest.approx(
-        np.stack([t, 2 * t, 100 + 3 * t - G * t**2 / 2], axis=1), abs=1e-9
-    )
+    assert states["ball.position"] == pytest.approx(np.stack([t, 2 * t, 100 + 3 * t - G * t**2 / 2], axis=1), abs=1e-9)
     assert states["ball.velocity"][:, 2] == pytest.approx(3 - G * t, abs=1e-9)
 
 

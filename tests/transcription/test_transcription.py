@@ -1,0 +1,179 @@
+"""From a problem file to numbers: objective, residuals, constraints, controls and verdicts against hand calculations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from symphys.problem import load_problem
+from symphys.trajectory import NotFinite
+from symphys.transcription import transcribe
+from symphys.transcription.decision import knot_weights
+
+PUSHED = """
+[simulation]
+duration = 1.0
+dt = 0.01
+
+[world]
+gravity = [0, 0, 0]
+
+[[body]]
+name = "puck"
+shape = { sphere = { radius = 0.1 } }
+mass = 2.0
+
+[[variable]]
+name = "push"
+sets = "puck.force[0:2]"
+knots = 4
+guess = [[1, 2], [3, 4], [5, 6], [7, 8]]
+
+[[variable]]
+name = "mass"
+sets = "puck.mass"
+guess = 2.0
+
+[[cost]]
+name = "effort"
+at = "always"
+squares = "puck.force"
+weight = 0.5
+
+[[cost]]
+name = "path"
+at = "always"
+value = "puck.position[0] + time"
+
+[[target]]
+name = "place"
+value = "puck.position[0:2] - [1, 0]"
+tolerance = 0.1
+weight = 3.0
+
+[[constraint]]
+name = "speed"
+at = "always"
+value = "puck.velocity[0]"
+upper = 1.5
+tolerance = 0.01
+penalty = 7.0
+"""
+
+
+@pytest.fixture
+def pushed(tmp_path):
+    file = tmp_path / "pushed.toml"
+    file.write_text(PUSHED)
+    return transcribe(load_problem(file))
+
+
+def motion(mass=2.0):
+    """The puck's exact motion under the guess's forces, at the ends of the steps: times, x, vx, y."""
+    t = np.linspace(0, 1, 101)
+    fx, fy = np.repeat([[1, 3, 5, 7], [2, 4, 6, 8]], 25, axis=1)
+    vx = np.concatenate([[0], np.cumsum(fx) * 0.01 / mass])
+    vy = np.concatenate([[0], np.cumsum(fy) * 0.01 / mass])
+    x = np.concatenate([[0], np.cumsum((vx[:-1] + vx[1:]) / 2 * 0.01)])
+    y = np.concatenate([[0], np.cumsum((vy[:-1] + vy[1:]) / 2 * 0.01)])
+    return t, x, vx, y
+
+
+def test_objective_is_the_sum_of_the_file_s_terms(pushed):
+    t, x, vx, y = motion()
+    effort = 0.5 * 0.25 * sum(a * a for a in range(1, 9))
+    path = np.trapezoid(x + t, t)
+    place = 3 * ((x[-1] - 1) ** 2 + y[-1] ** 2)
+    z = pushed.shooting.start(0)
+    merit, objective, errors = (np.array(part).ravel() for part in pushed.shooting.value(z, 0.0))
+    assert objective[0] == pytest.approx(effort + path + place, rel=1e-12)
+    over = np.maximum(vx[1:] - 1.5, 0)
+    assert merit[0] == pytest.approx(objective[0] + 7 * 0.01 * (over**2).sum(), rel=1e-12)
+    assert errors == pytest.approx([np.hypot(x[-1] - 1, y[-1]) / 0.1, over.max() / 0.01], rel=1e-9)
+
+
+def test_gradient_agrees_with_differences_of_the_value(pushed):
+    z = pushed.shooting.start(0)
+    slope = np.array(pushed.shooting.gradient(z, 0.0)[3]).ravel()
+
+    def merit(at):
+        return float(pushed.shooting.value(at, 0.0)[0])
+
+    differences = [(merit(z + 1e-5 * e) - merit(z - 1e-5 * e)) / 2e-5 for e in np.eye(z.size)]
+    assert slope == pytest.approx(differences, rel=1e-6)
+    assert np.abs(slope).min() > 1e-3
+
+
+def test_a_cost_that_is_no_square_has_no_residuals(pushed):
+    assert pushed.shooting.residuals is None
+    assert pushed.shooting.jacobian is None
+
+
+def test_residuals_square_to_the_merit(tmp_path):
+    file = tmp_path / "squares.toml"
+    file.write_text(PUSHED.replace('value = "puck.position[0] + time"', 'squares = "puck.position[0] + time"'))
+    shooting = transcribe(load_problem(file)).shooting
+    z = shooting.start(0)
+    r, _, _, jacobian = (np.array(part) for part in shooting.jacobian(z, 0.0))
+    merit, _, _, slope = (np.array(part).ravel() for part in shooting.gradient(z, 0.0))
+    assert (r**2).sum() == pytest.approx(merit[0], rel=1e-12)
+    assert 2 * jacobian.T @ r.ravel() == pytest.approx(slope, rel=1e-9)
+
+
+def test_constraints_reach_nlp_solvers_step_by_step(pushed):
+    _, _, vx, _ = motion()
+    _, values = pushed.shooting.nlp(pushed.shooting.start(0), 0.0)
+    assert np.array(values).ravel() == pytest.approx(vx[1:], abs=1e-12)
+    assert pushed.shooting.constraint_names == ("speed",) * 100
+    assert np.isneginf(pushed.shooting.constraint_lower).all()
+    assert (pushed.shooting.constraint_upper == 1.5).all()
+
+
+def test_verdict_names_every_check(pushed):
+    verdict = pushed.judge(pushed.shooting.start(0))
+    assert [(check.kind, check.name, check.met) for check in verdict.checks] == [
+        ("target", "place", False),
+        ("constraint", "speed", False),
+    ]
+    assert set(verdict.costs) == {"effort", "path"}
+    assert not verdict.solved
+    assert verdict.worst == pytest.approx(max(check.error / check.tolerance for check in verdict.checks))
+
+
+def test_parameters_and_inputs_enter_the_simulation(pushed):
+    z = pushed.shooting.from_blocks({"push": np.ones((2, 4)), "mass": np.array([[4.0]])})
+    recorded = pushed.simulate(z)
+    assert recorded.position[-1, 0] == pytest.approx([1 / 8, 1 / 8, 0], abs=1e-12)
+    assert recorded.force[:, 0] == pytest.approx(np.tile([1, 1, 0], (100, 1)))
+    assert recorded.time[-1] == pytest.approx(1.0)
+
+
+def test_a_simulation_that_is_not_finite_names_step_and_body(pushed):
+    z = pushed.shooting.from_blocks({"push": np.full((2, 4), 1e308), "mass": np.array([[1e-300]])})
+    with pytest.raises(NotFinite, match=r"step 1 .*'puck'"):
+        pushed.simulate(z)
+
+
+def test_seed_zero_is_the_guess_and_others_stay_in_bounds(tmp_path):
+    file = tmp_path / "bounded.toml"
+    file.write_text(PUSHED.replace("guess = 2.0", "guess = 2.0\nlower = 1.9\nupper = 2.1\nspread = 5.0"))
+    shooting = transcribe(load_problem(file)).shooting
+    assert (shooting.start(0) == shooting.stacked("guess")).all()
+    assert (shooting.start(3) == shooting.start(3)).all()
+    assert shooting.start(3)[-1] in (1.9, 2.1) or 1.9 <= shooting.start(3)[-1] <= 2.1
+    assert (shooting.start(1) != shooting.start(2)).any()
+
+
+@pytest.mark.parametrize("steps", [7, 100])
+@pytest.mark.parametrize("knots", [1, 2, 3, 7])
+def test_knots_are_shared_out_over_the_steps(knots, steps):
+    """Shares sum to one; linear knots reproduce a straight line, constant ones equal parts."""
+    line = np.linspace(2.0, 5.0, knots) if knots > 1 else np.array([2.0])
+    middle = (np.arange(steps) + 0.5) / steps
+    for kind in ("constant", "linear"):
+        weights = np.array(knot_weights(knots, steps, kind).full())
+        assert weights.sum(axis=0) == pytest.approx(np.ones(steps))
+    linear = line @ np.array(knot_weights(knots, steps, "linear").full())
+    assert linear == pytest.approx(2 + 3 * middle if knots > 1 else np.full(steps, 2.0))
+    constant = np.array(knot_weights(knots, steps, "constant").full())
+    assert (np.argmax(constant, axis=0) == np.floor(middle * knots)).all()
