@@ -1,4 +1,4 @@
-"""From a problem file to numbers: objective, residuals, constraints, controls and verdicts against hand calculations."""
+"""From a problem file to numbers: objective, residuals, constraints, controls, verdicts; by hand."""
 
 from __future__ import annotations
 

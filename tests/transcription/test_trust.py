@@ -49,7 +49,9 @@ def test_refined_answers_are_those_of_the_refined_problem():
     shot = transcribe(load_problem(find("bank_shot"), settings))
     z = shot.shooting.start(1)
     halved = judge_for(load_problem(find("bank_shot"), settings | {"simulation.dt": 0.01}))(z)
-    doubled = judge_for(load_problem(find("bank_shot"), settings | {"simulation.sweeps": 12}))(z)
+    doubled = judge_for(
+        load_problem(find("bank_shot"), settings | {"simulation.sweeps": 2 * shot.problem.simulation.sweeps})
+    )(z)
     found = trust.examine(shot, z)["refined"]
     assert [row["objective"] for row in found] == [halved.objective, doubled.objective]
     assert [row["worst"] for row in found] == [halved.worst, doubled.worst]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -89,7 +91,7 @@ def test_v10_bounce_heights(e):
     first = np.sqrt(2 / G)
     flights = first + np.concatenate([[0], np.cumsum(2 * first * e ** np.arange(1, 4))])
     time = np.arange(z.size) * 0.01
-    for n, (begin, end) in enumerate(zip(flights[:-1], flights[1:], strict=True), start=1):
+    for n, (begin, end) in enumerate(itertools.pairwise(flights), start=1):
         inside = (time > begin) & (time < min(end, 1.2))
         assert heights[inside] == pytest.approx(e ** (2 * n), abs=1e-9)
 
