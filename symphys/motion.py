@@ -164,8 +164,9 @@ def free_motion(body: Body, state: BodyState, gravity: Expr, dt: float) -> Motio
     if not isotropic(body):
         middle = rotation.turn(state.orientation, dt / 2 * w)
         inverse_mid = inverse_inertia(body, rotation.matrix(middle))
-        spin = rotation.cross_matrix(apply(inverse_mid, mid_momentum))
-        inverse_rate = ca.mtimes(spin, inverse_mid) - ca.mtimes(inverse_mid, spin)
+        spin: Expr = rotation.cross_matrix(apply(inverse_mid, mid_momentum))
+        turning: Expr = ca.mtimes(spin, inverse_mid)
+        inverse_rate = turning + turning.T
     return Motion(
         body=body,
         position=state.position,

@@ -25,6 +25,6 @@ def roll_out(step: ca.Function, steps: int, x0: Expr, u: Expr, p: Expr, smoothin
         The states (nx, N + 1) that include x0, then each further output of ``step``, N columns of them.
     """
     horizon = step.mapaccum(f"{step.name()}_{steps}", steps)
-    outputs = horizon(x0, u, ca.repmat(p, 1, steps), ca.repmat(ca.MX(smoothing), 1, steps))
+    outputs: Any = horizon(x0, u, ca.repmat(p, 1, steps), ca.repmat(ca.MX(smoothing), 1, steps))
     outputs = outputs if isinstance(outputs, tuple) else (outputs,)
     return (ca.horzcat(x0, outputs[0]), *outputs[1:])

@@ -70,7 +70,7 @@ def probe(transcription: Transcription) -> tuple[ca.Function, ca.Function]:
     combined = ca.dot(ca.DM(weights), ca.densify(everything))
     z = ca.MX.sym("z", rollout.z.shape[0])
 
-    def exact(name: str, output: ca.MX) -> ca.Function:
+    def exact(name: str, output: Any) -> ca.Function:
         smooth = ca.Function(name, [rollout.z, rollout.smoothing], [output])
         return ca.Function(name, [z], [smooth(z, 0)])
 

@@ -206,7 +206,8 @@ def _report(
 ) -> tuple[Expr, Expr, Expr, Expr]:
     """(forces, gaps, residual, crowded) of ``StepResult``."""
     forces = [impulse.linear(row.impulse_normal) / scheme.dt for row, impulse in zip(rows, impulses, strict=True)]
-    residual, counts = ca.SX(0), {}
+    residual: Expr = ca.SX(0)
+    counts: dict[int, Expr] = {}
     for row, new, old in zip(rows, impulses, last, strict=True):
         change = new.minus(old)
         residual = ca.fmax(residual, ca.fmax(ca.fabs(change.normal), ca.norm_inf(change.tangent)))

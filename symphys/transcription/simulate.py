@@ -33,7 +33,7 @@ def simulate(rollout: Rollout, record: ca.Function, z: Array, smoothing: float) 
     layout = Layout(world)
     bodies = {field: _stack([x[:, layout[f"{b.name}.{field}"]] for b in world.bodies]) for field in GIVEN}
     return Trajectory(
-        time=np.arange(steps + 1) * rollout.dt,
+        time=np.arange(steps + 1, dtype=np.float64) * rollout.dt,
         body_names=tuple(body.name for body in world.bodies),
         **bodies,
         force=_applied(rollout, u, "force"),

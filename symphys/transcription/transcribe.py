@@ -55,7 +55,7 @@ class Transcription:
     def _priced(self, kind: str) -> ca.Function | None:
         if kind == "hessian":
             return self._hessian
-        return {"gradient": self.shooting.gradient, "jacobian": self.shooting.jacobian}[kind]
+        return self.shooting.jacobian if kind == "jacobian" else self.shooting.gradient
 
     @cached_property
     def _judge(self) -> Judge:
