@@ -1,0 +1,33 @@
+# Every target installs what it needs into .venv by itself. PYTHON chooses the interpreter (3.11 or newer).
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+.PHONY: help demo test lint typecheck clean
+
+help:  ## list the targets
+	@sed -n 's/^\([a-z]*\):.*## /make \1\t/p' Makefile
+
+demo: $(VENV)/.installed  ## solve the ball throw with every solver and write the report
+	$(BIN)/symphys solve problems/ball_throw.toml --out reports
+
+test: $(VENV)/.developing  ## run the tests; ARGS="-m 'not slow'" passes options to pytest
+	$(BIN)/pytest $(ARGS)
+
+lint: $(VENV)/.developing  ## check style and format
+	$(BIN)/ruff check . && $(BIN)/ruff format --check .
+
+typecheck: $(VENV)/.developing  ## check types on a folder of links laid out as the package is installed
+	rm -rf build/farm && mkdir -p build/farm/symphys
+	cd build/farm/symphys && ln -s ../../../symphys/* ../../../solvers ../../../problems .
+	$(BIN)/mypy -p symphys
+
+clean:  ## remove what the other targets made, reports aside
+	rm -rf $(VENV) build dist *.egg-info
+
+$(VENV)/.installed: setup.cfg pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --editable . && touch $@
+
+$(VENV)/.developing: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --editable '.[dev]' && touch $@

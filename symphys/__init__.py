@@ -1,0 +1,67 @@
+"""Trajectory optimisation through contact.
+
+Rigid bodies with contact as casadi expressions, problem files about them, and what solves and reports them. The names
+below are the public surface; solvers are in ``symphys.solvers``, runs in ``symphys.runs``, reports in
+``symphys.report``. Everything is imported when it is first used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from symphys.errors import ProblemError, SymphysError
+    from symphys.problem import Problem, load_problem
+    from symphys.rollout import roll_out
+    from symphys.shooting import ShootingProblem
+    from symphys.state import Layout, initial_state
+    from symphys.step import step_function
+    from symphys.trajectory import Trajectory
+    from symphys.transcription.transcribe import Transcription, transcribe
+    from symphys.world import Body, Law, Plane, Scheme, Sphere, World, make_world
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Body",
+    "Law",
+    "Layout",
+    "Plane",
+    "Problem",
+    "ProblemError",
+    "Scheme",
+    "ShootingProblem",
+    "Sphere",
+    "SymphysError",
+    "Trajectory",
+    "Transcription",
+    "World",
+    "__version__",
+    "initial_state",
+    "load_problem",
+    "make_world",
+    "roll_out",
+    "step_function",
+    "transcribe",
+]
+
+_HOMES = {
+    "errors": ("ProblemError", "SymphysError"),
+    "problem": ("Problem", "load_problem"),
+    "rollout": ("roll_out",),
+    "shooting": ("ShootingProblem",),
+    "state": ("Layout", "initial_state"),
+    "step": ("step_function",),
+    "trajectory": ("Trajectory",),
+    "transcription": ("Transcription", "transcribe"),
+    "world": ("Body", "Law", "Plane", "Scheme", "Sphere", "World", "make_world"),
+}
+
+
+def __getattr__(name: str) -> object:
+    """A public name, from the room where it lives."""
+    for home, names in _HOMES.items():
+        if name in names:
+            return getattr(import_module(f"symphys.{home}"), name)
+    raise AttributeError(f"module 'symphys' has no attribute {name!r}")

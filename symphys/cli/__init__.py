@@ -1,0 +1,5 @@
+"""The command line: ``symphys``."""
+
+from symphys.cli.app import main
+
+__all__ = ["main"]

@@ -1,0 +1,102 @@
+"""Arguments that several commands share, and how they are read."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from symphys import files
+from symphys.errors import SymphysError
+from symphys.suggest import hint
+
+if TYPE_CHECKING:
+    from symphys.problem import Problem
+
+F = TypeVar("F", bound=Callable[..., Any])
+REPORTS = Path("reports")
+
+
+class UsageFault(SymphysError):
+    """An argument that cannot be used."""
+
+
+def settings_option(command: F) -> F:
+    """``--set KEY=VALUE``, as often as you like."""
+    return click.option(
+        "--set",
+        "assignments",
+        multiple=True,
+        metavar="KEY=VALUE",
+        help="Change a value of the problem file: simulation.dt=0.005, solver.cma.evaluations=2000. Repeatable.",
+    )(command)
+
+
+def out_option(command: F) -> F:
+    """``--out DIR``."""
+    return click.option(
+        "--out",
+        type=click.Path(path_type=Path, file_okay=False),
+        default=REPORTS,
+        show_default=True,
+        help="Folder for what is written.",
+    )(command)
+
+
+def read_settings(assignments: Iterable[str]) -> dict[str, object]:
+    """``KEY=VALUE`` pairs by key; a value is read as TOML, and as plain text where it is none."""
+    settings: dict[str, object] = {}
+    for assignment in assignments:
+        key, equals, text = assignment.partition("=")
+        if not key.strip() or not equals:
+            raise UsageFault(f"--set {assignment!r}: write KEY=VALUE, for instance simulation.dt=0.005")
+        settings[key.strip()] = read_value(text.strip())
+    return settings
+
+
+def read_value(text: str) -> object:
+    """A TOML value that JSON knows too, else the text itself."""
+    try:
+        table = tomllib.loads(f"value = {text}")
+        files.strict(table)
+    except (ValueError, TypeError, RecursionError):
+        return text
+    return table["value"] if table.keys() == {"value"} else text
+
+
+def read_problems(sources: Sequence[str], settings: dict[str, object]) -> list[Problem]:
+    """The problems in files or under shipped names, each once; two of one name would share their run folders."""
+    from symphys.problem import load_problem
+
+    paths = list(dict.fromkeys(problem_path(source) for source in sources))
+    problems = [load_problem(path, settings) for path in paths]
+    seen: dict[str, Path] = {}
+    for problem, path in zip(problems, paths, strict=True):
+        if problem.name in seen:
+            raise UsageFault(f"{seen[problem.name]} and {path} have one name: rename one, or solve them apart")
+        seen[problem.name] = path
+    return problems
+
+
+def problem_path(source: str) -> Path:
+    """A file, or a shipped problem by its name, which a folder of that name does not hide."""
+    from symphys import problems
+
+    shipped = problems.catalogue()
+    if source in shipped and not Path(source).is_file():
+        return shipped[source]
+    return problems.find(source)
+
+
+def read_solvers(text: str | None) -> tuple[str, ...]:
+    """Names, separated by commas, each once; all solvers for None."""
+    from symphys.solvers import SOLVERS
+
+    names = tuple(dict.fromkeys(SOLVERS if text is None else (name.strip() for name in text.split(","))))
+    for name in names:
+        if name not in SOLVERS:
+            raise UsageFault(f"--solver: there is no solver {name!r}; {hint(name, SOLVERS)}")
+    return names

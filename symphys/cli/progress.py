@@ -1,0 +1,74 @@
+"""What is shown while runs go on, on stderr: live lines on a terminal, one plain line per event elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import click
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from rich.text import Text
+
+from symphys.cli.wording import brief, number
+
+if TYPE_CHECKING:
+    from symphys.runs import Job, Observer, Result
+    from symphys.solvers import TraceRow
+
+
+@contextmanager
+def watch(runs: int) -> Iterator[Observer]:
+    """An observer of a batch of so many runs."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield Plain()
+        return
+    columns = (BarColumn(16), TimeElapsedColumn(), TextColumn("{task.description}", markup=False))
+    with Progress(*columns, console=console, transient=True) as progress:
+        yield Live(progress, runs)
+
+
+class Plain:
+    """One line when a run begins and one when it ends; nothing is redrawn."""
+
+    def started(self, job: Job, resumed: bool) -> None:
+        """Say so."""
+        click.echo(f"{job.name}: {'goes on' if resumed else 'begins'}", err=True)
+
+    def advanced(self, job: Job, row: TraceRow) -> None:
+        """Say nothing."""
+
+    def ended(self, job: Job, result: Result, skipped: bool) -> None:
+        """Say how."""
+        click.echo(f"{job.name}: {brief(job, result, skipped)}", err=True)
+
+
+class Live:
+    """A bar for the batch, a moving line for each run in work, and a line that stays for each that is over."""
+
+    def __init__(self, progress: Progress, runs: int) -> None:
+        """Start at zero."""
+        self.progress = progress
+        self.runs, self.over = runs, 0
+        self.whole = progress.add_task(f"0 of {runs} runs done", total=runs)
+        self.tasks: dict[str, TaskID] = {}
+
+    def started(self, job: Job, resumed: bool) -> None:
+        """Open the run's line."""
+        self.tasks[job.name] = self.progress.add_task(f"{job.name}: building", total=None)
+
+    def advanced(self, job: Job, row: TraceRow) -> None:
+        """Move the run's line on."""
+        if job.name in self.tasks:
+            text = f"{job.name}: iteration {row.iteration}, objective {number(row.best)}, worst {number(row.miss)}"
+            self.progress.update(self.tasks[job.name], description=text)
+
+    def ended(self, job: Job, result: Result, skipped: bool) -> None:
+        """Close the run's line."""
+        if job.name in self.tasks:
+            self.progress.remove_task(self.tasks.pop(job.name))
+        self.progress.console.print(Text(f"{job.name}: {brief(job, result, skipped)}"))
+        self.over += 1
+        self.progress.update(self.whole, completed=self.over, description=f"{self.over} of {self.runs} runs done")

@@ -1,0 +1,100 @@
+"""``symphys solve``: problems times solvers times seeds."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from symphys import threads
+from symphys.cli.arguments import out_option, read_problems, read_settings, read_solvers, settings_option
+
+if TYPE_CHECKING:
+    from symphys.runs import Batch, Job
+
+MOST_SEEDS = 10_000
+MOST_JOBS = 256
+
+
+@click.command()
+@click.argument("sources", metavar="FILE...", nargs=-1, required=True)
+@click.option("--solver", "names", metavar="A,B", help="Solvers, separated by commas.  [default: all]")
+@click.option(
+    "--seeds",
+    type=click.IntRange(1, MOST_SEEDS),
+    default=1,
+    show_default=True,
+    help="How many seeds; seed 0 starts from the guess as it is, the others from one perturbed by its spread.",
+)
+@settings_option
+@click.option(
+    "--jobs",
+    type=click.IntRange(1, MOST_JOBS),
+    default=1,
+    show_default=True,
+    help="How many runs go on at once.",
+)
+@out_option
+def solve(
+    sources: tuple[str, ...], names: str | None, seeds: int, assignments: tuple[str, ...], jobs: int, out: Path
+) -> int:
+    """Solve problems, and write a report.
+
+    FILE is a problem file, or the name of a shipped problem (see `symphys list`). What is done already is not done
+    again, and what was interrupted goes on where it stopped.
+    """
+    threads.limit()
+    from symphys.cli.progress import watch
+    from symphys.runs import make_jobs, run_batch
+    from symphys.transcription import transcribe
+
+    settings = read_settings(assignments)
+    solvers = read_solvers(names)
+    problems = read_problems(sources, settings)
+    command = shlex.join(["symphys", *sys.argv[1:]])
+    asked = make_jobs(problems, solvers, range(seeds), settings, out, command)
+    with watch(len(asked)) as observer:
+        batch = run_batch(asked, jobs, observer, transcribe)
+    return conclude(asked, batch, out)
+
+
+def conclude(jobs: list[Job], batch: Batch, out: Path) -> int:
+    """Show what came of it; the exit code."""
+    from symphys.cli.summary import print_summary
+
+    print_summary(jobs, batch)
+    if batch.interrupted:
+        click.echo(last_words(batch, out), err=True)
+        return 130
+    write_reports(jobs, out)
+    return 0 if batch.solved else 1
+
+
+def last_words(batch: Batch, out: Path) -> str:
+    """What an interruption has left, and how to go on."""
+    over = sum(result is not None and not result.interrupted for result in batch.results)
+    halfway = sum(result is not None and result.interrupted for result in batch.results)
+    return (
+        f"symphys: interrupted; {over} of {len(batch.results)} runs are done and {halfway} halfway, saved in {out}; "
+        "the same command goes on from there"
+    )
+
+
+def write_reports(jobs: list[Job], out: Path) -> None:
+    """Write the pages of the runs that are new, and that of the batch; print where to look."""
+    from symphys.report import write_batch_report, write_run_report
+    from symphys.report.run_page import PAGE
+    from symphys.runs import RESULT
+
+    for job in jobs:
+        if newer(job.folder.path / RESULT, job.folder.path / PAGE):
+            write_run_report(job.folder.path)
+    click.echo(f"report: {write_batch_report(out)}")
+
+
+def newer(source: Path, page: Path) -> bool:
+    """Whether there is something that the page does not show yet."""
+    return source.exists() and not (page.exists() and page.stat().st_mtime >= source.stat().st_mtime)

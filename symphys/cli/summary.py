@@ -1,0 +1,84 @@
+"""The table after the runs: one row per problem and solver, its seeds together."""
+
+from __future__ import annotations
+
+import statistics
+from collections import Counter
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from symphys.cli.wording import duration, first_line, number, whole
+
+if TYPE_CHECKING:
+    from symphys.runs import Batch, Job, Result
+
+NARROWEST = 120
+"""Columns of the table where the output is no terminal."""
+
+
+def print_summary(jobs: list[Job], batch: Batch) -> None:
+    """Print the table, and the advice of what is not solved."""
+    groups: dict[tuple[str, str], list[Result]] = {}
+    for job, result in zip(jobs, batch.results, strict=True):
+        group = groups.setdefault((job.config.problem, job.config.solver), [])
+        if result is not None:
+            group.append(result)
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=max(console.width, NARROWEST))
+    console.print(table(groups))
+    for line in advice(groups):
+        console.print(Text(line), soft_wrap=True)
+
+
+def table(groups: dict[tuple[str, str], list[Result]]) -> Table:
+    """The table of all groups, by problem and solver."""
+    several = any(len(group) > 1 for group in groups.values())
+    caption = "worst: largest error / tolerance, met at 1; work in rollouts" + ("; medians over the seeds" * several)
+    shown = Table(box=SIMPLE_HEAD, caption=caption, caption_justify="left")
+    for name in ("problem", "solver"):
+        shown.add_column(name, no_wrap=True)
+    for name in ("solved", "objective", "worst", "iterations", "work", "seconds"):
+        shown.add_column(name, justify="right", no_wrap=True)
+    shown.add_column("ended")
+    for (problem, solver), group in groups.items():
+        shown.add_row(Text(problem), Text(solver), *cells(group))
+    return shown
+
+
+def cells(group: list[Result]) -> list[Text]:
+    """The numbers of one row."""
+    solved = sum(result.solved for result in group)
+    ends = Counter(result.status.replace("_", " ") for result in group)
+    texts = [
+        number(median(result.objective for result in group)),
+        number(median(result.worst for result in group)),
+        whole(median(result.iterations for result in group)),
+        whole(median(result.equivalents for result in group)),
+        duration(median((result.seconds or {}).get("solve") for result in group)),
+        ", ".join(status if count == len(group) else f"{status} {count}" for status, count in ends.items()),
+    ]
+    style = "green" if group and solved == len(group) else "red"
+    return [Text(f"{solved}/{len(group)}", style=style), *map(Text, texts)]
+
+
+def median(values: Iterable[float | None]) -> float | None:
+    """The median of what is known; None if nothing is."""
+    known = [value for value in values if value is not None]
+    return statistics.median(known) if known else None
+
+
+def advice(groups: dict[tuple[str, str], list[Result]]) -> list[str]:
+    """What to try for runs that are not solved, each piece of advice once per problem and solver."""
+    lines = [
+        f"{problem} {solver}: {first_line(result.advice)}"
+        for (problem, solver), group in groups.items()
+        for result in group
+        if result.advice and not result.solved
+    ]
+    return list(dict.fromkeys(lines))

@@ -1,0 +1,51 @@
+"""Results in words and short numbers."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from symphys.runs import Job, Result
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """A short number; a dash for what is not known."""
+    if value is None or math.isnan(value):
+        return "-"
+    return f"{value:.{digits}g}"
+
+
+def whole(value: float | None) -> str:
+    """A number of things."""
+    return "-" if value is None or not math.isfinite(value) else f"{value:,.0f}"
+
+
+def duration(seconds: float | None) -> str:
+    """Seconds, without more digits than anybody reads."""
+    if seconds is None:
+        return "-"
+    return f"{seconds:,.0f}" if seconds >= 100 else f"{seconds:.3g}"
+
+
+def brief(job: Job, result: Result, skipped: bool) -> str:
+    """One line on a run that is over."""
+    if result.status == "failed" and skipped:
+        return f"failed before: {first_line(result.advice)} (to try again, remove {job.folder.path})"
+    if result.status == "failed":
+        return f"failed: {first_line(result.advice)}"
+    if skipped:
+        return f"done before ({verdict(result)})"
+    seconds = (result.seconds or {}).get("solve")
+    words = f"{verdict(result)}, objective {number(result.objective)}, {result.iterations} iterations"
+    return f"{words}, {duration(seconds)} s"
+
+
+def verdict(result: Result) -> str:
+    """Solved, or why not."""
+    return "solved" if result.solved else f"not solved ({result.status.replace('_', ' ')})"
+
+
+def first_line(text: str) -> str:
+    """The first line of a message."""
+    return text.partition("\n")[0]

@@ -1,0 +1,122 @@
+"""Reading and writing files: what is written appears at once and whole, or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from symphys.errors import SymphysError
+
+NON_FINITE = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
+
+
+class FileError(SymphysError):
+    """A file or folder that cannot be read or written; names it and says why."""
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder and its parents; FileError if that cannot be."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"cannot make the folder {path}: {reason(error)}") from error
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write to a temporary name in the same folder, then replace; FileError if that cannot be."""
+    make_folder(path.parent)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        temporary.write_bytes(content)
+        temporary.replace(path)
+    except OSError as error:
+        raise FileError(f"cannot write {path}: {reason(error)}") from error
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write UTF-8 text with the line ends as they are."""
+    write_bytes(path, text.encode())
+
+
+def write_json(path: Path, value: object) -> None:
+    """Write strict JSON; numbers that are not finite become the strings "nan", "inf" and "-inf"."""
+    write_text(path, json.dumps(strict(value), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def write_npz(path: Path, arrays: Mapping[str, Any]) -> None:
+    """Write named arrays, compressed."""
+    import numpy as np  # late: the command line's help needs none
+
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **arrays)
+    write_bytes(path, buffer.getvalue())
+
+
+def remove(path: Path) -> None:
+    """Remove a file if it is there; FileError if it stays."""
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        raise FileError(f"cannot remove {path}: {reason(error)}") from error
+
+
+def read_text(path: Path) -> str:
+    """The UTF-8 text of a file; FileError if there is none."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise FileError(f"cannot read {path}: {reason(error)}") from error
+    except UnicodeDecodeError as error:
+        raise FileError(f"cannot read {path}: it is not UTF-8 text") from error
+
+
+def read_json(path: Path) -> Any:
+    """The value in a JSON file; FileError if it cannot be read or is not JSON."""
+    text = read_text(path)
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise FileError(f"{path} is not valid JSON: {error}") from error
+
+
+def strict(value: Any) -> Any:
+    """The value in JSON's own types: arrays as lists, numbers that are not finite as strings."""
+    match value:
+        case Mapping():
+            return {str(key): strict(item) for key, item in value.items()}
+        case list() | tuple():
+            return [strict(item) for item in value]
+        case float() if not math.isfinite(value):
+            return "nan" if math.isnan(value) else ("inf" if value > 0 else "-inf")
+        case None | bool() | int() | float() | str():
+            return value
+    if hasattr(value, "tolist"):  # an array or one of its numbers
+        return strict(value.tolist())
+    raise TypeError(f"{type(value).__name__} has no place in a JSON file")
+
+
+def numbers(value: Any) -> Any:
+    """The inverse of ``strict`` for data without text of its own: "nan", "inf" and "-inf" become floats again."""
+    match value:
+        case dict():
+            return {key: numbers(item) for key, item in value.items()}
+        case list():
+            return [numbers(item) for item in value]
+        case str():
+            return NON_FINITE.get(value, value)
+    return value
+
+
+def reason(error: OSError) -> str:
+    """Why the system refused, in lower case and without the path."""
+    text = error.strerror or str(error)
+    return text[:1].lower() + text[1:]

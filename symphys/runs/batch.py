@@ -1,0 +1,118 @@
+"""Many runs: one after another here, or side by side in worker processes; no run's failure stops the others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from symphys.runs.execute import execute
+from symphys.runs.job import Job
+from symphys.runs.result import Result
+from symphys.runs.stopping import Interrupts, Stop
+from symphys.runs.workers import side_by_side
+from symphys.runs.workshop import Transcribe, Workshop
+from symphys.solvers import TraceRow
+
+
+class Observer(Protocol):
+    """Is told what happens to the runs of a batch."""
+
+    def started(self, job: Job, resumed: bool) -> None:
+        """The run begins, or goes on."""
+
+    def advanced(self, job: Job, row: TraceRow) -> None:
+        """The run has come to this iteration."""
+
+    def ended(self, job: Job, result: Result, skipped: bool) -> None:
+        """The run is over; ``skipped``: it was so before."""
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What came of the jobs.
+
+    Attributes:
+        results: (jobs) in the order of the jobs; None for a run that an interruption kept from starting.
+        interrupted: whether Ctrl-C was pressed.
+    """
+
+    results: tuple[Result | None, ...]
+    interrupted: bool
+
+    @property
+    def solved(self) -> bool:
+        """Whether every run solved its problem."""
+        return all(result is not None and result.solved for result in self.results)
+
+
+def run_batch(jobs: Sequence[Job], processes: int, observer: Observer, transcribe: Transcribe) -> Batch:
+    """Run what is not done yet, here or in ``processes`` workers, until all is done or Ctrl-C is pressed."""
+    ledger = Ledger(jobs, observer)
+    waiting = {index: job for index, job in enumerate(jobs) if not ledger.skip(index)}
+    with Interrupts().listening() as stop:
+        if processes > 1 and len(waiting) > 1:
+            side_by_side(waiting, processes, transcribe, ledger, stop)
+        else:
+            one_by_one(waiting, transcribe, ledger, stop)
+    return Batch(tuple(ledger.results), stop.requested)
+
+
+def one_by_one(jobs: Mapping[int, Job], transcribe: Transcribe, ledger: Ledger, stop: Stop) -> None:
+    """Run all jobs in this process."""
+    workshop = Workshop(transcribe)
+    for index, job in jobs.items():
+        if stop():
+            return
+
+        def watch(row: TraceRow, index: int = index) -> None:
+            if stop():
+                raise KeyboardInterrupt
+            ledger.advanced(index, row)
+
+        ledger.started(index)
+        ledger.ended(index, execute(job, watch, workshop))
+
+
+@dataclass
+class Ledger:
+    """Keeps the results by the index of their job, and passes on what happens.
+
+    Attributes:
+        results: one per job; None until it is over.
+        halfway: indices of the jobs that an earlier command began and was interrupted in.
+    """
+
+    jobs: Sequence[Job]
+    observer: Observer
+    results: list[Result | None] = field(default_factory=list)
+    halfway: set[int] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        """No job is done."""
+        self.results = [None] * len(self.jobs)
+
+    def skip(self, index: int) -> bool:
+        """Take the result of a job that was done before; False if it was not."""
+        job = self.jobs[index]
+        earlier = job.folder.earlier(job.config)
+        if earlier is not None and earlier.interrupted:
+            self.halfway.add(index)
+        if earlier is None or earlier.interrupted:
+            return False
+        self.results[index] = earlier
+        self.observer.ended(job, earlier, skipped=True)
+        return True
+
+    def started(self, index: int) -> None:
+        """Tell that a run begins, or goes on."""
+        self.observer.started(self.jobs[index], resumed=index in self.halfway)
+
+    def advanced(self, index: int, row: TraceRow) -> None:
+        """Tell of an iteration."""
+        self.observer.advanced(self.jobs[index], row)
+
+    def ended(self, index: int, result: Result) -> None:
+        """Keep a result and tell of it."""
+        self.results[index] = result
+        self.observer.ended(self.jobs[index], result, skipped=False)

@@ -1,0 +1,44 @@
+"""What exactly was asked for: the fields of config.json, and the key by which a finished run is known again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from symphys import __version__, files
+
+
+@dataclass(frozen=True)
+class Config:
+    """One solve.
+
+    Attributes:
+        problem: the stem of the problem's file.
+        solver: a solver's name.
+        seed: 0 is the guess as it stands.
+        settings: what the command line changed in the file, by dotted key.
+        options: the solver's options, all of them.
+        key: of the problem's text and all the above; two runs with one key are the same run.
+    """
+
+    problem: str
+    solver: str
+    seed: int
+    settings: dict[str, object] = field(default_factory=dict)
+    options: dict[str, object] = field(default_factory=dict)
+    key: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """The object of config.json."""
+        return asdict(self)
+
+
+def make_config(
+    problem: str, text: str, solver: str, seed: int, settings: dict[str, object], options: dict[str, object]
+) -> Config:
+    """The configuration with its key; ``text`` is the problem file's source."""
+    parts = [text, settings, solver, options, seed, __version__]
+    canonical = json.dumps(files.strict(parts), sort_keys=True, allow_nan=False)
+    return Config(problem, solver, seed, settings, options, hashlib.sha256(canonical.encode()).hexdigest())

@@ -1,0 +1,89 @@
+"""One run from its beginning to a finished folder."""
+
+from __future__ import annotations
+
+import traceback
+
+from symphys import files
+from symphys.errors import SymphysError
+from symphys.runs.folder import CHECKPOINT, LOG, RESULT, FolderBusy
+from symphys.runs.job import Job
+from symphys.runs.provenance import stamp
+from symphys.runs.result import Result
+from symphys.runs.solving import solve
+from symphys.runs.workshop import Workshop
+from symphys.solvers import Monitor
+
+
+def execute(job: Job, monitor: Monitor, workshop: Workshop) -> Result:
+    """Do the run, or go on with it, unless it is done; write its folder; tell what it found.
+
+    ``monitor`` sees each iteration and may raise KeyboardInterrupt, which ends the run so that it can go on later.
+    A run that fails is a result with the status "failed"; only a FileError, a folder that cannot be written, is raised.
+    """
+    try:
+        with job.folder.locked():
+            earlier = job.folder.earlier(job.config)
+            if earlier and not earlier.interrupted:
+                return earlier
+            return proceed(job, monitor, workshop, earlier)
+    except FolderBusy as error:
+        return failure(job, str(error))
+
+
+def proceed(job: Job, monitor: Monitor, workshop: Workshop, earlier: Result | None) -> Result:
+    """Solve and write down what came of it; ``earlier`` is the interrupted run to go on with."""
+    checkpoint = job.folder.checkpoint() if earlier else None
+    if not checkpoint:
+        checkpoint = earlier = None
+        job.folder.begin(job.config, job.problem.text)
+    log = Log(job)
+    try:
+        result = solve(job, workshop(job), monitor, log, checkpoint, earlier)
+    except files.FileError:
+        raise
+    except SymphysError as error:
+        result = failure(job, str(error))
+    except Exception as error:  # one broken run must not take the others with it
+        log(traceback.format_exc())
+        result = failure(job, f"unexpected {type(error).__name__}: {error} (details in {job.folder.path / LOG})")
+    finally:
+        log.write()
+    finish(job, result)
+    return result
+
+
+class Log:
+    """The text of log.txt: what the solver says, line by line; a continued run adds to what is there."""
+
+    def __init__(self, job: Job) -> None:
+        """Start from what an interrupted run wrote."""
+        self.path = job.folder.path / LOG
+        self.text = files.read_text(self.path) if self.path.exists() else ""
+
+    def __call__(self, line: str) -> None:
+        """Add a line."""
+        self.text += line.rstrip("\n") + "\n"
+
+    def write(self) -> None:
+        """Write the file."""
+        files.write_text(self.path, self.text)
+
+
+def finish(job: Job, result: Result) -> None:
+    """Write the result, last of all files, as it tells that the others are whole."""
+    files.write_json(job.folder.path / RESULT, result.to_json())
+    if not result.interrupted:
+        files.remove(job.folder.path / CHECKPOINT)
+
+
+def give_up(job: Job, message: str) -> Result:
+    """Write that the run failed."""
+    result = failure(job, message)
+    finish(job, result)
+    return result
+
+
+def failure(job: Job, message: str) -> Result:
+    """The result of a run that could not be done."""
+    return Result(**stamp(job), solved=False, status="failed", advice=message)

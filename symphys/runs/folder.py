@@ -1,0 +1,99 @@
+"""A run's folder: where its files are, what they say about being done, and who may write to them."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import dataclasses
+import io
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+
+from symphys import files
+from symphys.runs.config import Config
+from symphys.runs.result import Result, read_result
+
+try:
+    import fcntl
+except ImportError:  # not a POSIX system: concurrent commands are then kept apart by atomic writes alone
+    fcntl = None  # type: ignore[assignment]
+
+PROBLEM, CONFIG, RESULT, CHECKPOINT = "problem.toml", "config.json", "result.json", "checkpoint.json"
+TRAJECTORY, GUESS, SCENE, TRACE, LOG = "trajectory.npz", "guess.npz", "scene.json", "trace.csv", "log.txt"
+
+
+class FolderBusy(files.FileError):
+    """Another command is working in the folder."""
+
+
+@dataclasses.dataclass(frozen=True)
+class RunFolder:
+    """The files of one run; ARCHITECTURE.md says what each holds."""
+
+    path: Path
+
+    @classmethod
+    def of(cls, out: Path, problem: str, solver: str, seed: int) -> RunFolder:
+        """OUT/<problem>/<solver>-seed<k>; FileError for a problem whose name would lead out of OUT."""
+        if problem in {"", ".", ".."}:
+            raise files.FileError(f"a problem called {problem!r} can have no folder: rename its file")
+        return cls(out / problem / f"{solver}-seed{seed}")
+
+    def earlier(self, config: Config) -> Result | None:
+        """The result of the very run that ``config`` asks for, interrupted or finished; None if there is none."""
+        try:
+            if files.read_json(self.path / CONFIG)["key"] != config.key:
+                return None
+            return read_result(self.path / RESULT)
+        except (files.FileError, KeyError, TypeError):
+            return None
+
+    def checkpoint(self) -> dict[str, object] | None:
+        """Where an interrupted run stopped; None if that is not known."""
+        try:
+            value = files.numbers(files.read_json(self.path / CHECKPOINT))
+        except files.FileError:
+            return None
+        return value if isinstance(value, dict) else None
+
+    def begin(self, config: Config, problem_text: str) -> None:
+        """Take away what an earlier run of another configuration left, then write down what is asked for."""
+        files.make_folder(self.path)
+        for name in (RESULT, CHECKPOINT, CONFIG, TRAJECTORY, GUESS, SCENE, TRACE, LOG):
+            files.remove(self.path / name)
+        files.write_text(self.path / PROBLEM, problem_text)
+        files.write_json(self.path / CONFIG, config.to_json())
+
+    def write_trace(self, rows: Iterable[Mapping[str, object]]) -> None:
+        """Write one line per iteration under a header with the names of the columns."""
+        rows = list(rows)
+        buffer = io.StringIO()
+        writer = csv.DictWriter(buffer, list(rows[0]) if rows else [], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows({key: repr(value) for key, value in row.items()} for row in rows)
+        files.write_text(self.path / TRACE, buffer.getvalue())
+
+    @contextlib.contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other commands out; FolderBusy if one is in. The lock ends with its process, however that ends."""
+        files.make_folder(self.path)
+        if fcntl is None:
+            yield
+            return
+        handle = os.open(self.path, os.O_RDONLY)
+        try:
+            take(handle, self.path)
+            yield
+        finally:
+            os.close(handle)
+
+
+def take(handle: int, path: Path) -> None:
+    """Lock an open folder; file systems without locks are let pass."""
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        raise FolderBusy(f"another symphys command is working in {path}; nothing was changed there") from error
+    except OSError:
+        return

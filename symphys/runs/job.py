@@ -1,0 +1,77 @@
+"""A run that is asked for: which problem, which solver, which seed, and where it is written."""
+
+from __future__ import annotations
+
+import copyreg
+import dataclasses
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from symphys.expression import Formula, parse
+from symphys.problem import Problem, require_solvers, validate_options
+from symphys.runs.config import Config, make_config
+from symphys.runs.folder import RunFolder
+from symphys.solvers import SOLVERS, solver
+
+copyreg.pickle(Formula, lambda formula: (parse, (formula.text,)))  # a job goes to other processes with its formulas
+
+
+@dataclass(frozen=True)
+class Job:
+    """Everything that a run needs; may be sent to another process.
+
+    Attributes:
+        problem: what to solve.
+        config: what exactly is asked for, by plain values.
+        options: of the solver, validated.
+        folder: where the run is written.
+        command: what was typed.
+    """
+
+    problem: Problem
+    config: Config
+    options: Any
+    folder: RunFolder
+    command: str
+
+    @property
+    def name(self) -> str:
+        """For messages: ``ball_throw gradient seed 0``."""
+        return f"{self.config.problem} {self.config.solver} seed {self.config.seed}"
+
+
+def make_jobs(
+    problems: Iterable[Problem],
+    solvers: Sequence[str],
+    seeds: Iterable[int],
+    settings: dict[str, object],
+    out: Path,
+    command: str = "",
+) -> list[Job]:
+    """Every problem with every solver and seed, below the folder ``out``; ProblemError for bad solver options."""
+    seeds = tuple(seeds)
+    jobs = []
+    for problem in problems:
+        check_tables(problem)
+        for name in solvers:
+            options = solver_options(problem, name)
+            plain = dataclasses.asdict(options)
+            for seed in seeds:
+                config = make_config(problem.name, problem.text, name, seed, settings, plain)
+                jobs.append(Job(problem, config, options, RunFolder.of(out, problem.name, name, seed), command))
+    return jobs
+
+
+def solver_options(problem: Problem, name: str) -> Any:
+    """The options that the file's [solver.NAME] table sets, the others at their defaults; ProblemError if bad."""
+    table = problem.solver_tables.get(name, {})
+    return validate_options(solver(name).Options, table, problem.file, f"solver.{name}")
+
+
+def check_tables(problem: Problem) -> None:
+    """ProblemError if a [solver.NAME] table is of no solver, or sets what that solver does not take."""
+    require_solvers(problem.solver_tables, SOLVERS, problem.file)
+    for name in problem.solver_tables:
+        solver_options(problem, name)

@@ -1,0 +1,122 @@
+"""What a run found: the fields of result.json."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypedDict
+
+from symphys import files
+
+FORMAT = 1
+MEASURES = ("error", "tolerance", "ratio")
+
+
+class CheckRecord(TypedDict):
+    """One target, constraint or goal: ``error`` and ``tolerance`` in its own unit; met where ``ratio`` <= 1."""
+
+    kind: str
+    name: str
+    error: float
+    tolerance: float
+    ratio: float
+    met: bool
+
+
+class BlockRecord(TypedDict):
+    """One variable: ``shape`` (components, knots); the lists hold components * knots numbers, knot after knot."""
+
+    sets: list[str]
+    shape: list[int]
+    value: list[float]
+    guess: list[float]
+    lower: list[float | None]
+    upper: list[float | None]
+
+
+@dataclass(frozen=True)
+class Result:
+    """One solve, judged by the exact rollout at smoothing 0. What is not known is None.
+
+    Attributes:
+        problem, title: the file's stem and its title.
+        solver, seed: who solved it, from which guess.
+        solved: whether every check is met.
+        status, advice: how the solver ended and what to try.
+        objective: of the exact rollout.
+        costs: weighted value of each cost by name.
+        checks: targets, constraints and the goal.
+        z: the variables by name.
+        iterations: of the solver.
+        counts: evaluations by kind.
+        price: measured cost of one evaluation by kind, in rollouts.
+        equivalents: the whole work in rollouts.
+        seconds: wall time of "build", "compile" and "solve".
+        trust: how far the solution can be trusted.
+        versions: of everything that took part.
+        when: UTC time of the end, ISO 8601.
+        command: what was typed.
+        backend: what evaluated the functions.
+    """
+
+    problem: str
+    title: str
+    solver: str
+    seed: int
+    solved: bool
+    status: str
+    advice: str
+    objective: float | None = None
+    costs: dict[str, float] | None = None
+    checks: list[CheckRecord] | None = None
+    z: dict[str, BlockRecord] | None = None
+    iterations: int | None = None
+    counts: dict[str, int] | None = None
+    price: dict[str, float] | None = None
+    equivalents: float | None = None
+    seconds: dict[str, float] | None = None
+    trust: dict[str, Any] | None = None
+    versions: dict[str, str] = field(default_factory=dict)
+    when: str = ""
+    command: str = ""
+    backend: str = ""
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether the same command would go on with it."""
+        return self.status == "interrupted"
+
+    @property
+    def worst(self) -> float | None:
+        """Largest ratio of the checks, nan if one is nan: all are met at 1 or below. None without any."""
+        ratios = [check["ratio"] for check in self.checks or ()]
+        return max(ratios, key=lambda r: math.inf if math.isnan(r) else r, default=None)
+
+    def to_json(self) -> dict[str, Any]:
+        """The object of result.json."""
+        return {"format": FORMAT, **dataclasses.asdict(self)}
+
+    @classmethod
+    def from_json(cls, value: Any) -> Result:
+        """The result in an object of result.json; FileError if it is none, or of another format."""
+        if not isinstance(value, Mapping) or value.get("format") != FORMAT:
+            raise files.FileError(f"not a result of format {FORMAT}")
+        known = {f.name for f in dataclasses.fields(cls)}
+        if missing := known - value.keys():
+            raise files.FileError(f"a result without {', '.join(sorted(missing))}")
+        kept = {"problem", "title", "status", "advice", "checks"}
+        fields = {key: value[key] if key in kept else files.numbers(value[key]) for key in known}
+        if fields["checks"] is not None:
+            fields["checks"] = [{**c, **files.numbers({k: c[k] for k in MEASURES})} for c in fields["checks"]]
+        return cls(**fields)
+
+
+def read_result(path: Path) -> Result:
+    """The result in a file; FileError, which names the file, if there is none."""
+    try:
+        return Result.from_json(files.read_json(path))
+    except files.FileError as error:
+        raise files.FileError(f"{path}: {error}") from error

@@ -1,0 +1,168 @@
+"""The heart of a run: solve, judge by the exact rollout, examine, and write all but the result itself."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from symphys import files, trust
+from symphys.errors import SymphysError
+from symphys.runs.folder import CHECKPOINT, GUESS, SCENE, TRAJECTORY
+from symphys.runs.job import Job
+from symphys.runs.provenance import stamp
+from symphys.runs.result import BlockRecord, CheckRecord, Result
+from symphys.runs.scene import scene
+from symphys.shooting import Array
+from symphys.solvers import Counts, Monitor, Outcome, Status, TraceRow, solver
+from symphys.trajectory import Trajectory
+from symphys.transcription import Check, Transcription, Verdict
+
+SMOOTHED = "what the solver's smoothed rollout meets, the exact one does not: lower the smoothing"
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What the exact rollout of the solution says; all None where it cannot be simulated.
+
+    Attributes:
+        verdict: costs and checks.
+        trajectory: the motion.
+        trust: how far the solution can be trusted; None also for a run that is not over.
+        advice: the solver's and what the rollout adds.
+    """
+
+    verdict: Verdict | None
+    trajectory: Trajectory | None
+    trust: dict[str, Any] | None
+    advice: str
+
+
+def solve(
+    job: Job,
+    transcription: Transcription,
+    monitor: Monitor,
+    log: Callable[[str], None],
+    checkpoint: dict[str, object] | None,
+    earlier: Result | None,
+) -> Result:
+    """Solve from the seed's guess, or go on from ``checkpoint`` of the ``earlier`` result; write what was found."""
+    shooting = transcription.shooting
+    start = shooting.start(job.config.seed)
+    files.write_npz(job.folder.path / GUESS, transcription.simulate(start).arrays())
+    began = time.perf_counter()
+    outcome = solver(job.config.solver).solve(
+        shooting, start, job.options, job.config.seed, monitor=monitor, checkpoint=checkpoint, log=log
+    )
+    spent = time.perf_counter() - began + (((earlier and earlier.seconds) or {}).get("solve", 0.0))
+    judgement = judge(transcription, outcome)
+    price = transcription.prices(used(outcome.counts))
+    write(job, transcription, outcome, judgement, price)
+    seconds = {"build": transcription.build_seconds, "compile": 0.0, "solve": spent}
+    return record(job, transcription, outcome, judgement, price, seconds)
+
+
+def judge(transcription: Transcription, outcome: Outcome) -> Judgement:
+    """Roll the solution out exactly."""
+    try:
+        verdict = transcription.judge(outcome.z)
+        trajectory = transcription.simulate(outcome.z)
+        over = outcome.status is not Status.INTERRUPTED
+        examined = trust.examine(transcription, outcome.z) if over else None
+    except SymphysError as error:
+        return Judgement(None, None, None, f"{outcome.advice} {error}".strip())
+    smoothed = outcome.status is Status.MET and not verdict.solved and outcome.trace[-1].smoothing > 0
+    return Judgement(verdict, trajectory, examined, outcome.advice or (SMOOTHED if smoothed else ""))
+
+
+def write(
+    job: Job, transcription: Transcription, outcome: Outcome, judgement: Judgement, price: Mapping[str, float]
+) -> None:
+    """Write trace, motion and checkpoint."""
+    rows = [{**asdict(row), "equivalents": equivalents(row, price)} for row in outcome.trace]
+    job.folder.write_trace(rows)
+    if judgement.trajectory is not None:
+        files.write_npz(job.folder.path / TRAJECTORY, judgement.trajectory.arrays())
+        z = transcription.shooting.by_block(outcome.z)
+        files.write_json(job.folder.path / SCENE, scene(job.problem, z))
+    if outcome.status is Status.INTERRUPTED:
+        files.write_json(job.folder.path / CHECKPOINT, outcome.checkpoint)
+
+
+def record(
+    job: Job,
+    transcription: Transcription,
+    outcome: Outcome,
+    judgement: Judgement,
+    price: dict[str, float],
+    seconds: dict[str, float],
+) -> Result:
+    """Everything that result.json says."""
+    verdict = judgement.verdict
+    return Result(
+        **stamp(job),
+        solved=verdict is not None and verdict.solved and outcome.status is not Status.INTERRUPTED,
+        status=outcome.status.value,
+        advice=judgement.advice,
+        objective=verdict.objective if verdict else None,
+        costs=dict(verdict.costs) if verdict else None,
+        checks=[check_record(check) for check in verdict.checks] if verdict else None,
+        z=blocks(transcription, outcome.z),
+        iterations=outcome.trace[-1].iteration if outcome.trace else 0,
+        counts=asdict(outcome.counts),
+        price=price,
+        equivalents=equivalents(outcome.counts, price),
+        seconds=seconds,
+        trust=judgement.trust,
+    )
+
+
+def used(counts: Counts) -> list[str]:
+    """The kinds of evaluation whose price matters here."""
+    return ["gradient", *(kind for kind, count in priced(counts).items() if count and kind != "gradient")]
+
+
+def priced(counts: Counts | TraceRow) -> dict[str, int]:
+    """How often each kind of evaluation that is dearer than a rollout was done."""
+    return {"gradient": counts.gradients, "jacobian": counts.jacobians, "hessian": counts.hessians}
+
+
+def equivalents(counts: Counts | TraceRow, price: Mapping[str, float]) -> float:
+    """Work in rollouts: every evaluation times its measured price."""
+    return float(counts.rollouts + sum(count * price[kind] for kind, count in priced(counts).items() if count))
+
+
+def check_record(check: Check) -> CheckRecord:
+    """A check as JSON."""
+    return CheckRecord(
+        kind=check.kind,
+        name=check.name,
+        error=check.error,
+        tolerance=check.tolerance,
+        ratio=check.ratio,
+        met=check.met,
+    )
+
+
+def blocks(transcription: Transcription, z: Array) -> dict[str, BlockRecord]:
+    """The variables by name, flat, knot after knot."""
+    sets = {v.name: [slot.name for slot in v.slots] for v in transcription.problem.variables}
+    return {
+        block.name: BlockRecord(
+            sets=sets[block.name],
+            shape=list(block.shape),
+            value=z[block.start : block.stop].tolist(),
+            guess=block.guess.tolist(),
+            lower=bounds(block.lower),
+            upper=bounds(block.upper),
+        )
+        for block in transcription.shooting.blocks
+    }
+
+
+def bounds(values: Array) -> list[float | None]:
+    """Bounds as JSON: None where there is none."""
+    return [value if np.isfinite(value) else None for value in values.tolist()]

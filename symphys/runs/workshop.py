@@ -1,0 +1,28 @@
+"""Transcriptions, made once for all runs of a problem."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from symphys.problem import Problem
+from symphys.runs.job import Job
+from symphys.transcription import Transcription
+
+Transcribe = Callable[[Problem], Transcription]
+
+
+class Workshop:
+    """Keeps the transcription of the problem that was last asked for; one problem's functions may be large."""
+
+    def __init__(self, transcribe: Transcribe) -> None:
+        """Start empty."""
+        self.transcribe = transcribe
+        self.made: tuple[object, Transcription] | None = None
+
+    def __call__(self, job: Job) -> Transcription:
+        """The job's problem as a shooting problem."""
+        subject = (job.problem.file, job.problem.text, repr(job.config.settings))
+        if self.made is None or self.made[0] != subject:
+            self.made = None
+            self.made = (subject, self.transcribe(job.problem))
+        return self.made[1]

@@ -1,0 +1,274 @@
+"""Exit codes and messages: 0 solved, 1 not solved, 2 wrong usage or file, 130 interrupted; never a traceback."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import symphys
+from symphys.cli import main
+from symphys.runs import read_result
+
+THROW = """
+title = "A short throw"
+[simulation]
+duration = 0.2
+dt = 0.02
+[[body]]
+name = "ball"
+shape = {{ sphere = {{ radius = 0.1 }} }}
+mass = 1.0
+position = [0, 0, 1]
+[ground]
+[[variable]]
+name = "throw"
+sets = "ball.velocity[0:2]"
+guess = [1, 0]
+upper = {upper}
+[[target]]
+name = "is at half a metre"
+value = "ball.position[0:2] - [0.5, 0]"
+tolerance = 0.01
+"""
+LONG = ("--set", "simulation.dt=1e-4", "--set", "objective.stop=converged")
+"""Makes of a throw a solve of several seconds."""
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def throw(tmp_path: Path) -> Path:
+    path = tmp_path / "throw.toml"
+    path.write_text(THROW.format(upper=10), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def unreachable(tmp_path: Path) -> Path:
+    path = tmp_path / "unreachable.toml"
+    path.write_text(THROW.format(upper=1.5), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
+    """Run a command line in an empty folder: (exit code, stdout, stderr)."""
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+
+    def call(*arguments: object) -> tuple[int, str, str]:
+        code = main([str(argument) for argument in arguments])
+        printed = capsys.readouterr()
+        assert "Traceback" not in printed.out + printed.err
+        return code, printed.out, printed.err
+
+    return call
+
+
+def test_a_solved_problem_exits_0_with_table_and_report(run: Run, throw: Path) -> None:
+    code, out, err = run("solve", throw, "--solver", "gradient,least_squares")
+    assert code == 0
+    assert "least_squares" in out and "1/1" in out
+    report = Path(out.partition("report: ")[2].strip())
+    assert report.is_file() and report.parts[0] == "reports"
+    assert err.splitlines()[0] == "throw gradient seed 0: begins"
+    assert err.splitlines()[1].startswith("throw gradient seed 0: solved, objective")
+    assert Path("reports/throw/gradient-seed0/report.html").is_file()
+
+
+def test_the_same_command_again_does_nothing_and_says_so(run: Run, throw: Path) -> None:
+    run("solve", throw, "--solver", "gradient")
+    before = Path("reports/throw/gradient-seed0/result.json").read_bytes()
+    code, _, err = run("solve", throw, "--solver", "gradient")
+    assert code == 0
+    assert err.splitlines() == ["throw gradient seed 0: done before (solved)"]
+    assert Path("reports/throw/gradient-seed0/result.json").read_bytes() == before
+
+
+def test_one_unsolved_run_exits_1_and_the_others_are_done(run: Run, throw: Path, unreachable: Path) -> None:
+    code, out, _ = run("solve", unreachable, throw, "--solver", "least_squares", "--out", "o")
+    assert code == 1
+    assert "0/1" in out and "1/1" in out
+    assert read_result(Path("o/throw/least_squares-seed0/result.json")).solved
+    assert not read_result(Path("o/unreachable/least_squares-seed0/result.json")).solved
+
+
+def test_seeds_and_settings_reach_the_runs(run: Run, throw: Path) -> None:
+    options = ("--seeds", "2", "--set", "simulation.dt=0.01", "--set", "solver.least_squares.iterations=30")
+    code, out, _ = run("solve", throw, "--solver", "least_squares", *options)
+    assert code == 0 and "2/2" in out
+    config = json.loads(Path("reports/throw/least_squares-seed1/config.json").read_text(encoding="utf-8"))
+    assert config["seed"] == 1
+    assert config["settings"] == {"simulation.dt": 0.01, "solver.least_squares.iterations": 30}
+    assert config["options"]["iterations"] == 30
+
+
+def test_workers_solve_too(run: Run, throw: Path) -> None:
+    code, out, err = run("solve", throw, "--solver", "gradient,least_squares", "--jobs", "2")
+    assert code == 0 and out.count("1/1") == 2
+    assert sorted(line.rpartition(": ")[2] for line in err.splitlines() if line.endswith("begins")) == ["begins"] * 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["sovle"], "solve"),
+        (["solve"], "FILE"),
+        (["solve", "ball_throw", "--sovler", "cma"], "--solver"),
+        (["solve", "ball_throw", "--solver", "cmaes"], "cma"),
+        (["solve", "ball_throw", "--solver", ""], "gradient"),
+        (["solve", "ball_thorw"], "ball_throw"),
+        (["solve", "nowhere/ball_throw.toml"], "nowhere"),
+        (["solve", "."], "folder"),
+        (["solve", "ball_throw", "--seeds", "0"], "seeds"),
+        (["solve", "ball_throw", "--jobs", "none"], "jobs"),
+        (["solve", "ball_throw", "--set", "simulation.dt"], "KEY=VALUE"),
+        (["solve", "ball_throw", "--set", "simulation.td=1"], "dt"),
+        (["solve", "ball_throw", "--set", "simulation.dt=fast"], "dt"),
+        (["solve", "ball_throw", "--set", "solver.cma.evaluatoins=3", "--solver", "gradient"], "evaluations"),
+        (["solve", "ball_throw", "--set", "solver.cmaes.evaluations=3"], "cma"),
+        (["solve", "x" * 5000], "no file"),
+        (["report", "nowhere"], "nowhere"),
+        (["show", "ball_thorw"], "ball_throw"),
+        (["check", "ball_throw", "--set", "simulation.duration=[[[["], "duration"),
+        (["schema", "--out", "/dev/null/below/schema.json"], "/dev/null"),
+    ],
+)
+def test_wrong_usage_exits_2_with_a_hint(run: Run, arguments: list[str], words: str) -> None:
+    code, out, err = run(*arguments)
+    assert code == 2
+    assert words in err
+    assert out == ""
+    assert not Path("reports").exists()
+
+
+@pytest.mark.parametrize("content", [b"", b"\x00\xff\x80 binary", b"[" * 1_000_000, b"a = nan\n", b"[simulation]\n"])
+def test_a_bad_file_exits_2_and_nothing_is_run(run: Run, throw: Path, tmp_path: Path, content: bytes) -> None:
+    bad = tmp_path / "bad.toml"
+    bad.write_bytes(content)
+    code, out, err = run("solve", throw, bad)
+    assert code == 2 and out == ""
+    assert "bad.toml" in err
+    assert not Path("reports").exists()
+
+
+def test_two_files_of_one_name_are_refused(run: Run, throw: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other" / "throw.toml"
+    other.parent.mkdir()
+    other.write_text(throw.read_text(encoding="utf-8"), encoding="utf-8")
+    code, _, err = run("solve", throw, other)
+    assert code == 2 and "one name" in err
+    assert run("solve", throw, throw, "--solver", "gradient")[0] == 0
+
+
+def test_an_out_that_cannot_be_written_exits_2(run: Run, throw: Path) -> None:
+    Path("file").write_text("in the way", encoding="utf-8")
+    code, _, err = run("solve", throw, "--solver", "gradient", "--out", "file/below")
+    assert code == 2 and "file" in err
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="permissions do not bind this user")
+def test_a_read_only_out_exits_2(run: Run, throw: Path) -> None:
+    Path("locked").mkdir(mode=0o500)
+    code, _, err = run("solve", throw, "--solver", "gradient", "--out", "locked")
+    assert code == 2 and "permission denied" in err
+
+
+def test_a_failing_run_stops_no_other(run: Run, throw: Path, tmp_path: Path) -> None:
+    """A root of a negative number is no fault of the file, but of its motion."""
+    wild = tmp_path / "wild.toml"
+    text = throw.read_text(encoding="utf-8").replace('"ball.position[0:2]', '"sqrt(ball.position[0:2] - 3)')
+    wild.write_text(text, encoding="utf-8")
+    code, out, _ = run("solve", wild, throw, "--solver", "gradient")
+    assert code == 1
+    assert "0/1" in out and "1/1" in out
+
+
+def test_report_is_made_again(run: Run, throw: Path) -> None:
+    run("solve", throw, "--solver", "gradient")
+    pages = [Path("reports/throw/gradient-seed0/report.html"), Path("reports/index.html")]
+    for page in pages:
+        page.unlink()
+    code, out, _ = run("report", "reports")
+    assert code == 0
+    assert out.split() == [str(page) for page in pages]
+    assert all(page.is_file() for page in pages)
+    assert run("report", pages[0].parent)[1].split() == [str(pages[0])]
+
+
+def test_show_draws_the_guess(run: Run, throw: Path) -> None:
+    code, out, _ = run("show", throw, "--out", "pictures")
+    assert code == 0
+    page = Path(out.strip())
+    assert page.is_file() and page.parts[0] == "pictures"
+    assert "ball" in page.read_text(encoding="utf-8")
+
+
+def test_check_describes_the_file_and_compares_gradients(run: Run, throw: Path) -> None:
+    code, out, _ = run("check", throw)
+    assert code == 0
+    for words in ("A short throw", "10 steps", "sets ball.velocity", "is at half a metre", "agrees"):
+        assert words in out
+
+
+def test_check_exits_1_where_the_gradient_is_wrong(run: Run, throw: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    wrong = [{"variable": "throw", "error": 0.5, "scale": 1.0}]
+    monkeypatch.setattr("symphys.trust.compare_gradient", lambda *given: wrong)
+    code, out, _ = run("check", throw)
+    assert code == 1
+    assert "disagrees" in out
+
+
+def test_list_names_problems_and_solvers(run: Run) -> None:
+    code, out, _ = run("list")
+    assert code == 0
+    for name in ("ball_throw", "gradient", "least_squares", "ipopt", "cma"):
+        assert name in out
+
+
+def test_schema_is_json_and_knows_the_solvers(run: Run) -> None:
+    code, out, _ = run("schema")
+    assert code == 0
+    assert {"gradient", "cma"} <= set(json.loads(out)["properties"]["solver"]["properties"])
+    code, named, _ = run("schema", "--out", "s.json")
+    assert code == 0 and named == "s.json\n"
+    assert json.loads(Path("s.json").read_text(encoding="utf-8")) == json.loads(out)
+
+
+def test_version_and_help(run: Run) -> None:
+    assert run("--version")[:2] == (0, f"symphys {symphys.__version__}\n")
+    code, out, _ = run("solve", "--help")
+    assert code == 0 and "--seeds" in out
+
+
+def test_help_loads_nothing_heavy() -> None:
+    """The command line answers at once: casadi, numpy and the like are loaded when they are needed."""
+    code = "import sys; from symphys.cli import main; main(['--help']); print(*sys.modules, file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = {name.partition(".")[0] for name in done.stderr.split()}
+    assert not loaded & {"casadi", "numpy", "scipy", "cma", "matplotlib", "pydantic", "rich"}
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_ctrl_c_saves_and_the_same_command_goes_on(throw: Path, tmp_path: Path, jobs: int) -> None:
+    command = [sys.executable, "-m", "symphys", "solve", str(throw), "--solver", "cma", "--seeds", "2", *LONG]
+    command += ["--jobs", str(jobs)]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        for _ in range(jobs):
+            assert process.stderr.readline().endswith("begins\n")
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in err
+    assert "the same command goes on from there" in err
+    folders = [tmp_path / "reports" / "throw" / f"cma-seed{seed}" for seed in range(jobs)]
+    assert all(read_result(folder / "result.json").interrupted for folder in folders)
+    assert all((folder / "checkpoint.json").exists() for folder in folders)

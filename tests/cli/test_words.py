@@ -1,0 +1,102 @@
+"""What is typed is read as meant, and what is found is said briefly."""
+
+from __future__ import annotations
+
+import io
+import json
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.console import Console
+from rich.progress import Progress
+
+from symphys.cli.arguments import UsageFault, read_settings, read_value
+from symphys.cli.progress import Live
+from symphys.cli.summary import advice, table
+from symphys.cli.wording import brief, duration, number, whole
+from symphys.runs import Result
+
+NAN = float("nan")
+
+
+def result(**changes: Any) -> Result:
+    given = {"solver": "cma", "seed": 0, "solved": True, "status": "met", "advice": "", "seconds": {"solve": 1.5}}
+    given |= {"objective": 0.5, "iterations": 7, "equivalents": 1234.5}
+    return Result(problem="throw", title="A throw", **(given | changes))
+
+
+class Job:
+    """As much of a job as messages need."""
+
+    name = "throw cma seed 0"
+
+    class folder:
+        path = "out/throw/cma-seed0"
+
+
+@given(st.recursive(st.booleans() | st.integers(-(2**60), 2**60) | st.floats(allow_nan=False), st.lists, max_leaves=5))
+def test_a_toml_value_is_read_as_such(value: object) -> None:
+    assert read_value(json.dumps(value).replace("Infinity", "inf")) == value
+
+
+@given(st.text())
+def test_anything_else_is_text(text: str) -> None:
+    assert read_value(f"no {text}") == f"no {text}"
+
+
+@pytest.mark.parametrize("text", ["1\nb = 2", "[" * 100_000, "2020-01-01", "", "1 2"])
+def test_odd_values_are_text(text: str) -> None:
+    assert read_value(text) == text
+
+
+def test_settings_keep_their_keys() -> None:
+    assert read_settings(["a.b=1.5", " c = x=y"]) == {"a.b": 1.5, "c": "x=y"}
+
+
+@pytest.mark.parametrize("assignment", ["a", "=1", ""])
+def test_a_setting_needs_key_and_value(assignment: str) -> None:
+    with pytest.raises(UsageFault, match="KEY=VALUE"):
+        read_settings([assignment])
+
+
+def test_numbers_are_short_and_unknown_ones_are_dashes() -> None:
+    assert [number(x) for x in (None, NAN, 0.000123456, float("inf"))] == ["-", "-", "0.000123", "inf"]
+    assert [whole(x) for x in (None, NAN, 1234.6)] == ["-", "-", "1,235"]
+    assert [duration(x) for x in (None, 0.01234, 104.2, 4000.0)] == ["-", "0.0123", "104", "4,000"]
+
+
+def test_a_run_in_a_line() -> None:
+    job: Any = Job()
+    assert brief(job, result(), skipped=False) == "solved, objective 0.5, 7 iterations, 1.5 s"
+    assert brief(job, result(), skipped=True) == "done before (solved)"
+    failed = result(solved=False, status="failed", advice="broken\nin two")
+    assert brief(job, failed, skipped=False) == "failed: broken"
+    assert brief(job, failed, skipped=True) == "failed before: broken (to try again, remove out/throw/cma-seed0)"
+
+
+def test_seeds_share_a_row_of_medians() -> None:
+    group = [result(iterations=1), result(iterations=9), result(iterations=4, solved=False, status="budget")]
+    shown = io.StringIO()
+    Console(file=shown, width=120).print(table({("throw", "cma"): group, ("throw", "ipopt"): []}))
+    rows = [line.split() for line in shown.getvalue().splitlines() if line.strip().startswith("throw")]
+    assert rows[0] == ["throw", "cma", "2/3", "0.5", "-", "4", "1,234", "1.5", "met", "2,", "budget", "1"]
+    assert rows[1] == ["throw", "ipopt", "0/0", "-", "-", "-", "-", "-"]
+    assert "medians over the seeds" in shown.getvalue()
+
+
+def test_advice_is_given_once_and_for_unsolved_runs_only() -> None:
+    group = [result(solved=False, advice="try more"), result(solved=False, advice="try more"), result(advice="fine")]
+    assert advice({("throw", "cma"): group}) == ["throw cma: try more"]
+
+
+def test_live_progress_opens_and_closes_its_lines() -> None:
+    console = Console(file=io.StringIO(), force_terminal=True, width=100)
+    job: Any = Job()
+    with Progress(console=console) as progress:
+        live = Live(progress, 1)
+        live.started(job, resumed=False)
+        assert len(progress.tasks) == 2
+        live.ended(job, result(), skipped=False)
+        assert [task.description for task in progress.tasks] == ["1 of 1 runs done"]

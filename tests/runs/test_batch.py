@@ -1,0 +1,140 @@
+"""Many runs: order, failures, interruption; here and in worker processes."""
+
+from __future__ import annotations
+
+import importlib
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from symphys.problem import load_problem
+from symphys.runs import Job, make_jobs, run_batch
+from symphys.solvers import TraceRow
+from symphys.transcription import transcribe
+
+MakeJob = Callable[..., Job]
+
+CRASHING = """
+import os
+from symphys.transcription import transcribe as honest
+
+def transcribe(problem):
+    if problem.name == "fatal":
+        os._exit(7)
+    return honest(problem)
+"""
+
+
+def test_results_come_in_the_order_of_the_jobs(make_job: MakeJob, recorder: Any) -> None:
+    jobs = [make_job(seed) for seed in range(3)]
+    batch = run_batch(jobs, 1, recorder, transcribe)
+    assert [result.seed for result in batch.results if result] == [0, 1, 2]
+    assert batch.solved and not batch.interrupted
+    again = run_batch(jobs, 1, recorder, transcribe)
+    assert again.results == batch.results
+    assert [event for event, _ in recorder.events[-3:]] == ["skipped"] * 3
+
+
+def test_a_failing_run_stops_no_other(make_job: MakeJob, recorder: Any) -> None:
+    batch = run_batch([make_job(0, does="break"), make_job(1)], 1, recorder, transcribe)
+    assert [result.status for result in batch.results if result] == ["failed", "met"]
+    assert not batch.solved
+
+
+def test_ctrl_c_stops_in_good_order_and_the_next_command_goes_on(make_job: MakeJob, recorder: Any) -> None:
+    jobs = [make_job(seed, iterations=5) for seed in range(3)]
+    told = recorder.advanced
+
+    def press(job: Job, row: TraceRow) -> None:
+        told(job, row)
+        if job.config.seed == 1 and row.iteration == 1:
+            signal.raise_signal(signal.SIGINT)
+
+    recorder.advanced = press
+    batch = run_batch(jobs, 1, recorder, transcribe)
+    assert batch.interrupted and not batch.solved
+    assert [result and result.status for result in batch.results] == ["met", "interrupted", None]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+    recorder.advanced, recorder.events = told, []
+    rest = run_batch(jobs, 1, recorder, transcribe)
+    assert rest.solved
+    starts = [event for event, _ in recorder.events if event in {"skipped", "resumed", "started"}]
+    assert starts == ["skipped", "resumed", "started"]
+
+
+def test_a_second_ctrl_c_stops_at_once(make_job: MakeJob, recorder: Any) -> None:
+    def press_twice(job: Job, resumed: bool) -> None:
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+
+    recorder.started = press_twice
+    with pytest.raises(KeyboardInterrupt):
+        run_batch([make_job()], 1, recorder, transcribe)
+
+
+def test_a_transcription_is_made_once_per_problem(make_job: MakeJob, recorder: Any) -> None:
+    made = []
+
+    def counting(problem: Any) -> Any:
+        made.append(problem.name)
+        return transcribe(problem)
+
+    run_batch([make_job(seed) for seed in range(3)], 1, recorder, counting)
+    assert made == ["short_throw"]
+
+
+def test_workers_do_what_one_process_does(problem_file: Path, tmp_path: Path, recorder: Any) -> None:
+    problem = load_problem(problem_file)
+    here = make_jobs([problem], ["gradient", "least_squares"], [0], {}, tmp_path / "here")
+    there = make_jobs([problem], ["gradient", "least_squares"], [0], {}, tmp_path / "there")
+    alone = run_batch(here, 1, recorder, transcribe)
+    recorder.events.clear()
+    together = run_batch(there, 2, recorder, transcribe)
+    for a, b in zip(alone.results, together.results, strict=True):
+        assert a is not None and b is not None
+        assert (a.solver, a.status, a.z, a.counts) == (b.solver, b.status, b.z, b.counts)
+    names = {job.name for job in there}
+    assert {name for event, name in recorder.events if event == "started"} == names
+
+
+def test_a_process_that_dies_fails_its_own_run_only(
+    problem_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, recorder: Any
+) -> None:
+    (tmp_path / "crashing_transcription.py").write_text(CRASHING, encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    crashing = importlib.import_module("crashing_transcription")
+    fatal = problem_file.with_name("fatal.toml")
+    fatal.write_text(problem_file.read_text(encoding="utf-8"), encoding="utf-8")
+    problems = [load_problem(path) for path in (problem_file, fatal)]
+    jobs = make_jobs(problems, ["least_squares"], [0, 1], {}, tmp_path / "out")
+    batch = run_batch(jobs, 2, recorder, crashing.transcribe)
+    ends = [(result.problem, result.status) for result in batch.results if result]
+    assert ends == [("short_throw", "met")] * 2 + [("fatal", "failed")] * 2
+    assert all("died" in result.advice for result in batch.results[2:] if result)
+
+
+@pytest.mark.parametrize("name", ["gradient", "least_squares", "ipopt", "cma"])
+def test_every_solver_goes_on_from_its_file_as_if_nothing_had_been(
+    problem_file: Path, tmp_path: Path, recorder: Any, name: str
+) -> None:
+    problem = load_problem(problem_file)
+    (whole,) = run_batch(make_jobs([problem], [name], [0], {}, tmp_path / "whole"), 1, recorder, transcribe).results
+    jobs = make_jobs([problem], [name], [0], {}, tmp_path / "broken")
+    told = recorder.advanced
+
+    def press(job: Job, row: TraceRow) -> None:
+        if row.iteration == 1:
+            signal.raise_signal(signal.SIGINT)
+
+    recorder.advanced = press
+    assert run_batch(jobs, 1, recorder, transcribe).interrupted
+    recorder.advanced = told
+    (continued,) = run_batch(jobs, 1, recorder, transcribe).results
+    assert whole is not None and continued is not None
+    assert continued.solved
+    if name != "ipopt":  # IPOPT starts anew from its best point
+        assert (continued.z, continued.counts) == (whole.z, whole.counts)

@@ -1,0 +1,192 @@
+"""One run: what is written, what is skipped, what goes on, and what a failure leaves."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from symphys import files
+from symphys.runs import Job, Result, execute
+from symphys.runs.workshop import Workshop
+from symphys.solvers import TraceRow
+from symphys.transcription import transcribe
+
+MakeJob = Callable[..., Job]
+
+
+def silent(row: TraceRow) -> None:
+    """Watch nothing."""
+
+
+def run(job: Job, monitor: Callable[[TraceRow], None] = silent) -> Result:
+    return execute(job, monitor, Workshop(transcribe))
+
+
+def interrupt_at(iteration: int) -> Callable[[TraceRow], None]:
+    def monitor(row: TraceRow) -> None:
+        if row.iteration == iteration:
+            raise KeyboardInterrupt
+
+    return monitor
+
+
+def test_a_run_leaves_every_file(make_job: MakeJob) -> None:
+    job = make_job()
+    result = run(job)
+    names = {path.name for path in job.folder.path.iterdir()}
+    assert names == {
+        "problem.toml",
+        "config.json",
+        "result.json",
+        "trajectory.npz",
+        "scene.json",
+        "guess.npz",
+        "trace.csv",
+        "log.txt",
+    }
+    assert job.folder.earlier(job.config) == result
+    assert (job.folder.path / "problem.toml").read_text(encoding="utf-8") == job.problem.text
+
+
+def test_the_result_is_that_of_the_exact_rollout(make_job: MakeJob) -> None:
+    result = run(make_job())
+    assert result.solved and result.status == "met"
+    assert result.objective == pytest.approx(6.25e-4, abs=1e-9)
+    assert result.costs == pytest.approx({"speed": 6.25e-4})
+    assert result.checks is not None and result.checks[0]["error"] == pytest.approx(0, abs=1e-9)
+    assert result.z is not None
+    assert result.z["throw"]["value"] == [2.5, 0, 0]
+    assert result.z["throw"]["lower"] == [-10, -10, 0] and result.z["throw"]["upper"] == [None] * 3
+    assert result.counts == {"rollouts": 3, "gradients": 3, "jacobians": 0, "hessians": 0}
+    assert result.price is not None and result.price["gradient"] > 0
+    assert result.equivalents == pytest.approx(3 + 3 * result.price["gradient"])
+
+
+def test_motions_are_recorded(make_job: MakeJob) -> None:
+    job = make_job()
+    run(job)
+    with np.load(job.folder.path / "trajectory.npz", allow_pickle=False) as motion:
+        assert motion["position"].shape == (11, 1, 3)
+        assert motion["position"][-1, 0, 0] == pytest.approx(0.5)
+    with np.load(job.folder.path / "guess.npz", allow_pickle=False) as motion:
+        assert motion["position"][-1, 0, 0] == pytest.approx(0.2)
+    scene = files.read_json(job.folder.path / "scene.json")
+    assert scene["bodies"] == [
+        {"name": "ball", "shapes": [{"kind": "sphere", "radius": 0.1, "centre": [0.0, 0.0, 0.0]}]}
+    ]
+    assert scene["planes"] == [{"name": "ground", "normal": [0.0, 0.0, 1.0], "offset": 0.0}]
+
+
+def test_the_trace_has_a_row_per_iteration_with_its_work(make_job: MakeJob) -> None:
+    job = make_job(iterations=4)
+    result = run(job)
+    with (job.folder.path / "trace.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["iteration"]) for row in rows] == [0, 1, 2, 3]
+    assert float(rows[-1]["equivalents"]) == result.equivalents
+    assert rows[0]["gradient_norm"] == "nan"
+
+
+def test_a_run_that_misses_is_not_solved(make_job: MakeJob) -> None:
+    result = run(make_job(does="miss"))
+    assert not result.solved
+    assert result.status == "budget"
+    assert result.worst == pytest.approx(30)
+
+
+def test_a_done_run_is_not_done_again(make_job: MakeJob) -> None:
+    job = make_job()
+    first = run(job)
+    before = (job.folder.path / "result.json").stat().st_mtime_ns
+    assert run(job, interrupt_at(0)) == first
+    assert (job.folder.path / "result.json").stat().st_mtime_ns == before
+
+
+def test_another_configuration_is_another_run(make_job: MakeJob) -> None:
+    run(make_job())
+    result = run(make_job(iterations=7))
+    assert result.iterations == 6
+
+
+def test_an_interrupted_run_goes_on_where_it_stopped(make_job: MakeJob) -> None:
+    job = make_job(iterations=6)
+    stopped = run(job, interrupt_at(2))
+    assert stopped.status == "interrupted" and not stopped.solved
+    assert (job.folder.path / "checkpoint.json").exists()
+    seen: list[int] = []
+    result = run(job, lambda row: seen.append(row.iteration))
+    assert seen == [3, 4, 5]
+    assert result.solved
+    assert not (job.folder.path / "checkpoint.json").exists()
+    assert (job.folder.path / "log.txt").read_text(encoding="utf-8").splitlines() == [
+        "told to solve from 0",
+        "told to solve from 3",
+    ]
+    assert result.seconds is not None and stopped.seconds is not None
+    assert result.seconds["solve"] > stopped.seconds["solve"]
+
+
+def test_a_checkpoint_of_another_configuration_is_not_used(make_job: MakeJob) -> None:
+    run(make_job(iterations=6), interrupt_at(2))
+    seen: list[int] = []
+    run(make_job(iterations=5), lambda row: seen.append(row.iteration))
+    assert seen == [0, 1, 2, 3, 4]
+
+
+def test_an_expected_failure_is_a_result_with_the_message(make_job: MakeJob) -> None:
+    job = make_job(does="refuse")
+    result = run(job)
+    assert (result.status, result.solved, result.advice) == ("failed", False, "cannot do that")
+    assert "Traceback" not in (job.folder.path / "log.txt").read_text(encoding="utf-8")
+    assert job.folder.earlier(job.config) == result
+
+
+def test_an_unexpected_failure_puts_its_traceback_into_the_log_only(make_job: MakeJob) -> None:
+    job = make_job(does="break")
+    result = run(job)
+    assert result.status == "failed"
+    assert "ZeroDivisionError" in result.advice and "Traceback" not in result.advice
+    assert "Traceback" in (job.folder.path / "log.txt").read_text(encoding="utf-8")
+
+
+def test_a_failure_leaves_nothing_of_an_earlier_success(make_job: MakeJob) -> None:
+    job = make_job()
+    run(job)
+    run(make_job(does="refuse"))
+    assert {path.name for path in job.folder.path.iterdir()} == {
+        "problem.toml",
+        "config.json",
+        "result.json",
+        "guess.npz",
+        "log.txt",
+    }
+
+
+def test_a_folder_in_use_is_left_alone(make_job: MakeJob) -> None:
+    job = make_job()
+    with job.folder.locked():
+        result = run(job)
+        assert list(job.folder.path.iterdir()) == []
+    assert result.status == "failed"
+    assert "another symphys command" in result.advice
+    assert run(job).solved
+
+
+@pytest.mark.parametrize("name", ["result.json", "config.json", "checkpoint.json"])
+def test_damaged_files_mean_a_fresh_start(make_job: MakeJob, name: str) -> None:
+    job = make_job(iterations=4)
+    run(job, interrupt_at(1))
+    (job.folder.path / name).write_bytes(b"\x00junk")
+    seen: list[int] = []
+    assert run(job, lambda row: seen.append(row.iteration)).solved
+    assert seen == [0, 1, 2, 3]
+
+
+def test_a_folder_that_cannot_be_written_stops_the_command(make_job: MakeJob, tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("in the way")
+    with pytest.raises(files.FileError, match="cannot make the folder"):
+        run(make_job())

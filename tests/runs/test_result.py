@@ -1,0 +1,57 @@
+"""Results survive their file; errors against tolerances are told apart."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from symphys import files
+from symphys.runs import Result, read_result
+from symphys.runs.config import make_config
+from symphys.runs.result import CheckRecord
+
+NAN = float("nan")
+
+
+def result(*errors: float) -> Result:
+    checks = [CheckRecord(kind="target", name="inf", error=e, tolerance=0.5, ratio=2 * e, met=e <= 0.5) for e in errors]
+    return Result("p", "nan", "gradient", 0, False, "budget", "", objective=NAN, checks=checks)
+
+
+def test_a_result_survives_its_file(tmp_path: Path) -> None:
+    written = result(0.25, math.inf)
+    files.write_json(tmp_path / "result.json", written.to_json())
+    read = read_result(tmp_path / "result.json")
+    assert repr(read) == repr(written)
+    assert "NaN" not in (tmp_path / "result.json").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(("errors", "worst"), [((0.25, 1.0), 2.0), ((0.25, NAN), NAN), ((NAN, 0.25), NAN), ((), None)])
+def test_worst_is_the_largest_ratio_and_nan_is_worse(errors: tuple[float, ...], worst: float | None) -> None:
+    assert repr(result(*errors).worst) == repr(worst)
+
+
+@pytest.mark.parametrize("content", [[], {}, {"format": 2}, {"format": 1, "problem": "p"}])
+def test_other_objects_are_refused_by_name_of_file(tmp_path: Path, content: object) -> None:
+    files.write_json(tmp_path / "result.json", content)
+    with pytest.raises(files.FileError, match=r"result\.json"):
+        read_result(tmp_path / "result.json")
+
+
+def test_the_key_depends_on_all_that_decides_the_result() -> None:
+    base = ("p", "text", "gradient", 0, {"simulation.dt": 0.01}, {"iterations": 5})
+    changes = [
+        (1, "texts"),
+        (2, "cma"),
+        (3, 1),
+        (4, {"simulation.dt": 0.02}),
+        (4, {}),
+        (5, {"iterations": 6}),
+    ]
+    keys = {make_config(*base).key}
+    for place, value in changes:
+        keys.add(make_config(*base[:place], value, *base[place + 1 :]).key)  # type: ignore[arg-type]
+    assert len(keys) == 1 + len(changes)
+    assert make_config("other stem", *base[1:]).key in keys
