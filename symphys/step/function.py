@@ -62,7 +62,7 @@ def step_function(
     """
     x, u, p, knob = _arguments(world, inputs, parameters)
     result = take_step(world, scheme or Scheme(), inputs, x, u, knob)
-    return ca.Function("step", [x, u, p, knob], [result.x], ["x", "u", "p", "smoothing"], ["x_next"])
+    return ca.Function("step", [x, u, p, knob], [ca.cse(result.x)], ["x", "u", "p", "smoothing"], ["x_next"])
 
 
 def report_function(
