@@ -1,0 +1,143 @@
+// Plays a recorded motion on a canvas: parallel projection, drag to turn. Comes after painter.js.
+
+class Player {
+  constructor(root) {
+    this.data = JSON.parse(root.querySelector("script").textContent);
+    this.canvas = root.querySelector("canvas");
+    this.painter = new Painter(this.canvas, this.data.axes);
+    this.button = root.querySelector(".play");
+    this.slider = root.querySelector("input");
+    this.output = root.querySelector("output");
+    this.speed = root.querySelector("select");
+    this.views = [...root.querySelectorAll("[data-view]")];
+    this.box = bounds(this.data);
+    this.patches = this.visible(this.data.planes);
+    this.paths = this.data.bodies.map((_, b) => this.path(b));
+    this.guesses = this.data.guess.map((flat) => triples(flat));
+    this.seen = mustSee(this.data, this.patches);
+    this.first = this.data.time[0];
+    this.last = this.data.time[this.data.time.length - 1];
+    this.time = this.first;
+    this.playing = false;
+    this.listen();
+    this.look(this.data.flat ? "top" : "space");
+  }
+
+  visible(planes) {
+    const box = enclose(this.box, planes);
+    const patches = planes.map((plane) => patch(plane, planes.filter((other) => other !== plane), box));
+    return patches.filter((found) => found && found.quad.length > 2);
+  }
+
+  listen() {
+    this.button.addEventListener("click", () => this.toggle());
+    this.slider.addEventListener("input", () => {
+      this.pause();
+      this.time = this.first + (this.slider.value / 1000) * (this.last - this.first);
+      this.draw();
+    });
+    this.views.forEach((b) => b.addEventListener("click", () => this.look(b.dataset.view)));
+    this.canvas.addEventListener("keydown", (e) => {
+      if (e.key === " ") { e.preventDefault(); this.toggle(); }
+    });
+    this.canvas.addEventListener("pointerdown", (e) => {
+      this.grip = [e.clientX, e.clientY];
+      this.canvas.setPointerCapture(e.pointerId);
+    });
+    this.canvas.addEventListener("pointerup", () => { this.grip = null; });
+    this.canvas.addEventListener("pointermove", (e) => this.drag(e));
+    new ResizeObserver(() => this.draw()).observe(this.canvas);
+  }
+
+  look(name) {
+    const side = this.data.along === "y" ? 0 : -Math.PI / 2;
+    const angles = { space: [side - 0.5, this.data.flat ? 0.9 : 0.38], side: [side, 0], top: [side, Math.PI / 2] };
+    [this.azimuth, this.elevation] = angles[name];
+    this.mark(name);
+    this.draw();
+  }
+
+  mark(name) { this.views.forEach((b) => b.setAttribute("aria-pressed", String(b.dataset.view === name))); }
+
+  drag(event) {
+    if (!this.grip) return;
+    this.azimuth -= (event.clientX - this.grip[0]) * 0.008;
+    this.elevation += (event.clientY - this.grip[1]) * 0.008;
+    this.elevation = Math.min(Math.PI / 2, Math.max(-0.1, this.elevation));
+    this.grip = [event.clientX, event.clientY];
+    this.mark("");
+    this.draw();
+  }
+
+  toggle() { if (this.playing) this.pause(); else this.play(); }
+
+  pause() {
+    this.playing = false;
+    this.button.textContent = "▶";
+  }
+
+  play() {
+    if (this.time >= this.last) this.time = this.first;
+    this.playing = true;
+    this.button.textContent = "❚❚";
+    this.clock = performance.now();
+    requestAnimationFrame((now) => this.advance(now));
+  }
+
+  advance(now) {
+    if (!this.playing) return;
+    this.time += Math.max(now - this.clock, 0) / 1000 * Number(this.speed.value);
+    this.clock = now;
+    if (this.time >= this.last) { this.time = this.last; this.pause(); }
+    this.draw();
+    if (this.playing) requestAnimationFrame((next) => this.advance(next));
+  }
+
+  frame() { // index of the frame before the time, and the share of the way to the next
+    const t = this.data.time;
+    let a = 0, b = t.length - 1;
+    while (b - a > 1) { const m = (a + b) >> 1; if (t[m] <= this.time) a = m; else b = m; }
+    return [a, b > a && t[b] > t[a] ? Math.min(1, (this.time - t[a]) / (t[b] - t[a])) : 0];
+  }
+
+  pose(body, index, share) {
+    const count = this.data.bodies.length, frames = this.data.time.length;
+    const read = (list, size, i) => list.slice((i * count + body) * size, (i * count + body + 1) * size);
+    const next = Math.min(index + 1, frames - 1);
+    const p = read(this.data.position, 3, index), p1 = read(this.data.position, 3, next);
+    const q = read(this.data.orientation, 4, index), q1 = read(this.data.orientation, 4, next);
+    const s = q.reduce((a, x, k) => a + x * q1[k], 0) < 0 ? -1 : 1;
+    const mid = q.map((x, k) => x + share * (s * q1[k] - x)), size = Math.hypot(...mid) || 1;
+    return { p: sum(p, sum(p1, p, -1), share), q: mid.map((x) => x / size) };
+  }
+
+  draw() {
+    const painter = this.painter, [index, share] = this.frame();
+    painter.fit(this.seen, this.azimuth, this.elevation);
+    this.patches.forEach((p) => painter.drawPlane(p));
+    this.guesses.forEach((path) => painter.drawGuess(path));
+    this.paths.forEach((path, b) => painter.drawPath(path, index, this.data.bodies[b].colour));
+    const balls = this.balls(index, share);
+    balls.forEach((ball) => painter.drawShadows(ball, this.patches));
+    balls.sort((a, b) => painter.depth(a.centre) - painter.depth(b.centre)).forEach((ball) => painter.drawBall(ball));
+    painter.drawTriad();
+    this.output.textContent = `${this.time.toFixed(2)} / ${this.last.toFixed(2)} s`;
+    this.slider.value = String(Math.round(1000 * (this.time - this.first) / (this.last - this.first || 1)));
+  }
+
+  path(body) {
+    const count = this.data.bodies.length;
+    return triples(this.data.position).filter((_, i) => i % count === body);
+  }
+
+  balls(index, share) {
+    return this.data.bodies.flatMap((body, b) => {
+      const pose = this.pose(b, index, share);
+      return body.balls.map((s) => (
+        { centre: sum(pose.p, turn(pose.q, s.slice(1)), 1), radius: s[0], q: pose.q, colour: body.colour }
+      ));
+    });
+  }
+}
+
+document.querySelectorAll(".animation").forEach((root) => new Player(root));

@@ -1,0 +1,101 @@
+"""The motion as it is played in the page: decimated, rounded, and the element that plays it."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+
+from symphys.report import style
+from symphys.report.markup import Html, dot, join, tag
+from symphys.report.records import Array, Scene, Trajectory
+from symphys.report.views import SIDE_YZ, TOP, balls_of, choose_views
+
+NUMBERS = 60_000
+"""How many numbers a page carries at most for one motion, about 400 kB."""
+MOST_FRAMES = 600
+GUESS_POINTS = 120
+MOST_NAMED = 7
+SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
+LEAST_PLAY = 3.0
+"""[s] a motion plays at least, slowed down if need be."""
+
+
+def animation(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = None, numbers: int = NUMBERS) -> Html:
+    """A canvas with play, time and view controls, and its data; works without any network."""
+    data = json.dumps(motion_data(trajectory, scene, guess, numbers), separators=(",", ":"), allow_nan=False)
+    inert = data.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
+    names = trajectory.body_names
+    legend = [join([dot(style.BODIES[i % len(style.BODIES)]), style.short(name, 24)]) for i, name in enumerate(names)]
+    return tag(
+        "div",
+        tag("canvas", tabindex="0", role="img", aria_label="The motion, played; drag to turn"),
+        tag("div", *(tag("span", part) for part in legend), class_="legend") if 1 < len(names) <= MOST_NAMED else "",
+        controls(float(trajectory.time[-1] - trajectory.time[0])),
+        tag("noscript", "The motion plays only with JavaScript; the figure below shows it without."),
+        tag("script", Html(inert), type="application/json"),
+        class_="animation",
+    )
+
+
+def controls(duration: float) -> Html:
+    """Play button, slider, time, speed and views."""
+    fitting = [speed for speed in SPEEDS if speed <= 1 and duration / speed >= LEAST_PLAY]
+    chosen = max(fitting, default=SPEEDS[0])
+    speeds = [tag("option", f"{s:g}×", value=f"{s:g}", selected="" if s == chosen else None) for s in SPEEDS]  # noqa: RUF001
+    views = [tag("button", title, type="button", data_view=key) for key, title in VIEW_TITLES]
+    return tag(
+        "div",
+        tag("button", "▶", type="button", class_="play", aria_label="Play or pause"),
+        tag("input", type="range", min="0", max="1000", value="0", step="1", aria_label="Time"),
+        tag("output", ""),
+        tag("select", *speeds, aria_label="Speed"),
+        tag("span", *views, class_="views"),
+        class_="controls",
+    )
+
+
+VIEW_TITLES = (("space", "3D"), ("side", "Side"), ("top", "Top"))
+
+
+def motion_data(trajectory: Trajectory, scene: Scene, guess: Trajectory | None, numbers: int) -> dict[str, object]:
+    """What animation.js reads; lists are flat, frame after frame, body after body."""
+    bodies = len(trajectory.body_names)
+    frames = int(np.clip(numbers // (7 * bodies), 40, MOST_FRAMES))
+    chosen = even(len(trajectory.time), frames)
+    views = choose_views(trajectory, scene)
+    return {
+        "time": rounded(trajectory.time[chosen], 1e-6),
+        "bodies": [body_data(trajectory, scene, body) for body in range(bodies)],
+        "position": rounded(trajectory.position[chosen], 1e-5),
+        "orientation": rounded(trajectory.orientation[chosen], 1e-4),
+        "guess": [] if guess is None else [guess_data(guess, body) for body in range(len(guess.body_names))],
+        "planes": [{"normal": rounded(p.normal, 1e-9), "offset": float(p.offset)} for p in scene.planes],
+        "flat": views[0] == TOP,
+        "along": "y" if views[0] == SIDE_YZ else "x",
+        "axes": list(style.AXES),
+    }
+
+
+def body_data(trajectory: Trajectory, scene: Scene, body: int) -> dict[str, object]:
+    """Colour and spheres (radius, centre) of a body."""
+    balls = balls_of(trajectory, scene, body)
+    spheres = [rounded(np.array([ball.radius, *ball.centre]), 1e-6) for ball in balls]
+    return {"colour": style.BODIES[body % len(style.BODIES)], "balls": spheres}
+
+
+def guess_data(guess: Trajectory, body: int) -> list[float]:
+    """The guess's path, flat."""
+    return rounded(guess.position[even(len(guess.time), GUESS_POINTS), body], 1e-4)
+
+
+def even(count: int, most: int) -> Array:
+    """At most ``most`` indices below ``count``, evenly apart, the first and the last among them."""
+    return np.linspace(0, count - 1, min(count, most)).round().astype(int)
+
+
+def rounded(values: Array, share: float) -> list[float]:
+    """Flat, rounded to decimals that are ``share`` of the largest number."""
+    largest = float(np.abs(values).max(initial=0.0))
+    decimals = int(np.ceil(-np.log10(share * largest))) if largest > 0 else 0
+    return [entry + 0.0 for entry in np.round(values.ravel(), max(decimals, 0)).tolist()]

@@ -1,0 +1,110 @@
+"""Contact forces and gaps against time, a row for each pair."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from symphys.report import style
+from symphys.report.records import Array, Ball, Scene, Trajectory
+from symphys.report.views import centres
+
+MOST_PAIRS = 6
+NORMAL, TANGENTIAL, GAP = style.BODIES[0], style.ORANGE, style.GREY
+
+
+def shown_pairs(trajectory: Trajectory) -> list[int]:
+    """The pairs that get a row: the largest impulses first; pairs that never touch only if none does."""
+    impulse = np.nan_to_num(np.abs(trajectory.contact_force)).sum(axis=(0, 2))
+    touching = [int(pair) for pair in np.argsort(-impulse, kind="stable") if impulse[pair] > 0]
+    if touching:
+        return touching[:MOST_PAIRS]
+    nearest = np.argsort(np.nan_to_num(trajectory.contact_gap, nan=np.inf).min(axis=0), kind="stable")
+    return [int(pair) for pair in nearest[:MOST_PAIRS]]
+
+
+def draw_contacts(trajectory: Trajectory, scene: Scene) -> Figure | None:
+    """Normal and tangential force and the gap of ``shown_pairs``; None without pairs."""
+    pairs = shown_pairs(trajectory)
+    if not pairs or len(trajectory.time) < 2:
+        return None
+    figure = Figure(figsize=(style.WIDTH, 0.8 + 1.7 * len(pairs)), layout="constrained")
+    grid = figure.subplots(len(pairs), 2, sharex=True, squeeze=False, width_ratios=(1.7, 1))
+    normals = dict(pair_normals(trajectory, scene))
+    for row, pair in enumerate(pairs):
+        normal = normals.get(trajectory.contact_names[pair])
+        draw_forces(grid[row, 0], trajectory, pair, normal)
+        draw_gap(grid[row, 1], trajectory, pair)
+        grid[row, 0].set_ylabel(style.short(trajectory.contact_names[pair], 24), fontweight="bold", color=style.INK)
+    grid[0, 0].set_title("Contact force, mean over a step [N]")
+    grid[0, 1].set_title("Gap [m]")
+    for axes in grid[-1]:
+        axes.set_xlabel("time [s]")
+    lines = [Line2D([], [], color=colour) for colour in (NORMAL, TANGENTIAL)]
+    style.legend_above(figure, lines, ["normal", "tangential"])
+    return figure
+
+
+def draw_forces(axes: Axes, trajectory: Trajectory, pair: int, normal: Array | None) -> None:
+    """Normal and tangential magnitude, or the whole where the pair's normal is not known."""
+    force = trajectory.contact_force[:, pair]
+    middles = (trajectory.time[1:] + trajectory.time[:-1]) / 2
+    if normal is None:
+        parts = np.linalg.norm(force, axis=1)[:, None]
+    else:
+        along = np.sum(force * normal, axis=1, keepdims=True)
+        parts = np.hstack([np.abs(along), np.linalg.norm(force - along * normal, axis=1, keepdims=True)])
+    time, parts = style.thin(middles, parts, 1200)
+    for column, colour in zip(parts.T, (NORMAL, TANGENTIAL), strict=False):
+        axes.fill_between(time, column, step="mid", color=colour, alpha=0.12, linewidth=0)
+        axes.plot(time, column, drawstyle="steps-mid", color=colour, linewidth=1.2)
+    fit_force_scale(axes, parts)
+    style.set_linear(axes, "x")
+    axes.margins(x=0.01)
+    axes.set_ylim(bottom=0)
+
+
+def fit_force_scale(axes: Axes, force: Array) -> None:
+    """Linear, unless impacts tower over lasting contact: then logarithmic above a small force."""
+    acting = force[np.isfinite(force) & (force > 0)]
+    if acting.size and acting.max() > 20 * np.median(acting):
+        style.set_symlog(axes, "y", float(max(np.quantile(acting, 0.1), acting.max() * 1e-3)))
+        axes.set_ylim(top=float(acting.max()) * 2)
+    else:
+        style.set_linear(axes, "y")
+        axes.set_ylim(top=float(acting.max()) * 1.08 if acting.size else 1.0)
+
+
+def draw_gap(axes: Axes, trajectory: Trajectory, pair: int) -> None:
+    """The distance of the two surfaces; below zero they overlap."""
+    time, gap = style.thin(trajectory.time, trajectory.contact_gap[:, [pair]])
+    axes.axhline(0, color=style.FAINT, linewidth=0.9, zorder=1.5)
+    axes.plot(time, gap[:, 0], color=GAP, linewidth=1.2)
+    style.set_linear(axes, "x")
+    style.set_linear(axes, "y")
+    axes.margins(x=0.01, y=0.08)
+
+
+def pair_normals(trajectory: Trajectory, scene: Scene) -> Iterator[tuple[str, Array]]:
+    """The names that pairs of surfaces have, each with its unit normal (N, 3) or (3,) at the start of a step."""
+    spheres = list(sphere_labels(trajectory, scene))
+    for (label, _, _), plane in itertools.product(spheres, scene.planes):
+        yield f"{label}-{plane.name}", plane.normal
+    wanted = set(trajectory.contact_names)
+    for (first, i, a), (second, j, b) in itertools.permutations(spheres, 2):
+        if i != j and f"{first}-{second}" in wanted:
+            apart = (centres(trajectory, i, a) - centres(trajectory, j, b))[:-1]
+            yield f"{first}-{second}", apart / np.maximum(np.linalg.norm(apart, axis=1, keepdims=True), 1e-12)
+
+
+def sphere_labels(trajectory: Trajectory, scene: Scene) -> Iterator[tuple[str, int, Ball]]:
+    """Every sphere under the name that pairs call it by: the body's, with an index where it has several."""
+    for body, name in enumerate(trajectory.body_names):
+        balls = scene.balls(name)
+        for index, ball in enumerate(balls):
+            yield (f"{name}[{index}]" if len(balls) > 1 else name), body, ball

@@ -1,0 +1,216 @@
+"""How solvers came to their results: objective and errors against work and time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from symphys.report import style
+from symphys.report.finding import Study
+from symphys.report.records import Array, Run, Trace
+
+WORK, SECONDS = "equivalents", "seconds"
+AXIS_TITLES = {WORK: "work [rollout equivalents]", SECONDS: "time of the solve [s]"}
+MISS_FLOOR = 1e-3
+"""Errors below this share of the tolerance are drawn as this: nothing is gained below it."""
+GRID = 300
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A quantity that only falls, as a step function: ``y[i]`` holds from ``x[i]`` on."""
+
+    x: Array
+    y: Array
+
+
+def best_so_far(trace: Trace) -> Array:
+    """(rows,): the lowest objective up to each iteration, as the solver recorded it."""
+    recorded = trace["best"]
+    return recorded if np.isfinite(recorded).any() else np.fmin.accumulate(trace["objective"])
+
+
+def miss_so_far(trace: Trace) -> Array:
+    """(rows,): the smallest largest error / tolerance up to each iteration."""
+    return np.fmin.accumulate(trace["miss"]) if trace.rows else np.zeros(0)
+
+
+QUANTITIES: tuple[tuple[str, Callable[[Trace], Array]], ...] = (
+    ("Lowest objective so far", best_so_far),
+    ("Largest error / tolerance, smallest so far", miss_so_far),
+)
+
+
+def curve(run: Run, along: str, quantity: Callable[[Trace], Array]) -> Curve | None:
+    """One run's curve; None if nothing of it is finite."""
+    x, y = run.trace[along], quantity(run.trace)
+    known = np.isfinite(x) & np.isfinite(y)
+    return Curve(x[known], y[known]) if known.any() else None
+
+
+def median_curve(curves: Sequence[Curve]) -> Curve:
+    """The median of step functions from where all have begun; a curve that has ended keeps its last value."""
+    if len(curves) == 1:
+        return curves[0]
+    grid = np.unique(np.concatenate([c.x for c in curves]))
+    grid = grid[grid >= max(c.x[0] for c in curves)]
+    if grid.size > GRID:
+        grid = grid[np.linspace(0, grid.size - 1, GRID).round().astype(int)]
+    values = [c.y[np.searchsorted(c.x, grid, side="right") - 1] for c in curves]
+    return Curve(grid, np.median(values, axis=0))
+
+
+def draw_convergence(study: Study) -> Figure | None:
+    """All solvers on one axis: objective and errors against rollout equivalents and against time."""
+    rows = [quantity for quantity in QUANTITIES if any(curve(run, WORK, quantity[1]) for run in study.runs)]
+    columns = [x for x in (WORK, SECONDS) if any(np.isfinite(run.trace[x]).any() for run in study.runs)]
+    if not rows or not columns:
+        return None
+    figure = Figure(figsize=(style.WIDTH, 0.9 + 2.45 * len(rows)), layout="constrained")
+    grid = figure.subplots(len(rows), len(columns), sharex="col", sharey="row", squeeze=False)
+    for row, (title, quantity) in enumerate(rows):
+        for column, along in enumerate(columns):
+            draw_panel(grid[row, column], study, along, quantity)
+            grid[row, column].set_xlabel(AXIS_TITLES[along] if row == len(rows) - 1 else "")
+        grid[row, 0].set_title(title)
+        if quantity is miss_so_far:
+            mark_tolerance(list(grid[row]))
+    add_legend(figure, study)
+    return figure
+
+
+def draw_panel(axes: Axes, study: Study, along: str, quantity: Callable[[Trace], Array]) -> None:
+    """Thin lines for seeds, a strong one for their median, a mark at each end."""
+    marks = style.solver_marks(entry.solver for entry in study.entries)
+    floor = MISS_FLOOR if quantity is miss_so_far else -np.inf
+    seen_x, seen_y = [], []
+    for entry in study.entries:
+        colour, marker = marks[entry.solver]
+        pairs = [(run, curve(run, along, quantity)) for run in entry.runs]
+        curves = [raise_to(c, floor) for _, c in pairs if c is not None]
+        if not curves:
+            continue
+        if len(curves) > 1:
+            for single in curves:
+                draw_steps(axes, single, color=colour, linewidth=0.7, alpha=0.35)
+        middle = median_curve(curves)
+        draw_steps(axes, middle, color=colour, linewidth=1.9, zorder=3)
+        met = entry.solved * 2 > len(entry.runs)
+        face = colour if met else "white"
+        axes.plot(middle.x[-1], middle.y[-1], marker, color=colour, markerfacecolor=face, markersize=6, zorder=4)
+        seen_x += [c.x for c in curves]
+        seen_y += [c.y for c in curves]
+    if seen_x:
+        scale_panel(axes, np.concatenate(seen_x), np.concatenate(seen_y), quantity is miss_so_far)
+
+
+def raise_to(source: Curve, floor: float) -> Curve:
+    """The curve with all that lies below ``floor`` drawn at it."""
+    return Curve(source.x, np.maximum(source.y, floor))
+
+
+def scale_panel(axes: Axes, x: Array, y: Array, relative: bool) -> None:
+    """Logarithmic work and relative errors; an objective on the scale that fits it."""
+    fit_values(axes, y, relative)
+    positive = x[x > 0]
+    if positive.size:
+        style.set_log(axes, "x", positive)
+        axes.set_xlim(left=float(positive.min()) * 0.8)
+
+
+def fit_values(axes: Axes, values: Array, relative: bool) -> None:
+    """Logarithmic for errors relative to a tolerance, whatever fits for other values."""
+    positive = values[np.isfinite(values) & (values > 0)]
+    if relative and positive.size:
+        style.set_log(axes, "y", np.append(positive, 1.0))
+    else:
+        style.fit_scale(axes, "y", values)
+
+
+def draw_steps(axes: Axes, source: Curve, **look: object) -> None:
+    """A step function, thinned; x = 0 is drawn just left of the first positive x."""
+    x, y = style.thin(source.x, source.y[:, None], 400)
+    positive = x[x > 0]
+    first = float(positive.min()) * 0.8 if positive.size else 1.0
+    axes.plot(np.where(x > 0, x, first), y[:, 0], drawstyle="steps-post", **look)  # type: ignore[arg-type]
+
+
+def mark_tolerance(panels: Sequence[Axes]) -> None:
+    """The line at 1, and the region where everything is met."""
+    low, high = panels[0].get_ylim()
+    for axes in panels:
+        axes.axhspan(min(low, 0.5), 1, color=style.MET, linewidth=0, zorder=0.5)
+        axes.axhline(1, color=style.GREEN, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
+        axes.set_ylim(min(low, 0.5), max(high, 2))
+    panels[0].annotate(
+        "met below",
+        (0, 1),
+        xycoords=("axes fraction", "data"),
+        xytext=(5, -3),
+        textcoords="offset points",
+        ha="left",
+        va="top",
+        color="#00775a",
+        fontsize=8,
+    )
+
+
+def add_legend(figure: Figure, study: Study) -> None:
+    """Solvers by colour and mark, and what a hollow mark means."""
+    marks = style.solver_marks(entry.solver for entry in study.entries)
+    handles = [Line2D([], [], color=c, marker=m, markersize=6, linewidth=1.9) for c, m in marks.values()]
+    labels = [style.short(name, 20) for name in marks]
+    if any(entry.solved * 2 <= len(entry.runs) for entry in study.entries):
+        handles.append(Line2D([], [], color=style.GREY, marker="o", markerfacecolor="white", linestyle="none"))
+        labels.append("hollow: ended unsolved")
+    if any(len(entry.runs) > 1 for entry in study.entries):
+        handles.append(Line2D([], [], color=style.GREY, linewidth=0.7, alpha=0.6))
+        labels.append("thin: single seeds")
+    style.legend_above(figure, handles, labels)
+
+
+def draw_run(run: Run) -> Figure | None:
+    """One run against its work: objective, errors, gradient norm, step; what was not recorded is left out."""
+    x = run.trace[WORK]
+    x = x if np.isfinite(x).any() else run.trace["iteration"]
+    shown = [
+        ("Objective", run.trace["objective"], best_so_far(run.trace)),
+        ("Largest error / tolerance", run.trace["miss"], None),
+        ("Norm of the gradient", run.trace["gradient_norm"], None),
+        ("Step" if not run.solver.startswith("cma") else "Step size σ", run.trace["step"], None),  # noqa: RUF001
+    ]
+    shown = [panel for panel in shown if np.isfinite(panel[1]).any()]
+    if run.trace.rows < 2 or not shown:
+        return None
+    colour = style.solver_marks([run.solver])[run.solver][0]
+    rows, columns = (2, 2) if len(shown) == 4 else (1, len(shown))
+    figure = Figure(figsize=(style.WIDTH, 0.6 + 2.0 * rows), layout="constrained")
+    panels = list(figure.subplots(rows, columns, sharex=True, squeeze=False).flat)
+    for axes, (title, values, best) in zip(panels, shown, strict=False):
+        relative = title.startswith("Largest")
+        draw_history(axes, x, np.maximum(values, MISS_FLOOR) if relative else values, best, colour)
+        fit_values(axes, np.maximum(values, MISS_FLOOR) if relative else values, relative)
+        axes.set_title(title)
+        if relative:
+            mark_tolerance([axes])
+    label = AXIS_TITLES[WORK] if np.isfinite(run.trace[WORK]).any() else "iteration"
+    for axes in panels[-columns:]:
+        axes.set_xlabel(label)
+    return figure
+
+
+def draw_history(axes: Axes, x: Array, values: Array, best: Array | None, colour: str) -> None:
+    """A recorded column, and the lowest so far behind it where that differs."""
+    known = np.isfinite(x) & np.isfinite(values)
+    if best is not None and np.any(best[known] < values[known]):
+        axes.plot(x[known], best[known], drawstyle="steps-post", color=colour, linewidth=2.4, alpha=0.25)
+    times, shown = style.thin(x[known], values[known][:, None], 500)
+    few = len(times) <= 40
+    axes.plot(times, shown[:, 0], color=colour, linewidth=1.4, marker="o" if few else "", markersize=3)
+    style.set_linear(axes, "x")
+    axes.margins(x=0.02)

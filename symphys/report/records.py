@@ -1,0 +1,243 @@
+"""What a run folder holds, as frozen records; ``nan`` is a number that is not known."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.errors import SymphysError
+
+Array = NDArray[np.float64]
+
+
+class ReportError(SymphysError):
+    """A folder or file from which no report can be made."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """A target, constraint or goal.
+
+    Attributes:
+        kind: "target", "constraint" or "goal".
+        name: as in the problem file.
+        error: in its own unit.
+        tolerance: in its own unit.
+        ratio: error against tolerance: met where <= 1.
+        met: as the run judged it.
+    """
+
+    kind: str
+    name: str
+    error: float
+    tolerance: float
+    ratio: float
+    met: bool
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One named block of z.
+
+    Attributes:
+        name: in the problem file.
+        sets: the quantities that it sets, as the problem file writes them where that can be read.
+        value, guess, lower, upper: (components, knots).
+    """
+
+    name: str
+    sets: tuple[str, ...]
+    value: Array
+    guess: Array
+    lower: Array
+    upper: Array
+
+
+@dataclass(frozen=True)
+class GradientCheck:
+    """|adjoint - central difference| of one variable, relative to ``scale``, the norm of its gradient."""
+
+    variable: str
+    error: float
+    scale: float
+
+
+@dataclass(frozen=True)
+class Refined:
+    """The same z simulated more finely: objective and largest error / tolerance."""
+
+    what: str
+    objective: float
+    worst: float
+
+
+@dataclass(frozen=True)
+class Trust:
+    """How far a solution can be trusted.
+
+    Attributes:
+        gradient: one per variable.
+        step: of the central differences, in units of each variable's scale.
+        refined: one per refinement.
+        residual: largest change of an impulse in the last sweep [N s].
+        deepest: deepest penetration [m].
+        multiple_impacts: steps with two or more impacts on a body.
+        energy: (steps + 1,) total energy [J]; empty where it was not recorded.
+    """
+
+    gradient: tuple[GradientCheck, ...] = ()
+    step: float = np.nan
+    refined: tuple[Refined, ...] = ()
+    residual: float = np.nan
+    deepest: float = np.nan
+    multiple_impacts: float = np.nan
+    energy: Array = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def known(self) -> bool:
+        """Whether anything was examined."""
+        numbers = (self.residual, self.deepest, self.multiple_impacts)
+        return bool(self.gradient or self.refined) or not all(np.isnan(numbers))
+
+
+@dataclass(frozen=True)
+class Trace:
+    """The iterations of a solve, column by column; a column that the file lacks is all nan.
+
+    Attributes:
+        columns: name -> (rows,).
+        rows: how many.
+    """
+
+    columns: Mapping[str, Array]
+    rows: int
+
+    def __getitem__(self, name: str) -> Array:
+        """(rows,): the column called ``name``."""
+        return self.columns.get(name, np.full(self.rows, np.nan))
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What a solve took.
+
+    Attributes:
+        iterations: of the solver.
+        counts: evaluations by kind.
+        price: of one evaluation by kind, in rollouts.
+        equivalents: the whole work in rollouts.
+        seconds: wall time by phase.
+    """
+
+    iterations: float
+    counts: Mapping[str, float]
+    price: Mapping[str, float]
+    equivalents: float
+    seconds: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a result comes from: versions and platform by name, time, command, what evaluated the functions."""
+
+    versions: Mapping[str, str]
+    when: str
+    command: str
+    backend: str
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run folder.
+
+    Attributes:
+        folder: where it is.
+        place: the folder's path below the report's folder, with forward slashes.
+        readable: whether there is a result; if not, only names and ``faults`` mean anything.
+        faults: what could not be read, one sentence each.
+    """
+
+    folder: Path
+    place: str
+    readable: bool
+    problem: str
+    title: str
+    description: str
+    solver: str
+    seed: int
+    solved: bool
+    status: str
+    advice: str
+    objective: float
+    costs: Mapping[str, float]
+    checks: tuple[Check, ...]
+    variables: tuple[Variable, ...]
+    effort: Effort
+    trust: Trust
+    origin: Origin
+    trace: Trace
+    faults: tuple[str, ...]
+
+    @property
+    def worst(self) -> float:
+        """Largest error / tolerance; inf where one is nan; nan without checks."""
+        ratios = [np.inf if np.isnan(check.ratio) else check.ratio for check in self.checks]
+        return max(ratios, default=np.nan)
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """The recorded motion, as in trajectory.npz: N steps, B bodies, C contacts; world frame, SI units."""
+
+    time: Array
+    body_names: tuple[str, ...]
+    position: Array
+    orientation: Array
+    velocity: Array
+    angular_velocity: Array
+    force: Array
+    torque: Array
+    contact_names: tuple[str, ...]
+    contact_force: Array
+    contact_gap: Array
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A sphere of a body: radius [m] and (3,) centre [m], body frame."""
+
+    radius: float
+    centre: Array
+
+
+@dataclass(frozen=True)
+class SceneBody:
+    """A body's name and the spheres of its surface."""
+
+    name: str
+    balls: tuple[Ball, ...]
+
+
+@dataclass(frozen=True)
+class ScenePlane:
+    """A static half space {x: normal . x < offset}; ``normal`` (3,) of length 1, ``offset`` [m]."""
+
+    name: str
+    normal: Array
+    offset: float
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is drawn around and for the states of a trajectory."""
+
+    bodies: tuple[SceneBody, ...] = ()
+    planes: tuple[ScenePlane, ...] = ()
+
+    def balls(self, name: str) -> tuple[Ball, ...]:
+        """The spheres of the body called ``name``; none if the scene does not know it."""
+        return next((body.balls for body in self.bodies if body.name == name), ())

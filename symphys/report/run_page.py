@@ -1,0 +1,188 @@
+"""The page of one run, made from its folder alone."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from symphys import files
+from symphys.report import sections, style, trust, values, words
+from symphys.report.contacts import draw_contacts, shown_pairs
+from symphys.report.convergence import draw_run
+from symphys.report.finding import is_run
+from symphys.report.markup import Html, card, figures, join, page, tag
+from symphys.report.motion import draw_motion
+from symphys.report.output import write_figures
+from symphys.report.reading import CONFIG, PROBLEM, read_run
+from symphys.report.recordings import GUESS, SCENE, TRAJECTORY, read_scene, read_trajectory
+from symphys.report.records import ReportError, Run, Scene, Trajectory
+from symphys.report.states import MOST_BODIES, controlled_bodies, draw_controls, draw_energy, draw_states, shown_bodies
+from symphys.report.style import Picture
+from symphys.report.variables import draw_variables
+
+PAGE = "report.html"
+LOG = "log.txt"
+
+
+@dataclass(frozen=True)
+class Recording:
+    """The motion of a run, as far as it could be read; ``faults`` says what could not."""
+
+    trajectory: Trajectory | None
+    guess: Trajectory | None
+    scene: Scene
+    faults: tuple[str, ...]
+
+
+def write_run_report(run_dir: Path) -> Path:
+    """Write report.html and figures/*.svg into a run folder, from its files alone.
+
+    Args:
+        run_dir: a run folder, finished or not; what is missing is said in the page.
+
+    Returns:
+        The page's path.
+
+    Raises:
+        ReportError: there is no such folder, it is no run folder, or it cannot be written to.
+    """
+    if not run_dir.is_dir():
+        raise ReportError(f"{run_dir}: there is no such folder")
+    if not is_run([path.name for path in run_dir.iterdir()]):
+        raise ReportError(f"{run_dir}: no run folder; one holds result.json, or config.json and problem.toml")
+    run = read_run(run_dir, run_dir)
+    recording = read_recording(run_dir)
+    with style.paper():
+        pictures = draw(run, recording)
+    write_figures(run_dir, pictures.values())
+    body = build(run, recording, pictures)
+    title = f"{run.title}: {run.solver}, seed {run.seed}"
+    files.write_text(run_dir / PAGE, page(title, body, animated=recording.trajectory is not None))
+    return run_dir / PAGE
+
+
+def read_recording(folder: Path) -> Recording:
+    """Read what there is; the guess is no loss where it is missing."""
+    faults: list[str] = []
+    trajectory = read_or_note(folder / TRAJECTORY, faults)
+    guess = read_or_note(folder / GUESS, faults)
+    try:
+        scene = read_scene(folder / SCENE)
+    except ReportError as error:
+        scene = Scene()
+        faults.append(str(error))
+    return Recording(trajectory, guess, scene, tuple(faults))
+
+
+def read_or_note(path: Path, faults: list[str]) -> Trajectory | None:
+    """A recorded motion; None, with a sentence in ``faults``, if there is none."""
+    try:
+        return read_trajectory(path)
+    except ReportError as error:
+        faults.append(str(error))
+        return None
+
+
+def draw(run: Run, recording: Recording) -> dict[str, Picture]:
+    """Every figure of the page by name; those that have nothing to show are left out."""
+    made = style.picture("convergence", "Convergence of this run", draw_run(run))
+    made += style.picture("variables", "Variables against their knots", draw_variables(run))
+    motion = recording.trajectory
+    if motion is not None:
+        made += style.picture("motion", "Path and snapshots", draw_motion(motion, recording.scene, recording.guess))
+        made += style.picture("states", "Position, velocity and angular velocity over time", draw_states(motion))
+        made += style.picture("controls", "Forces and torques over time", draw_controls(motion))
+        made += style.picture("contacts", "Contact forces and gaps over time", draw_contacts(motion, recording.scene))
+        made += style.picture("energy", "Total energy over time", draw_energy(motion.time, run.trust.energy))
+    return {picture.name: picture for picture in made}
+
+
+def build(run: Run, recording: Recording, pictures: dict[str, Picture]) -> Html:
+    """The page, from the verdict to the sources."""
+    lines = trust.findings(run, sizes(recording))
+    cards = [
+        sections.checks(run),
+        motion_card(run, recording, pictures),
+        sections.found(run, pictures),
+        sections.trusted(run, lines),
+        card(
+            "Convergence",
+            figures(only(pictures, "convergence"), "Pale: the lowest so far. Work counts one rollout as 1."),
+            anchor="convergence",
+        ),
+        *motion_cards(recording.trajectory, pictures),
+        sections.time_split(run),
+        sources(run),
+    ]
+    header = sections.header(run, cards)
+    return join([header, sections.key_numbers(run), *cards, sections.FOOTER])
+
+
+def motion_card(run: Run, recording: Recording, pictures: dict[str, Picture]) -> Html:
+    """The motion; nothing where there is neither a result nor a motion."""
+    if recording.trajectory is None and not run.readable:
+        return Html("")
+    return sections.motion(recording.trajectory, recording.scene, recording.guess, pictures, recording.faults)
+
+
+def only(pictures: dict[str, Picture], name: str) -> list[Picture]:
+    """The picture of that name, if it was made."""
+    return [pictures[name]] if name in pictures else []
+
+
+def motion_cards(motion: Trajectory | None, pictures: dict[str, Picture]) -> list[Html]:
+    """States, controls, contacts and energy over time."""
+    if motion is None:
+        return []
+    bodies, pairs = len(motion.body_names), len(motion.contact_names)
+    states = shortened(len(shown_bodies(motion)), bodies, "bodies", "that move most")
+    controlled = len(controlled_bodies(motion))
+    acting = shortened(min(controlled, MOST_BODIES), controlled, "bodies", "that come first")
+    contacts = shortened(len(shown_pairs(motion)), pairs, "pairs", "with the largest impulses")
+    force = "A force is the step's impulse over its duration, so an impact is a spike whose height grows as dt shrinks."
+    return [
+        card("States over time", figures(only(pictures, "states"), states), anchor="states"),
+        card("Controls", figures(only(pictures, "controls"), acting), anchor="controls"),
+        card("Contacts", figures(only(pictures, "contacts"), f"{force} {contacts}"), anchor="contacts"),
+        card("Energy", figures(only(pictures, "energy")), anchor="energy"),
+    ]
+
+
+def shortened(shown: int, total: int, noun: str, which: str) -> str:
+    """What a figure leaves out; empty if nothing."""
+    return f"Shown are {shown} of {total} {noun}: those {which}." if shown < total else ""
+
+
+def sizes(recording: Recording) -> trust.Sizes:
+    """What residual and penetration are compared with."""
+    motion = recording.trajectory
+    radii = [ball.radius for body in recording.scene.bodies for ball in body.balls]
+    radius = min(radii, default=math.nan)
+    if motion is None or len(motion.time) < 2:
+        return trust.Sizes(radius=radius)
+    force = np.linalg.norm(np.nan_to_num(motion.contact_force), axis=2)
+    impulse = float((force * np.diff(motion.time)[:, None]).max(initial=0.0))
+    return trust.Sizes(impulse=impulse or math.nan, radius=radius, steps=len(motion.time) - 1)
+
+
+def sources(run: Run) -> Html:
+    """Provenance: versions, command, and the files that the run was made from."""
+    texts = [("Resolved configuration", CONFIG), ("Problem file", PROBLEM), ("Log of the solver", LOG)]
+    folds = [sections.source(title, read_text(run.folder / name)) for title, name in texts]
+    faults = [tag("p", f"Not read: {'; '.join(run.faults)}.", class_="note")] if run.faults else []
+    return card("Where this comes from", sections.provenance(run), *faults, *folds, anchor="provenance")
+
+
+def read_text(path: Path) -> str:
+    """A file's text, JSON set out in lines; empty if it cannot be read."""
+    try:
+        text = values.read_words(path)
+        return json.dumps(json.loads(text), indent=2, ensure_ascii=False) if path.suffix == ".json" else text
+    except (ReportError, RecursionError):
+        return ""
+    except ValueError:
+        return words.several(len(text), "character") + " that are no JSON:\n" + text

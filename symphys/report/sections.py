@@ -1,0 +1,228 @@
+"""The parts of a run's page."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from symphys.report import style, words
+from symphys.report.animation import animation
+from symphys.report.markup import Html, banner, card, facts, figures, fold, join, pill, stats, table, tag
+from symphys.report.records import Check, Run, Scene, Trajectory, Variable
+from symphys.report.style import Picture
+from symphys.report.trust import Finding, advice
+from symphys.report.variables import component_names, knotted
+from symphys.report.words import show
+
+FOOTER = tag("footer", "Made by symphys from the files of the run folder; make it again with “symphys report”.")
+MOST_ROWS = 60
+LOG_TAIL = 20_000
+HOW_JUDGED = (
+    "Judged by an exact rollout of the result, without smoothing. The bar ends at the error, the line is the tolerance."
+)
+HOW_DRAWN = (
+    "Snapshots at even times, the later the darker, fewer where a body hardly moves; the spoke turns with the body."
+)
+MARKS = {"good": "good", "fair": "look closer", "bad": "do not rely on it", "unknown": "not judged"}
+CHAPTERS = (
+    ("checks", "Checks"),
+    ("motion", "Motion"),
+    ("found", "Found"),
+    ("trust", "Trust"),
+    ("convergence", "Convergence"),
+    ("states", "States"),
+    ("contacts", "Contacts"),
+    ("provenance", "Provenance"),
+)
+
+
+def header(run: Run, cards: Sequence[Html]) -> Html:
+    """Title, description, verdict, and links to those cards that there are."""
+    there = [(anchor, title) for anchor, title in CHAPTERS if any(f'id="{anchor}"' in card[:80] for card in cards)]
+    links = [tag("a", title, href=f"#{anchor}") for anchor, title in there]
+    unread = () if run.readable else run.faults
+    return join(
+        [
+            tag("p", f"Run report · {run.problem} · {run.solver} · seed {run.seed}", class_="kicker"),
+            tag("h1", run.title),
+            *(tag("p", part, class_="lead") for part in re.split(r"\n\s*\n", run.description.strip()) if part),
+            banner(words.level(run), words.headline(run), words.verdict(run), run.advice, *unread),
+            tag("nav", *links, aria_label="Sections") if run.readable else "",
+        ]
+    )
+
+
+def key_numbers(run: Run) -> Html:
+    """The strip of numbers below the verdict."""
+    if not run.readable:
+        return Html("")
+    derivatives = [(kind, run.effort.counts.get(kind, 0.0)) for kind in ("gradients", "jacobians", "hessians")]
+    used = [(kind.capitalize(), words.count(number)) for kind, number in derivatives if number > 0]
+    return stats(
+        [
+            ("Objective", show(run.objective)),
+            ("Error / tolerance", show(run.worst)),
+            ("Rollouts", words.count(run.effort.counts.get("rollouts", math.nan))),
+            *used,
+            ("Work, in rollouts", words.count(round(run.effort.equivalents, 1))),
+            ("Time of the solve", words.seconds(run.effort.seconds.get("solve", math.nan))),
+        ]
+    )
+
+
+def checks(run: Run) -> Html:
+    """Targets, constraints and goals by name, each with a gauge whose middle is the tolerance."""
+    rows = [
+        [
+            join([check.name, Html(" "), tag("small", check.kind)]),
+            show(check.error),
+            show(check.tolerance),
+            show(check.ratio),
+            gauge(check),
+            pill("good", "met") if check.met else pill("bad", "missed"),
+        ]
+        for check in run.checks
+    ]
+    costs = facts([(name, show(value, 4)) for name, value in run.costs.items()])
+    return card(
+        "Targets and constraints",
+        table(["name", "error", "tolerance", "ratio", "", ""], rows, "tnnntt", "Checks") if rows else "",
+        tag("h3", "Costs, weighted") if costs else "",
+        costs,
+        anchor="checks",
+        note=HOW_JUDGED,
+    )
+
+
+def gauge(check: Check) -> Html:
+    """Error against tolerance: the middle of the bar is 1, its end 2 and more."""
+    share = min(check.ratio / 2, 1.0) if math.isfinite(check.ratio) else 1.0
+    bar = tag("span", style=f"width:{100 * max(share, 0):.1f}%")
+    return tag("span", bar, class_=f"gauge {'good' if check.met else 'bad'}", aria_hidden="true")
+
+
+def motion(
+    trajectory: Trajectory | None,
+    scene: Scene,
+    guess: Trajectory | None,
+    pictures: dict[str, Picture],
+    faults: Sequence[str],
+) -> Html:
+    """The motion played and drawn, or why there is none."""
+    notes = tag("p", "Not read: " + "; ".join(faults) + ".", class_="note") if faults else Html("")
+    if trajectory is None:
+        return card("The motion", tag("p", "This run recorded no motion."), notes, anchor="motion")
+    drawn = figures([pictures["motion"]], HOW_DRAWN)
+    return card("The motion", animation(trajectory, scene, guess), drawn, notes, anchor="motion")
+
+
+def found(run: Run, pictures: dict[str, Picture]) -> Html:
+    """Variables with one knot as a table, those with many as curves."""
+    rows = [row for variable in run.variables if variable.value.shape[1] == 1 for row in variable_rows(variable)]
+    more = tag("p", f"and {len(rows) - MOST_ROWS} more, in result.json", class_="note") if len(rows) > MOST_ROWS else ""
+    header = ["variable", "guess", "found", "lower bound", "upper bound", "between bounds"]
+    curves = [
+        f"{v.name}: {words.several(v.value.shape[1], 'knot')} of {words.several(v.value.shape[0], 'component')}"
+        for v in knotted(run)
+    ]
+    return card(
+        "What was found",
+        table(header, rows[:MOST_ROWS], "tnnnnt", "Variables") if rows else "",
+        more,
+        figures([pictures["variables"]] if "variables" in pictures else [], "; ".join(curves)),
+        anchor="found",
+    )
+
+
+def variable_rows(variable: Variable) -> list[list[str]]:
+    """One row for each component."""
+    rows: list[list[str]] = []
+    for index, name in enumerate(component_names(variable)):
+        value, guess = variable.value[index, 0], variable.guess[index, 0]
+        low, high = variable.lower[index, 0], variable.upper[index, 0]
+        sets = tag("small", ", ".join(variable.sets)) if index == 0 else Html("")
+        label = join([tag("b", variable.name) if index == 0 else "", f" {name} " if name else " ", sets])
+        numbers = [show(guess), tag("b", show(value, 4)), show(low), show(high)]
+        rows.append([label, *numbers, between(value, guess, low, high)])
+    return rows
+
+
+def between(value: float, guess: float, low: float, high: float) -> Html:
+    """Where value and guess lie between finite bounds; says so where a bound is active."""
+    if not (math.isfinite(low) and math.isfinite(high) and high > low and math.isfinite(value)):
+        return tag("small", "free" if math.isinf(low) and math.isinf(high) else "")
+    spots = [
+        tag("i", class_=kind, style=f"left:{100 * np.clip((at - low) / (high - low), 0, 1):.1f}%")
+        for at, kind in ((guess, "guess"), (value, "value"))
+        if math.isfinite(at)
+    ]
+    bar = tag("span", *spots, class_="range", aria_hidden="true")
+    edge = min(value - low, high - value) <= 1e-6 * (high - low)
+    return join([bar, tag("small", "at a bound")]) if edge else bar
+
+
+def trusted(run: Run, lines: Sequence[Finding]) -> Html:
+    """The panel "how far to trust this"."""
+    if not lines:
+        unknown = tag("p", "This run was not examined.") if run.readable else ""
+        return card("How far to trust this", unknown, anchor="trust")
+    rows = [[pill(line.level, MARKS[line.level]), line.what, line.number, line.meaning] for line in lines]
+    step = run.trust.step
+    note = f" Central differences with a step of {show(step, 2)}." if math.isfinite(step) else ""
+    return card(
+        "How far to trust this",
+        tag("p", advice(run, list(lines))),
+        table(["", "looked at", "number", "meaning"], rows, "tttt", "Trust"),
+        tag("p", f"As solved: objective {show(run.objective, 4)}.{note}", class_="caption"),
+        anchor="trust",
+    )
+
+
+def time_split(run: Run) -> Html:
+    """Build, compile and solve as one bar."""
+    colours = {"build": style.SKY, "compile": style.ORANGE, "solve": style.BODIES[0]}
+    parts = [(name, run.effort.seconds.get(name, math.nan), colour) for name, colour in colours.items()]
+    known = [(name, took, colour) for name, took, colour in parts if math.isfinite(took) and took >= 0]
+    total = sum(took for _, took, _ in known)
+    if total <= 0:
+        return Html("")
+    bars = [tag("span", style=f"flex:{took / total:.4f};background:{c}") for _, took, c in known if took > 0]
+    keys = [
+        tag("li", tag("span", class_="dot", style=f"background:{c}"), f"{name} {words.seconds(took)}")
+        for name, took, c in known
+    ]
+    note = f"Simulated with: {run.origin.backend}." if run.origin.backend else ""
+    prices = [f"{name} {show(price, 2)}" for name, price in run.effort.price.items() if math.isfinite(price)]
+    priced = f" Measured price in rollouts: {words.listed(prices)}." if prices else ""
+    return card(
+        "Where the time went",
+        tag("div", *bars, class_="split", aria_hidden="true"),
+        tag("ul", *keys, class_="keys"),
+        tag("p", note + priced, class_="caption") if note or priced else "",
+        anchor="time",
+    )
+
+
+def provenance(run: Run) -> Html:
+    """When, with what and by which command."""
+    versions = ", ".join(f"{name} {version}" for name, version in run.origin.versions.items() if name != "platform")
+    return facts(
+        [
+            ("Command", tag("code", run.origin.command) if run.origin.command else ""),
+            ("When", run.origin.when),
+            ("Machine", run.origin.versions.get("platform", "")),
+            ("Versions", versions),
+            ("Ended as", words.status(run.status)),
+            ("Iterations", words.count(run.effort.iterations) if math.isfinite(run.effort.iterations) else ""),
+        ]
+    )
+
+
+def source(title: str, text: str) -> Html:
+    """A file behind a line that opens it; of a long log the end."""
+    if len(text) > LOG_TAIL and title.startswith("Log"):
+        text = "…\n" + text[-LOG_TAIL:]
+    return fold(title, text)

@@ -1,0 +1,124 @@
+"""The page of a batch: every solver, every target, every broken folder by name."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from symphys.report import write_batch_report, write_run_report
+from symphys.report.finding import run_folders
+from symphys.report.records import ReportError
+
+
+def read(folder: Path) -> str:
+    return write_batch_report(folder).read_text(encoding="utf-8")
+
+
+def plain(text: str) -> str:
+    return re.sub(r"\s+", " ", re.sub(r"<(script|style).*?</\1>|<[^>]*>", " ", text, flags=re.DOTALL))
+
+
+def test_page_compares_all_solvers(batch: Path) -> None:
+    text = plain(read(batch))
+    for word in ("Throw a giant soccer ball", "Two balls, one push", "5 of 5", "0 of 1", "not finite", "budget spent"):
+        assert word in text
+    for solver in ("gradient", "least_squares", "cma", "ipopt", "nelder_mead"):
+        assert solver in text
+    assert "cma, gradient and least_squares met every target; ipopt and nelder_mead never did." in text
+    assert "Least work: least_squares, worth 50 rollouts" in text
+    assert "Both solvers met every target." in text
+    assert "13 of 15 runs solved" in text
+
+
+def test_medians_are_over_seeds(batch: Path) -> None:
+    row = re.search(r"<tr><td><span[^>]*>(?:<span[^>]*></span>)?gradient.*?</tr>", read(batch), re.DOTALL)
+    assert row is not None
+    assert re.search(r">55</td>", row[0])
+    assert re.search(r">225.5</td>", row[0])
+
+
+def test_targets_are_told_by_name_for_every_solver(batch: Path) -> None:
+    text = plain(read(batch))
+    assert re.search(r"comes to rest at 10 m 0\.\d+ ✓ met 0\.\d+ ✓ met – ✕ missed 0\.\d+ ✓ met 0\.\d+ ✕ missed", text)  # noqa: RUF001
+
+
+def test_broken_and_foreign_folders_are_listed(batch: Path) -> None:
+    text = plain(read(batch))
+    assert "2 folders without a readable result" in text
+    assert re.search(r"two_balls/cma-seed0 result.json: not valid JSON", text)
+    assert re.search(r"elsewhere result.json: a JSON object is expected", text)
+
+
+def test_page_needs_nothing_else_and_is_the_same_again(batch: Path) -> None:
+    text = read(batch)
+    assert "http://" not in text
+    assert "https://" not in text
+    assert set(re.findall(r'src="([a-z]+:)', text)) == {"data:"}
+    assert re.findall(r'src="(?!data:)', text) == []
+    assert read(batch) == text
+    stems = {path.stem for path in (batch / "figures").iterdir()}
+    assert stems == {f"{p}-{f}" for p in ("ball_throw", "two_balls") for f in ("convergence", "checks", "motion")}
+
+
+def test_links_go_to_pages_that_exist(batch: Path) -> None:
+    assert 'href="./' not in read(batch)
+    for folder in run_folders(batch):
+        (folder / "report.html").touch()
+    links = re.findall(r'href="\./([^"]+)"', read(batch))
+    assert len(links) == 15
+    assert all((batch / link).is_file() for link in links)
+
+
+def test_batch_of_one_run_folder(run_dir: Path) -> None:
+    write_run_report(run_dir)
+    text = read(run_dir)
+    assert "gradient met every target." in plain(text)
+    assert 'href="./report.html"' in text
+
+
+def test_same_problem_in_two_places_is_not_mixed(batch: Path, tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        shutil.copytree(batch / "two_balls", tmp_path / "both" / name / "two_balls")
+    text = read(tmp_path / "both")
+    assert "two_balls in a/two_balls" in plain(text)
+    assert {path.name for path in (tmp_path / "both" / "figures").glob("*-motion.svg")} == {
+        "two_balls-motion.svg",
+        "two_balls-2-motion.svg",
+    }
+
+
+def test_names_cannot_lead_out_of_the_folder(batch: Path, edit: Callable[..., None]) -> None:
+    for folder in run_folders(batch / "two_balls"):
+        if "cma" not in folder.name:
+            edit(folder / "result.json", problem="../../evil<script>", title="<script>alert(1)</script>")
+    text = read(batch)
+    assert "<script>alert" not in text
+    assert "evil<script>" not in text
+    assert (batch / "figures" / "evil-script-motion.svg").is_file()
+    assert not list(batch.parent.glob("evil*"))
+
+
+@pytest.mark.parametrize("more", ["", ', "seed": "inf", "objective": [], "checks": {}, "counts": 3'])
+def test_almost_empty_results_are_runs(tmp_path: Path, more: str) -> None:
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "result.json").write_text('{"solver": "x", "problem": "y"' + more + "}")
+    text = plain(read(tmp_path))
+    assert "x did not meet every target." in text
+    assert "There is no motion to draw: trajectory.npz: there is no such file." in text
+
+
+def test_only_broken_folders(tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "result.json").write_text("{")
+    assert "1 folder without a readable result" in plain(read(tmp_path))
+
+
+def test_folder_without_runs_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ReportError, match="no run folder"):
+        write_batch_report(tmp_path)
+    with pytest.raises(ReportError, match="no such folder"):
+        write_batch_report(tmp_path / "nowhere")

@@ -1,0 +1,101 @@
+"""The page of a motion alone, and the animation in it."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from symphys.report import write_motion
+from symphys.report.animation import NUMBERS, motion_data
+from symphys.report.markup import HERE, SCRIPTS
+from symphys.report.recordings import read_scene, read_trajectory
+from symphys.report.records import ReportError
+
+STAGE = """
+const gradient = () => ({ addColorStop() {} });
+const pen = new Proxy({}, { get: (_, key) => (key === "createRadialGradient" ? gradient : () => {}), set: () => true });
+const listeners = {};
+const element = (name) => ({
+  textContent: DATA, clientWidth: 800, clientHeight: 400, dataset: { view: name }, getContext: () => pen,
+  setAttribute() {}, addEventListener: (kind, f) => { listeners[`${name} ${kind}`] = f; },
+});
+const names = ["canvas", ".play", "input", "output", "select", "script"];
+const parts = Object.fromEntries(names.map((name) => [name, element(name)]));
+const views = ["space", "side", "top"].map(element);
+let frames = 0;
+global.window = { devicePixelRatio: 2 };
+global.document = {
+  querySelectorAll: () => [{ querySelector: (name) => parts[name], querySelectorAll: () => views }],
+};
+global.ResizeObserver = class { observe() {} };
+global.requestAnimationFrame = (f) => { if (frames++ < 400) setImmediate(() => f(performance.now() + 100 * frames)); };
+"""
+
+
+def test_page_plays_and_draws(made: Path, tmp_path: Path) -> None:
+    run = made / "two_balls" / "gradient-seed0"
+    out = write_motion(run / "guess.npz", run / "scene.json", tmp_path / "new" / "motion.html", title="Two <balls>")
+    text = out.read_text(encoding="utf-8")
+    assert "Two &lt;balls&gt;" in text
+    assert "1 s in 480 steps; 2 bodies." in text
+    assert "<canvas" in text
+    assert set(re.findall(r'src="([a-z]+:)', text)) == {"data:"}
+    assert "http" not in re.sub(r"http-equiv", "", text)
+
+
+@pytest.mark.parametrize(("name", "words"), [("trajectory.npz", "no such file"), ("scene.json", "no such file")])
+def test_missing_file_is_named(run_dir: Path, name: str, words: str) -> None:
+    (run_dir / name).unlink()
+    with pytest.raises(ReportError, match=f"{name}: there is {words}"):
+        write_motion(run_dir / "trajectory.npz", run_dir / "scene.json", run_dir / "motion.html")
+
+
+def data_of(run: Path) -> dict[str, Any]:
+    return dict(motion_data(read_trajectory(run / "trajectory.npz"), read_scene(run / "scene.json"), None, NUMBERS))
+
+
+def test_animation_holds_the_motion(run_dir: Path) -> None:
+    data = data_of(run_dir)
+    motion = read_trajectory(run_dir / "trajectory.npz")
+    frames = np.searchsorted(motion.time, np.array(data["time"]) - 1e-9)
+    assert np.allclose(np.reshape(data["position"], (-1, 3)), motion.position[frames, 0], atol=2e-4)
+    assert np.allclose(np.reshape(data["orientation"], (-1, 4)), motion.orientation[frames, 0], atol=2e-4)
+    assert data["time"][-1] == pytest.approx(motion.time[-1])
+    assert len(json.dumps(data)) < 8 * NUMBERS
+
+
+def test_views_follow_the_motion(made: Path) -> None:
+    assert data_of(made / "two_balls" / "gradient-seed0")["flat"] is True
+    thrown = data_of(made / "ball_throw" / "gradient-seed0")
+    assert (thrown["flat"], thrown["along"]) == (False, "x")
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="needs node to run the page's script")
+@pytest.mark.parametrize("run", ["two_balls/gradient-seed0", "ball_throw/gradient-seed0"])
+def test_script_plays_to_the_end(made: Path, run: str) -> None:
+    data = json.dumps(json.dumps(data_of(made / run)))
+    script = "".join((HERE / name).read_text(encoding="utf-8") for name in SCRIPTS)
+    acts = """
+    for (const key of ["space click", "side click", "top click"]) listeners[key]();
+    parts.input.value = "500";
+    listeners["input input"]();
+    const half = parts.output.textContent;
+    parts.select.value = "1";
+    listeners[".play click"]();
+    setTimeout(() => console.log(half, "|", parts.output.textContent, "|", parts[".play"].textContent), 800);
+    """
+    code = f"const DATA = {data};{STAGE}{script}{acts}"
+    played = subprocess.run(["node", "-"], input=code, capture_output=True, text=True, timeout=30, check=False)
+    assert played.stderr == ""
+    half, end, button = played.stdout.strip().split(" | ")
+    last = half.split(" / ")[1]
+    assert float(half.split(" / ")[0]) == pytest.approx(float(last.rstrip(" s")) / 2, abs=0.01)
+    assert end == f"{float(last.rstrip(' s')):.2f} / {last}"
+    assert button == "▶"

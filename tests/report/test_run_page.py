@@ -1,0 +1,239 @@
+"""The page of one run: complete, alone, harmless, and the same again."""
+
+from __future__ import annotations
+
+import json
+import re
+import time
+from collections.abc import Callable
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from symphys.report import write_run_report
+from symphys.report.records import ReportError
+
+LARGEST = 3_000_000
+SLOWEST = 10.0
+OPTIONAL = ("trajectory.npz", "guess.npz", "scene.json", "trace.csv", "config.json", "problem.toml", "log.txt")
+ONE_ARRAY = (
+    b"\x93NUMPY\x01\x00v\x00" + b"{'descr': '<f8', 'fortran_order': False, 'shape': (1,)}".ljust(117) + b"\n" + bytes(8)
+)
+
+
+class Page(HTMLParser):
+    """What a page refers to and shows."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.references: list[str] = []
+        self.tags: list[str] = []
+        self.words: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.references += [value or "" for key, value in attributes if key in ("src", "href", "srcset", "data")]
+
+    def handle_data(self, data: str) -> None:
+        self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return re.sub(r"\s+", " ", " ".join(self.words))
+
+
+def without_motion(run_dir: Path) -> Path:
+    """The same folder, quicker to read, for tests of words."""
+    for name in ("trajectory.npz", "guess.npz", "trace.csv"):
+        (run_dir / name).unlink()
+    return run_dir
+
+
+def read(run_dir: Path) -> str:
+    return write_run_report(run_dir).read_text(encoding="utf-8")
+
+
+def test_page_tells_names_status_and_numbers(run_dir: Path) -> None:
+    page = Page(read(run_dir))
+    found = json.loads((run_dir / "result.json").read_text())
+    for word in ("Throw a giant soccer ball", "gradient", "seed 0", "comes to rest at 10 m", "Solved", "45 rollouts"):
+        assert word in page.text
+    for word in ("throw", "spin", "Thrown so that it stops dead.", "casadi virtual machine", "symphys solve", "3.11.7"):
+        assert word in page.text
+    assert f"{found['objective']:.2e}"[:4] in page.text
+    assert "Agrees with finite differences." in page.text
+
+
+def test_page_needs_nothing_else(run_dir: Path) -> None:
+    text = read(run_dir)
+    page = Page(text)
+    assert page.references
+    assert [r for r in page.references if not r.startswith(("data:image/svg+xml;base64,", "#"))] == []
+    assert not {"link", "iframe", "object", "embed", "base"} & set(page.tags)
+    assert "http://" not in text
+    assert "https://" not in text
+    assert "@import" not in text
+    assert "url(" not in text
+
+
+def test_figures_are_files_too(run_dir: Path) -> None:
+    read(run_dir)
+    names = {path.name for path in (run_dir / "figures").iterdir()}
+    assert names == {"motion.svg", "states.svg", "contacts.svg", "convergence.svg"}
+    assert all(
+        path.read_text(encoding="utf-8").lstrip().startswith("<?xml") for path in (run_dir / "figures").iterdir()
+    )
+
+
+def test_knots_and_controls_are_drawn(made: Path, tmp_path: Path) -> None:
+    page = Page(read(made / "two_balls" / "gradient-seed0"))
+    assert "push: 480 knots of 2 components" in page.text
+    assert {"controls.svg", "variables.svg"} <= {p.name for p in (made / "two_balls/gradient-seed0/figures").iterdir()}
+
+
+def test_remade_page_is_the_same(run_dir: Path) -> None:
+    first = read(run_dir)
+    figures = {path.name: path.read_bytes() for path in (run_dir / "figures").iterdir()}
+    assert read(run_dir) == first
+    assert {path.name: path.read_bytes() for path in (run_dir / "figures").iterdir()} == figures
+    assert [path for path in run_dir.rglob("*") if path.name.startswith(".")] == []
+
+
+def test_page_is_light(run_dir: Path) -> None:
+    start = time.perf_counter()
+    text = read(run_dir)
+    assert time.perf_counter() - start < SLOWEST
+    assert len(text) < LARGEST
+
+
+def test_text_from_files_is_escaped(run_dir: Path, edit: Callable[..., None]) -> None:
+    evil = "<script>alert(1)</script><img src=x onerror=alert(2)> & \"'"
+    found = json.loads((run_dir / "result.json").read_text())
+    checks = [{**check, "name": evil, "kind": evil} for check in found["checks"]]
+    z = {evil: {**found["z"]["throw"], "sets": [evil]}}
+    edit(run_dir / "result.json", title=evil, advice=evil, checks=checks, z=z, command=evil, backend=evil)
+    (run_dir / "log.txt").write_text("</pre>" + evil)
+    (run_dir / "problem.toml").write_text(f'description = """{evil}"""')
+    with np.load(run_dir / "trajectory.npz") as archive:
+        arrays = dict(archive) | {"body_names": np.array([evil]), "contact_names": np.array([evil])}
+    np.savez(run_dir / "trajectory.npz", **arrays)
+    text = read(run_dir)
+    assert evil not in text
+    assert "<script>alert" not in text
+    assert Page(text).tags.count("script") == 2
+    assert "onerror" not in re.sub(r"&lt;.*?&gt;", "", text)
+    assert all("<script" not in path.read_text(encoding="utf-8") for path in (run_dir / "figures").iterdir())
+
+
+@pytest.mark.parametrize("text", ["$\\frac{$", "球 \N{ROCKET}", "\x00\x1b\ud800", "a" * 5000, ""])
+def test_any_name_can_be_drawn(run_dir: Path, edit: Callable[..., None], text: str) -> None:
+    found = json.loads((run_dir / "result.json").read_text())
+    edit(run_dir / "result.json", title=text, solver=text, checks=[{**c, "name": text} for c in found["checks"]])
+    assert "Targets and constraints" in read(run_dir)
+
+
+@pytest.mark.parametrize("name", OPTIONAL)
+def test_any_file_but_the_result_may_be_missing(run_dir: Path, name: str) -> None:
+    (run_dir / name).unlink()
+    text = read(run_dir)
+    assert "All 3 checks are met" in text
+    assert ("<canvas" in text) == (name != "trajectory.npz")
+
+
+@pytest.mark.parametrize("content", [b"", b"\x00\xffjunk", b"[1, 2", b"PK\x03\x04 half an archive", ONE_ARRAY])
+def test_every_file_but_the_result_may_be_broken(run_dir: Path, content: bytes) -> None:
+    for name in OPTIONAL:
+        (run_dir / name).write_bytes(content)
+    text = read(run_dir)
+    assert "All 3 checks are met" in text
+    assert "trajectory.npz: not an archive of plain arrays" in text
+
+
+def test_run_without_motion_says_so(made: Path) -> None:
+    text = Page(read(made / "ball_throw" / "ipopt-seed0")).text
+    assert "Not solved" in text
+    assert "not a finite number" in text
+    assert "start from a slower throw" in text
+    assert "This run recorded no motion." in text
+    assert "trajectory.npz: there is no such file" in text
+    assert "This run was not examined." in text
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"status": "budget", "solved": False}, "The run did not end as solved"),
+        ({"status": "interrupted", "solved": False}, "goes on from where it stopped"),
+        ({"status": "not_applicable", "solved": False}, "does not apply"),
+        ({"checks": []}, "states no targets"),
+        ({"checks": None, "objective": None, "status": "failed", "solved": False}, "There is nothing to judge."),
+        ({"objective": None, "counts": None, "seconds": None, "trust": None, "z": None, "price": None}, "Solved"),
+        ({"objective": "inf", "equivalents": "nan", "z": [], "checks": "none"}, "∞"),
+        ({"trust": {"refined": [{"what": "dt / 2", "objective": 1.0, "worst": 7.0}]}}, "Misses by far"),
+        ({"trust": {"gradient": [{"variable": "throw", "error": 0.3, "scale": 1.0}]}}, "Does not agree"),
+        ({"trust": {"gradient": [{"variable": "throw", "error": 0.3, "scale": 1e-9}]}}, "says little"),
+        ({"format": 2}, "this report reads 1"),
+    ],
+)
+def test_every_result_has_its_words(
+    run_dir: Path, edit: Callable[..., None], fields: dict[str, object], words: str
+) -> None:
+    edit(run_dir / "result.json", **fields)
+    assert words in Page(read(without_motion(run_dir))).text
+
+
+@pytest.mark.parametrize("content", ["", "{", "[]", "{}", "null", '{"solver": 1}', "[" * 100_000, "1" * 5000])
+def test_broken_result_is_named(run_dir: Path, content: str) -> None:
+    (run_dir / "result.json").write_text(content)
+    text = Page(read(without_motion(run_dir))).text
+    assert "No result could be read" in text
+    assert "result.json" in text
+
+
+def test_motion_is_drawn_up_to_the_first_bad_state(run_dir: Path) -> None:
+    with np.load(run_dir / "trajectory.npz") as archive:
+        arrays = dict(archive)
+    arrays["position"][100:] = np.nan
+    np.savez(run_dir / "trajectory.npz", **arrays)
+    data = re.search(r'<script type="application/json">(.*?)</script>', read(run_dir))
+    assert data is not None
+    assert json.loads(data[1])["time"][-1] == pytest.approx(0.99)
+
+
+def test_components_are_named_as_in_the_problem_file(run_dir: Path, edit: Callable[..., None]) -> None:
+    found = json.loads((run_dir / "result.json").read_text())
+    throw = {**found["z"]["throw"], "shape": [2, 1], "value": [4, 3], "guess": [0, 0], "lower": [], "upper": []}
+    edit(run_dir / "result.json", z={"throw": throw})
+    (run_dir / "problem.toml").write_text('[[variable]]\nname = "throw"\nsets = "ball.velocity[0:3:2]"\n')
+    assert "throw 0 ball.velocity[0:3:2]" in Page(read(without_motion(run_dir))).text
+    (run_dir / "problem.toml").write_text('[[variable]]\nname = "throw"\nsets = ["ball.velocity[1:]"]\n')
+    text = re.sub(r"\s+", " ", Page(write_run_report(run_dir).read_text(encoding="utf-8")).text)
+    assert "throw y ball.velocity[1:]" in text
+
+
+def test_energy_is_drawn_where_it_was_recorded(run_dir: Path, edit: Callable[..., None]) -> None:
+    edit(run_dir / "result.json", trust={"energy": list(range(501))})
+    read(run_dir)
+    assert (run_dir / "figures" / "energy.svg").is_file()
+
+
+def test_pickled_arrays_are_refused(run_dir: Path) -> None:
+    np.savez(run_dir / "trajectory.npz", time=np.array([{"a": 1}], dtype=object), position=np.zeros((1, 1, 3)))
+    assert "not an archive of plain arrays" in read(run_dir)
+
+
+def test_script_that_runs_is_the_one_that_the_page_allows(run_dir: Path) -> None:
+    text = read(run_dir)
+    assert text.count("sha256-") == 1
+    assert "script-src &#x27;sha256-" in text
+    assert "unsafe-eval" not in text
+
+
+def test_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ReportError, match="no run folder"):
+        write_run_report(tmp_path)
+    with pytest.raises(ReportError, match="no such folder"):
+        write_run_report(tmp_path / "nowhere")
