@@ -26,4 +26,4 @@ def show(source: str, assignments: tuple[str, ...], out: Path) -> None:
     folder = out / problem.name / "guess"
     files.write_npz(folder / TRAJECTORY, transcription.simulate(guess).arrays())
     files.write_json(folder / SCENE, scene(problem, transcription.shooting.by_block(guess)))
-    click.echo(write_motion(folder / TRAJECTORY, folder / SCENE, folder / "motion.html"))
+    click.echo(write_motion(folder / TRAJECTORY, folder / SCENE, folder / "motion.html", title=problem.title))

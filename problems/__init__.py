@@ -1,0 +1,42 @@
+"""The shipped problem files, and how a name on the command line finds one."""
+
+from __future__ import annotations
+
+if __name__ != "symphys.problems":
+    raise ImportError(
+        f"this folder is the package symphys.problems, but was imported as {__name__!r}: "
+        "install the project (pip install -e .) and import symphys.problems"
+    )
+
+from pathlib import Path
+
+from symphys.errors import SymphysError
+from symphys.suggest import hint, quote
+
+FOLDER = Path(__file__).parent
+
+
+def catalogue() -> dict[str, Path]:
+    """Every shipped problem file by its name without ``.toml``."""
+    return {path.stem: path for path in sorted(FOLDER.glob("*.toml"))}
+
+
+def find(name_or_path: str | Path) -> Path:
+    """A path that exists, else the shipped problem of that name (with or without ``.toml``).
+
+    Raises:
+        SymphysError: there is neither; names the nearest shipped problems.
+    """
+    text = str(name_or_path)
+    try:
+        if text and Path(text).exists():
+            return Path(text)
+    except (OSError, ValueError):  # a path that the system cannot even look up
+        pass
+    shipped = catalogue()
+    name = text.removesuffix(".toml")
+    if name in shipped:
+        return shipped[name]
+    raise SymphysError(
+        f"there is no file {quote(text)} and no shipped problem of that name; {hint(name.rsplit('/')[-1], shipped)}"
+    )

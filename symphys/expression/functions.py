@@ -1,0 +1,151 @@
+"""The functions and operators of formulas, each with its arguments and meaning."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import reduce
+
+import casadi as ca
+
+from symphys import rotation
+from symphys.expression.columns import Expr, length, require_fit, require_length, require_same
+
+NORM_WIDTH = 1e-12
+"""norm(v) is sqrt(v . v + NORM_WIDTH^2), and hypot likewise: finite derivatives at 0, where the value is 1e-12."""
+
+
+@dataclass(frozen=True)
+class Function:
+    """A function of formulas.
+
+    Attributes:
+        signature: how it is written.
+        meaning: one line.
+        apply: takes columns, gives a column; raises UnfitError where shapes do not fit.
+        least, most: number of arguments; ``most`` None is any number.
+    """
+
+    signature: str
+    meaning: str
+    apply: Callable[..., Expr]
+    least: int = 1
+    most: int | None = 1
+
+
+def elementwise(operation: Callable[..., Expr]) -> Callable[..., Expr]:
+    """The operation component by component, numbers combining with every component."""
+
+    def apply(*values: Expr) -> Expr:
+        require_fit(*values)
+        return operation(*values)
+
+    return apply
+
+
+def larger(a: Expr, b: Expr) -> Expr:
+    """The larger one; unlike fmax, a NaN on either side stays a NaN."""
+    return ca.if_else(a > b, a, ca.if_else(b >= a, b, a + b))
+
+
+def smaller(a: Expr, b: Expr) -> Expr:
+    """The smaller one; unlike fmin, a NaN on either side stays a NaN."""
+    return ca.if_else(a < b, a, ca.if_else(b <= a, b, a + b))
+
+
+def extreme(choose: Callable[[Expr, Expr], Expr]) -> Callable[..., Expr]:
+    """Of one vector: its extreme component; of several values: component by component."""
+
+    def apply(*values: Expr) -> Expr:
+        if len(values) == 1:
+            return reduce(choose, ca.vertsplit(values[0]))
+        require_fit(*values)
+        return reduce(choose, values)
+
+    return apply
+
+
+def clip(x: Expr, lower: Expr, upper: Expr) -> Expr:
+    """X limited to [lower, upper]."""
+    return smaller(larger(x, lower), upper)
+
+
+def length_of(*squares: Expr) -> Expr:
+    """sqrt(sum of the squares + NORM_WIDTH^2)."""
+    return ca.sqrt(sum(squares) + NORM_WIDTH**2)
+
+
+def hypot(a: Expr, b: Expr) -> Expr:
+    """The length of (a, b)."""
+    return length_of(a * a, b * b)
+
+
+def norm(vector: Expr) -> Expr:
+    """The Euclidean length."""
+    return length_of(ca.dot(vector, vector))
+
+
+def mean(vector: Expr) -> Expr:
+    """The mean of the components."""
+    total: Expr = ca.sum1(vector)
+    return total / length(vector)
+
+
+def dot(a: Expr, b: Expr) -> Expr:
+    """The scalar product."""
+    require_same(a, b)
+    return ca.dot(a, b)
+
+
+def cross(a: Expr, b: Expr) -> Expr:
+    """The vector product."""
+    require_length(a, 3, "the first vector")
+    require_length(b, 3, "the second vector")
+    return ca.cross(a, b)
+
+
+def rotate(quaternion: Expr, vector: Expr) -> Expr:
+    """The body-frame vector in world coordinates."""
+    require_length(quaternion, 4, "the quaternion")
+    require_length(vector, 3, "the vector")
+    return rotation.rotate(quaternion, vector)
+
+
+FUNCTIONS: dict[str, Function] = {
+    "sin": Function("sin(x)", "sine of an angle [rad]", ca.sin),
+    "cos": Function("cos(x)", "cosine of an angle [rad]", ca.cos),
+    "tan": Function("tan(x)", "tangent of an angle [rad]", ca.tan),
+    "asin": Function("asin(x)", "arc sine [rad]", ca.asin),
+    "acos": Function("acos(x)", "arc cosine [rad]", ca.acos),
+    "atan": Function("atan(x)", "arc tangent [rad]", ca.atan),
+    "atan2": Function("atan2(y, x)", "angle [rad] of the point (x, y)", elementwise(ca.atan2), 2, 2),
+    "sinh": Function("sinh(x)", "hyperbolic sine", ca.sinh),
+    "cosh": Function("cosh(x)", "hyperbolic cosine", ca.cosh),
+    "tanh": Function("tanh(x)", "hyperbolic tangent", ca.tanh),
+    "sqrt": Function("sqrt(x)", "square root; its slope at 0 is infinite", ca.sqrt),
+    "exp": Function("exp(x)", "exponential", ca.exp),
+    "log": Function("log(x)", "natural logarithm", ca.log),
+    "abs": Function("abs(x)", "absolute value, component by component", ca.fabs),
+    "sign": Function("sign(x)", "-1, 0 or 1", ca.sign),
+    "min": Function(
+        "min(a, b, ...)", "smallest, component by component; of one vector its least", extreme(smaller), 1, None
+    ),
+    "max": Function(
+        "max(a, b, ...)", "largest, component by component; of one vector its greatest", extreme(larger), 1, None
+    ),
+    "clip": Function("clip(x, lower, upper)", "x limited to a range", elementwise(clip), 3, 3),
+    "hypot": Function("hypot(a, b)", "sqrt(a^2 + b^2), finite slope at 0", elementwise(hypot), 2, 2),
+    "norm": Function("norm(v)", "Euclidean length, finite slope at 0", norm),
+    "sumsqr": Function("sumsqr(v)", "sum of the squared components", ca.sumsqr),
+    "sum": Function("sum(v)", "sum of the components", ca.sum1),
+    "mean": Function("mean(v)", "mean of the components", mean),
+    "dot": Function("dot(a, b)", "scalar product", dot, 2, 2),
+    "cross": Function("cross(a, b)", "vector product of two vectors of 3", cross, 2, 2),
+    "rotate": Function(
+        "rotate(quaternion, v)",
+        "a body-frame vector in world coordinates: rotate(ball.orientation, [1, 0, 0])",
+        rotate,
+        2,
+        2,
+    ),
+}

@@ -1,0 +1,20 @@
+"""Problem files: reading, validation, and the model that everything after works with."""
+
+from symphys.problem.json_schema import json_schema
+from symphys.problem.load import load_problem
+from symphys.problem.model import Constraint, Cost, Problem, Simulation, Slot, Target, Variable
+from symphys.problem.options import require_solvers, validate_options
+
+__all__ = [
+    "Constraint",
+    "Cost",
+    "Problem",
+    "Simulation",
+    "Slot",
+    "Target",
+    "Variable",
+    "json_schema",
+    "load_problem",
+    "require_solvers",
+    "validate_options",
+]

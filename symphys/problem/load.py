@@ -1,0 +1,135 @@
+"""From a problem file to a Problem; everything that can be wrong with a file is found here."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from symphys.problem.aims import Aims, read_aims
+from symphys.problem.bodies import read_body, read_state
+from symphys.problem.complaints import report
+from symphys.problem.faults import Faults
+from symphys.problem.model import NOTHING, Array, Problem
+from symphys.problem.plan import WorldPlan
+from symphys.problem.quantities import quantities
+from symphys.problem.schema import Document
+from symphys.problem.settings import apply_settings
+from symphys.problem.simulation import read_simulation
+from symphys.problem.source import parse_toml, read_source
+from symphys.problem.start import at_guess, check_overlap, formula_names
+from symphys.problem.surfaces import (
+    check_count,
+    check_laws,
+    check_mates,
+    check_varied,
+    read_contact,
+    read_pairs,
+    read_planes,
+)
+from symphys.problem.variables import read_variables
+
+SHARED_NAMES = ("body", "plane", "variable")
+OWN_NAMES = ("cost", "target", "constraint")
+
+
+def load_problem(path: str | Path, settings: Mapping[str, object] = NOTHING) -> Problem:
+    """Read and validate a problem file.
+
+    Args:
+        path: the TOML file.
+        settings: values that replace those in the file, by dotted key: ``simulation.dt``, ``body.ball.mass`` or
+            ``body.0.mass``, ``ground.friction``, ``solver.gradient.iterations``, ``target.<name>.tolerance``.
+
+    Raises:
+        ProblemError: names the file and every fault found, each with table, key and what would be valid.
+    """
+    path = Path(path)
+    text = read_source(path)
+    data = parse_toml(path, text)
+    apply_settings(data, settings, str(path))
+    faults = Faults(str(path), data)
+    document = read_document(data, faults)
+    return build(path, text, document, faults)
+
+
+def read_document(data: Mapping[str, Any], faults: Faults) -> Document:
+    """Tables and keys of the right kinds, with names that are unique."""
+    try:
+        document = Document.model_validate(data)
+    except ValidationError as error:
+        report(error, Document, faults)
+        faults.stop_if_any()
+        raise
+    check_names(document, faults)
+    faults.stop_if_any()
+    return document
+
+
+def check_names(document: Document, faults: Faults) -> None:
+    """Bodies, planes and variables share one set of names; costs, targets and constraints have one each."""
+    for group in (SHARED_NAMES, *((key,) for key in OWN_NAMES)):
+        named = [(key, index, table.name) for key in group for index, table in enumerate(getattr(document, key))]
+        counts = Counter(name for _, _, name in named)
+        seen: set[str] = set()
+        for key, index, name in named:
+            if counts[name] > 1 and name in seen:
+                faults.add((key, index, "name"), f'"{name}" is already the name of another {" or ".join(group)}')
+            seen.add(name)
+
+
+def build(path: Path, text: str, document: Document, faults: Faults) -> Problem:
+    """The problem; each stage needs the ones before without fault."""
+    simulation = read_simulation(document.simulation, faults)
+    plan, initial = read_plan(document, faults)
+    faults.stop_if_any()
+    check_laws(plan, faults)
+    known = quantities(initial, plan.parameters())
+    variables = read_variables(document.variable, known, simulation, faults)
+    check_varied(plan, variables, faults)
+    faults.stop_if_any()
+    start = at_guess(known, variables)
+    check_overlap(plan, start, faults)
+    aims = read_aims(document, simulation, formula_names(start, variables), faults)
+    faults.stop_if_any()
+    return Problem(
+        name=path.stem,
+        title=document.title or path.stem,
+        description=document.description,
+        file=str(path),
+        text=text,
+        simulation=simulation,
+        plan=plan,
+        initial=initial,
+        parameters=plan.parameters(),
+        variables=variables,
+        **vars(aims),
+        goal=document.objective.goal,
+        stop_when_met=stop_when_met(document, aims),
+        solver_tables=document.solver,
+    )
+
+
+def read_plan(document: Document, faults: Faults) -> tuple[WorldPlan, dict[str, Array]]:
+    """The world's plan and the state of every body at the start."""
+    bodies = tuple(read_body(index, table, faults) for index, table in enumerate(document.body))
+    planes = read_planes(document, faults)
+    names = [body.name for body in bodies] + [plane.name for plane in planes]
+    check_mates(bodies, names, document, faults)
+    check_count(bodies, planes, faults)
+    pairs = read_pairs(document.pair, names, faults)
+    initial: dict[str, Array] = {}
+    for index, table in enumerate(document.body):
+        initial |= read_state(table, index, faults)
+    x, y, z = document.world.gravity
+    return WorldPlan(bodies, planes, pairs, read_contact(document.contact), (x, y, z)), initial
+
+
+def stop_when_met(document: Document, aims: Aims) -> bool:
+    """As the file says; else True with a goal, or with targets and no costs, which leave nothing to improve."""
+    if document.objective.stop is not None:
+        return document.objective.stop == "met"
+    return document.objective.goal is not None or (bool(aims.targets) and not aims.costs)

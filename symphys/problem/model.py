@@ -1,0 +1,210 @@
+"""A problem after validation: plain numbers and formulas, nothing of files or tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.expression import Formula
+from symphys.problem.plan import WorldPlan
+from symphys.world import Scheme, World
+
+Array = NDArray[np.float64]
+NOTHING: Mapping[str, Any] = MappingProxyType({})
+
+Kind = Literal["initial", "parameter", "control"]
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """How time passes.
+
+    Attributes:
+        duration: [s], a whole number of steps.
+        dt: time step [s].
+        sweeps, position_sweeps, warm_start, push_out, time_of_impact, impact_friction: as in symphys.world.Scheme.
+        smoothing: [m/s] the knob that solvers use unless told otherwise; 0 is the exact contact law.
+    """
+
+    duration: float
+    dt: float
+    sweeps: int
+    position_sweeps: int
+    warm_start: bool
+    smoothing: float
+    push_out: float = 1.0
+    time_of_impact: bool = True
+    impact_friction: bool = True
+
+    @property
+    def steps(self) -> int:
+        """The number of time steps."""
+        return round(self.duration / self.dt)
+
+    def scheme(self) -> Scheme:
+        """The switches of the time step."""
+        return Scheme(
+            dt=self.dt,
+            sweeps=self.sweeps,
+            position_sweeps=self.position_sweeps,
+            push_out=self.push_out,
+            warm_start=self.warm_start,
+            time_of_impact=self.time_of_impact,
+            impact_friction=self.impact_friction,
+        )
+
+
+@dataclass(frozen=True)
+class Slot:
+    """Where a variable's components go.
+
+    Attributes:
+        name: ``ball.velocity``, ``ball.mass``, ``gravity``, ``ground.friction``, ``ball.force``, ...
+        components: the indices that are set; (0,) for a number.
+    """
+
+    name: str
+    components: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Variable:
+    """Something that a solver may choose; every slot gets the same values.
+
+    Attributes:
+        name: as in the file.
+        kind: what is set: the state at the start, a physical parameter, or a force or torque over time.
+        slots: all with the same number of components.
+        knots: values over the duration; 1 unless a control. ``constant``: knot k holds over the k-th of ``knots``
+            equal parts of the duration. ``linear``: knots at equal distances from start to end.
+        interpolation: between knots.
+        guess, lower, upper, scale, spread: (components * knots,), knot after knot; bounds may be infinite.
+    """
+
+    name: str
+    kind: Kind
+    slots: tuple[Slot, ...]
+    knots: int
+    interpolation: Literal["constant", "linear"]
+    guess: Array
+    lower: Array
+    upper: Array
+    scale: Array
+    spread: Array
+
+    @property
+    def components(self) -> int:
+        """Numbers in one knot."""
+        return len(self.slots[0].components)
+
+
+@dataclass(frozen=True)
+class Cost:
+    """A term of the objective.
+
+    Attributes:
+        name: as in the file.
+        formula: of a number, or with ``squares`` of a vector whose squares are summed.
+        at: ``end``, ``always`` (integral over time) or a time [s].
+        weight: factor.
+        squares: whether the cost is weight * sum of squares.
+    """
+
+    name: str
+    formula: Formula
+    at: str | float
+    weight: float
+    squares: bool
+
+
+@dataclass(frozen=True)
+class Target:
+    """A vector that should be zero; its term of the objective is weight * |value|^2.
+
+    Attributes:
+        name: as in the file.
+        formula: of the vector.
+        at: ``end`` or a time [s].
+        tolerance: met where the Euclidean norm is at most this.
+        weight: factor.
+    """
+
+    name: str
+    formula: Formula
+    at: str | float
+    tolerance: float
+    weight: float
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """Bounds on a vector, component by component.
+
+    Attributes:
+        name: as in the file.
+        formula: of the vector.
+        at: ``end``, ``always`` (every time step) or a time [s].
+        lower, upper: (components,) or (1,), may be infinite.
+        tolerance: largest violation of a component that counts as met.
+        penalty: weight of squared violations for solvers that know no constraints.
+    """
+
+    name: str
+    formula: Formula
+    at: str | float
+    lower: Array
+    upper: Array
+    tolerance: float
+    penalty: float
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A validated problem.
+
+    Attributes:
+        name: the file's stem.
+        title, description: for people.
+        file: the path as given.
+        text: the source.
+        simulation: how time passes.
+        plan: bodies, planes and their laws, from which ``world`` builds.
+        initial: for every body ``<body>.position`` (3,) [m], ``.orientation`` (4,) unit quaternion w x y z,
+            ``.velocity`` (3,) [m/s], ``.angular_velocity`` (3,) [rad/s]; world frame.
+        parameters: every physical parameter by name with its value in the file, (k,).
+        variables, costs, targets, constraints: in the file's order.
+        goal: the objective should come down to this; None for no goal.
+        stop_when_met: stop at the first point that meets everything, instead of at an optimum.
+        solver_tables: the raw [solver.NAME] tables by NAME.
+    """
+
+    name: str
+    title: str
+    description: str
+    file: str
+    text: str = field(repr=False)
+    simulation: Simulation
+    plan: WorldPlan = field(repr=False)
+    initial: dict[str, Array]
+    parameters: dict[str, Array]
+    variables: tuple[Variable, ...]
+    costs: tuple[Cost, ...]
+    targets: tuple[Target, ...]
+    constraints: tuple[Constraint, ...]
+    goal: float | None
+    stop_when_met: bool
+    solver_tables: dict[str, dict[str, object]]
+
+    def world(self, overrides: Mapping[str, Any] = NOTHING) -> World:
+        """The world with its numbers, some replaced.
+
+        Args:
+            overrides: parameter names to floats or casadi symbols; three of them in a sequence for gravity.
+                KeyError for a name that is no parameter.
+        """
+        return self.plan.world(overrides)

@@ -1,0 +1,92 @@
+"""Tables that say what may vary and what should come out: variables, costs, targets, constraints, objective."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from symphys.problem.schema.types import (
+    Bounds,
+    Finite,
+    Identifier,
+    Instant,
+    Interpolation,
+    Label,
+    Moment,
+    NonNegative,
+    Numbers,
+    Positive,
+    Stop,
+    Table,
+    Texts,
+)
+
+Knots = Annotated[int, Field(ge=1, le=1_000_000)]
+
+
+class VariableTable(Table):
+    """Something that a solver may choose."""
+
+    name: Identifier = Field(description="how formulas and results refer to it")
+    sets: Texts = Field(description='what it sets: "ball.velocity", "ball.force[0:2]", "ground.friction", or a list')
+    guess: Numbers | None = Field(
+        default=None, description="where solvers start; default: what the file says (forces: 0)"
+    )
+    lower: Bounds | None = Field(default=None, description="default: none, or what is physical")
+    upper: Bounds | None = Field(default=None, description="default: none, or what is physical")
+    scale: Numbers | None = Field(
+        default=None, description="a typical change; default 1, for parameters their own size"
+    )
+    spread: Numbers | None = Field(
+        default=None,
+        description="standard deviation with which seeds above 0 perturb the guess; default: a tenth of scale",
+    )
+    knots: Knots = Field(default=1, description="for forces and torques: number of values over the duration")
+    interpolation: Interpolation = Field(default="constant", description="of forces and torques between knots")
+
+
+class CostTable(Table):
+    """A term of the objective: a number to make small, or a vector whose squares are summed."""
+
+    name: Label
+    at: Moment = Field(default="end", description='"end", "always" (integral over time) or a time [s]')
+    value: str | None = Field(default=None, description="formula of a number")
+    squares: str | None = Field(default=None, description="formula of a vector; the cost is the sum of its squares")
+    weight: Finite = Field(default=1.0, description="negative makes a value large")
+
+
+class TargetTable(Table):
+    """A vector that should be zero within a tolerance; the objective gets weight * |value|^2."""
+
+    name: Label
+    at: Instant = Field(default="end", description='"end" or a time [s]')
+    value: str = Field(description="formula of what should be zero")
+    tolerance: Positive = Field(description="met where the Euclidean norm of the value is at most this")
+    weight: NonNegative = 1.0
+
+
+class ConstraintTable(Table):
+    """Bounds on every component of a vector."""
+
+    name: Label
+    at: Moment = Field(default="end", description='"end", "always" (every time step) or a time [s]')
+    value: str = Field(description="formula of what is bounded")
+    lower: Bounds | None = None
+    upper: Bounds | None = None
+    equals: Numbers | None = Field(default=None, description="instead of lower and upper")
+    tolerance: Positive = Field(default=1e-3, description="largest violation of a component that counts as met")
+    penalty: Positive = Field(
+        default=1e3, description="weight of squared violations for solvers that know no constraints"
+    )
+
+
+class ObjectiveTable(Table):
+    """When to be content."""
+
+    goal: Finite | None = Field(default=None, description="the objective should come down to this")
+    stop: Stop | None = Field(
+        default=None,
+        description='"met": stop at the first point that meets every target, constraint and the goal; "converged": '
+        "go on to the optimum. Default: met with a goal, or with targets and no costs",
+    )

@@ -1,0 +1,119 @@
+"""Checks of single values, each with one message that goes to the user as it is."""
+
+from __future__ import annotations
+
+import keyword
+import math
+import re
+from collections.abc import Callable
+from typing import Any, TypeGuard
+
+from pydantic_core import PydanticCustomError
+
+from symphys.expression import CONSTANTS, FUNCTIONS
+from symphys.problem.words import shown
+from symphys.suggest import quote
+
+RESERVED = frozenset({*FUNCTIONS, *CONSTANTS, *keyword.kwlist, "time", "gravity", "ground"})
+IDENTIFIER = "[A-Za-z][A-Za-z0-9_]*"
+MAX_IDENTIFIER = 64
+MAX_LABEL = 100
+
+
+def fault(message: str) -> PydanticCustomError:
+    """An error whose message goes to the user as it is."""
+    return PydanticCustomError("symphys", "{message}", {"message": message})
+
+
+def is_number(value: object, bound: bool = False) -> TypeGuard[int | float]:
+    """Whether the value is a finite number; ``bound`` lets infinities through."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    try:
+        number = float(value)
+    except OverflowError:
+        return False
+    return not math.isnan(number) if bound else math.isfinite(number)
+
+
+def identifier(value: object) -> str:
+    """A name that formulas can use."""
+    if not isinstance(value, str) or not re.fullmatch(IDENTIFIER, value) or len(value) > MAX_IDENTIFIER:
+        shown = quote(value) if isinstance(value, str) else "this"
+        raise fault(f"{shown} is no name: letters, digits and _, a letter first, at most {MAX_IDENTIFIER}")
+    if value in RESERVED:
+        raise fault(f"{quote(value)} already has a meaning in formulas; choose another name")
+    return value
+
+
+def label(value: object) -> str:
+    """A name for people: one line of text."""
+    if not isinstance(value, str) or not value.strip() or not value.isprintable() or len(value) > MAX_LABEL:
+        raise fault(f"must be a name: one line of text, at most {MAX_LABEL} characters")
+    return value
+
+
+def vector(count: int) -> Callable[[object], list[float]]:
+    """A list of ``count`` finite numbers."""
+
+    def check(value: object) -> list[float]:
+        if not isinstance(value, list) or len(value) != count:
+            raise fault(f"must be a list of {count} numbers, not {shown(value)}")
+        for item in value:
+            if not is_number(item):
+                raise fault(f"must be a list of {count} finite numbers; one is {shown(item)}")
+        return [float(item) for item in value]
+
+    return check
+
+
+def nested(bound: bool) -> Callable[[object], Any]:
+    """A number, a list of numbers, or a list of lists of numbers; ``bound`` lets infinities through."""
+    kind = "numbers" if bound else "finite numbers"
+
+    def check(value: object) -> Any:
+        rows = value if isinstance(value, list) else [value]
+        flat = [item for row in rows for item in (row if isinstance(row, list) else [row])]
+        mixed = len({isinstance(row, list) for row in rows}) > 1
+        if not flat or mixed or not all(is_number(item, bound) for item in flat):
+            raise fault(f"must be a number, a list with one number per component, or one such list per knot ({kind})")
+        return value
+
+    return check
+
+
+def moment(value: object) -> str | float:
+    """``end``, ``always`` or a time."""
+    if is_number(value):
+        return float(value)
+    if isinstance(value, str) and value in ("end", "always"):
+        return value
+    raise fault('must be "end", "always" or a time in seconds')
+
+
+def instant(value: object) -> str | float:
+    """``end`` or a time."""
+    if is_number(value):
+        return float(value)
+    if isinstance(value, str) and value == "end":
+        return value
+    advice = '; for "always" use a [[constraint]] or a [[cost]]' if value == "always" else ""
+    raise fault(f'must be "end" or a time in seconds{advice}')
+
+
+def inertia(value: object) -> Any:
+    """A number, three numbers or a 3 x 3 matrix."""
+    rows: list[Any] = value if isinstance(value, list) else [value]
+    matrix = len(rows) == 3 and all(isinstance(row, list) and len(row) == 3 for row in rows)
+    flat = [item for row in rows for item in row] if matrix else rows
+    if not (matrix or not isinstance(value, list) or len(rows) == 3) or not all(is_number(item) for item in flat):
+        raise fault("must be a number, three principal moments or a 3 x 3 matrix (three lists of three), in kg m^2")
+    return value
+
+
+def texts(value: object) -> list[str]:
+    """One text or a list of texts."""
+    items = value if isinstance(value, list) else [value]
+    if not items or not all(isinstance(item, str) for item in items):
+        raise fault('must be a text or a list of texts, for instance "ball.velocity" or ["ball.force[0:2]"]')
+    return list(items)

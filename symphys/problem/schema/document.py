@@ -1,0 +1,41 @@
+"""The whole file."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import Field
+
+from symphys.problem.schema.aims import ConstraintTable, CostTable, ObjectiveTable, TargetTable, VariableTable
+from symphys.problem.schema.physics import (
+    BodyTable,
+    ContactTable,
+    GroundTable,
+    PairTable,
+    PlaneTable,
+    SimulationTable,
+    WorldTable,
+)
+from symphys.problem.schema.types import Label, Table
+
+
+class Document(Table):
+    """A symphys problem."""
+
+    title: Label | None = Field(default=None, description="one line; default: the file's name")
+    description: str = Field(default="", description="what the problem is about")
+    simulation: SimulationTable
+    world: WorldTable = WorldTable()
+    body: list[BodyTable] = Field(min_length=1)
+    ground: GroundTable | None = None
+    plane: list[PlaneTable] = Field(default=[])
+    contact: ContactTable = ContactTable()
+    pair: list[PairTable] = Field(default=[])
+    variable: list[VariableTable] = Field(default=[])
+    cost: list[CostTable] = Field(default=[])
+    target: list[TargetTable] = Field(default=[])
+    constraint: list[ConstraintTable] = Field(default=[])
+    objective: ObjectiveTable = ObjectiveTable()
+    solver: dict[str, dict[str, Any]] = Field(
+        default={}, description="options by solver: [solver.gradient], [solver.cma], ..."
+    )

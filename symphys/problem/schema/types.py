@@ -1,0 +1,80 @@
+"""Kinds of values in a problem file: strict, so that no text and no true or false passes as a number."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, PlainValidator, Tag, WithJsonSchema
+
+from symphys.problem.schema import checks
+
+
+class Table(BaseModel):
+    """A table of the file: unknown keys are errors, values are taken as they are written."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+def vector_schema(count: int) -> dict[str, Any]:
+    """The JSON Schema of a list of ``count`` numbers."""
+    return {"type": "array", "items": {"type": "number"}, "minItems": count, "maxItems": count}
+
+
+def numbers_schema() -> dict[str, Any]:
+    """The JSON Schema of a number, a list of numbers or a list of lists of numbers."""
+    number = {"type": "number"}
+    flat = {"type": "array", "items": number, "minItems": 1}
+    nested_rows = {"type": "array", "items": flat, "minItems": 1}
+    return {"anyOf": [number, flat, nested_rows]}
+
+
+NestedList = float | list[float] | list[list[float]]
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+Vector = Annotated[list[float], PlainValidator(checks.vector(3)), WithJsonSchema(vector_schema(3))]
+Quaternion = Annotated[list[float], PlainValidator(checks.vector(4)), WithJsonSchema(vector_schema(4))]
+Numbers = Annotated[NestedList, PlainValidator(checks.nested(bound=False)), WithJsonSchema(numbers_schema())]
+Bounds = Annotated[NestedList, PlainValidator(checks.nested(bound=True)), WithJsonSchema(numbers_schema())]
+Identifier = Annotated[
+    str,
+    PlainValidator(checks.identifier),
+    WithJsonSchema({"type": "string", "pattern": f"^{checks.IDENTIFIER}$", "maxLength": checks.MAX_IDENTIFIER}),
+]
+Label = Annotated[
+    str, PlainValidator(checks.label), WithJsonSchema({"type": "string", "minLength": 1, "maxLength": checks.MAX_LABEL})
+]
+Moment = Annotated[
+    str | float,
+    PlainValidator(checks.moment),
+    WithJsonSchema({"anyOf": [{"enum": ["end", "always"]}, {"type": "number", "minimum": 0}]}),
+]
+Instant = Annotated[
+    str | float,
+    PlainValidator(checks.instant),
+    WithJsonSchema({"anyOf": [{"const": "end"}, {"type": "number", "minimum": 0}]}),
+]
+Inertia = Annotated[NestedList, PlainValidator(checks.inertia), WithJsonSchema(numbers_schema())]
+Texts = Annotated[
+    list[str],
+    PlainValidator(checks.texts),
+    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}, "minItems": 1}]}),
+]
+Interpolation = Literal["constant", "linear"]
+Stop = Literal["met", "converged"]
+
+
+class RollPitchYaw(Table):
+    """An orientation as angles: turn by roll about x, then pitch about y, then yaw about z, all fixed world axes."""
+
+    roll_deg: Finite = 0.0
+    pitch_deg: Finite = 0.0
+    yaw_deg: Finite = 0.0
+
+
+Orientation = Annotated[
+    Annotated[Quaternion, Tag("<quaternion>")] | Annotated[RollPitchYaw, Tag("<angles>")],
+    Discriminator(lambda value: "<angles>" if isinstance(value, dict | RollPitchYaw) else "<quaternion>"),
+]

@@ -1,0 +1,69 @@
+"""From a path to parsed TOML; everything that is no such file becomes a ProblemError with one message."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from symphys.errors import Issue, ProblemError
+
+MAX_BYTES = 10_000_000
+MAX_KEY_PARTS = 20
+LONG_KEY = re.compile(rf"(?<![\w-])(?:[\"']?[\w-]++[\"']?[ \t]*\.[ \t]*){{{MAX_KEY_PARTS}}}")
+"""Dotted keys cost the parser quadratic time in their length."""
+EXAMPLE = (
+    'a problem file is TOML text such as: [simulation] with duration and dt, then [[body]] with name = "ball", ...'
+)
+
+
+def refuse(path: Path, message: str) -> ProblemError:
+    """The error for a file as a whole."""
+    return ProblemError(str(path), [Issue("", message)])
+
+
+def read_source(path: Path) -> str:
+    """The text of the file."""
+    try:
+        if path.is_dir():
+            raise refuse(path, "this is a folder; name a problem file in it")
+        if not path.exists():
+            raise refuse(path, "there is no such file")
+        with path.open("rb") as stream:
+            content = stream.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise refuse(path, f"cannot be read: {error.strerror or error}") from None
+    except ValueError:
+        raise refuse(path, "this is no valid path") from None
+    if len(content) > MAX_BYTES:
+        raise refuse(path, f"the file is larger than {MAX_BYTES // 1_000_000} MB, too large for a problem file")
+    return decode(path, content)
+
+
+def decode(path: Path, content: bytes) -> str:
+    """The content as text with plain line ends."""
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
+        raise refuse(path, f"the file is not UTF-8 text (line {line}); {EXAMPLE}") from None
+    if not text.strip():
+        raise refuse(path, f"the file is empty; {EXAMPLE}")
+    return text.replace("\r\n", "\n")
+
+
+def parse_toml(path: Path, text: str) -> dict[str, Any]:
+    """The tables and keys of the text."""
+    long = LONG_KEY.search(text)
+    if long:
+        line = text.count("\n", 0, long.start()) + 1
+        raise refuse(path, f"line {line}: a name with more than {MAX_KEY_PARTS} dots")
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise refuse(path, f"this is not valid TOML: {error}") from None
+    except RecursionError:
+        raise refuse(path, "brackets or braces are nested too deep") from None
+    except (ValueError, OverflowError, MemoryError) as error:
+        raise refuse(path, f"this is not valid TOML: {error}") from None

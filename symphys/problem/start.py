@@ -1,0 +1,83 @@
+"""The start as the guess has it: what formulas see there, and whether surfaces overlap."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys import rotation
+from symphys.problem.faults import Faults
+from symphys.problem.model import Variable
+from symphys.problem.plan import WorldPlan
+from symphys.problem.quantities import Quantity
+from symphys.world import Side, World
+
+Array = NDArray[np.float64]
+OVERLAP = 1e-3
+"""Deepest overlap at the start [m]; more would be pushed out in the first steps, which nobody means."""
+
+
+def at_guess(known: Mapping[str, Quantity], variables: Sequence[Variable]) -> dict[str, Array]:
+    """Every quantity's value at t = 0, with the first knot of every guess put in."""
+    values = {name: quantity.nominal.copy() for name, quantity in known.items()}
+    for variable in variables:
+        for slot in variable.slots:
+            values[slot.name][list(slot.components)] = variable.guess[: variable.components]
+    for name, value in values.items():
+        if name.endswith(".orientation"):
+            values[name] = value / max(float(np.linalg.norm(value)), 1e-12)
+    return values
+
+
+def formula_names(values: Mapping[str, Array], variables: Sequence[Variable]) -> dict[str, Any]:
+    """Every name that a formula may use, with a value of its shape."""
+    named: dict[str, Any] = {name: ca.DM(value) for name, value in values.items() if "-" not in name}
+    named["time"] = ca.DM(0.0)
+    return named | {variable.name: ca.DM(variable.guess) for variable in variables}
+
+
+def check_overlap(plan: WorldPlan, values: Mapping[str, Array], faults: Faults) -> None:
+    """Surfaces that may touch must not overlap at the start."""
+    overrides: dict[str, Any] = {name: float(values[name][0]) for name in plan.parameters() if name != "gravity"}
+    world = plan.world(overrides)
+    centres = [sphere_centres(world, index, values) for index in range(len(world.bodies))]
+    deepest: dict[tuple[str, str], float] = {}
+    for pair in world.pairs:
+        depth = -gap(world, centres, pair.first, pair.second)
+        owners = plan.owners(pair)
+        if not depth <= max(OVERLAP, deepest.get(owners, OVERLAP)):
+            deepest[owners] = depth
+    for (a, b), depth in deepest.items():
+        index = plan_index(plan, a)
+        verb = "overlaps" if any(body.name == b for body in plan.bodies) else "sinks into"
+        message = f"{a} {verb} {b} by {depth:.4g} m at the start; at most {OVERLAP:g} m is allowed"
+        faults.add(("body", index, "position"), message)
+
+
+def plan_index(plan: WorldPlan, name: str) -> int:
+    """The index of a body."""
+    return [body.name for body in plan.bodies].index(name)
+
+
+def sphere_centres(world: World, index: int, values: Mapping[str, Array]) -> Array:
+    """(spheres, 3): centres of a body's spheres in the world [m]."""
+    body = world.bodies[index]
+    position, orientation = values[f"{body.name}.position"], values[f"{body.name}.orientation"]
+    turned = np.array(rotation.matrix(ca.DM(orientation)))
+    offsets = np.array([shape.centre for shape in body.shapes], float).reshape(-1, 3)
+    return np.asarray(position + offsets @ turned.T)
+
+
+def gap(world: World, centres: Sequence[Array], first: Side, second: Side) -> float:
+    """The distance between two surfaces [m]; negative when they overlap."""
+    assert first.body is not None
+    centre, radius = centres[first.body][first.shape], world.bodies[first.body].shapes[first.shape].radius
+    if second.body is None:
+        plane = world.planes[second.shape]
+        return float(np.dot(plane.normal, centre) - plane.offset - radius)
+    other = world.bodies[second.body].shapes[second.shape].radius
+    return float(np.linalg.norm(centre - centres[second.body][second.shape]) - radius - other)

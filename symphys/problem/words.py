@@ -1,0 +1,20 @@
+"""How values of a file are shown in messages."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from symphys.suggest import quote
+
+
+def shown(value: object) -> str:
+    """A value as its author would recognise it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return f"the text {quote(value)}"
+    if isinstance(value, int | float):
+        return repr(value) if isinstance(value, float) or abs(value) < 10**18 else "a number that large"
+    if isinstance(value, list):
+        return f"a list of {len(value)}"
+    return "a table" if isinstance(value, Mapping) else f"a {type(value).__name__}"

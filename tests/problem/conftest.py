@@ -1,0 +1,115 @@
+"""A small valid file, and ways to load changed copies of it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import pytest
+
+from symphys.errors import ProblemError
+from symphys.problem import Problem, load_problem
+
+VALID = """
+title = "Two balls"
+
+[simulation]
+duration = 1.0
+dt = 0.01
+
+[[body]]
+name = "ball"
+shape = { sphere = { radius = 0.5 } }
+mass = 2.0
+position = [0, 0, 1]
+friction = 0.5
+
+[[body]]
+name = "marble"
+shape = { sphere = { radius = 0.1 } }
+density = 1000.0
+position = [2, 0, 1]
+
+[ground]
+friction = 0.8
+restitution = 0.5
+
+[[variable]]
+name = "throw"
+sets = "ball.velocity"
+guess = [1, 2, 3]
+
+[[variable]]
+name = "push"
+sets = "marble.force[0:2]"
+knots = 4
+
+[[cost]]
+name = "effort"
+at = "always"
+squares = "marble.force"
+
+[[target]]
+name = "lands there"
+value = "ball.position - [1, 0, 0.5]"
+tolerance = 0.01
+
+[[constraint]]
+name = "stays low"
+at = "always"
+value = "ball.position[2]"
+upper = 5
+
+[solver.gradient]
+iterations = 10
+"""
+
+Load = Callable[..., Problem]
+Refused = Callable[..., ProblemError]
+
+
+@pytest.fixture(scope="session")
+def valid() -> str:
+    return VALID
+
+
+@pytest.fixture
+def load(tmp_path: Path) -> Load:
+    """A function that loads a text, by default the valid one, with pairs of old and new pieces."""
+
+    def load(*changes: tuple[str, str], text: str = VALID, settings: Mapping[str, object] | None = None) -> Problem:
+        for old, new in changes:
+            assert text.count(old) >= 1, f"{old!r} is not in the text"
+            text = text.replace(old, new, 1)
+        path = tmp_path / "example.toml"
+        path.write_text(text, encoding="utf-8")
+        return load_problem(path, settings or {})
+
+    return load
+
+
+@pytest.fixture
+def refused(load: Load) -> Refused:
+    """The error that a changed text raises."""
+
+    def refused(
+        *changes: tuple[str, str], text: str = VALID, settings: Mapping[str, object] | None = None
+    ) -> ProblemError:
+        with pytest.raises(ProblemError) as caught:
+            load(*changes, text=text, settings=settings)
+        return caught.value
+
+    return refused
+
+
+@pytest.fixture(scope="session")
+def names() -> Callable[[ProblemError, str, str], None]:
+    """A check that an error names the file, a place, and what a pattern describes."""
+
+    def names(error: ProblemError, where: str, pattern: str) -> None:
+        found = [issue.message for issue in error.issues if issue.where == where]
+        assert any(re.search(pattern, message) for message in found), str(error)
+        assert str(error).startswith(error.file)
+
+    return names

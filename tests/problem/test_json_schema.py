@@ -1,0 +1,62 @@
+"""The JSON Schema names every table and key, and knows no null."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+from symphys.problem import json_schema
+from symphys.problem.schema import Document
+
+
+@dataclass(frozen=True)
+class Options:
+    iterations: int = 100
+    clip: float | None = None
+
+
+def definition(schema: dict[str, Any], reference: dict[str, Any]) -> dict[str, Any]:
+    name = reference["$ref"].removeprefix("#/$defs/")
+    found = schema["$defs"][name]
+    assert isinstance(found, dict)
+    return found
+
+
+def test_every_table_and_key_is_there() -> None:
+    schema = json_schema()
+    assert set(schema["properties"]) == set(Document.model_fields)
+    assert schema["required"] == ["simulation", "body"]
+    assert schema["additionalProperties"] is False
+    body = definition(schema, schema["properties"]["body"]["items"])
+    assert {"name", "shape", "mass", "friction", "collides_with"} <= set(body["properties"])
+    assert body["required"] == ["name"]
+    assert body["properties"]["mass"]["exclusiveMinimum"] == 0
+    assert body["properties"]["position"]["minItems"] == 3
+
+
+def test_ground_may_be_left_out_but_is_no_null() -> None:
+    text = json.dumps(json_schema(), allow_nan=False)
+    assert '"null"' not in text
+    assert "null" not in text
+
+
+def test_references_lead_somewhere() -> None:
+    schema = json_schema({"gradient": Options})
+    text = json.dumps(schema)
+    names = {part.split('"')[0] for part in text.split("#/$defs/")[1:]}
+    assert names == set(schema["$defs"])
+
+
+def test_solver_options() -> None:
+    schema = json_schema({"gradient": Options})
+    solver = schema["properties"]["solver"]
+    assert solver["additionalProperties"] is False
+    options = definition(schema, solver["properties"]["gradient"])
+    assert options["properties"]["iterations"] == {"default": 100, "title": "Iterations", "type": "integer"}
+    assert options["properties"]["clip"]["type"] == "number"
+    assert options["additionalProperties"] is False
+
+
+def test_without_solvers_any_option_passes() -> None:
+    assert "properties" not in json_schema()["properties"]["solver"]

@@ -1,0 +1,114 @@
+"""Whatever a file holds, either a Problem or a ProblemError comes out."""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from symphys.errors import ProblemError
+from symphys.problem import load_problem
+from symphys.problem.schema import Document
+
+KEYS = sorted({*Document.model_fields, "name", "mass", "friction", "value", "at", "sets", "guess", "sphere", "radius"})
+TEXTS = ["", "ball", "ball.velocity", "ball.force[0:2]", "ball.mass", "gravity", "end", "always", "1 / time", "é", "-"]
+VALUES = st.recursive(
+    st.one_of(
+        st.booleans(),
+        st.integers(-(10**25), 10**25),
+        st.floats(),
+        st.sampled_from([0, 1, -1, 0.5, 1e308, 1e-308, 100]),
+        st.sampled_from(TEXTS),
+        st.text(max_size=10),
+    ),
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=4), st.dictionaries(st.sampled_from(KEYS) | st.text(max_size=5), inner, max_size=4)
+    ),
+    max_leaves=6,
+)
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("properties") / "problem.toml"
+
+
+def write(value: Any) -> str:
+    """A value as TOML."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{json.dumps(k, ensure_ascii=False)} = {write(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(write(item) for item in value) + "]"
+    return repr(value) if isinstance(value, float) else json.dumps(value, ensure_ascii=False)
+
+
+def load(path: Path, text: str, changed: dict[str, object] | None = None) -> None:
+    path.write_text(text, encoding="utf-8", errors="replace")
+    with contextlib.suppress(ProblemError):
+        load_problem(path, changed or {}).world()
+
+
+def places(value: Any, prefix: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Every key and index in a nested value."""
+    keys = value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
+    return [found for key in keys for found in [(*prefix, key), *places(value[key], (*prefix, key))]]
+
+
+def put(data: Any, place: tuple[Any, ...], value: Any) -> None:
+    for key in place[:-1]:
+        data = data[key]
+    data[place[-1]] = value
+
+
+@settings(deadline=None)
+@given(st.text(max_size=300))
+def test_any_text(path: Path, text: str) -> None:
+    load(path, text)
+
+
+@settings(deadline=None)
+@given(content=st.binary(max_size=300))
+def test_any_bytes(path: Path, content: bytes) -> None:
+    path.write_bytes(content)
+    with contextlib.suppress(ProblemError):
+        load_problem(path)
+
+
+@settings(max_examples=200, deadline=None)
+@given(data=st.data())
+def test_a_valid_file_with_any_value_anywhere(path: Path, valid: str, data: st.DataObject) -> None:
+    document = copy.deepcopy(tomllib.loads(valid))
+    for _ in range(data.draw(st.integers(1, 3))):
+        put(document, data.draw(st.sampled_from(places(document))), data.draw(VALUES))
+    load(path, "\n".join(f"{key} = {write(value)}" for key, value in document.items()))
+
+
+@settings(max_examples=200, deadline=None)
+@given(data=st.data())
+def test_a_valid_file_with_text_spliced_in(path: Path, valid: str, data: st.DataObject) -> None:
+    start = data.draw(st.integers(0, len(valid)))
+    stop = min(len(valid), start + data.draw(st.integers(0, 30)))
+    load(path, valid[:start] + data.draw(st.text(max_size=10)) + valid[stop:])
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    key=st.lists(st.sampled_from([*KEYS, "ball", "0", "gradient", "throw", "dt"]) | st.text(max_size=3), max_size=5),
+    value=VALUES,
+)
+def test_any_setting(path: Path, valid: str, key: list[str], value: object) -> None:
+    load(path, valid, {".".join(key): value})
+
+
+def test_the_rewritten_file_is_the_same(path: Path, valid: str) -> None:
+    text = "\n".join(f"{key} = {write(value)}" for key, value in tomllib.loads(valid).items())
+    assert tomllib.loads(text) == tomllib.loads(valid)
+    path.write_text(text)
+    load_problem(path)
