@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 Formula = Callable[[Any, Any], Any]
 """(z, smoothing) -> casadi expression."""
 PENALTY = 100.0
-TOLERANCE = 1e-3
+TOLERANCE = 1e-9
 
 
 def toy(

@@ -1,0 +1,47 @@
+"""Optimisers: each takes a shooting problem and gives an outcome, and knows nothing of physics.
+
+``SOLVERS`` lists them; ``solver(name)`` finds one. All follow one interface, ``Solver``, and stop at the first
+evaluated point that meets every target, unless the problem says otherwise.
+"""
+
+from __future__ import annotations
+
+if __name__ != "symphys.solvers":
+    raise ImportError(f"this package installs as symphys.solvers: import that, not {__name__!r}")
+
+from difflib import get_close_matches
+from typing import Any
+
+from symphys.errors import SymphysError
+from symphys.solvers.cma_ import CMA, CmaOptions
+from symphys.solvers.gradient import GRADIENT, GradientOptions
+from symphys.solvers.interface import Solver
+from symphys.solvers.ipopt_ import IPOPT, IpoptOptions
+from symphys.solvers.least_squares import LEAST_SQUARES, LeastSquaresOptions
+from symphys.solvers.outcome import Counts, Monitor, Outcome, Status, TraceRow
+
+__all__ = [
+    "SOLVERS",
+    "CmaOptions",
+    "Counts",
+    "GradientOptions",
+    "IpoptOptions",
+    "LeastSquaresOptions",
+    "Monitor",
+    "Outcome",
+    "Solver",
+    "Status",
+    "TraceRow",
+    "solver",
+]
+
+SOLVERS: dict[str, Solver[Any]] = {each.name: each for each in (GRADIENT, LEAST_SQUARES, IPOPT, CMA)}
+
+
+def solver(name: str) -> Solver[Any]:
+    """The solver called ``name``; SymphysError naming the nearest ones if there is none."""
+    if name not in SOLVERS:
+        close = get_close_matches(name.lower(), SOLVERS)
+        guess = f"did you mean {close[0]!r}? " if close else ""
+        raise SymphysError(f"there is no solver {name!r}; {guess}valid: {', '.join(SOLVERS)}")
+    return SOLVERS[name]

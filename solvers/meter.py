@@ -1,0 +1,227 @@
+"""The meter between a solver and its problem: evaluates, counts, remembers the best point, writes the trace."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterable
+from dataclasses import asdict, astuple, dataclass, field, replace
+
+import numpy as np
+
+from symphys.shooting import Function, ShootingProblem
+from symphys.solvers.calls import Call
+from symphys.solvers.outcome import Array, Counts, Monitor, Status, TraceRow
+
+
+@dataclass(frozen=True)
+class Point:
+    """An evaluated z.
+
+    Attributes:
+        z: (n,).
+        merit, objective: see ``ShootingProblem``.
+        errors: normalised; met where <= 1.
+        met: all errors met.
+        gradient: (n,) of the merit by z; empty where it was not asked for.
+        residuals, jacobian: (m,) and (m, n), merit = r . r; empty where they were not asked for.
+    """
+
+    z: Array
+    merit: float
+    objective: float
+    errors: Array
+    met: bool = False
+    gradient: Array = field(default_factory=lambda: np.zeros(0))
+    residuals: Array = field(default_factory=lambda: np.zeros(0))
+    jacobian: Array = field(default_factory=lambda: np.zeros((0, 0)))
+
+    @property
+    def miss(self) -> float:
+        """The largest of the errors; nan without any."""
+        return float(np.max(self.errors)) if self.errors.size else math.nan
+
+    @property
+    def finite(self) -> bool:
+        """Whether every number that was asked for is finite."""
+        parts = (self.merit, self.objective, self.errors, self.gradient, self.residuals, self.jacobian)
+        return all(bool(np.all(np.isfinite(part))) for part in parts)
+
+    def better(self, other: Point | None) -> bool:
+        """Met before not met, then the lower merit; one that is not finite is never better."""
+        if not self.finite:
+            return False
+        return other is None or not other.finite or (not self.met, self.merit) < (not other.met, other.merit)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How a stage of a solve ended; see ``Outcome``."""
+
+    status: Status
+    advice: str = ""
+
+
+class Stop(Exception):
+    """Ends a stage from within an evaluation."""
+
+    def __init__(self, status: Status, advice: str = "") -> None:
+        """Carry the verdict."""
+        super().__init__(status.value)
+        self.verdict = Verdict(status, advice)
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """All that a solve needs to go on: taken when an iteration is complete, never in its middle.
+
+    Attributes:
+        stage: index of the stage of smoothing.
+        state: the solver's own.
+        best: of this stage.
+        last: (n,) z of the last row of the trace.
+        counts, rows, seconds: the work up to here, and how many rows of the trace tell of it.
+    """
+
+    stage: int
+    state: object
+    best: Point
+    last: Array
+    counts: Counts
+    rows: int
+    seconds: float
+
+
+class Meter:
+    """Evaluates a problem at points inside its bounds.
+
+    ``value``, ``gradient``, ``residuals`` and ``jacobian`` raise Stop(MET) once a point meets everything, where the
+    problem asks to stop there; the point is ``best`` then.
+    """
+
+    def __init__(self, problem: ShootingProblem, monitor: Monitor | None = None) -> None:
+        """Nothing is evaluated yet."""
+        self.problem = problem
+        self.monitor = monitor
+        self.scale, self.lower, self.upper = (problem.stacked(field) for field in ("scale", "lower", "upper"))
+        self.counts = Counts()
+        self.rows: list[TraceRow] = []
+        self.best: Point | None = None
+        self.last: Array | None = None
+        self.stage, self.smoothing = 0, problem.smoothing
+        self.snapshot: Snapshot | None = None
+        self.began, self.earlier = time.perf_counter(), 0.0
+        self.calls: dict[str, Call] = {}
+
+    def enter(self, stage: int, smoothing: float, resumed: bool = False) -> None:
+        """Begin a stage, or go on with one; merits at another smoothing are not compared with those of this one."""
+        self.stage, self.smoothing = stage, smoothing
+        if not resumed:
+            self.best, self.last = None, None
+
+    def restore(self, snapshot: Snapshot, rows: Iterable[TraceRow]) -> None:
+        """Go on from a snapshot and its trace, as if there had been no break."""
+        self.snapshot, self.best, self.last = snapshot, snapshot.best, snapshot.last
+        self.counts, self.rows = replace(snapshot.counts), list(rows)
+        self.earlier, self.began = snapshot.seconds, time.perf_counter()
+
+    @property
+    def seconds(self) -> float:
+        """Since the solve began, breaks left out."""
+        return self.earlier + time.perf_counter() - self.began
+
+    def clip(self, z: Array) -> Array:
+        """The nearest point within the bounds."""
+        return np.clip(z, self.lower, self.upper)
+
+    def stationarity(self, z: Array, gradient: Array) -> float:
+        """Length of the step in z / scale that the projected gradient takes; 0 at a stationary point."""
+        return float(np.linalg.norm((self.clip(z - gradient * self.scale**2) - z) / self.scale))
+
+    def value(self, z: Array) -> Point:
+        """One rollout at z, which must lie within the bounds."""
+        return self.seen([self.rollout(z)])[0]
+
+    def values(self, population: Iterable[Array]) -> list[Point]:
+        """One rollout for each; stops at the end of the batch if one of them meets everything.
+
+        The one place where a batch is evaluated: a compiled batch of rollouts belongs here.
+        """
+        return self.seen([self.rollout(z) for z in population])
+
+    def gradient(self, z: Array) -> Point:
+        """One gradient at z."""
+        merit, objective, errors, gradient = self.call("gradient", self.problem.gradient)(z, self.smoothing)
+        self.counts.gradients += 1
+        return self.seen([self.point(z, merit[0], objective, errors, gradient=gradient)])[0]
+
+    def residuals(self, z: Array) -> Point:
+        """One rollout at z, with residuals."""
+        r, objective, errors = self.call("residuals", self.problem.residuals)(z, self.smoothing)
+        self.counts.rollouts += 1
+        return self.seen([self.point(z, float(r @ r), objective, errors, residuals=r)])[0]
+
+    def jacobian(self, z: Array) -> Point:
+        """One Jacobian of the residuals at z; the gradient comes with it."""
+        r, objective, errors, jacobian = self.call("jacobian", self.problem.jacobian)(z, self.smoothing)
+        jacobian = jacobian.reshape(r.size, z.size)
+        self.counts.jacobians += 1
+        parts = {"gradient": 2 * jacobian.T @ r, "residuals": r, "jacobian": jacobian}
+        return self.seen([self.point(z, float(r @ r), objective, errors, **parts)])[0]
+
+    def commit(self, point: Point, state: object, gradient_norm: float = math.nan, step: float = math.nan) -> None:
+        """End an iteration: a row of the trace, a snapshot, then the monitor, which may raise KeyboardInterrupt."""
+        best, self.last = self.best or point, point.z
+        work = (*astuple(self.counts), self.seconds)
+        numbers = (point.objective, best.objective, point.miss, gradient_norm, step, self.smoothing)
+        row = TraceRow(*(len(self.rows), *work, *numbers))
+        self.rows.append(row)
+        self.snapshot = Snapshot(self.stage, state, best, point.z, replace(self.counts), len(self.rows), row.seconds)
+        if self.monitor:
+            self.monitor(row)
+
+    def settle(self, first: int, work: Counts) -> None:
+        """For a library that tells its counts at the end only: add ``work`` to the rows from ``first`` on, evenly."""
+        share = len(self.rows) - first
+        for index in range(first, len(self.rows)):
+            part = scaled(work, (index - first + 1) / share)
+            self.rows[index] = replace(self.rows[index], **asdict(added(self.rows[index], part)))
+        self.counts = added(self.counts, work)
+        if self.snapshot:
+            last = self.rows[self.snapshot.rows - 1]
+            self.snapshot = replace(self.snapshot, counts=added(last, Counts()))
+
+    def call(self, name: str, function: Function) -> Call:
+        """The buffered function, made once."""
+        if name not in self.calls:
+            self.calls[name] = Call(function)
+        return self.calls[name]
+
+    def rollout(self, z: Array) -> Point:
+        """One rollout, not yet compared with the best."""
+        merit, objective, errors = self.call("value", self.problem.value)(z, self.smoothing)
+        self.counts.rollouts += 1
+        return self.point(z, merit[0], objective, errors)
+
+    def point(self, z: Array, merit: float, objective: Array, errors: Array, **parts: Array) -> Point:
+        """A point with its own copy of z."""
+        return Point(z.copy(), float(merit), float(objective[0]), errors, self.problem.met(errors), **parts)
+
+    def seen(self, points: list[Point]) -> list[Point]:
+        """Remember the best; Stop(MET) if it meets everything and the problem asks to stop there."""
+        for point in points:
+            if point.better(self.best):
+                self.best = point
+        if self.best and self.best.met and self.problem.stop_when_met:
+            raise Stop(Status.MET)
+        return points
+
+
+def scaled(counts: Counts, share: float) -> Counts:
+    """A share of the work, in whole evaluations."""
+    return Counts(*(round(number * share) for number in astuple(counts)))
+
+
+def added(row: TraceRow | Counts, work: Counts) -> Counts:
+    """The counts of a row and some more."""
+    return Counts(**{name: getattr(row, name) + number for name, number in asdict(work).items()})

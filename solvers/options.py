@@ -1,0 +1,37 @@
+"""Checks that the options of all solvers share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+from symphys.errors import SymphysError
+
+
+def require(holds: bool, name: str, valid: str) -> None:
+    """ValueError unless it holds: ``name`` must be ``valid``."""
+    if not holds:
+        raise ValueError(f"{name} must be {valid}")
+
+
+def at_least(lowest: float, **options: float) -> None:
+    """ValueError unless every option is at least ``lowest``; NaN never is."""
+    for name, value in options.items():
+        require(value >= lowest, name, f"at least {lowest:g}")
+
+
+def check_stages(smoothing: tuple[float, ...]) -> None:
+    """ValueError unless every stage of smoothing is a value that the knob can have."""
+    require(all(0 <= knob < math.inf for knob in smoothing), "smoothing", "finite numbers of at least 0")
+
+
+def nearest(name: str, valid: Iterable[str]) -> str:
+    """``did you mean 'tol'?``, or nothing where no valid name comes close."""
+    close = get_close_matches(name, list(valid))
+    return f"did you mean {' or '.join(map(repr, close))}?" if close else ""
+
+
+def refuse(solver: str, name: str, reason: str) -> SymphysError:
+    """The error for an option of a library that cannot be passed to it."""
+    return SymphysError(f"solver.{solver}.options.{name}: {reason}")

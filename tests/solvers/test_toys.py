@@ -1,0 +1,206 @@
+"""Every solver on every toy: the answer, the counts, the trace, the bounds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from toys import PENALTY, constrained, counted, quadratic, rosenbrock, solve, target, toy
+
+from symphys.solvers import SOLVERS, Status
+
+WAYS: list[tuple[str, dict[str, Any]]] = [
+    ("gradient", {}),
+    ("gradient", {"method": "gradient", "rates": (0.05,)}),
+    ("gradient", {"method": "momentum", "rates": (0.02,), "momentum": 0.5}),
+    ("gradient", {"method": "adam", "rates": (1.0, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001)}),
+    ("gradient", {"method": "adam", "backtracking": 0, "rates": (1.0, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001)}),
+    ("least_squares", {}),
+    ("ipopt", {}),
+    ("ipopt", {"hessian": "exact"}),
+    ("cma", {}),
+]
+IDS = [
+    f"{name}-{'-'.join(str(value) for value in options.values() if isinstance(value, str | int))}"
+    for name, options in WAYS
+]
+every_way = pytest.mark.parametrize(("name", "options"), WAYS, ids=IDS)
+every_solver = pytest.mark.parametrize("name", list(SOLVERS))
+
+
+@every_way
+def test_quadratic(name: str, options: dict[str, Any]) -> None:
+    found = solve(name, quadratic(), options=options)
+    assert found.z == pytest.approx([1, 2, 3], abs=1e-3)
+    assert found.status is not Status.MET
+
+
+@every_solver
+def test_converges_on_a_quadratic(name: str) -> None:
+    found = solve(name, quadratic())
+    assert (found.status, found.advice) == (Status.CONVERGED, "")
+    assert found.z == pytest.approx([1, 2, 3], abs=1e-5)
+
+
+@every_solver
+def test_rosenbrock(name: str) -> None:
+    found = solve(name, rosenbrock())
+    assert found.z == pytest.approx([1, 1], abs=1e-3)
+
+
+@every_way
+def test_target_is_met_and_the_solve_stops_there(name: str, options: dict[str, Any]) -> None:
+    problem = target()
+    found = solve(name, problem, options=options)
+    assert (found.status, found.advice) == (Status.MET, "")
+    errors = np.array(problem.value(found.z, 0)[2]).ravel()
+    assert problem.met(errors)
+    assert found.trace[-1].miss == pytest.approx(errors.max())
+    assert all(row.miss > 1 for row in found.trace[:-1])
+
+
+@every_solver
+def test_goes_on_past_met_where_asked_to(name: str) -> None:
+    found = solve(name, target(stop_when_met=False))
+    assert found.status is Status.CONVERGED
+    assert found.z == pytest.approx([2, -1], abs=1e-4)
+
+
+@every_way
+def test_bounds_hold_at_every_evaluation(name: str, options: dict[str, Any]) -> None:
+    lower, upper = 0.3, 1.7
+    problem, functions = counted(quadratic(bounds=(lower, upper), guess=0.5, scale=0.9))
+    found = solve(name, problem, options=options)
+    assert found.z == pytest.approx([1, upper, upper], abs=2e-3)
+    points = np.array([point for function in functions.values() for point in function.points])
+    assert np.all((points >= lower) & (points <= upper))
+
+
+@every_solver
+def test_start_outside_the_bounds_is_moved_inside(name: str) -> None:
+    problem = quadratic(bounds=(0.0, 5.0))
+    found = SOLVERS[name].solve(problem, np.array([-3.0, 9.0, 1.0]), SOLVERS[name].Options())
+    assert found.trace[0].objective == pytest.approx(float(problem.value([0, 5, 1], 0)[0]))
+    assert found.z == pytest.approx([1, 2, 3], abs=1e-4)
+
+
+@every_solver
+def test_equal_bounds_hold_a_variable(name: str) -> None:
+    problem = toy(1, lambda z, s: z - 1, bounds=(3.0, 3.0), guess=3.0)
+    assert solve(name, problem).z == pytest.approx([3.0], abs=0)
+
+
+def test_ipopt_meets_the_constraint_exactly() -> None:
+    for hessian in ("exact", "limited-memory"):
+        found = solve("ipopt", constrained(), options={"hessian": hessian})
+        assert found.status is Status.CONVERGED
+        assert found.z == pytest.approx([1, 0], abs=1e-7)
+        assert found.counts.jacobians > 0
+
+
+@pytest.mark.parametrize("name", ["gradient", "least_squares", "cma"])
+def test_the_others_follow_the_penalty(name: str) -> None:
+    found = solve(name, constrained())
+    assert found.z == pytest.approx(np.array([1, 0]) + 1 / (1 + 2 * PENALTY), abs=1e-4)
+    assert found.status is Status.CONVERGED
+    assert "not everything is met" in found.advice
+
+
+@every_solver
+def test_scale_changes_the_way_not_the_answer(name: str) -> None:
+    for scale in (1e-2, 1e2):
+        assert solve(name, quadratic(scale=scale)).z == pytest.approx([1, 2, 3], abs=1e-2)
+
+
+@pytest.mark.parametrize("name", ["gradient", "least_squares"])
+@pytest.mark.parametrize("problem", [quadratic(), rosenbrock(), target()], ids=["quadratic", "rosenbrock", "target"])
+def test_counts(name: str, problem: Any) -> None:
+    watched, functions = counted(problem)
+    found = solve(name, watched)
+    assert found.counts.rollouts == functions["value"].count + functions["residuals"].count
+    assert found.counts.gradients == functions["gradient"].count
+    assert found.counts.jacobians == functions["jacobian"].count
+    assert found.counts.hessians == 0
+
+
+def test_counts_of_cma_are_whole_generations_and_the_guess() -> None:
+    watched, functions = counted(target())
+    found = solve("cma", watched, options={"population": 10})
+    assert found.counts.rollouts == functions["value"].count
+    assert found.counts.rollouts == 1 + 10 * (len(found.trace) - 1)
+
+
+@pytest.mark.parametrize("hessian", ["exact", "limited-memory"])
+def test_counts_of_ipopt_are_its_own_and_one_rollout_an_iterate(hessian: str) -> None:
+    lines: list[str] = []
+    watched, functions = counted(constrained())
+    unscaled = {"nlp_scaling_method": "none"}  # scaling takes a gradient that IPOPT's text does not tell of
+    found = solve("ipopt", watched, options={"hessian": hessian, "options": unscaled}, log=lines.append)
+    told = {
+        line.split("=")[0].strip(): int(line.split("=")[1])
+        for line in lines
+        if line.startswith("Number of") and "=" in line
+    }
+    rollouts = told["Number of objective function evaluations"] + told["Number of equality constraint evaluations"]
+    assert found.counts.gradients == told["Number of objective gradient evaluations"]
+    assert found.counts.jacobians == told["Number of equality constraint Jacobian evaluations"]
+    assert found.counts.hessians == (told["Number of Lagrangian Hessian evaluations"] if hessian == "exact" else 0)
+    assert found.counts.rollouts == rollouts + functions["value"].count
+
+
+@every_way
+def test_trace(name: str, options: dict[str, Any]) -> None:
+    seen = []
+    found = solve(name, target(), options=options, monitor=seen.append)
+    assert [row.iteration for row in found.trace] == list(range(len(found.trace)))
+    assert [row.iteration for row in seen] == list(range(len(seen)))
+    assert found.trace[0].objective == pytest.approx(float(target().value(np.zeros(2), 0)[1]))
+    for field in ("rollouts", "gradients", "jacobians", "hessians", "seconds"):
+        numbers = [getattr(row, field) for row in found.trace]
+        assert numbers == sorted(numbers)
+        if field != "seconds":
+            assert numbers[-1] == getattr(found.counts, field)
+    assert found.trace[-1].best == found.trace[-1].objective
+
+
+@every_solver
+def test_nothing_is_printed_read_or_written(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "ipopt.opt").write_text("max_iter 1\n")
+    (tmp_path / "cma_signals.in").write_text("{'maxiter': 1}\n")
+    assert solve(name, quadratic()).status is Status.CONVERGED
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cma_signals.in", "ipopt.opt"]
+    assert capfd.readouterr() == ("", "")
+
+
+@every_solver
+def test_a_seed_means_the_same_twice(name: str) -> None:
+    runs = [solve(name, target(), seed=seed) for seed in (3, 3, 4)]
+    assert np.array_equal(runs[0].z, runs[1].z)
+    assert not np.array_equal(runs[0].z, runs[2].z)
+    assert all(run.status is Status.MET for run in runs)
+
+
+def test_cma_leaves_the_global_random_stream_alone() -> None:
+    np.random.seed(7)
+    before = np.random.get_state()[1].copy()
+    solve("cma", target())
+    assert np.array_equal(before, np.random.get_state()[1])
+
+
+@every_solver
+def test_stages_of_smoothing(name: str) -> None:
+    """The answer moves with the knob: x = 1 + s; what is met at s > 0 is no end."""
+    problem = toy(1, lambda z, s: z - 1 - s, errors=lambda z, s: ca.fabs(z - 1 - s) / 1e-3, guess=5.0, smoothing=0.25)
+    found = solve(name, problem, options={"smoothing": (1.0, 0.1, 0.0)})
+    assert found.status is Status.MET
+    assert found.z == pytest.approx([1.0], abs=1e-3)
+    knobs = [row.smoothing for row in found.trace]
+    assert sorted(set(knobs), reverse=True) == [1.0, 0.1, 0.0]
+    assert knobs == sorted(knobs, reverse=True)
+    assert solve(name, problem).z == pytest.approx([1.25], abs=1e-3)
