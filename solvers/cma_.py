@@ -2,7 +2,9 @@
 
 A generation is evaluated as one batch; if a candidate of it meets every target, the solve stops at the end of that
 generation, and all of its rollouts count. There are no restarts. Candidates whose simulation is not finite rank last.
-pycma's own options pass through ``options``; it prints nothing, and reads and writes no files.
+pycma's own options pass through ``options``; it prints nothing, and reads and writes no files. One default is not
+pycma's: ``tolflatfitness`` is 50. Generations whose merits are all the same are no convergence but a plateau (see
+``plateau``), which the search leaves as its candidates spread; pycma gives up on the second one.
 
 A solve goes on by replay: the strategy is asked again from the same random stream and told the recorded merits, so
 that mean, step size, covariance and paths are the same to the last bit under any options, at the cost of no rollout.
@@ -18,11 +20,12 @@ import numpy as np
 
 from symphys.shooting import ShootingProblem
 from symphys.solvers.checkpoint import damaged
-from symphys.solvers.cma_strategy import Strategy, Trail
+from symphys.solvers.cma_strategy import PLATEAU, Strategy, Trail
 from symphys.solvers.interface import Log, Solver
 from symphys.solvers.meter import Meter, Point, Verdict
 from symphys.solvers.options import at_least, check_stages, require
 from symphys.solvers.outcome import Array, Monitor, Outcome, Status
+from symphys.solvers.plateau import FLAT
 from symphys.solvers.session import Request, begin, converged, run
 
 BUDGETS = {"maxiter", "timeout"}
@@ -106,6 +109,8 @@ def ended(meter: Meter, options: CmaOptions, strategy: Strategy) -> Verdict | No
         return None
     if reasons & BUDGETS:
         return Verdict(Status.BUDGET, BUDGET)
+    if PLATEAU in reasons:
+        return Verdict(Status.STALLED, FLAT)
     return converged(meter) if reasons & CONVERGED else Verdict(Status.STALLED, STALLED.format(", ".join(reasons)))
 
 

@@ -31,6 +31,12 @@ RESERVED = {
 TEXTS = {"BoundaryHandler": ("BoundTransform", "BoundPenalty")}
 """The options that take a name of pycma's, and which. It evaluates any other text as Python: so none can be allowed."""
 QUIET = {"verbose": -9, "verb_log": 0, "verb_disp": 0, "signals_filename": "", "seed": math.nan}
+PLATEAU = "tolflatfitness"
+"""The criterion that ends a search on a plateau: more generations in a row without a difference than this option."""
+DEFAULTS = {PLATEAU: 50}
+"""Where pycma's own default is not used."""
+CONFUSED = {"tolfun", "tolfunhist", "tolfunrel", "flat fitness"}
+"""Criteria that take a plateau for convergence."""
 DRIFTED = "this checkpoint leads elsewhere with the present versions of pycma and numpy: start afresh without it"
 
 
@@ -70,7 +76,7 @@ class Strategy:
         self.start, self.scale, self.free = start, meter.scale, meter.lower < meter.upper
         bounds = [sides(bound / meter.scale, self.free) for bound in (meter.lower, meter.upper)]
         named = {name: getattr(cma, options[name]) for name in TEXTS if name in options}
-        own = {**options, **named, **QUIET, "bounds": bounds, "randn": self.draw}
+        own = {**DEFAULTS, **options, **named, **QUIET, "bounds": bounds, "randn": self.draw}
         if population:
             own["popsize"] = population
         with pycma():
@@ -97,7 +103,9 @@ class Strategy:
     def stopped(self) -> set[str]:
         """Which of pycma's own criteria hold."""
         with pycma():
-            return set(self.es.stop())
+            reasons = set(self.es.stop())
+        plateau = bool(self.merits) and min(self.merits[-1]) == max(self.merits[-1])
+        return reasons - CONFUSED if plateau else reasons
 
     def trail(self) -> Trail:
         """The way so far."""
@@ -106,6 +114,7 @@ class Strategy:
     def follow(self, trail: Trail) -> None:
         """Replay; SymphysError if it does not lead where it led."""
         for merits in trail.merits:
+            self.stopped()  # pycma counts the generations of a plateau there
             self.ask()
             self.tell(merits)
         same = self.es.mean.shape == trail.mean.shape and np.allclose(self.es.mean, trail.mean, rtol=1e-6)

@@ -3,6 +3,7 @@
 ``directions`` has the methods. A direction is projected into the bounds, then shortened until the merit is below the
 largest of the last few (``backtracking``; Grippo, Lampariello, Lucidi 1986; with bounds and the spectral step this is
 the SPG2 of Birgin, Martinez, Raydan 2000). A direction that does not descend is replaced by that of an empty memory.
+A step onto a plateau is refused and shortened, see ``plateau``.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from symphys.solvers.line_search import ROUNDING, backtrack
 from symphys.solvers.meter import Meter, Point, Verdict
 from symphys.solvers.options import at_least, check_stages, require
 from symphys.solvers.outcome import Array, Monitor, Outcome, Status
+from symphys.solvers.plateau import REFUSALS, SHORTER, lost
 from symphys.solvers.probe import believed
 from symphys.solvers.progress import Progress
 from symphys.solvers.session import Request, begin, not_finite, run
@@ -50,7 +52,7 @@ class GradientOptions:
 
     Attributes:
         method: "spectral", "gradient", "momentum" or "adam".
-        iterations: at most, one gradient each, in each stage of smoothing.
+        iterations: at most, one gradient each (more where a plateau is refused), in each stage of smoothing.
         rates: of learning, each for an equal share of the iterations; () stands for the method's own. Gradient and
             momentum: factors on the scaled gradient. Adam: steps in units of scale. Spectral: one number, the length
             of the first step in units of scale.
@@ -58,7 +60,7 @@ class GradientOptions:
         betas: of Adam: share of the mean gradient and of its mean square that is kept.
         clip: largest norm of the scaled gradient; a longer one is shortened to it.
         backtracking: compare the merit with the largest of this many last ones; 1 is Armijo's rule,
-            0 takes every step as it comes.
+            0 takes every step as it comes, plateaus too.
         tolerance: converged where the projected scaled gradient is below tolerance * (1 + |merit|).
         patience: stalled where the merit has not fallen by 1e-5 of itself in so many iterations at the last of the
             rates; 0 goes on regardless.
@@ -173,12 +175,12 @@ def advance(meter: Meter, options: GradientOptions, state: State) -> State | Ver
     """One step: direction, line search, new gradient."""
     g = shortened(state.gradient * meter.scale, options.clip)
     step, memory = direction(meter, options, state, g)
-    z = search(meter, options, state, step)
-    if isinstance(z, Verdict):
-        return z
-    point = meter.gradient(z)
+    point = follow(meter, options, state, step)
+    if isinstance(point, Verdict):
+        return point
     if not point.finite:
         return not_finite(point, NOT_FINITE)
+    z = point.z
     if options.method == "spectral":
         memory = learn_length(memory, (z - state.z) / meter.scale, (point.gradient - state.gradient) * meter.scale)
     merits = (*state.merits, point.merit)[-max(options.backtracking, 1) :]
@@ -196,6 +198,20 @@ def direction(meter: Meter, options: GradientOptions, state: State, g: Array) ->
         if state.gradient @ step < 0 or not options.backtracking:
             break
     return step, memory
+
+
+def follow(meter: Meter, options: GradientOptions, state: State, step: Array) -> Point | Verdict:
+    """The next point with its gradient; one on a plateau is refused a few times, and the step shortened."""
+    plateau: Point | None = None
+    for _ in range(REFUSALS + 1):
+        z = search(meter, options, state, step)
+        if isinstance(z, Verdict):
+            return plateau or z
+        point = meter.gradient(z)
+        if not (options.backtracking and point.finite and lost(meter, point, point.gradient, state.gradient)):
+            return point
+        plateau, step = point, SHORTER * (z - state.z)
+    return point
 
 
 def search(meter: Meter, options: GradientOptions, state: State, step: Array) -> Array | Verdict:

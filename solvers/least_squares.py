@@ -3,6 +3,7 @@
 Each step solves (J'J + lambda I) d = -J'r over the variables that are free: those at a bound that the gradient
 pushes against are held (active set), and the step is projected into the bounds. lambda follows the gain ratio, the
 decrease of the merit over that of the linear model (Nielsen 1999; Madsen, Nielsen, Tingleff 2004, algorithm 3.16).
+A step onto a plateau is refused like one that raises the merit, see ``plateau``.
 
 Why not scipy.optimize.least_squares: it can be stopped between iterations but not at the first point that meets the
 targets, and its trust region cannot be set when a solve goes on, so an interrupted solve would end elsewhere.
@@ -25,6 +26,7 @@ from symphys.solvers.line_search import ROUNDING
 from symphys.solvers.meter import Meter, Point, Verdict
 from symphys.solvers.options import at_least, check_stages, require
 from symphys.solvers.outcome import Array, Monitor, Outcome, Status
+from symphys.solvers.plateau import REFUSALS, lost
 from symphys.solvers.probe import believed
 from symphys.solvers.progress import Progress
 from symphys.solvers.session import Request, begin, not_finite, run
@@ -53,7 +55,7 @@ class LeastSquaresOptions:
     """Options of Levenberg-Marquardt.
 
     Attributes:
-        iterations: Jacobians at most, in each stage of smoothing.
+        iterations: Jacobians at most (more where a plateau is refused), in each stage of smoothing.
         damping: first lambda, as a share of the largest squared column of the first scaled Jacobian.
         tolerance: converged where the projected scaled gradient is below tolerance * (1 + merit), or where no column
             of the Jacobian is nearer to the residuals than this cosine.
@@ -159,7 +161,7 @@ def finished(meter: Meter, options: LeastSquaresOptions, state: State) -> Verdic
 
 def advance(meter: Meter, state: State) -> State | Verdict:
     """One step that lowers the merit, and the Jacobian there."""
-    first_try = True
+    first_try, refused = True, 0
     while state.damping <= state.stiffest:
         z, promised = candidate(meter, state)
         if first_try and promised <= ROUNDING * state.merit:
@@ -167,7 +169,10 @@ def advance(meter: Meter, state: State) -> State | Verdict:
         trial, first_try = meter.residuals(z), False
         gain = (state.merit - trial.merit) / promised if promised > 0 else -math.inf
         if trial.finite and gain > WORTH:
-            return accept(meter, state, z, gain)
+            point = meter.jacobian(z)
+            if refused == REFUSALS or not (point.finite and lost(meter, point, point.jacobian, state.jacobian)):
+                return accept(meter, state, point, gain)
+            refused += 1
         state = replace(state, damping=state.damping * state.growth, growth=2 * state.growth)
     return Verdict(Status.STALLED, STALLED) if trial.finite else not_finite(trial, NOT_FINITE)
 
@@ -193,16 +198,15 @@ def damped_step(jacobian: Array, r: Array, damping: float) -> Array:
     return np.asarray(-jacobian.T @ scipy.linalg.cho_solve(factor, r))
 
 
-def accept(meter: Meter, state: State, z: Array, gain: float) -> State | Verdict:
+def accept(meter: Meter, state: State, point: Point, gain: float) -> State | Verdict:
     """Take the step; lambda falls with the gain ratio."""
-    point = meter.jacobian(z)
     if not point.finite:
         return not_finite(point, NOT_FINITE)
     damping = state.damping * max(LOOSEST, 1 - (2 * gain - 1) ** 3)
     evaluated = (point.z, point.residuals, point.jacobian)
     progress = state.progress.after(point.merit)
     taken = State(state.iteration + 1, *evaluated, damping, 2.0, state.stiffest, progress)
-    return complete(meter, point, taken, float(np.linalg.norm(z - state.z)))
+    return complete(meter, point, taken, float(np.linalg.norm(point.z - state.z)))
 
 
 def movable(meter: Meter, state: State) -> NDArray[np.bool_]:

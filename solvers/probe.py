@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from symphys.solvers.meter import Meter, Verdict
 from symphys.solvers.outcome import Array, Status
+from symphys.solvers.plateau import STEP, direction
 from symphys.solvers.session import converged
 
-STEP = 1e-4
-"""Length of the step to either side, in x = z / scale."""
 SLACK = 1e-3
 """A slope below it, relative to 1 + |merit|, is none: differences of kinked merits are no better."""
 TILTED = (
@@ -25,9 +22,3 @@ def believed(meter: Meter, z: Array, merit: float) -> Verdict:
     ahead, behind = meter.value(z + step), meter.value(z - step)
     slope = abs(ahead.merit - behind.merit) / (2 * STEP)
     return Verdict(Status.STALLED, TILTED) if slope > SLACK * (1 + abs(merit)) else converged(meter)
-
-
-def direction(n: int) -> Array:
-    """A unit vector (n,), always the same, with no component that is special."""
-    u = np.random.default_rng(0).standard_normal(n)
-    return np.asarray(u / np.linalg.norm(u))

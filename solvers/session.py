@@ -12,6 +12,7 @@ from symphys.solvers.checkpoint import from_checkpoint, to_checkpoint
 from symphys.solvers.interface import Log
 from symphys.solvers.meter import Meter, Point, Stop, Verdict
 from symphys.solvers.outcome import Array, Monitor, Outcome, Status
+from symphys.solvers.plateau import FLAT, flat
 
 FINISHED: dict[str, object] = {}
 """The state of a stage that has nothing left to do."""
@@ -131,9 +132,13 @@ def not_finite(point: Point, advice: str) -> Verdict:
 
 
 def converged(meter: Meter) -> Verdict:
-    """A stationary point, with advice where the best point misses something."""
+    """A stationary point, with advice where the best point misses something or lies on a plateau."""
     best = meter.best
-    return Verdict(Status.CONVERGED, MISSED if best and best.errors.size and not best.met else "")
+    if best is None or best.met:
+        return Verdict(Status.CONVERGED)
+    if flat(meter, best.z):
+        return Verdict(Status.CONVERGED, FLAT)
+    return Verdict(Status.CONVERGED, MISSED if best.errors.size else "")
 
 
 def silent(line: str) -> None:
