@@ -32,6 +32,7 @@ def shooting(distance: int = 10) -> ShootingProblem:
 def solve(problem: ShootingProblem, name: str, seed: int = 0) -> tuple[bool, Counts, float]:
     """(met, counts, seconds) of one solve with the solver's defaults."""
     chosen = solver(name)
+    chosen.prepare()
     began = perf_counter()
     outcome = chosen.solve(problem, problem.start(seed), chosen.Options(), seed)
     return outcome.status is Status.MET, outcome.counts, perf_counter() - began

@@ -20,7 +20,7 @@ import numpy as np
 
 from symphys.shooting import ShootingProblem
 from symphys.solvers.checkpoint import damaged
-from symphys.solvers.cma_strategy import PLATEAU, Strategy, Trail
+from symphys.solvers.cma_strategy import PLATEAU, Strategy, Trail, load
 from symphys.solvers.interface import Log, Solver
 from symphys.solvers.meter import Meter, Point, Verdict
 from symphys.solvers.options import at_least, check_stages, require
@@ -142,4 +142,9 @@ def read_trail(saved: dict[str, Any]) -> Trail:
         raise damaged(error) from error
 
 
-CMA = Solver("cma", "CMA-ES by pycma, without derivatives", CmaOptions, solve)
+def prepare() -> None:
+    """Import pycma."""
+    load()
+
+
+CMA = Solver("cma", "CMA-ES by pycma, without derivatives", CmaOptions, solve, prepare)

@@ -69,8 +69,7 @@ class Strategy:
         stream: np.random.Generator,
     ) -> None:
         """Begin at ``start`` (n,) with the standard deviation ``sigma``; SymphysError for options that cannot be."""
-        import cma  # takes a second to import, so only those who use it wait
-
+        cma = load()
         check(options, cma.CMAOptions.defaults())
         self.stream = stream
         self.start, self.scale, self.free = start, meter.scale, meter.lower < meter.upper
@@ -131,6 +130,13 @@ class Strategy:
         z = self.start.copy()
         z[self.free] = np.asarray(x) * self.scale[self.free]
         return z
+
+
+def load() -> Any:
+    """Pycma, which takes a second or two to import the first time: so only those who use it wait."""
+    import cma
+
+    return cma
 
 
 def check(options: Mapping[str, Any], defaults: Mapping[str, Any]) -> None:

@@ -46,6 +46,10 @@ class Solve(Protocol[O_contra]):
         ...
 
 
+def nothing() -> None:
+    """What most solvers need to load."""
+
+
 @dataclass(frozen=True)
 class Solver(Generic[O_inv]):
     """A solver: its name, its options and what it does.
@@ -55,9 +59,12 @@ class Solver(Generic[O_inv]):
         summary: one line for people.
         Options: frozen dataclass of plain values, each with a default; ValueError where a value cannot be.
         solve: see ``Solve``.
+        prepare: loads what ``solve`` needs, such as a library, so that who times solves can leave it out; ``solve``
+            works without, and a second call costs nothing.
     """
 
     name: str
     summary: str
     Options: type[O_inv]
     solve: Solve[O_inv]
+    prepare: Callable[[], None] = nothing

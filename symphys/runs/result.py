@@ -54,7 +54,7 @@ class Result:
         counts: evaluations by kind.
         price: measured cost of one evaluation by kind, in rollouts.
         equivalents: the whole work in rollouts.
-        seconds: wall time of "build", "compile" and "solve".
+        seconds: wall time of "build", "compile" and "solve"; what a solver loads beforehand is in none of them.
         trust: how far the solution can be trusted.
         versions: of everything that took part.
         when: UTC time of the end, ISO 8601.

@@ -53,8 +53,10 @@ def solve(
     shooting = transcription.shooting
     start = shooting.start(job.config.seed)
     files.write_npz(job.folder.path / GUESS, transcription.simulate(start).arrays())
+    chosen = solver(job.config.solver)
+    chosen.prepare()
     began = time.perf_counter()
-    outcome = solver(job.config.solver).solve(
+    outcome = chosen.solve(
         shooting, start, job.options, job.config.seed, monitor=monitor, checkpoint=checkpoint, log=log
     )
     spent = time.perf_counter() - began + (((earlier and earlier.seconds) or {}).get("solve", 0.0))

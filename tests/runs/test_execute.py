@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import csv
+import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from symphys import files
+from symphys import files, solvers
 from symphys.runs import Job, Result, execute
 from symphys.runs.workshop import Workshop
 from symphys.solvers import TraceRow
@@ -89,6 +91,20 @@ def test_the_trace_has_a_row_per_iteration_with_its_work(make_job: MakeJob) -> N
     assert [int(row["iteration"]) for row in rows] == [0, 1, 2, 3]
     assert float(rows[-1]["equivalents"]) == result.equivalents
     assert rows[0]["gradient_norm"] == "nan"
+
+
+def test_what_a_solver_loads_is_no_part_of_its_time(make_job: MakeJob, monkeypatch: pytest.MonkeyPatch) -> None:
+    prepared = []
+
+    def prepare() -> None:
+        time.sleep(0.5)
+        prepared.append(time.perf_counter())
+
+    monkeypatch.setitem(solvers.SOLVERS, "told", replace(solvers.SOLVERS["told"], prepare=prepare))
+    result = run(make_job())
+    assert len(prepared) == 1
+    assert result.seconds is not None
+    assert sum(result.seconds.values()) < 0.5
 
 
 def test_a_run_that_misses_is_not_solved(make_job: MakeJob) -> None:

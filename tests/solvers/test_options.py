@@ -140,6 +140,19 @@ def test_rates_share_the_iterations() -> None:
     assert [row.step for row in found.trace[1:]] == pytest.approx([0.5 * 3**0.5] * 2 + [0.05 * 3**0.5] * 2, rel=1e-6)
 
 
+def test_pycma_is_loaded_by_prepare_and_not_before() -> None:
+    tell = "'cma' in sys.modules"
+    code = f"import sys; from symphys.solvers import solver; print({tell}); solver('cma').prepare(); print({tell})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "True"]
+
+
+@every_solver
+def test_prepared_twice_is_no_different(name: str) -> None:
+    solver(name).prepare()
+    solver(name).prepare()
+
+
 def test_imported_by_another_name_says_so(tmp_path: Path) -> None:
     folder = Path(sys.modules["symphys.solvers"].__file__ or "").resolve().parent
     done = subprocess.run(
