@@ -21,6 +21,7 @@ TOLERANCE = 1e-4
 @settings_option
 def check(source: str, assignments: tuple[str, ...]) -> int:
     """Validate a problem file, and compare its gradient at the guess with central differences."""
+    from symphys.problem import require_solvable
     from symphys.runs import check_tables
     from symphys.transcription import transcribe
     from symphys.trust import compare_gradient
@@ -28,6 +29,7 @@ def check(source: str, assignments: tuple[str, ...]) -> int:
     (problem,) = read_problems([source], read_settings(assignments))
     check_tables(problem)
     click.echo("\n".join(describe(problem)))
+    require_solvable(problem)
     transcription = transcribe(problem)
     compared = compare_gradient(transcription, transcription.shooting.start(0))
     wrong = [row["variable"] for row in compared if not row["error"] <= TOLERANCE]

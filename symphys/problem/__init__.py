@@ -4,6 +4,7 @@ from symphys.problem.json_schema import json_schema
 from symphys.problem.load import load_problem
 from symphys.problem.model import Constraint, Cost, Problem, Simulation, Slot, Target, Variable
 from symphys.problem.options import require_solvers, validate_options
+from symphys.problem.solvable import require_solvable
 
 __all__ = [
     "Constraint",
@@ -15,6 +16,7 @@ __all__ = [
     "Variable",
     "json_schema",
     "load_problem",
+    "require_solvable",
     "require_solvers",
     "validate_options",
 ]

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from symphys.expression import Formula, parse
-from symphys.problem import Problem, require_solvers, validate_options
+from symphys.problem import Problem, require_solvable, require_solvers, validate_options
 from symphys.runs.config import Config, make_config
 from symphys.runs.folder import RunFolder
 from symphys.solvers import SOLVERS, solver
@@ -50,10 +50,14 @@ def make_jobs(
     out: Path,
     command: str = "",
 ) -> list[Job]:
-    """Every problem with every solver and seed, below the folder ``out``; ProblemError for bad solver options."""
+    """Every problem with every solver and seed, below the folder ``out``.
+
+    ProblemError for a problem without variables or aims, and for bad solver options.
+    """
     seeds = tuple(seeds)
     jobs = []
     for problem in problems:
+        require_solvable(problem)
         check_tables(problem)
         for name in solvers:
             options = solver_options(problem, name)

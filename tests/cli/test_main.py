@@ -13,63 +13,12 @@ from pathlib import Path
 import pytest
 
 import symphys
-from symphys.cli import main
 from symphys.runs import read_result
 
-THROW = """
-title = "A short throw"
-[simulation]
-duration = 0.2
-dt = 0.02
-[[body]]
-name = "ball"
-shape = {{ sphere = {{ radius = 0.1 }} }}
-mass = 1.0
-position = [0, 0, 1]
-[ground]
-[[variable]]
-name = "throw"
-sets = "ball.velocity[0:2]"
-guess = [1, 0]
-upper = {upper}
-[[target]]
-name = "is at half a metre"
-value = "ball.position[0:2] - [0.5, 0]"
-tolerance = 0.01
-"""
 LONG = ("--set", "simulation.dt=1e-4", "--set", "objective.stop=converged")
 """Makes of a throw a solve of several seconds."""
 
 Run = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def throw(tmp_path: Path) -> Path:
-    path = tmp_path / "throw.toml"
-    path.write_text(THROW.format(upper=10), encoding="utf-8")
-    return path
-
-
-@pytest.fixture
-def unreachable(tmp_path: Path) -> Path:
-    path = tmp_path / "unreachable.toml"
-    path.write_text(THROW.format(upper=1.5), encoding="utf-8")
-    return path
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
-    """Run a command line in an empty folder: (exit code, stdout, stderr)."""
-    (tmp_path / "here").mkdir()
-    monkeypatch.chdir(tmp_path / "here")
-
-    def call(*arguments: object) -> tuple[int, str, str]:
-        code = main([str(argument) for argument in arguments])
-        printed = capsys.readouterr()
-        assert "Traceback" not in printed.out + printed.err
-        return code, printed.out, printed.err
-
-    return call
 
 
 def test_a_solved_problem_exits_0_with_table_and_report(run: Run, throw: Path) -> None:
