@@ -93,7 +93,7 @@ class Motion:
     mid_momentum: Expr
     inverse_mid: Expr
     inverse_rate: Expr | None
-    dt: float
+    dt: Expr
 
     def inverse_inertia(self, t: Expr) -> Expr:
         """World-frame inverse inertia at time t in the step, to first order; scalar if isotropic."""
@@ -153,7 +153,7 @@ def inverse_inertia(body: Body, r_wb: Expr) -> Expr:
     return ca.mtimes(r_wb, ca.mtimes(ca.inv_minor(inertia_matrix(body)), r_wb.T))
 
 
-def free_motion(body: Body, state: BodyState, gravity: Expr, dt: float) -> Motion:
+def free_motion(body: Body, state: BodyState, gravity: Expr, dt: Expr) -> Motion:
     """The motion from ``state`` under gravity, force and torque, all constant over the step."""
     acceleration = gravity + state.force / body.mass
     mid_momentum = state.angular_momentum + dt / 2 * state.torque

@@ -43,7 +43,7 @@ def sphere_plane(pair: Pair, motion: Motion, sphere: Sphere, plane: Plane) -> Co
     )
 
 
-def first_root(gap: Expr, rate: Expr, bend: Expr, dt: float) -> Expr:
+def first_root(gap: Expr, rate: Expr, bend: Expr, dt: Expr) -> Expr:
     """The first t in [0, dt] with gap + rate t + bend t^2/2 = 0; 0 when overlapping, dt when there is none."""
     discriminant = ca.fmax(rate * rate - 2 * bend * gap, 0)
     closing = ca.fmax(ca.sqrt(discriminant + TINY_SQUARE) - rate, TINY_RATE)

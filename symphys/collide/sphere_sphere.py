@@ -49,7 +49,7 @@ def sphere_sphere(pair: Pair, motions: tuple[Motion, Motion], spheres: tuple[Sph
     )
 
 
-def first_touch(path: Parabola, reach: Expr, dt: float) -> Expr:
+def first_touch(path: Parabola, reach: Expr, dt: Expr) -> Expr:
     """The first t in [0, dt] with |path(t)| = reach; 0 when overlapping, dt when there is none.
 
     Exact for uniform relative motion; relative acceleration enters by Newton steps on |path|^2 - reach^2.
@@ -67,7 +67,7 @@ def first_touch(path: Parabola, reach: Expr, dt: float) -> Expr:
     return ca.if_else(falls(distance - reach, -closing / distance), t, 0)
 
 
-def _meets(path: Parabola, reach: Expr, dt: float) -> Expr:
+def _meets(path: Parabola, reach: Expr, dt: Expr) -> Expr:
     """1 if the spheres overlap at the end of the step, or at their closest approach on the way."""
     closing, speed2 = -ca.dot(path.start, path.velocity), ca.dot(path.velocity, path.velocity)
     nearest = path.at(ca.fmin(ca.fmax(closing, 0) / (speed2 + TINY_SQUARE), dt))

@@ -27,7 +27,7 @@ class Simulation:
     Attributes:
         duration: [s], a whole number of steps.
         dt: time step [s].
-        sweeps, position_sweeps, warm_start, push_out, time_of_impact, impact_friction: as in symphys.world.Scheme.
+        sweeps, position_sweeps, warm_start, push_out, time_of_impact, impact_friction, split: as in world.Scheme.
         smoothing: [m/s] the knob that solvers use unless told otherwise; 0 is the exact contact law.
     """
 
@@ -40,6 +40,7 @@ class Simulation:
     push_out: float = 1.0
     time_of_impact: bool = True
     impact_friction: bool = True
+    split: bool = True
 
     @property
     def steps(self) -> int:
@@ -56,6 +57,7 @@ class Simulation:
             warm_start=self.warm_start,
             time_of_impact=self.time_of_impact,
             impact_friction=self.impact_friction,
+            split=self.split,
         )
 
 

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import copyreg
 import dataclasses
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from symphys.expression import Formula, parse
 from symphys.problem import Problem, require_solvable, require_solvers, validate_options
 from symphys.runs.config import Config, make_config
 from symphys.runs.folder import RunFolder
 from symphys.solvers import SOLVERS, solver
-
-copyreg.pickle(Formula, lambda formula: (parse, (formula.text,)))  # a job goes to other processes with its formulas
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import casadi as ca
 
 from symphys.motion import apply
 from symphys.smooth import onto_disc, positive
-from symphys.step.rows import ContactRow, Side
+from symphys.step.row import ContactRow, Side
 
 Expr = Any
 """casadi SX, MX or DM"""

@@ -10,7 +10,7 @@ import casadi as ca
 from symphys.collide.contact import Shift
 from symphys.motion import Motion, apply
 from symphys.step.pgs import Impulse, Momenta
-from symphys.step.rows import ContactRow
+from symphys.step.row import ContactRow
 from symphys.world import Scheme
 
 Expr = Any
@@ -18,11 +18,16 @@ Expr = Any
 
 
 def displacements(
-    rows: Sequence[ContactRow], impulses: Sequence[Impulse], momenta: Momenta, motions: Sequence[Motion], scheme: Scheme
+    rows: Sequence[ContactRow],
+    impulses: Sequence[Impulse],
+    momenta: Momenta,
+    motions: Sequence[Motion],
+    scheme: Scheme,
+    duration: Expr,
 ) -> dict[int, Shift]:
-    """Dt times the new velocities, less t* times the velocity change of each impact: until t* it had not happened."""
-    linear = [scheme.dt * v for v in momenta.velocity]
-    angular = [scheme.dt * apply(m.inverse_mid, momentum) for m, momentum in zip(motions, momenta.angular, strict=True)]
+    """Duration times the new velocities, less t* times what each impact changed: until t* it had not happened."""
+    linear = [duration * v for v in momenta.velocity]
+    angular = [duration * apply(m.inverse_mid, momentum) for m, momentum in zip(motions, momenta.angular, strict=True)]
     for row, impulse in zip(rows, impulses, strict=True):
         if not scheme.time_of_impact:
             continue

@@ -1,4 +1,4 @@
-"""What the sweeps need to know of a contact, worked out once a step.
+"""What the sweeps need to know of a contact over a stretch of time, worked out once.
 
 Formulas: ARCHITECTURE.md, "The time step". Letters: t* instant of touch, s = dt - t* what is left of the step,
 n normal, r arms, v* velocity of approach at t*, f* relative acceleration of the touching points there,
@@ -8,16 +8,15 @@ u rebound speed, chi in [0, 1]: 1 where the rebound leaves the step, 0 where it 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
-from symphys.collide.contact import Contact, Frame
-from symphys.motion import Motion, apply
-from symphys.rotation import cross_matrix
-from symphys.smooth import TINY_SQUARE, clip, positive
-from symphys.world import Law, Scheme
+from symphys.collide.contact import Contact
+from symphys.motion import Motion
+from symphys.smooth import clip, positive
+from symphys.step.row import UNREACHED, ContactRow, at_touch, inverse_masses, make_side, moving_sides
+from symphys.step.scene import Scene
 
 Expr = Any
 """casadi SX, MX or DM"""
@@ -26,79 +25,31 @@ MARGIN = 1e-4
 """Width of chi's rise, as a share of the reference acceleration: a rebound that barely leaves is part rest."""
 
 
-@dataclass(frozen=True)
-class Side:
-    """One moving side of a row.
+def prepare(scene: Scene, contact: Contact, motions: Sequence[Motion], duration: Expr, spared: Expr = 0) -> ContactRow:
+    """The row of one contact over a stretch of time.
 
-    Attributes:
-        body: index.
-        sign: +1 for the pair's first body, -1 for the second.
-        inverse_mass: [1/kg].
-        inverse_inertia: at the row's instant: scalar or (3, 3) [1/(kg m^2)].
-        arm: (3,) [m] at the row's instant.
-        impulse_arm: (3,) [m] where the impulse is applied.
+    Args:
+        scene: what holds over the step.
+        contact: along the free motion.
+        motions: of all bodies.
+        duration: of the stretch [s].
+        spared: 1 for a contact that gives no impulse.
     """
-
-    body: int
-    sign: int
-    inverse_mass: Expr
-    inverse_inertia: Expr
-    arm: Expr
-    impulse_arm: Expr
-
-
-@dataclass(frozen=True)
-class ContactRow:
-    """A contact as the sweeps see it.
-
-    Attributes:
-        law: of the pair.
-        contact: where it came from.
-        sides: one or two moving sides.
-        normal: (3,) at the row's instant; the impulse's normal is ``impulse_normal``.
-        impulse_normal: (3,).
-        normal_mass, tangent_mass: inverse effective masses k [1/kg]; the scalar tangential one is the largest
-            eigenvalue, so that sliding friction stays opposite to the slip.
-        spin_mass, roll_mass: the same for torques [1/(kg m^2)].
-        softness: gamma [1/kg] of a soft contact, 0 if rigid.
-        target: normal velocity at the middle of the step [m/s].
-        slip_target: (3,) tangential velocity that friction aims at [m/s].
-        leaving: hit chi: the share of the contact that is an impact, in [0, 1].
-        width: of the smoothed normal projection [m/s]; 0 for fast approach.
-        knob: smoothing [m/s].
-    """
-
-    law: Law
-    contact: Contact
-    sides: tuple[Side, ...]
-    normal: Expr
-    impulse_normal: Expr
-    normal_mass: Expr
-    tangent_mass: Expr
-    spin_mass: Expr
-    roll_mass: Expr
-    softness: Expr
-    target: Expr
-    slip_target: Expr
-    leaving: Expr
-    width: Expr
-    knob: Expr
-
-
-def prepare(contact: Contact, motions: Sequence[Motion], scheme: Scheme, reference: Expr, knob: Expr) -> ContactRow:
-    """The row of one contact; ``reference`` is the acceleration [m/s^2] below which nothing counts as fast."""
-    moving = _moving(contact, motions)
+    scheme, knob = scene.scheme, scene.knob
+    moving = moving_sides(contact, motions)
     time = contact.time if scheme.time_of_impact else ca.SX(0)
-    velocity, acceleration, normal = _at_touch(contact, moving, time)
+    velocity, acceleration, normal = at_touch(contact, moving, time)
     pull = ca.dot(normal, acceleration)
     rebound = contact.pair.law.restitution * positive(-ca.dot(normal, velocity), knob)
-    leaving = contact.hit * _leaves(rebound, pull, scheme.dt - time, reference, scheme.dt, knob)
-    half = scheme.dt / 2
+    leaving = contact.hit * _leaves(rebound, pull, duration - time, scene.reference, scheme.dt, knob)
+    half = duration / 2
     row_time = half + leaving * (time - half)
     frame, applied = contact.frame(row_time), contact.frame(leaving * time)
-    sides = tuple(_side(i, k, m, row_time, frame, applied) for k, i, m in moving)
-    normal_mass, tangent_mass, spin_mass, roll_mass = _inverse_masses(sides, frame.normal)
-    softness, target = _normal_target(contact, scheme, time, rebound, pull, normal_mass, knob)
+    sides = tuple(make_side(i, k, m, row_time, frame, applied) for k, i, m in moving)
+    normal_mass, tangent_mass, spin_mass, roll_mass = inverse_masses(sides, frame.normal)
+    softness, target = _normal_target(contact, duration, time, rebound, pull, normal_mass, knob)
+    quick = contact.rate < -scene.fast
+    target = ca.if_else(spared, UNREACHED, target)
     slip = contact.hit * leaving * (half - time) * (acceleration - normal * pull)
     return ContactRow(
         law=contact.pair.law,
@@ -114,27 +65,15 @@ def prepare(contact: Contact, motions: Sequence[Motion], scheme: Scheme, referen
         target=target,
         slip_target=slip if scheme.impact_friction else ca.SX.zeros(3),
         leaving=leaving,
-        width=knob * ca.exp(-((contact.rate / (2 * reference * scheme.dt)) ** 2)),
+        struck=0 if contact.pair.law.soft else ca.logic_and(contact.hit, quick),
+        width=width_of(scene, contact),
         knob=knob,
     )
 
 
-def _moving(contact: Contact, motions: Sequence[Motion]) -> list[tuple[int, int, Motion]]:
-    """(side 0 or 1, body index, motion) of the sides that can move."""
-    bodies = (contact.pair.first.body, contact.pair.second.body)
-    return [(k, i, motions[i]) for k, i in enumerate(bodies) if i is not None]
-
-
-def _at_touch(contact: Contact, moving: list[tuple[int, int, Motion]], t: Expr) -> tuple[Expr, Expr, Expr]:
-    """Relative velocity and acceleration (without the centripetal part) of the touching points at t*; the normal."""
-    frame = contact.frame(t)
-    velocity, acceleration = ca.SX.zeros(3), ca.SX.zeros(3)
-    for k, _, motion in moving:
-        sign, arm, inverse = 1 - 2 * k, frame.arms[k], motion.inverse_inertia(t)
-        spin = apply(inverse, motion.momentum_k + t * motion.torque)
-        velocity += sign * (motion.velocity + t * motion.acceleration + ca.cross(spin, arm))
-        acceleration += sign * (motion.acceleration + ca.cross(apply(inverse, motion.torque), arm))
-    return velocity, acceleration, frame.normal
+def width_of(scene: Scene, contact: Contact) -> Expr:
+    """Of the smoothed projection [m/s]: the knob at rest, nothing for an impact."""
+    return scene.knob * ca.exp(-((contact.rate / scene.fast) ** 2))
 
 
 def _leaves(rebound: Expr, pull: Expr, left: Expr, reference: Expr, dt: float, knob: Expr) -> Expr:
@@ -143,42 +82,8 @@ def _leaves(rebound: Expr, pull: Expr, left: Expr, reference: Expr, dt: float, k
     return clip((2 * rebound - fall) / (fall + MARGIN * dt), 0, 1, knob)
 
 
-def _side(body: int, k: int, motion: Motion, row_time: Expr, frame: Frame, applied: Frame) -> Side:
-    return Side(
-        body=body,
-        sign=1 - 2 * k,
-        inverse_mass=1 / motion.body.mass,
-        inverse_inertia=motion.inverse_inertia(row_time),
-        arm=frame.arms[k],
-        impulse_arm=applied.arms[k],
-    )
-
-
-def _inverse_masses(sides: Sequence[Side], n: Expr) -> tuple[Expr, Expr, Expr, Expr]:
-    """k along the normal, across it, and for torques about it and across it."""
-    push, twist = ca.SX.zeros(3, 3), ca.SX.zeros(3, 3)
-    for side in sides:
-        inverse = apply(side.inverse_inertia, ca.SX.eye(3))
-        arm = cross_matrix(side.arm)
-        push += side.inverse_mass * ca.SX.eye(3) - ca.mtimes(arm, ca.mtimes(inverse, arm))
-        twist += inverse
-    return along(push, n), across(push, n), along(twist, n), across(twist, n)
-
-
-def along(k: Expr, n: Expr) -> Expr:
-    """n . k n."""
-    return ca.dot(n, ca.mtimes(k, n))
-
-
-def across(k: Expr, n: Expr) -> Expr:
-    """The largest eigenvalue of the symmetric (3, 3) ``k`` restricted to the plane across the unit vector n."""
-    half_trace = (ca.trace(k) - along(k, n)) / 2
-    determinant = ca.dot(n, ca.mtimes(ca.adj(k), n))
-    return half_trace + ca.sqrt(ca.fmax(half_trace**2 - determinant, 0) + TINY_SQUARE)
-
-
 def _normal_target(
-    contact: Contact, scheme: Scheme, time: Expr, rebound: Expr, pull: Expr, inverse_mass: Expr, knob: Expr
+    contact: Contact, duration: Expr, time: Expr, rebound: Expr, pull: Expr, inverse_mass: Expr, knob: Expr
 ) -> tuple[Expr, Expr]:
     """(softness, target): the velocity that the normal row asks for at the middle of the step.
 
@@ -186,13 +91,13 @@ def _normal_target(
     Soft (Catto, GDC 2011), deviation: the spring acts over what is left of the step, so that a contact that
     begins late in the step begins gently.
     """
-    law, dt = contact.pair.law, scheme.dt
-    away = -ca.fmax(contact.gap, 0) / dt
+    law = contact.pair.law
+    away = -ca.fmax(contact.gap, 0) / duration
     if not law.soft:
-        return ca.SX(0), ca.if_else(contact.hit, positive(rebound + pull * (dt / 2 - time), knob), away)
+        return ca.SX(0), ca.if_else(contact.hit, positive(rebound + pull * (duration / 2 - time), knob), away)
     omega = 2 * ca.pi * law.frequency
     stiffness, damper = omega**2 / inverse_mass, 2 * law.damping * omega / inverse_mass
-    left = dt - time
+    left = duration - time
     beta = stiffness / (damper + left * stiffness)
     gamma = 1 / (left * (damper + left * stiffness) + 1e-30)
     return gamma, ca.if_else(contact.hit, -beta * ca.fmin(contact.gap, 0), away)

@@ -48,6 +48,11 @@ class SimulationTable(Table):
     impact_friction: bool = Field(
         default=DEFAULT.impact_friction, description="friction at an impact aims at the velocity at that instant"
     )
+    split: bool = Field(
+        default=DEFAULT.split,
+        description="cut steps at the first impact where bodies have several contacts; without it gradients of a body "
+        "that is hit while it touches another are wrong",
+    )
 
 
 class WorldTable(Table):

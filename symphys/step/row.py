@@ -1,0 +1,135 @@
+"""A contact as the sweeps see it, and the geometry that every kind of row needs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from symphys.collide.contact import Contact, Frame
+from symphys.motion import Motion, apply
+from symphys.rotation import cross_matrix
+from symphys.smooth import TINY_SQUARE
+from symphys.world import Law
+
+Expr = Any
+"""casadi SX, MX or DM"""
+
+UNREACHED = -1e6
+"""[m/s] a normal velocity that no row reaches: it gives no impulse."""
+
+
+@dataclass(frozen=True)
+class Side:
+    """One moving side of a row.
+
+    Attributes:
+        body: index.
+        sign: +1 for the pair's first body, -1 for the second.
+        inverse_mass: [1/kg].
+        inverse_inertia: at the row's instant: scalar or (3, 3) [1/(kg m^2)].
+        arm: (3,) [m] at the row's instant.
+        impulse_arm: (3,) [m] where the impulse is applied.
+    """
+
+    body: int
+    sign: int
+    inverse_mass: Expr
+    inverse_inertia: Expr
+    arm: Expr
+    impulse_arm: Expr
+
+
+@dataclass(frozen=True)
+class ContactRow:
+    """A contact as the sweeps see it.
+
+    Attributes:
+        law: of the pair.
+        contact: where it came from.
+        sides: one or two moving sides.
+        normal: (3,) at the row's instant; the impulse's normal is ``impulse_normal``.
+        impulse_normal: (3,).
+        normal_mass, tangent_mass: inverse effective masses k [1/kg]; the scalar tangential one is the largest
+            eigenvalue, so that sliding friction stays opposite to the slip.
+        spin_mass, roll_mass: the same for torques [1/(kg m^2)].
+        softness: gamma [1/kg] of a soft contact, 0 if rigid.
+        target: normal velocity at the middle of the step [m/s].
+        slip_target: (3,) tangential velocity that friction aims at [m/s].
+        leaving: hit chi: the share of the contact that is an impact, in [0, 1].
+        struck: 1 if the surfaces meet at speed, else 0.
+        width: of the smoothed normal projection [m/s]; 0 for fast approach.
+        knob: smoothing [m/s].
+    """
+
+    law: Law
+    contact: Contact
+    sides: tuple[Side, ...]
+    normal: Expr
+    impulse_normal: Expr
+    normal_mass: Expr
+    tangent_mass: Expr
+    spin_mass: Expr
+    roll_mass: Expr
+    softness: Expr
+    target: Expr
+    slip_target: Expr
+    leaving: Expr
+    struck: Expr
+    width: Expr
+    knob: Expr
+
+
+def moving_sides(contact: Contact, motions: Sequence[Motion]) -> list[tuple[int, int, Motion]]:
+    """(side 0 or 1, body index, motion) of the sides that can move."""
+    bodies = (contact.pair.first.body, contact.pair.second.body)
+    return [(k, i, motions[i]) for k, i in enumerate(bodies) if i is not None]
+
+
+def at_touch(contact: Contact, moving: list[tuple[int, int, Motion]], t: Expr) -> tuple[Expr, Expr, Expr]:
+    """Relative velocity and acceleration (without the centripetal part) of the touching points at t*; the normal."""
+    frame = contact.frame(t)
+    velocity, acceleration = ca.SX.zeros(3), ca.SX.zeros(3)
+    for k, _, motion in moving:
+        sign, arm, inverse = 1 - 2 * k, frame.arms[k], motion.inverse_inertia(t)
+        spin = apply(inverse, motion.momentum_k + t * motion.torque)
+        velocity += sign * (motion.velocity + t * motion.acceleration + ca.cross(spin, arm))
+        acceleration += sign * (motion.acceleration + ca.cross(apply(inverse, motion.torque), arm))
+    return velocity, acceleration, frame.normal
+
+
+def make_side(body: int, k: int, motion: Motion, row_time: Expr, frame: Frame, applied: Frame) -> Side:
+    """A side whose row is evaluated at ``row_time`` in ``frame`` and whose impulse acts in ``applied``."""
+    return Side(
+        body=body,
+        sign=1 - 2 * k,
+        inverse_mass=1 / motion.body.mass,
+        inverse_inertia=motion.inverse_inertia(row_time),
+        arm=frame.arms[k],
+        impulse_arm=applied.arms[k],
+    )
+
+
+def inverse_masses(sides: Sequence[Side], n: Expr) -> tuple[Expr, Expr, Expr, Expr]:
+    """k along the normal, across it, and for torques about it and across it."""
+    push, twist = ca.SX.zeros(3, 3), ca.SX.zeros(3, 3)
+    for side in sides:
+        inverse = apply(side.inverse_inertia, ca.SX.eye(3))
+        arm = cross_matrix(side.arm)
+        push += side.inverse_mass * ca.SX.eye(3) - ca.mtimes(arm, ca.mtimes(inverse, arm))
+        twist += inverse
+    return along(push, n), across(push, n), along(twist, n), across(twist, n)
+
+
+def along(k: Expr, n: Expr) -> Expr:
+    """n . k n."""
+    return ca.dot(n, ca.mtimes(k, n))
+
+
+def across(k: Expr, n: Expr) -> Expr:
+    """The largest eigenvalue of the symmetric (3, 3) ``k`` restricted to the plane across the unit vector n."""
+    half_trace = (ca.trace(k) - along(k, n)) / 2
+    determinant = ca.dot(n, ca.mtimes(ca.adj(k), n))
+    return half_trace + ca.sqrt(ca.fmax(half_trace**2 - determinant, 0) + TINY_SQUARE)
