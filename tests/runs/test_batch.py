@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import copy
 import importlib
+import multiprocessing
 import signal
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from symphys.problem import load_problem
+from symphys.problem import Problem, load_problem
 from symphys.runs import Job, make_jobs, run_batch
 from symphys.solvers import TraceRow
 from symphys.transcription import transcribe
@@ -99,6 +103,17 @@ def test_workers_do_what_one_process_does(problem_file: Path, tmp_path: Path, re
         assert (a.solver, a.status, a.z, a.counts) == (b.solver, b.status, b.z, b.counts)
     names = {job.name for job in there}
     assert {name for event, name in recorder.events if event == "started"} == names
+
+
+def test_a_job_survives_the_way_to_a_new_process_and_back(problem: Problem, tmp_path: Path) -> None:
+    (job,) = make_jobs([problem], ["gradient"], [3], {"simulation.dt": 0.02}, tmp_path)
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        back = pool.submit(copy.copy, job).result(timeout=60)
+    assert (back.name, back.config, back.options, back.folder) == (job.name, job.config, job.options, job.folder)
+    assert back.problem.targets == job.problem.targets
+    z = np.array([1.0, 2.0, 3.0])
+    values, expected = (np.array(transcribe(each.problem).shooting.value(z, 0)[2]) for each in (back, job))
+    assert np.array_equal(values, expected)
 
 
 def test_a_process_that_dies_fails_its_own_run_only(
