@@ -49,6 +49,8 @@ def start_of(problem: Problem, world: World, inputs: Sequence[str], parameters: 
         values = initial if variable.kind == "initial" else physical
         for slot in variable.slots:
             values[slot.name] = _replace(values[slot.name], slot.components, part)
+    varied = {slot.name for variable in problem.variables for slot in variable.slots}
+    initial |= {name: _unit(initial[name]) for name in varied if name.endswith(".orientation")}
     return Start(initial_state(world, initial), u, ca.vertcat(ca.MX(0, 1), *physical.values()))
 
 
@@ -58,6 +60,11 @@ def _replace(value: Expr, components: Sequence[int], part: Expr) -> Expr:
     for k, component in enumerate(components):
         rows[component] = part[k]
     return ca.vertcat(*rows)
+
+
+def _unit(q: Expr) -> Expr:
+    """A varied quaternion at length 1: solvers move its four numbers freely, a rotation needs a unit one."""
+    return q / ca.norm_2(q)
 
 
 def _spread_inputs(problem: Problem, variable: Variable, inputs: Sequence[str], part: Expr) -> Expr:

@@ -29,7 +29,10 @@ class VariableTable(Table):
     """Something that a solver may choose."""
 
     name: Identifier = Field(description="how formulas and results refer to it")
-    sets: Texts = Field(description='what it sets: "ball.velocity", "ball.force[0:2]", "ground.friction", or a list')
+    sets: Texts = Field(
+        description='what it sets: "ball.velocity", "ball.force[0:2]", "ground.friction", or a list; '
+        "an orientation (w, x, y, z) is normalised"
+    )
     guess: Numbers | None = Field(
         default=None, description="where solvers start; default: what the file says (forces: 0)"
     )
