@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help demo test lint typecheck clean
+.PHONY: help demo test lint typecheck bench gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /make \1\t/p' Makefile
@@ -21,6 +21,14 @@ typecheck: $(VENV)/.developing  ## check types on a folder of links laid out as 
 	rm -rf build/farm && mkdir -p build/farm/symphys
 	cd build/farm/symphys && ln -s ../../../symphys/* ../../../solvers ../../../problems .
 	$(BIN)/mypy -p symphys
+
+bench: $(VENV)/.installed  ## measure what BENCHMARKS.md reports
+	$(BIN)/python benchmarks/ball_throw.py
+
+gallery: $(VENV)/.installed  ## make the figures of the README again
+	$(BIN)/symphys solve ball_throw bank_shot --out build/gallery
+	cp build/gallery/figures/ball_throw-motion.svg build/gallery/figures/ball_throw-convergence.svg \
+	    build/gallery/figures/bank_shot-motion.svg reports/gallery/
 
 clean:  ## remove what the other targets made, reports aside
 	rm -rf $(VENV) build dist *.egg-info
