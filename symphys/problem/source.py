@@ -66,4 +66,5 @@ def parse_toml(path: Path, text: str) -> dict[str, Any]:
     except RecursionError:
         raise refuse(path, "brackets or braces are nested too deep") from None
     except (ValueError, OverflowError, MemoryError) as error:
-        raise refuse(path, f"this is not valid TOML: {error}") from None
+        reason = str(error).split(";")[0]  # what follows is advice to programmers
+        raise refuse(path, f"this is not valid TOML: {reason}") from None
