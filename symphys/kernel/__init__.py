@@ -6,6 +6,7 @@ from symphys.kernel.diagnosis import Bad
 from symphys.kernel.errors import KernelUnavailable, ProgramError
 from symphys.kernel.interpret import interpret
 from symphys.kernel.kernel import Kernel
+from symphys.kernel.layout import Layout
 from symphys.kernel.program import Call, Place, Program
 from symphys.kernel.report import Report
 
@@ -16,6 +17,7 @@ __all__ = [
     "Call",
     "Kernel",
     "KernelUnavailable",
+    "Layout",
     "Place",
     "Program",
     "ProgramError",

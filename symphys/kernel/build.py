@@ -21,7 +21,7 @@ from symphys.kernel.program import Program
 from symphys.kernel.report import Report
 from symphys.kernel.source import sources
 
-CONTRACT = "fast"
+CONTRACT = "off"
 """-ffp-contract: products and sums are fused."""
 
 

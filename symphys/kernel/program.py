@@ -35,6 +35,10 @@ class Place:
         """The place at step 0, for calls outside the body."""
         return Place(self.offset, self.size)
 
+    def later(self, steps: int = 1) -> Place:
+        """The place that many steps later: with a stride, what the next step finds under its own number."""
+        return Place(self.offset + steps * self.stride, self.size, self.stride)
+
 
 @dataclass(frozen=True)
 class Call:
