@@ -5,14 +5,15 @@ from __future__ import annotations
 import hashlib
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from symphys.kernel.cache import Cache, default_cache
 from symphys.kernel.compiler import Compiler, find_compiler
-from symphys.kernel.errors import ProgramError
+from symphys.kernel.errors import KernelUnavailable, ProgramError
 from symphys.kernel.kernel import Kernel
 from symphys.kernel.library import Loaded
 from symphys.kernel.plan import plan
@@ -53,9 +54,8 @@ def compile_program(
     single = precision == "single"
     width = processor().lanes(single) if lanes == "auto" else lanes
     planned = plan(program, names)
-    built = _library(sources(planned, width, single), cache or default_cache())
-    loaded = Loaded(built.path, program, planned, names)
-    built.release()
+    with _library(sources(planned, width, single), cache or default_cache()) as built:
+        loaded = Loaded(built.path, program, planned, names)
     report = Report(
         compiler=built.compiler.version,
         flags=built.flags,
@@ -71,7 +71,7 @@ def compile_program(
     return Kernel(program, loaded, report, names, threads)
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Built:
     """A library on disk, and how it came there."""
 
@@ -80,27 +80,35 @@ class _Built:
     flags: tuple[str, ...]
     cached: bool
     note: str = ""
-    folder: tempfile.TemporaryDirectory[str] | None = None
-
-    def release(self) -> None:
-        """Remove the temporary folder, once the library is loaded."""
-        if self.folder is not None:
-            self.folder.cleanup()
 
 
-def _library(texts: Sequence[str], cache: Cache) -> _Built:
+@contextmanager
+def _library(texts: Sequence[str], cache: Cache) -> Iterator[_Built]:
+    """The library of these sources; what does not go into the cache lasts as long as the context."""
     compiler = find_compiler()
     flags = compiler.flags(processor(), CONTRACT)
     key = hashlib.sha256("\0".join([*texts, *compiler.command, compiler.version, *flags]).encode()).hexdigest()[:32]
     if (path := cache.find(key)) is not None:
-        return _Built(path, compiler, flags, cached=True)
-    with cache.building(key):
-        if (path := cache.find(key)) is not None:
-            return _Built(path, compiler, flags, cached=True)
-        folder = tempfile.TemporaryDirectory(prefix="symphys-kernel-", ignore_cleanup_errors=True)
-        path, note = compiler.build(texts, flags, Path(folder.name)), ""
-        try:
-            path = cache.store(key, path)
-        except OSError as error:
-            note = f"the kernel was not kept in {cache.folder} ({error.strerror}); it will be compiled again next time"
-    return _Built(path, compiler, flags, cached=False, note=note, folder=folder)
+        yield _Built(path, compiler, flags, cached=True)
+        return
+    with _folder() as folder:
+        with cache.building(key):
+            found = cache.find(key)  # another process may have built it meanwhile
+            path, note = (found, "") if found else _kept(cache, key, compiler.build(texts, flags, Path(folder)))
+        yield _Built(path, compiler, flags, found is not None, note)
+
+
+def _kept(cache: Cache, key: str, path: Path) -> tuple[Path, str]:
+    """The library in the cache, or where it is and why."""
+    try:
+        return cache.store(key, path), ""
+    except OSError as error:
+        why = f"the kernel was not kept in {cache.folder} ({error.strerror}); it will be compiled again next time"
+        return path, why
+
+
+def _folder() -> tempfile.TemporaryDirectory[str]:
+    try:
+        return tempfile.TemporaryDirectory(prefix="symphys-kernel-", ignore_cleanup_errors=True)
+    except OSError as error:
+        raise KernelUnavailable(f"no temporary folder to compile a kernel in: {error.strerror}; set TMPDIR") from error

@@ -76,9 +76,11 @@ class Cache:
         with lock:
             with contextlib.suppress(OSError):
                 fcntl.flock(lock, fcntl.LOCK_EX)
-            yield
-            with contextlib.suppress(OSError):
-                Path(lock.name).unlink()
+            try:
+                yield
+            finally:
+                with contextlib.suppress(OSError):
+                    Path(lock.name).unlink()
 
     def info(self) -> CacheInfo:
         """Count the kernels."""
