@@ -14,7 +14,7 @@ Flags = NDArray[np.bool_]
 Words = NDArray[np.int64]
 
 
-@dataclass(frozen=True)
+@dataclass
 class Reach:
     """One call with the words of its places at all steps.
 

@@ -7,6 +7,7 @@ import casadi as ca
 from symphys.kernel.graph import Graph
 from symphys.kernel.instructions import graph_of
 from symphys.kernel.program import Function
+from symphys.kernel.rewrite import with_reciprocals
 
 Mask = tuple[bool, ...]
 
@@ -23,4 +24,4 @@ def adjoint_graph(function: Function, inputs: Mask, outputs: Mask) -> Graph:
     for x in wanted:
         ends.append(ends[-1] + x.numel())
     pieces = [ca.densify(piece) for piece in ca.vertsplit(ca.densify(adjoint), ends)]
-    return graph_of(ca.Function("adjoint", [*arguments, *seeds], pieces))
+    return with_reciprocals(graph_of(ca.Function("adjoint", [*arguments, *seeds], pieces)))

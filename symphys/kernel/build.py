@@ -20,10 +20,7 @@ from symphys.kernel.plan import plan
 from symphys.kernel.processor import processor
 from symphys.kernel.program import Program
 from symphys.kernel.report import Report
-from symphys.kernel.source import sources
-
-CONTRACT = "off"
-"""-ffp-contract: products and sums are fused."""
+from symphys.kernel.source import Source, sources
 
 
 def compile_program(
@@ -63,7 +60,7 @@ def compile_program(
         precision=precision,
         functions=len(planned.functions),
         operations=sum(len(graph.nodes) for graph, _ in planned.functions),
-        bytes_per_lane=2 * program.size * (4 if single else 8),
+        bytes_per_lane=(2 * program.size + planned.tape) * (4 if single else 8),
         cached=built.cached,
         seconds=time.perf_counter() - started,
         note=built.note,
@@ -83,10 +80,11 @@ class _Built:
 
 
 @contextmanager
-def _library(texts: Sequence[str], cache: Cache) -> Iterator[_Built]:
+def _library(parts: Sequence[Source], cache: Cache) -> Iterator[_Built]:
     """The library of these sources; what does not go into the cache lasts as long as the context."""
     compiler = find_compiler()
-    flags = compiler.flags(processor(), CONTRACT)
+    flags = compiler.flags(processor())
+    texts = [f"{part.fused} {part.text}" for part in parts]
     key = hashlib.sha256("\0".join([*texts, *compiler.command, compiler.version, *flags]).encode()).hexdigest()[:32]
     if (path := cache.find(key)) is not None:
         yield _Built(path, compiler, flags, cached=True)
@@ -94,7 +92,7 @@ def _library(texts: Sequence[str], cache: Cache) -> Iterator[_Built]:
     with _folder() as folder:
         with cache.building(key):
             found = cache.find(key)  # another process may have built it meanwhile
-            path, note = (found, "") if found else _kept(cache, key, compiler.build(texts, flags, Path(folder)))
+            path, note = (found, "") if found else _kept(cache, key, compiler.build(parts, flags, Path(folder)))
         yield _Built(path, compiler, flags, found is not None, note)
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from symphys.kernel.errors import KernelUnavailable
 from symphys.kernel.processor import Processor
+from symphys.kernel.source import Source
 
 ADVICE = "install gcc or clang (or `pip install ziglang`), or set CC to a C compiler"
 FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-fvisibility=hidden", "-fno-math-errno", "-fno-trapping-math", "-w")
@@ -35,23 +36,24 @@ class Compiler:
     command: tuple[str, ...]
     version: str
 
-    def flags(self, processor: Processor, contract: str) -> tuple[str, ...]:
+    def flags(self, processor: Processor) -> tuple[str, ...]:
         """The flags of every C file: they are part of what a kernel is."""
         target: tuple[str, ...] = (f"-march={processor.architecture}",) if processor.architecture else ()
         if target and "zig" in " ".join(self.command):
             target = (f"-mcpu={processor.architecture.replace('-', '_')}",)
         if processor.vector_bytes == 64:
             target += ("-mprefer-vector-width=512",)
-        return (*FLAGS, f"-ffp-contract={contract}", *target)
+        return (*FLAGS, *target)
 
-    def build(self, texts: Sequence[str], flags: Sequence[str], folder: Path) -> Path:
-        """Compile each text in a process of its own, link them, and return the shared library."""
-        objects = [folder / f"part{i}.o" for i in range(len(texts))]
+    def build(self, sources: Sequence[Source], flags: Sequence[str], folder: Path) -> Path:
+        """Compile each source in a process of its own, link them, and return the shared library."""
+        objects = [folder / f"part{i}.o" for i in range(len(sources))]
         commands = []
-        for text, target in zip(texts, objects, strict=True):
-            source = target.with_suffix(".c")
-            _write(source, text)
-            commands.append([*self.command, *flags, "-c", str(source), "-o", str(target)])
+        for source, target in zip(sources, objects, strict=True):
+            file = target.with_suffix(".c")
+            _write(file, source.text)
+            fusing = f"-ffp-contract={'fast' if source.fused else 'off'}"
+            commands.append([*self.command, *flags, fusing, "-c", str(file), "-o", str(target)])
         with ThreadPoolExecutor(processors()) as pool:
             list(pool.map(_run, commands))
         library = folder / "kernel.so"

@@ -45,7 +45,7 @@ class Bad:
 def first_bad(program: Program, loaded: Loaded, batch: Batch, memory: Memory) -> Bad | None:
     """Run one rollout phase by phase and step by step, and look at all that each wrote."""
     loaded.begin(batch.part(0, 1), memory)
-    lane = memory[0, :, 0]
+    lane = memory[:, 0]
     for name, place in (("z", program.z), ("knob", program.knob)):
         if (word := _not_finite(lane, place)) is not None:
             return Bad("inputs", 0, -1, name, word, float(lane[word]))

@@ -5,7 +5,7 @@
 typedef struct { word count; const word *entries; } table;
 typedef struct { word count; const word *places; } ranges; /* (offset, size) pairs */
 typedef struct {
-  word size, steps;
+  word size, tape, steps;
   ranges z, knob, zeroed, outputs, seeded;
   table prologue, body, epilogue;                        /* forward */
   table again, back_body, back_prologue, back_epilogue;  /* backward */
@@ -57,11 +57,11 @@ static void roll(const program *p, V *m) {
   run(&p->epilogue, m, 0, 0);
 }
 
-/* The scratch of the last step still holds; that of the others is computed again. */
+/* States are in the memory; the scratch of a step, and the tape for its adjoints, are computed again. */
 static void pull(const program *p, V *m, V *b) {
   run(&p->back_epilogue, m, b, 0);
   for (word k = p->steps - 1; k >= 0; k--) {
-    if (k < p->steps - 1) run(&p->again, m, 0, k);
+    run(&p->again, m, 0, k);
     run(&p->back_body, m, b, k);
   }
   run(&p->back_prologue, m, b, 0);
@@ -74,9 +74,9 @@ static void record(const batch *x, const V *m, word row, word rows) {
         x->trajectory[((row + l) * x->count + k) * x->size + j] = (double)m[x->offset + k * x->stride + j][l];
 }
 
-/* Memory: size vectors, and as many again if there is a gradient. */
+/* Memory: size vectors, then the tape, then size vectors of adjoints. */
 API void evaluate(const program *p, const batch *x, V *m) {
-  V *b = m + p->size;
+  V *b = m + p->size + p->tape;
   for (word row = 0; row < x->rows; row += LANES) {
     word rows = x->rows - row < LANES ? x->rows - row : LANES;
     gather(m, &p->z, &x->z, row, rows, 0);

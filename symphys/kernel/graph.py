@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-MASKS = frozenset({"lt", "le", "eq", "ne", "not", "and", "or", "isnt0"})
+from symphys.kernel.operations import MASKS
+
 COMMUTE = frozenset({"add", "mul", "eq", "ne", "and", "or", "hypot"})
 
 

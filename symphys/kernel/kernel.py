@@ -31,7 +31,8 @@ class Kernel:
         self.program, self.loaded, self.report = program, loaded, report
         self.seeded = tuple(seeded)
         self.threads = processors() if threads is None else threads
-        self._pool = Pool(program.size, report.lanes, np.float32 if report.precision == "single" else np.float64)
+        real = np.dtype(np.float32 if report.precision == "single" else np.float64)
+        self._pool = Pool(report.bytes_per_lane // real.itemsize, report.lanes, real)
 
     def forward(self, Z: ArrayLike, knob: ArrayLike = ()) -> Outputs:
         """The outputs of rollouts.

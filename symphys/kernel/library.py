@@ -16,7 +16,7 @@ from symphys.kernel.program import Place, Program
 TABLES = ("prologue", "body", "epilogue", "again", "back_body", "back_prologue", "back_epilogue")
 WORD = ctypes.c_int64
 Memory = Any
-"""(2, words, lanes) float64 or float32, aligned: the values and their adjoints"""
+"""(words, lanes) float64 or float32, aligned: the values, the tape and the adjoints"""
 
 
 class List(ctypes.Structure):
@@ -36,6 +36,7 @@ class ProgramData(ctypes.Structure):
 
     _fields_ = (
         ("size", WORD),
+        ("tape", WORD),
         ("steps", WORD),
         *((name, List) for name in ("z", "knob", "zeroed", "outputs", "seeded")),
         *((name, List) for name in TABLES),
@@ -66,7 +67,7 @@ class Loaded:
         self._begin = _prepared(library.begin, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
         self._perform = _prepared(library.perform, ctypes.c_void_p, ctypes.c_void_p, WORD)
         self._kept: list[Any] = []
-        self.data = ProgramData(program.size, program.steps)
+        self.data = ProgramData(program.size, plan.tape, program.steps)
         places = {"z": [program.z], "knob": [program.knob], "zeroed": program.zeroed}
         places |= {"outputs": list(program.outputs.values()), "seeded": [program.outputs[name] for name in seeded]}
         for name, listed in places.items():

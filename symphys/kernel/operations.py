@@ -12,6 +12,9 @@ NAMES = {getattr(ca, f"OP_{name.upper()}"): name for name in f"{UNARY} {BINARY} 
 }
 """Operations that become one node of the same operands."""
 
+MASKS = frozenset({"lt", "le", "eq", "ne", "not", "and", "or", "isnt0"})
+"""Operations that give a mask."""
+
 INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
 COMPARE = {"lt": "<", "le": "<=", "eq": "==", "ne": "!="}
 FORMS = (
@@ -32,3 +35,7 @@ FORMS = (
     }
 )
 """C expressions of operands {0}, {1}, {2}."""
+
+CHEAP = frozenset(["neg", "floor", "ceil", "copysign", "fabs", "add", "sub", "mul", "one", "iez", "select"])
+COSTLY = frozenset(FORMS) - CHEAP - MASKS
+"""Divisions, roots and calls of the C library: computing them again costs more than to store and load them."""

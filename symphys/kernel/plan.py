@@ -1,21 +1,23 @@
-"""From a program to what is compiled, each distinct function once, and to the tables that the driver walks."""
+"""From a program to what is compiled, and to the tables that the driver walks."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symphys.kernel.activity import Activity, Reach
-from symphys.kernel.adjoint import Mask, adjoint_graph
+from symphys.kernel.adjoint import Mask
+from symphys.kernel.functions import Functions
 from symphys.kernel.graph import Graph
-from symphys.kernel.instructions import graph_of
-from symphys.kernel.program import Call, Function, Place, Program
+from symphys.kernel.program import Call, Place, Program
+from symphys.kernel.rewrite import Taped
 from symphys.kernel.writer import Form
 
 Table = NDArray[np.int64]
+Entries = list[list[int]]
 
 
 @dataclass(frozen=True)
@@ -25,123 +27,134 @@ class Plan:
     Attributes:
         functions: the C functions, in the order of their numbers.
         tables: for each phase the number of calls and their entries.
+        tape: words after the program's own, for what adjoints need not compute again.
     """
 
     functions: tuple[tuple[Graph, Form], ...]
     tables: dict[str, tuple[int, Table]]
+    tape: int
 
 
 def plan(program: Program, seeded: Sequence[str]) -> Plan:
     """Plan the forward pass and the gradient with respect to z of the seeded outputs."""
-    library = _Library()
-    phases = [program.prologue, program.body, program.epilogue]
-    reaches = [
-        [library.reach(call, program.steps if phase is program.body else 1) for call in phase] for phase in phases
-    ]
-    activity = Activity(program, reaches, [program.outputs[name] for name in seeded])
-    back = [[pull for reach in reversed(phase) if (pull := library.pull(reach, activity))] for phase in reaches]
-    tables = dict(zip(("prologue", "body", "epilogue"), ([library.push(c) for c in p] for p in phases), strict=True))
-    tables |= dict(
-        zip(("back_prologue", "back_body", "back_epilogue"), ([p.entry for p in b] for b in back), strict=True)
+    functions = Functions()
+    prologue, body, epilogue = phases = (
+        _reaches(program.prologue, 1, functions),
+        _reaches(program.body, program.steps, functions),
+        _reaches(program.epilogue, 1, functions),
     )
-    tables["again"] = [library.push(call) for call in _again(program, reaches[1], back[1])]
-    return Plan(tuple(library.functions), {name: (len(rows), _flat(rows)) for name, rows in tables.items()})
+    activity = Activity(program, phases, [program.outputs[name] for name in seeded])
+    pulls = [[pull for reach in reversed(phase) if (pull := _pull(reach, activity, functions))] for phase in phases]
+    again = _again(program, body, pulls[1])
+    tape = _put_on_tape(program, pulls[1], again, functions)
+    entries: dict[str, Entries] = {
+        "prologue": [_push(reach.call, functions) for reach in prologue],
+        "body": [_push(reach.call, functions) for reach in body],
+        "epilogue": [_push(reach.call, functions) for reach in epilogue],
+        "again": [_push(reach.call, functions, reach.tape) for reach in again],
+        "back_prologue": [pull.entry(functions) for pull in pulls[0]],
+        "back_body": [pull.entry(functions) for pull in pulls[1]],
+        "back_epilogue": [pull.entry(functions) for pull in pulls[2]],
+    }
+    return Plan(tuple(functions.listed), {name: (len(rows), _flat(rows)) for name, rows in entries.items()}, tape)
+
+
+@dataclass
+class _Tape:
+    """A place for values that a call's adjoint needs, and the functions that write and read it."""
+
+    functions: Taped
+    place: Place
+
+
+@dataclass
+class _Reach(Reach):
+    """A call and, once that is known, its tape."""
+
+    tape: _Tape | None = None
 
 
 @dataclass(frozen=True)
 class _Pull:
-    """An adjoint call: its table entry, and the words of the memory that it reads."""
+    """The adjoint of a call, with respect to the marked arguments and results."""
 
-    entry: list[int]
-    reads: list[NDArray[np.int64]]
+    reach: _Reach
+    graph: Graph
+    inputs: Mask
+    outputs: Mask
 
+    def reads(self) -> list[NDArray[np.int64]]:
+        """The words of the memory that it reads."""
+        used = {self.graph.nodes[x].at[0] for x in self.graph.needed()}
+        return [words for i, words in enumerate(self.reach.inputs) if i in used]
 
-@dataclass
-class _Library:
-    """The C functions so far, and what is known about each casadi Function."""
-
-    functions: list[tuple[Graph, Form]] = field(default_factory=list)
-    numbers: dict[object, int] = field(default_factory=dict)
-    graphs: dict[object, Graph] = field(default_factory=dict)
-    dependences: dict[int, list[NDArray[np.bool_]]] = field(default_factory=dict)
-
-    def reach(self, call: Call, steps: int) -> Reach:
-        inputs = [place.words(steps) for place in call.inputs]
-        outputs = [place.words(steps) for place in call.outputs]
-        return Reach(call, inputs, outputs, self._dependence(call.function))
-
-    def push(self, call: Call) -> list[int]:
-        form = Form(primal=len(call.inputs), adds=call.accumulate)
-        return _entry(self._number(self._forward(call.function), form), [*call.inputs, *call.outputs])
-
-    def pull(self, reach: Reach, activity: Activity) -> _Pull | None:
-        call = reach.call
-        inputs, outputs = activity.marks(reach.inputs), activity.marks(reach.outputs)
-        if not any(inputs) or not any(outputs):
-            return None
-        graph = self._adjoint(call.function, inputs, outputs)
-        form = Form(primal=len(inputs), adds=True, backward=True, clears=not call.accumulate)
-        places = [*call.inputs, *_marked(call.outputs, outputs), *_marked(call.inputs, inputs)]
-        used = {graph.nodes[x].at[0] for x in graph.needed() if graph.nodes[x].op == "input"}
-        reads = [words for i, words in enumerate(reach.inputs) if i in used]
-        return _Pull(_entry(self._number(graph, form), places), reads)
-
-    def _number(self, graph: Graph, form: Form) -> int:
-        key = (id(graph), form)
-        if key not in self.numbers:
-            self.numbers[key] = self.numbers.setdefault((graph.key(), form), len(self.functions))
-            if self.numbers[key] == len(self.functions):
-                self.functions.append((graph, form))
-        return self.numbers[key]
-
-    def _forward(self, function: Function) -> Graph:
-        key = function.__hash__()
-        if key not in self.graphs:
-            self.graphs[key] = graph_of(function)
-        return self.graphs[key]
-
-    def _adjoint(self, function: Function, inputs: Mask, outputs: Mask) -> Graph:
-        key = (self._forward(function).key(), inputs, outputs)
-        if key not in self.graphs:
-            self.graphs[key] = adjoint_graph(function, inputs, outputs)
-        return self.graphs[key]
-
-    def _dependence(self, function: Function) -> list[NDArray[np.bool_]]:
-        graph = self._forward(function)
-        if id(graph) not in self.dependences:
-            bits, arguments = graph.origins(), range(len(graph.sizes))
-            self.dependences[id(graph)] = [
-                np.array([[bits[x] >> i & 1 for i in arguments] for x in result], dtype=bool).reshape(len(result), -1)
-                for result in graph.results
-            ]
-        return self.dependences[id(graph)]
+    def entry(self, functions: Functions) -> list[int]:
+        """Its table entry."""
+        call, tape = self.reach.call, self.reach.tape
+        primal = [*call.inputs, *([tape.place] if tape else [])]
+        form = Form(primal=len(primal), adds=True, backward=True, clears=not call.accumulate)
+        places = [*primal, *_marked(call.outputs, self.outputs), *_marked(call.inputs, self.inputs)]
+        return functions.entry(tape.functions.adjoint if tape else self.graph, form, places)
 
 
-def _again(program: Program, body: Sequence[Reach], pulls: Iterable[_Pull]) -> list[Call]:
+def _reaches(calls: Sequence[Call], steps: int, functions: Functions) -> list[_Reach]:
+    return [
+        _Reach(
+            call,
+            [place.words(steps) for place in call.inputs],
+            [place.words(steps) for place in call.outputs],
+            functions.dependence(call.function),
+        )
+        for call in calls
+    ]
+
+
+def _push(call: Call, functions: Functions, tape: _Tape | None = None) -> list[int]:
+    form = Form(primal=len(call.inputs), adds=call.accumulate)
+    graph = tape.functions.forward if tape else functions.forward(call.function)
+    return functions.entry(graph, form, [*call.inputs, *call.outputs, *([tape.place] if tape else [])])
+
+
+def _pull(reach: _Reach, activity: Activity, functions: Functions) -> _Pull | None:
+    inputs, outputs = activity.marks(reach.inputs), activity.marks(reach.outputs)
+    if not any(inputs) or not any(outputs):
+        return None
+    return _Pull(reach, functions.adjoint(reach.call.function, inputs, outputs), inputs, outputs)
+
+
+def _again(program: Program, body: Sequence[_Reach], pulls: Sequence[_Pull]) -> list[_Reach]:
     """The calls that must be run again before the adjoints of a step: those whose scratch is read."""
     scratch = program.scratch()
     needed = np.zeros(program.size, dtype=bool)
     for pull in pulls:
-        for words in pull.reads:
+        for words in pull.reads():
             needed[words] = True
     needed &= scratch
     chosen = []
     for reach in reversed(body):
         if any(needed[words].any() for words in reach.outputs):
-            chosen.append(reach.call)
+            chosen.append(reach)
             for words in reach.inputs:
                 needed[words] |= scratch[words]
     return chosen[::-1]
+
+
+def _put_on_tape(program: Program, pulls: Sequence[_Pull], again: Sequence[_Reach], functions: Functions) -> int:
+    """Give the calls that are run again a tape where that is worth it; returns its words."""
+    end = program.size
+    repeated = {id(reach) for reach in again if not reach.call.accumulate}
+    for pull in pulls:
+        if id(pull.reach) not in repeated:
+            continue
+        if pair := functions.taped(functions.forward(pull.reach.call.function), pull.graph):
+            pull.reach.tape = _Tape(pair, Place(end, pair.size))
+            end += pair.size
+    return end - program.size
 
 
 def _marked(places: Sequence[Place], marks: Mask) -> list[Place]:
     return [place for place, on in zip(places, marks, strict=True) if on]
 
 
-def _entry(number: int, places: Sequence[Place]) -> list[int]:
-    pairs = [x for place in places for x in (place.offset, place.stride)]
-    return [number, 2 + len(pairs), *pairs]
-
-
-def _flat(rows: Sequence[Sequence[int]]) -> Table:
+def _flat(rows: Entries) -> Table:
     return np.array([x for row in rows for x in row] or [0], dtype=np.int64)

@@ -21,8 +21,8 @@ class Pool:
     """Memories of one shape, kept from call to call; a task has one for itself while it runs."""
 
     def __init__(self, words: int, lanes: int, real: Any) -> None:
-        """Memories of (2, words, lanes) numbers of this type."""
-        self._shape, self._real = (2, words, lanes), np.dtype(real)
+        """Memories of (words, lanes) numbers of this type."""
+        self._shape, self._real = (words, lanes), np.dtype(real)
         self._free: list[Memory] = []
 
     def run(self, tasks: Sequence[Callable[[Memory], None]], threads: int) -> None:
@@ -45,7 +45,7 @@ class Pool:
             self._free.append(memory)
 
     def _new(self) -> Memory:
-        alignment = max(ALIGNMENT, self._shape[2] * self._real.itemsize)
+        alignment = max(ALIGNMENT, self._shape[1] * self._real.itemsize)
         size = int(np.prod(self._shape)) * self._real.itemsize
         raw = np.empty(size + alignment, dtype=np.uint8)
         start = -raw.ctypes.data % alignment

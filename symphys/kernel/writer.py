@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from symphys.kernel.graph import MASKS, Graph
-from symphys.kernel.operations import FORMS
+from symphys.kernel.graph import Graph
+from symphys.kernel.operations import FORMS, MASKS
 
 LONGEST = 500
 """Statements in one C function: gcc's time grows faster than its length."""
