@@ -58,17 +58,16 @@ def chain() -> Program:
     body += [Call(f["move"], (x, v), (x.later(),)) for x, v in zip(states, speeds, strict=True)]
     body += [Call(f["cost"], (x.later(), force), (merit,), accumulate=True) for x in states]
     body.append(Call(f["square"], (effort, effort), (work,), accumulate=True))
-    starts = [ca.Function("start", [], [ca.SX([0.8 * i, 0.1 * i])]) for i in range(BODIES)]
     return Program(
         size=at.size,
         z=z,
         knob=Place(0, 0),
         steps=STEPS,
         zeroed=(nothing, work),
+        constants=tuple((x.still(), (0.8 * i, 0.1 * i)) for i, x in enumerate(states)),
         prologue=(
             Call(f["zero"], (), (merit,)),
             Call(f["forces"], (z,), (Place(force.offset, STEPS),)),
-            *(Call(start, (), (x,)) for start, x in zip(starts, states, strict=True)),
         ),
         body=tuple(body),
         epilogue=(Call(f["end"], (states[0].later(STEPS), states[-1].later(STEPS)), (errors,)),),
@@ -101,6 +100,8 @@ def graph(program: Program) -> Any:
     memory = ca.SX.nan(program.size)
     for place in program.zeroed:
         memory[place.offset : place.offset + place.size] = 0
+    for place, values in program.constants:
+        memory[place.offset : place.offset + place.size] = values
     memory[program.z.offset : program.z.offset + program.z.size] = z
     memory[program.knob.offset : program.knob.offset + program.knob.size] = knob
     calls = [(call, 0) for call in program.prologue]

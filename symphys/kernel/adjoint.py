@@ -24,4 +24,5 @@ def adjoint_graph(function: Function, inputs: Mask, outputs: Mask) -> Graph:
     for x in wanted:
         ends.append(ends[-1] + x.numel())
     pieces = [ca.densify(piece) for piece in ca.vertsplit(ca.densify(adjoint), ends)]
-    return with_reciprocals(graph_of(ca.Function("adjoint", [*arguments, *seeds], pieces)))
+    graph = graph_of(ca.Function("adjoint", [*arguments, *seeds], pieces))
+    return with_reciprocals(graph, len(arguments))

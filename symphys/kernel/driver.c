@@ -6,7 +6,8 @@ typedef struct { word count; const word *entries; } table;
 typedef struct { word count; const word *places; } ranges; /* (offset, size) pairs */
 typedef struct {
   word size, tape, steps;
-  ranges z, knob, zeroed, outputs, seeded;
+  ranges z, knob, zeroed, constants, outputs, seeded;
+  const double *values;                                  /* of the constants */
   table prologue, body, epilogue;                        /* forward */
   table again, back_body, back_prologue, back_epilogue;  /* backward */
 } program;
@@ -49,9 +50,16 @@ static void scatter(double *to, const V *from, const ranges *r, word width, word
       for (word l = 0; l < rows; l++) to[(row + l) * width + j] = (double)from[w][l];
 }
 
-static void roll(const program *p, V *m) {
+static void fill(const program *p, const batch *x, V *m, word row, word rows) {
+  const source values = {p->values, 0};
   for (word i = 0; i < p->zeroed.count; i++)
     memset(m + p->zeroed.places[2 * i], 0, sizeof(V) * p->zeroed.places[2 * i + 1]);
+  gather(m, &p->constants, &values, 0, 1, 0);
+  gather(m, &p->z, &x->z, row, rows, 0);
+  gather(m, &p->knob, &x->knob, row, rows, 0);
+}
+
+static void roll(const program *p, V *m) {
   run(&p->prologue, m, 0, 0);
   for (word k = 0; k < p->steps; k++) run(&p->body, m, 0, k);
   run(&p->epilogue, m, 0, 0);
@@ -79,8 +87,7 @@ API void evaluate(const program *p, const batch *x, V *m) {
   V *b = m + p->size + p->tape;
   for (word row = 0; row < x->rows; row += LANES) {
     word rows = x->rows - row < LANES ? x->rows - row : LANES;
-    gather(m, &p->z, &x->z, row, rows, 0);
-    gather(m, &p->knob, &x->knob, row, rows, 0);
+    fill(p, x, m, row, rows);
     roll(p, m);
     if (x->outputs) scatter(x->outputs, m, &p->outputs, total(&p->outputs), row, rows);
     if (x->trajectory) record(x, m, row, rows);
@@ -93,11 +100,6 @@ API void evaluate(const program *p, const batch *x, V *m) {
 }
 
 /* One phase or step alone, to look for the call that went wrong. */
-API void begin(const program *p, const batch *x, V *m) {
-  gather(m, &p->z, &x->z, 0, 1, 0);
-  gather(m, &p->knob, &x->knob, 0, 1, 0);
-  for (word i = 0; i < p->zeroed.count; i++)
-    memset(m + p->zeroed.places[2 * i], 0, sizeof(V) * p->zeroed.places[2 * i + 1]);
-}
+API void begin(const program *p, const batch *x, V *m) { fill(p, x, m, 0, 1); }
 
 API void perform(const table *calls, V *m, word k) { run(calls, m, 0, k); }

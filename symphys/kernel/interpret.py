@@ -23,6 +23,8 @@ def remember(program: Program, z: ArrayLike, knob: ArrayLike = ()) -> Array:
     memory = np.full(program.size, np.nan)
     for place in program.zeroed:
         at(memory, place, 0)[:] = 0
+    for place, values in program.constants:
+        at(memory, place, 0)[:] = values
     at(memory, program.z, 0)[:] = z
     at(memory, program.knob, 0)[:] = knob
     for call, k in _order(program):

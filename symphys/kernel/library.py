@@ -38,7 +38,8 @@ class ProgramData(ctypes.Structure):
         ("size", WORD),
         ("tape", WORD),
         ("steps", WORD),
-        *((name, List) for name in ("z", "knob", "zeroed", "outputs", "seeded")),
+        *((name, List) for name in ("z", "knob", "zeroed", "constants", "outputs", "seeded")),
+        ("values", ctypes.c_void_p),
         *((name, List) for name in TABLES),
     )
 
@@ -70,6 +71,10 @@ class Loaded:
         self.data = ProgramData(program.size, plan.tape, program.steps)
         places = {"z": [program.z], "knob": [program.knob], "zeroed": program.zeroed}
         places |= {"outputs": list(program.outputs.values()), "seeded": [program.outputs[name] for name in seeded]}
+        places |= {"constants": [place for place, _ in program.constants]}
+        values = np.array([x for _, row in program.constants for x in row] or [0], dtype=np.float64)
+        self._kept.append(values)
+        self.data.values = values.ctypes.data
         for name, listed in places.items():
             setattr(self.data, name, self._list(len(listed), _ranges(listed)))
         for name in TABLES:

@@ -35,7 +35,3 @@ FORMS = (
     }
 )
 """C expressions of operands {0}, {1}, {2}."""
-
-CHEAP = frozenset(["neg", "floor", "ceil", "copysign", "fabs", "add", "sub", "mul", "one", "iez", "select"])
-COSTLY = frozenset(FORMS) - CHEAP - MASKS
-"""Divisions, roots and calls of the C library: computing them again costs more than to store and load them."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -71,6 +71,7 @@ class Program:
         steps: number of time steps.
         outputs: named places, read after the epilogue.
         zeroed: places that are 0 at the beginning.
+        constants: places and their values. Programs that differ in them only share one compiled kernel.
     """
 
     size: int
@@ -81,7 +82,8 @@ class Program:
     prologue: tuple[Call, ...] = ()
     body: tuple[Call, ...] = ()
     epilogue: tuple[Call, ...] = ()
-    zeroed: tuple[Place, ...] = field(default=())
+    zeroed: tuple[Place, ...] = ()
+    constants: tuple[tuple[Place, tuple[float, ...]], ...] = ()
 
     def __post_init__(self) -> None:
         """Check everything that can be checked; ProgramError names the call and the words."""

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from symphys.kernel.graph import Graph, Node
-from symphys.kernel.operations import COSTLY
+from symphys.kernel.operations import MASKS
 
 Change = Callable[[Graph, int, Node], int]
 """(new graph, number of the old node, node with new operands) -> number of the new node"""
@@ -23,13 +23,17 @@ def rewritten(graph: Graph, into: Graph, change: Change) -> dict[int, int]:
     return numbers
 
 
-def with_reciprocals(graph: Graph) -> Graph:
-    """Several divisions by one value become one, and products with its reciprocal."""
-    nodes = [graph.nodes[x] for x in graph.needed()]
-    divisors = Counter(node.operands[1] for node in nodes if node.op == "div")
+def with_reciprocals(graph: Graph, primal: int) -> Graph:
+    """Several divisions of adjoints by one value become one, and products with its reciprocal.
+
+    What depends on the first ``primal`` arguments only stays as it is, so that it is also what the call computes.
+    """
+    origins = graph.origins()
+    divisions = {x for x in graph.needed() if graph.nodes[x].op == "div" and origins[x] >> primal}
+    divisors = Counter(graph.nodes[x].operands[1] for x in divisions)
 
     def change(new: Graph, x: int, node: Node) -> int:
-        if node.op != "div" or divisors[graph.nodes[x].operands[1]] < 2:
+        if x not in divisions or divisors[graph.nodes[x].operands[1]] < 2:
             return new.put(node)
         return new.add("mul", node.operands[0], new.add("div", new.constant(1.0), node.operands[1]))
 
@@ -55,11 +59,19 @@ class Taped:
 
 
 def taped(forward: Graph, adjoint: Graph) -> Taped | None:
-    """Put what is costly, and depends on the call's arguments only, on a tape; None if there is nothing."""
+    """Put all that depends on the call's arguments only on a tape; None if there is nothing.
+
+    A load costs less than any operation: storing divisions and roots only was slower, even where the tape of a step
+    is larger than the second cache. Masks are computed again.
+    """
     primal = len(forward.sizes)
     origins = adjoint.origins()
-    costly = [x for x in adjoint.needed() if adjoint.nodes[x].op in COSTLY and not origins[x] >> primal]
-    leaves = _reached(adjoint, set(costly))
+    kept = {
+        x
+        for x in adjoint.needed()
+        if adjoint.nodes[x].op not in MASKS | {"input", "const"} and not origins[x] >> primal
+    }
+    leaves = _reached(adjoint, kept)
     if not leaves:
         return None
     slots = {x: slot for slot, x in enumerate(leaves)}

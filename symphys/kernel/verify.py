@@ -33,6 +33,10 @@ class Verification:
             self._begin(name, place)
         for place in program.zeroed:
             self._begin("zeroed place", place)
+        for place, values in program.constants:
+            self._begin("constant", place)
+            if len(values) != place.size:
+                raise ProgramError(f"constant: {place} has {place.size} words, but there are {len(values)} values")
 
     def _begin(self, name: str, place: Place) -> None:
         words = place.still().words(1)

@@ -33,6 +33,8 @@ START = call(Z, STATE)
         ({"steps": -1}, "steps must be 0 or more, not -1"),
         ({"z": Place(19, 2)}, "z: words 19 to 20 lie outside the memory of 20 words"),
         ({"zeroed": (Place(1, 2),)}, "zeroed place: words 1 to 2 overlap another input"),
+        ({"constants": ((Place(3, 1), (1.0,)),)}, "constant: words 3 to 3 overlap another input"),
+        ({"constants": ((A, (1.0,)),)}, "has 2 words, but there are 1 values"),
         ({"prologue": (call(Z, A), call(Z, A))}, r"prologue call 1 \(twice\): words 4 to 5 are written already"),
         ({"prologue": (call(A, B), call(Z, A))}, "prologue call 0.*reads words 4 to 5, before they are complete"),
         ({"prologue": (call(A, B),)}, "reads words 4 to 5, which nobody writes"),
