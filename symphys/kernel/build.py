@@ -50,6 +50,8 @@ def compile_program(
         raise ProgramError(f"no output is called {unknown[0]!r}; there are {', '.join(program.outputs)}")
     single = precision == "single"
     width = processor().lanes(single) if lanes == "auto" else lanes
+    if width not in range(1, 65) or width & (width - 1):
+        raise ProgramError(f"lanes must be a power of two from 1 to 64, not {lanes}")
     planned = plan(program, names)
     with _library(sources(planned, width, single), cache or default_cache()) as built:
         loaded = Loaded(built.path, program, planned, names)

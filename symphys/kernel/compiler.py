@@ -38,12 +38,9 @@ class Compiler:
 
     def flags(self, processor: Processor) -> tuple[str, ...]:
         """The flags of every C file: they are part of what a kernel is."""
-        target: tuple[str, ...] = (f"-march={processor.architecture}",) if processor.architecture else ()
-        if target and "zig" in " ".join(self.command):
-            target = (f"-mcpu={processor.architecture.replace('-', '_')}",)
-        if processor.vector_bytes == 64:
-            target += ("-mprefer-vector-width=512",)
-        return (*FLAGS, *target)
+        if "ziglang" in self.command and processor.features:  # its default is the machine's own processor
+            return (*FLAGS, f"-mcpu={processor.architecture.replace('-', '_')}", "-mprefer-vector-width=512")
+        return (*FLAGS, *processor.flags())
 
     def build(self, sources: Sequence[Source], flags: Sequence[str], folder: Path) -> Path:
         """Compile each source in a process of its own, link them, and return the shared library."""

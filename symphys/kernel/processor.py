@@ -8,10 +8,12 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-LEVELS: tuple[tuple[str, int, set[str]], ...] = (
-    ("x86-64-v4", 64, {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"}),
-    ("x86-64-v3", 32, {"avx2", "bmi1", "bmi2", "f16c", "fma", "movbe"}),
-    ("x86-64", 16, set()),
+AVX2 = ("avx2", "fma", "f16c", "bmi1", "bmi2")
+AVX512 = ("avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl")
+LEVELS: tuple[tuple[str, int, tuple[str, ...]], ...] = (
+    ("x86-64-v4", 64, AVX2 + AVX512),
+    ("x86-64-v3", 32, AVX2),
+    ("x86-64", 16, ()),
 )
 """Architecture, bytes of a vector, and what the processor must say that it has."""
 
@@ -21,12 +23,19 @@ class Processor:
     """A target.
 
     Attributes:
-        architecture: for the compiler's -march; empty: its default.
+        architecture: its name.
         vector_bytes: size of a vector register.
+        features: what compilers may use beyond their default.
     """
 
     architecture: str
     vector_bytes: int
+    features: tuple[str, ...] = ()
+
+    def flags(self) -> tuple[str, ...]:
+        """The features for gcc and clang, one by one: older ones do not know the architectures by name."""
+        wide = ("-mprefer-vector-width=512",) if self.vector_bytes == 64 else ()
+        return (*(f"-m{name.replace('bmi1', 'bmi')}" for name in self.features), *wide)
 
     def lanes(self, single: bool) -> int:
         """Numbers in a vector."""
@@ -39,8 +48,8 @@ def processor() -> Processor:
     machine = platform.machine().lower()
     if machine in ("x86_64", "amd64"):
         features = _features()
-        return next(Processor(name, size) for name, size, wanted in LEVELS if wanted <= features)
-    return Processor("", 16)
+        return next(Processor(*level) for level in LEVELS if set(level[2]) <= features)
+    return Processor(machine, 16)
 
 
 def _features() -> set[str]:
