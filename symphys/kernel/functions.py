@@ -25,14 +25,16 @@ class Functions:
     listed: list[tuple[Graph, Form]] = field(default_factory=list)
     _numbers: dict[Key, int] = field(default_factory=dict)
     _forward: dict[int, Graph] = field(default_factory=dict)
-    _keys: dict[int, Key] = field(default_factory=dict)
+    _identities: dict[int, int] = field(default_factory=dict)
+    _distinct: dict[Key, int] = field(default_factory=dict)
     _adjoints: dict[Key, Graph] = field(default_factory=dict)
     _taped: dict[tuple[int, int], Taped | None] = field(default_factory=dict)
+    _arguments: dict[int, frozenset[int]] = field(default_factory=dict)
     _dependences: dict[int, list[NDArray[np.bool_]]] = field(default_factory=dict)
 
     def entry(self, graph: Graph, form: Form, places: Sequence[Place]) -> list[int]:
         """The table entry of a call: number, length, then offset and stride of each place."""
-        key = (*self._key(graph), form)
+        key = (self._identity(graph), form)
         if key not in self._numbers:
             self._numbers[key] = len(self.listed)
             self.listed.append((graph, form))
@@ -48,7 +50,7 @@ class Functions:
 
     def adjoint(self, function: Function, inputs: Mask, outputs: Mask) -> Graph:
         """The adjoint graph for these arguments and results."""
-        key = (*self._key(self.forward(function)), inputs, outputs)
+        key = (self._identity(self.forward(function)), inputs, outputs)
         if key not in self._adjoints:
             self._adjoints[key] = adjoint_graph(function, inputs, outputs)
         return self._adjoints[key]
@@ -71,8 +73,14 @@ class Functions:
             ]
         return self._dependences[id(graph)]
 
-    def _key(self, graph: Graph) -> Key:
-        """Equal for equal graphs; all graphs live as long as this object, so that their addresses name them."""
-        if id(graph) not in self._keys:
-            self._keys[id(graph)] = graph.key()
-        return self._keys[id(graph)]
+    def arguments(self, graph: Graph) -> frozenset[int]:
+        """The arguments that a graph reads."""
+        if id(graph) not in self._arguments:
+            self._arguments[id(graph)] = frozenset(graph.nodes[x].at[0] for x in graph.needed())
+        return self._arguments[id(graph)]
+
+    def _identity(self, graph: Graph) -> int:
+        """A number that equal graphs share; graphs live as long as this object, so that addresses name them."""
+        if id(graph) not in self._identities:
+            self._identities[id(graph)] = self._distinct.setdefault(graph.key(), len(self._distinct))
+        return self._identities[id(graph)]

@@ -45,7 +45,7 @@ def plan(program: Program, seeded: Sequence[str]) -> Plan:
     )
     activity = Activity(program, phases, [program.outputs[name] for name in seeded])
     pulls = [[pull for reach in reversed(phase) if (pull := _pull(reach, activity, functions))] for phase in phases]
-    again = _again(program, body, pulls[1])
+    again = _again(program, body, pulls[1], functions)
     tape = _put_on_tape(program, pulls[1], again, functions)
     entries: dict[str, Entries] = {
         "prologue": [_push(reach.call, functions) for reach in prologue],
@@ -83,9 +83,9 @@ class _Pull:
     inputs: Mask
     outputs: Mask
 
-    def reads(self) -> list[NDArray[np.int64]]:
+    def reads(self, functions: Functions) -> list[NDArray[np.int64]]:
         """The words of the memory that it reads."""
-        used = {self.graph.nodes[x].at[0] for x in self.graph.needed()}
+        used = functions.arguments(self.graph)
         return [words for i, words in enumerate(self.reach.inputs) if i in used]
 
     def entry(self, functions: Functions) -> list[int]:
@@ -122,12 +122,12 @@ def _pull(reach: _Reach, activity: Activity, functions: Functions) -> _Pull | No
     return _Pull(reach, functions.adjoint(reach.call.function, inputs, outputs), inputs, outputs)
 
 
-def _again(program: Program, body: Sequence[_Reach], pulls: Sequence[_Pull]) -> list[_Reach]:
+def _again(program: Program, body: Sequence[_Reach], pulls: Sequence[_Pull], functions: Functions) -> list[_Reach]:
     """The calls that must be run again before the adjoints of a step: those whose scratch is read."""
     scratch = program.scratch()
     needed = np.zeros(program.size, dtype=bool)
     for pull in pulls:
-        for words in pull.reads():
+        for words in pull.reads(functions):
             needed[words] = True
     needed &= scratch
     chosen = []

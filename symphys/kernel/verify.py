@@ -98,18 +98,17 @@ class Verification:
         """Refuse what is read before it is complete."""
         for place in call.inputs:
             words = self.cover(who, place, period)
-            count = self.program.steps if period else 1
-            when = time + period * np.arange(count)[:, None]
+            when = time + period * np.arange(len(words))[:, None]  # without stride: step 0, the first to read
             self._refuse(who, words, self.written[words] == NEVER, "which nobody writes")
             scratch = self.scratch[words]
             if not period:
                 self._refuse(who, words, scratch, "which are scratch of the body")
             late = np.where(scratch, self.written[words] >= time, self.written[words] >= when)
-            self._refuse(who, words + 0 * when, late, "before they are complete")
+            self._refuse(who, words, late, "before they are complete")
 
     def _refuse(self, who: str, words: Words, bad: NDArray[np.bool_], why: str) -> None:
         if bad.any():
-            raise ProgramError(f"{who}: reads {span(np.broadcast_to(words, bad.shape)[bad])}, {why}")
+            raise ProgramError(f"{who}: reads {span(words[bad])}, {why}")
 
 
 def verify(program: Program) -> Verification:
