@@ -45,13 +45,8 @@ def compile_program(
         KernelUnavailable: with one line that says why; the caller falls back.
     """
     started = time.perf_counter()
-    names = tuple(program.outputs if seeded is None else seeded)
-    if unknown := [name for name in names if name not in program.outputs]:
-        raise ProgramError(f"no output is called {unknown[0]!r}; there are {', '.join(program.outputs)}")
     single = precision == "single"
-    width = processor().lanes(single) if lanes == "auto" else lanes
-    if width not in range(1, 65) or width & (width - 1):
-        raise ProgramError(f"lanes must be a power of two from 1 to 64, not {lanes}")
+    names, width = _names(program, seeded), _width(lanes, single)
     planned = plan(program, names)
     with _library(sources(planned, width, single), cache or default_cache()) as built:
         loaded = Loaded(built.path, program, planned, names)
@@ -68,6 +63,21 @@ def compile_program(
         note=built.note,
     )
     return Kernel(program, loaded, report, names, threads)
+
+
+def _names(program: Program, seeded: Sequence[str] | None) -> tuple[str, ...]:
+    names = tuple(program.outputs if seeded is None else seeded)
+    if unknown := [name for name in names if name not in program.outputs]:
+        raise ProgramError(f"no output is called {unknown[0]!r}; there are {', '.join(program.outputs)}")
+    return names
+
+
+def _width(lanes: int | Literal["auto"], single: bool) -> int:
+    if lanes == "auto":
+        return processor().lanes(single)
+    if lanes not in range(1, 65) or lanes & (lanes - 1):
+        raise ProgramError(f"lanes must be a power of two from 1 to 64, not {lanes}")
+    return lanes
 
 
 @dataclass(frozen=True)

@@ -134,6 +134,8 @@ def test_only_seeded_outputs_are_differentiated(chain: Kernel, cache: Cache) -> 
 
 
 def test_wrong_shapes_are_named(pendulum: Kernel) -> None:
+    with pytest.raises(ProgramError, match="lanes must be a power of two from 1 to 64, not 3"):
+        compile_program(pendulum.program, lanes=3)
     with pytest.raises(ProgramError, match=r"z has the shape \(3,\); wanted is \(batch, 30\) or \(30,\)"):
         pendulum.forward(np.ones(3), [1.0])
     with pytest.raises(ProgramError, match=r"the batch sizes \[2, 3\] of z, knob differ"):
