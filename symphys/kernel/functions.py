@@ -68,7 +68,9 @@ class Functions:
         if id(graph) not in self._dependences:
             bits, arguments = graph.origins(), range(len(graph.sizes))
             self._dependences[id(graph)] = [
-                np.array([[bits[x] >> i & 1 for i in arguments] for x in result], dtype=bool).reshape(len(result), -1)
+                np.array([[bits[x] >> i & 1 for i in arguments] for x in result], dtype=bool).reshape(
+                    len(result), len(arguments)
+                )
                 for result in graph.results
             ]
         return self._dependences[id(graph)]
