@@ -75,7 +75,7 @@ class Rollout:
     def over_steps(self, formula: Formula) -> Expr:
         """(m, N or 2N): samples whose mean is the time average; 2N for what moves (trapezoid)."""
         before = self._mapped(formula, self.x[:, :-1], np.arange(self.steps))
-        if not _moves(formula):
+        if not formula_moves(formula):
             return before
         return ca.horzcat(before, self.after_steps(formula))
 
@@ -89,7 +89,7 @@ class Rollout:
         return any(variable.name in formula.names for variable in self.problem.variables)
 
 
-def _moves(formula: Formula) -> bool:
+def formula_moves(formula: Formula) -> bool:
     """Whether the formula depends on what changes within a step."""
     return any(name == "time" or name.rpartition(".")[2] in GIVEN for name in formula.names)
 

@@ -3,17 +3,42 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
 
-from symphys.problem import Constraint, Cost, Target
+from symphys.expression import Formula
+from symphys.problem import Constraint, Cost, Problem, Target
 from symphys.smooth import length
-from symphys.transcription.along import Rollout
 
 Expr = Any
 """casadi MX"""
+
+
+class Sampled(Protocol):
+    """A rollout that can be asked for the values of formulas along it; see ``Rollout``."""
+
+    @property
+    def problem(self) -> Problem:
+        """What is rolled out."""
+
+    @property
+    def steps(self) -> int:
+        """N."""
+
+    @property
+    def dt(self) -> float:
+        """[s]."""
+
+    def at(self, formula: Formula, when: str | float) -> Expr:
+        """(m,) at the end or at a time."""
+
+    def after_steps(self, formula: Formula) -> Expr:
+        """(m, N) at the end of every step."""
+
+    def over_steps(self, formula: Formula) -> Expr:
+        """(m, N or 2N) samples whose mean is the time average."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +65,7 @@ class Terms:
     names: tuple[str, ...]
 
 
-def terms(rollout: Rollout) -> Terms:
+def terms(rollout: Sampled) -> Terms:
     """The terms of the rollout's problem."""
     problem = rollout.problem
     costs = [_cost(rollout, cost) for cost in problem.costs]
@@ -76,7 +101,7 @@ def _stack(parts: list[Expr]) -> Expr:
     return ca.vertcat(ca.MX(0, 1), *(ca.vec(part) for part in parts))
 
 
-def _cost(rollout: Rollout, cost: Cost) -> tuple[Expr, Expr | None]:
+def _cost(rollout: Sampled, cost: Cost) -> tuple[Expr, Expr | None]:
     """(weighted cost, residuals whose squares sum to it, or None)."""
     if cost.at == "always":
         samples = rollout.over_steps(cost.formula)
@@ -96,7 +121,7 @@ def _miss(target: Target, value: Expr) -> Expr:
 class _Limit:
     """One constraint: its values, bounds, penalty residuals and error."""
 
-    def __init__(self, rollout: Rollout, constraint: Constraint) -> None:
+    def __init__(self, rollout: Sampled, constraint: Constraint) -> None:
         always = constraint.at == "always"
         values = rollout.after_steps(constraint.formula) if always else rollout.at(constraint.formula, constraint.at)
         count = values.shape[1]

@@ -80,6 +80,13 @@ def test_physics_imports_casadi_and_numpy_alone(name: str, path: Path) -> None:
         assert top != "symphys" or room(target) in PHYSICS | {"errors"}, target
 
 
+@pytest.mark.parametrize(("name", "path"), [pair for pair in modules() if room(pair[0]) == "kernel"])
+def test_kernels_know_no_physics(name: str, path: Path) -> None:
+    for target in imported(path):
+        assert target.split(".")[0] in RUNTIME | {"casadi", "numpy", "symphys"}, target
+        assert not target.startswith("symphys") or room(target) in {"kernel", "errors"}, target
+
+
 @pytest.mark.parametrize(("name", "path"), [pair for pair in modules() if room(pair[0]) == "solvers"])
 def test_solvers_see_the_shooting_problem_alone(name: str, path: Path) -> None:
     rooms = {room(target) for target in imported(path) if target.split(".")[0] == "symphys"}

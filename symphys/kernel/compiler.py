@@ -1,0 +1,114 @@
+"""C compilers: found, asked for their version, run in parallel; every way to fail is one clear line."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from symphys.kernel.errors import KernelUnavailable
+from symphys.kernel.processor import Processor
+from symphys.kernel.source import Source
+
+ADVICE = "install gcc or clang (or `pip install ziglang`), or set CC to a C compiler"
+FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-fvisibility=hidden", "-fno-math-errno", "-fno-trapping-math", "-w")
+"""No -ffast-math: a NaN stays one, and sums keep their order."""
+MEMORY_WORDS = ("memory exhausted", "out of memory", "cannot allocate memory", "bad_alloc")
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """A C compiler.
+
+    Attributes:
+        command: how it is called.
+        version: first line of what it says of itself; where it lies is in the command.
+    """
+
+    command: tuple[str, ...]
+    version: str
+
+    def flags(self, processor: Processor) -> tuple[str, ...]:
+        """The flags of every C file: they are part of what a kernel is."""
+        if "ziglang" in self.command and processor.features:  # its default is the machine's own processor
+            return (*FLAGS, f"-mcpu={processor.architecture.replace('-', '_')}", "-mprefer-vector-width=512")
+        return (*FLAGS, *processor.flags())
+
+    def build(self, sources: Sequence[Source], flags: Sequence[str], folder: Path) -> Path:
+        """Compile each source in a process of its own, link them, and return the shared library."""
+        objects = [folder / f"part{i}.o" for i in range(len(sources))]
+        commands = []
+        for source, target in zip(sources, objects, strict=True):
+            file = target.with_suffix(".c")
+            _write(file, source.text)
+            fusing = f"-ffp-contract={'fast' if source.fused else 'off'}"
+            commands.append([*self.command, *flags, fusing, "-c", str(file), "-o", str(target)])
+        with ThreadPoolExecutor(processors()) as pool:
+            list(pool.map(_run, commands))
+        library = folder / "kernel.so"
+        _run([*self.command, *flags, "-shared", *map(str, objects), "-o", str(library), "-lm"])
+        return library
+
+
+def processors() -> int:
+    """How many processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def find_compiler() -> Compiler:
+    """The compiler of $CC, else gcc, clang, cc or the ziglang package; KernelUnavailable if there is none."""
+    wanted = os.environ.get("CC", "").strip()
+    if wanted:
+        return _asked(tuple(shlex.split(wanted)), named=True)
+    for name in ("gcc", "clang", "cc"):
+        path = shutil.which(name)
+        if path:
+            return _asked((path,), named=False)
+    if importlib.util.find_spec("ziglang"):
+        return _asked((sys.executable, "-m", "ziglang", "cc"), named=False)
+    raise KernelUnavailable(f"no C compiler was found: {ADVICE}")
+
+
+@cache
+def _asked(command: tuple[str, ...], named: bool) -> Compiler:
+    path = shutil.which(command[0])
+    if path is None:
+        raise KernelUnavailable(f"the compiler {command[0]!r} that CC names was not found: {ADVICE}")
+    command = (path, *command[1:])
+    lines = _run([*command, "--version"]).splitlines()
+    return Compiler(command, lines[0] if lines else "unknown version")
+
+
+def _run(command: Sequence[str]) -> str:
+    """Run a compiler; KernelUnavailable says how it failed."""
+    name = Path(command[0]).name
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+    except OSError as error:
+        raise KernelUnavailable(f"the compiler {name} cannot be run ({error.strerror}): {ADVICE}") from error
+    if done.returncode == 0:
+        return done.stdout
+    said = done.stderr.strip()
+    if any(word in said.lower() for word in MEMORY_WORDS):
+        raise KernelUnavailable(f"the compiler {name} ran out of memory; close other programs or use fewer processes")
+    if done.returncode < 0 or "signal" in said.lower():
+        raise KernelUnavailable(f"the compiler {name} was killed (often: out of memory); the kernel was not built")
+    line = next((line for line in said.splitlines() if "error" in line.lower()), said.splitlines()[0] if said else "")
+    raise KernelUnavailable(f"the compiler {name} failed with code {done.returncode}: {line}")
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise KernelUnavailable(f"cannot write the sources of a kernel to {path.parent}: {error.strerror}") from error

@@ -1,0 +1,105 @@
+/* The loops over blocks of lanes, time and calls. Programs are data: what is compiled does not depend on their length.
+   A table is a list of entries: number of the function, length of the entry, then (offset, stride) of each place. */
+#include <string.h>
+
+typedef struct { word count; const word *entries; } table;
+typedef struct { word count; const word *places; } ranges; /* (offset, size) pairs */
+typedef struct {
+  word size, tape, steps;
+  ranges z, knob, zeroed, constants, outputs, seeded;
+  const double *values;                                  /* of the constants */
+  table prologue, body, epilogue;                        /* forward */
+  table again, back_body, back_prologue, back_epilogue;  /* backward */
+} program;
+typedef struct { const double *rows; word stride; } source; /* stride 0: one row for all lanes */
+typedef struct {
+  word rows;
+  source z, knob, seed;
+  double *outputs, *gradient, *trajectory;
+  word offset, size, stride, count; /* of the trajectory */
+} batch;
+
+#define API __attribute__((visibility("default")))
+
+static void run(const table *calls, V *m, V *b, word k) {
+  const word *t = calls->entries;
+  for (word c = 0; c < calls->count; c++, t += t[1]) FUNCTIONS[t[0]](m, b, t + 2, k);
+}
+
+static word total(const ranges *r) {
+  word sum = 0;
+  for (word i = 0; i < r->count; i++) sum += r->places[2 * i + 1];
+  return sum;
+}
+
+/* Lanes beyond the last row repeat it, so that they compute nothing unusual. */
+static void gather(V *to, const ranges *r, const source *from, word row, word rows, int add) {
+  const double *lane[LANES];
+  for (word l = 0; l < LANES; l++) lane[l] = from->rows + from->stride * (l < rows ? row + l : row + rows - 1);
+  for (word i = 0, j = 0; i < r->count; i++)
+    for (word w = r->places[2 * i]; w < r->places[2 * i] + r->places[2 * i + 1]; w++, j++) {
+      V x;
+      for (word l = 0; l < LANES; l++) x[l] = (R)lane[l][j];
+      to[w] = add ? to[w] + x : x;
+    }
+}
+
+static void scatter(double *to, const V *from, const ranges *r, word width, word row, word rows) {
+  for (word i = 0, j = 0; i < r->count; i++)
+    for (word w = r->places[2 * i]; w < r->places[2 * i] + r->places[2 * i + 1]; w++, j++)
+      for (word l = 0; l < rows; l++) to[(row + l) * width + j] = (double)from[w][l];
+}
+
+static void fill(const program *p, const batch *x, V *m, word row, word rows) {
+  const source values = {p->values, 0};
+  for (word i = 0; i < p->zeroed.count; i++)
+    memset(m + p->zeroed.places[2 * i], 0, sizeof(V) * p->zeroed.places[2 * i + 1]);
+  gather(m, &p->constants, &values, 0, 1, 0);
+  gather(m, &p->z, &x->z, row, rows, 0);
+  gather(m, &p->knob, &x->knob, row, rows, 0);
+}
+
+static void roll(const program *p, V *m) {
+  run(&p->prologue, m, 0, 0);
+  for (word k = 0; k < p->steps; k++) run(&p->body, m, 0, k);
+  run(&p->epilogue, m, 0, 0);
+}
+
+/* States are in the memory; the scratch of a step, and the tape for its adjoints, are computed again. */
+static void pull(const program *p, V *m, V *b) {
+  run(&p->back_epilogue, m, b, 0);
+  for (word k = p->steps - 1; k >= 0; k--) {
+    run(&p->again, m, 0, k);
+    run(&p->back_body, m, b, k);
+  }
+  run(&p->back_prologue, m, b, 0);
+}
+
+static void record(const batch *x, const V *m, word row, word rows) {
+  for (word l = 0; l < rows; l++)
+    for (word k = 0; k < x->count; k++)
+      for (word j = 0; j < x->size; j++)
+        x->trajectory[((row + l) * x->count + k) * x->size + j] = (double)m[x->offset + k * x->stride + j][l];
+}
+
+/* Memory: size vectors, then the tape, then size vectors of adjoints. */
+API void evaluate(const program *p, const batch *x, V *m) {
+  V *b = m + p->size + p->tape;
+  for (word row = 0; row < x->rows; row += LANES) {
+    word rows = x->rows - row < LANES ? x->rows - row : LANES;
+    fill(p, x, m, row, rows);
+    roll(p, m);
+    if (x->outputs) scatter(x->outputs, m, &p->outputs, total(&p->outputs), row, rows);
+    if (x->trajectory) record(x, m, row, rows);
+    if (!x->gradient) continue;
+    memset(b, 0, sizeof(V) * p->size);
+    gather(b, &p->seeded, &x->seed, row, rows, 1);
+    pull(p, m, b);
+    scatter(x->gradient, b, &p->z, total(&p->z), row, rows);
+  }
+}
+
+/* One phase or step alone, to look for the call that went wrong. */
+API void begin(const program *p, const batch *x, V *m) { fill(p, x, m, 0, 1); }
+
+API void perform(const table *calls, V *m, word k) { run(calls, m, 0, k); }

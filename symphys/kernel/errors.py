@@ -1,0 +1,13 @@
+"""What can go wrong between a program and its kernel."""
+
+from __future__ import annotations
+
+from symphys.errors import SymphysError
+
+
+class ProgramError(SymphysError):
+    """A program that contradicts itself; names the call and the words."""
+
+
+class KernelUnavailable(SymphysError):
+    """No kernel can be built here; one line says why, and what to install or to do. The caller falls back."""

@@ -1,0 +1,37 @@
+"""What each operation of an SX Function is called here, and how it is written in C."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+UNARY = "neg exp log sqrt sin cos tan asin acos atan floor ceil erf sinh cosh tanh asinh acosh atanh log1p expm1"
+BINARY = "add sub mul div pow lt le eq ne fmod remainder copysign atan2 hypot"
+NAMES = {getattr(ca, f"OP_{name.upper()}"): name for name in f"{UNARY} {BINARY} and or not".split()} | {
+    ca.OP_CONSTPOW: "pow",
+    ca.OP_IF_ELSE_ZERO: "iez",
+}
+"""Operations that become one node of the same operands."""
+
+MASKS = frozenset({"lt", "le", "eq", "ne", "not", "and", "or", "isnt0"})
+"""Operations that give a mask."""
+
+INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
+COMPARE = {"lt": "<", "le": "<=", "eq": "==", "ne": "!="}
+FORMS = (
+    {name: f"{{0}} {sign} {{1}}" for name, sign in INFIX.items()}
+    | {name: f"(I)({{0}} {sign} {{1}})" for name, sign in COMPARE.items()}
+    | {name: f"{name}_({{0}})" for name in UNARY.split()}
+    | {name: f"{name}_({{0}}, {{1}})" for name in ["pow", "fmod", "remainder", "copysign", "atan2", "hypot"]}
+    | {
+        "neg": "-{0}",
+        "not": "~{0}",
+        "and": "{0} & {1}",
+        "or": "{0} | {1}",
+        "isnt0": "(I)({0} != S(0.0))",
+        "one": "(V)({0} & (I)S(1.0))",
+        "iez": "(V)({0} & (I){1})",
+        "select": "(V)(({0} & (I){1}) | (~{0} & (I){2}))",
+        "fabs": "(V)((I){0} & MAGNITUDE)",
+    }
+)
+"""C expressions of operands {0}, {1}, {2}."""

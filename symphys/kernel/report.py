@@ -1,0 +1,34 @@
+"""How a kernel was built."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Report:
+    """How a kernel was built.
+
+    Attributes:
+        compiler: its version, in its own words.
+        flags: what it was called with.
+        lanes: rollouts in one block.
+        precision: "double" or "single".
+        functions: C functions, forward and adjoint.
+        operations: nodes of their graphs together.
+        bytes_per_lane: memory of one rollout with its adjoint; a block of lanes takes as many times that.
+        cached: whether it came from the cache.
+        seconds: from the program to the loaded kernel.
+        note: what the user should know, or empty.
+    """
+
+    compiler: str
+    flags: tuple[str, ...]
+    lanes: int
+    precision: str
+    functions: int
+    operations: int
+    bytes_per_lane: int
+    cached: bool
+    seconds: float
+    note: str

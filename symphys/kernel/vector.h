@@ -1,0 +1,37 @@
+/* Lanes: V is LANES numbers, I as many integers of the same size; comparisons give all ones or all zeros. */
+#include <stdint.h>
+
+typedef int64_t word;
+#if SINGLE
+typedef float R;
+typedef int32_t N;
+#define LIBM(name) __builtin_##name##f
+#define MAGNITUDE 0x7fffffff
+#else
+typedef double R;
+typedef int64_t N;
+#define LIBM(name) __builtin_##name
+#define MAGNITUDE 0x7fffffffffffffff
+#endif
+typedef R V __attribute__((vector_size(LANES * sizeof(R))));
+typedef N I __attribute__((vector_size(LANES * sizeof(R))));
+#define S(x) ((V){0} + (R)(x))
+#define NOINLINE __attribute__((noinline, unused))
+
+/* sqrt, floor and ceil become one instruction; the others call the C library lane by lane. */
+#define UNARY(name) \
+  static inline __attribute__((unused)) V name##_(V x) { \
+    V r; \
+    for (int l = 0; l < LANES; l++) r[l] = LIBM(name)(x[l]); \
+    return r; \
+  }
+#define BINARY(name) \
+  static inline __attribute__((unused)) V name##_(V x, V y) { \
+    V r; \
+    for (int l = 0; l < LANES; l++) r[l] = LIBM(name)(x[l], y[l]); \
+    return r; \
+  }
+UNARY(sqrt) UNARY(floor) UNARY(ceil)
+UNARY(exp) UNARY(log) UNARY(sin) UNARY(cos) UNARY(tan) UNARY(asin) UNARY(acos) UNARY(atan) UNARY(erf)
+UNARY(sinh) UNARY(cosh) UNARY(tanh) UNARY(asinh) UNARY(acosh) UNARY(atanh) UNARY(log1p) UNARY(expm1)
+BINARY(pow) BINARY(fmod) BINARY(remainder) BINARY(copysign) BINARY(atan2) BINARY(hypot)

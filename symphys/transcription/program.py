@@ -1,0 +1,126 @@
+"""A problem's rollout as a program of calls, for the compiled kernels."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from symphys.expression import Formula
+from symphys.kernel import Call, Layout, Place, Program
+from symphys.step import step_function
+from symphys.transcription.along import Rollout, formula_moves
+from symphys.transcription.decision import start_of
+from symphys.transcription.terms import Terms, terms
+
+Expr = Any
+"""casadi MX"""
+
+
+class Samples:
+    """A rollout's values where a problem asks for them, as symbols (MX), and the calls that compute them.
+
+    Stands in for ``Rollout`` where costs, targets and constraints are put together; see its methods.
+    """
+
+    def __init__(self, rollout: Rollout) -> None:
+        """Places for z, knob, times, parameters, inputs and states."""
+        self.rollout, self.problem, self.steps, self.dt = rollout, rollout.problem, rollout.steps, rollout.dt
+        self.layout = Layout()
+        nx, nu, np_ = (int(part.shape[0]) for part in (rollout.x, rollout.u, rollout.p))
+        self.z, self.knob = self.layout.take(int(rollout.z.shape[0])), self.layout.take(1)
+        self.p, self.u = self.layout.take(np_), self.layout.series(nu, self.steps)
+        self.x = self.layout.series(nx, self.steps + 1)
+        self.time = self.layout.series(1, self.steps + 1)
+        self.calls: list[Call] = []
+        self.symbols: dict[Place, Expr] = {}
+
+    def symbol(self, place: Place) -> Expr:
+        """The symbol that stands for a still place."""
+        if place not in self.symbols:
+            self.symbols[place] = ca.MX.sym(f"at{place.offset}", place.size)
+        return self.symbols[place]
+
+    def at(self, formula: Formula, when: str | float) -> Expr:
+        """(m,): see ``Rollout.at``."""
+        k = self.steps if isinstance(when, str) else round(when / self.dt)
+        x, u = self.x.later(k).still(), self.u.later(min(k, self.steps - 1)).still()
+        p, z = self.symbol(self.p), self.symbol(self.z)
+        return self.rollout.compiled(formula)(self.symbol(x), self.symbol(u), p, k * self.dt, z)
+
+    def after_steps(self, formula: Formula) -> Expr:
+        """(m, N): see ``Rollout.after_steps``."""
+        return self._series(formula, 1)
+
+    def over_steps(self, formula: Formula) -> Expr:
+        """(m, N or 2N): see ``Rollout.over_steps``."""
+        before = self._series(formula, 0)
+        return ca.horzcat(before, self.after_steps(formula)) if formula_moves(formula) else before
+
+    def _series(self, formula: Formula, shift: int) -> Expr:
+        function = self.rollout.compiled(formula)
+        size = int(function.size1_out(0))
+        out = self.layout.series(size, self.steps)
+        places = (self.x.later(shift), self.u, self.p, self.time.later(shift), self.z)
+        self.calls.append(Call(dense(function), places, (out,)))
+        whole = self.symbol(Place(out.offset, size * self.steps))
+        return ca.reshape(whole, size, self.steps)
+
+
+def dense(function: ca.Function) -> ca.Function:
+    """The function with dense results."""
+    arguments = function.sx_in()
+    results = [ca.densify(result) for result in function.call(arguments)]
+    return ca.Function(function.name(), arguments, results)
+
+
+def rollout_program(rollout: Rollout, exact: bool = False) -> Program:
+    """value, objective, errors, residuals, constraints and costs of a rollout as outputs of a program.
+
+    Args:
+        rollout: of the problem.
+        exact: leave the smoothing out: the knob must then be 0.
+    """
+    samples = Samples(rollout)
+    asked = terms(samples)
+    step = step_function(rollout.world, rollout.problem.simulation.scheme(), rollout.inputs, rollout.parameters.symbols)
+    forward = Call(dense(step), (samples.x, samples.u, samples.p, samples.knob), (samples.x.later(),))
+    epilogue, outputs = _epilogue(samples, asked)
+    times = tuple(np.arange(rollout.steps + 1) * rollout.dt)
+    return Program(
+        size=samples.layout.size,
+        z=samples.z,
+        knob=samples.knob,
+        steps=rollout.steps,
+        outputs=outputs,
+        prologue=(_prologue(samples),),
+        body=(forward, *samples.calls),
+        epilogue=(epilogue,),
+        constants=((Place(samples.time.offset, len(times)), times),),
+    )
+
+
+def _prologue(samples: Samples) -> Call:
+    rollout = samples.rollout
+    start = start_of(samples.problem, rollout.world, rollout.inputs, rollout.parameters, rollout.z)
+    results = [ca.densify(ca.vec(part)) for part in (start.x0, start.u, start.p)]
+    function = ca.Function("start", [rollout.z], results).expand()
+    u = Place(samples.u.offset, samples.u.size * samples.steps)
+    return Call(function, (samples.z,), (samples.x.still(), u, samples.p))
+
+
+def _epilogue(samples: Samples, asked: Terms) -> tuple[Call, dict[str, Place]]:
+    parts = {
+        "merit": asked.objective + asked.penalties,
+        "objective": asked.objective,
+        "errors": asked.errors,
+        "constraints": asked.constraints,
+        "costs": asked.costs,
+    }
+    if asked.residuals is not None:
+        parts["residuals"] = asked.residuals
+    parts = {name: ca.densify(part) for name, part in parts.items() if part.shape[0]}
+    function = ca.Function("aims", list(samples.symbols.values()), list(parts.values())).expand()
+    outputs = {name: samples.layout.take(int(part.shape[0])) for name, part in parts.items()}
+    return Call(function, tuple(samples.symbols), tuple(outputs.values())), outputs

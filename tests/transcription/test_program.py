@@ -1,0 +1,46 @@
+"""A rollout as a program of calls gives the numbers of the same rollout as one casadi expression."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pushed import PUSHED
+
+from symphys.kernel import compile_program, interpret
+from symphys.problem import Problem, load_problem
+from symphys.problems import find
+from symphys.transcription import rollout_program, transcribe
+
+
+@pytest.fixture(params=["pushed", "ball_throw", "two_balls"])
+def problem(request: pytest.FixtureRequest, tmp_path) -> Problem:
+    if request.param == "pushed":
+        path = tmp_path / "pushed.toml"
+        path.write_text(PUSHED, encoding="utf-8")
+        return load_problem(path)
+    return load_problem(find(request.param))
+
+
+def test_value_and_gradient_are_those_of_the_expression(problem: Problem) -> None:
+    transcription = transcribe(problem)
+    shooting = transcription.shooting
+    program = rollout_program(transcription.rollout)
+    kernel = compile_program(program, seeded=("merit",), threads=1)
+    z = shooting.start(1)
+    for knob in (0.0, 1e-3):
+        merit, objective, errors, slope = (np.array(part).ravel() for part in shooting.gradient(z, knob))
+        outputs, gradient = kernel.gradient(z, [1.0], [knob])
+        for name, expected in (("merit", merit), ("objective", objective), ("errors", errors)):
+            assert outputs[name][0] == pytest.approx(expected, rel=1e-12, abs=1e-12)
+            assert interpret(program, z, [knob])[name] == pytest.approx(expected, rel=1e-12, abs=1e-12)
+        assert gradient[0] == pytest.approx(slope, rel=1e-9, abs=1e-11 * np.abs(slope).max())
+
+
+def test_residuals_and_their_jacobian_are_those_of_the_expression() -> None:
+    transcription = transcribe(load_problem(find("ball_throw")))
+    kernel = compile_program(rollout_program(transcription.rollout), seeded=("residuals",), threads=1)
+    z = transcription.shooting.start(1)
+    r, _, _, expected = (np.array(part) for part in transcription.shooting.jacobian(z, 0.0))
+    assert kernel.forward(z, [0.0])["residuals"][0] == pytest.approx(r.ravel(), rel=1e-12, abs=1e-12)
+    jacobian = kernel.jacobian(z, "residuals", [0.0])
+    assert jacobian == pytest.approx(expected, rel=1e-9, abs=1e-11 * np.abs(expected).max())
