@@ -13,7 +13,9 @@ import casadi as ca
 
 from symphys.motion import apply
 from symphys.smooth import onto_disc, positive
+from symphys.step.record import Keep
 from symphys.step.row import ContactRow, Side
+from symphys.step.scene import Scene
 
 Expr = Any
 """casadi SX, MX or DM"""
@@ -25,6 +27,15 @@ class Momenta:
 
     velocity: list[Expr]
     angular: list[Expr]
+
+    def kept(self, keep: Keep, row: ContactRow, impulse: Impulse) -> Impulse:
+        """Keep what a visit of the row has changed: its bodies' momenta and its impulse."""
+        bodies = [side.body for side in row.sides]
+        changed = [(self.velocity[i], self.angular[i]) for i in bodies]
+        changed, impulse = keep((changed, impulse))
+        for i, (velocity, angular) in zip(bodies, changed, strict=True):
+            self.velocity[i], self.angular[i] = velocity, angular
+        return impulse
 
 
 @dataclass(frozen=True)
@@ -58,12 +69,36 @@ class Impulse:
         )
 
 
+Solution = tuple[Momenta, list[Impulse], list[Impulse]]
 ZERO = Impulse(ca.SX(0), ca.SX.zeros(3), ca.SX(0), ca.SX.zeros(3))
 
 
-def sweep(rows: Sequence[ContactRow], momenta: Momenta, impulses: Sequence[Impulse]) -> list[Impulse]:
+def relax(
+    scene: Scene, rows: Sequence[ContactRow], momenta: Momenta, impulses: Sequence[Impulse]
+) -> tuple[Momenta, list[Impulse], list[Impulse]]:
+    """All sweeps; returns the momenta, the impulses, and the impulses before the last sweep."""
+
+    def once(state: Solution) -> Solution:
+        momenta, impulses, _ = state
+        momenta = Momenta(list(momenta.velocity), list(momenta.angular))
+        return momenta, sweep(scene.keep, rows, momenta, impulses), impulses
+
+    solution: Solution = scene.repeat(scene.scheme.sweeps, once, (momenta, list(impulses), list(impulses)))
+    return solution
+
+
+def sweep(keep: Keep, rows: Sequence[ContactRow], momenta: Momenta, impulses: Sequence[Impulse]) -> list[Impulse]:
     """One pass over all rows; returns the new impulses."""
-    return [_visit(row, momenta, impulse) for row, impulse in zip(rows, impulses, strict=True)]
+    return [momenta.kept(keep, row, _visit(row, momenta, old)) for row, old in zip(rows, impulses, strict=True)]
+
+
+def begin(keep: Keep, rows: Sequence[ContactRow], momenta: Momenta, impulses: Sequence[Impulse]) -> list[Impulse]:
+    """Give the impulses that the sweeps start from."""
+    started = []
+    for row, impulse in zip(rows, impulses, strict=True):
+        give(row, momenta, impulse)
+        started.append(momenta.kept(keep, row, impulse))
+    return started
 
 
 def give(row: ContactRow, momenta: Momenta, impulse: Impulse) -> None:
