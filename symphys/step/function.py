@@ -65,15 +65,23 @@ class Recording:
 
 
 def record_step(
-    world: World, scheme: Scheme | None = None, inputs: Sequence[str] = (), parameters: Sequence[Any] = ()
+    world: World,
+    scheme: Scheme | None = None,
+    inputs: Sequence[str] = (),
+    parameters: Sequence[Any] = (),
+    exact: bool = False,
 ) -> Recording:
-    """The step of ``step_function`` in pieces; their named slots are the parts of x, and "u", "p" and "smoothing"."""
+    """The step of ``step_function`` in pieces; their named slots are the parts of x, and "u", "p" and "smoothing".
+
+    ``exact`` is the step at smoothing 0 only: what the knob would add is left out.
+    """
     _, u, p, knob = _arguments(world, inputs, parameters)
     layout, recorder = Layout(world), Recorder()
     for name, symbols in (("u", u), ("p", p), ("smoothing", knob)):
         recorder.take(name, symbols)
     x = layout.pack({name: recorder.argument(name, layout[name].stop - layout[name].start) for name in layout.names()})
-    scene = Scene(world, scheme or Scheme(), layout, tuple(inputs), u, knob, recorder.keep, recorder.repeat)
+    smoothing = ca.SX(0) if exact else knob
+    scene = Scene(world, scheme or Scheme(), layout, tuple(inputs), u, smoothing, recorder.keep, recorder.repeat)
     after = take_step(scene, x).x
     owners: dict[str, list[slice]] = {}
     for name in layout.names():

@@ -13,7 +13,7 @@ from symphys.motion import Motion, angular_velocity
 from symphys.smooth import positive
 from symphys.step.pgs import ZERO, Momenta, relax
 from symphys.step.phase import Phase, expected_motions, look
-from symphys.step.row import UNREACHED, ContactRow, at_touch, inverse_masses, make_side, moving_sides
+from symphys.step.row import UNREACHED, ContactRow, at_touch, effective_masses, inverse_masses, make_side, moving_sides
 from symphys.step.rows import width_of
 from symphys.step.scene import Scene
 
@@ -93,7 +93,7 @@ def _row(scene: Scene, contact: Contact, motions: Sequence[Motion], struck: Expr
     rebound = contact.pair.law.restitution * positive(-ca.dot(normal, velocity), scene.knob)
     frame = contact.frame(now)
     sides = tuple(make_side(i, k, m, now, frame, frame) for k, i, m in moving)
-    masses = inverse_masses(sides, frame.normal)
+    masses = effective_masses(*inverse_masses(sides, frame.normal))
     resting = ca.if_else(touching, 0, UNREACHED)
     return ContactRow(
         contact.pair.law,
@@ -101,7 +101,7 @@ def _row(scene: Scene, contact: Contact, motions: Sequence[Motion], struck: Expr
         sides,
         frame.normal,
         frame.normal,
-        *masses,
+        **masses,
         softness=ca.SX(0),
         target=UNREACHED if contact.pair.law.soft else ca.if_else(struck, rebound, resting),
         slip_target=ca.SX.zeros(3),

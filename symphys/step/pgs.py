@@ -117,10 +117,9 @@ def _visit(row: ContactRow, momenta: Momenta, old: Impulse) -> Impulse:
 
 
 def _normal(row: ContactRow, momenta: Momenta, old: Impulse) -> Expr:
-    """ln <- max(ln - (n.u - b + gamma ln) / (k + gamma), 0)."""
-    k = row.normal_mass + row.softness
+    """ln <- max(ln - m (n.u - b + gamma ln), 0), m = 1 / (k + gamma)."""
     wanted = ca.dot(row.normal, _slip(row, momenta)) - row.target + row.softness * old.normal
-    new = positive(old.normal * k - wanted, row.width) / k
+    new = positive(old.normal - row.normal_mass * wanted, row.normal_mass * row.width)
     give(row, momenta, Impulse(new - old.normal, ca.SX.zeros(3), ca.SX(0), ca.SX.zeros(3)))
     return new
 
@@ -128,8 +127,8 @@ def _normal(row: ContactRow, momenta: Momenta, old: Impulse) -> Expr:
 def _tangent(row: ContactRow, momenta: Momenta, old: Impulse, normal: Expr) -> Expr:
     """The friction impulse, onto the disc of radius mu ln."""
     slip = _slip(row, momenta) - row.slip_target
-    wanted = old.tangent - _across(slip, row.normal) / row.tangent_mass
-    new = onto_disc(wanted, row.law.friction * normal, row.knob / row.tangent_mass, row.knob)
+    wanted = old.tangent - row.tangent_mass * _across(slip, row.normal)
+    new = onto_disc(wanted, row.law.friction * normal, row.tangent_mass * row.knob, row.knob)
     give(row, momenta, Impulse(ca.SX(0), new - old.tangent, ca.SX(0), ca.SX.zeros(3)))
     return new
 
@@ -139,11 +138,11 @@ def _torques(row: ContactRow, momenta: Momenta, old: Impulse, normal: Expr) -> t
     if not row.law.spins:
         return old.spin, old.roll
     n = row.normal
-    spin_width, roll_width = row.knob / row.spin_mass, row.knob / row.roll_mass
+    spin_width, roll_width = row.knob * row.spin_mass, row.knob * row.roll_mass
     rate = sum(side.sign * _spin(momenta, side) for side in row.sides)
-    twist = n * (old.spin - ca.dot(n, rate) / row.spin_mass)
+    twist = n * (old.spin - row.spin_mass * ca.dot(n, rate))
     spin = ca.dot(n, onto_disc(twist, row.law.torsion * normal, spin_width, row.knob))
-    wanted = old.roll - _across(rate, n) / row.roll_mass
+    wanted = old.roll - row.roll_mass * _across(rate, n)
     roll = onto_disc(wanted, row.law.rolling * normal, roll_width, row.knob)
     give(row, momenta, Impulse(ca.SX(0), ca.SX.zeros(3), spin - old.spin, roll - old.roll))
     return spin, roll

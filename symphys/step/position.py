@@ -51,7 +51,7 @@ def push_apart(scene: Scene, rows: Sequence[ContactRow], shifts: dict[int, Shift
     for _ in range(scene.scheme.position_sweeps):
         for k, row in enumerate(rigid):
             gap = row.contact.gap_after(shifts)
-            push = _not_negative(pushes[k] - scene.scheme.push_out * gap / row.normal_mass)
+            push = _not_negative(pushes[k] - scene.scheme.push_out * gap * row.normal_mass)
             _push(row, shifts, push - pushes[k])
             touched = {side.body: shifts[side.body] for side in row.sides}
             pushes[k], touched = scene.keep((push, touched))

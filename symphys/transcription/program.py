@@ -76,11 +76,14 @@ def dense(function: ca.Function) -> ca.Function:
     return ca.Function(function.name(), arguments, results)
 
 
-def rollout_program(rollout: Rollout) -> Program:
-    """A program of z and smoothing whose outputs are merit, objective, errors, constraints, costs and residuals."""
+def rollout_program(rollout: Rollout, exact: bool = False) -> Program:
+    """A program of z and smoothing whose outputs are merit, objective, errors, constraints, costs and residuals.
+
+    ``exact`` is for smoothing 0 only, whatever is given: it has less to compute.
+    """
     samples = Samples(rollout)
     asked = terms(samples)
-    body = _step(samples)
+    body = _step(samples, exact)
     epilogue, outputs = _epilogue(samples, asked)
     times = tuple(np.arange(rollout.steps + 1) * rollout.dt)
     return Program(
@@ -96,12 +99,12 @@ def rollout_program(rollout: Rollout) -> Program:
     )
 
 
-def _step(samples: Samples) -> list[Call]:
+def _step(samples: Samples, exact: bool) -> list[Call]:
     """The calls of one time step."""
     rollout = samples.rollout
     columns = Columns(rollout.world)
     recording = record_step(
-        rollout.world, rollout.problem.simulation.scheme(), rollout.inputs, rollout.parameters.symbols
+        rollout.world, rollout.problem.simulation.scheme(), rollout.inputs, rollout.parameters.symbols, exact
     )
     arguments = {"u": samples.u, "p": samples.p, "smoothing": samples.knob}
     after = samples.x.later()
