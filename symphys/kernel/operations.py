@@ -34,4 +34,17 @@ FORMS = (
         "fabs": "(V)((I){0} & MAGNITUDE)",
     }
 )
-"""C expressions of operands {0}, {1}, {2}."""
+"""C expressions of operands {0}, {1}, {2}, for vectors."""
+PLAIN = (
+    FORMS
+    | {name: f"{{0}} {sign} {{1}}" for name, sign in COMPARE.items()}
+    | {
+        "not": "!{0}",
+        "isnt0": "{0} != S(0.0)",
+        "one": "(V){0}",
+        "iez": "{0} ? {1} : S(0.0)",
+        "select": "{0} ? {1} : {2}",
+        "fabs": "fabs({0})",
+    }
+)
+"""The same for single numbers in plain C, where a mask is 0 or 1."""
