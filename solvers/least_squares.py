@@ -124,7 +124,7 @@ def solve(
     """Descend; nothing is drawn, so the seed acts through ``start`` alone. See ``interface.Solve``."""
 
     def stage(meter: Meter, z: Array, saved: dict[str, object] | None) -> Verdict:
-        if problem.residuals is None or problem.jacobian is None:
+        if not problem.squares:
             return Verdict(Status.NOT_APPLICABLE, NO_SQUARES)
         step: State | Verdict = revive(State, saved, Progress) if saved else first(meter, options, z)
         while isinstance(step, State):
