@@ -225,5 +225,9 @@ def cosine(meter: Meter, state: State) -> float:
 
 
 LEAST_SQUARES = Solver(
-    "least_squares", "Levenberg-Marquardt within bounds, for costs that are sums of squares", LeastSquaresOptions, solve
+    "least_squares",
+    "Levenberg-Marquardt within bounds, for costs that are sums of squares",
+    LeastSquaresOptions,
+    solve,
+    threaded=True,
 )

@@ -10,10 +10,12 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from symphys.backends import Source, choose
-from symphys.kernel import Call, Layout, Program
+from symphys.kernel import Call, KernelUnavailable, Layout, Program
+from symphys.kernel.compiler import find_compiler
 from symphys.shooting import Block, Evaluator, ShootingProblem, Values
 from symphys.solvers import SOLVERS, Outcome, TraceRow, solver
 
@@ -75,6 +77,15 @@ def toy(
         constraint_upper=zeros,
         **more,
     )
+
+
+def require(backend: str) -> None:
+    """Skip where a backend cannot be built."""
+    try:
+        if backend != "casadi":
+            find_compiler()
+    except KernelUnavailable as error:
+        pytest.skip(str(error))
 
 
 def program(z: Any, s: Any, named: dict[str, Any]) -> Program:

@@ -47,7 +47,8 @@ class FunctionEvaluator:
 
 def squared(r: Array) -> Array:
     """(batch,) r . r, each row by itself, so that it does not depend on the others."""
-    return np.array([row @ row for row in r])
+    with np.errstate(all="ignore"):  # a rollout that is not finite is no fault here
+        return np.array([row @ row for row in r])
 
 
 def casadi(source: Source, threads: int) -> Backend:

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from toys import PENALTY, constrained, counted, quadratic, rosenbrock, solve, target, toy, values
+from toys import PENALTY, constrained, counted, quadratic, require, rosenbrock, solve, target, toy, values
 
 from symphys.solvers import SOLVERS, Status
 
@@ -205,3 +205,13 @@ def test_stages_of_smoothing(name: str) -> None:
     assert sorted(set(knobs), reverse=True) == [1.0, 0.1, 0.0]
     assert knobs == sorted(knobs, reverse=True)
     assert solve(name, problem).z == pytest.approx([1.25], abs=1e-3)
+
+
+@every_way
+@pytest.mark.parametrize("backend", ["c", "simd"])
+def test_compiled_toys(backend: str, name: str, options: dict[str, Any]) -> None:
+    require(backend)
+    assert solve(name, quadratic(backend=backend), options=options).z == pytest.approx([1, 2, 3], abs=1e-3)
+    assert solve(name, target(backend=backend), options=options).status is Status.MET
+    if name == "ipopt":
+        assert solve(name, constrained(backend=backend), options=options).z == pytest.approx([1, 0], abs=1e-7)
