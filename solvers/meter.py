@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Iterable
 from dataclasses import asdict, astuple, dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -40,11 +41,13 @@ class Point:
         """The largest of the errors; nan without any."""
         return float(np.max(self.errors)) if self.errors.size else math.nan
 
-    @property
+    @cached_property
     def finite(self) -> bool:
         """Whether every number that was asked for is finite."""
-        parts = (self.merit, self.objective, self.errors, self.gradient, self.residuals, self.jacobian)
-        return all(bool(np.all(np.isfinite(part))) for part in parts)
+        if not (math.isfinite(self.merit) and math.isfinite(self.objective)):
+            return False
+        parts = (self.errors, self.gradient, self.residuals, self.jacobian)
+        return all(bool(np.isfinite(part).all()) for part in parts if part.size)
 
     def better(self, other: Point | None) -> bool:
         """Met before not met, then the lower merit; one that is not finite is never better."""
