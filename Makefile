@@ -22,8 +22,12 @@ typecheck: $(VENV)/.developing  ## check types on a folder of links laid out as 
 	cd build/farm/symphys && ln -s ../../../symphys/* ../../../solvers ../../../problems .
 	$(BIN)/mypy -p symphys
 
-bench: $(VENV)/.installed  ## measure what BENCHMARKS.md reports
+bench: $(VENV)/.benching  ## measure what BENCHMARKS.md reports; figures go to build/
 	$(BIN)/python benchmarks/ball_throw.py
+	$(BIN)/python benchmarks/spheres.py
+	$(BIN)/python benchmarks/limit.py build
+	$(BIN)/python benchmarks/pile.py build
+	$(BIN)/python benchmarks/against_mujoco.py
 
 gallery: $(VENV)/.installed  ## make the figures of the README again
 	$(BIN)/symphys solve ball_throw bank_shot --out build/gallery
@@ -36,6 +40,9 @@ clean:  ## remove what the other targets made, reports aside
 $(VENV)/.installed: setup.cfg pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --editable . && touch $@
+
+$(VENV)/.benching: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --editable '.[bench]' && mkdir -p build && touch $@
 
 $(VENV)/.developing: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --editable '.[dev]' && touch $@

@@ -43,6 +43,6 @@ def onto_disc(y: Expr, radius: Expr, width: Expr, knob: Expr) -> Expr:
     Exact: y radius / |y| outside, y inside. Smooth: y radius / (radius + positive(|y| - radius, width)).
     """
     norm = length(y)
-    soft = radius / (radius + positive(norm - radius, width) + 1e-30)
-    outside = ca.dot(y, y) >= radius * radius
-    return y * ca.if_else(knob > 0, soft, ca.if_else(outside, radius / norm, 1))
+    smooth, outside = knob > 0, ca.dot(y, y) >= radius * radius
+    reach = ca.if_else(smooth, radius + positive(norm - radius, width) + 1e-30, norm)
+    return y * ca.if_else(ca.logic_or(smooth, outside), radius / reach, 1)

@@ -47,7 +47,7 @@ def compile_program(
     started = time.perf_counter()
     single = precision == "single"
     names, width = _names(program, seeded), _width(lanes, single)
-    planned = plan(program, names)
+    planned = plan(program, names, width * (4 if single else 8))
     with shared_library(sources(planned, width, single), cache or default_cache()) as built:
         loaded = Loaded(built.path, program, planned, names)
     report = Report(

@@ -1,5 +1,6 @@
 """One time step, as a branch-free casadi expression."""
 
-from symphys.step.function import report_function, step_function
+from symphys.step.function import Recording, record_step, report_function, step_function
+from symphys.step.record import Piece, Slot
 
-__all__ = ["report_function", "step_function"]
+__all__ = ["Piece", "Recording", "Slot", "record_step", "report_function", "step_function"]

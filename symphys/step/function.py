@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
 from symphys.state import Layout
+from symphys.step.record import Piece, Recorder, Slot
 from symphys.step.scene import Scene
 from symphys.step.whole import take_step
 from symphys.world import Scheme, World
@@ -47,6 +49,46 @@ def report_function(
     names = ["x_next", "forces", "gaps", "residual", "crowded"]
     outputs = [r.x, r.forces, r.gaps, r.residual, r.crowded]
     return ca.Function("report", [x, u, p, knob], outputs, ["x", "u", "p", "smoothing"], names)
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One time step as pieces.
+
+    Attributes:
+        pieces: in the order in which they are computed.
+        results: which columns of the next state each slot named "next" holds.
+    """
+
+    pieces: tuple[Piece, ...]
+    results: Mapping[Slot, slice]
+
+
+def record_step(
+    world: World,
+    scheme: Scheme | None = None,
+    inputs: Sequence[str] = (),
+    parameters: Sequence[Any] = (),
+    exact: bool = False,
+) -> Recording:
+    """The step of ``step_function`` in pieces; their named slots are the parts of x, and "u", "p" and "smoothing".
+
+    ``exact`` is the step at smoothing 0 only: what the knob would add is left out.
+    """
+    _, u, p, knob = _arguments(world, inputs, parameters)
+    layout, recorder = Layout(world), Recorder()
+    for name, symbols in (("u", u), ("p", p), ("smoothing", knob)):
+        recorder.take(name, symbols)
+    x = layout.pack({name: recorder.argument(name, layout[name].stop - layout[name].start) for name in layout.names()})
+    smoothing = ca.SX(0) if exact else knob
+    scene = Scene(world, scheme or Scheme(), layout, tuple(inputs), u, smoothing, recorder.keep, recorder.repeat)
+    after = take_step(scene, x).x
+    owners: dict[str, list[slice]] = {}
+    for name in layout.names():
+        owners.setdefault(name.rpartition(".")[0], []).append(layout[name])
+    columns = [slice(slices[0].start, slices[-1].stop) for slices in owners.values()]
+    results = {recorder.give("next", after[part]): part for part in columns}
+    return Recording(tuple(recorder.pieces), results)
 
 
 def _arguments(world: World, inputs: Sequence[str], parameters: Sequence[Any]) -> tuple[Expr, Expr, Expr, Expr]:

@@ -11,9 +11,9 @@ import casadi as ca
 from symphys.collide import Contact
 from symphys.motion import Motion, angular_velocity
 from symphys.smooth import positive
-from symphys.step.pgs import ZERO, Momenta, sweep
+from symphys.step.pgs import ZERO, Momenta, relax
 from symphys.step.phase import Phase, expected_motions, look
-from symphys.step.row import UNREACHED, ContactRow, at_touch, inverse_masses, make_side, moving_sides
+from symphys.step.row import UNREACHED, ContactRow, at_touch, effective_masses, inverse_masses, make_side, moving_sides
 from symphys.step.rows import width_of
 from symphys.step.scene import Scene
 
@@ -49,22 +49,24 @@ def find_cut(scene: Scene, x: Expr) -> Cut:
     """The first impact within the step, on paths under the persistent forces of the last step."""
     dt = scene.scheme.dt
     contacts = look(scene, expected_motions(scene, x, ca.SX(dt)))
-    fast = tuple(_closes_fast(scene, contact) for contact in contacts)
+    fast = tuple(scene.keep(_closes_fast(scene, contact)) for contact in contacts)
     strikes = [ca.logic_and(closes, contact.hit) for contact, closes in zip(contacts, fast, strict=True)]
     impact, first = ca.SX(0), ca.SX(dt)
     for contact, meets in zip(contacts, strikes, strict=True):
-        impact = ca.fmax(impact, meets)
-        first = ca.if_else(meets, ca.fmin(first, contact.time), first)
+        earliest = ca.if_else(meets, ca.fmin(first, contact.time), first)
+        impact, first = scene.keep((ca.fmax(impact, meets), earliest))
     latest = first + TOGETHER * dt
-    struck = tuple(ca.logic_and(meets, c.time <= latest) for c, meets in zip(contacts, strikes, strict=True))
+    struck = tuple(
+        scene.keep(ca.logic_and(meets, c.time <= latest)) for c, meets in zip(contacts, strikes, strict=True)
+    )
     inside = ca.fmin(ca.fmax(first, MARGIN * dt), (1 - MARGIN) * dt)
-    return Cut(impact, ca.if_else(impact, inside, dt / 2), fast, struck)
+    return Cut(impact, scene.keep(ca.if_else(impact, inside, dt / 2)), fast, struck)
 
 
 def passing(scene: Scene, x: Expr, duration: Expr) -> list[Expr]:
     """Per pair: 1 if it closes at speed but does not meet within ``duration``."""
     contacts = look(scene, expected_motions(scene, x, duration))
-    return [ca.logic_and(_closes_fast(scene, contact), ca.logic_not(contact.hit)) for contact in contacts]
+    return [scene.keep(ca.logic_and(_closes_fast(scene, c), ca.logic_not(c.hit))) for c in contacts]
 
 
 def _closes_fast(scene: Scene, contact: Contact) -> Expr:
@@ -76,13 +78,11 @@ def collide_now(scene: Scene, x: Expr, cut: Cut) -> Phase:
     motions = expected_motions(scene, x, ca.SX(scene.scheme.dt))
     reach = TOUCHING * scene.reference * scene.scheme.dt**2
     rows = tuple(
-        _row(scene, contact, motions, struck, ca.logic_and(cut.impact, contact.gap < reach))
+        scene.keep(_row(scene, contact, motions, struck, ca.logic_and(cut.impact, contact.gap < reach)))
         for contact, struck in zip(look(scene, motions), cut.struck, strict=True)
     )
     momenta = Momenta([m.velocity for m in motions], [m.momentum_k for m in motions])
-    impulses = last = [ZERO for _ in rows]
-    for _ in range(scene.scheme.sweeps):
-        last, impulses = impulses, sweep(rows, momenta, impulses)
+    momenta, impulses, last = relax(scene, rows, momenta, [ZERO for _ in rows])
     return Phase(_with_velocities(scene, x, motions, momenta, cut.impact), rows, tuple(impulses), tuple(last))
 
 
@@ -93,7 +93,7 @@ def _row(scene: Scene, contact: Contact, motions: Sequence[Motion], struck: Expr
     rebound = contact.pair.law.restitution * positive(-ca.dot(normal, velocity), scene.knob)
     frame = contact.frame(now)
     sides = tuple(make_side(i, k, m, now, frame, frame) for k, i, m in moving)
-    masses = inverse_masses(sides, frame.normal)
+    masses = effective_masses(*inverse_masses(sides, frame.normal))
     resting = ca.if_else(touching, 0, UNREACHED)
     return ContactRow(
         contact.pair.law,
@@ -101,7 +101,7 @@ def _row(scene: Scene, contact: Contact, motions: Sequence[Motion], struck: Expr
         sides,
         frame.normal,
         frame.normal,
-        *masses,
+        **masses,
         softness=ca.SX(0),
         target=UNREACHED if contact.pair.law.soft else ca.if_else(struck, rebound, resting),
         slip_target=ca.SX.zeros(3),
@@ -117,7 +117,11 @@ def _with_velocities(scene: Scene, x: Expr, motions: Sequence[Motion], momenta: 
     for motion, velocity, turning in zip(motions, momenta.velocity, momenta.angular, strict=True):
         body, name = motion.body, motion.body.name
         spin = angular_velocity(body, motion.orientation, turning)
-        values[f"{name}.velocity"] = ca.if_else(impact, velocity, values[f"{name}.velocity"])
-        values[f"{name}.angular_velocity"] = ca.if_else(impact, spin, values[f"{name}.angular_velocity"])
-    values["lag"] = ca.if_else(impact, 0, values["lag"])
+        values |= scene.keep(
+            {
+                f"{name}.velocity": ca.if_else(impact, velocity, values[f"{name}.velocity"]),
+                f"{name}.angular_velocity": ca.if_else(impact, spin, values[f"{name}.angular_velocity"]),
+            }
+        )
+    values["lag"] = scene.keep(ca.if_else(impact, 0, values["lag"]))
     return scene.layout.pack(values)

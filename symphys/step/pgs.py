@@ -13,7 +13,9 @@ import casadi as ca
 
 from symphys.motion import apply
 from symphys.smooth import onto_disc, positive
+from symphys.step.record import Keep
 from symphys.step.row import ContactRow, Side
+from symphys.step.scene import Scene
 
 Expr = Any
 """casadi SX, MX or DM"""
@@ -25,6 +27,15 @@ class Momenta:
 
     velocity: list[Expr]
     angular: list[Expr]
+
+    def kept(self, keep: Keep, row: ContactRow, impulse: Impulse) -> Impulse:
+        """Keep what a visit of the row has changed: its bodies' momenta and its impulse."""
+        bodies = [side.body for side in row.sides]
+        changed = [(self.velocity[i], self.angular[i]) for i in bodies]
+        changed, impulse = keep((changed, impulse))
+        for i, (velocity, angular) in zip(bodies, changed, strict=True):
+            self.velocity[i], self.angular[i] = velocity, angular
+        return impulse
 
 
 @dataclass(frozen=True)
@@ -58,12 +69,36 @@ class Impulse:
         )
 
 
+Solution = tuple[Momenta, list[Impulse], list[Impulse]]
 ZERO = Impulse(ca.SX(0), ca.SX.zeros(3), ca.SX(0), ca.SX.zeros(3))
 
 
-def sweep(rows: Sequence[ContactRow], momenta: Momenta, impulses: Sequence[Impulse]) -> list[Impulse]:
+def relax(
+    scene: Scene, rows: Sequence[ContactRow], momenta: Momenta, impulses: Sequence[Impulse]
+) -> tuple[Momenta, list[Impulse], list[Impulse]]:
+    """All sweeps; returns the momenta, the impulses, and the impulses before the last sweep."""
+
+    def once(state: Solution) -> Solution:
+        momenta, impulses, _ = state
+        momenta = Momenta(list(momenta.velocity), list(momenta.angular))
+        return momenta, sweep(scene.keep, rows, momenta, impulses), impulses
+
+    solution: Solution = scene.repeat(scene.scheme.sweeps, once, (momenta, list(impulses), list(impulses)))
+    return solution
+
+
+def sweep(keep: Keep, rows: Sequence[ContactRow], momenta: Momenta, impulses: Sequence[Impulse]) -> list[Impulse]:
     """One pass over all rows; returns the new impulses."""
-    return [_visit(row, momenta, impulse) for row, impulse in zip(rows, impulses, strict=True)]
+    return [momenta.kept(keep, row, _visit(row, momenta, old)) for row, old in zip(rows, impulses, strict=True)]
+
+
+def begin(keep: Keep, rows: Sequence[ContactRow], momenta: Momenta, impulses: Sequence[Impulse]) -> list[Impulse]:
+    """Give the impulses that the sweeps start from."""
+    started = []
+    for row, impulse in zip(rows, impulses, strict=True):
+        give(row, momenta, impulse)
+        started.append(momenta.kept(keep, row, impulse))
+    return started
 
 
 def give(row: ContactRow, momenta: Momenta, impulse: Impulse) -> None:
@@ -82,10 +117,9 @@ def _visit(row: ContactRow, momenta: Momenta, old: Impulse) -> Impulse:
 
 
 def _normal(row: ContactRow, momenta: Momenta, old: Impulse) -> Expr:
-    """ln <- max(ln - (n.u - b + gamma ln) / (k + gamma), 0)."""
-    k = row.normal_mass + row.softness
+    """ln <- max(ln - m (n.u - b + gamma ln), 0), m = 1 / (k + gamma)."""
     wanted = ca.dot(row.normal, _slip(row, momenta)) - row.target + row.softness * old.normal
-    new = positive(old.normal * k - wanted, row.width) / k
+    new = positive(old.normal - row.normal_mass * wanted, row.normal_mass * row.width)
     give(row, momenta, Impulse(new - old.normal, ca.SX.zeros(3), ca.SX(0), ca.SX.zeros(3)))
     return new
 
@@ -93,8 +127,8 @@ def _normal(row: ContactRow, momenta: Momenta, old: Impulse) -> Expr:
 def _tangent(row: ContactRow, momenta: Momenta, old: Impulse, normal: Expr) -> Expr:
     """The friction impulse, onto the disc of radius mu ln."""
     slip = _slip(row, momenta) - row.slip_target
-    wanted = old.tangent - _across(slip, row.normal) / row.tangent_mass
-    new = onto_disc(wanted, row.law.friction * normal, row.knob / row.tangent_mass, row.knob)
+    wanted = old.tangent - row.tangent_mass * _across(slip, row.normal)
+    new = onto_disc(wanted, row.law.friction * normal, row.tangent_mass * row.knob, row.knob)
     give(row, momenta, Impulse(ca.SX(0), new - old.tangent, ca.SX(0), ca.SX.zeros(3)))
     return new
 
@@ -104,11 +138,11 @@ def _torques(row: ContactRow, momenta: Momenta, old: Impulse, normal: Expr) -> t
     if not row.law.spins:
         return old.spin, old.roll
     n = row.normal
-    spin_width, roll_width = row.knob / row.spin_mass, row.knob / row.roll_mass
+    spin_width, roll_width = row.knob * row.spin_mass, row.knob * row.roll_mass
     rate = sum(side.sign * _spin(momenta, side) for side in row.sides)
-    twist = n * (old.spin - ca.dot(n, rate) / row.spin_mass)
+    twist = n * (old.spin - row.spin_mass * ca.dot(n, rate))
     spin = ca.dot(n, onto_disc(twist, row.law.torsion * normal, spin_width, row.knob))
-    wanted = old.roll - _across(rate, n) / row.roll_mass
+    wanted = old.roll - row.roll_mass * _across(rate, n)
     roll = onto_disc(wanted, row.law.rolling * normal, roll_width, row.knob)
     give(row, momenta, Impulse(ca.SX(0), ca.SX.zeros(3), spin - old.spin, roll - old.roll))
     return spin, roll

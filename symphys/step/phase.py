@@ -13,7 +13,7 @@ from symphys.collide import Contact, collide
 from symphys.collide.contact import Shift
 from symphys.motion import BodyState, Motion, angular_velocity, free_motion, momentum
 from symphys.state import BODY_FIELDS
-from symphys.step.pgs import ZERO, Impulse, Momenta, give, sweep
+from symphys.step.pgs import ZERO, Impulse, Momenta, begin, relax
 from symphys.step.position import displacements, push_apart
 from symphys.step.row import ContactRow
 from symphys.step.rows import prepare
@@ -38,7 +38,7 @@ class Phase:
 
 def look(scene: Scene, motions: Sequence[Motion]) -> list[Contact]:
     """The contacts on the way."""
-    return [collide(scene.world, pair, motions) for pair in scene.world.pairs]
+    return [scene.keep(collide(scene.world, pair, motions)) for pair in scene.world.pairs]
 
 
 def advance(scene: Scene, x: Expr, duration: Expr, spared: Sequence[Expr] = ()) -> Phase:
@@ -51,26 +51,24 @@ def advance(scene: Scene, x: Expr, duration: Expr, spared: Sequence[Expr] = ()) 
 
     # rows: where, when and how the surfaces meet
     rows = tuple(
-        prepare(scene, c, motions, duration, off)
+        scene.keep(prepare(scene, c, motions, duration, off))
         for c, off in zip(contacts, spared or [0] * len(contacts), strict=True)
     )
 
     # velocities: warm start, then sweeps
     momenta = Momenta([m.mid_velocity for m in motions], [m.mid_momentum for m in motions])
-    impulses = last = _warm_start(scene, rows, x, kick)
-    for row, impulse in zip(rows, impulses, strict=True):
-        give(row, momenta, impulse)
-    for _ in range(scheme.sweeps):
-        last, impulses = impulses, sweep(rows, momenta, impulses)
+    started = begin(scene.keep, rows, momenta, _warm_start(scene, rows, x, kick))
+    momenta, impulses, last = relax(scene, rows, momenta, started)
 
     # positions
-    shifts = push_apart(rows, displacements(rows, impulses, momenta, motions, scheme, duration), scheme)
+    moved = displacements(scene, rows, impulses, momenta, motions, duration)
+    shifts = push_apart(scene, rows, moved)
 
     # the next state
     values: dict[str, Any] = {"lag": ca.SX(duration / 2)}
     resting = _store_forces(scene, rows, impulses, ca.fmax(kick, SHORTEST_KICK * scheme.dt), values)
     for i, motion in enumerate(motions):
-        _store_body(motion, momenta.velocity[i], momenta.angular[i], shifts[i], resting[i], values)
+        values |= scene.keep(_store_body(motion, momenta.velocity[i], momenta.angular[i], shifts[i], resting[i]))
     return Phase(scene.layout.pack(values), rows, tuple(impulses), tuple(last))
 
 
@@ -100,7 +98,7 @@ def _motions(scene: Scene, x: Expr, duration: Expr, kick: Expr, share: int) -> l
             force=applied.get(f"{body.name}.force", zero) + share * part["reaction_force"],
             torque=applied.get(f"{body.name}.torque", zero) + share * part["reaction_torque"],
         )
-        motions.append(free_motion(body, state, scene.gravity, duration))
+        motions.append(scene.keep(free_motion(body, state, scene.gravity, duration)))
     return motions
 
 
@@ -132,26 +130,32 @@ def _store_forces(
     total = [(ca.SX.zeros(3), ca.SX.zeros(3)) for _ in scene.world.bodies]
     for pair, row, impulse in zip(scene.world.pairs, rows, impulses, strict=True):
         share = (1 - row.leaving) * (1 - row.struck) / kick
-        force, torque = share * impulse.linear(row.impulse_normal), share * impulse.angular(row.impulse_normal)
+        force, torque = scene.keep(
+            (share * impulse.linear(row.impulse_normal), share * impulse.angular(row.impulse_normal))
+        )
         values[f"{pair.name}.force"] = force if scene.scheme.warm_start else ca.SX.zeros(3)
         if pair.law.spins:
             values[f"{pair.name}.torque"] = torque if scene.scheme.warm_start else ca.SX.zeros(3)
         for side in row.sides:
             f, t = total[side.body]
-            total[side.body] = (f + side.sign * force, t + side.sign * (ca.cross(side.impulse_arm, force) + torque))
+            sum_force = f + side.sign * force
+            sum_torque = t + side.sign * (ca.cross(side.impulse_arm, force) + torque)
+            total[side.body] = scene.keep((sum_force, sum_torque))
     return total
 
 
 def _store_body(
-    motion: Motion, velocity: Expr, angular: Expr, shift: Shift, resting: tuple[Expr, Expr], values: dict[str, Any]
-) -> None:
-    """The body's pose and true velocities at the end of the step."""
+    motion: Motion, velocity: Expr, angular: Expr, shift: Shift, resting: tuple[Expr, Expr]
+) -> dict[str, Expr]:
+    """The body's pose and true velocities at the end of the stretch, by name."""
     body, half, (force, torque) = motion.body, motion.dt / 2, resting
     orientation = rotation.turn(motion.orientation, shift.angular)
     end_momentum = angular + half * (motion.torque + torque)
-    values[f"{body.name}.position"] = motion.position + shift.linear
-    values[f"{body.name}.orientation"] = orientation
-    values[f"{body.name}.velocity"] = velocity + half * (motion.acceleration + force / body.mass)
-    values[f"{body.name}.angular_velocity"] = angular_velocity(body, orientation, end_momentum)
-    values[f"{body.name}.reaction_force"] = force
-    values[f"{body.name}.reaction_torque"] = torque
+    return {
+        f"{body.name}.position": motion.position + shift.linear,
+        f"{body.name}.orientation": orientation,
+        f"{body.name}.velocity": velocity + half * (motion.acceleration + force / body.mass),
+        f"{body.name}.angular_velocity": angular_velocity(body, orientation, end_momentum),
+        f"{body.name}.reaction_force": force,
+        f"{body.name}.reaction_torque": torque,
+    }

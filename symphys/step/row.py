@@ -52,9 +52,9 @@ class ContactRow:
         sides: one or two moving sides.
         normal: (3,) at the row's instant; the impulse's normal is ``impulse_normal``.
         impulse_normal: (3,).
-        normal_mass, tangent_mass: inverse effective masses k [1/kg]; the scalar tangential one is the largest
-            eigenvalue, so that sliding friction stays opposite to the slip.
-        spin_mass, roll_mass: the same for torques [1/(kg m^2)].
+        normal_mass, tangent_mass: effective masses [kg], 1 / (k + gamma) and 1 / k; across the normal k is the
+            largest eigenvalue, one number, so that sliding friction stays opposite to the slip.
+        spin_mass, roll_mass: the same for torques [kg m^2].
         softness: gamma [1/kg] of a soft contact, 0 if rigid.
         target: normal velocity at the middle of the step [m/s].
         slip_target: (3,) tangential velocity that friction aims at [m/s].
@@ -121,6 +121,11 @@ def inverse_masses(sides: Sequence[Side], n: Expr) -> tuple[Expr, Expr, Expr, Ex
         push += side.inverse_mass * ca.SX.eye(3) - ca.mtimes(arm, ca.mtimes(inverse, arm))
         twist += inverse
     return along(push, n), across(push, n), along(twist, n), across(twist, n)
+
+
+def effective_masses(normal: Expr, tangent: Expr, spin: Expr, roll: Expr) -> dict[str, Expr]:
+    """The fields of a row from the inverse effective masses k; here they are inverted once, not in each sweep."""
+    return {"normal_mass": 1 / normal, "tangent_mass": 1 / tangent, "spin_mass": 1 / spin, "roll_mass": 1 / roll}
 
 
 def along(k: Expr, n: Expr) -> Expr:

@@ -15,7 +15,7 @@ import casadi as ca
 from symphys.collide.contact import Contact
 from symphys.motion import Motion
 from symphys.smooth import clip, positive
-from symphys.step.row import UNREACHED, ContactRow, at_touch, inverse_masses, make_side, moving_sides
+from symphys.step.row import UNREACHED, ContactRow, at_touch, effective_masses, inverse_masses, make_side, moving_sides
 from symphys.step.scene import Scene
 
 Expr = Any
@@ -46,8 +46,8 @@ def prepare(scene: Scene, contact: Contact, motions: Sequence[Motion], duration:
     row_time = half + leaving * (time - half)
     frame, applied = contact.frame(row_time), contact.frame(leaving * time)
     sides = tuple(make_side(i, k, m, row_time, frame, applied) for k, i, m in moving)
-    normal_mass, tangent_mass, spin_mass, roll_mass = inverse_masses(sides, frame.normal)
-    softness, target = _normal_target(contact, duration, time, rebound, pull, normal_mass, knob)
+    k_normal, *k_others = inverse_masses(sides, frame.normal)
+    softness, target = _normal_target(contact, duration, time, rebound, pull, k_normal, knob)
     quick = contact.rate < -scene.fast
     target = ca.if_else(spared, UNREACHED, target)
     slip = contact.hit * leaving * (half - time) * (acceleration - normal * pull)
@@ -57,10 +57,7 @@ def prepare(scene: Scene, contact: Contact, motions: Sequence[Motion], duration:
         sides=sides,
         normal=frame.normal,
         impulse_normal=applied.normal,
-        normal_mass=normal_mass,
-        tangent_mass=tangent_mass,
-        spin_mass=spin_mass,
-        roll_mass=roll_mass,
+        **effective_masses(k_normal + softness, *k_others),
         softness=softness,
         target=target,
         slip_target=slip if scheme.impact_friction else ca.SX.zeros(3),

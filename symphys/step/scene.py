@@ -9,6 +9,7 @@ import casadi as ca
 
 from symphys.smooth import TINY_SQUARE
 from symphys.state import Layout
+from symphys.step.record import Keep, Repeat, over_again, whole
 from symphys.world import Scheme, World
 
 Expr = Any
@@ -27,6 +28,7 @@ class Scene:
         inputs: names of the forces and torques that ``u`` stacks.
         u: (3 * inputs,), constant over the step.
         knob: smoothing [m/s].
+        keep, repeat: see ``record``: ``whole`` and ``over_again``, or those of a ``Recorder``.
     """
 
     world: World
@@ -35,6 +37,8 @@ class Scene:
     inputs: tuple[str, ...]
     u: Expr
     knob: Expr
+    keep: Keep = whole
+    repeat: Repeat = over_again
 
     @property
     def gravity(self) -> Expr:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -32,7 +33,7 @@ class Rollout:
         parameters: what p stacks.
         z: (n,) decision vector.
         smoothing: scalar.
-        x: (nx, N + 1) states.
+        x0: (nx,) initial state.
         u: (nu, N).
         p: (np,).
     """
@@ -43,9 +44,17 @@ class Rollout:
     parameters: Parameters
     z: Expr
     smoothing: Expr
-    x: Expr
+    x0: Expr
     u: Expr
     p: Expr
+
+    @cached_property
+    def x(self) -> Expr:
+        """(nx, N + 1) states; built when first asked for, since the whole step as one expression takes its time."""
+        scheme = self.problem.simulation.scheme()
+        step = step_function(self.world, scheme, self.inputs, self.parameters.symbols)
+        (x,) = roll_out(step, self.steps, self.x0, self.u, self.p, self.smoothing)
+        return x
 
     @property
     def steps(self) -> int:
@@ -98,12 +107,10 @@ def symbolic_rollout(problem: Problem) -> Rollout:
     """The rollout of a problem over its horizon."""
     parameters, inputs = varied_parameters(problem), input_names(problem)
     world = problem.world(_overrides(parameters))
-    step = step_function(world, problem.simulation.scheme(), inputs, parameters.symbols)
     z = ca.MX.sym("z", sum(v.guess.size for v in problem.variables))
     smoothing = ca.MX.sym("smoothing")
     start = start_of(problem, world, inputs, parameters, z)
-    (x,) = roll_out(step, problem.simulation.steps, start.x0, start.u, start.p, smoothing)
-    return Rollout(problem, world, inputs, parameters, z, smoothing, x, start.u, start.p)
+    return Rollout(problem, world, inputs, parameters, z, smoothing, start.x0, start.u, start.p)
 
 
 def _overrides(parameters: Parameters) -> dict[str, Any]:

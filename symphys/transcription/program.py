@@ -9,7 +9,8 @@ import numpy as np
 
 from symphys.expression import Formula
 from symphys.kernel import Call, Layout, Place, Program
-from symphys.step import step_function
+from symphys.state import Layout as Columns
+from symphys.step import Slot, record_step
 from symphys.transcription.along import Rollout, formula_moves
 from symphys.transcription.decision import start_of
 from symphys.transcription.terms import Terms, terms
@@ -28,7 +29,7 @@ class Samples:
         """Places for z, knob, times, parameters, inputs and states."""
         self.rollout, self.problem, self.steps, self.dt = rollout, rollout.problem, rollout.steps, rollout.dt
         self.layout = Layout()
-        nx, nu, np_ = (int(part.shape[0]) for part in (rollout.x, rollout.u, rollout.p))
+        nx, nu, np_ = (int(part.shape[0]) for part in (rollout.x0, rollout.u, rollout.p))
         self.z, self.knob = self.layout.take(int(rollout.z.shape[0])), self.layout.take(1)
         self.p, self.u = self.layout.take(np_), self.layout.series(nu, self.steps)
         self.x = self.layout.series(nx, self.steps + 1)
@@ -76,16 +77,13 @@ def dense(function: ca.Function) -> ca.Function:
 
 
 def rollout_program(rollout: Rollout, exact: bool = False) -> Program:
-    """value, objective, errors, residuals, constraints and costs of a rollout as outputs of a program.
+    """A program of z and smoothing whose outputs are merit, objective, errors, constraints, costs and residuals.
 
-    Args:
-        rollout: of the problem.
-        exact: leave the smoothing out: the knob must then be 0.
+    ``exact`` is for smoothing 0 only, whatever is given: it has less to compute.
     """
     samples = Samples(rollout)
     asked = terms(samples)
-    step = step_function(rollout.world, rollout.problem.simulation.scheme(), rollout.inputs, rollout.parameters.symbols)
-    forward = Call(dense(step), (samples.x, samples.u, samples.p, samples.knob), (samples.x.later(),))
+    body = _step(samples, exact)
     epilogue, outputs = _epilogue(samples, asked)
     times = tuple(np.arange(rollout.steps + 1) * rollout.dt)
     return Program(
@@ -95,10 +93,37 @@ def rollout_program(rollout: Rollout, exact: bool = False) -> Program:
         steps=rollout.steps,
         outputs=outputs,
         prologue=(_prologue(samples),),
-        body=(forward, *samples.calls),
+        body=(*body, *samples.calls),
         epilogue=(epilogue,),
         constants=((Place(samples.time.offset, len(times)), times),),
     )
+
+
+def _step(samples: Samples, exact: bool) -> list[Call]:
+    """The calls of one time step."""
+    rollout = samples.rollout
+    columns = Columns(rollout.world)
+    recording = record_step(
+        rollout.world, rollout.problem.simulation.scheme(), rollout.inputs, rollout.parameters.symbols, exact
+    )
+    arguments = {"u": samples.u, "p": samples.p, "smoothing": samples.knob}
+    after = samples.x.later()
+    places: dict[Slot, Place] = {slot: _part(after, part) for slot, part in recording.results.items()}
+    calls = []
+    for piece in recording.pieces:
+        for slot in piece.inputs:
+            if slot.name in columns:
+                places[slot] = _part(samples.x, columns[slot.name])
+            elif slot.name:
+                places[slot] = arguments[slot.name]
+        places.setdefault(piece.output, samples.layout.take(piece.output.size))
+        calls.append(Call(piece.function, tuple(places[slot] for slot in piece.inputs), (places[piece.output],)))
+    return calls
+
+
+def _part(place: Place, columns: slice) -> Place:
+    """Some columns of a state."""
+    return Place(place.offset + columns.start, columns.stop - columns.start, place.stride)
 
 
 def _prologue(samples: Samples) -> Call:

@@ -43,3 +43,15 @@ def test_residuals_and_their_jacobian_are_those_of_the_expression() -> None:
     assert kernel.forward(z, [0.0])["residuals"][0] == pytest.approx(r.ravel(), rel=1e-12, abs=1e-12)
     jacobian = kernel.jacobian(z, "residuals", [0.0])
     assert jacobian == pytest.approx(expected, rel=1e-9, abs=1e-11 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("name", ["ball_throw", "bank_shot"])
+def test_the_exact_kernel_is_the_knob_at_zero(name: str) -> None:
+    rollout = transcribe(load_problem(find(name), {"simulation.duration": 1.0})).rollout
+    exact, knob = (compile_program(rollout_program(rollout, exact=e), seeded=("merit",)) for e in (True, False))
+    Z = np.concatenate([v.guess for v in rollout.problem.variables]) + np.linspace(0, 0.1, 9)[:, None]
+    (one, slope), (other, expected) = exact.gradient(Z, [1.0], [0.0]), knob.gradient(Z, [1.0], [0.0])
+    for output, values in one.items():
+        assert values == pytest.approx(other[output], rel=1e-9, abs=1e-12), output
+    assert slope == pytest.approx(expected, rel=1e-8, abs=1e-10 * np.abs(expected).max())
+    assert exact.report.operations < 0.9 * knob.report.operations
