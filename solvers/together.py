@@ -39,7 +39,8 @@ def solve_together(
         starts: (n,) each.
         options: of all.
         seeds: one for each start; None: 0 for all.
-        monitors: one for each start, called in the thread of its solve.
+        monitors: one for each start, called in the thread of its solve; one that raises KeyboardInterrupt ends its
+            solve alone, which can go on. Ctrl-C itself ends all of them and is raised.
     """
     if not solver.threaded:
         raise SymphysError(f"the solver {solver.name!r} cannot run several solves side by side")

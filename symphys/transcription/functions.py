@@ -54,6 +54,12 @@ class ExpressionFunctions:
         return self._function("nlp", [self._terms.objective, self._terms.constraints])
 
     @cached_property
+    def constraint_jacobian(self) -> ca.Function:
+        """-> (constraints, their derivative (m, n))."""
+        constraints = self._terms.constraints
+        return self._function("constraint_jacobian", [constraints, ca.jacobian(constraints, self._rollout.z)])
+
+    @cached_property
     def hessian(self) -> ca.Function:
         """-> the second derivative of the objective (n, n)."""
         return self._function("hessian", [ca.hessian(self._terms.objective, self._rollout.z)[0]])

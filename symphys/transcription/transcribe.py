@@ -57,13 +57,17 @@ class Transcription:
     def prices(self, kinds: Iterable[str] = ("gradient", "jacobian")) -> dict[str, float]:
         """Measured cost of one "gradient", "jacobian" or "hessian" in rollouts, at the guess, one at a time.
 
-        Hessians are those of casadi's virtual machine, whatever the backend.
+        A Jacobian is that of the residuals, or of the constraints where there are none. Hessians are those of
+        casadi's virtual machine, whatever the backend.
         """
         z, evaluator = self.shooting.start(0), self.shooting.evaluator
         one = _fastest(lambda: evaluator.value(z[None], 0.0))
         calls: dict[str, Callable[[], object]] = {"gradient": lambda: evaluator.gradient(z[None], 0.0)}
         if self.shooting.squares:
             calls["jacobian"] = lambda: evaluator.jacobian(z[None], 0.0)
+        elif self.terms.names:
+            constraints = self.shooting.nlp.jacobian or self.functions.constraint_jacobian
+            calls["jacobian"] = lambda: constraints(z, 0.0)
         calls["hessian"] = lambda: self.functions.hessian(z, 0.0)
         return {kind: _fastest(calls[kind]) / one for kind in kinds if kind in calls}
 

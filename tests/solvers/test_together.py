@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import threading
+import time
 from dataclasses import astuple, replace
 from typing import Any
 
 import numpy as np
 import pytest
-from toys import counted, failing, quadratic, rosenbrock, solve, stop_at, target
+from toys import Counted, counted, failing, quadratic, rosenbrock, solve, stop_at, target
 
 from symphys.errors import SymphysError
 from symphys.problem import load_problem
 from symphys.problems import find
+from symphys.shooting import Values
 from symphys.solvers import Outcome, Status, solve_together, solver
 from symphys.transcription import transcribe
 
@@ -71,6 +75,26 @@ def test_what_an_evaluation_raises_reaches_every_solve(name: str) -> None:
     assert {outcome.status for outcome in together(name, problem, range(3))} == {Status.INTERRUPTED}
     with pytest.raises(KeyError):
         together(name, failing(rosenbrock(), ("gradient", "jacobian"), 4, KeyError("bug")), range(3))
+    assert not [each for each in threading.enumerate() if each.name.startswith("symphys-solve")]
+
+
+class Pressed(Counted):
+    """Presses Ctrl-C at the third call."""
+
+    def evaluate(self, kind: str, Z: Any, smoothing: float) -> Values:
+        if sum(self.calls.values()) == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.2)
+        return super().evaluate(kind, Z, smoothing)
+
+
+@descents
+def test_ctrl_c_ends_all_solves_and_leaves_no_thread(name: str) -> None:
+    problem = rosenbrock()
+    pressed = Pressed(problem.evaluator)
+    with pytest.raises(KeyboardInterrupt):
+        together(name, replace(problem, evaluator=pressed))
+    assert sum(pressed.calls.values()) <= 4
     assert not [each for each in threading.enumerate() if each.name.startswith("symphys-solve")]
 
 

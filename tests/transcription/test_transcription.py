@@ -82,6 +82,16 @@ def test_constraints_reach_nlp_solvers_step_by_step(pushed):
     assert (pushed.shooting.constraint_upper == 1.5).all()
 
 
+@pytest.mark.parametrize("backend", ["casadi", "auto"])
+def test_every_evaluation_has_a_price(tmp_path, backend):
+    """Also the Jacobian of constraints, where a cost is no sum of squares."""
+    file = tmp_path / "priced.toml"
+    file.write_text(PUSHED)
+    price = transcribe(load_problem(file), backend).prices(("gradient", "jacobian", "hessian"))
+    assert set(price) == {"gradient", "jacobian", "hessian"}
+    assert all(each > 0 for each in price.values())
+
+
 def test_verdict_names_every_check(pushed):
     verdict = pushed.judge(pushed.shooting.start(0))
     assert [(check.kind, check.name, check.met) for check in verdict.checks] == [
