@@ -83,9 +83,6 @@ def conclude(jobs: list[Job], batch: Batch, out: Path) -> int:
     from symphys.cli.summary import print_summary
 
     print_summary(jobs, batch)
-    for note in dict.fromkeys(result.backend.get("note") for result in batch.results if result):
-        if note:
-            click.echo(f"symphys: {note}", err=True)
     if batch.interrupted:
         click.echo(last_words(batch, out), err=True)
         return 130
