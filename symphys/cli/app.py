@@ -9,7 +9,10 @@ from collections.abc import Sequence
 import click
 
 from symphys import __version__
+from symphys.cli.cache import cache
 from symphys.cli.check import check
+from symphys.cli.doctor import doctor
+from symphys.cli.export import export
 from symphys.cli.listing import listing
 from symphys.cli.report import report
 from symphys.cli.schema import schema
@@ -40,7 +43,7 @@ def app() -> None:
     """Trajectory optimisation through contact: a problem file in, a solution and a report out."""
 
 
-for command in (solve, report, show, check, listing, schema):
+for command in (solve, report, show, check, export, listing, schema, doctor, cache):
     app.add_command(command)
 
 

@@ -11,12 +11,17 @@ import hashlib
 import os
 import shutil
 import tempfile
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from symphys.kernel.errors import KernelUnavailable
+
 LIMIT = 512 * 2**20
 """Bytes that the kernels may take together; those not used for longest go first."""
+LEFT = 3600.0
+"""Seconds after which an unfinished file belongs to a process that was killed."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +99,15 @@ class Cache:
             with contextlib.suppress(OSError):
                 path.unlink()
                 gone += 1
+        self._sweep(time.time())
         return gone
+
+    def _sweep(self, before: float) -> None:
+        """Remove what processes that were killed have left unfinished, if it is older than this."""
+        for path in self._files(".new-*"):
+            with contextlib.suppress(OSError):
+                if path.stat().st_mtime <= before:
+                    path.unlink()
 
     def _files(self, pattern: str) -> list[Path]:
         try:
@@ -112,6 +125,7 @@ class Cache:
         return sorted(found)
 
     def _shrink(self, keep: Path) -> None:
+        self._sweep(time.time() - LEFT)
         entries = self._entries()
         total = sum(size for _, size, _ in entries)
         for _, size, path in entries:
@@ -122,12 +136,15 @@ class Cache:
 
 
 def default_cache() -> Cache:
-    """The cache in $SYMPHYS_CACHE, else in the user's cache folder."""
+    """The cache in $SYMPHYS_CACHE, else in the user's cache folder; KernelUnavailable if the user has none."""
     wanted = os.environ.get("SYMPHYS_CACHE")
     if wanted:
         return Cache(Path(wanted))
     base = os.environ.get("XDG_CACHE_HOME")
-    return Cache((Path(base) if base else Path.home() / ".cache") / "symphys" / "kernels")
+    try:
+        return Cache((Path(base) if base else Path.home() / ".cache") / "symphys" / "kernels")
+    except RuntimeError as error:
+        raise KernelUnavailable("no home folder in which to keep kernels; set SYMPHYS_CACHE to a folder") from error
 
 
 def _checksum(path: Path) -> str:

@@ -6,22 +6,23 @@ import importlib.util
 import os
 import shlex
 import shutil
-import subprocess
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 from symphys.kernel.errors import KernelUnavailable
+from symphys.kernel.processes import ADVICE, run, run_all
 from symphys.kernel.processor import Processor
 from symphys.kernel.source import Source
 
-ADVICE = "install gcc or clang (or `pip install ziglang`), or set CC to a C compiler"
 FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-fvisibility=hidden", "-fno-math-errno", "-fno-trapping-math", "-w")
 """No -ffast-math: a NaN stays one, and sums keep their order."""
-MEMORY_WORDS = ("memory exhausted", "out of memory", "cannot allocate memory", "bad_alloc")
+LIMIT = 600.0
+"""Seconds that a compiler may take for one file: far more than any kernel needs; one that hangs is stopped."""
+ANSWER = 60.0
+"""Seconds in which it must say its version; ziglang unpacks itself on its first call."""
 
 
 @dataclass(frozen=True)
@@ -51,10 +52,9 @@ class Compiler:
             _write(file, source.text)
             fusing = f"-ffp-contract={'fast' if source.fused else 'off'}"
             commands.append([*self.command, *flags, fusing, "-c", str(file), "-o", str(target)])
-        with ThreadPoolExecutor(processors()) as pool:
-            list(pool.map(_run, commands))
+        run_all(commands, LIMIT, processors())
         library = folder / "kernel.so"
-        _run([*self.command, *flags, "-shared", *map(str, objects), "-o", str(library), "-lm"])
+        run([*self.command, *flags, "-shared", *map(str, objects), "-o", str(library), "-lm"], LIMIT)
         return library
 
 
@@ -85,26 +85,8 @@ def _asked(command: tuple[str, ...], named: bool) -> Compiler:
     if path is None:
         raise KernelUnavailable(f"the compiler {command[0]!r} that CC names was not found: {ADVICE}")
     command = (path, *command[1:])
-    lines = _run([*command, "--version"]).splitlines()
+    lines = run([*command, "--version"], ANSWER).splitlines()
     return Compiler(command, lines[0] if lines else "unknown version")
-
-
-def _run(command: Sequence[str]) -> str:
-    """Run a compiler; KernelUnavailable says how it failed."""
-    name = Path(command[0]).name
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
-    except OSError as error:
-        raise KernelUnavailable(f"the compiler {name} cannot be run ({error.strerror}): {ADVICE}") from error
-    if done.returncode == 0:
-        return done.stdout
-    said = done.stderr.strip()
-    if any(word in said.lower() for word in MEMORY_WORDS):
-        raise KernelUnavailable(f"the compiler {name} ran out of memory; close other programs or use fewer processes")
-    if done.returncode < 0 or "signal" in said.lower():
-        raise KernelUnavailable(f"the compiler {name} was killed (often: out of memory); the kernel was not built")
-    line = next((line for line in said.splitlines() if "error" in line.lower()), said.splitlines()[0] if said else "")
-    raise KernelUnavailable(f"the compiler {name} failed with code {done.returncode}: {line}")
 
 
 def _write(path: Path, text: str) -> None:

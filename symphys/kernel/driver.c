@@ -19,8 +19,6 @@ typedef struct {
   word offset, size, stride, count; /* of the trajectory */
 } batch;
 
-#define API __attribute__((visibility("default")))
-
 static void run(const table *calls, V *m, V *b, word k) {
   const word *t = calls->entries;
   for (word c = 0; c < calls->count; c++, t += t[1]) FUNCTIONS[t[0]](m, b, t + 2, k);
@@ -39,7 +37,7 @@ static void gather(V *to, const ranges *r, const source *from, word row, word ro
   for (word i = 0, j = 0; i < r->count; i++)
     for (word w = r->places[2 * i]; w < r->places[2 * i] + r->places[2 * i + 1]; w++, j++) {
       V x;
-      for (word l = 0; l < LANES; l++) x[l] = (R)lane[l][j];
+      for (word l = 0; l < LANES; l++) LANE(x, l) = (R)lane[l][j];
       to[w] = add ? to[w] + x : x;
     }
 }
@@ -47,7 +45,7 @@ static void gather(V *to, const ranges *r, const source *from, word row, word ro
 static void scatter(double *to, const V *from, const ranges *r, word width, word row, word rows) {
   for (word i = 0, j = 0; i < r->count; i++)
     for (word w = r->places[2 * i]; w < r->places[2 * i] + r->places[2 * i + 1]; w++, j++)
-      for (word l = 0; l < rows; l++) to[(row + l) * width + j] = (double)from[w][l];
+      for (word l = 0; l < rows; l++) to[(row + l) * width + j] = (double)LANE(from[w], l);
 }
 
 static void fill(const program *p, const batch *x, V *m, word row, word rows) {
@@ -79,7 +77,7 @@ static void record(const batch *x, const V *m, word row, word rows) {
   for (word l = 0; l < rows; l++)
     for (word k = 0; k < x->count; k++)
       for (word j = 0; j < x->size; j++)
-        x->trajectory[((row + l) * x->count + k) * x->size + j] = (double)m[x->offset + k * x->stride + j][l];
+        x->trajectory[((row + l) * x->count + k) * x->size + j] = (double)LANE(m[x->offset + k * x->stride + j], l);
 }
 
 /* Memory: size vectors, then the tape, then size vectors of adjoints. */
@@ -98,8 +96,3 @@ API void evaluate(const program *p, const batch *x, V *m) {
     scatter(x->gradient, b, &p->z, total(&p->z), row, rows);
   }
 }
-
-/* One phase or step alone, to look for the call that went wrong. */
-API void begin(const program *p, const batch *x, V *m) { fill(p, x, m, 0, 1); }
-
-API void perform(const table *calls, V *m, word k) { run(calls, m, 0, k); }

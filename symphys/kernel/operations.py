@@ -15,13 +15,16 @@ NAMES = {getattr(ca, f"OP_{name.upper()}"): name for name in f"{UNARY} {BINARY} 
 MASKS = frozenset({"lt", "le", "eq", "ne", "not", "and", "or", "isnt0"})
 """Operations that give a mask."""
 
+LIBRARY = tuple(name for name in UNARY.split() if name != "neg")
+LIBRARY_OF_TWO = ("pow", "fmod", "remainder", "copysign", "atan2", "hypot")
+"""Functions of the C library."""
 INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
 COMPARE = {"lt": "<", "le": "<=", "eq": "==", "ne": "!="}
 FORMS = (
     {name: f"{{0}} {sign} {{1}}" for name, sign in INFIX.items()}
     | {name: f"(I)({{0}} {sign} {{1}})" for name, sign in COMPARE.items()}
-    | {name: f"{name}_({{0}})" for name in UNARY.split()}
-    | {name: f"{name}_({{0}}, {{1}})" for name in ["pow", "fmod", "remainder", "copysign", "atan2", "hypot"]}
+    | {name: f"{name}_({{0}})" for name in LIBRARY}
+    | {name: f"{name}_({{0}}, {{1}})" for name in LIBRARY_OF_TWO}
     | {
         "neg": "-{0}",
         "not": "~{0}",
@@ -34,4 +37,19 @@ FORMS = (
         "fabs": "(V)((I){0} & MAGNITUDE)",
     }
 )
-"""C expressions of operands {0}, {1}, {2}."""
+"""C expressions of operands {0}, {1}, {2}, for vectors."""
+PLAIN = (
+    FORMS
+    | {name: f"{{0}} {sign} {{1}}" for name, sign in COMPARE.items()}
+    | {name: f"{name}({{0}})" for name in LIBRARY}
+    | {name: f"{name}({{0}}, {{1}})" for name in LIBRARY_OF_TWO}
+    | {
+        "not": "!{0}",
+        "isnt0": "{0} != S(0.0)",
+        "one": "(V){0}",
+        "iez": "{0} ? {1} : S(0.0)",
+        "select": "{0} ? {1} : {2}",
+        "fabs": "fabs({0})",
+    }
+)
+"""The same for single numbers in plain C, where a mask is 0 or 1."""

@@ -24,7 +24,7 @@ class Source:
 
 def sources(plan: Plan, lanes: int, single: bool) -> list[Source]:
     """The C files; each compiles alone. Adjoints are fused; values are not, so that they are casadi's to the bit."""
-    head = f"#define LANES {lanes}\n#define SINGLE {int(single)}\n{_resource('vector.h')}"
+    head = f"#define LANES {lanes}\n#define SINGLE {int(single)}\n{resource('vector.h')}"
     texts = [write(f"f{number}", graph, form) for number, (graph, form) in enumerate(plan.functions)]
     found = []
     for backward in (False, True):
@@ -36,7 +36,7 @@ def sources(plan: Plan, lanes: int, single: bool) -> list[Source]:
     declared = "".join(f"void {name}(V *m, V *b, const word *t, word k);\n" for name in names)
     table = ", ".join(names) or "0"
     listed = f"{declared}static void (*const FUNCTIONS[])(V *, V *, const word *, word) = {{{table}}};\n"
-    return [*found, Source(head + listed + _resource("driver.c"))]
+    return [*found, Source(head + listed + resource("driver.c") + resource("phases.c"))]
 
 
 def _spread(texts: Sequence[str], work: Sequence[int]) -> list[list[str]]:
@@ -51,5 +51,6 @@ def _spread(texts: Sequence[str], work: Sequence[int]) -> list[list[str]]:
     return [group for group in groups if group]
 
 
-def _resource(name: str) -> str:
+def resource(name: str) -> str:
+    """The text of a C file of this room."""
     return files(ROOM).joinpath(name).read_text(encoding="utf-8")

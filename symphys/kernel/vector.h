@@ -16,7 +16,11 @@ typedef int64_t N;
 typedef R V __attribute__((vector_size(LANES * sizeof(R))));
 typedef N I __attribute__((vector_size(LANES * sizeof(R))));
 #define S(x) ((V){0} + (R)(x))
+#define LANE(x, l) (x)[l]
+#define NAN __builtin_nan("")
+#define INFINITY __builtin_inf()
 #define NOINLINE __attribute__((noinline, unused))
+#define API __attribute__((visibility("default")))
 
 /* sqrt, floor and ceil become one instruction; the others call the C library lane by lane. */
 #define UNARY(name) \

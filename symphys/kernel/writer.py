@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from symphys.kernel.graph import Graph
@@ -29,9 +29,12 @@ class Form:
     clears: bool = False
 
 
-def write(name: str, graph: Graph, form: Form) -> str:
-    """The C function ``name(m, b, t, k)``: memory, adjoint memory, places as (offset, stride) pairs, step."""
-    pieces = _cut(graph)
+def write(name: str, graph: Graph, form: Form, forms: Mapping[str, str] = FORMS) -> str:
+    """The C function ``name(m, b, t, k)``: memory, adjoint memory, places as (offset, stride) pairs, step.
+
+    ``forms`` says how operations are written: FORMS for vectors, PLAIN for single numbers.
+    """
+    pieces = _cut(graph, forms)
     pointers = _pointers(graph, form)
     parameters = ", ".join(f"{kind}{pointer}" for kind, pointer, _ in pointers) + ", V *restrict w"
     text = []
@@ -54,11 +57,13 @@ class _Piece:
     Attributes:
         nodes: what it computes, in order.
         slots: the values that a later piece than their own reads, and their words in the buffer between pieces.
+        forms: how operations are written.
         targets: for a node, the words of results that it is.
     """
 
     nodes: list[int]
     slots: dict[int, int]
+    forms: Mapping[str, str]
     targets: dict[int, list[str]] = field(default_factory=dict)
 
     def statements(self, graph: Graph, adds: bool) -> list[str]:
@@ -68,7 +73,7 @@ class _Piece:
         for x in self.nodes:
             node = graph.nodes[x]
             operands = [self._use(graph, y, names, lines) for y in node.operands]
-            lines.append(f"const {_type(node.op)} v{x} = {FORMS[node.op].format(*operands)};")
+            lines.append(f"const {_type(node.op)} v{x} = {self.forms[node.op].format(*operands)};")
             names[x] = f"v{x}"
             if x in self.slots:
                 lines.append(f"w[{self.slots[x]}] = (V)v{x};")
@@ -97,13 +102,13 @@ class _Piece:
             yield f"{target} {'+=' if adds else '='} {value};"
 
 
-def _cut(graph: Graph) -> list[_Piece]:
+def _cut(graph: Graph, forms: Mapping[str, str]) -> list[_Piece]:
     order = [x for x in graph.needed() if graph.nodes[x].op not in ("const", "input")]
     runs = [order[i : i + LONGEST] for i in range(0, len(order), LONGEST)] or [[]]
     home = {x: i for i, run in enumerate(runs) for x in run}
     crossing = sorted({y for x in order for y in graph.nodes[x].operands if home.get(y, home[x]) != home[x]})
     slots = {x: slot for slot, x in enumerate(crossing)}
-    pieces = [_Piece(run, slots) for run in runs]
+    pieces = [_Piece(run, slots, forms) for run in runs]
     for r, result in enumerate(graph.results):
         for word, x in enumerate(result):
             pieces[home.get(x, -1)].targets.setdefault(x, []).append(f"o{r}[{word}]")
@@ -135,7 +140,7 @@ def literal(value: str) -> str:
     """A constant in all lanes."""
     number = float.fromhex(value)
     if number != number:
-        return 'S(__builtin_nan(""))'
+        return "S(NAN)"
     if number in (float("inf"), float("-inf")):
-        return f"S({'-' if number < 0 else ''}__builtin_inf())"
+        return "S(-INFINITY)" if number < 0 else "S(INFINITY)"
     return f"S({number!r})"

@@ -89,7 +89,24 @@ def relax(
 
 def sweep(keep: Keep, rows: Sequence[ContactRow], momenta: Momenta, impulses: Sequence[Impulse]) -> list[Impulse]:
     """One pass over all rows; returns the new impulses."""
-    return [momenta.kept(keep, row, _visit(row, momenta, old)) for row, old in zip(rows, impulses, strict=True)]
+    new = list(impulses)
+    for k in visiting_order(rows):
+        new[k] = momenta.kept(keep, rows[k], _visit(rows[k], momenta, impulses[k]))
+    return new
+
+
+def visiting_order(rows: Sequence[ContactRow]) -> list[int]:
+    """Rows one after the other that share no body as far as may be: a processor works on several visits at once."""
+    order: list[int] = []
+    left = list(range(len(rows)))
+    busy: set[int] = set()
+    while left:
+        free = (k for k in left if not busy & {side.body for side in rows[k].sides})
+        k = next(free, left[0])
+        busy = {side.body for side in rows[k].sides}
+        left.remove(k)
+        order.append(k)
+    return order
 
 
 def begin(keep: Keep, rows: Sequence[ContactRow], momenta: Momenta, impulses: Sequence[Impulse]) -> list[Impulse]:

@@ -61,6 +61,8 @@ def importers(wanted: str) -> set[str]:
         ("symphys.cli", {"__main__"}),
         ("symphys.runs", {"cli"}),
         ("symphys.report", {"cli"}),
+        ("symphys.export", {"cli"}),
+        ("symphys.doctor", {"cli"}),
         ("symphys.problems", {"cli"}),
         ("matplotlib", {"report"}),
         ("pydantic", {"problem"}),
@@ -93,6 +95,17 @@ def test_backends_see_kernels_and_the_shooting_problem_alone(name: str, path: Pa
     for target in imported(path):
         assert target.split(".")[0] in RUNTIME | {"casadi", "numpy", "symphys"}, target
         assert not target.startswith("symphys") or room(target) in {"backends", "kernel", "shooting"}, target
+
+
+@pytest.mark.parametrize(("name", "path"), [pair for pair in modules() if room(pair[0]) == "doctor"])
+def test_the_doctor_sees_kernels_alone(name: str, path: Path) -> None:
+    assert {room(target) for target in imported(path) if target.split(".")[0] == "symphys"} <= {"kernel"}
+
+
+@pytest.mark.parametrize(("name", "path"), [pair for pair in modules() if room(pair[0]) == "export"])
+def test_exports_see_no_solvers(name: str, path: Path) -> None:
+    rooms = {room(target) for target in imported(path) if target.split(".")[0] == "symphys"}
+    assert rooms <= PHYSICS | {"export", "problem", "transcription", "kernel", "files", "errors"}
 
 
 @pytest.mark.parametrize(("name", "path"), [pair for pair in modules() if room(pair[0]) == "solvers"])

@@ -84,6 +84,10 @@ def project_files() -> list[Path]:
 
 def wheel_names() -> set[str]:
     """Where code, problem files, styles and scripts go."""
-    kept = [path for path in project_files() if path.suffix in {".py", ".toml", ".css", ".js", ".typed"}]
+    kept = [
+        path
+        for path in project_files()
+        if path.suffix in {".py", ".toml", ".css", ".js", ".typed", ".c", ".h"} or path.name == "Makefile"
+    ]
     kept = [path for path in kept if len(path.parts) > 1]
     return {path.as_posix() if path.parts[0] == "symphys" else f"symphys/{path.as_posix()}" for path in kept}

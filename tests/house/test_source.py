@@ -13,7 +13,7 @@ import pytest
 import symphys
 
 ROOT = Path(__file__).parents[2]
-TEXTS = {".py", ".toml", ".cfg", ".md", ".css", ".js", ".html", ".json", ".txt", ".svg", ""}
+TEXTS = {".py", ".c", ".h", ".toml", ".cfg", ".md", ".css", ".js", ".html", ".json", ".txt", ".svg", ""}
 SKIPPED = {".git", ".venv", "build", "dist", "reports", "__pycache__"}
 LONGEST_FILE = 400
 LONGEST_FUNCTION = 60
@@ -61,7 +61,10 @@ def test_public_surface_is_small_and_real() -> None:
     assert [name for name in symphys.__all__ if getattr(symphys, name, None) is None] == []
 
 
-@pytest.mark.parametrize("package", ["symphys.solvers", "symphys.problem", "symphys.report", "symphys.runs"])
+@pytest.mark.parametrize(
+    "package",
+    ["symphys.solvers", "symphys.problem", "symphys.report", "symphys.runs", "symphys.export", "symphys.kernel"],
+)
 def test_exported_names_exist(package: str) -> None:
     module = importlib.import_module(package)
     assert [name for name in module.__all__ if not hasattr(module, name)] == []

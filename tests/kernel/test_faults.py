@@ -1,31 +1,23 @@
-"""Compilers that are missing, fail or die give one clear line; a cache that fails is done without."""
+"""Compilers that are missing, fail, hang or die give one clear line, and leave no process behind."""
 
 from __future__ import annotations
 
-import errno
-import os
 import shlex
-import shutil
-import subprocess
+import signal
 import sys
+import time
 from pathlib import Path
 
 import programs
 import pytest
+from compilers import assert_gone, building, fake, wait_for
 
-from symphys.kernel import Cache, Kernel, KernelUnavailable, compile_program, default_cache, processor
+from symphys.kernel import Cache, KernelUnavailable, compile_program, processor
 from symphys.kernel.compiler import find_compiler
+from symphys.kernel.processes import run_all
 
 Patch = pytest.MonkeyPatch
 UNIX = pytest.mark.skipif(sys.platform == "win32", reason="the fake compilers are shell scripts")
-
-
-def fake(folder: Path, script: str) -> str:
-    """A compiler that knows its version and then does as the script says."""
-    path = folder / "fakecc"
-    path.write_text(f'#!/bin/sh\nif [ "$1" = --version ]; then echo fake 1.0; exit 0; fi\n{script}\n', "utf-8")
-    path.chmod(0o755)
-    return str(path)
 
 
 @UNIX
@@ -36,6 +28,7 @@ def fake(folder: Path, script: str) -> str:
         ("kill -9 $$", "fakecc was killed .often: out of memory."),
         ("echo 'fatal error: Killed signal terminated program cc1' >&2; exit 1", "fakecc was killed"),
         ("echo 'cc1: out of memory allocating 65536 bytes' >&2; exit 1", "fakecc ran out of memory"),
+        ("echo 'error: cannot write part0.o: No space left on device' >&2; exit 1", "No space left on device"),
         ("exit 3", "fakecc failed with code 3"),
     ],
 )
@@ -45,6 +38,13 @@ def test_a_compiler_that_fails(tmp_path: Path, monkeypatch: Patch, script: str, 
         compile_program(programs.pendulum(), cache=Cache(tmp_path / "cache"))
     assert "\n" not in str(caught.value)
     assert list((tmp_path / "cache").glob("*.so")) == []
+
+
+def real_compiler() -> tuple[str, ...]:
+    try:
+        return find_compiler().command
+    except KernelUnavailable as error:
+        pytest.skip(str(error))
 
 
 def test_a_compiler_that_is_missing(tmp_path: Path, monkeypatch: Patch) -> None:
@@ -67,101 +67,53 @@ def test_a_compiler_that_cannot_be_run(tmp_path: Path, monkeypatch: Patch) -> No
         find_compiler()
 
 
-def test_the_second_time_it_comes_from_the_cache(chain: Kernel, cache: Cache) -> None:
-    again = compile_program(chain.program, cache=cache)
-    assert again.report.cached
-    assert again.report.seconds < 1
-
-
-def test_time_and_sweeps_are_data(chain: Kernel, cache: Cache, monkeypatch: Patch) -> None:
-    monkeypatch.setattr(programs, "SWEEPS", 7)
-    assert compile_program(programs.chain(), cache=cache).report.cached
-
-
-def test_the_key_holds_flags_and_lanes(pendulum: Kernel, cache: Cache, monkeypatch: Patch) -> None:
-    before = cache.info().kernels
-    assert compile_program(pendulum.program, cache=cache, threads=1).report.cached
-    monkeypatch.setattr("symphys.kernel.compiler.FLAGS", ("-O1", "-fPIC"))
-    assert not compile_program(pendulum.program, cache=cache, threads=1).report.cached
-    assert cache.info().kernels == before + 1
-
-
-def test_a_damaged_kernel_is_built_again(pendulum: Kernel, cache: Cache, tmp_path: Path) -> None:
-    own = Cache(tmp_path)
-    shutil.copytree(cache.folder, own.folder, dirs_exist_ok=True)
-    for path in own.folder.glob("*.so"):
-        os.truncate(path, path.stat().st_size // 2)
-    rebuilt = compile_program(pendulum.program, cache=own, threads=1)
-    assert not rebuilt.report.cached
-    assert rebuilt.forward([0.0] * 30, [1.0])["merit"].shape == (1, 1)
-    assert compile_program(pendulum.program, cache=own, threads=1).report.cached
-
-
-def test_a_folder_that_cannot_be_written(pendulum: Kernel, tmp_path: Path) -> None:
-    blocked = tmp_path / "file"
-    blocked.write_text("in the way", "utf-8")
-    kernel = compile_program(pendulum.program, cache=Cache(blocked / "cache"))
-    assert not kernel.report.cached
-    assert "was not kept" in kernel.report.note
-    kernel.forward([0.0] * 30, [1.0])
-
-
-def test_a_full_disk(pendulum: Kernel, tmp_path: Path, monkeypatch: Patch) -> None:
-    def full(*_: object) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr("shutil.copyfile", full)
-    kernel = compile_program(pendulum.program, cache=Cache(tmp_path))
-    assert "No space left" in kernel.report.note
-    kernel.forward([0.0] * 30, [1.0])
-    assert [path for path in tmp_path.iterdir() if path.name.startswith(".new")] == []
-
-
-def test_the_oldest_kernels_go_first(tmp_path: Path) -> None:
-    built = tmp_path / "built"
-    small = Cache(tmp_path / "cache", limit=250)
-    for i, key in enumerate(("a", "b", "c")):
-        built.write_bytes(bytes([i]) * 100)
-        stored = small.store(key, built)
-        os.utime(stored, (1000 + i, 1000 + i))
-        small.find("a")
-    assert small.find("b") is None
-    assert small.find("a") is not None
-    assert small.find("c") is not None
-    assert small.info().bytes == 200
-    assert small.clear() == 2
-    assert small.info().kernels == 0
-
-
-def test_where_the_cache_lies(monkeypatch: Patch) -> None:
-    monkeypatch.setenv("SYMPHYS_CACHE", "there")
-    assert default_cache().folder == Path("there")
-    monkeypatch.delenv("SYMPHYS_CACHE")
-    monkeypatch.setenv("XDG_CACHE_HOME", "base")
-    assert default_cache().folder == Path("base", "symphys", "kernels")
+@UNIX
+def test_a_compiler_without_memory(tmp_path: Path, monkeypatch: Patch) -> None:
+    real = shlex.join(real_compiler())
+    monkeypatch.setenv("CC", fake(tmp_path, f'ulimit -v 20000; exec {real} "$@"'))
+    with pytest.raises(KernelUnavailable, match=r"fakecc (ran out of memory|was killed)"):
+        compile_program(programs.pendulum(), cache=Cache(tmp_path / "cache"))
 
 
 @UNIX
-def test_two_processes_build_a_kernel_once(pendulum: Kernel, tmp_path: Path) -> None:
-    real = shlex.join(find_compiler().command)
-    script = f'echo "$@" >> {tmp_path}/log; exec {real} "$@"'
-    code = (
-        "import programs; from symphys.kernel import compile_program as c; print(c(programs.pendulum()).report.cached)"
-    )
-    environment = os.environ | {
-        "CC": fake(tmp_path, script),
-        "SYMPHYS_CACHE": str(tmp_path / "cache"),
-        "PYTHONPATH": os.pathsep.join([str(Path(programs.__file__).parent), *sys.path]),
-    }
-    started = [
-        subprocess.Popen([sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, text=True)
-        for _ in range(2)
-    ]
-    said = sorted(process.communicate(timeout=60)[0].strip() for process in started)
-    assert said == ["False", "True"]
-    assert (tmp_path / "log").read_text("utf-8").count("-shared") == 1
-    assert len(list((tmp_path / "cache").glob("*.so"))) == 1
-    assert [p.name for p in (tmp_path / "cache").iterdir() if p.suffix != ".so"] == []
+def test_a_compiler_that_hangs_is_stopped_with_all_that_it_started(tmp_path: Path, monkeypatch: Patch) -> None:
+    monkeypatch.setenv("CC", fake(tmp_path, f"sleep 60 & echo $! >> {tmp_path}/started; wait"))
+    monkeypatch.setattr("symphys.kernel.compiler.LIMIT", 0.5)
+    began = time.monotonic()
+    with pytest.raises(KernelUnavailable, match=r"fakecc did not end within 0\.5 s and was stopped"):
+        compile_program(programs.pendulum(), cache=Cache(tmp_path / "cache"))
+    assert time.monotonic() - began < 20
+    assert_gone(tmp_path / "started")
+
+
+@UNIX
+def test_a_version_that_does_not_come(tmp_path: Path, monkeypatch: Patch) -> None:
+    path = Path(fake(tmp_path, ""))
+    path.write_text("#!/bin/sh\nexec sleep 60\n", "utf-8")
+    monkeypatch.setenv("CC", str(path))
+    monkeypatch.setattr("symphys.kernel.compiler.ANSWER", 0.5)
+    with pytest.raises(KernelUnavailable, match="did not end within"):
+        find_compiler()
+
+
+@UNIX
+def test_the_first_failure_ends_the_others(tmp_path: Path) -> None:
+    slow = ["sh", "-c", f"sleep 60 & echo $! >> {tmp_path}/started; wait"]
+    began = time.monotonic()
+    with pytest.raises(KernelUnavailable, match="sh failed with code 7"):
+        run_all([slow, ["sh", "-c", "sleep 0.5; exit 7"], slow], 60, at_once=2)
+    assert time.monotonic() - began < 20
+    assert_gone(tmp_path / "started")
+
+
+@UNIX
+def test_ctrl_c_ends_the_compilers(tmp_path: Path) -> None:
+    script = fake(tmp_path, f"sleep 60 & echo $! >> {tmp_path}/started; wait")
+    process = building(tmp_path, script)
+    wait_for(tmp_path / "started")
+    process.send_signal(signal.SIGINT)
+    assert "KeyboardInterrupt" in process.communicate(timeout=20)[1]
+    assert_gone(tmp_path / "started")
 
 
 @pytest.mark.parametrize(

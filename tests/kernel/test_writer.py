@@ -9,48 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from operations import ARGUMENTS, PAIRS, SMOOTH, alone, build, every_operation, long_function
 
-from symphys.kernel import Cache, Call, Layout, Program, compile_program
+from symphys.kernel import Cache, compile_program
 from symphys.kernel.instructions import graph_of
 
-ARGUMENTS = (3, 2)
-SMOOTH = [
-    ca.sin, ca.cos, ca.tanh, ca.atan, ca.erf, ca.asinh, ca.fabs, ca.sign, ca.floor, ca.ceil,
-    lambda a: a**2, lambda a: -a, lambda a: 2 * a, lambda a: ca.exp(ca.tanh(a)), lambda a: ca.log(1 + ca.fabs(a)),
-    lambda a: ca.sqrt(1 + a * a), lambda a: 1 / (1 + a * a), lambda a: (1 + ca.fabs(a)) ** 1.5,
-    lambda a: ca.log1p(ca.fabs(a)), lambda a: ca.expm1(ca.tanh(a)), lambda a: ca.tan(ca.sin(a)),
-    lambda a: ca.asin(ca.tanh(a)), lambda a: ca.acos(ca.tanh(a)), lambda a: ca.cosh(ca.sin(a)),
-    lambda a: ca.sinh(ca.cos(a)), lambda a: ca.acosh(1.5 + a * a), lambda a: ca.atanh(0.9 * ca.sin(a)),
-]  # fmt: skip
-PAIRS = [
-    lambda a, b: a + b, lambda a, b: a - b, lambda a, b: a * b, lambda a, b: a / (1 + b * b), ca.fmin, ca.fmax,
-    ca.atan2, ca.hypot, ca.copysign, lambda a, b: ca.fmod(a, 1 + b * b), lambda a, b: ca.remainder(a, 1 + b * b),
-    lambda a, b: (1 + a * a) ** ca.tanh(b), lambda a, b: ca.if_else(a < b, a, b * b), lambda a, b: a <= b,
-    lambda a, b: ca.if_else(ca.logic_and(a > 0, ca.logic_not(b > 0)), a, 0), lambda a, b: ca.logic_or(a, b < 0),
-    lambda a, b: ca.if_else(a == b, 1, b), lambda a, b: (a != b) + 3 * a, lambda a, b: ca.fmin(a, 0.5) + b,
-    lambda a, b: ca.fmax(0.25, b) - a, lambda a, b: ca.if_else(a, b, 1.5),
-]  # fmt: skip
 step = st.tuples(st.integers(0, len(SMOOTH) + len(PAIRS) - 1), st.integers(0, 10**6), st.integers(0, 10**6))
-
-
-def build(steps: list[tuple[int, int, int]]) -> Any:
-    """A function of two arguments from random operations on what there is so far; all values are results."""
-    x, y = (ca.SX.sym(name, size) for name, size in zip("xy", ARGUMENTS, strict=True))
-    values = [*ca.vertsplit(x), *ca.vertsplit(y), ca.SX(0.5)]
-    for op, i, j in steps:
-        a, b = values[i % len(values)], values[j % len(values)]
-        values.append(SMOOTH[op](a) if op < len(SMOOTH) else PAIRS[op - len(SMOOTH)](a, b))
-    return ca.Function("random", [x, y], [ca.vertcat(*values[6:]), values[-1] + x])
-
-
-def alone(functions: list[Any]) -> Program:
-    """Each function once, on z."""
-    at = Layout()
-    x, y = (at.take(size) for size in ARGUMENTS)
-    calls = [Call(f, (x, y), tuple(at.take(f.numel_out(i)) for i in range(f.n_out()))) for f in functions]
-    results = {f"f{i}r{j}": place for i, call in enumerate(calls) for j, place in enumerate(call.outputs)}
-    z = type(x)(x.offset, sum(ARGUMENTS))
-    return Program(at.size, z, type(x)(0, 0), 0, results, prologue=tuple(calls))
 
 
 def compare(functions: list[Any], cache: Cache, z: Any, precision: Any = "double") -> None:
@@ -81,10 +45,8 @@ def test_random_functions(cache: Cache, steps: list[list[tuple[int, int, int]]],
 
 
 def test_every_operation_alone(cache: Cache) -> None:
-    ops = range(len(SMOOTH) + len(PAIRS))
-    functions = [build([(op, 0, 4)]) for op in ops] + [build([(op, 2, 2)]) for op in ops]
     z = np.array([[-1.5, 0.3, 0.0, 1.0, 0.7], [0.7, -0.3, 2.0, 1.0, 0.7], [0.2, 0.0, -2.0, 0.5, -3.0]])
-    compare(functions, cache, z)
+    compare(every_operation(), cache, z)
 
 
 def test_every_operation_alone_in_single_precision(cache: Cache) -> None:
@@ -93,11 +55,7 @@ def test_every_operation_alone_in_single_precision(cache: Cache) -> None:
 
 
 def test_a_long_function_is_cut(cache: Cache) -> None:
-    random = np.random.default_rng(5)
-    smooth = [0, 1, 2, 15, 16]  # no growth
-    steps = [(int(random.choice(smooth)), *map(int, random.integers(0, 10**6, 2))) for _ in range(900)]
-    steps += [(len(SMOOTH) + k % 3, *map(int, random.integers(0, 900, 2))) for k in range(300)]
-    compare([build(steps)], cache, np.array([[0.1, -0.2, 0.3, 0.4, -0.5]]))
+    compare([long_function()], cache, np.array([[0.1, -0.2, 0.3, 0.4, -0.5]]))
 
 
 @pytest.mark.parametrize("pair", [(0, 1), (1, 0)])

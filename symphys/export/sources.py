@@ -1,0 +1,124 @@
+"""A problem as C sources: the step, the rollout and its gradient, with a header, an example and a Makefile."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+import unicodedata
+from collections.abc import Iterable
+from importlib.resources import files
+from string import Template
+
+import casadi as ca
+import numpy as np
+
+from symphys.export import words
+from symphys.kernel import Layout, Program
+from symphys.kernel.plain import plain_source, table
+from symphys.step import step_function
+from symphys.transcription import Transcription, rollout_program
+from symphys.transcription.along import Rollout
+
+ROOM = "symphys.export"
+
+
+def c_files(transcription: Transcription, version: str) -> dict[str, bytes]:
+    """name -> content of every file."""
+    rollout, name = transcription.rollout, identifier(transcription.problem.name)
+    program, step = rollout_program(rollout), dense_step(rollout)
+    plain = plain_source(program, ("merit",), {"step": step})
+    outputs = sum(place.size for place in program.outputs.values())
+    values = {"name": name, "NAME": name.upper(), "memory": plain.memory}
+    values |= {"work": max(plain.memory + outputs, step.nnz_in() + step.nnz_out())}
+    values |= _sizes(rollout, step) | _documented(transcription, program, version)
+    values |= _data(transcription, program) | {"places": _places(step)}
+    texts = {
+        f"{name}.h": _filled("api.h", values),
+        f"{name}.c": f'#include "{name}.h"\n\n' + plain.text + _filled("api.c", values),
+        f"{name}_main.c": _filled("main.c", values),
+        "Makefile": _filled("Makefile", values),
+    }
+    return {file: text.encode() for file, text in texts.items()}
+
+
+def identifier(name: str) -> str:
+    """A problem's name as the beginning of C names."""
+    plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
+    plain = re.sub(r"\W+", "_", plain).strip("_")
+    return plain if plain[:1].isalpha() else f"problem_{plain}".rstrip("_")
+
+
+def dense_step(rollout: Rollout) -> ca.Function:
+    """The step of a rollout, a function (x, u, p, smoothing) -> x_next of dense vectors."""
+    scheme = rollout.problem.simulation.scheme()
+    step = step_function(rollout.world, scheme, rollout.inputs, rollout.parameters.symbols)
+    arguments = step.sx_in()
+    return ca.Function("step", arguments, [ca.densify(step(*arguments))], step.name_in(), step.name_out())
+
+
+def _sizes(rollout: Rollout, step: ca.Function) -> dict[str, object]:
+    nx, nu, np_, _ = (step.numel_in(i) for i in range(step.n_in()))
+    problem = rollout.problem
+    sizes = {"n": rollout.z.shape[0], "nx": nx, "nu": nu, "np": np_, "count": len(words.error_names(problem))}
+    return {**sizes, "steps": rollout.steps, "dt": f"{rollout.dt:g}"}
+
+
+def _documented(transcription: Transcription, program: Program, version: str) -> dict[str, object]:
+    problem, rollout = transcription.problem, transcription.rollout
+    members = [
+        f"  double {name}{f'[{place.size}]' if place.size > 1 or name not in ('merit', 'objective') else ''};"
+        for name, place in program.outputs.items()
+    ]
+    return {
+        "title": words.one_line(problem.title or problem.name),
+        "problem": words.one_line(problem.name),
+        "version": version,
+        "decision": words.indented(words.decision_lines(problem)),
+        "state": words.indented(words.state_lines(rollout)),
+        "inputs": words.indented(words.input_lines(rollout)),
+        "parameters": words.indented(words.parameter_lines(rollout)),
+        "errors": words.indented(words.error_lines(problem)),
+        "costs": words.indented(words.cost_lines(problem)),
+        "constraints": words.indented(words.constraint_lines(transcription)),
+        "members": "\n".join(members),
+    }
+
+
+def _data(transcription: Transcription, program: Program) -> dict[str, object]:
+    shooting = transcription.shooting
+    stacked = {name: _numbers(shooting.stacked(name)) for name in ("lower", "upper")}
+    x, u, p = program.prologue[0].outputs
+    names = [string(name) for name in words.error_names(transcription.problem)]
+    return {
+        **stacked,
+        "guess": _numbers(shooting.start(0)),
+        "names": _wrapped(names or ["0"]),
+        **{"at_x": x.offset, "at_u": u.offset, "at_p": p.offset},
+    }
+
+
+def _places(step: ca.Function) -> str:
+    layout = Layout()
+    return table([layout.take(step.numel_in(i)) for i in range(4)] + [layout.take(step.numel_out(0))])
+
+
+def string(text: str) -> str:
+    """A C string literal."""
+    kept = [chr(b) if 32 <= b < 127 and chr(b) not in '"\\?' else f"\\{b:03o}" for b in text.encode()]
+    return f'"{"".join(kept)}"'
+
+
+def _numbers(values: Iterable[float]) -> str:
+    def written(x: float) -> str:
+        return repr(x) if np.isfinite(x) else ("-INFINITY" if x < 0 else "INFINITY")
+
+    return _wrapped(written(float(x)) for x in values)
+
+
+def _wrapped(items: Iterable[str]) -> str:
+    whole = ", ".join(items)
+    return whole if len(whole) < 60 else "\n" + textwrap.indent("\n".join(textwrap.wrap(whole, 116)), "  ") + "\n"
+
+
+def _filled(name: str, values: dict[str, object]) -> str:
+    return Template(files(ROOM).joinpath(name).read_text(encoding="utf-8")).substitute(values)

@@ -1,0 +1,56 @@
+"""Exported functions load in a process that knows casadi only, and give the numbers of Python."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from symphys.export import casadi_files, write_folders
+from symphys.export.casadi_files import RESULTS
+from symphys.transcription import Transcription
+
+LOADED = """
+import json, sys
+sys.modules["symphys"] = None  # whoever imports it fails
+import casadi
+z = json.loads(sys.argv[1])
+values = {}
+for name in ("value", "gradient", "residuals", "jacobian", "nlp", "step"):
+    try:
+        function = casadi.Function.load(name + ".casadi")
+    except RuntimeError:
+        continue
+    given = {"x": 0.5, "p": 0.6} if name == "step" else {"z": z, "smoothing": 0}
+    values[name] = {key: value.full().T.tolist() for key, value in function(**given).items()}
+print(json.dumps(values))
+"""
+
+
+def test_plain_casadi_loads_them(kick: Transcription, tmp_path: Path) -> None:
+    written = write_folders({tmp_path: casadi_files(kick, "1.2")})
+    z = kick.shooting.start(1)
+    command = [sys.executable, "-c", LOADED, json.dumps(z.tolist())]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    values = json.loads(done.stdout)
+    assert {path.stem for path in written} == {*values, "README"}
+    for name in ("value", "gradient", "nlp"):
+        expected = getattr(kick.functions, name)(z, 0.0)
+        assert values[name].keys() == set(RESULTS[name])
+        for result, theirs in zip(RESULTS[name], expected, strict=True):
+            np.testing.assert_allclose(np.ravel(values[name][result]), np.array(theirs).ravel(), rtol=1e-12, atol=1e-12)
+    assert len(values["step"]["x_next"][0]) == 23
+
+
+def test_the_readme_names_everything(kick: Transcription) -> None:
+    text = casadi_files(kick, "1.2")["README.txt"].decode()
+    for line in (
+        "gradient: z (7), smoothing (1) -> merit (1), objective (1), errors (2), gradient (7)",
+        "step: x (23), u (3), p (1), smoothing (1) -> x_next (23)",
+        "x[7..9]            ball.velocity [m/s]",
+        'errors[0]          target über "there" ?',
+    ):
+        assert line in text
