@@ -15,7 +15,7 @@ from symphys.problems import find
 from symphys.shooting import ShootingProblem
 from symphys.solvers import solver
 from symphys.solvers.outcome import Counts, Status
-from symphys.transcription import transcribe
+from symphys.transcription import Transcription, transcribe
 
 SEEDS = 10
 DISTANCES = range(6, 15)
@@ -23,10 +23,15 @@ REPEATS = 25
 PAPER = {"gradient iterations": 88, "CMA-ES iterations": 2422, "ratio of iterations": 27, "ratio of times": 3.7}
 
 
-def shooting(distance: int = 10) -> ShootingProblem:
-    """The throw to another distance, otherwise the shipped file."""
+def transcription(distance: int = 10) -> Transcription:
+    """The throw to another distance, otherwise the shipped file, by the default backend."""
     value = f"ball.position[0:2] - [{distance}, 0]"
-    return transcribe(load_problem(find("ball_throw"), {"target.0.value": value})).shooting
+    return transcribe(load_problem(find("ball_throw"), {"target.0.value": value}))
+
+
+def shooting(distance: int = 10) -> ShootingProblem:
+    """Its shooting problem."""
+    return transcription(distance).shooting
 
 
 def solve(problem: ShootingProblem, name: str, seed: int = 0) -> tuple[bool, Counts, float]:
@@ -40,14 +45,14 @@ def solve(problem: ShootingProblem, name: str, seed: int = 0) -> tuple[bool, Cou
 
 def call_times(problem: ShootingProblem) -> dict[str, float]:
     """Milliseconds of one call, the best of REPEATS."""
-    z = problem.start(1)
+    Z = problem.start(1)[None]
     times = {}
     for name in ("value", "gradient", "jacobian"):
-        function = getattr(problem, name)
+        function = getattr(problem.evaluator, name)
         runs = []
         for _ in range(REPEATS):
             began = perf_counter()
-            function(z, 0.0)
+            function(Z, 0.0)
             runs.append(perf_counter() - began)
         times[name] = 1e3 * min(runs)
     return times
@@ -55,8 +60,10 @@ def call_times(problem: ShootingProblem) -> dict[str, float]:
 
 def main() -> None:
     """Print everything."""
-    print(f"machine: {platform.machine()}, {os.cpu_count()} cores, casadi virtual machine")
-    times = call_times(shooting())
+    made = transcription()
+    print(f"machine: {platform.machine()}, {os.cpu_count()} cores")
+    print(f"evaluated by {made.backend}; {made.backend.seconds:.2f} s until it could")
+    times = call_times(made.shooting)
     print("500 steps, ms, best of", REPEATS, {name: round(value, 2) for name, value in times.items()})
     print("\ndistance  gradient: met, gradients, rollouts   least squares: met, jacobians   ipopt: met, gradients")
     for distance in DISTANCES:
@@ -76,10 +83,12 @@ def compare() -> None:
     searches = [solve(problem, "cma", seed) for seed in range(SEEDS)]
     gradients = median(counts.gradients for _, counts, _ in descents)
     evaluations = median(counts.rollouts for _, counts, _ in searches)
-    seconds = [median(t for _, _, t in runs) for runs in (descents, searches)]
+    fits = [solve(problem, "least_squares", seed) for seed in range(SEEDS)]
+    seconds = [median(t for _, _, t in runs) for runs in (descents, searches, fits)]
     print(f"\nseeds met: gradient {sum(m for m, _, _ in descents)}, cma {sum(m for m, _, _ in searches)} of {SEEDS}")
     print("cma evaluations by seed:", [counts.rollouts for _, counts, _ in searches])
     print(f"median gradients {gradients}, median evaluations {evaluations}; seconds {seconds[0]:.3f}, {seconds[1]:.3f}")
+    print(f"median seconds of least squares {seconds[2]:.4f}")
     print(f"ratio of evaluations {evaluations / gradients:.1f}, of times {seconds[1] / seconds[0]:.1f}; paper: {PAPER}")
 
 

@@ -19,6 +19,7 @@ from symphys.solvers.interface import Solver
 from symphys.solvers.ipopt_ import IPOPT, IpoptOptions
 from symphys.solvers.least_squares import LEAST_SQUARES, LeastSquaresOptions
 from symphys.solvers.outcome import Counts, Monitor, Outcome, Status, TraceRow
+from symphys.solvers.together import solve_together
 
 __all__ = [
     "SOLVERS",
@@ -32,6 +33,7 @@ __all__ = [
     "Solver",
     "Status",
     "TraceRow",
+    "solve_together",
     "solver",
 ]
 

@@ -235,4 +235,6 @@ def shortened(g: Array, longest: float) -> Array:
     return g * (longest / norm) if norm > longest else g
 
 
-GRADIENT = Solver("gradient", "first-order descent by the adjoint of the rollout", GradientOptions, solve)
+GRADIENT = Solver(
+    "gradient", "first-order descent by the adjoint of the rollout", GradientOptions, solve, threaded=True
+)

@@ -61,6 +61,7 @@ class Solver(Generic[O_inv]):
         solve: see ``Solve``.
         prepare: loads what ``solve`` needs, such as a library, so that who times solves can leave it out; ``solve``
             works without, and a second call costs nothing.
+        threaded: whether several solves may run in threads side by side, see ``together``.
     """
 
     name: str
@@ -68,3 +69,4 @@ class Solver(Generic[O_inv]):
     Options: type[O_inv]
     solve: Solve[O_inv]
     prepare: Callable[[], None] = nothing
+    threaded: bool = False

@@ -24,6 +24,7 @@ import numpy as np
 from symphys.shooting import ShootingProblem
 from symphys.solvers.checkpoint import revive
 from symphys.solvers.interface import Log, Solver
+from symphys.solvers.ipopt_functions import functions
 from symphys.solvers.ipopt_options import SILENT, check
 from symphys.solvers.meter import Meter, Verdict
 from symphys.solvers.options import at_least, check_stages, require
@@ -143,8 +144,7 @@ def descend(meter: Meter, options: IpoptOptions, state: State, log: Log) -> Verd
 
 def build(meter: Meter, options: IpoptOptions, iterations: int, watch: Watch, text: Path) -> Any:
     """The nlpsol over x = z / scale, the knob as its parameter."""
-    x, smoothing = ca.MX.sym("x", meter.problem.n), ca.MX.sym("smoothing")
-    objective, constraints = meter.problem.nlp(x * meter.scale, smoothing)
+    nlp, derivatives = functions(meter.problem.nlp, meter.scale, options.hessian == "exact")
     own = {
         **SILENT,
         "file_print_level": 5,
@@ -155,12 +155,12 @@ def build(meter: Meter, options: IpoptOptions, iterations: int, watch: Watch, te
         **options.options,
     }
     settings: dict[str, Any] = {
+        **derivatives,
         "ipopt": own,
         "print_time": False,
         "iteration_callback": watch,
         "show_eval_warnings": False,
     }
-    nlp: dict[str, Any] = {"x": x, "p": smoothing, "f": objective, "g": constraints}
     return ca.nlpsol("solve", "ipopt", nlp, settings)
 
 

@@ -124,7 +124,7 @@ def solve(
     """Descend; nothing is drawn, so the seed acts through ``start`` alone. See ``interface.Solve``."""
 
     def stage(meter: Meter, z: Array, saved: dict[str, object] | None) -> Verdict:
-        if problem.residuals is None or problem.jacobian is None:
+        if not problem.squares:
             return Verdict(Status.NOT_APPLICABLE, NO_SQUARES)
         step: State | Verdict = revive(State, saved, Progress) if saved else first(meter, options, z)
         while isinstance(step, State):
@@ -225,5 +225,9 @@ def cosine(meter: Meter, state: State) -> float:
 
 
 LEAST_SQUARES = Solver(
-    "least_squares", "Levenberg-Marquardt within bounds, for costs that are sums of squares", LeastSquaresOptions, solve
+    "least_squares",
+    "Levenberg-Marquardt within bounds, for costs that are sums of squares",
+    LeastSquaresOptions,
+    solve,
+    threaded=True,
 )

@@ -6,11 +6,11 @@ import math
 import time
 from collections.abc import Iterable
 from dataclasses import asdict, astuple, dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
-from symphys.shooting import Function, ShootingProblem
-from symphys.solvers.calls import Call
+from symphys.shooting import ShootingProblem, Values
 from symphys.solvers.outcome import Array, Counts, Monitor, Status, TraceRow
 
 
@@ -41,11 +41,13 @@ class Point:
         """The largest of the errors; nan without any."""
         return float(np.max(self.errors)) if self.errors.size else math.nan
 
-    @property
+    @cached_property
     def finite(self) -> bool:
         """Whether every number that was asked for is finite."""
-        parts = (self.merit, self.objective, self.errors, self.gradient, self.residuals, self.jacobian)
-        return all(bool(np.all(np.isfinite(part))) for part in parts)
+        if not (math.isfinite(self.merit) and math.isfinite(self.objective)):
+            return False
+        parts = (self.errors, self.gradient, self.residuals, self.jacobian)
+        return all(bool(np.isfinite(part).all()) for part in parts if part.size)
 
     def better(self, other: Point | None) -> bool:
         """Met before not met, then the lower merit; one that is not finite is never better."""
@@ -111,7 +113,6 @@ class Meter:
         self.stage, self.smoothing = 0, problem.smoothing
         self.snapshot: Snapshot | None = None
         self.began, self.earlier = time.perf_counter(), 0.0
-        self.calls: dict[str, Call] = {}
 
     def enter(self, stage: int, smoothing: float, resumed: bool = False) -> None:
         """Begin a stage, or go on with one; merits at another smoothing are not compared with those of this one."""
@@ -140,34 +141,32 @@ class Meter:
 
     def value(self, z: Array) -> Point:
         """One rollout at z, which must lie within the bounds."""
-        return self.seen([self.rollout(z)])[0]
+        return self.values([z])[0]
 
     def values(self, population: Iterable[Array]) -> list[Point]:
-        """One rollout for each; stops at the end of the batch if one of them meets everything.
-
-        The one place where a batch is evaluated: a compiled batch of rollouts belongs here.
-        """
-        return self.seen([self.rollout(z) for z in population])
+        """One rollout for each, in one call; stops after it if one of them meets everything."""
+        Z = np.array(list(population))
+        values = self.problem.evaluator.value(Z, self.smoothing)
+        self.counts.rollouts += len(Z)
+        return self.seen(self.points(Z, values))
 
     def gradient(self, z: Array) -> Point:
         """One gradient at z."""
-        merit, objective, errors, gradient = self.call("gradient", self.problem.gradient)(z, self.smoothing)
+        values = self.problem.evaluator.gradient(z[None], self.smoothing)
         self.counts.gradients += 1
-        return self.seen([self.point(z, merit[0], objective, errors, gradient=gradient)])[0]
+        return self.seen(self.points(z[None], values))[0]
 
     def residuals(self, z: Array) -> Point:
         """One rollout at z, with residuals."""
-        r, objective, errors = self.call("residuals", self.problem.residuals)(z, self.smoothing)
+        values = self.problem.evaluator.residuals(z[None], self.smoothing)
         self.counts.rollouts += 1
-        return self.seen([self.point(z, float(r @ r), objective, errors, residuals=r)])[0]
+        return self.seen(self.points(z[None], values))[0]
 
     def jacobian(self, z: Array) -> Point:
         """One Jacobian of the residuals at z; the gradient comes with it."""
-        r, objective, errors, jacobian = self.call("jacobian", self.problem.jacobian)(z, self.smoothing)
-        jacobian = jacobian.reshape(r.size, z.size)
+        values = self.problem.evaluator.jacobian(z[None], self.smoothing)
         self.counts.jacobians += 1
-        parts = {"gradient": 2 * jacobian.T @ r, "residuals": r, "jacobian": jacobian}
-        return self.seen([self.point(z, float(r @ r), objective, errors, **parts)])[0]
+        return self.seen(self.points(z[None], values))[0]
 
     def commit(self, point: Point, state: object, gradient_norm: float = math.nan, step: float = math.nan) -> None:
         """End an iteration: a row of the trace, a snapshot, then the monitor, which may raise KeyboardInterrupt."""
@@ -191,21 +190,18 @@ class Meter:
             last = self.rows[self.snapshot.rows - 1]
             self.snapshot = replace(self.snapshot, counts=added(last, Counts()))
 
-    def call(self, name: str, function: Function) -> Call:
-        """The buffered function, made once."""
-        if name not in self.calls:
-            self.calls[name] = Call(function)
-        return self.calls[name]
-
-    def rollout(self, z: Array) -> Point:
-        """One rollout, not yet compared with the best."""
-        merit, objective, errors = self.call("value", self.problem.value)(z, self.smoothing)
-        self.counts.rollouts += 1
-        return self.point(z, merit[0], objective, errors)
-
-    def point(self, z: Array, merit: float, objective: Array, errors: Array, **parts: Array) -> Point:
-        """A point with its own copy of z."""
-        return Point(z.copy(), float(merit), float(objective[0]), errors, self.problem.met(errors), **parts)
+    def points(self, Z: Array, values: Values) -> list[Point]:
+        """The rows as points with their own copies of everything."""
+        names = [name for name in ("gradient", "residuals", "jacobian") if getattr(values, name) is not None]
+        merits, objectives = values.merit.tolist(), values.objective.tolist()
+        points = []
+        for row, (merit, objective) in enumerate(zip(merits, objectives, strict=True)):
+            parts = {name: getattr(values, name)[row].copy() for name in names}
+            if "jacobian" in parts:
+                parts["gradient"] = 2 * parts["jacobian"].T @ parts["residuals"]
+            errors = values.errors[row].copy()
+            points.append(Point(Z[row].copy(), merit, objective, errors, self.problem.met(errors), **parts))
+        return points
 
     def seen(self, points: list[Point]) -> list[Point]:
         """Remember the best; Stop(MET) if it meets everything and the problem asks to stop there."""

@@ -1,10 +1,10 @@
-"""The shooting problem: all that a solver sees, as named casadi functions of one decision vector z."""
+"""The shooting problem: all that a solver sees, evaluated for batches of decision vectors z."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,8 +42,69 @@ class Block:
 
 
 @dataclass(frozen=True)
+class Values:
+    """What an evaluation of Z (batch, n) gave, row by row.
+
+    Attributes:
+        merit, objective: (batch,).
+        errors: (batch, k).
+        gradient: (batch, n) of the merit; None where it was not asked for.
+        residuals, jacobian: (batch, m) and (batch, m, n), merit = r . r; None where they were not asked for.
+    """
+
+    merit: Array
+    objective: Array
+    errors: Array
+    gradient: Array | None = None
+    residuals: Array | None = None
+    jacobian: Array | None = None
+
+
+class Evaluator(Protocol):
+    """Evaluates Z (batch, n) at one smoothing; a row's numbers do not depend on the other rows.
+
+    A simulation that is not finite is a row that is not finite; RuntimeError where nothing could be evaluated.
+    """
+
+    def value(self, Z: Array, smoothing: float) -> Values:
+        """Merits, objectives, errors."""
+        ...
+
+    def gradient(self, Z: Array, smoothing: float) -> Values:
+        """These and the gradients of the merits."""
+        ...
+
+    def residuals(self, Z: Array, smoothing: float) -> Values:
+        """Residuals with them; only where the problem has ``squares``."""
+        ...
+
+    def jacobian(self, Z: Array, smoothing: float) -> Values:
+        """Residuals and their Jacobians with them; only where the problem has ``squares``."""
+        ...
+
+
+@dataclass(frozen=True)
+class Nlp:
+    """Objective and constraints for NLP solvers: casadi functions of (z, smoothing), to be called on symbols.
+
+    Attributes:
+        expression: -> (objective, constraints); can be differentiated as often as you like.
+        value: -> (objective, constraints), compiled; None: use the expression.
+        gradient: -> (objective, its gradient (n,)), compiled; None likewise.
+        jacobian: -> (constraints, their Jacobian (m, n)), compiled; None likewise.
+        keep: what the compiled functions need to live.
+    """
+
+    expression: Function
+    value: Function | None = None
+    gradient: Function | None = None
+    jacobian: Function | None = None
+    keep: object = None
+
+
+@dataclass(frozen=True)
 class ShootingProblem:
-    """Minimise objective(z) within bounds and constraints; every function takes (z, smoothing).
+    """Minimise objective(z) within bounds and constraints.
 
     ``merit`` is the objective plus the quadratic penalty of violated constraints, for solvers that know no
     constraints; without constraints both are the same. ``errors`` holds one number per target, constraint and goal,
@@ -52,11 +113,9 @@ class ShootingProblem:
     Attributes:
         name: the problem's name.
         blocks: the parts of z, in order.
-        value: -> (merit, objective, errors).
-        gradient: -> (merit, objective, errors, d merit / dz (n,)).
-        residuals: -> (r, objective, errors) with merit = r . r; None where a cost is no sum of squares.
-        jacobian: -> (r, objective, errors, dr/dz (m, n)); None likewise.
-        nlp: -> (objective, constraints): one casadi function to be called on symbols by NLP solvers.
+        evaluator: evaluates all of this for batches of z.
+        nlp: objective and constraints for NLP solvers.
+        squares: whether the merit is a sum of squared residuals; otherwise these cannot be asked for.
         constraint_names: one per entry of the constraints.
         constraint_lower, constraint_upper: (m,).
         smoothing: the knob that solvers use unless told otherwise.
@@ -65,11 +124,9 @@ class ShootingProblem:
 
     name: str
     blocks: tuple[Block, ...]
-    value: Function
-    gradient: Function
-    residuals: Function | None
-    jacobian: Function | None
-    nlp: Function
+    evaluator: Evaluator
+    nlp: Nlp
+    squares: bool
     constraint_names: tuple[str, ...] = ()
     constraint_lower: Array = field(default_factory=lambda: np.zeros(0))
     constraint_upper: Array = field(default_factory=lambda: np.zeros(0))

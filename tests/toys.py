@@ -1,17 +1,22 @@
-"""Small shooting problems with known answers, and functions that count how often they are evaluated."""
+"""Small shooting problems with known answers, and evaluators that count."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from dataclasses import replace
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
-from symphys.shooting import Block, ShootingProblem
+from symphys.backends import Source, choose
+from symphys.kernel import Call, KernelUnavailable, Layout, Program
+from symphys.kernel.compiler import find_compiler
+from symphys.shooting import Block, Evaluator, ShootingProblem, Values
 from symphys.solvers import SOLVERS, Outcome, TraceRow, solver
 
 Array = NDArray[np.float64]
@@ -19,6 +24,17 @@ Formula = Callable[[Any, Any], Any]
 """(z, smoothing) -> casadi expression."""
 PENALTY = 100.0
 TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class ToyFunctions:
+    """See ``symphys.backends.Functions``."""
+
+    value: Any
+    gradient: Any
+    residuals: Any
+    jacobian: Any
+    nlp: Any
 
 
 def toy(
@@ -30,6 +46,7 @@ def toy(
     bounds: tuple[float, float] = (-np.inf, np.inf),
     guess: float = 0.0,
     scale: float = 1.0,
+    backend: str = "casadi",
     **more: Any,
 ) -> ShootingProblem:
     """A problem from formulas; ``constraint`` should be zero and is penalised in the merit."""
@@ -40,19 +57,46 @@ def toy(
     e = ca.vertcat(errors(z, s) if errors else ca.MX(0, 1), ca.fabs(c) / TOLERANCE)
     rows = ca.vertcat(r, np.sqrt(PENALTY) * c) if residuals else None
     merit = f + PENALTY * ca.sumsqr(c)
-    zeros = np.zeros(c.numel())
-    return ShootingProblem(
-        name="toy",
-        blocks=(block(n, bounds, guess, scale),),
+    functions = ToyFunctions(
         value=ca.Function("value", [z, s], [merit, f, e]),
         gradient=ca.Function("gradient", [z, s], [merit, f, e, ca.gradient(merit, z)]),
         residuals=ca.Function("residuals", [z, s], [rows, f, e]) if residuals else None,
         jacobian=ca.Function("jacobian", [z, s], [rows, f, e, ca.jacobian(rows, z)]) if residuals else None,
         nlp=ca.Function("nlp", [z, s], [f, c]),
+    )
+    named = {"merit": merit, "objective": f, "errors": e, "constraints": c, "residuals": rows}
+    chosen = choose(backend, Source(functions, lambda: program(z, s, named)))
+    zeros = np.zeros(c.numel())
+    return ShootingProblem(
+        name="toy",
+        blocks=(block(n, bounds, guess, scale),),
+        evaluator=chosen.evaluator,
+        nlp=chosen.nlp,
+        squares=residuals is not None,
         constraint_lower=zeros,
         constraint_upper=zeros,
         **more,
     )
+
+
+def require(backend: str) -> None:
+    """Skip where a backend cannot be built."""
+    try:
+        if backend != "casadi":
+            find_compiler()
+    except KernelUnavailable as error:
+        pytest.skip(str(error))
+
+
+def program(z: Any, s: Any, named: dict[str, Any]) -> Program:
+    """The toy as one call."""
+    parts = {name: ca.densify(part) for name, part in named.items() if part is not None and part.numel()}
+    layout = Layout()
+    inputs = (layout.take(z.numel()), layout.take(1))
+    outputs = {name: layout.take(part.numel()) for name, part in parts.items()}
+    function = ca.Function("toy", [z, s], list(parts.values())).expand()
+    call = Call(function, inputs, tuple(outputs.values()))
+    return Program(layout.size, *inputs, steps=0, outputs=outputs, epilogue=(call,))
 
 
 def block(n: int, bounds: tuple[float, float], guess: float, scale: float) -> Block:
@@ -80,57 +124,64 @@ def target(**more: Any) -> ShootingProblem:
     return toy(2, miss, errors=lambda z, s: ca.fabs(miss(z, s)) / 1e-3, **more)
 
 
-def constrained() -> ShootingProblem:
+def constrained(**more: Any) -> ShootingProblem:
     """Nearest point to (2, 1) on x + y = 1: (1, 0); with the penalty p (1, 0) + (1, 1) / (1 + 2 p)."""
-    return toy(2, lambda z, s: z - ca.vertcat(2, 1), constraint=lambda z, s: z[0] + z[1] - 1, stop_when_met=False)
-
-
-class Arguments:
-    """A casadi function's buffer that remembers where its arguments lie."""
-
-    def __init__(self, buffer: Any) -> None:
-        self.buffer, self.values = buffer, {}
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.buffer, name)
-
-    def set_arg(self, index: int, memory: memoryview) -> None:
-        """Pass on."""
-        self.values[index] = memory
-        self.buffer.set_arg(index, memory)
+    return toy(
+        2, lambda z, s: z - ca.vertcat(2, 1), constraint=lambda z, s: z[0] + z[1] - 1, stop_when_met=False, **more
+    )
 
 
 class Counted:
-    """A casadi function that counts its evaluations, keeps the points, and can be made to fail."""
+    """An evaluator that counts the rows that it evaluates by kind, keeps them, and can be made to fail."""
 
-    def __init__(self, function: Any, at: int = 0, error: BaseException | None = None) -> None:
-        """Raise ``error`` at the evaluation ``at``."""
-        self.function, self.at, self.error, self.count = function, at, error, 0
+    def __init__(self, evaluator: Evaluator, kinds: Iterable[str] = (), at: int = 0, error: Any = None) -> None:
+        """Raise ``error`` at the row number ``at`` of one of the kinds."""
+        self.evaluator, self.kinds, self.at, self.error = evaluator, tuple(kinds), at, error
+        self.count, self.calls = Counter[str](), Counter[str]()
         self.points: list[Array] = []
 
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.function, name)
+    def evaluate(self, kind: str, Z: Array, smoothing: float) -> Values:
+        """Count and pass on."""
+        before = self.count[kind]
+        self.calls[kind] += 1
+        self.count[kind] += len(Z)
+        self.points += list(Z)
+        if kind in self.kinds and before < self.at <= self.count[kind]:
+            raise self.error
+        values: Values = getattr(self.evaluator, kind)(Z, smoothing)
+        return values
 
-    def buffer(self) -> tuple[Arguments, Callable[[], None]]:
-        """As of the function."""
-        inner, evaluate = self.function.buffer()
-        buffer = Arguments(inner)
+    def value(self, Z: Array, smoothing: float) -> Values:
+        """See ``Evaluator``."""
+        return self.evaluate("value", Z, smoothing)
 
-        def counted() -> None:
-            self.count += 1
-            self.points.append(np.array(buffer.values[0]))
-            if self.error and self.count == self.at:
-                raise self.error
-            evaluate()
+    def gradient(self, Z: Array, smoothing: float) -> Values:
+        """See ``Evaluator``."""
+        return self.evaluate("gradient", Z, smoothing)
 
-        return buffer, counted
+    def residuals(self, Z: Array, smoothing: float) -> Values:
+        """See ``Evaluator``."""
+        return self.evaluate("residuals", Z, smoothing)
+
+    def jacobian(self, Z: Array, smoothing: float) -> Values:
+        """See ``Evaluator``."""
+        return self.evaluate("jacobian", Z, smoothing)
 
 
-def counted(problem: ShootingProblem) -> tuple[ShootingProblem, dict[str, Counted]]:
-    """The problem with all its functions counted."""
-    names = [name for name in ("value", "gradient", "residuals", "jacobian") if getattr(problem, name)]
-    functions = {name: Counted(getattr(problem, name)) for name in names}
-    return replace(problem, **functions), functions
+def counted(problem: ShootingProblem) -> tuple[ShootingProblem, Counted]:
+    """The problem with its evaluations counted."""
+    evaluator = Counted(problem.evaluator)
+    return replace(problem, evaluator=evaluator), evaluator
+
+
+def failing(problem: ShootingProblem, kinds: Iterable[str], at: int, error: BaseException) -> ShootingProblem:
+    """The problem with an evaluation that raises."""
+    return replace(problem, evaluator=Counted(problem.evaluator, kinds, at, error))
+
+
+def values(problem: ShootingProblem, z: Any, smoothing: float = 0.0) -> Values:
+    """At one z."""
+    return problem.evaluator.value(np.array([z], float), smoothing)
 
 
 def solve(name: str, problem: ShootingProblem, seed: int = 0, options: Any = None, **more: Any) -> Outcome:

@@ -35,6 +35,26 @@ def settings_option(command: F) -> F:
     )(command)
 
 
+def backend_option(command: F) -> F:
+    """``--backend NAME``."""
+    return click.option(
+        "--backend",
+        default="auto",
+        show_default=True,
+        metavar="auto|casadi|c|simd",
+        help="What evaluates: SIMD kernels, casadi's C (both need a C compiler), or casadi's virtual machine.",
+    )(command)
+
+
+def read_backend(name: str) -> str:
+    """The name, if it is one."""
+    from symphys.backends import NAMES
+
+    if name not in NAMES:
+        raise UsageFault(f"--backend: there is no backend {name!r}; {hint(name, NAMES)}")
+    return name
+
+
 def out_option(command: F) -> F:
     """``--out DIR``."""
     return click.option(

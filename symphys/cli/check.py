@@ -30,7 +30,7 @@ def check(source: str, assignments: tuple[str, ...]) -> int:
     check_tables(problem)
     click.echo("\n".join(describe(problem)))
     require_solvable(problem)
-    transcription = transcribe(problem)
+    transcription = transcribe(problem, backend="casadi")
     compared = compare_gradient(transcription, transcription.shooting.start(0))
     wrong = [row["variable"] for row in compared if not row["error"] <= TOLERANCE]
     print_comparison(compared)

@@ -30,7 +30,7 @@ def export(source: str, c: Path | None, casadi: Path | None, assignments: tuple[
 
     (problem,) = read_problems([source], read_settings(assignments))
     require_solvable(problem)
-    transcription = transcribe(problem)
+    transcription = transcribe(problem, backend="casadi")
     folders: dict[Path, dict[str, bytes]] = {}
     if c is not None:
         folders[c] = c_files(transcription, __version__)

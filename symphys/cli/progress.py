@@ -30,8 +30,28 @@ def watch(runs: int) -> Iterator[Observer]:
         yield Live(progress, runs)
 
 
+class Notes:
+    """What backends have to say, each note once."""
+
+    def __init__(self) -> None:
+        """Nothing is told."""
+        self.told: set[str] = set()
+
+    def new(self, result: Result, skipped: bool) -> list[str]:
+        """The lines to tell; none for a run that was done before."""
+        note = "" if skipped else result.backend.get("note", "")
+        if not note or note in self.told:
+            return []
+        self.told.add(note)
+        return [f"symphys: {note}"]
+
+
 class Plain:
     """One line when a run begins and one when it ends; nothing is redrawn."""
+
+    def __init__(self) -> None:
+        """Nothing is told."""
+        self.notes = Notes()
 
     def started(self, job: Job, resumed: bool) -> None:
         """Say so."""
@@ -43,6 +63,8 @@ class Plain:
     def ended(self, job: Job, result: Result, skipped: bool) -> None:
         """Say how."""
         click.echo(f"{job.name}: {brief(job, result, skipped)}", err=True)
+        for note in self.notes.new(result, skipped):
+            click.echo(note, err=True)
 
 
 class Live:
@@ -54,6 +76,7 @@ class Live:
         self.runs, self.over = runs, 0
         self.whole = progress.add_task(f"0 of {runs} runs done", total=runs)
         self.tasks: dict[str, TaskID] = {}
+        self.notes = Notes()
 
     def started(self, job: Job, resumed: bool) -> None:
         """Open the run's line."""
@@ -70,5 +93,7 @@ class Live:
         if job.name in self.tasks:
             self.progress.remove_task(self.tasks.pop(job.name))
         self.progress.console.print(Text(f"{job.name}: {brief(job, result, skipped)}"))
+        for note in self.notes.new(result, skipped):
+            self.progress.console.print(Text(note), soft_wrap=True)
         self.over += 1
         self.progress.update(self.whole, completed=self.over, description=f"{self.over} of {self.runs} runs done")

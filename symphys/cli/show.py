@@ -21,7 +21,7 @@ def show(source: str, assignments: tuple[str, ...], out: Path) -> None:
     from symphys.transcription import transcribe
 
     (problem,) = read_problems([source], read_settings(assignments))
-    transcription = transcribe(problem)
+    transcription = transcribe(problem, backend="casadi")
     guess = transcription.shooting.start(0)
     folder = out / problem.name / "guess"
     files.write_npz(folder / TRAJECTORY, transcription.simulate(guess).arrays())

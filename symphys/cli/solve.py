@@ -4,13 +4,22 @@ from __future__ import annotations
 
 import shlex
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from symphys import threads
-from symphys.cli.arguments import out_option, read_problems, read_settings, read_solvers, settings_option
+from symphys.cli.arguments import (
+    backend_option,
+    out_option,
+    read_backend,
+    read_problems,
+    read_settings,
+    read_solvers,
+    settings_option,
+)
 
 if TYPE_CHECKING:
     from symphys.runs import Batch, Job
@@ -37,9 +46,16 @@ MOST_JOBS = 256
     show_default=True,
     help="How many runs go on at once.",
 )
+@backend_option
 @out_option
 def solve(
-    sources: tuple[str, ...], names: str | None, seeds: int, assignments: tuple[str, ...], jobs: int, out: Path
+    sources: tuple[str, ...],
+    names: str | None,
+    seeds: int,
+    assignments: tuple[str, ...],
+    jobs: int,
+    backend: str,
+    out: Path,
 ) -> int:
     """Solve problems, and write a report.
 
@@ -55,9 +71,10 @@ def solve(
     solvers = read_solvers(names)
     problems = read_problems(sources, settings)
     command = shlex.join(["symphys", *sys.argv[1:]])
-    asked = make_jobs(problems, solvers, range(seeds), settings, out, command)
+    asked = make_jobs(problems, solvers, range(seeds), settings, out, command, read_backend(backend))
+    made = partial(transcribe, backend=backend, threads=1 if jobs > 1 else None)
     with watch(len(asked)) as observer:
-        batch = run_batch(asked, jobs, observer, transcribe)
+        batch = run_batch(asked, jobs, observer, made)
     return conclude(asked, batch, out)
 
 

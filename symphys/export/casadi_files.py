@@ -39,7 +39,7 @@ def casadi_files(transcription: Transcription, version: str) -> dict[str, bytes]
     """name -> content of every file."""
     functions = {"step": dense_step(transcription.rollout)}
     for name, results in RESULTS.items():
-        function = getattr(transcription.shooting, name)
+        function = getattr(transcription.functions, name)
         if function is not None:
             functions[name] = _named(name, function, results)
     contents = {f"{name}.casadi": _serialised(function) for name, function in functions.items()}

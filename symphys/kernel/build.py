@@ -48,7 +48,7 @@ def compile_program(
     single = precision == "single"
     names, width = _names(program, seeded), _width(lanes, single)
     planned = plan(program, names, width * (4 if single else 8))
-    with _library(sources(planned, width, single), cache or default_cache()) as built:
+    with shared_library(sources(planned, width, single), cache or default_cache()) as built:
         loaded = Loaded(built.path, program, planned, names)
     report = Report(
         compiler=built.compiler.version,
@@ -81,7 +81,7 @@ def _width(lanes: int | Literal["auto"], single: bool) -> int:
 
 
 @dataclass(frozen=True)
-class _Built:
+class Built:
     """A library on disk, and how it came there."""
 
     path: Path
@@ -92,20 +92,20 @@ class _Built:
 
 
 @contextmanager
-def _library(parts: Sequence[Source], cache: Cache) -> Iterator[_Built]:
+def shared_library(parts: Sequence[Source], cache: Cache) -> Iterator[Built]:
     """The library of these sources; what does not go into the cache lasts as long as the context."""
     compiler = find_compiler()
     flags = compiler.flags(processor())
     texts = [f"{part.fused} {part.text}" for part in parts]
     key = hashlib.sha256("\0".join([*texts, *compiler.command, compiler.version, *flags]).encode()).hexdigest()[:32]
     if (path := cache.find(key)) is not None:
-        yield _Built(path, compiler, flags, cached=True)
+        yield Built(path, compiler, flags, cached=True)
         return
     with _folder() as folder:
         with cache.building(key):
             found = cache.find(key)  # another process may have built it meanwhile
             path, note = (found, "") if found else _kept(cache, key, compiler.build(parts, flags, Path(folder)))
-        yield _Built(path, compiler, flags, found is not None, note)
+        yield Built(path, compiler, flags, found is not None, note)
 
 
 def _kept(cache: Cache, key: str, path: Path) -> tuple[Path, str]:

@@ -12,6 +12,7 @@ from symphys.kernel.batch import Array, Batch
 from symphys.kernel.compiler import processors
 from symphys.kernel.diagnosis import Bad, first_bad
 from symphys.kernel.errors import ProgramError
+from symphys.kernel.fixed import Fixed
 from symphys.kernel.library import Loaded
 from symphys.kernel.pool import Pool
 from symphys.kernel.program import Place, Program
@@ -80,6 +81,14 @@ class Kernel:
         trajectory = batch.trajectory(place, count)
         self._run(batch)
         return trajectory
+
+    def fixed(self, seed: ArrayLike = ()) -> Fixed:
+        """An evaluation of one z at fixed addresses, with a row for each seed (rows, s), or one row without any."""
+        seeds, z, knob = np.array(seed, float), np.zeros(self.program.z.size), np.zeros(self.program.knob.size)
+        batch = self._batch(z, knob, seeds if seeds.size else None)
+        outputs = batch.outputs(self._width())
+        gradient = batch.gradient(len(z)) if seeds.size else np.zeros((0, len(z)))
+        return Fixed(self.loaded, batch.part(0, batch.rows), self._pool.new(), z, knob, outputs, gradient, seeds)
 
     def first_bad(self, z: ArrayLike, knob: ArrayLike = ()) -> Bad | None:
         """The first call of one rollout that gives a value that is not finite; None if all are finite."""

@@ -84,6 +84,11 @@ class Loaded:
         self._kept.append(words)
         return List(count, words.ctypes.data)
 
+    @property
+    def addresses(self) -> tuple[int, int]:
+        """Of the driver's ``evaluate`` and of the program that it wants."""
+        return ctypes.cast(self._evaluate, ctypes.c_void_p).value or 0, ctypes.addressof(self.data)
+
     def evaluate(self, batch: BatchData, memory: Memory) -> None:
         """Run a batch in this memory; the interpreter is free meanwhile."""
         self._evaluate(ctypes.byref(self.data), ctypes.byref(batch), memory.ctypes.data)

@@ -38,13 +38,14 @@ class Pool:
         try:
             memory = self._free.pop()
         except IndexError:
-            memory = self._new()
+            memory = self.new()
         try:
             return task(memory)
         finally:
             self._free.append(memory)
 
-    def _new(self) -> Memory:
+    def new(self) -> Memory:
+        """A memory that is the caller's."""
         alignment = max(ALIGNMENT, self._shape[1] * self._real.itemsize)
         size = int(np.prod(self._shape)) * self._real.itemsize
         raw = np.empty(size + alignment, dtype=np.uint8)

@@ -153,7 +153,7 @@ def provenance(runs: Sequence[Run]) -> Html:
             ("When", span),
             ("Machine", once([run.origin.versions.get("platform", "") for run in runs])),
             ("Versions", once(versions)),
-            ("Simulated with", once([run.origin.backend for run in runs])),
+            ("Evaluated by", once([run.origin.backend for run in runs])),
         ]
     )
     return card("Where this comes from", content)

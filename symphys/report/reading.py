@@ -96,8 +96,21 @@ def make_effort(result: dict[str, object]) -> Effort:
 def make_origin(result: dict[str, object]) -> Origin:
     """Where the result comes from."""
     versions = {key: values.name(entry) for key, entry in values.table(result.get("versions")).items()}
-    texts = (values.name(result.get(key)) for key in ("when", "command", "backend"))
-    return Origin(versions, *texts)
+    when, command = (values.name(result.get(key)) for key in ("when", "command"))
+    return Origin(versions, when, command, backend_words(result.get("backend")))
+
+
+def backend_words(value: object) -> str:
+    """What evaluated, in a line."""
+    told = values.table(value)
+    lanes, threads = (values.whole(told.get(key)) for key in ("lanes", "threads"))
+    name, precision, compiler, compiled, note = (
+        values.name(told.get(key)) for key in ("name", "precision", "compiler", "compiled", "note")
+    )
+    counts = [f"{n} {what}{'s' * (n > 1)}" for n, what in ((lanes, "lane"), (threads, "thread")) if n]
+    start = {"cold": "compiled anew", "warm": "taken from the cache"}.get(compiled, "")
+    parts = [name, *counts, precision and f"{precision} precision", compiler, start]
+    return "; ".join(filter(None, [", ".join(filter(None, parts)), note]))
 
 
 def read_or_note(path: Path, faults: list[str]) -> dict[str, object]:

@@ -194,14 +194,13 @@ def time_split(run: Run) -> Html:
         tag("li", tag("span", class_="dot", style=f"background:{c}"), f"{name} {words.seconds(took)}")
         for name, took, c in known
     ]
-    note = f"Simulated with: {run.origin.backend}." if run.origin.backend else ""
     prices = [f"{name} {show(price, 2)}" for name, price in run.effort.price.items() if math.isfinite(price)]
-    priced = f" Measured price in rollouts: {words.listed(prices)}." if prices else ""
+    priced = f"Measured price in rollouts: {words.listed(prices)}." if prices else ""
     return card(
         "Where the time went",
         tag("div", *bars, class_="split", aria_hidden="true"),
         tag("ul", *keys, class_="keys"),
-        tag("p", note + priced, class_="caption") if note or priced else "",
+        tag("p", priced, class_="caption") if priced else "",
         anchor="time",
     )
 
@@ -215,6 +214,7 @@ def provenance(run: Run) -> Html:
             ("When", run.origin.when),
             ("Machine", run.origin.versions.get("platform", "")),
             ("Versions", versions),
+            ("Evaluated by", run.origin.backend),
             ("Ended as", words.status(run.status)),
             ("Iterations", words.count(run.effort.iterations) if math.isfinite(run.effort.iterations) else ""),
         ]

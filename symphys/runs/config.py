@@ -20,6 +20,7 @@ class Config:
         seed: 0 is the guess as it stands.
         settings: what the command line changed in the file, by dotted key.
         options: the solver's options, all of them.
+        backend: what was to evaluate; "auto" is the best that the machine has.
         key: of the problem's text and all the above; two runs with one key are the same run.
     """
 
@@ -28,6 +29,7 @@ class Config:
     seed: int
     settings: dict[str, object] = field(default_factory=dict)
     options: dict[str, object] = field(default_factory=dict)
+    backend: str = "auto"
     key: str = ""
 
     def to_json(self) -> dict[str, Any]:
@@ -36,9 +38,16 @@ class Config:
 
 
 def make_config(
-    problem: str, text: str, solver: str, seed: int, settings: dict[str, object], options: dict[str, object]
+    problem: str,
+    text: str,
+    solver: str,
+    seed: int,
+    settings: dict[str, object],
+    options: dict[str, object],
+    backend: str,
 ) -> Config:
     """The configuration with its key; ``text`` is the problem file's source."""
-    parts = [text, settings, solver, options, seed, __version__]
+    parts = [text, settings, solver, options, seed, backend, __version__]
     canonical = json.dumps(files.strict(parts), sort_keys=True, allow_nan=False)
-    return Config(problem, solver, seed, settings, options, hashlib.sha256(canonical.encode()).hexdigest())
+    key = hashlib.sha256(canonical.encode()).hexdigest()
+    return Config(problem, solver, seed, settings, options, backend, key)

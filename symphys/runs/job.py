@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from symphys.backends import BEST
 from symphys.problem import Problem, require_solvable, require_solvers, validate_options
 from symphys.runs.config import Config, make_config
 from symphys.runs.folder import RunFolder
@@ -45,6 +46,7 @@ def make_jobs(
     settings: dict[str, object],
     out: Path,
     command: str = "",
+    backend: str = BEST,
 ) -> list[Job]:
     """Every problem with every solver and seed, below the folder ``out``.
 
@@ -59,7 +61,7 @@ def make_jobs(
             options = solver_options(problem, name)
             plain = dataclasses.asdict(options)
             for seed in seeds:
-                config = make_config(problem.name, problem.text, name, seed, settings, plain)
+                config = make_config(problem.name, problem.text, name, seed, settings, plain, backend)
                 jobs.append(Job(problem, config, options, RunFolder.of(out, problem.name, name, seed), command))
     return jobs
 

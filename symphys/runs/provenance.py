@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import datetime
 import platform
+from dataclasses import asdict
 from importlib.metadata import version
 from typing import Any
 
 from symphys import __version__
+from symphys.backends import Description
 from symphys.runs.job import Job
-
-BACKEND = "casadi virtual machine"
 
 
 def stamp(job: Job) -> dict[str, Any]:
@@ -23,8 +23,14 @@ def stamp(job: Job) -> dict[str, Any]:
         "versions": versions(),
         "when": now(),
         "command": job.command,
-        "backend": BACKEND,
     }
+
+
+def evaluated(backend: Description) -> dict[str, Any]:
+    """The "backend" of a result."""
+    told = asdict(backend)
+    cached, _ = told.pop("cached"), told.pop("seconds")
+    return {**told, "compiled": "" if cached is None else "warm" if cached else "cold"}
 
 
 def versions() -> dict[str, str]:

@@ -59,7 +59,8 @@ class Result:
         versions: of everything that took part.
         when: UTC time of the end, ISO 8601.
         command: what was typed.
-        backend: what evaluated the functions.
+        backend: what evaluated: "name", "lanes", "threads", "precision", "compiler"; "compiled": "cold", "warm" (from
+            the cache) or empty; "note": why it is not what was asked for, or empty.
     """
 
     problem: str
@@ -82,7 +83,7 @@ class Result:
     versions: dict[str, str] = field(default_factory=dict)
     when: str = ""
     command: str = ""
-    backend: str = ""
+    backend: dict[str, Any] = field(default_factory=dict)
 
     @property
     def interrupted(self) -> bool:
@@ -107,7 +108,7 @@ class Result:
         known = {f.name for f in dataclasses.fields(cls)}
         if missing := known - value.keys():
             raise files.FileError(f"a result without {', '.join(sorted(missing))}")
-        kept = {"problem", "title", "status", "advice", "checks"}
+        kept = {"problem", "title", "status", "advice", "checks", "backend"}
         fields = {key: value[key] if key in kept else files.numbers(value[key]) for key in known}
         if fields["checks"] is not None:
             fields["checks"] = [{**c, **files.numbers({k: c[k] for k in MEASURES})} for c in fields["checks"]]

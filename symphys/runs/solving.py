@@ -13,7 +13,7 @@ from symphys import files, trust
 from symphys.errors import SymphysError
 from symphys.runs.folder import CHECKPOINT, GUESS, SCENE, TRAJECTORY
 from symphys.runs.job import Job
-from symphys.runs.provenance import stamp
+from symphys.runs.provenance import evaluated, stamp
 from symphys.runs.result import BlockRecord, CheckRecord, Result
 from symphys.runs.scene import scene
 from symphys.shooting import Array
@@ -51,6 +51,7 @@ def solve(
 ) -> Result:
     """Solve from the seed's guess, or go on from ``checkpoint`` of the ``earlier`` result; write what was found."""
     shooting = transcription.shooting
+    log(f"evaluated by {transcription.backend}")
     start = shooting.start(job.config.seed)
     files.write_npz(job.folder.path / GUESS, transcription.simulate(start).arrays())
     chosen = solver(job.config.solver)
@@ -63,7 +64,7 @@ def solve(
     judgement = judge(transcription, outcome)
     price = transcription.prices(used(outcome.counts))
     write(job, transcription, outcome, judgement, price)
-    seconds = {"build": transcription.build_seconds, "compile": 0.0, "solve": spent}
+    seconds = {"build": transcription.build_seconds, "compile": transcription.backend.seconds, "solve": spent}
     return record(job, transcription, outcome, judgement, price, seconds)
 
 
@@ -106,6 +107,7 @@ def record(
     verdict = judgement.verdict
     return Result(
         **stamp(job),
+        backend=evaluated(transcription.backend),
         solved=verdict is not None and verdict.solved and outcome.status is not Status.INTERRUPTED,
         status=outcome.status.value,
         advice=judgement.advice,

@@ -1,4 +1,4 @@
-"""The transcription: one rollout expression, cut into the functions that solvers, judges and recorders call."""
+"""The transcription: one rollout, as the shooting problem that solvers see, and the functions of judge and recorder."""
 
 from __future__ import annotations
 
@@ -6,18 +6,20 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from time import perf_counter
-from typing import Any
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.backends import BEST, Description, Source, choose
 from symphys.problem import Problem
 from symphys.shooting import ShootingProblem
 from symphys.trajectory import Trajectory
 from symphys.transcription.along import Rollout, symbolic_rollout
 from symphys.transcription.decision import blocks
+from symphys.transcription.functions import ExpressionFunctions, function_of
 from symphys.transcription.judge import Verdict, verdict
+from symphys.transcription.program import rollout_program
 from symphys.transcription.simulate import recorder, simulate
 from symphys.transcription.terms import Terms, terms
 
@@ -29,12 +31,19 @@ PRICING_CALLS = 5
 
 @dataclass(frozen=True)
 class Transcription:
-    """A problem, its shooting problem, and the exact rollout that judges and records."""
+    """A problem, its shooting problem, and the exact rollout that judges and records.
+
+    Attributes:
+        backend: what evaluates the shooting problem.
+        build_seconds: until there were expressions; ``backend.seconds`` come on top.
+    """
 
     problem: Problem
     rollout: Rollout
     terms: Terms
+    functions: ExpressionFunctions
     shooting: ShootingProblem
+    backend: Description
     build_seconds: float
 
     def judge(self, z: Array) -> Verdict:
@@ -46,16 +55,21 @@ class Transcription:
         return simulate(self.rollout, self._recorder, z, smoothing)
 
     def prices(self, kinds: Iterable[str] = ("gradient", "jacobian")) -> dict[str, float]:
-        """Measured cost of one "gradient", "jacobian" or "hessian" in rollouts, at the guess."""
-        z = self.shooting.start(0)
-        one = _fastest(self.shooting.value, z)
-        functions = {kind: self._priced(kind) for kind in kinds}
-        return {kind: _fastest(f, z) / one for kind, f in functions.items() if f is not None}
+        """Measured cost of one "gradient", "jacobian" or "hessian" in rollouts, at the guess, one at a time.
 
-    def _priced(self, kind: str) -> ca.Function | None:
-        if kind == "hessian":
-            return self._hessian
-        return self.shooting.jacobian if kind == "jacobian" else self.shooting.gradient
+        A Jacobian is that of the residuals, or of the constraints where there are none. Hessians are those of
+        casadi's virtual machine, whatever the backend.
+        """
+        z, evaluator = self.shooting.start(0), self.shooting.evaluator
+        one = _fastest(lambda: evaluator.value(z[None], 0.0))
+        calls: dict[str, Callable[[], object]] = {"gradient": lambda: evaluator.gradient(z[None], 0.0)}
+        if self.shooting.squares:
+            calls["jacobian"] = lambda: evaluator.jacobian(z[None], 0.0)
+        elif self.terms.names:
+            constraints = self.shooting.nlp.jacobian or self.functions.constraint_jacobian
+            calls["jacobian"] = lambda: constraints(z, 0.0)
+        calls["hessian"] = lambda: self.functions.hessian(z, 0.0)
+        return {kind: _fastest(calls[kind]) / one for kind in kinds if kind in calls}
 
     @cached_property
     def _judge(self) -> Judge:
@@ -65,14 +79,10 @@ class Transcription:
     def _recorder(self) -> ca.Function:
         return recorder(self.rollout)
 
-    @cached_property
-    def _hessian(self) -> ca.Function:
-        return _function(self.rollout, "hessian", [ca.hessian(self.terms.objective, self.rollout.z)[0]])
-
 
 def judge_of(rollout: Rollout, asked: Terms) -> Judge:
     """A judge of candidates by the exact rollout, without the functions that solvers need."""
-    numbers = _function(rollout, "judge", [asked.objective, asked.costs, asked.errors])
+    numbers = function_of(rollout, "judge", [asked.objective, asked.costs, asked.errors])
 
     def judge(z: Array) -> Verdict:
         objective, costs, errors = numbers(z, 0.0)
@@ -87,47 +97,40 @@ def judge_for(problem: Problem) -> Judge:
     return judge_of(rollout, terms(rollout))
 
 
-def transcribe(problem: Problem) -> Transcription:
-    """Build everything that solving, judging and recording this problem needs."""
+def transcribe(problem: Problem, backend: str = BEST, threads: int | None = None) -> Transcription:
+    """Build everything that solving, judging and recording this problem needs.
+
+    Args:
+        problem: what to solve.
+        backend: what evaluates it, a name of ``symphys.backends.NAMES``.
+        threads: that share a batch; None: one for each processor.
+    """
     began = perf_counter()
     rollout = symbolic_rollout(problem)
     asked = terms(rollout)
-    shooting = _shooting(problem, rollout, asked)
-    return Transcription(problem, rollout, asked, shooting, perf_counter() - began)
-
-
-def _shooting(problem: Problem, rollout: Rollout, asked: Terms) -> ShootingProblem:
-    merit = asked.objective + asked.penalties
-    common = [asked.objective, asked.errors]
-    squares, r = {}, asked.residuals
-    if r is not None and r.shape[0]:
-        squares["residuals"] = _function(rollout, "residuals", [r, *common])
-        squares["jacobian"] = _function(rollout, "jacobian", [r, *common, ca.jacobian(r, rollout.z)])
-    return ShootingProblem(
+    functions = ExpressionFunctions(rollout, asked)
+    built = perf_counter() - began
+    chosen = choose(backend, Source(functions, lambda: rollout_program(rollout)), threads)
+    shooting = ShootingProblem(
         name=problem.name,
         blocks=blocks(problem),
-        value=_function(rollout, "value", [merit, *common]),
-        gradient=_function(rollout, "gradient", [merit, *common, ca.gradient(merit, rollout.z)]),
-        residuals=squares.get("residuals"),
-        jacobian=squares.get("jacobian"),
-        nlp=_function(rollout, "nlp", [asked.objective, asked.constraints]),
+        evaluator=chosen.evaluator,
+        nlp=chosen.nlp,
+        squares=functions.squares is not None,
         constraint_names=asked.names,
         constraint_lower=asked.lower,
         constraint_upper=asked.upper,
         smoothing=problem.simulation.smoothing,
         stop_when_met=problem.stop_when_met,
     )
+    return Transcription(problem, rollout, asked, functions, shooting, chosen.description, built)
 
 
-def _function(rollout: Rollout, name: str, outputs: list[Any]) -> ca.Function:
-    return ca.Function(name, [rollout.z, rollout.smoothing], [ca.densify(output) for output in outputs])
-
-
-def _fastest(function: ca.Function, z: Array) -> float:
+def _fastest(call: Callable[[], object]) -> float:
     """Seconds of the fastest of a few calls."""
     times = []
     for _ in range(PRICING_CALLS):
         began = perf_counter()
-        function(z, 0.0)
+        call()
         times.append(perf_counter() - began)
     return min(times)

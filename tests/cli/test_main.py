@@ -221,3 +221,38 @@ def test_ctrl_c_saves_and_the_same_command_goes_on(throw: Path, tmp_path: Path, 
     folders = [tmp_path / "reports" / "throw" / f"cma-seed{seed}" for seed in range(jobs)]
     assert all(read_result(folder / "result.json").interrupted for folder in folders)
     assert all((folder / "checkpoint.json").exists() for folder in folders)
+
+
+def test_a_backend_is_chosen_and_told(run: Run, throw: Path) -> None:
+    assert run("solve", throw, "--solver", "least_squares", "--backend", "casadi")[0] == 0
+    found = read_result(Path("reports/throw/least_squares-seed0/result.json"))
+    assert found.backend["name"] == "casadi" and found.backend["compiled"] == "" and found.backend["note"] == ""
+    assert found.seconds is not None and found.seconds["compile"] == 0
+    config = json.loads(Path("reports/throw/least_squares-seed0/config.json").read_text(encoding="utf-8"))
+    assert config["backend"] == "casadi"
+    code, _, err = run("solve", throw, "--solver", "least_squares")
+    assert code == 0 and "done before" not in err
+    code, _, err = run("solve", throw, "--backend", "smid")
+    assert code == 2 and "simd" in err
+
+
+def test_without_a_compiler_one_line_says_so(
+    run: Run, throw: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("CC", "/nonexistent")
+    monkeypatch.setenv("SYMPHYS_CACHE", str(tmp_path / "cache"))
+    code, _, err = run("solve", throw, "--solver", "gradient,least_squares", "--seeds", "2")
+    assert code == 0
+    said = [line for line in err.splitlines() if "ziglang" in line]
+    assert len(said) == 1 and said[0].startswith("symphys: casadi's virtual machine evaluates")
+    folder = Path("reports/throw/gradient-seed1")
+    assert read_result(folder / "result.json").backend["note"] in said[0]
+    assert "ziglang" in (folder / "log.txt").read_text(encoding="utf-8")
+    assert "ziglang" in (folder / "report.html").read_text(encoding="utf-8")
+
+
+def test_the_help_names_every_backend(run: Run) -> None:
+    from symphys.backends import NAMES
+
+    _, out, _ = run("solve", "--help")
+    assert "|".join(sorted(NAMES, key=["auto", "casadi", "c", "simd"].index)) in out

@@ -55,7 +55,7 @@ def example(folder: Path, name: str, *z: float) -> dict[str, float]:
 
 @pytest.mark.parametrize("problem", ["kick", "ball_throw"])
 def test_the_example_prints_the_numbers_of_python(problem: str, kick: Transcription, tmp_path: Path) -> None:
-    one = kick if problem == "kick" else transcribe(load_problem(find(problem)))
+    one = kick if problem == "kick" else transcribe(load_problem(find(problem)), "casadi")
     name = identifier(one.problem.name)
     write_folders({tmp_path: c_files(one, "1.2")})
     sources = [tmp_path / f"{name}.c", tmp_path / f"{name}_main.c"]
@@ -63,7 +63,7 @@ def test_the_example_prints_the_numbers_of_python(problem: str, kick: Transcript
     for z in ([], one.shooting.start(1).tolist()):
         printed = example(tmp_path, name, *z)
         merit, objective, errors, slope = (
-            np.array(part).ravel() for part in one.shooting.gradient(z or one.shooting.start(0), 0.0)
+            np.array(part).ravel() for part in one.functions.gradient(z or one.shooting.start(0), 0.0)
         )
         assert printed["merit"] == pytest.approx(merit[0], **CLOSE)
         assert printed["objective"] == pytest.approx(objective[0], **CLOSE)

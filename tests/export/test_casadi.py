@@ -38,7 +38,7 @@ def test_plain_casadi_loads_them(kick: Transcription, tmp_path: Path) -> None:
     values = json.loads(done.stdout)
     assert {path.stem for path in written} == {*values, "README"}
     for name in ("value", "gradient", "nlp"):
-        expected = getattr(kick.shooting, name)(z, 0.0)
+        expected = getattr(kick.functions, name)(z, 0.0)
         assert values[name].keys() == set(RESULTS[name])
         for result, theirs in zip(RESULTS[name], expected, strict=True):
             np.testing.assert_allclose(np.ravel(values[name][result]), np.array(theirs).ravel(), rtol=1e-12, atol=1e-12)

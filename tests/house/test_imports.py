@@ -57,6 +57,7 @@ def importers(wanted: str) -> set[str]:
     ("wanted", "allowed"),
     [
         ("symphys.solvers", {"cli", "runs"}),
+        ("symphys.backends", {"cli", "runs", "transcription"}),
         ("symphys.cli", {"__main__"}),
         ("symphys.runs", {"cli"}),
         ("symphys.report", {"cli"}),
@@ -87,6 +88,13 @@ def test_kernels_know_no_physics(name: str, path: Path) -> None:
     for target in imported(path):
         assert target.split(".")[0] in RUNTIME | {"casadi", "numpy", "symphys"}, target
         assert not target.startswith("symphys") or room(target) in {"kernel", "errors"}, target
+
+
+@pytest.mark.parametrize(("name", "path"), [pair for pair in modules() if room(pair[0]) == "backends"])
+def test_backends_see_kernels_and_the_shooting_problem_alone(name: str, path: Path) -> None:
+    for target in imported(path):
+        assert target.split(".")[0] in RUNTIME | {"casadi", "numpy", "symphys"}, target
+        assert not target.startswith("symphys") or room(target) in {"backends", "kernel", "shooting"}, target
 
 
 @pytest.mark.parametrize(("name", "path"), [pair for pair in modules() if room(pair[0]) == "doctor"])

@@ -133,7 +133,10 @@ def result(problem: str, title: str, solver: str, seed: int, rows: list[dict[str
             "residual": 1e-9, "deepest": 1e-5, "multiple_impacts": 2, "energy": [],
         },
         "versions": VERSIONS, "when": "2026-11-21T12:00:00+00:00", "command": f"symphys solve {problem}.toml --seeds 5",
-        "backend": "casadi virtual machine",
+        "backend": {
+            "name": "simd", "lanes": 8, "threads": 2, "precision": "double", "compiler": "gcc 12.2", "compiled": "warm",
+            "note": "",
+        },
     }  # fmt: skip
 
 

@@ -61,7 +61,14 @@ def test_page_tells_names_status_and_numbers(run_dir: Path) -> None:
     found = json.loads((run_dir / "result.json").read_text())
     for word in ("Throw a giant soccer ball", "gradient", "seed 0", "comes to rest at 10 m", "Solved", "45 rollouts"):
         assert word in page.text
-    for word in ("throw", "spin", "Thrown so that it stops dead.", "casadi virtual machine", "symphys solve", "3.11.7"):
+    for word in (
+        "throw",
+        "spin",
+        "Thrown so that it stops dead.",
+        "simd, 8 lanes, 2 threads, double precision, gcc 12.2, taken from the cache",
+        "symphys solve",
+        "3.11.7",
+    ):
         assert word in page.text
     assert f"{found['objective']:.2e}"[:4] in page.text
     assert "Agrees with finite differences." in page.text
@@ -114,7 +121,15 @@ def test_text_from_files_is_escaped(run_dir: Path, edit: Callable[..., None]) ->
     found = json.loads((run_dir / "result.json").read_text())
     checks = [{**check, "name": evil, "kind": evil} for check in found["checks"]]
     z = {evil: {**found["z"]["throw"], "sets": [evil]}}
-    edit(run_dir / "result.json", title=evil, advice=evil, checks=checks, z=z, command=evil, backend=evil)
+    edit(
+        run_dir / "result.json",
+        title=evil,
+        advice=evil,
+        checks=checks,
+        z=z,
+        command=evil,
+        backend={"name": evil, "note": evil},
+    )
     (run_dir / "log.txt").write_text("</pre>" + evil)
     (run_dir / "problem.toml").write_text(f'description = """{evil}"""')
     with np.load(run_dir / "trajectory.npz") as archive:

@@ -112,7 +112,7 @@ def test_a_job_survives_the_way_to_a_new_process_and_back(problem: Problem, tmp_
     assert (back.name, back.config, back.options, back.folder) == (job.name, job.config, job.options, job.folder)
     assert back.problem.targets == job.problem.targets
     z = np.array([1.0, 2.0, 3.0])
-    values, expected = (np.array(transcribe(each.problem).shooting.value(z, 0)[2]) for each in (back, job))
+    values, expected = (transcribe(each.problem).shooting.evaluator.value(z[None], 0).errors for each in (back, job))
     assert np.array_equal(values, expected)
 
 

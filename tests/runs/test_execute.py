@@ -138,7 +138,8 @@ def test_an_interrupted_run_goes_on_where_it_stopped(make_job: MakeJob) -> None:
     assert seen == [3, 4, 5]
     assert result.solved
     assert not (job.folder.path / "checkpoint.json").exists()
-    assert (job.folder.path / "log.txt").read_text(encoding="utf-8").splitlines() == [
+    lines = (job.folder.path / "log.txt").read_text(encoding="utf-8").splitlines()
+    assert [line for line in lines if not line.startswith("evaluated by")] == [
         "told to solve from 0",
         "told to solve from 3",
     ]

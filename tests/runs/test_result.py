@@ -41,7 +41,7 @@ def test_other_objects_are_refused_by_name_of_file(tmp_path: Path, content: obje
 
 
 def test_the_key_depends_on_all_that_decides_the_result() -> None:
-    base = ("p", "text", "gradient", 0, {"simulation.dt": 0.01}, {"iterations": 5})
+    base = ("p", "text", "gradient", 0, {"simulation.dt": 0.01}, {"iterations": 5}, "auto")
     changes = [
         (1, "texts"),
         (2, "cma"),
@@ -49,6 +49,7 @@ def test_the_key_depends_on_all_that_decides_the_result() -> None:
         (4, {"simulation.dt": 0.02}),
         (4, {}),
         (5, {"iterations": 6}),
+        (6, "casadi"),
     ]
     keys = {make_config(*base).key}
     for place, value in changes:

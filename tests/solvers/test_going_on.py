@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from toys import Counted, counted, rosenbrock, solve, stop_at, target, through_json
+from toys import failing, rosenbrock, solve, stop_at, target, through_json, values
 
 from symphys.errors import SymphysError
 from symphys.solvers import SOLVERS, Outcome, Status
@@ -51,9 +51,8 @@ def test_the_same_to_the_last_bit(name: str, options: dict[str, Any], problem: A
 @pytest.mark.parametrize("evaluation", [1, 2, 5, 8])
 def test_interrupted_in_the_middle_of_an_evaluation(name: str, evaluation: int) -> None:
     problem = rosenbrock()
-    function = {"gradient": "value", "least_squares": "residuals", "cma": "value"}[name]
-    failing = replace(problem, **{function: Counted(getattr(problem, function), evaluation, KeyboardInterrupt())})
-    part = solve(name, failing)
+    kind = {"gradient": "value", "least_squares": "residuals", "cma": "value"}[name]
+    part = solve(name, failing(problem, [kind], evaluation, KeyboardInterrupt()))
     assert part.status is Status.INTERRUPTED
     assert part.counts == (part.counts if not part.trace else type(part.counts)(*astuple(part.trace[-1])[1:5]))
     rest = solve(name, problem, checkpoint=through_json(part.checkpoint))
@@ -82,8 +81,8 @@ def test_ipopt_goes_on_from_its_last_point() -> None:
 
 
 def test_ipopt_interrupted_in_the_middle_of_an_evaluation() -> None:
-    problem, failing = rosenbrock(), Counted(rosenbrock().value, 4, KeyboardInterrupt())
-    part = solve("ipopt", replace(problem, value=failing))
+    problem = rosenbrock()
+    part = solve("ipopt", failing(problem, ["value"], 4, KeyboardInterrupt()))
     assert (part.status, len(part.trace)) == (Status.INTERRUPTED, 3)
     assert solve("ipopt", problem, checkpoint=part.checkpoint).status is Status.CONVERGED
 
@@ -91,7 +90,7 @@ def test_ipopt_interrupted_in_the_middle_of_an_evaluation() -> None:
 @every_solver
 def test_the_best_so_far_is_kept(name: str) -> None:
     part = solve(name, rosenbrock(), monitor=stop_at(6))
-    merit = float(rosenbrock().value(part.z, 0)[0])
+    merit = values(rosenbrock(), part.z).merit[0]
     assert merit == part.trace[-1].best <= part.trace[0].objective
     assert "goes on" in part.advice
 
@@ -107,11 +106,7 @@ def test_seconds_go_on(name: str) -> None:
 
 @every_solver
 def test_interrupted_at_once(name: str) -> None:
-    watched, _ = counted(rosenbrock())
-    watched = replace(
-        watched, **{f: Counted(getattr(watched, f), 1, KeyboardInterrupt()) for f in ("value", "gradient", "jacobian")}
-    )
-    part = solve(name, watched)
+    part = solve(name, failing(rosenbrock(), ("value", "gradient", "jacobian"), 1, KeyboardInterrupt()))
     assert part.status is Status.INTERRUPTED
     assert part.checkpoint == {}
     assert np.array_equal(part.z, rosenbrock().start(0))

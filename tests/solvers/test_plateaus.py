@@ -75,11 +75,11 @@ def test_steps_that_are_taken_as_they_come_are_not_refused() -> None:
 @descents
 @pytest.mark.parametrize("problem", [cliff(), ledge()], ids=["cliff", "ledge"])
 def test_what_is_refused_is_counted(name: str, problem: ShootingProblem) -> None:
-    watched, functions = counted(problem)
+    watched, watch = counted(problem)
     found = solve(name, watched)
-    assert found.counts.gradients == functions["gradient"].count
-    assert found.counts.jacobians == functions["jacobian"].count
-    assert found.counts.rollouts == functions["value"].count + functions["residuals"].count
+    assert found.counts.gradients == watch.count["gradient"]
+    assert found.counts.jacobians == watch.count["jacobian"]
+    assert found.counts.rollouts == watch.count["value"] + watch.count["residuals"]
     assert found.counts.gradients + found.counts.jacobians > len(found.trace)
 
 

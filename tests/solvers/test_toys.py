@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from toys import PENALTY, constrained, counted, quadratic, rosenbrock, solve, target, toy
+from toys import PENALTY, constrained, counted, quadratic, require, rosenbrock, solve, target, toy, values
 
 from symphys.solvers import SOLVERS, Status
 
@@ -56,7 +56,7 @@ def test_target_is_met_and_the_solve_stops_there(name: str, options: dict[str, A
     problem = target()
     found = solve(name, problem, options=options)
     assert (found.status, found.advice) == (Status.MET, "")
-    errors = np.array(problem.value(found.z, 0)[2]).ravel()
+    errors = values(problem, found.z).errors[0]
     assert problem.met(errors)
     assert found.trace[-1].miss == pytest.approx(errors.max())
     assert all(row.miss > 1 for row in found.trace[:-1])
@@ -72,10 +72,10 @@ def test_goes_on_past_met_where_asked_to(name: str) -> None:
 @every_way
 def test_bounds_hold_at_every_evaluation(name: str, options: dict[str, Any]) -> None:
     lower, upper = 0.3, 1.7
-    problem, functions = counted(quadratic(bounds=(lower, upper), guess=0.5, scale=0.9))
+    problem, watch = counted(quadratic(bounds=(lower, upper), guess=0.5, scale=0.9))
     found = solve(name, problem, options=options)
     assert found.z == pytest.approx([1, upper, upper], abs=2e-3)
-    points = np.array([point for function in functions.values() for point in function.points])
+    points = np.array(watch.points)
     assert np.all((points >= lower) & (points <= upper))
 
 
@@ -83,7 +83,7 @@ def test_bounds_hold_at_every_evaluation(name: str, options: dict[str, Any]) -> 
 def test_start_outside_the_bounds_is_moved_inside(name: str) -> None:
     problem = quadratic(bounds=(0.0, 5.0))
     found = SOLVERS[name].solve(problem, np.array([-3.0, 9.0, 1.0]), SOLVERS[name].Options())
-    assert found.trace[0].objective == pytest.approx(float(problem.value([0, 5, 1], 0)[0]))
+    assert found.trace[0].objective == pytest.approx(values(problem, [0, 5, 1]).merit[0])
     assert found.z == pytest.approx([1, 2, 3], abs=1e-4)
 
 
@@ -118,25 +118,26 @@ def test_scale_changes_the_way_not_the_answer(name: str) -> None:
 @pytest.mark.parametrize("name", ["gradient", "least_squares"])
 @pytest.mark.parametrize("problem", [quadratic(), rosenbrock(), target()], ids=["quadratic", "rosenbrock", "target"])
 def test_counts(name: str, problem: Any) -> None:
-    watched, functions = counted(problem)
+    watched, watch = counted(problem)
     found = solve(name, watched)
-    assert found.counts.rollouts == functions["value"].count + functions["residuals"].count
-    assert found.counts.gradients == functions["gradient"].count
-    assert found.counts.jacobians == functions["jacobian"].count
+    assert found.counts.rollouts == watch.count["value"] + watch.count["residuals"]
+    assert found.counts.gradients == watch.count["gradient"]
+    assert found.counts.jacobians == watch.count["jacobian"]
     assert found.counts.hessians == 0
 
 
 def test_counts_of_cma_are_whole_generations_and_the_guess() -> None:
-    watched, functions = counted(target())
+    watched, watch = counted(target())
     found = solve("cma", watched, options={"population": 10})
-    assert found.counts.rollouts == functions["value"].count
+    assert found.counts.rollouts == watch.count["value"]
     assert found.counts.rollouts == 1 + 10 * (len(found.trace) - 1)
+    assert watch.calls["value"] == len(found.trace)
 
 
 @pytest.mark.parametrize("hessian", ["exact", "limited-memory"])
 def test_counts_of_ipopt_are_its_own_and_one_rollout_an_iterate(hessian: str) -> None:
     lines: list[str] = []
-    watched, functions = counted(constrained())
+    watched, watch = counted(constrained())
     unscaled = {"nlp_scaling_method": "none"}  # scaling takes a gradient that IPOPT's text does not tell of
     found = solve("ipopt", watched, options={"hessian": hessian, "options": unscaled}, log=lines.append)
     told = {
@@ -148,7 +149,7 @@ def test_counts_of_ipopt_are_its_own_and_one_rollout_an_iterate(hessian: str) ->
     assert found.counts.gradients == told["Number of objective gradient evaluations"]
     assert found.counts.jacobians == told["Number of equality constraint Jacobian evaluations"]
     assert found.counts.hessians == (told["Number of Lagrangian Hessian evaluations"] if hessian == "exact" else 0)
-    assert found.counts.rollouts == rollouts + functions["value"].count
+    assert found.counts.rollouts == rollouts + watch.count["value"]
 
 
 @every_way
@@ -157,7 +158,7 @@ def test_trace(name: str, options: dict[str, Any]) -> None:
     found = solve(name, target(), options=options, monitor=seen.append)
     assert [row.iteration for row in found.trace] == list(range(len(found.trace)))
     assert [row.iteration for row in seen] == list(range(len(seen)))
-    assert found.trace[0].objective == pytest.approx(float(target().value(np.zeros(2), 0)[1]))
+    assert found.trace[0].objective == pytest.approx(values(target(), np.zeros(2)).objective[0])
     for field in ("rollouts", "gradients", "jacobians", "hessians", "seconds"):
         numbers = [getattr(row, field) for row in found.trace]
         assert numbers == sorted(numbers)
@@ -204,3 +205,13 @@ def test_stages_of_smoothing(name: str) -> None:
     assert sorted(set(knobs), reverse=True) == [1.0, 0.1, 0.0]
     assert knobs == sorted(knobs, reverse=True)
     assert solve(name, problem).z == pytest.approx([1.25], abs=1e-3)
+
+
+@every_way
+@pytest.mark.parametrize("backend", ["c", "simd"])
+def test_compiled_toys(backend: str, name: str, options: dict[str, Any]) -> None:
+    require(backend)
+    assert solve(name, quadratic(backend=backend), options=options).z == pytest.approx([1, 2, 3], abs=1e-3)
+    assert solve(name, target(backend=backend), options=options).status is Status.MET
+    if name == "ipopt":
+        assert solve(name, constrained(backend=backend), options=options).z == pytest.approx([1, 0], abs=1e-7)

@@ -16,7 +16,7 @@ from symphys.transcription.decision import knot_weights
 def pushed(tmp_path):
     file = tmp_path / "pushed.toml"
     file.write_text(PUSHED)
-    return transcribe(load_problem(file))
+    return transcribe(load_problem(file), "casadi")
 
 
 def motion(mass=2.0):
@@ -36,7 +36,7 @@ def test_objective_is_the_sum_of_the_file_s_terms(pushed):
     path = np.trapezoid(x + t, t)
     place = 3 * ((x[-1] - 1) ** 2 + y[-1] ** 2)
     z = pushed.shooting.start(0)
-    merit, objective, errors = (np.array(part).ravel() for part in pushed.shooting.value(z, 0.0))
+    merit, objective, errors = (np.array(part).ravel() for part in pushed.functions.value(z, 0.0))
     assert objective[0] == pytest.approx(effort + path + place, rel=1e-12)
     over = np.maximum(vx[1:] - 1.5, 0)
     assert merit[0] == pytest.approx(objective[0] + 7 * 0.01 * (over**2).sum(), rel=1e-12)
@@ -45,10 +45,10 @@ def test_objective_is_the_sum_of_the_file_s_terms(pushed):
 
 def test_gradient_agrees_with_differences_of_the_value(pushed):
     z = pushed.shooting.start(0)
-    slope = np.array(pushed.shooting.gradient(z, 0.0)[3]).ravel()
+    slope = np.array(pushed.functions.gradient(z, 0.0)[3]).ravel()
 
     def merit(at):
-        return float(pushed.shooting.value(at, 0.0)[0])
+        return float(pushed.functions.value(at, 0.0)[0])
 
     differences = [(merit(z + 1e-5 * e) - merit(z - 1e-5 * e)) / 2e-5 for e in np.eye(z.size)]
     assert slope == pytest.approx(differences, rel=1e-6)
@@ -56,15 +56,17 @@ def test_gradient_agrees_with_differences_of_the_value(pushed):
 
 
 def test_a_cost_that_is_no_square_has_no_residuals(pushed):
-    assert pushed.shooting.residuals is None
-    assert pushed.shooting.jacobian is None
+    assert not pushed.shooting.squares
+    assert pushed.functions.residuals is None
+    assert pushed.functions.jacobian is None
 
 
 def test_residuals_square_to_the_merit(tmp_path):
     file = tmp_path / "squares.toml"
     file.write_text(PUSHED.replace('value = "puck.position[0] + time"', 'squares = "puck.position[0] + time"'))
-    shooting = transcribe(load_problem(file)).shooting
-    z = shooting.start(0)
+    squares = transcribe(load_problem(file), "casadi")
+    shooting = squares.functions
+    z = squares.shooting.start(0)
     r, _, _, jacobian = (np.array(part) for part in shooting.jacobian(z, 0.0))
     merit, _, _, slope = (np.array(part).ravel() for part in shooting.gradient(z, 0.0))
     assert (r**2).sum() == pytest.approx(merit[0], rel=1e-12)
@@ -73,11 +75,21 @@ def test_residuals_square_to_the_merit(tmp_path):
 
 def test_constraints_reach_nlp_solvers_step_by_step(pushed):
     _, _, vx, _ = motion()
-    _, values = pushed.shooting.nlp(pushed.shooting.start(0), 0.0)
+    _, values = pushed.functions.nlp(pushed.shooting.start(0), 0.0)
     assert np.array(values).ravel() == pytest.approx(vx[1:], abs=1e-12)
     assert pushed.shooting.constraint_names == ("speed",) * 100
     assert np.isneginf(pushed.shooting.constraint_lower).all()
     assert (pushed.shooting.constraint_upper == 1.5).all()
+
+
+@pytest.mark.parametrize("backend", ["casadi", "auto"])
+def test_every_evaluation_has_a_price(tmp_path, backend):
+    """Also the Jacobian of constraints, where a cost is no sum of squares."""
+    file = tmp_path / "priced.toml"
+    file.write_text(PUSHED)
+    price = transcribe(load_problem(file), backend).prices(("gradient", "jacobian", "hessian"))
+    assert set(price) == {"gradient", "jacobian", "hessian"}
+    assert all(each > 0 for each in price.values())
 
 
 def test_verdict_names_every_check(pushed):
@@ -108,7 +120,7 @@ def test_a_simulation_that_is_not_finite_names_step_and_body(pushed):
 def test_seed_zero_is_the_guess_and_others_stay_in_bounds(tmp_path):
     file = tmp_path / "bounded.toml"
     file.write_text(PUSHED.replace("guess = 2.0", "guess = 2.0\nlower = 1.9\nupper = 2.1\nspread = 5.0"))
-    shooting = transcribe(load_problem(file)).shooting
+    shooting = transcribe(load_problem(file), "casadi").shooting
     assert (shooting.start(0) == shooting.stacked("guess")).all()
     assert (shooting.start(3) == shooting.start(3)).all()
     assert shooting.start(3)[-1] in (1.9, 2.1) or 1.9 <= shooting.start(3)[-1] <= 2.1

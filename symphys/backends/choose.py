@@ -1,0 +1,33 @@
+"""The backend that is asked for, or the best that this machine has."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from symphys.backends.c_ import c
+from symphys.backends.casadi_ import casadi
+from symphys.backends.interface import Backend, Source
+from symphys.backends.simd import simd
+from symphys.kernel import KernelUnavailable, ProgramError, processors
+
+BACKENDS: dict[str, Callable[[Source, int], Backend]] = {"simd": simd, "c": c, "casadi": casadi}
+BEST = "auto"
+NAMES = (BEST, *BACKENDS)
+
+
+def choose(name: str, source: Source, threads: int | None = None) -> Backend:
+    """The backend of this name for a problem; one that cannot be built here gives way to casadi, and its note says why.
+
+    Args:
+        name: one of NAMES; "auto" is the fastest, simd.
+        source: the problem.
+        threads: that share a batch; None: one for each processor.
+    """
+    count = processors() if threads is None else threads
+    try:
+        return BACKENDS["simd" if name == BEST else name](source, count)
+    except (KernelUnavailable, ProgramError) as error:
+        note = f"casadi's virtual machine evaluates, which is slower: {error}"
+        backend = casadi(source, count)
+        return replace(backend, description=replace(backend.description, note=note))

@@ -1,0 +1,86 @@
+"""Kernels of SIMD lanes: a rollout in each lane, derivatives by adjoints, Jacobians by a lane for each seed."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from symphys.backends.casadi_ import squared
+from symphys.backends.external import external_nlp
+from symphys.backends.interface import Backend, Description, Source
+from symphys.backends.seeds import Seeds
+from symphys.kernel import Kernel, KernelUnavailable, compile_program
+from symphys.kernel.kernel import Outputs
+from symphys.shooting import Array, Values
+
+SEEDED = ("merit", "objective", "residuals", "constraints")
+
+
+class KernelEvaluator:
+    """Evaluates with a kernel; see ``Evaluator``."""
+
+    def __init__(self, kernel: Kernel, rows: Seeds | None) -> None:
+        """``rows``: of the residuals, where there are any."""
+        self.kernel, self.rows = kernel, rows
+        self.steepest = Seeds.whole(kernel, "merit").words[0]
+
+    def value(self, Z: Array, smoothing: float) -> Values:
+        """See ``Evaluator``."""
+        outputs = self.kernel.forward(Z, (smoothing,))
+        return Values(*common(outputs))
+
+    def gradient(self, Z: Array, smoothing: float) -> Values:
+        """See ``Evaluator``."""
+        outputs, gradient = self.kernel.gradient(Z, self.steepest, (smoothing,))
+        return Values(*common(outputs), gradient=gradient)
+
+    def residuals(self, Z: Array, smoothing: float) -> Values:
+        """See ``Evaluator``."""
+        outputs = self.kernel.forward(Z, (smoothing,))
+        _, objective, errors = common(outputs)
+        r = outputs["residuals"]
+        return Values(squared(r), objective, errors, residuals=r)
+
+    def jacobian(self, Z: Array, smoothing: float) -> Values:
+        """See ``Evaluator``."""
+        assert self.rows is not None, "a problem without residuals has no Jacobian"
+        seeds = self.rows.words
+        outputs, slopes = self.kernel.gradient(
+            np.repeat(Z, len(seeds), axis=0), np.tile(seeds, (len(Z), 1)), (smoothing,)
+        )
+        first = {name: rows[:: len(seeds)] for name, rows in outputs.items()}
+        _, objective, errors = common(first)
+        r = np.ascontiguousarray(first["residuals"])
+        jacobian = self.rows.spread(slopes.reshape(len(Z), len(seeds), Z.shape[1]))
+        return Values(squared(r), objective, errors, residuals=r, jacobian=jacobian)
+
+
+def common(outputs: Outputs) -> tuple[Array, Array, Array]:
+    """Merits, objectives, errors."""
+    merit = outputs["merit"]
+    return merit[:, 0], outputs["objective"][:, 0], outputs.get("errors", merit[:, :0])
+
+
+def simd(source: Source, threads: int) -> Backend:
+    """Compile the problem's program; KernelUnavailable if that cannot be. ``threads`` share the blocks of a batch."""
+    if source.program is None:
+        raise KernelUnavailable("this problem has no program to compile")
+    began = time.perf_counter()
+    program = source.program()
+    seeded = [name for name in SEEDED if name in program.outputs]
+    kernel = compile_program(program, seeded=seeded, threads=threads)
+    rows = {
+        name: Seeds.compressed(kernel, name, function, index)
+        for name, function, index in (
+            ("residuals", source.functions.residuals, 0),
+            ("constraints", source.functions.nlp, 1),
+        )
+        if name in program.outputs
+    }
+    nlp = external_nlp(kernel, source.functions.nlp, rows.get("constraints"))
+    report, spent = kernel.report, time.perf_counter() - began
+    told = Description(
+        "simd", report.lanes, threads, report.precision, report.compiler, report.cached, spent, report.note
+    )
+    return Backend(told, KernelEvaluator(kernel, rows.get("residuals")), nlp)

@@ -1,0 +1,73 @@
+"""A rollout and what a problem asks of it as casadi functions of (z, smoothing)."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+
+from symphys.transcription.along import Rollout
+from symphys.transcription.terms import Terms
+
+
+class ExpressionFunctions:
+    """Each function is made when it is first asked for; see ``symphys.backends.Functions``."""
+
+    def __init__(self, rollout: Rollout, asked: Terms) -> None:
+        """Nothing is made yet."""
+        self._rollout, self._terms = rollout, asked
+        self._merit = asked.objective + asked.penalties
+        self._common = [asked.objective, asked.errors]
+
+    @property
+    def squares(self) -> Any:
+        """(m,) residuals as an expression; None where a cost is no sum of squares, or where there are none."""
+        r = self._terms.residuals
+        return r if r is not None and r.shape[0] else None
+
+    @cached_property
+    def value(self) -> ca.Function:
+        """-> (merit, objective, errors)."""
+        return self._function("value", [self._merit, *self._common])
+
+    @cached_property
+    def gradient(self) -> ca.Function:
+        """-> (merit, objective, errors, d merit / dz (n,))."""
+        return self._function("gradient", [self._merit, *self._common, ca.gradient(self._merit, self._rollout.z)])
+
+    @cached_property
+    def residuals(self) -> ca.Function | None:
+        """-> (r, objective, errors)."""
+        return None if self.squares is None else self._function("residuals", [self.squares, *self._common])
+
+    @cached_property
+    def jacobian(self) -> ca.Function | None:
+        """-> (r, objective, errors, dr/dz (m, n))."""
+        if self.squares is None:
+            return None
+        return self._function("jacobian", [self.squares, *self._common, ca.jacobian(self.squares, self._rollout.z)])
+
+    @cached_property
+    def nlp(self) -> ca.Function:
+        """-> (objective, constraints)."""
+        return self._function("nlp", [self._terms.objective, self._terms.constraints])
+
+    @cached_property
+    def constraint_jacobian(self) -> ca.Function:
+        """-> (constraints, their derivative (m, n))."""
+        constraints = self._terms.constraints
+        return self._function("constraint_jacobian", [constraints, ca.jacobian(constraints, self._rollout.z)])
+
+    @cached_property
+    def hessian(self) -> ca.Function:
+        """-> the second derivative of the objective (n, n)."""
+        return self._function("hessian", [ca.hessian(self._terms.objective, self._rollout.z)[0]])
+
+    def _function(self, name: str, outputs: list[Any]) -> ca.Function:
+        return function_of(self._rollout, name, outputs)
+
+
+def function_of(rollout: Rollout, name: str, outputs: list[Any]) -> ca.Function:
+    """Outputs of a rollout as a function of (z, smoothing) with dense results."""
+    return ca.Function(name, [rollout.z, rollout.smoothing], [ca.densify(output) for output in outputs])

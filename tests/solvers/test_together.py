@@ -1,0 +1,108 @@
+"""Solves side by side end as they do alone, in fewer calls."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from dataclasses import astuple, replace
+from typing import Any
+
+import numpy as np
+import pytest
+from toys import Counted, counted, failing, quadratic, rosenbrock, solve, stop_at, target
+
+from symphys.errors import SymphysError
+from symphys.problem import load_problem
+from symphys.problems import find
+from symphys.shooting import Values
+from symphys.solvers import Outcome, Status, solve_together, solver
+from symphys.transcription import transcribe
+
+descents = pytest.mark.parametrize("name", ["gradient", "least_squares"])
+
+
+def together(name: str, problem: Any, seeds: range = range(5), **more: Any) -> list[Outcome]:
+    chosen = solver(name)
+    return solve_together(chosen, problem, [problem.start(seed) for seed in seeds], chosen.Options(), **more)
+
+
+def same(a: Outcome, b: Outcome) -> None:
+    """All but the seconds."""
+    assert (a.status, a.advice, a.counts) == (b.status, b.advice, b.counts)
+    assert np.array_equal(a.z, b.z)
+    rows = [[astuple(replace(row, seconds=0)) for row in outcome.trace] for outcome in (a, b)]
+    np.testing.assert_array_equal(rows[0], rows[1])
+
+
+@descents
+@pytest.mark.parametrize("problem", [rosenbrock(), target(), quadratic()], ids=["rosenbrock", "target", "quadratic"])
+def test_each_is_that_of_the_solve_alone(name: str, problem: Any) -> None:
+    for seed, found in enumerate(together(name, problem)):
+        same(found, solve(name, problem, seed))
+
+
+@descents
+@pytest.mark.parametrize("backend", ["casadi", "auto"])
+def test_on_a_throw(name: str, backend: str) -> None:
+    problem = transcribe(load_problem(find("ball_throw")), backend).shooting
+    for seed, found in enumerate(together(name, problem, range(4))):
+        same(found, solve(name, problem, seed))
+
+
+def test_evaluations_are_gathered() -> None:
+    watched, watch = counted(quadratic())
+    outcomes = together("least_squares", watched)
+    assert watch.count["jacobian"] == sum(outcome.counts.jacobians for outcome in outcomes)
+    assert watch.calls["jacobian"] <= max(outcome.counts.jacobians for outcome in outcomes) + 1
+
+
+@descents
+def test_an_interruption_ends_one_solve_and_no_other(name: str) -> None:
+    outcomes = together(name, rosenbrock(), range(3), monitors=[None, stop_at(2), None])
+    assert outcomes[1].status is Status.INTERRUPTED
+    assert outcomes[1].checkpoint
+    for seed in (0, 2):
+        same(outcomes[seed], solve(name, rosenbrock(), seed))
+
+
+@descents
+def test_what_an_evaluation_raises_reaches_every_solve(name: str) -> None:
+    problem = failing(rosenbrock(), ("gradient", "jacobian"), 2, RuntimeError("out of order"))
+    assert {outcome.status for outcome in together(name, problem, range(3))} == {Status.FAILED}
+    problem = failing(rosenbrock(), ("gradient", "jacobian"), 2, KeyboardInterrupt())
+    assert {outcome.status for outcome in together(name, problem, range(3))} == {Status.INTERRUPTED}
+    with pytest.raises(KeyError):
+        together(name, failing(rosenbrock(), ("gradient", "jacobian"), 4, KeyError("bug")), range(3))
+    assert not [each for each in threading.enumerate() if each.name.startswith("symphys-solve")]
+
+
+class Pressed(Counted):
+    """Presses Ctrl-C at the third call."""
+
+    def evaluate(self, kind: str, Z: Any, smoothing: float) -> Values:
+        if sum(self.calls.values()) == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.2)
+        return super().evaluate(kind, Z, smoothing)
+
+
+@descents
+def test_ctrl_c_ends_all_solves_and_leaves_no_thread(name: str) -> None:
+    problem = rosenbrock()
+    pressed = Pressed(problem.evaluator)
+    with pytest.raises(KeyboardInterrupt):
+        together(name, replace(problem, evaluator=pressed))
+    assert sum(pressed.calls.values()) <= 4
+    assert not [each for each in threading.enumerate() if each.name.startswith("symphys-solve")]
+
+
+@pytest.mark.parametrize("name", ["ipopt", "cma"])
+def test_the_others_refuse(name: str) -> None:
+    with pytest.raises(SymphysError, match="side by side"):
+        together(name, quadratic())
+
+
+def test_no_start_is_no_solve() -> None:
+    assert together("gradient", quadratic(), range(0)) == []
