@@ -26,7 +26,7 @@ PAPER = {"gradient iterations": 88, "CMA-ES iterations": 2422, "ratio of iterati
 def transcription(distance: int = 10) -> Transcription:
     """The throw to another distance, otherwise the shipped file, by the default backend."""
     value = f"ball.position[0:2] - [{distance}, 0]"
-    return transcribe(load_problem(find("ball_throw"), {"target.0.value": value}))
+    return transcribe(load_problem(find("ball_throw"), {"target.0.value": value}), exact=True)
 
 
 def shooting(distance: int = 10) -> ShootingProblem:

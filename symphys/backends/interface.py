@@ -45,10 +45,12 @@ class Source:
         functions: as casadi functions.
         program: makes the program of its rollout: the outputs merit, objective and, where the problem has any, errors,
             constraints and residuals, of z and the smoothing as its knob. None: there is none.
+        exact: whether that program is for smoothing 0 only.
     """
 
     functions: Functions
     program: Callable[[], Program] | None = None
+    exact: bool = False
 
 
 @dataclass(frozen=True)

@@ -20,24 +20,30 @@ SEEDED = ("merit", "objective", "residuals", "constraints")
 class KernelEvaluator:
     """Evaluates with a kernel; see ``Evaluator``."""
 
-    def __init__(self, kernel: Kernel, rows: Seeds | None) -> None:
-        """``rows``: of the residuals, where there are any."""
-        self.kernel, self.rows = kernel, rows
+    def __init__(self, kernel: Kernel, rows: Seeds | None, exact: bool) -> None:
+        """``rows``: of the residuals, where there are any; ``exact``: for smoothing 0 only."""
+        self.kernel, self.rows, self.exact = kernel, rows, exact
         self.steepest = Seeds.whole(kernel, "merit").words[0]
+
+    def knob(self, smoothing: float) -> tuple[float]:
+        """The kernel's knob."""
+        if self.exact and smoothing != 0:
+            raise ValueError(f"this kernel is for smoothing 0 only, not for {smoothing:g}")
+        return (smoothing,)
 
     def value(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
-        outputs = self.kernel.forward(Z, (smoothing,))
+        outputs = self.kernel.forward(Z, self.knob(smoothing))
         return Values(*common(outputs))
 
     def gradient(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
-        outputs, gradient = self.kernel.gradient(Z, self.steepest, (smoothing,))
+        outputs, gradient = self.kernel.gradient(Z, self.steepest, self.knob(smoothing))
         return Values(*common(outputs), gradient=gradient)
 
     def residuals(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
-        outputs = self.kernel.forward(Z, (smoothing,))
+        outputs = self.kernel.forward(Z, self.knob(smoothing))
         _, objective, errors = common(outputs)
         r = outputs["residuals"]
         return Values(squared(r), objective, errors, residuals=r)
@@ -47,7 +53,7 @@ class KernelEvaluator:
         assert self.rows is not None, "a problem without residuals has no Jacobian"
         seeds = self.rows.words
         outputs, slopes = self.kernel.gradient(
-            np.repeat(Z, len(seeds), axis=0), np.tile(seeds, (len(Z), 1)), (smoothing,)
+            np.repeat(Z, len(seeds), axis=0), np.tile(seeds, (len(Z), 1)), self.knob(smoothing)
         )
         first = {name: rows[:: len(seeds)] for name, rows in outputs.items()}
         _, objective, errors = common(first)
@@ -83,4 +89,4 @@ def simd(source: Source, threads: int) -> Backend:
     told = Description(
         "simd", report.lanes, threads, report.precision, report.compiler, report.cached, spent, report.note
     )
-    return Backend(told, KernelEvaluator(kernel, rows.get("residuals")), nlp)
+    return Backend(told, KernelEvaluator(kernel, rows.get("residuals"), source.exact), nlp)

@@ -38,6 +38,11 @@ class Job:
         """For messages: ``ball_throw gradient seed 0``."""
         return f"{self.config.problem} {self.config.solver} seed {self.config.seed}"
 
+    @property
+    def smooth(self) -> bool:
+        """Whether the solver will ask for rollouts at a smoothing above 0."""
+        return self.problem.simulation.smoothing > 0 or any(knob > 0 for knob in getattr(self.options, "smoothing", ()))
+
 
 def make_jobs(
     problems: Iterable[Problem],

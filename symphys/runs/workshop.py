@@ -8,7 +8,8 @@ from symphys.problem import Problem
 from symphys.runs.job import Job
 from symphys.transcription import Transcription
 
-Transcribe = Callable[[Problem], Transcription]
+Transcribe = Callable[[Problem, bool], Transcription]
+"""(problem, whether smoothing 0 is all that will be asked for) -> its transcription."""
 
 
 class Workshop:
@@ -21,8 +22,8 @@ class Workshop:
 
     def __call__(self, job: Job) -> Transcription:
         """The job's problem as a shooting problem."""
-        subject = (job.problem.file, job.problem.text, repr(job.config.settings))
+        subject = (job.problem.file, job.problem.text, repr(job.config.settings), job.smooth)
         if self.made is None or self.made[0] != subject:
             self.made = None
-            self.made = (subject, self.transcribe(job.problem))
+            self.made = (subject, self.transcribe(job.problem, not job.smooth))
         return self.made[1]

@@ -97,11 +97,12 @@ def judge_for(problem: Problem) -> Judge:
     return judge_of(rollout, terms(rollout))
 
 
-def transcribe(problem: Problem, backend: str = BEST, threads: int | None = None) -> Transcription:
+def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threads: int | None = None) -> Transcription:
     """Build everything that solving, judging and recording this problem needs.
 
     Args:
         problem: what to solve.
+        exact: whether smoothing 0 is all that will be asked for; kernels then leave the knob out.
         backend: what evaluates it, a name of ``symphys.backends.NAMES``.
         threads: that share a batch; None: one for each processor.
     """
@@ -110,7 +111,7 @@ def transcribe(problem: Problem, backend: str = BEST, threads: int | None = None
     asked = terms(rollout)
     functions = ExpressionFunctions(rollout, asked)
     built = perf_counter() - began
-    chosen = choose(backend, Source(functions, lambda: rollout_program(rollout)), threads)
+    chosen = choose(backend, Source(functions, lambda: rollout_program(rollout, exact), exact), threads)
     shooting = ShootingProblem(
         name=problem.name,
         blocks=blocks(problem),

@@ -26,7 +26,7 @@ FIELDS = ("merit", "objective", "errors", "gradient", "residuals", "jacobian")
 @cache
 def throw(backend: str, threads: int = 2) -> Transcription:
     require(backend)
-    return transcribe(load_problem(find("ball_throw"), {"simulation.duration": 1.0}), backend, threads)
+    return transcribe(load_problem(find("ball_throw"), {"simulation.duration": 1.0}), backend=backend, threads=threads)
 
 
 def points(count: int) -> np.ndarray:
@@ -101,7 +101,7 @@ def test_constraints_and_their_derivatives_reach_nlp_solvers(backend: str, tmp_p
     file = tmp_path / "pushed.toml"
     squares = PUSHED.replace('value = "puck.position[0] + time"', 'squares = "puck.position[0] + time"')
     file.write_text(squares, encoding="utf-8")
-    exact, compiled = (transcribe(load_problem(file), name) for name in ("casadi", backend))
+    exact, compiled = (transcribe(load_problem(file), backend=name) for name in ("casadi", backend))
     z = ca.MX.sym("z", exact.shooting.n)
     f, g = exact.shooting.nlp.expression(z, 0)
     at = exact.shooting.start(1)
@@ -121,7 +121,7 @@ def test_two_problems_of_one_shape_keep_their_numbers_apart() -> None:
     goals = [
         {**each, "target.0.value": f"ball.position[0:2] - [{x}, 0]"} for each, x in zip(settings, (5, 9), strict=True)
     ]
-    pair = [transcribe(load_problem(find("ball_throw"), each), "simd") for each in goals]
+    pair = [transcribe(load_problem(find("ball_throw"), each), backend="simd") for each in goals]
     z = pair[0].shooting.start(0)
     values = [float(each.shooting.nlp.value(z, 0)[0]) for each in pair]
     assert values == pytest.approx([float(each.functions.nlp(z, 0)[0]) for each in pair], rel=1e-12)
@@ -143,7 +143,7 @@ def test_without_a_compiler_casadi_takes_over(backend: str, monkeypatch: pytest.
         for name, value in environment.items():
             monkeypatch.setenv(name, value)
         monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-        told = transcribe(problem, backend).backend
+        told = transcribe(problem, backend=backend).backend
         monkeypatch.undo()
         monkeypatch.setenv("SYMPHYS_CACHE", str(tmp_path))
         assert (told.name, told.cached) == ("casadi", None)
@@ -156,10 +156,20 @@ def test_a_compiler_that_fails_is_no_obstacle_either(monkeypatch: pytest.MonkeyP
     failing.write_text('#!/bin/sh\n[ "$1" = --version ] && echo cc 1.0 && exit 0\nexit 3\n', encoding="utf-8")
     failing.chmod(0o755)
     monkeypatch.setenv("CC", str(failing))
-    told = transcribe(load_problem(find("ball_throw"), {"simulation.duration": 0.2}), BEST).backend
+    told = transcribe(load_problem(find("ball_throw"), {"simulation.duration": 0.2}), backend=BEST).backend
     assert told.name == "casadi"
     assert "failed with code 3" in told.note
 
 
 def test_names() -> None:
     assert set(NAMES) == {"auto", "casadi", "c", "simd"}
+
+
+def test_an_exact_kernel_refuses_smoothing() -> None:
+    """It has no knob: an answer to another question would be worse than none."""
+    require("simd")
+    made = transcribe(load_problem(find("ball_throw"), {"simulation.duration": 0.2}), exact=True, backend="simd")
+    Z = made.shooting.start(0)[None]
+    assert np.isfinite(made.shooting.evaluator.value(Z, 0.0).merit).all()
+    with pytest.raises(ValueError, match="for smoothing 0 only"):
+        made.shooting.evaluator.value(Z, 0.1)

@@ -54,4 +54,4 @@ tolerance = 0.01
 def kick(tmp_path_factory: pytest.TempPathFactory) -> Transcription:
     path = Path(tmp_path_factory.mktemp("problem")) / "1st kick-ü.toml"
     path.write_text(KICK, encoding="utf-8")
-    return transcribe(load_problem(path), "casadi")
+    return transcribe(load_problem(path), backend="casadi")

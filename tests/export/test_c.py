@@ -55,7 +55,7 @@ def example(folder: Path, name: str, *z: float) -> dict[str, float]:
 
 @pytest.mark.parametrize("problem", ["kick", "ball_throw"])
 def test_the_example_prints_the_numbers_of_python(problem: str, kick: Transcription, tmp_path: Path) -> None:
-    one = kick if problem == "kick" else transcribe(load_problem(find(problem)), "casadi")
+    one = kick if problem == "kick" else transcribe(load_problem(find(problem)), backend="casadi")
     name = identifier(one.problem.name)
     write_folders({tmp_path: c_files(one, "1.2")})
     sources = [tmp_path / f"{name}.c", tmp_path / f"{name}_main.c"]

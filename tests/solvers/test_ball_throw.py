@@ -31,7 +31,7 @@ every_throw = pytest.mark.parametrize(("backend", "distance"), BACKENDS)
 def throw(distance: float, backend: str = "auto") -> ShootingProblem:
     """The shipped problem with another target [m]."""
     value = f"ball.position[0:2] - [{distance:g}, 0]"
-    made = transcribe(load_problem(SHIPPED, {"target.0.value": value}), backend)
+    made = transcribe(load_problem(SHIPPED, {"target.0.value": value}), backend=backend)
     if backend not in ("auto", made.backend.name):
         pytest.skip(made.backend.note)
     return made.shooting

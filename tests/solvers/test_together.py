@@ -46,7 +46,7 @@ def test_each_is_that_of_the_solve_alone(name: str, problem: Any) -> None:
 @descents
 @pytest.mark.parametrize("backend", ["casadi", "auto"])
 def test_on_a_throw(name: str, backend: str) -> None:
-    problem = transcribe(load_problem(find("ball_throw")), backend).shooting
+    problem = transcribe(load_problem(find("ball_throw")), backend=backend).shooting
     for seed, found in enumerate(together(name, problem, range(4))):
         same(found, solve(name, problem, seed))
 

@@ -41,7 +41,7 @@ Q = np.array([0.9, 0.2, -0.3, 0.4])
 def held(folder: Path, part: str = "", guess: str = "[1, 0, 0, 0]") -> Transcription:
     path = folder / "dumbbell.toml"
     path.write_text(DUMBBELL.format(part=part, guess=guess), encoding="utf-8")
-    return transcribe(load_problem(path), "casadi")
+    return transcribe(load_problem(path), backend="casadi")
 
 
 @pytest.mark.parametrize("length", [0.5, 1.0, 3.0])

@@ -22,7 +22,7 @@ def problem(request: pytest.FixtureRequest, tmp_path) -> Problem:
 
 
 def test_value_and_gradient_are_those_of_the_expression(problem: Problem) -> None:
-    transcription = transcribe(problem, "casadi")
+    transcription = transcribe(problem, backend="casadi")
     program = rollout_program(transcription.rollout)
     kernel = compile_program(program, seeded=("merit",), threads=1)
     z = transcription.shooting.start(1)
@@ -36,7 +36,7 @@ def test_value_and_gradient_are_those_of_the_expression(problem: Problem) -> Non
 
 
 def test_residuals_and_their_jacobian_are_those_of_the_expression() -> None:
-    transcription = transcribe(load_problem(find("ball_throw")), "casadi")
+    transcription = transcribe(load_problem(find("ball_throw")), backend="casadi")
     kernel = compile_program(rollout_program(transcription.rollout), seeded=("residuals",), threads=1)
     z = transcription.shooting.start(1)
     r, _, _, expected = (np.array(part) for part in transcription.functions.jacobian(z, 0.0))

@@ -16,7 +16,7 @@ from symphys.transcription.decision import knot_weights
 def pushed(tmp_path):
     file = tmp_path / "pushed.toml"
     file.write_text(PUSHED)
-    return transcribe(load_problem(file), "casadi")
+    return transcribe(load_problem(file), backend="casadi")
 
 
 def motion(mass=2.0):
@@ -64,7 +64,7 @@ def test_a_cost_that_is_no_square_has_no_residuals(pushed):
 def test_residuals_square_to_the_merit(tmp_path):
     file = tmp_path / "squares.toml"
     file.write_text(PUSHED.replace('value = "puck.position[0] + time"', 'squares = "puck.position[0] + time"'))
-    squares = transcribe(load_problem(file), "casadi")
+    squares = transcribe(load_problem(file), backend="casadi")
     shooting = squares.functions
     z = squares.shooting.start(0)
     r, _, _, jacobian = (np.array(part) for part in shooting.jacobian(z, 0.0))
@@ -87,7 +87,7 @@ def test_every_evaluation_has_a_price(tmp_path, backend):
     """Also the Jacobian of constraints, where a cost is no sum of squares."""
     file = tmp_path / "priced.toml"
     file.write_text(PUSHED)
-    price = transcribe(load_problem(file), backend).prices(("gradient", "jacobian", "hessian"))
+    price = transcribe(load_problem(file), backend=backend).prices(("gradient", "jacobian", "hessian"))
     assert set(price) == {"gradient", "jacobian", "hessian"}
     assert all(each > 0 for each in price.values())
 
@@ -120,7 +120,7 @@ def test_a_simulation_that_is_not_finite_names_step_and_body(pushed):
 def test_seed_zero_is_the_guess_and_others_stay_in_bounds(tmp_path):
     file = tmp_path / "bounded.toml"
     file.write_text(PUSHED.replace("guess = 2.0", "guess = 2.0\nlower = 1.9\nupper = 2.1\nspread = 5.0"))
-    shooting = transcribe(load_problem(file), "casadi").shooting
+    shooting = transcribe(load_problem(file), backend="casadi").shooting
     assert (shooting.start(0) == shooting.stacked("guess")).all()
     assert (shooting.start(3) == shooting.start(3)).all()
     assert shooting.start(3)[-1] in (1.9, 2.1) or 1.9 <= shooting.start(3)[-1] <= 2.1

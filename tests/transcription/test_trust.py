@@ -15,7 +15,7 @@ THROW = np.array([3.0, 0.1, 3.0, 0.0, -9.0, 0.5])
 
 @pytest.fixture(scope="module")
 def throw():
-    return transcribe(load_problem(find("ball_throw")), "casadi")
+    return transcribe(load_problem(find("ball_throw")), backend="casadi")
 
 
 def test_right_gradients_pass(throw):
