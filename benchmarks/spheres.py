@@ -89,7 +89,7 @@ def spheres(sweeps: int, exact: bool) -> tuple[float, float]:
 
 def casadi_c(problem: Problem, name: str) -> float:
     """Seconds for BATCH rollouts by casadi's own C code and ``map``, compiled with -O2."""
-    function = getattr(transcribe(problem).shooting, name).map(BATCH)
+    function = getattr(transcribe(problem, backend="casadi").functions, name).map(BATCH)
     Z = around(guess_of(problem)).T
     with tempfile.TemporaryDirectory() as folder:
         here = Path.cwd()

@@ -8,10 +8,10 @@ from dataclasses import replace
 from symphys.backends.c_ import c
 from symphys.backends.casadi_ import casadi
 from symphys.backends.interface import Backend, Source
-from symphys.backends.simd import simd
+from symphys.backends.simd import simd, simd32
 from symphys.kernel import KernelUnavailable, ProgramError, processors
 
-BACKENDS: dict[str, Callable[[Source, int], Backend]] = {"simd": simd, "c": c, "casadi": casadi}
+BACKENDS: dict[str, Callable[[Source, int], Backend]] = {"simd": simd, "simd32": simd32, "c": c, "casadi": casadi}
 BEST = "auto"
 NAMES = (BEST, *BACKENDS)
 

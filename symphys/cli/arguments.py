@@ -41,8 +41,9 @@ def backend_option(command: F) -> F:
         "--backend",
         default="auto",
         show_default=True,
-        metavar="auto|casadi|c|simd",
-        help="What evaluates: SIMD kernels, casadi's C (both need a C compiler), or casadi's virtual machine.",
+        metavar="auto|casadi|c|simd|simd32",
+        help="What evaluates: SIMD kernels (simd32: in single precision), casadi's C (all need a C compiler), or "
+        "casadi's virtual machine.",
     )(command)
 
 

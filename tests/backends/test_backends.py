@@ -53,6 +53,17 @@ def test_all_agree(backend: str, kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
+def test_single_precision_is_off_by_no_more_than_it_says(kind: str) -> None:
+    expected, found = (evaluated(throw(backend), kind, points(8)) for backend in ("casadi", "simd32"))
+    for name in FIELDS:
+        a, b = getattr(expected, name), getattr(found, name)
+        if a is not None:
+            assert b == pytest.approx(a, rel=1e-4, abs=1e-5 * (1 + np.abs(a).max()))
+    assert throw("simd32").backend.precision == "single"
+    assert throw("simd32").backend.lanes == 2 * throw("simd").backend.lanes
+
+
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_a_row_does_not_depend_on_its_batch(backend: str, kind: str) -> None:
     Z = points(11)
@@ -162,7 +173,7 @@ def test_a_compiler_that_fails_is_no_obstacle_either(monkeypatch: pytest.MonkeyP
 
 
 def test_names() -> None:
-    assert set(NAMES) == {"auto", "casadi", "c", "simd"}
+    assert set(NAMES) == {"auto", "casadi", "c", "simd", "simd32"}
 
 
 def test_an_exact_kernel_refuses_smoothing() -> None:
