@@ -20,6 +20,7 @@ from symphys.cli.arguments import (
     read_solvers,
     settings_option,
 )
+from symphys.cli.wording import many_pairs
 
 if TYPE_CHECKING:
     from symphys.runs import Batch, Job
@@ -72,6 +73,9 @@ def solve(
     problems = read_problems(sources, settings)
     command = shlex.join(["symphys", *sys.argv[1:]])
     asked = make_jobs(problems, solvers, range(seeds), settings, out, command, read_backend(backend))
+    for problem in problems:
+        if note := many_pairs(problem.name, len(problem.world().pairs)):
+            click.echo(note, err=True)
     made = partial(transcribe, backend=backend, threads=1 if jobs > 1 else None)
     with watch(len(asked)) as observer:
         batch = run_batch(asked, jobs, observer, made)

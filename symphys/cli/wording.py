@@ -8,6 +8,20 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from symphys.runs import Job, Result
 
+MANY_PAIRS = 50
+SECONDS_PER_PAIR = 0.3
+"""To build a problem, its step in pieces and as one expression; measured with heaps of 8 and 16 spheres."""
+
+
+def many_pairs(name: str, pairs: int) -> str:
+    """What to say of a world in which many surfaces may meet; nothing of others."""
+    if pairs <= MANY_PAIRS:
+        return ""
+    return (
+        f"{name}: {pairs} pairs of surfaces may meet; each is computed in every step, and building takes about "
+        f"{SECONDS_PER_PAIR * pairs:.0f} s. `collides_with` leaves out those that never meet"
+    )
+
 
 def number(value: float | None, digits: int = 3) -> str:
     """A short number; a dash for what is not known."""

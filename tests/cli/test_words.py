@@ -15,7 +15,7 @@ from rich.progress import Progress
 from symphys.cli.arguments import UsageFault, read_settings, read_value
 from symphys.cli.progress import Live
 from symphys.cli.summary import advice, table
-from symphys.cli.wording import brief, duration, number, whole
+from symphys.cli.wording import brief, duration, many_pairs, number, whole
 from symphys.runs import Result
 
 NAN = float("nan")
@@ -100,3 +100,9 @@ def test_live_progress_opens_and_closes_its_lines() -> None:
         assert len(progress.tasks) == 2
         live.ended(job, result(), skipped=False)
         assert [task.description for task in progress.tasks] == ["1 of 1 runs done"]
+
+
+def test_a_world_with_many_pairs_says_what_it_costs_and_what_to_do() -> None:
+    assert many_pairs("break", 11) == ""
+    said = many_pairs("heap", 400)
+    assert "400 pairs" in said and "120 s" in said and "collides_with" in said
