@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import casadi as ca
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from symphys.problem import Problem
 from symphys.shooting import Block
 from symphys.trajectory import Trajectory
-from symphys.transcription import Transcription, judge_for
+from symphys.transcription import Judge, Transcription, judge_for
 
 Array = NDArray[np.float64]
 
@@ -31,7 +32,7 @@ def examine(transcription: Transcription, z: Array) -> dict[str, Any]:
     """
     return {
         "gradient": compare_gradient(transcription, z),
-        "refined": [refined(what, problem, z) for what, problem in _finer(transcription.problem)],
+        "refined": [refined(what, judge, z) for what, judge in finer_judges(transcription)],
         **_contacts(transcription, transcription.simulate(z)),
     }
 
@@ -47,10 +48,16 @@ def compare_gradient(transcription: Transcription, z: Array) -> list[dict[str, A
     return [_compare_block(value, block, z, slope) for block in transcription.shooting.blocks]
 
 
-def refined(what: str, problem: Problem, z: Array) -> dict[str, Any]:
+def refined(what: str, judge: Judge, z: Array) -> dict[str, Any]:
     """How ``z`` does in another discretisation of the problem."""
-    verdict = judge_for(problem)(z)
+    verdict = judge(z)
     return {"what": what, "objective": verdict.objective, "worst": verdict.worst}
+
+
+@lru_cache(maxsize=1)
+def finer_judges(transcription: Transcription) -> list[tuple[str, Judge]]:
+    """Judges of the finer problems, made once for all runs of a problem."""
+    return [(what, judge_for(problem)) for what, problem in _finer(transcription.problem)]
 
 
 def _finer(problem: Problem) -> list[tuple[str, Problem]]:
@@ -61,6 +68,7 @@ def _finer(problem: Problem) -> list[tuple[str, Problem]]:
     ]
 
 
+@lru_cache(maxsize=1)
 def probe(transcription: Transcription) -> tuple[ca.Function, ca.Function]:
     """(z -> weights . everything asked for, z -> its gradient), exact contact."""
     terms, rollout = transcription.terms, transcription.rollout

@@ -2,6 +2,6 @@
 
 from symphys.transcription.judge import Check, Verdict
 from symphys.transcription.program import rollout_program
-from symphys.transcription.transcribe import Transcription, judge_for, transcribe
+from symphys.transcription.transcribe import Judge, Transcription, judge_for, transcribe
 
-__all__ = ["Check", "Transcription", "Verdict", "judge_for", "rollout_program", "transcribe"]
+__all__ = ["Check", "Judge", "Transcription", "Verdict", "judge_for", "rollout_program", "transcribe"]

@@ -29,9 +29,9 @@ PRICING_CALLS = 5
 """How often a function is timed; the fastest call counts."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Transcription:
-    """A problem, its shooting problem, and the exact rollout that judges and records.
+    """A problem, its shooting problem, and the exact rollout that judges and records; equal to itself only.
 
     Attributes:
         backend: what evaluates the shooting problem.
