@@ -47,6 +47,12 @@ MOST_JOBS = 256
     show_default=True,
     help="How many runs go on at once.",
 )
+@click.option(
+    "--together",
+    is_flag=True,
+    help="Solve the seeds of gradient and least_squares side by side, their evaluations in batches. Sooner done, but "
+    "the seconds of each run are those of all.",
+)
 @backend_option
 @out_option
 def solve(
@@ -55,6 +61,7 @@ def solve(
     seeds: int,
     assignments: tuple[str, ...],
     jobs: int,
+    together: bool,
     backend: str,
     out: Path,
 ) -> int:
@@ -78,7 +85,7 @@ def solve(
             click.echo(note, err=True)
     made = partial(transcribe, backend=backend, threads=1 if jobs > 1 else None)
     with watch(len(asked)) as observer:
-        batch = run_batch(asked, jobs, observer, made)
+        batch = run_batch(asked, jobs, observer, made, together)
     return conclude(asked, batch, out)
 
 

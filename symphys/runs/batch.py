@@ -10,9 +10,10 @@ from symphys.runs.execute import execute
 from symphys.runs.job import Job
 from symphys.runs.result import Result
 from symphys.runs.stopping import Interrupts, Stop
+from symphys.runs.together import groups, solve_group
 from symphys.runs.workers import side_by_side
 from symphys.runs.workshop import Transcribe, Workshop
-from symphys.solvers import TraceRow
+from symphys.solvers import Monitor, TraceRow
 
 
 class Observer(Protocol):
@@ -46,32 +47,44 @@ class Batch:
         return all(result is not None and result.solved for result in self.results)
 
 
-def run_batch(jobs: Sequence[Job], processes: int, observer: Observer, transcribe: Transcribe) -> Batch:
-    """Run what is not done yet, here or in ``processes`` workers, until all is done or Ctrl-C is pressed."""
+def run_batch(
+    jobs: Sequence[Job], processes: int, observer: Observer, transcribe: Transcribe, together: bool = False
+) -> Batch:
+    """Run what is not done yet, here or in ``processes`` workers, until all is done or Ctrl-C is pressed.
+
+    ``together``: here, solve the seeds of a problem and solver side by side where the solver can.
+    """
     ledger = Ledger(jobs, observer)
     waiting = {index: job for index, job in enumerate(jobs) if not ledger.skip(index)}
     with Interrupts().listening() as stop:
         if processes > 1 and len(waiting) > 1:
             side_by_side(waiting, processes, transcribe, ledger, stop)
         else:
-            one_by_one(waiting, transcribe, ledger, stop)
+            one_by_one(waiting, transcribe, ledger, stop, together)
     return Batch(tuple(ledger.results), stop.requested)
 
 
-def one_by_one(jobs: Mapping[int, Job], transcribe: Transcribe, ledger: Ledger, stop: Stop) -> None:
+def one_by_one(jobs: Mapping[int, Job], transcribe: Transcribe, ledger: Ledger, stop: Stop, together: bool) -> None:
     """Run all jobs in this process."""
     workshop = Workshop(transcribe)
-    for index, job in jobs.items():
-        if stop():
-            return
 
-        def watch(row: TraceRow, index: int = index) -> None:
+    def watch(index: int) -> Monitor:
+        def monitor(row: TraceRow) -> None:
             if stop():
                 raise KeyboardInterrupt
             ledger.advanced(index, row)
 
-        ledger.started(index)
-        ledger.ended(index, execute(job, watch, workshop))
+        return monitor
+
+    for group in groups(jobs, ledger.halfway) if together else [[index] for index in jobs]:
+        if stop():
+            return
+        for index in group:
+            ledger.started(index)
+        here = {index: jobs[index] for index in group}
+        solved = solve_group(here, workshop, watch) if len(group) > 1 else {}
+        for index, job in here.items():
+            ledger.ended(index, execute(job, watch(index), workshop, solved.get(index)))
 
 
 @dataclass

@@ -12,13 +12,14 @@ from symphys.runs.provenance import stamp
 from symphys.runs.result import Result
 from symphys.runs.solving import solve
 from symphys.runs.workshop import Workshop
-from symphys.solvers import Monitor
+from symphys.solvers import Monitor, Outcome
 
 
-def execute(job: Job, monitor: Monitor, workshop: Workshop) -> Result:
+def execute(job: Job, monitor: Monitor, workshop: Workshop, solved: Outcome | None = None) -> Result:
     """Do the run, or go on with it, unless it is done; write its folder; tell what it found.
 
     ``monitor`` sees each iteration and may raise KeyboardInterrupt, which ends the run so that it can go on later.
+    ``solved``: what its solver has found already, side by side with other seeds.
     A run that fails is a result with the status "failed"; only a FileError, a folder that cannot be written, is raised.
     """
     try:
@@ -26,12 +27,14 @@ def execute(job: Job, monitor: Monitor, workshop: Workshop) -> Result:
             earlier = job.folder.earlier(job.config)
             if earlier and not earlier.interrupted:
                 return earlier
-            return proceed(job, monitor, workshop, earlier)
+            return proceed(job, monitor, workshop, earlier, solved)
     except FolderBusy as error:
         return failure(job, str(error))
 
 
-def proceed(job: Job, monitor: Monitor, workshop: Workshop, earlier: Result | None) -> Result:
+def proceed(
+    job: Job, monitor: Monitor, workshop: Workshop, earlier: Result | None, solved: Outcome | None = None
+) -> Result:
     """Solve and write down what came of it; ``earlier`` is the interrupted run to go on with."""
     checkpoint = job.folder.checkpoint() if earlier else None
     if not checkpoint:
@@ -39,7 +42,7 @@ def proceed(job: Job, monitor: Monitor, workshop: Workshop, earlier: Result | No
         job.folder.begin(job.config, job.problem.text)
     log = Log(job)
     try:
-        result = solve(job, workshop(job), monitor, log, checkpoint, earlier)
+        result = solve(job, workshop(job), monitor, log, checkpoint, earlier, solved)
     except files.FileError:
         raise
     except SymphysError as error:

@@ -16,7 +16,7 @@ from symphys.runs.job import Job
 from symphys.runs.provenance import evaluated, stamp
 from symphys.runs.result import BlockRecord, CheckRecord, Result
 from symphys.runs.scene import scene
-from symphys.shooting import Array
+from symphys.shooting import Array, ShootingProblem
 from symphys.solvers import Counts, Monitor, Outcome, Status, TraceRow, solver
 from symphys.trajectory import Trajectory
 from symphys.transcription import Check, Transcription, Verdict
@@ -48,24 +48,45 @@ def solve(
     log: Callable[[str], None],
     checkpoint: dict[str, object] | None,
     earlier: Result | None,
+    solved: Outcome | None = None,
 ) -> Result:
-    """Solve from the seed's guess, or go on from ``checkpoint`` of the ``earlier`` result; write what was found."""
+    """Solve from the seed's guess, or go on from ``checkpoint`` of the ``earlier`` result; write what was found.
+
+    ``solved``: what was found already, side by side with other seeds; its seconds are those of the group.
+    """
     shooting = transcription.shooting
     log(f"evaluated by {transcription.backend}")
     start = shooting.start(job.config.seed)
     files.write_npz(job.folder.path / GUESS, transcription.simulate(start).arrays())
+    if solved is None:
+        outcome, spent = alone(job, shooting, start, monitor, log, checkpoint)
+    else:
+        log("solved side by side with other seeds: the seconds are those of all")
+        outcome, spent = solved, solved.trace[-1].seconds if solved.trace else 0.0
+    spent += ((earlier and earlier.seconds) or {}).get("solve", 0.0)
+    judgement = judge(transcription, outcome)
+    price = transcription.prices(used(outcome.counts))
+    write(job, transcription, outcome, judgement, price)
+    seconds = {"build": transcription.build_seconds, "compile": transcription.backend.seconds, "solve": spent}
+    return record(job, transcription, outcome, judgement, price, seconds)
+
+
+def alone(
+    job: Job,
+    shooting: ShootingProblem,
+    start: Array,
+    monitor: Monitor,
+    log: Callable[[str], None],
+    checkpoint: dict[str, object] | None,
+) -> tuple[Outcome, float]:
+    """Solve; the outcome and the seconds that it took."""
     chosen = solver(job.config.solver)
     chosen.prepare()
     began = time.perf_counter()
     outcome = chosen.solve(
         shooting, start, job.options, job.config.seed, monitor=monitor, checkpoint=checkpoint, log=log
     )
-    spent = time.perf_counter() - began + (((earlier and earlier.seconds) or {}).get("solve", 0.0))
-    judgement = judge(transcription, outcome)
-    price = transcription.prices(used(outcome.counts))
-    write(job, transcription, outcome, judgement, price)
-    seconds = {"build": transcription.build_seconds, "compile": transcription.backend.seconds, "solve": spent}
-    return record(job, transcription, outcome, judgement, price, seconds)
+    return outcome, time.perf_counter() - began
 
 
 def judge(transcription: Transcription, outcome: Outcome) -> Judgement:
