@@ -14,17 +14,21 @@ if TYPE_CHECKING:
     from symphys.errors import ProblemError, SymphysError
     from symphys.problem import Problem, load_problem
     from symphys.rollout import roll_out
+    from symphys.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain
     from symphys.shooting import ShootingProblem
     from symphys.state import Layout, initial_state
     from symphys.step import step_function
     from symphys.trajectory import Trajectory
     from symphys.transcription.transcribe import Transcription, transcribe
-    from symphys.world import Body, Law, Plane, Scheme, Sphere, World, make_world
+    from symphys.world import Body, Law, Scheme, World, make_world
 
 __version__ = "0.1.0"
 
 __all__ = [
     "Body",
+    "Box",
+    "Capsule",
+    "Fixture",
     "Law",
     "Layout",
     "Plane",
@@ -34,6 +38,7 @@ __all__ = [
     "ShootingProblem",
     "Sphere",
     "SymphysError",
+    "Terrain",
     "Trajectory",
     "Transcription",
     "World",
@@ -55,7 +60,8 @@ _HOMES = {
     "step": ("step_function",),
     "trajectory": ("Trajectory",),
     "transcription": ("Transcription", "transcribe"),
-    "world": ("Body", "Law", "Plane", "Scheme", "Sphere", "World", "make_world"),
+    "shapes": ("Box", "Capsule", "Fixture", "Plane", "Sphere", "Terrain"),
+    "world": ("Body", "Law", "Scheme", "World", "make_world"),
 }
 
 

@@ -1,4 +1,4 @@
-"""What the physics is about: bodies, static planes, and which of their surfaces meet under which law.
+"""What the physics is about: bodies, static surfaces, and which of their surfaces meet under which law.
 
 Everything here is frozen. A number may be a float or a casadi symbol: a symbol makes the step a function of it,
 so a mass, a radius or a coefficient of friction becomes a parameter with exact derivatives.
@@ -11,27 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-Scalar = Any
-"""float or casadi.SX"""
+from symphys.shapes import Scalar, Shape, Sphere, Static, Surface, contact_points, surface
+
 Vector = Sequence[Any]
 """three of them"""
 
 GRAVITY = (0.0, 0.0, -9.81)
 SOLID_SPHERE = 2 / 5
 HOLLOW_SPHERE = 2 / 3
-
-
-@dataclass(frozen=True)
-class Sphere:
-    """A ball-shaped part of a body's surface.
-
-    Attributes:
-        radius: [m].
-        centre: (3,) [m], body frame, from the centre of mass.
-    """
-
-    radius: Scalar
-    centre: tuple[Scalar, ...] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -49,33 +36,13 @@ class Body:
     name: str
     mass: Scalar
     inertia: Scalar
-    shapes: tuple[Sphere, ...] = ()
+    shapes: tuple[Shape, ...] = ()
 
     @classmethod
     def ball(cls, name: str, radius: Scalar, mass: Scalar, hollow: bool = False) -> Body:
         """A uniform solid sphere, or a thin hollow one: I = 2/5 m r^2 or 2/3 m r^2."""
         share = HOLLOW_SPHERE if hollow else SOLID_SPHERE
         return cls(name, mass, share * mass * radius * radius, (Sphere(radius),))
-
-
-@dataclass(frozen=True)
-class Plane:
-    """A static half space {x: normal . x < offset}; bodies stay on the other side.
-
-    Attributes:
-        name: how formulas and pairs refer to it.
-        normal: (3,) unit vector, out of the solid.
-        offset: [m].
-    """
-
-    name: str
-    normal: tuple[Scalar, ...] = (0.0, 0.0, 1.0)
-    offset: Scalar = 0.0
-
-    @classmethod
-    def ground(cls, height: Scalar = 0.0) -> Plane:
-        """The floor: everything below ``height`` is solid."""
-        return cls("ground", offset=height)
 
 
 @dataclass(frozen=True)
@@ -111,7 +78,7 @@ class Law:
 
 @dataclass(frozen=True)
 class Side:
-    """One side of a pair: a body's shape, or (``body`` None) the static plane with index ``shape``."""
+    """One side of a pair: a body's shape, or (``body`` None) the static surface with index ``shape``."""
 
     body: int | None
     shape: int
@@ -119,27 +86,36 @@ class Side:
 
 @dataclass(frozen=True)
 class Pair:
-    """Two surfaces that may touch; ``first`` always belongs to a body."""
+    """A point where two surfaces may touch.
+
+    Attributes:
+        name: unique; surfaces that may touch in several points add its number: ``box-ground:3``.
+        first: always belongs to a body.
+        second: a later body, or static.
+        law: how they act on each other.
+        point: which of the points of the two.
+    """
 
     name: str
     first: Side
     second: Side
     law: Law
+    point: int = 0
 
 
 @dataclass(frozen=True)
 class World:
-    """Bodies, planes, the pairs that may touch, and gravity.
+    """Bodies, static surfaces, the pairs that may touch, and gravity.
 
     Attributes:
         bodies: the order gives the state's columns.
-        planes: static.
-        pairs: every pair of surfaces that is looked at; see ``all_pairs``.
+        statics: planes, fixtures, terrain.
+        pairs: every point of contact that is looked at, those of two surfaces one after the other; ``all_pairs``.
         gravity: (3,) [m/s^2].
     """
 
     bodies: tuple[Body, ...]
-    planes: tuple[Plane, ...] = ()
+    statics: tuple[Static, ...] = ()
     pairs: tuple[Pair, ...] = ()
     gravity: tuple[Scalar, ...] = GRAVITY
 
@@ -149,6 +125,10 @@ class World:
             if body.name == name:
                 return index
         raise KeyError(f"no body is called {name!r}; there are {', '.join(b.name for b in self.bodies)}")
+
+    def surface(self, side: Side) -> Surface:
+        """The surface on one side of a pair."""
+        return surface_of(self.bodies, self.statics, side)
 
 
 @dataclass(frozen=True)
@@ -181,32 +161,44 @@ class Scheme:
 
 def make_world(
     bodies: Sequence[Body],
-    planes: Sequence[Plane] = (),
+    statics: Sequence[Static] = (),
     law: Law | None = None,
     gravity: Vector = GRAVITY,
 ) -> World:
     """A world where everything may touch everything under one law; change ``pairs`` for anything finer."""
-    bodies, planes = tuple(bodies), tuple(planes)
-    return World(bodies, planes, all_pairs(bodies, planes, law or Law()), tuple(gravity))
+    bodies, statics = tuple(bodies), tuple(statics)
+    return World(bodies, statics, all_pairs(bodies, statics, law or Law()), tuple(gravity))
 
 
-def all_pairs(bodies: Sequence[Body], planes: Sequence[Plane], law: Law) -> tuple[Pair, ...]:
-    """Every shape of every body against every plane, then against every shape of every later body."""
-    sides = [(body.name, Side(i, j)) for i, body in enumerate(bodies) for j in range(len(body.shapes))]
-    statics = [(plane.name, Side(None, k)) for k, plane in enumerate(planes)]
-    pairs = [(a, b) for a in sides for b in statics]
-    pairs += [(a, b) for i, a in enumerate(sides) for b in sides[i + 1 :] if a[1].body != b[1].body]
-    return tuple(Pair(pair_name(a, b, bodies), a[1], b[1], law) for a, b in pairs)
+def all_pairs(bodies: Sequence[Body], statics: Sequence[Static], law: Law) -> tuple[Pair, ...]:
+    """Every shape of every body against every static surface, then against every shape of every later body.
+
+    Surfaces that no rule covers (``shapes.contact_points`` is 0) are left out.
+    """
+    sides = [Side(i, j) for i, body in enumerate(bodies) for j in range(len(body.shapes))]
+    both = [(a, Side(None, k)) for a in sides for k in range(len(statics))]
+    both += [(a, b) for i, a in enumerate(sides) for b in sides[i + 1 :] if a.body != b.body]
+    return tuple(pair for a, b in both for pair in points_of(bodies, statics, a, b, law))
 
 
-def pair_name(a: tuple[str, Side], b: tuple[str, Side], bodies: Sequence[Body]) -> str:
-    """``ball-ground``; a body with several shapes adds the index of the shape: ``dumbbell[1]-ground``."""
+def points_of(bodies: Sequence[Body], statics: Sequence[Static], a: Side, b: Side, law: Law) -> list[Pair]:
+    """The points where two surfaces may touch."""
+    count = contact_points(surface_of(bodies, statics, a), surface_of(bodies, statics, b))
+    name = f"{side_name(bodies, statics, a)}-{side_name(bodies, statics, b)}"
+    return [Pair(f"{name}:{k}" if count > 1 else name, a, b, law, k) for k in range(count)]
 
-    def label(name: str, side: Side) -> str:
-        several = side.body is not None and len(bodies[side.body].shapes) > 1
-        return f"{name}[{side.shape}]" if several else name
 
-    return f"{label(*a)}-{label(*b)}"
+def surface_of(bodies: Sequence[Body], statics: Sequence[Static], side: Side) -> Surface:
+    """The surface on one side of a pair."""
+    return surface(statics[side.shape]) if side.body is None else bodies[side.body].shapes[side.shape]
+
+
+def side_name(bodies: Sequence[Body], statics: Sequence[Static], side: Side) -> str:
+    """``ball``; a body with several shapes adds the index of the shape: ``dumbbell[1]``."""
+    if side.body is None:
+        return statics[side.shape].name
+    body = bodies[side.body]
+    return f"{body.name}[{side.shape}]" if len(body.shapes) > 1 else body.name
 
 
 def is_zero(value: Scalar) -> bool:

@@ -49,7 +49,7 @@ def describe(problem: Problem) -> list[str]:
         f"{problem.name}: {problem.title}",
         f"  time         {simulation.duration:g} s in {simulation.steps} steps of {simulation.dt:g} s",
         f"  bodies       {listed(body.name for body in world.bodies)}",
-        f"  planes       {listed(plane.name for plane in world.planes)}",
+        f"  planes       {listed(plane.name for plane in world.statics)}",
         f"  contacts     {listed(pair.name for pair in world.pairs)}",
     ]
     for variable in problem.variables:

@@ -8,6 +8,7 @@ from symphys.collide.contact import Contact
 from symphys.collide.sphere_plane import sphere_plane
 from symphys.collide.sphere_sphere import sphere_sphere
 from symphys.motion import Motion
+from symphys.shapes import Plane, Sphere
 from symphys.world import Pair, World
 
 __all__ = ["Contact", "collide"]
@@ -18,8 +19,10 @@ def collide(world: World, pair: Pair, motions: Sequence[Motion]) -> Contact:
     first, second = pair.first, pair.second
     if first.body is None:
         raise ValueError(f"pair {pair.name!r}: the first side must belong to a body")
-    motion, shape = motions[first.body], world.bodies[first.body].shapes[first.shape]
+    motion, shape, other = motions[first.body], world.surface(first), world.surface(second)
+    assert isinstance(shape, Sphere)
     if second.body is None:
-        return sphere_plane(pair, motion, shape, world.planes[second.shape])
-    other = world.bodies[second.body].shapes[second.shape]
+        assert isinstance(other, Plane)
+        return sphere_plane(pair, motion, shape, other)
+    assert isinstance(other, Sphere)
     return sphere_sphere(pair, (motion, motions[second.body]), (shape, other))

@@ -8,8 +8,9 @@ import casadi as ca
 
 from symphys.collide.contact import Contact, Expr, Frame, Shift, falls, moved
 from symphys.motion import Motion
+from symphys.shapes import Plane, Sphere
 from symphys.smooth import TINY_SQUARE
-from symphys.world import Pair, Plane, Sphere
+from symphys.world import Pair
 
 TINY_RATE = 1e-12
 """[m/s] below which the surfaces count as not closing."""

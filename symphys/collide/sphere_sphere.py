@@ -8,8 +8,9 @@ import casadi as ca
 
 from symphys.collide.contact import Contact, Expr, Frame, Shift, falls, moved
 from symphys.motion import Motion, Parabola
+from symphys.shapes import Sphere
 from symphys.smooth import TINY_SQUARE
-from symphys.world import Pair, Sphere
+from symphys.world import Pair
 
 TINY_LENGTH = 1e-12
 """[m] added along z to a line of centres shorter than half of it, so that coincident spheres have a normal."""

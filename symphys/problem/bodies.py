@@ -13,7 +13,7 @@ from symphys.problem.inertia import centre_of_mass, complaint, volume
 from symphys.problem.plan import COMBINE, BodyPlan
 from symphys.problem.schema.physics import BodyTable, ShapeTable, SurfaceTable
 from symphys.problem.schema.types import RollPitchYaw
-from symphys.world import Sphere
+from symphys.shapes import Sphere
 
 Array = NDArray[np.float64]
 OFF_CENTRE = 1e-6

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.world import SOLID_SPHERE, Scalar, Sphere
+from symphys.shapes import Scalar, Sphere
+from symphys.world import SOLID_SPHERE
 
 Array = NDArray[np.float64]
 ROUNDING = 1e-9

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.problem.inertia import specific, volume
-from symphys.world import Body, Law, Pair, Plane, Scalar, Sphere, World, all_pairs
+from symphys.shapes import Plane, Scalar, Sphere
+from symphys.world import Body, Law, Pair, World, all_pairs
 
 Array = NDArray[np.float64]
 Value = Callable[[str], Scalar]

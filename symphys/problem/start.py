@@ -14,6 +14,7 @@ from symphys.problem.faults import Faults
 from symphys.problem.model import Variable
 from symphys.problem.plan import WorldPlan
 from symphys.problem.quantities import Quantity
+from symphys.shapes import Plane, Sphere
 from symphys.world import Side, World
 
 Array = NDArray[np.float64]
@@ -75,9 +76,10 @@ def sphere_centres(world: World, index: int, values: Mapping[str, Array]) -> Arr
 def gap(world: World, centres: Sequence[Array], first: Side, second: Side) -> float:
     """The distance between two surfaces [m]; negative when they overlap."""
     assert first.body is not None
-    centre, radius = centres[first.body][first.shape], world.bodies[first.body].shapes[first.shape].radius
-    if second.body is None:
-        plane = world.planes[second.shape]
-        return float(np.dot(plane.normal, centre) - plane.offset - radius)
-    other = world.bodies[second.body].shapes[second.shape].radius
-    return float(np.linalg.norm(centre - centres[second.body][second.shape]) - radius - other)
+    shape, other = world.surface(first), world.surface(second)
+    assert isinstance(shape, Sphere)
+    centre = centres[first.body][first.shape]
+    if isinstance(other, Plane):
+        return float(np.dot(other.normal, centre) - other.offset - shape.radius)
+    assert isinstance(other, Sphere) and second.body is not None
+    return float(np.linalg.norm(centre - centres[second.body][second.shape]) - shape.radius - other.radius)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from symphys.problem import Problem
+from symphys.shapes import Plane, Sphere
 from symphys.shooting import Array
 
 
@@ -16,10 +17,13 @@ def scene(problem: Problem, z: Mapping[str, Array]) -> dict[str, Any]:
     world = problem.world(parameters(problem, z))
     return {
         "bodies": [
-            {"name": body.name, "shapes": [sphere(s.radius, s.centre) for s in body.shapes]} for body in world.bodies
+            {"name": body.name, "shapes": [sphere(s.radius, s.centre) for s in body.shapes if isinstance(s, Sphere)]}
+            for body in world.bodies
         ],
         "planes": [
-            {"name": plane.name, "normal": plain(plane.normal), "offset": float(plane.offset)} for plane in world.planes
+            {"name": plane.name, "normal": plain(plane.normal), "offset": float(plane.offset)}
+            for plane in world.statics
+            if isinstance(plane, Plane)
         ],
     }
 

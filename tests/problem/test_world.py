@@ -137,15 +137,15 @@ def test_compound_off_centre_with_given_inertia(load: Load) -> None:
 def test_planes(load: Load) -> None:
     text = '[[plane]]\nname = "ramp"\nnormal = [0, 3, 4]\npoint = [0, 0, -5]\n[[plane]]\nname = "wall"\n'
     world = load(("[ground]", f"{text}normal = [-1, 0, 0]\noffset = -7\n[ground]\nheight = 0.25")).world()
-    assert [plane.name for plane in world.planes] == ["ground", "ramp", "wall"]
-    assert world.planes[0].offset == 0.25
-    assert world.planes[1].normal == pytest.approx((0, 0.6, 0.8))
-    assert [plane.offset for plane in world.planes[1:]] == [pytest.approx(-4), -7]
+    assert [plane.name for plane in world.statics] == ["ground", "ramp", "wall"]
+    assert world.statics[0].offset == 0.25
+    assert world.statics[1].normal == pytest.approx((0, 0.6, 0.8))
+    assert [plane.offset for plane in world.statics[1:]] == [pytest.approx(-4), -7]
 
 
 def test_no_ground_without_its_table(load: Load) -> None:
     problem = load(text=BASE + BALL.format(name="ball", x=0))
-    assert (problem.world().planes, problem.world().pairs) == ((), ())
+    assert (problem.world().statics, problem.world().pairs) == ((), ())
 
 
 def test_gravity(load: Load) -> None:

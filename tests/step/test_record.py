@@ -6,10 +6,11 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from symphys.shapes import Plane, Sphere
 from symphys.state import Layout, initial_state
 from symphys.step import Piece, Recording, Slot, record_step, step_function
 from symphys.step.record import Recorder
-from symphys.world import Body, Law, Plane, Scheme, Sphere, World, make_world
+from symphys.world import Body, Law, Scheme, World, make_world
 
 INPUTS = ("a.force",)
 
@@ -72,7 +73,7 @@ def test_equal_parts_share_their_functions() -> None:
     def distinct(count: int, sweeps: int) -> int:
         balls = [Body.ball(f"ball{i}", 0.1, 1.0) for i in range(count)]
         ground = make_world(balls, [Plane.ground()], Law(0.5, 0.5))
-        apart = World(ground.bodies, ground.planes, tuple(p for p in ground.pairs if p.second.body is None))
+        apart = World(ground.bodies, ground.statics, tuple(p for p in ground.pairs if p.second.body is None))
         return len({piece.function.__hash__() for piece in record_step(apart, Scheme(sweeps=sweeps)).pieces})
 
     assert distinct(20, 10) == distinct(2, 10) == distinct(2, 40)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from laboratory import Lab, value_and_gradient
 
-from symphys.world import Body, Law, Plane, Scheme, Sphere, World, make_world
+from symphys.shapes import Plane, Sphere
+from symphys.world import Body, Law, Scheme, World, make_world
 
 G = 9.81
 
@@ -23,7 +24,7 @@ def test_v8_49_bouncing_balls_keep_their_energy():
     grid = [(i, j) for i in range(7) for j in range(7)]
     balls = [Body.ball(f"b{i}{j}", 0.1, 10.0) for i, j in grid]
     world = make_world(balls, [Plane.ground()], Law(0.0, 1.0))
-    world = World(world.bodies, world.planes, tuple(p for p in world.pairs if p.second.body is None))
+    world = World(world.bodies, world.statics, tuple(p for p in world.pairs if p.second.body is None))
     states = Lab(world, Scheme(sweeps=4)).states({f"b{i}{j}.position": [i, j, 5.0] for i, j in grid}, 20.0)
     energy = sum(
         10 * G * states[f"{b.name}.position"][:, 2] + 5 * (states[f"{b.name}.velocity"] ** 2).sum(axis=1) for b in balls
@@ -164,7 +165,7 @@ def test_stacks_of_spheres_stand(masses, e):
     balls = [Body.ball(f"s{i}", 0.2, float(m)) for i, m in enumerate(masses)]
     world = make_world(balls, [Plane.ground()], Law(0.5, e))
     near = {f"s{i}-s{i + 1}" for i in range(len(masses))} | {"s0-ground"}
-    world = World(world.bodies, world.planes, tuple(p for p in world.pairs if p.name in near))
+    world = World(world.bodies, world.statics, tuple(p for p in world.pairs if p.name in near))
     values = {f"s{i}.position": [0, 0, 0.2 + 0.4 * i + 0.3 * (1 + 0.3 * i)] for i in range(len(masses))}
     states = Lab(world, Scheme()).states(values, 5.0)
     for i in range(len(masses)):

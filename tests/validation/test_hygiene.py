@@ -11,9 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from laboratory import Lab, central_difference, value_and_gradient
 
+from symphys.shapes import Plane, Sphere
 from symphys.state import initial_state
 from symphys.step import step_function
-from symphys.world import Body, Law, Plane, Scheme, Sphere, make_world
+from symphys.world import Body, Law, Scheme, make_world
 
 KNOBS = (0.0, 1e-12, 1e-6, 1e-3, 0.1)
 PLACES = {

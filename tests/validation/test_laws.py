@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from laboratory import Lab
 
-from symphys.world import Body, Law, Plane, Scheme, Sphere, World, make_world
+from symphys.shapes import Plane, Sphere
+from symphys.world import Body, Law, Scheme, World, make_world
 
 WEIGHTLESS = (0.0, 0.0, 0.0)
 INERTIA = (0.02, 0.03, 0.045)
@@ -128,7 +129,7 @@ def test_warm_start_carries_a_stack():
     balls = [Body.ball(f"s{i}", 0.2, 1.0) for i in range(5)]
     world = make_world(balls, [Plane.ground()], Law(0.5, 0.0))
     near = {f"s{i}-s{i + 1}" for i in range(5)} | {"s0-ground"}
-    world = World(world.bodies, world.planes, tuple(p for p in world.pairs if p.name in near))
+    world = World(world.bodies, world.statics, tuple(p for p in world.pairs if p.name in near))
     start = {f"s{i}.position": [0, 0, 0.2 + 0.4 * i] for i in range(5)}
     sag = {}
     for warm in (True, False):

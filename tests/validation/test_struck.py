@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from laboratory import Lab
 
-from symphys.world import Body, Law, Pair, Plane, Scheme, World, make_world
+from symphys.shapes import Plane
+from symphys.world import Body, Law, Pair, Scheme, World, make_world
 
 RADIUS = 0.0286
 
@@ -20,7 +21,7 @@ def billiard(cushion: Law) -> World:
     world = make_world([Body.ball("ball", RADIUS, 0.17)], planes)
     ground, wall = world.pairs
     pairs = (Pair("floor", ground.first, ground.second, Law(0.2)), Pair("side", wall.first, wall.second, cushion))
-    return World(world.bodies, world.planes, pairs)
+    return World(world.bodies, world.statics, pairs)
 
 
 def rolling_into(cushion: Law, dt: float, split: bool) -> ca.Function:
@@ -77,7 +78,7 @@ def wedge(angle: float, e: float) -> World:
 def exact_wedge(world: World, start: tuple[float, float], speed: float, time: float, e: float) -> np.ndarray:
     """Position and velocity (4,), from impact to impact."""
     p, v, now = np.array(start), np.array([0.0, -speed]), 0.0
-    normals = [np.array(plane.normal)[[0, 2]] for plane in world.planes]
+    normals = [np.array(plane.normal)[[0, 2]] for plane in world.statics]
     while True:
         ahead = [(max((n @ p - 0.1) / -(n @ v), 0.0), n) for n in normals if n @ v < -1e-12]
         wait, n = min(ahead, key=lambda pair: pair[0], default=(np.inf, None))
