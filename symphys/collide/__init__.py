@@ -1,28 +1,34 @@
-"""Collision: one file a pair of shapes, each returning the same ``Contact``."""
+"""Collision: one file a pair of shapes; all return the same ``Contact``, one for each point of the pair."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
+from typing import Any
 
-from symphys.collide.contact import Contact
+from symphys.collide.box_plane import box_plane
+from symphys.collide.capsule_plane import capsule_plane
+from symphys.collide.contact import Contact, flipped
 from symphys.collide.sphere_plane import sphere_plane
 from symphys.collide.sphere_sphere import sphere_sphere
-from symphys.motion import Motion
-from symphys.shapes import Plane, Sphere
-from symphys.world import Pair, World
+from symphys.course import Course
+from symphys.shapes import Box, Capsule, Plane, Sphere, Surface
 
 __all__ = ["Contact", "collide"]
 
+Rule = Callable[[Any, Any, Course, Course], list[Contact]]
 
-def collide(world: World, pair: Pair, motions: Sequence[Motion]) -> Contact:
-    """The contact of one pair in this step."""
-    first, second = pair.first, pair.second
-    if first.body is None:
-        raise ValueError(f"pair {pair.name!r}: the first side must belong to a body")
-    motion, shape, other = motions[first.body], world.surface(first), world.surface(second)
-    assert isinstance(shape, Sphere)
-    if second.body is None:
-        assert isinstance(other, Plane)
-        return sphere_plane(pair, motion, shape, other)
-    assert isinstance(other, Sphere)
-    return sphere_sphere(pair, (motion, motions[second.body]), (shape, other))
+RULES: dict[tuple[type, type], Rule] = {
+    (Sphere, Plane): sphere_plane,
+    (Capsule, Plane): capsule_plane,
+    (Box, Plane): box_plane,
+    (Sphere, Sphere): sphere_sphere,
+}
+"""Which rule covers which surfaces; ``shapes.POINTS`` says how many points each returns."""
+
+
+def collide(first: Surface, second: Surface, a: Course, b: Course) -> list[Contact]:
+    """The contacts of two surfaces, carried along a and b, in this step: one for each point."""
+    rule = RULES.get((type(first), type(second)))
+    if rule is not None:
+        return rule(first, second, a, b)
+    return [flipped(contact) for contact in RULES[type(second), type(first)](second, first, b, a)]

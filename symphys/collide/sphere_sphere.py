@@ -2,52 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import dataclass
 
 import casadi as ca
 
-from symphys.collide.contact import Contact, Expr, Frame, Shift, falls, moved
-from symphys.motion import Motion, Parabola
+from symphys.collide.contact import Contact, Expr, Frame, Shift
+from symphys.collide.touch import NEWTON_STEPS, TINY_RATE, falls
+from symphys.course import Course, Parabola
 from symphys.shapes import Sphere
 from symphys.smooth import TINY_SQUARE
-from symphys.world import Pair
 
 TINY_LENGTH = 1e-12
 """[m] added along z to a line of centres shorter than half of it, so that coincident spheres have a normal."""
-TINY_RATE = 1e-12
-"""Below this the squared distance (or the distance) counts as not closing."""
-NEWTON_STEPS = 3
-"""Corrections of the instant of touch for the relative acceleration."""
 
 
-def sphere_sphere(pair: Pair, motions: tuple[Motion, Motion], spheres: tuple[Sphere, Sphere]) -> Contact:
-    """The contact of two spheres carried along ``motions``."""
-    (a, b), (ball_a, ball_b) = motions, spheres
-    path_a, path_b = a.path(ball_a.centre), b.path(ball_b.centre)
-    arm_a, arm_b = a.arm(ball_a.centre), b.arm(ball_b.centre)
-    path = path_a - path_b
-    reach = ball_a.radius + ball_b.radius
-    gap = _distance(path.start) - reach
+@dataclass(frozen=True)
+class OnSphere:
+    """Two spheres: courses and arms of their centres, radii [m]."""
 
-    def frame(t: Expr) -> Frame:
-        normal = _direction(path.at(t))
-        return Frame(normal, (arm_a.at(t) - ball_a.radius * normal, arm_b.at(t) + ball_b.radius * normal))
+    paths: tuple[Parabola, Parabola]
+    arms: tuple[Parabola, Parabola]
+    radii: tuple[Expr, Expr]
 
-    def gap_after(shifts: Mapping[int, Shift]) -> Expr:
-        assert pair.first.body is not None and pair.second.body is not None
-        centre_a = moved(path_a.start, arm_a.start, shifts[pair.first.body])
-        centre_b = moved(path_b.start, arm_b.start, shifts[pair.second.body])
-        return _distance(centre_a - centre_b) - reach
+    def frame(self, t: Expr) -> Frame:
+        """See ``Meeting``."""
+        (a, b), (arm_a, arm_b), (r_a, r_b) = self.paths, self.arms, self.radii
+        normal = direction((a - b).at(t))
+        return Frame(normal, (arm_a.at(t) - r_a * normal, arm_b.at(t) + r_b * normal))
 
-    return Contact(
-        pair=pair,
-        gap=gap,
-        rate=ca.dot(_direction(path.start), path.velocity),
-        hit=_meets(path, reach, a.dt),
-        time=first_touch(path, reach, a.dt),
-        frame=frame,
-        gap_after=gap_after,
-    )
+    def gap_after(self, first: Shift, second: Shift) -> Expr:
+        """See ``Meeting``."""
+        (a, b), (arm_a, arm_b) = self.paths, self.arms
+        apart = first.moved(a.start, arm_a.start) - second.moved(b.start, arm_b.start)
+        return distance(apart) - self.radii[0] - self.radii[1]
+
+
+def sphere_sphere(ball_a: Sphere, ball_b: Sphere, a: Course, b: Course) -> list[Contact]:
+    """One point."""
+    paths = a.path(ball_a.centre), b.path(ball_b.centre)
+    path, reach = paths[0] - paths[1], ball_a.radius + ball_b.radius
+    return [
+        Contact(
+            gap=distance(path.start) - reach,
+            rate=ca.dot(direction(path.start), path.velocity),
+            hit=_meets(path, reach, a.dt),
+            time=first_touch(path, reach, a.dt),
+            meeting=OnSphere(paths, (a.arm(ball_a.centre), b.arm(ball_b.centre)), (ball_a.radius, ball_b.radius)),
+        )
+    ]
 
 
 def first_touch(path: Parabola, reach: Expr, dt: Expr) -> Expr:
@@ -64,8 +66,8 @@ def first_touch(path: Parabola, reach: Expr, dt: Expr) -> Expr:
         at = path.at(t)
         slope = ca.fmin(2 * ca.dot(at, path.velocity_at(t)), -TINY_RATE)
         t = ca.fmin(ca.fmax(t - (ca.dot(at, at) - reach * reach) / slope, -dt), dt)
-    distance = _distance(d)
-    return ca.if_else(falls(distance - reach, -closing / distance), t, 0)
+    apart = distance(d)
+    return ca.if_else(falls(apart - reach, -closing / apart), t, 0)
 
 
 def _meets(path: Parabola, reach: Expr, dt: Expr) -> Expr:
@@ -76,13 +78,15 @@ def _meets(path: Parabola, reach: Expr, dt: Expr) -> Expr:
     return ca.fmin(ca.dot(nearest, nearest), ca.dot(end, end)) < reach * reach
 
 
-def _distance(d: Expr) -> Expr:
+def distance(d: Expr) -> Expr:
+    """|d|, never zero."""
     lifted = _lifted(d)
     return ca.sqrt(ca.dot(lifted, lifted))
 
 
-def _direction(d: Expr) -> Expr:
-    return _lifted(d) / _distance(d)
+def direction(d: Expr) -> Expr:
+    """(3,): d / |d|; z where d is zero."""
+    return _lifted(d) / distance(d)
 
 
 def _lifted(d: Expr) -> Expr:

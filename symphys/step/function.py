@@ -9,14 +9,17 @@ from typing import Any
 import casadi as ca
 
 from symphys.state import Layout
+from symphys.step.pieces import Inline
 from symphys.step.record import Piece, Recorder, Slot
-from symphys.step.scene import Scene
-from symphys.step.whole import take_step
+from symphys.step.scene import Scene, State, make_scene
+from symphys.step.whole import report, take_step
 from symphys.world import Scheme, World
 
 Expr = Any
 """casadi SX, MX or DM"""
 
+MOST_INSTRUCTIONS = 100_000
+"""Of a step in which what several parts compute alike is looked for: that saves a tenth, but takes its time."""
 INPUT_FIELDS = ("force", "torque")
 
 
@@ -35,20 +38,24 @@ def step_function(
     Returns:
         A function of x (see ``Layout``), u, p and smoothing [m/s] >= 0, where 0 is the exact step.
     """
-    x, u, p, knob = _arguments(world, inputs, parameters)
-    result = take_step(Scene(world, scheme or Scheme(), Layout(world), tuple(inputs), u, knob), x)
-    return ca.Function("step", [x, u, p, knob], [ca.cse(result.x)], ["x", "u", "p", "smoothing"], ["x_next"])
+    arguments, scene, x = _flat(world, scheme, inputs, parameters)
+    after = _packed(scene, take_step(scene, x)[0])
+    step = ca.Function("step", arguments, [after], ["x", "u", "p", "smoothing"], ["x_next"])
+    if step.n_instructions() > MOST_INSTRUCTIONS:
+        return step
+    return ca.Function("step", arguments, [ca.cse(after)], ["x", "u", "p", "smoothing"], ["x_next"])
 
 
 def report_function(
     world: World, scheme: Scheme | None = None, inputs: Sequence[str] = (), parameters: Sequence[Any] = ()
 ) -> ca.Function:
-    """The same step with all of ``StepResult``: (x, u, p, smoothing) -> (x_next, forces, gaps, residual, crowded)."""
-    x, u, p, knob = _arguments(world, inputs, parameters)
-    r = take_step(Scene(world, scheme or Scheme(), Layout(world), tuple(inputs), u, knob), x)
+    """The same step with all of its ``Report``: (x, u, p, smoothing) -> (x_next, forces, gaps, residual, crowded)."""
+    arguments, scene, x = _flat(world, scheme, inputs, parameters)
+    after, phases = take_step(scene, x)
+    r = report(scene, phases)
+    outputs = [_packed(scene, after), *map(scene.pieces.value, (r.forces, r.gaps, r.residual, r.crowded))]
     names = ["x_next", "forces", "gaps", "residual", "crowded"]
-    outputs = [r.x, r.forces, r.gaps, r.residual, r.crowded]
-    return ca.Function("report", [x, u, p, knob], outputs, ["x", "u", "p", "smoothing"], names)
+    return ca.Function("report", arguments, outputs, ["x", "u", "p", "smoothing"], names)
 
 
 @dataclass(frozen=True)
@@ -75,27 +82,47 @@ def record_step(
 
     ``exact`` is the step at smoothing 0 only: what the knob would add is left out.
     """
-    _, u, p, knob = _arguments(world, inputs, parameters)
-    layout, recorder = Layout(world), Recorder()
-    for name, symbols in (("u", u), ("p", p), ("smoothing", knob)):
-        recorder.take(name, symbols)
-    x = layout.pack({name: recorder.argument(name, layout[name].stop - layout[name].start) for name in layout.names()})
-    smoothing = ca.SX(0) if exact else knob
-    scene = Scene(world, scheme or Scheme(), layout, tuple(inputs), u, smoothing, recorder.keep, recorder.repeat)
-    after = take_step(scene, x).x
-    owners: dict[str, list[slice]] = {}
+    (x, u, p, knob), layout, recorder = _arguments(world, inputs, parameters), Layout(world), Recorder()
+    for name, symbols in (("u", u), ("p", p), ("smoothing", knob), *_parts(layout, x).items()):
+        recorder.argument(name, symbols)
+    scene = make_scene(world, scheme, tuple(inputs), u, ca.SX(0) if exact else knob, recorder)
+    after, _ = take_step(scene, _parts(layout, x))
+    owners: dict[str, list[str]] = {}
     for name in layout.names():
-        owners.setdefault(name.rpartition(".")[0], []).append(layout[name])
-    columns = [slice(slices[0].start, slices[-1].stop) for slices in owners.values()]
-    results = {recorder.give("next", after[part]): part for part in columns}
+        owners.setdefault(name.rpartition(".")[0], []).append(name)
+    results = {}
+    for names in owners.values():
+        slot = recorder.give("next", [after[name] for name in names])
+        results[slot] = slice(layout[names[0]].start, layout[names[-1]].stop)
     return Recording(tuple(recorder.pieces), results)
 
 
-def _arguments(world: World, inputs: Sequence[str], parameters: Sequence[Any]) -> tuple[Expr, Expr, Expr, Expr]:
+def _flat(
+    world: World, scheme: Scheme | None, inputs: Sequence[str], parameters: Sequence[Any]
+) -> tuple[list[Expr], Scene, State]:
+    """The step's arguments, the scene of a step as one expression, and x in parts."""
+    arguments, pieces = _arguments(world, inputs, parameters), Inline()
+    for column in arguments:
+        pieces.take(column)
+    x, u, _, knob = arguments
+    scene = make_scene(world, scheme, tuple(inputs), u, knob, pieces)
+    return arguments, scene, _parts(Layout(world), x)
+
+
+def _packed(scene: Scene, x: State) -> Expr:
+    return Layout(scene.world).pack({name: scene.pieces.value(part) for name, part in x.items()})
+
+
+def _parts(layout: Layout, x: Expr) -> State:
+    return {name: x[layout[name]] for name in layout.names()}
+
+
+def _arguments(world: World, inputs: Sequence[str], parameters: Sequence[Any]) -> list[Expr]:
+    """x, u, p and smoothing."""
     known = {f"{body.name}.{field}" for body in world.bodies for field in INPUT_FIELDS}
     for name in inputs:
         if name not in known:
             raise KeyError(f"no input is called {name!r}; there are {', '.join(sorted(known))}")
     x = ca.SX.sym("x", Layout(world).size)
     u = ca.SX.sym("u", 3 * len(inputs))
-    return x, u, ca.vertcat(ca.SX(0, 1), *parameters), ca.SX.sym("smoothing")
+    return [x, u, ca.vertcat(ca.SX(0, 1), *parameters), ca.SX.sym("smoothing")]

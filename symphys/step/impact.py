@@ -11,11 +11,12 @@ import casadi as ca
 from symphys.collide import Contact
 from symphys.motion import Motion, angular_velocity
 from symphys.smooth import positive
-from symphys.step.pgs import ZERO, Momenta, relax
-from symphys.step.phase import Phase, expected_motions, look
-from symphys.step.row import UNREACHED, ContactRow, at_touch, effective_masses, inverse_masses, make_side, moving_sides
+from symphys.step.pgs import ZERO, Momentum, Row, Solution, relax
+from symphys.step.phase import Phase, bodies_of, expected_motions, look
+from symphys.step.row import UNREACHED, ContactRow, Moving, at_touch, effective_masses, inverse_masses, make_sides
 from symphys.step.rows import width_of
-from symphys.step.scene import Scene
+from symphys.step.scene import Scene, Setting, State
+from symphys.world import Law
 
 Expr = Any
 """casadi SX, MX or DM"""
@@ -45,83 +46,107 @@ class Cut:
     struck: tuple[Expr, ...]
 
 
-def find_cut(scene: Scene, x: Expr) -> Cut:
+def find_cut(scene: Scene, x: State) -> Cut:
     """The first impact within the step, on paths under the persistent forces of the last step."""
-    dt = scene.scheme.dt
-    contacts = look(scene, expected_motions(scene, x, ca.SX(dt)))
-    fast = tuple(scene.keep(_closes_fast(scene, contact)) for contact in contacts)
-    strikes = [ca.logic_and(closes, contact.hit) for contact, closes in zip(contacts, fast, strict=True)]
-    impact, first = ca.SX(0), ca.SX(dt)
-    for contact, meets in zip(contacts, strikes, strict=True):
-        earliest = ca.if_else(meets, ca.fmin(first, contact.time), first)
-        impact, first = scene.keep((ca.fmax(impact, meets), earliest))
-    latest = first + TOGETHER * dt
-    struck = tuple(
-        scene.keep(ca.logic_and(meets, c.time <= latest)) for c, meets in zip(contacts, strikes, strict=True)
-    )
-    inside = ca.fmin(ca.fmax(first, MARGIN * dt), (1 - MARGIN) * dt)
-    return Cut(impact, scene.keep(ca.if_else(impact, inside, dt / 2)), fast, struck)
+    do, dt = scene.pieces.do, scene.setting.scheme.dt
+    contacts = look(scene, expected_motions(scene, x, ca.SX(dt)), ca.SX(dt))
+    fast = [do(_closes_fast, scene.setting, p.law, c) for p, c in zip(scene.world.pairs, contacts, strict=True)]
+    earliest = ca.SX(0), ca.SX(dt)
+    for contact, closes in zip(contacts, fast, strict=True):
+        earliest = do(_earlier, earliest, closes, contact.hit, contact.time)
+    struck = [do(_is_struck, earliest, c, contact.hit, contact.time) for contact, c in zip(contacts, fast, strict=True)]
+    return Cut(earliest[0], do(_inside, earliest, dt), tuple(fast), tuple(struck))
 
 
-def passing(scene: Scene, x: Expr, duration: Expr) -> list[Expr]:
+def _closes_fast(setting: Setting, law: Law, contact: Contact) -> Expr:
+    return ca.SX(0) if law.soft else contact.rate < -setting.fast
+
+
+def _earlier(earliest: tuple[Expr, Expr], closes: Expr, hit: Expr, time: Expr) -> tuple[Expr, Expr]:
+    """(whether there is an impact, when), with one more contact looked at."""
+    meets = ca.logic_and(closes, hit)
+    return ca.fmax(earliest[0], meets), ca.if_else(meets, ca.fmin(earliest[1], time), earliest[1])
+
+
+def _is_struck(earliest: tuple[Expr, Expr], closes: Expr, hit: Expr, time: Expr) -> Expr:
+    return ca.logic_and(ca.logic_and(closes, hit), time <= earliest[1] * (1 + TOGETHER))
+
+
+def _inside(earliest: tuple[Expr, Expr], dt: float) -> Expr:
+    """The length of the stretch before the cut."""
+    return ca.if_else(earliest[0], ca.fmin(ca.fmax(earliest[1], MARGIN * dt), (1 - MARGIN) * dt), dt / 2)
+
+
+def passing(scene: Scene, x: State, duration: Expr) -> list[Expr]:
     """Per pair: 1 if it closes at speed but does not meet within ``duration``."""
-    contacts = look(scene, expected_motions(scene, x, duration))
-    return [scene.keep(ca.logic_and(_closes_fast(scene, c), ca.logic_not(c.hit))) for c in contacts]
+    contacts = look(scene, expected_motions(scene, x, duration), duration)
+    pairs = zip(scene.world.pairs, contacts, strict=True)
+    return [scene.pieces.do(_passes, scene.setting, pair.law, contact) for pair, contact in pairs]
 
 
-def _closes_fast(scene: Scene, contact: Contact) -> Expr:
-    return ca.SX(0) if contact.pair.law.soft else contact.rate < -scene.fast
+def _passes(setting: Setting, law: Law, contact: Contact) -> Expr:
+    return ca.logic_and(_closes_fast(setting, law, contact), ca.logic_not(contact.hit))
 
 
-def collide_now(scene: Scene, x: Expr, cut: Cut) -> Phase:
+def collide_now(scene: Scene, x: State, cut: Cut) -> Phase:
     """The state after the impacts at ``cut``; leapfrog begins anew there, so ``lag`` is 0. Without one the same x."""
-    motions = expected_motions(scene, x, ca.SX(scene.scheme.dt))
-    reach = TOUCHING * scene.reference * scene.scheme.dt**2
-    rows = tuple(
-        scene.keep(_row(scene, contact, motions, struck, ca.logic_and(cut.impact, contact.gap < reach)))
-        for contact, struck in zip(look(scene, motions), cut.struck, strict=True)
-    )
-    momenta = Momenta([m.velocity for m in motions], [m.momentum_k for m in motions])
-    momenta, impulses, last = relax(scene, rows, momenta, [ZERO for _ in rows])
-    return Phase(_with_velocities(scene, x, motions, momenta, cut.impact), rows, tuple(impulses), tuple(last))
+    duration = ca.SX(scene.setting.scheme.dt)
+    motions = expected_motions(scene, x, duration)
+    contacts = look(scene, motions, duration)
+    rows = []
+    for pair, contact, struck in zip(scene.world.pairs, contacts, cut.struck, strict=True):
+        moving = tuple(motions[i] for i in bodies_of(pair))
+        row = scene.pieces.do(_row, scene.setting, pair.law, contact, moving, struck, cut.impact)
+        rows.append(Row(bodies_of(pair), row))
+    momenta = tuple(Momentum(m.velocity, m.momentum_k) for m in motions)
+    still = tuple(ZERO for _ in rows)
+    solved = relax(scene.pieces, scene.setting.scheme.sweeps, tuple(rows), Solution(momenta, still, still))
+    after = _with_velocities(scene, x, motions, solved.momenta, cut.impact)
+    return Phase(after, tuple(rows), tuple(contacts), solved.impulses, solved.last)
 
 
-def _row(scene: Scene, contact: Contact, motions: Sequence[Motion], struck: Expr, touching: Expr) -> ContactRow:
-    """The row of a contact at the instant of an impact: of it where ``struck``, of its bodies where ``touching``."""
-    moving, now = moving_sides(contact, motions), ca.SX(0)
-    velocity, _, normal = at_touch(contact, moving, now)
-    rebound = contact.pair.law.restitution * positive(-ca.dot(normal, velocity), scene.knob)
-    frame = contact.frame(now)
-    sides = tuple(make_side(i, k, m, now, frame, frame) for k, i, m in moving)
-    masses = effective_masses(*inverse_masses(sides, frame.normal))
+def _row(setting: Setting, law: Law, contact: Contact, motions: Moving, struck: Expr, impact: Expr) -> ContactRow:
+    """The row of a contact at the instant of an impact: of it where ``struck``, of its bodies where they touch."""
+    now, scheme = ca.SX(0), setting.scheme
+    touching = ca.logic_and(impact, contact.gap < TOUCHING * setting.reference * scheme.dt**2)
+    velocity, _, normal = at_touch(contact, motions, now)
+    rebound = law.restitution * positive(-ca.dot(normal, velocity), setting.knob)
+    frame = contact.meeting.frame(now)
+    sides = make_sides(motions, now, frame, frame)
     resting = ca.if_else(touching, 0, UNREACHED)
     return ContactRow(
-        contact.pair.law,
-        contact,
+        law,
         sides,
         frame.normal,
         frame.normal,
-        **masses,
+        **effective_masses(*inverse_masses(sides, frame.normal)),
         softness=ca.SX(0),
-        target=UNREACHED if contact.pair.law.soft else ca.if_else(struck, rebound, resting),
+        target=ca.SX(UNREACHED) if law.soft else ca.if_else(struck, rebound, resting),
         slip_target=ca.SX.zeros(3),
         leaving=struck,
         struck=struck,
-        width=struck * width_of(scene, contact),
-        knob=scene.knob,
+        width=struck * width_of(setting, contact),
+        knob=setting.knob,
     )
 
 
-def _with_velocities(scene: Scene, x: Expr, motions: Sequence[Motion], momenta: Momenta, impact: Expr) -> Expr:
-    values = {name: x[scene.layout[name]] for name in scene.layout.names()}
-    for motion, velocity, turning in zip(motions, momenta.velocity, momenta.angular, strict=True):
-        body, name = motion.body, motion.body.name
-        spin = angular_velocity(body, motion.orientation, turning)
-        values |= scene.keep(
-            {
-                f"{name}.velocity": ca.if_else(impact, velocity, values[f"{name}.velocity"]),
-                f"{name}.angular_velocity": ca.if_else(impact, spin, values[f"{name}.angular_velocity"]),
-            }
-        )
-    values["lag"] = scene.keep(ca.if_else(impact, 0, values["lag"]))
-    return scene.layout.pack(values)
+def _with_velocities(
+    scene: Scene, x: State, motions: Sequence[Motion], momenta: Sequence[Momentum], impact: Expr
+) -> State:
+    values = dict(x)
+    for body, motion, momentum in zip(scene.world.bodies, motions, momenta, strict=True):
+        names = f"{body.name}.velocity", f"{body.name}.angular_velocity"
+        before = tuple(x[name] for name in names)
+        values |= zip(names, scene.pieces.do(_after, motion, momentum, before, impact), strict=True)
+    values["lag"] = scene.pieces.do(_renewed, impact, x["lag"])
+    return values
+
+
+def _after(motion: Motion, momentum: Momentum, before: tuple[Expr, ...], impact: Expr) -> tuple[Expr, Expr]:
+    """(velocity, angular velocity): as solved if there is an impact, else as before."""
+    spin = angular_velocity(motion.inertia, motion.orientation, momentum.angular)
+    return ca.if_else(impact, momentum.velocity, before[0]), ca.if_else(impact, spin, before[1])
+
+
+def _renewed(impact: Expr, lag: Expr) -> Expr:
+    return ca.if_else(impact, 0, lag)

@@ -13,29 +13,22 @@ import casadi as ca
 
 from symphys.motion import apply
 from symphys.smooth import onto_disc, positive
-from symphys.step.record import Keep
+from symphys.step.pieces import Pieces
 from symphys.step.row import ContactRow, Side
-from symphys.step.scene import Scene
 
 Expr = Any
 """casadi SX, MX or DM"""
 
 
-@dataclass
-class Momenta:
-    """The sweeps' unknowns, changed in place: V (3,) [m/s] and L (3,) [N m s] of each body at mid-step."""
+@dataclass(frozen=True)
+class Momentum:
+    """The sweeps' unknowns of one body at mid-step: velocity (3,) [m/s], angular momentum (3,) [N m s]."""
 
-    velocity: list[Expr]
-    angular: list[Expr]
+    velocity: Expr
+    angular: Expr
 
-    def kept(self, keep: Keep, row: ContactRow, impulse: Impulse) -> Impulse:
-        """Keep what a visit of the row has changed: its bodies' momenta and its impulse."""
-        bodies = [side.body for side in row.sides]
-        changed = [(self.velocity[i], self.angular[i]) for i in bodies]
-        changed, impulse = keep((changed, impulse))
-        for i, (velocity, angular) in zip(bodies, changed, strict=True):
-            self.velocity[i], self.angular[i] = velocity, angular
-        return impulse
+
+Momenta = tuple[Momentum, ...]
 
 
 @dataclass(frozen=True)
@@ -69,99 +62,121 @@ class Impulse:
         )
 
 
-Solution = tuple[Momenta, list[Impulse], list[Impulse]]
 ZERO = Impulse(ca.SX(0), ca.SX.zeros(3), ca.SX(0), ca.SX.zeros(3))
 
 
-def relax(
-    scene: Scene, rows: Sequence[ContactRow], momenta: Momenta, impulses: Sequence[Impulse]
-) -> tuple[Momenta, list[Impulse], list[Impulse]]:
-    """All sweeps; returns the momenta, the impulses, and the impulses before the last sweep."""
+@dataclass(frozen=True)
+class Solution:
+    """What the sweeps have come to: of all bodies, of all rows, and of all rows before the last sweep."""
 
-    def once(state: Solution) -> Solution:
-        momenta, impulses, _ = state
-        momenta = Momenta(list(momenta.velocity), list(momenta.angular))
-        return momenta, sweep(scene.keep, rows, momenta, impulses), impulses
-
-    solution: Solution = scene.repeat(scene.scheme.sweeps, once, (momenta, list(impulses), list(impulses)))
-    return solution
+    momenta: Momenta
+    impulses: tuple[Impulse, ...]
+    last: tuple[Impulse, ...]
 
 
-def sweep(keep: Keep, rows: Sequence[ContactRow], momenta: Momenta, impulses: Sequence[Impulse]) -> list[Impulse]:
-    """One pass over all rows; returns the new impulses."""
-    new = list(impulses)
+@dataclass(frozen=True)
+class Row:
+    """A row and the indices of the bodies on its moving sides."""
+
+    bodies: tuple[int, ...]
+    row: ContactRow
+
+
+def relax(pieces: Pieces, sweeps: int, rows: tuple[Row, ...], start: Solution) -> Solution:
+    """All sweeps."""
+    return pieces.repeat(sweeps, sweep, rows, start)
+
+
+def sweep(pieces: Pieces, rows: tuple[Row, ...], before: Solution) -> Solution:
+    """One pass over all rows."""
+    momenta, new = list(before.momenta), list(before.impulses)
     for k in visiting_order(rows):
-        new[k] = momenta.kept(keep, rows[k], _visit(rows[k], momenta, impulses[k]))
-    return new
+        visited, new[k] = pieces.do(visit, rows[k].row, of_bodies(momenta, rows[k]), new[k])
+        spread(momenta, rows[k], visited)
+    return Solution(tuple(momenta), tuple(new), before.impulses)
 
 
-def visiting_order(rows: Sequence[ContactRow]) -> list[int]:
+def visiting_order(rows: Sequence[Row]) -> list[int]:
     """Rows one after the other that share no body as far as may be: a processor works on several visits at once."""
     order: list[int] = []
     left = list(range(len(rows)))
     busy: set[int] = set()
     while left:
-        free = (k for k in left if not busy & {side.body for side in rows[k].sides})
+        free = (k for k in left if busy.isdisjoint(rows[k].bodies))
         k = next(free, left[0])
-        busy = {side.body for side in rows[k].sides}
+        busy = set(rows[k].bodies)
         left.remove(k)
         order.append(k)
     return order
 
 
-def begin(keep: Keep, rows: Sequence[ContactRow], momenta: Momenta, impulses: Sequence[Impulse]) -> list[Impulse]:
+def begin(pieces: Pieces, rows: Sequence[Row], momenta: Momenta, impulses: Sequence[Impulse]) -> Solution:
     """Give the impulses that the sweeps start from."""
-    started = []
-    for row, impulse in zip(rows, impulses, strict=True):
-        give(row, momenta, impulse)
-        started.append(momenta.kept(keep, row, impulse))
-    return started
+    started = list(momenta)
+    for each, impulse in zip(rows, impulses, strict=True):
+        spread(started, each, pieces.do(give, each.row, of_bodies(started, each), impulse))
+    return Solution(tuple(started), tuple(impulses), tuple(impulses))
 
 
-def give(row: ContactRow, momenta: Momenta, impulse: Impulse) -> None:
-    """Apply an impulse to the row's bodies."""
+def of_bodies(momenta: Sequence[Momentum], row: Row) -> Momenta:
+    """The momenta of the row's bodies."""
+    return tuple(momenta[i] for i in row.bodies)
+
+
+def spread(momenta: list[Momentum], row: Row, changed: Momenta) -> None:
+    """Put the momenta of the row's bodies back."""
+    for i, momentum in zip(row.bodies, changed, strict=True):
+        momenta[i] = momentum
+
+
+def give(row: ContactRow, momenta: Momenta, impulse: Impulse) -> Momenta:
+    """The momenta of the row's bodies after an impulse."""
     linear, angular = impulse.linear(row.impulse_normal), impulse.angular(row.impulse_normal)
-    for side in row.sides:
-        momenta.velocity[side.body] += side.sign * side.inverse_mass * linear
-        momenta.angular[side.body] += side.sign * (ca.cross(side.impulse_arm, linear) + angular)
+    return tuple(
+        Momentum(
+            m.velocity + side.sign * side.inverse_mass * linear,
+            m.angular + side.sign * (ca.cross(side.impulse_arm, linear) + angular),
+        )
+        for side, m in zip(row.sides, momenta, strict=True)
+    )
 
 
-def _visit(row: ContactRow, momenta: Momenta, old: Impulse) -> Impulse:
+def visit(row: ContactRow, momenta: Momenta, old: Impulse) -> tuple[Momenta, Impulse]:
+    """One projection of each of the row's impulses, one after the other."""
+    zero = ca.SX.zeros(3)
     normal = _normal(row, momenta, old)
+    momenta = give(row, momenta, Impulse(normal - old.normal, zero, ca.SX(0), zero))
     tangent = _tangent(row, momenta, old, normal)
+    momenta = give(row, momenta, Impulse(ca.SX(0), tangent - old.tangent, ca.SX(0), zero))
+    if not row.law.spins:
+        return momenta, Impulse(normal, tangent, old.spin, old.roll)
     spin, roll = _torques(row, momenta, old, normal)
-    return Impulse(normal, tangent, spin, roll)
+    momenta = give(row, momenta, Impulse(ca.SX(0), zero, spin - old.spin, roll - old.roll))
+    return momenta, Impulse(normal, tangent, spin, roll)
 
 
 def _normal(row: ContactRow, momenta: Momenta, old: Impulse) -> Expr:
     """ln <- max(ln - m (n.u - b + gamma ln), 0), m = 1 / (k + gamma)."""
     wanted = ca.dot(row.normal, _slip(row, momenta)) - row.target + row.softness * old.normal
-    new = positive(old.normal - row.normal_mass * wanted, row.normal_mass * row.width)
-    give(row, momenta, Impulse(new - old.normal, ca.SX.zeros(3), ca.SX(0), ca.SX.zeros(3)))
-    return new
+    return positive(old.normal - row.normal_mass * wanted, row.normal_mass * row.width)
 
 
 def _tangent(row: ContactRow, momenta: Momenta, old: Impulse, normal: Expr) -> Expr:
     """The friction impulse, onto the disc of radius mu ln."""
     slip = _slip(row, momenta) - row.slip_target
     wanted = old.tangent - row.tangent_mass * _across(slip, row.normal)
-    new = onto_disc(wanted, row.law.friction * normal, row.tangent_mass * row.knob, row.knob)
-    give(row, momenta, Impulse(ca.SX(0), new - old.tangent, ca.SX(0), ca.SX.zeros(3)))
-    return new
+    return onto_disc(wanted, row.law.friction * normal, row.tangent_mass * row.knob, row.knob)
 
 
 def _torques(row: ContactRow, momenta: Momenta, old: Impulse, normal: Expr) -> tuple[Expr, Expr]:
     """Torsional friction (an interval) and rolling friction (a disc), both limited by the normal impulse."""
-    if not row.law.spins:
-        return old.spin, old.roll
     n = row.normal
     spin_width, roll_width = row.knob * row.spin_mass, row.knob * row.roll_mass
-    rate = sum(side.sign * _spin(momenta, side) for side in row.sides)
+    rate = sum(side.sign * _spin(m, side) for side, m in zip(row.sides, momenta, strict=True))
     twist = n * (old.spin - row.spin_mass * ca.dot(n, rate))
     spin = ca.dot(n, onto_disc(twist, row.law.torsion * normal, spin_width, row.knob))
     wanted = old.roll - row.roll_mass * _across(rate, n)
     roll = onto_disc(wanted, row.law.rolling * normal, roll_width, row.knob)
-    give(row, momenta, Impulse(ca.SX(0), ca.SX.zeros(3), spin - old.spin, roll - old.roll))
     return spin, roll
 
 
@@ -169,13 +184,13 @@ def _across(a: Expr, n: Expr) -> Expr:
     return a - n * ca.dot(n, a)
 
 
-def _spin(momenta: Momenta, side: Side) -> Expr:
-    return apply(side.inverse_inertia, momenta.angular[side.body])
+def _spin(momentum: Momentum, side: Side) -> Expr:
+    return apply(side.inverse_inertia, momentum.angular)
 
 
 def _slip(row: ContactRow, momenta: Momenta) -> Expr:
     """(3,) [m/s]: relative velocity of the touching points."""
     total = ca.SX.zeros(3)
-    for side in row.sides:
-        total += side.sign * (momenta.velocity[side.body] + ca.cross(_spin(momenta, side), side.arm))
+    for side, m in zip(row.sides, momenta, strict=True):
+        total += side.sign * (m.velocity + ca.cross(_spin(m, side), side.arm))
     return total

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any
 
 import casadi as ca
@@ -11,13 +12,15 @@ import casadi as ca
 from symphys import rotation
 from symphys.collide import Contact, collide
 from symphys.collide.contact import Shift
+from symphys.course import at_rest
 from symphys.motion import BodyState, Motion, angular_velocity, free_motion, momentum
 from symphys.state import BODY_FIELDS
-from symphys.step.pgs import ZERO, Impulse, Momenta, begin, relax
+from symphys.step.pgs import ZERO, Impulse, Momentum, Row, begin, relax
 from symphys.step.position import displacements, push_apart
 from symphys.step.row import ContactRow
 from symphys.step.rows import prepare
-from symphys.step.scene import Scene
+from symphys.step.scene import Scene, State
+from symphys.world import Pair
 
 Expr = Any
 """casadi SX, MX or DM"""
@@ -30,132 +33,180 @@ SHORTEST_KICK = 1 / 8
 class Phase:
     """A stretch that has been advanced; ``last`` are the impulses before the final sweep."""
 
-    x: Expr
-    rows: tuple[ContactRow, ...]
+    x: State
+    rows: tuple[Row, ...]
+    contacts: tuple[Contact, ...]
     impulses: tuple[Impulse, ...]
     last: tuple[Impulse, ...]
 
 
-def look(scene: Scene, motions: Sequence[Motion]) -> list[Contact]:
-    """The contacts on the way."""
-    return [scene.keep(collide(scene.world, pair, motions)) for pair in scene.world.pairs]
+def look(scene: Scene, motions: Sequence[Motion], duration: Expr) -> list[Contact]:
+    """The contacts on the way: one for each pair."""
+    found: list[Contact] = []
+    for (first, second), _ in groupby(scene.world.pairs, key=lambda pair: (pair.first, pair.second)):
+        surfaces = scene.world.surface(first), scene.world.surface(second)
+        a = motions[_index(first.body)].course()
+        b = at_rest(duration) if second.body is None else motions[second.body].course()
+        found += scene.pieces.do(collide, *surfaces, a, b)
+    return found
 
 
-def advance(scene: Scene, x: Expr, duration: Expr, spared: Sequence[Expr] = ()) -> Phase:
+def bodies_of(pair: Pair) -> tuple[int, ...]:
+    """The indices of the bodies on the sides that can move."""
+    return tuple(side.body for side in (pair.first, pair.second) if side.body is not None)
+
+
+def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = ()) -> Phase:
     """The state after ``duration`` [s]; pairs whose ``spared`` is 1 give no impulse: the stretch ends as they meet."""
-    scheme, kick = scene.scheme, duration / 2 + x[scene.layout["lag"]]
+    pieces, pairs = scene.pieces, scene.world.pairs
+    kick, half = pieces.do(_times, duration, x["lag"])
 
     # free motion, in which impacts find their instant
     motions = free_motions(scene, x, duration)
-    contacts = look(scene, motions)
+    contacts = look(scene, motions, duration)
 
     # rows: where, when and how the surfaces meet
-    rows = tuple(
-        scene.keep(prepare(scene, c, motions, duration, off))
-        for c, off in zip(contacts, spared or [0] * len(contacts), strict=True)
-    )
+    rows = []
+    for pair, contact, off in zip(pairs, contacts, spared or [ca.SX(0)] * len(pairs), strict=True):
+        moving = tuple(motions[i] for i in bodies_of(pair))
+        row = pieces.do(prepare, scene.setting, pair.law, contact, moving, duration, off)
+        rows.append(Row(bodies_of(pair), row))
 
     # velocities: warm start, then sweeps
-    momenta = Momenta([m.mid_velocity for m in motions], [m.mid_momentum for m in motions])
-    started = begin(scene.keep, rows, momenta, _warm_start(scene, rows, x, kick))
-    momenta, impulses, last = relax(scene, rows, momenta, started)
+    momenta = tuple(Momentum(m.mid_velocity, m.mid_momentum) for m in motions)
+    started = begin(pieces, rows, momenta, _warm_start(scene, rows, x, kick))
+    solved = relax(pieces, scene.setting.scheme.sweeps, tuple(rows), started)
 
     # positions
-    moved = displacements(scene, rows, impulses, momenta, motions, duration)
-    shifts = push_apart(scene, rows, moved)
+    moved = displacements(scene, rows, contacts, solved, motions, duration)
+    shifts = push_apart(scene, rows, contacts, moved)
 
     # the next state
-    values: dict[str, Any] = {"lag": ca.SX(duration / 2)}
-    resting = _store_forces(scene, rows, impulses, ca.fmax(kick, SHORTEST_KICK * scheme.dt), values)
-    for i, motion in enumerate(motions):
-        values |= scene.keep(_store_body(motion, momenta.velocity[i], momenta.angular[i], shifts[i], resting[i]))
-    return Phase(scene.layout.pack(values), rows, tuple(impulses), tuple(last))
+    values: State = {"lag": half}
+    resting = _store_forces(scene, rows, solved.impulses, kick, values)
+    for body, *parts in zip(scene.world.bodies, motions, solved.momenta, shifts, resting, strict=True):
+        stored = pieces.do(_store_body, *parts)
+        values |= {f"{body.name}.{field}": value for field, value in stored.items()}
+    return Phase(values, tuple(rows), tuple(contacts), solved.impulses, solved.last)
 
 
-def free_motions(scene: Scene, x: Expr, duration: Expr) -> list[Motion]:
+def free_motions(scene: Scene, x: State, duration: Expr) -> list[Motion]:
     """Each body's free motion; the stored velocities are freed from the last half step's persistent forces."""
-    return _motions(scene, x, duration, -x[scene.layout["lag"]], 0)
+    return _motions(scene, x, duration, -1, 0)
 
 
-def expected_motions(scene: Scene, x: Expr, duration: Expr) -> list[Motion]:
+def expected_motions(scene: Scene, x: State, duration: Expr) -> list[Motion]:
     """Each body's motion from its true velocity under the persistent forces of the last step."""
     return _motions(scene, x, duration, 0, 1)
 
 
-def _motions(scene: Scene, x: Expr, duration: Expr, kick: Expr, share: int) -> list[Motion]:
-    """Motions with ``kick`` [s] times the persistent forces in the velocities and ``share`` of them acting."""
+def _motions(scene: Scene, x: State, duration: Expr, freed: int, share: int) -> list[Motion]:
+    """Motions with ``freed`` lags of the persistent forces in the velocities and ``share`` of them acting."""
     applied = {name: scene.u[3 * i : 3 * i + 3] for i, name in enumerate(scene.inputs)}
-    zero = ca.SX.zeros(3)
+    zero, lag = ca.SX.zeros(3), x["lag"]
     motions = []
     for body in scene.world.bodies:
-        part = {name: x[scene.layout[f"{body.name}.{name}"]] for name, _ in BODY_FIELDS}
-        turning = momentum(body, part["orientation"], part["angular_velocity"])
-        state = BodyState(
-            position=part["position"],
-            orientation=part["orientation"],
-            velocity=part["velocity"] + kick * part["reaction_force"] / body.mass,
-            angular_momentum=turning + kick * part["reaction_torque"],
-            force=applied.get(f"{body.name}.force", zero) + share * part["reaction_force"],
-            torque=applied.get(f"{body.name}.torque", zero) + share * part["reaction_torque"],
-        )
-        motions.append(scene.keep(free_motion(body, state, scene.gravity, duration)))
+        part = {name: x[f"{body.name}.{name}"] for name, _ in BODY_FIELDS}
+        push = tuple(applied.get(f"{body.name}.{name}", zero) for name in ("force", "torque"))
+        inertial, times = (body.mass, body.inertia), (freed, lag, share, duration)
+        motions.append(scene.pieces.do(_motion, inertial, part, push, scene.setting.gravity, times))
     return motions
 
 
-def _warm_start(scene: Scene, rows: Sequence[ContactRow], x: Expr, kick: Expr) -> list[Impulse]:
+def _motion(
+    inertial: tuple[Expr, Expr],
+    part: dict[str, Expr],
+    push: tuple[Expr, ...],
+    gravity: Expr,
+    times: tuple[int, Expr, int, Expr],
+) -> Motion:
+    (mass, inertia), (freed, lag, share, duration) = inertial, times
+    turning = momentum(inertia, part["orientation"], part["angular_velocity"])
+    kick = freed * lag
+    state = BodyState(
+        position=part["position"],
+        orientation=part["orientation"],
+        velocity=part["velocity"] + kick * part["reaction_force"] / mass,
+        angular_momentum=turning + kick * part["reaction_torque"],
+        force=push[0] + share * part["reaction_force"],
+        torque=push[1] + share * part["reaction_torque"],
+    )
+    return free_motion(mass, inertia, state, gravity, duration)
+
+
+def _times(duration: Expr, lag: Expr) -> tuple[Expr, Expr]:
+    """(over which impulses act as forces, how far the stored velocities will be ahead of the sweeps')."""
+    return duration / 2 + lag, duration / 2
+
+
+def _index(body: int | None) -> int:
+    if body is None:
+        raise ValueError("the first side of a pair must belong to a body")
+    return body
+
+
+def _warm_start(scene: Scene, rows: Sequence[Row], x: State, kick: Expr) -> list[Impulse]:
     """The last step's persistent forces, over this step's kick, in this step's frames."""
-    if not scene.scheme.warm_start:
+    if not scene.setting.scheme.warm_start:
         return [ZERO for _ in rows]
     impulses = []
-    for pair, row in zip(scene.world.pairs, rows, strict=True):
-        n = row.impulse_normal
-        normal, tangent = _split(kick * x[scene.layout[f"{pair.name}.force"]], n)
-        spin, roll = ZERO.spin, ZERO.roll
-        if pair.law.spins:
-            torque = kick * x[scene.layout[f"{pair.name}.torque"]]
-            spin, roll = ca.dot(n, torque), torque - n * ca.dot(n, torque)
-        impulses.append(Impulse(normal, tangent, spin, roll))
+    for pair, each in zip(scene.world.pairs, rows, strict=True):
+        force = x[f"{pair.name}.force"]
+        torque = x[f"{pair.name}.torque"] if pair.law.spins else None
+        impulses.append(scene.pieces.do(_resumed, each.row.impulse_normal, kick, force, torque))
     return impulses
 
 
+def _resumed(n: Expr, kick: Expr, force: Expr, torque: Expr | None) -> Impulse:
+    normal, tangent = _split(kick * force, n)
+    if torque is None:
+        return Impulse(ca.fmax(normal, 0), tangent, ZERO.spin, ZERO.roll)
+    return Impulse(ca.fmax(normal, 0), tangent, *_split(kick * torque, n))
+
+
 def _split(impulse: Expr, n: Expr) -> tuple[Expr, Expr]:
+    """What points along n, and the rest."""
     along = ca.dot(n, impulse)
-    return ca.fmax(along, 0), impulse - n * along
+    return along, impulse - n * along
 
 
 def _store_forces(
-    scene: Scene, rows: Sequence[ContactRow], impulses: Sequence[Impulse], kick: Expr, values: dict[str, Any]
+    scene: Scene, rows: Sequence[Row], impulses: Sequence[Impulse], kick: Expr, values: State
 ) -> list[tuple[Expr, Expr]]:
     """Persistent contact forces (impacts left out) into ``values``; returns their sum on each body."""
+    pieces, scheme = scene.pieces, scene.setting.scheme
     total = [(ca.SX.zeros(3), ca.SX.zeros(3)) for _ in scene.world.bodies]
-    for pair, row, impulse in zip(scene.world.pairs, rows, impulses, strict=True):
-        share = (1 - row.leaving) * (1 - row.struck) / kick
-        force, torque = scene.keep(
-            (share * impulse.linear(row.impulse_normal), share * impulse.angular(row.impulse_normal))
-        )
-        values[f"{pair.name}.force"] = force if scene.scheme.warm_start else ca.SX.zeros(3)
+    for pair, each, impulse in zip(scene.world.pairs, rows, impulses, strict=True):
+        force, torque = pieces.do(_persistent, each.row, impulse, kick, SHORTEST_KICK * scheme.dt)
+        values[f"{pair.name}.force"] = force if scheme.warm_start else ca.SX.zeros(3)
         if pair.law.spins:
-            values[f"{pair.name}.torque"] = torque if scene.scheme.warm_start else ca.SX.zeros(3)
-        for side in row.sides:
-            f, t = total[side.body]
-            sum_force = f + side.sign * force
-            sum_torque = t + side.sign * (ca.cross(side.impulse_arm, force) + torque)
-            total[side.body] = scene.keep((sum_force, sum_torque))
+            values[f"{pair.name}.torque"] = torque if scheme.warm_start else ca.SX.zeros(3)
+        for k, body in enumerate(each.bodies):
+            total[body] = pieces.do(_summed, total[body], each.row, k, force, torque)
     return total
 
 
-def _store_body(
-    motion: Motion, velocity: Expr, angular: Expr, shift: Shift, resting: tuple[Expr, Expr]
-) -> dict[str, Expr]:
-    """The body's pose and true velocities at the end of the stretch, by name."""
-    body, half, (force, torque) = motion.body, motion.dt / 2, resting
+def _persistent(row: ContactRow, impulse: Impulse, kick: Expr, shortest: float) -> tuple[Expr, Expr]:
+    share = (1 - row.leaving) * (1 - row.struck) / ca.fmax(kick, shortest)
+    return share * impulse.linear(row.impulse_normal), share * impulse.angular(row.impulse_normal)
+
+
+def _summed(total: tuple[Expr, Expr], row: ContactRow, k: int, force: Expr, torque: Expr) -> tuple[Expr, Expr]:
+    side = row.sides[k]
+    turning = ca.cross(side.impulse_arm, force) + torque
+    return total[0] + side.sign * force, total[1] + side.sign * turning
+
+
+def _store_body(motion: Motion, momentum: Momentum, shift: Shift, resting: tuple[Expr, Expr]) -> dict[str, Expr]:
+    """The body's pose and true velocities at the end of the stretch, by field."""
+    half, (force, torque) = motion.dt / 2, resting
     orientation = rotation.turn(motion.orientation, shift.angular)
-    end_momentum = angular + half * (motion.torque + torque)
+    end_momentum = momentum.angular + half * (motion.torque + torque)
     return {
-        f"{body.name}.position": motion.position + shift.linear,
-        f"{body.name}.orientation": orientation,
-        f"{body.name}.velocity": velocity + half * (motion.acceleration + force / body.mass),
-        f"{body.name}.angular_velocity": angular_velocity(body, orientation, end_momentum),
-        f"{body.name}.reaction_force": force,
-        f"{body.name}.reaction_torque": torque,
+        "position": motion.position + shift.linear,
+        "orientation": orientation,
+        "velocity": momentum.velocity + half * (motion.acceleration + force / motion.mass),
+        "angular_velocity": angular_velocity(motion.inertia, orientation, end_momentum),
+        "reaction_force": force,
+        "reaction_torque": torque,
     }

@@ -1,36 +1,23 @@
-"""A step as a list of small functions instead of one expression: where the step says ``keep``, a piece ends.
+"""A step as a list of small functions instead of one expression: each part that the step does is a piece.
 
-What is kept becomes fresh symbols, so that what follows depends on these and not on how they came about. Pieces of
-equal bodies, pairs and sweeps are equal functions, which a compiler then sees once.
+What a piece gives becomes fresh symbols, so that what follows depends on these and not on how they came about. Pieces
+of equal bodies, pairs and sweeps are equal functions, which a compiler then sees once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import casadi as ca
 
+from symphys.step.pieces import Once, Pieces
+from symphys.step.tree import Code, Numbers, dismantle, outline, rebuild
+
 T = TypeVar("T")
-Keep = Callable[[Any], Any]
-"""Takes a tree (dataclasses, lists, tuples, dicts) of expressions, gives the same tree."""
-Repeat = Callable[[int, Callable[[Any], Any], Any], Any]
-"""(count, once, state) -> the state after ``count`` times ``once``."""
 Expr = Any
 """casadi SX"""
-
-
-def whole(tree: T) -> T:
-    """Keeps nothing: the step stays one expression."""
-    return tree
-
-
-def over_again(count: int, once: Callable[[T], T], state: T) -> T:
-    """``once`` applied ``count`` times."""
-    for _ in range(count):
-        state = once(state)
-    return state
 
 
 @dataclass(frozen=True)
@@ -57,141 +44,98 @@ class Piece:
     output: Slot
 
 
-class Recorder:
-    """Collects the pieces of a step. Equal pieces share one function."""
+class Recorder(Pieces):
+    """Collects the pieces of a step."""
 
     def __init__(self) -> None:
         """Nothing yet."""
+        super().__init__()
         self.pieces: list[Piece] = []
-        self._home: dict[int, tuple[Slot, int]] = {}
-        self._symbols: dict[Slot, Expr] = {}
-        self._functions: dict[str, ca.Function] = {}
+        self._slots: list[Slot] = []
+        self._adopted: list[Expr] = []
 
-    def argument(self, name: str, size: int) -> Expr:
-        """Symbols for an argument of the step."""
-        return self._symbols[self.take(name, ca.SX.sym("kept", size))]
+    def argument(self, name: str, symbols: Expr) -> None:
+        """A slot for an argument of the step."""
+        self._slots.append(Slot(name, symbols.numel(), self.take(symbols)))
 
-    def take(self, name: str, symbols: Expr) -> Slot:
-        """A slot for symbols: of an argument, or of what a piece gives."""
-        slot = Slot(name, symbols.numel(), len(self._symbols))
-        self._symbols[slot] = symbols
-        for place in range(slot.size):
-            self._home[symbols[place].element_hash()] = slot, place
-        return slot
+    def give(self, name: str, values: Sequence[Expr]) -> Slot:
+        """A piece that puts values side by side."""
+        tree = self.do(_side_by_side, tuple(values))
+        slots: dict[int, int] = {}
+        codes = [(slots.setdefault(c[0], len(slots)), c[1]) if isinstance(c, tuple) else c for c in tree.codes]
+        symbols = [ca.SX.sym("a", self._slots[k].size) for k in slots]
+        entries = [ca.SX(c) if isinstance(c, float) else symbols[c[0]][c[1]] for c in codes]
+        function = self.shared(ca.Function("piece", symbols, [ca.vertcat(*entries)]))
+        return self._slots[self._add(name, function, list(slots))]
 
-    def keep(self, tree: T) -> T:
-        """The tree with what is computed in it replaced by symbols; a piece computes those."""
-        found: dict[int, Expr] = {}
-        for leaf in leaves(tree):
-            for number in leaf.nonzeros():
-                if computed(number):
-                    found.setdefault(number.element_hash(), number)
-        if not found:
-            return tree
-        slot = self.give("", ca.vertcat(*found.values()))
-        return renamed(tree, dict(zip(found, ca.vertsplit(self._symbols[slot]), strict=True)))
-
-    def give(self, name: str, values: Expr) -> Slot:
-        """A piece that computes ``values`` (a column)."""
-        inputs = tuple(dict.fromkeys(self._home[symbol.element_hash()][0] for symbol in ca.symvar(values)))
-        function = ca.Function("piece", [self._symbols[each] for each in inputs], [ca.densify(values)])
-        function = self._functions.setdefault(function.serialize(), function)
-        return self._add(name, function, inputs)
-
-    def repeat(self, count: int, once: Callable[[T], T], state: T) -> T:
-        """``once`` applied ``count`` times; as soon as it repeats itself its pieces are copied."""
+    def repeat(self, count: int, once: Once[T], context: Any, state: T) -> T:
+        """See ``Pieces``; as soon as it repeats itself its pieces are copied."""
         before, template = state, list[Piece]()
         for _ in range(count):
             slots = self._alike(before, state)
             if template and slots is not None:
-                before, state = state, self._copy(template, slots, before, state)
+                before, state = state, self._copy(template, slots, state)
                 template = self.pieces[-len(template) :]
             else:
                 first = len(self.pieces)
-                before, state = state, once(state)
+                before, state = state, once(self, context, state)
                 template = self.pieces[first:]
         return state
 
-    def _alike(self, before: Any, after: Any) -> dict[Slot, Slot] | None:
+    def _adopt(self, column: Expr) -> None:
+        homes = {symbol.element_hash(): self._homes[symbol.element_hash()][0] for symbol in ca.symvar(column)}
+        slots = list(dict.fromkeys(homes.values()))
+        symbols = [self._columns[slot] for slot in slots]
+        given = self._add("", self.shared(ca.Function("piece", symbols, [column])), slots)
+        self._adopted.append(column)
+        self._homes |= {entry.element_hash(): (given, k) for k, entry in enumerate(column.nonzeros())}
+
+    def _apply(self, function: ca.Function, slots: Sequence[int]) -> int:
+        return self._add("", function, slots)
+
+    def _alike(self, before: Any, after: Any) -> dict[int, int] | None:
         """Which slot of ``after`` stands where one of ``before`` stood; None if they do not lie alike."""
-        old, new = hashes(before), hashes(after)
-        slots: dict[Slot, Slot] = {}
+        old, new = self._codes_of(before), self._codes_of(after)
+        slots: dict[int, int] = {}
         for a, b in zip(old, new, strict=False):
-            (was, place), (now, there) = self._home[a], self._home[b]
-            if place != there or was.size != now.size or slots.setdefault(was, now) != now:
+            if isinstance(a, float) or isinstance(b, float):
+                if a != b:
+                    return None
+            elif a[1] != b[1] or self._size(a) != self._size(b) or slots.setdefault(a[0], b[0]) != b[0]:
                 return None
         return slots if len(old) == len(new) else None
 
-    def _copy(self, template: list[Piece], slots: dict[Slot, Slot], before: T, after: T) -> T:
-        """The state one time later: as ``template`` led from before to after, its copy leads from after on."""
-        symbols: dict[int, Expr] = {}
+    def _copy(self, template: list[Piece], slots: dict[int, int], after: T) -> T:
+        """The state one time later: as ``template`` led to ``after``, its copy leads on from there."""
         for piece in template:
-            new = self._add("", piece.function, tuple(slots.get(slot, slot) for slot in piece.inputs))
-            slots[piece.output] = new
-            for place in range(new.size):
-                symbols[self._symbols[piece.output][place].element_hash()] = self._symbols[new][place]
-        older = dict(zip(hashes(before), numbers(after), strict=True))
-        return renamed(after, older | symbols)
+            inputs = [slots.get(slot.number, slot.number) for slot in piece.inputs]
+            slots[piece.output.number] = self._add("", piece.function, inputs)
+        leaves: list[Expr] = []
+        shape = dismantle(after, leaves)
+        renamed: T = rebuild(shape, (self._renamed(leaf, slots) for leaf in leaves))
+        return renamed
 
-    def _add(self, name: str, function: ca.Function, inputs: tuple[Slot, ...]) -> Slot:
-        slot = self.take(name, ca.SX.sym("kept", function.numel_out(0)))
-        self.pieces.append(Piece(function, inputs, slot))
-        return slot
+    def _renamed(self, leaf: Expr, slots: dict[int, int]) -> Numbers:
+        codes = leaf.codes if isinstance(leaf, Numbers) else self._codes(leaf)
+        new = [c if isinstance(c, float) else (slots.get(c[0], c[0]), c[1]) for c in codes]
+        return Numbers(leaf.leaf if isinstance(leaf, Numbers) else outline(leaf), tuple(new))
 
+    def _codes_of(self, tree: Any) -> list[Code]:
+        """The codes of all entries of a tree, in order."""
+        leaves: list[Expr] = []
+        dismantle(tree, leaves)
+        return [c for leaf in leaves for c in (leaf.codes if isinstance(leaf, Numbers) else self._codes(leaf))]
 
-def computed(number: Expr) -> bool:
-    """Whether an SX scalar is neither a constant nor a symbol."""
-    return not number.is_constant() and not number.is_symbolic()
+    def _size(self, code: tuple[int, int]) -> int:
+        return self._slots[code[0]].size
 
-
-def renamed(tree: T, symbols: Mapping[int, Expr]) -> T:
-    """The tree with its numbers replaced by symbols, where there are some for them."""
-
-    def change(leaf: Expr) -> Expr:
-        new = [symbols.get(number.element_hash(), number) for number in leaf.nonzeros()]
-        return ca.SX(leaf.sparsity(), ca.vertcat(*new))
-
-    changed: T = mapped(tree, change)
-    return changed
-
-
-def numbers(tree: Any) -> list[Expr]:
-    """The symbols of a tree that has been kept, in order."""
-    return [number for leaf in leaves(tree) for number in leaf.nonzeros() if number.is_symbolic()]
+    def _add(self, name: str, function: ca.Function, slots: Sequence[int]) -> int:
+        symbols = ca.SX.sym("kept", function.numel_out(0))
+        slot = Slot(name, symbols.numel(), self.take(symbols))
+        self._slots.append(slot)
+        self.pieces.append(Piece(function, tuple(self._slots[k] for k in slots), slot))
+        return slot.number
 
 
-def hashes(tree: Any) -> list[int]:
-    """What tells those apart."""
-    return [number.element_hash() for number in numbers(tree)]
-
-
-def leaves(tree: Any) -> Iterator[Expr]:
-    """The SX matrices of a tree."""
-    if isinstance(tree, ca.SX):
-        yield tree
-    else:
-        for _, part in parts(tree):
-            yield from leaves(part)
-
-
-def mapped(tree: Any, change: Callable[[Expr], Expr]) -> Any:
-    """The tree with its SX matrices changed."""
-    if isinstance(tree, ca.SX):
-        return change(tree)
-    new = [(key, mapped(part, change)) for key, part in parts(tree)]
-    if isinstance(tree, list | tuple):
-        return type(tree)(part for _, part in new)
-    if isinstance(tree, dict):
-        return dict(new)
-    return replace(tree, **dict(new)) if new else tree
-
-
-def parts(tree: Any) -> list[tuple[Any, Any]]:
-    """What a tree consists of: nothing for what is no dataclass, list, tuple or dict."""
-    if isinstance(tree, list | tuple):
-        return list(enumerate(tree))
-    if isinstance(tree, dict):
-        return list(tree.items())
-    if is_dataclass(tree) and not isinstance(tree, type):
-        return [(field.name, getattr(tree, field.name)) for field in fields(tree)]
-    return []
+def _side_by_side(values: tuple[Expr, ...]) -> Expr:
+    return ca.vertcat(*(ca.densify(ca.vec(value)) for value in values))

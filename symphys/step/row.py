@@ -17,6 +17,9 @@ from symphys.world import Law
 Expr = Any
 """casadi SX, MX or DM"""
 
+Moving = tuple[Motion, ...]
+"""The motions of the sides that can move: of the first, or of both."""
+
 UNREACHED = -1e6
 """[m/s] a normal velocity that no row reaches: it gives no impulse."""
 
@@ -26,7 +29,6 @@ class Side:
     """One moving side of a row.
 
     Attributes:
-        body: index.
         sign: +1 for the pair's first body, -1 for the second.
         inverse_mass: [1/kg].
         inverse_inertia: at the row's instant: scalar or (3, 3) [1/(kg m^2)].
@@ -34,7 +36,6 @@ class Side:
         impulse_arm: (3,) [m] where the impulse is applied.
     """
 
-    body: int
     sign: int
     inverse_mass: Expr
     inverse_inertia: Expr
@@ -48,7 +49,6 @@ class ContactRow:
 
     Attributes:
         law: of the pair.
-        contact: where it came from.
         sides: one or two moving sides.
         normal: (3,) at the row's instant; the impulse's normal is ``impulse_normal``.
         impulse_normal: (3,).
@@ -65,7 +65,6 @@ class ContactRow:
     """
 
     law: Law
-    contact: Contact
     sides: tuple[Side, ...]
     normal: Expr
     impulse_normal: Expr
@@ -82,17 +81,11 @@ class ContactRow:
     knob: Expr
 
 
-def moving_sides(contact: Contact, motions: Sequence[Motion]) -> list[tuple[int, int, Motion]]:
-    """(side 0 or 1, body index, motion) of the sides that can move."""
-    bodies = (contact.pair.first.body, contact.pair.second.body)
-    return [(k, i, motions[i]) for k, i in enumerate(bodies) if i is not None]
-
-
-def at_touch(contact: Contact, moving: list[tuple[int, int, Motion]], t: Expr) -> tuple[Expr, Expr, Expr]:
+def at_touch(contact: Contact, motions: Moving, t: Expr) -> tuple[Expr, Expr, Expr]:
     """Relative velocity and acceleration (without the centripetal part) of the touching points at t*; the normal."""
-    frame = contact.frame(t)
+    frame = contact.meeting.frame(t)
     velocity, acceleration = ca.SX.zeros(3), ca.SX.zeros(3)
-    for k, _, motion in moving:
+    for k, motion in enumerate(motions):
         sign, arm, inverse = 1 - 2 * k, frame.arms[k], motion.inverse_inertia(t)
         spin = apply(inverse, motion.momentum_k + t * motion.torque)
         velocity += sign * (motion.velocity + t * motion.acceleration + ca.cross(spin, arm))
@@ -100,15 +93,17 @@ def at_touch(contact: Contact, moving: list[tuple[int, int, Motion]], t: Expr) -
     return velocity, acceleration, frame.normal
 
 
-def make_side(body: int, k: int, motion: Motion, row_time: Expr, frame: Frame, applied: Frame) -> Side:
-    """A side whose row is evaluated at ``row_time`` in ``frame`` and whose impulse acts in ``applied``."""
-    return Side(
-        body=body,
-        sign=1 - 2 * k,
-        inverse_mass=1 / motion.body.mass,
-        inverse_inertia=motion.inverse_inertia(row_time),
-        arm=frame.arms[k],
-        impulse_arm=applied.arms[k],
+def make_sides(motions: Moving, row_time: Expr, frame: Frame, applied: Frame) -> tuple[Side, ...]:
+    """The sides of a row that is evaluated at ``row_time`` in ``frame`` and whose impulse acts in ``applied``."""
+    return tuple(
+        Side(
+            sign=1 - 2 * k,
+            inverse_mass=1 / motion.mass,
+            inverse_inertia=motion.inverse_inertia(row_time),
+            arm=frame.arms[k],
+            impulse_arm=applied.arms[k],
+        )
+        for k, motion in enumerate(motions)
     )
 
 

@@ -7,16 +7,23 @@ u rebound speed, chi in [0, 1]: 1 where the rebound leaves the step, 0 where it 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import casadi as ca
 
 from symphys.collide.contact import Contact
-from symphys.motion import Motion
 from symphys.smooth import clip, positive
-from symphys.step.row import UNREACHED, ContactRow, at_touch, effective_masses, inverse_masses, make_side, moving_sides
-from symphys.step.scene import Scene
+from symphys.step.row import (
+    UNREACHED,
+    ContactRow,
+    Moving,
+    at_touch,
+    effective_masses,
+    inverse_masses,
+    make_sides,
+)
+from symphys.step.scene import Setting
+from symphys.world import Law
 
 Expr = Any
 """casadi SX, MX or DM"""
@@ -25,52 +32,50 @@ MARGIN = 1e-4
 """Width of chi's rise, as a share of the reference acceleration: a rebound that barely leaves is part rest."""
 
 
-def prepare(scene: Scene, contact: Contact, motions: Sequence[Motion], duration: Expr, spared: Expr = 0) -> ContactRow:
+def prepare(setting: Setting, law: Law, contact: Contact, motions: Moving, duration: Expr, spared: Expr) -> ContactRow:
     """The row of one contact over a stretch of time.
 
     Args:
-        scene: what holds over the step.
+        setting: what holds over the step.
+        law: of the pair.
         contact: along the free motion.
-        motions: of all bodies.
+        motions: of the sides that can move.
         duration: of the stretch [s].
         spared: 1 for a contact that gives no impulse.
     """
-    scheme, knob = scene.scheme, scene.knob
-    moving = moving_sides(contact, motions)
+    scheme, knob = setting.scheme, setting.knob
     time = contact.time if scheme.time_of_impact else ca.SX(0)
-    velocity, acceleration, normal = at_touch(contact, moving, time)
+    velocity, acceleration, normal = at_touch(contact, motions, time)
     pull = ca.dot(normal, acceleration)
-    rebound = contact.pair.law.restitution * positive(-ca.dot(normal, velocity), knob)
-    leaving = contact.hit * _leaves(rebound, pull, duration - time, scene.reference, scheme.dt, knob)
+    rebound = law.restitution * positive(-ca.dot(normal, velocity), knob)
+    leaving = contact.hit * _leaves(rebound, pull, duration - time, setting.reference, scheme.dt, knob)
     half = duration / 2
     row_time = half + leaving * (time - half)
-    frame, applied = contact.frame(row_time), contact.frame(leaving * time)
-    sides = tuple(make_side(i, k, m, row_time, frame, applied) for k, i, m in moving)
+    frame, applied = contact.meeting.frame(row_time), contact.meeting.frame(leaving * time)
+    sides = make_sides(motions, row_time, frame, applied)
     k_normal, *k_others = inverse_masses(sides, frame.normal)
-    softness, target = _normal_target(contact, duration, time, rebound, pull, k_normal, knob)
-    quick = contact.rate < -scene.fast
-    target = ca.if_else(spared, UNREACHED, target)
+    softness, target = _normal_target(law, contact, duration, time, rebound, pull, k_normal, knob)
+    quick = contact.rate < -setting.fast
     slip = contact.hit * leaving * (half - time) * (acceleration - normal * pull)
     return ContactRow(
-        law=contact.pair.law,
-        contact=contact,
+        law=law,
         sides=sides,
         normal=frame.normal,
         impulse_normal=applied.normal,
         **effective_masses(k_normal + softness, *k_others),
         softness=softness,
-        target=target,
+        target=ca.if_else(spared, UNREACHED, target),
         slip_target=slip if scheme.impact_friction else ca.SX.zeros(3),
         leaving=leaving,
-        struck=0 if contact.pair.law.soft else ca.logic_and(contact.hit, quick),
-        width=width_of(scene, contact),
+        struck=ca.SX(0) if law.soft else ca.logic_and(contact.hit, quick),
+        width=width_of(setting, contact),
         knob=knob,
     )
 
 
-def width_of(scene: Scene, contact: Contact) -> Expr:
+def width_of(setting: Setting, contact: Contact) -> Expr:
     """Of the smoothed projection [m/s]: the knob at rest, nothing for an impact."""
-    return scene.knob * ca.exp(-((contact.rate / scene.fast) ** 2))
+    return setting.knob * ca.exp(-((contact.rate / setting.fast) ** 2))
 
 
 def _leaves(rebound: Expr, pull: Expr, left: Expr, reference: Expr, dt: float, knob: Expr) -> Expr:
@@ -80,7 +85,7 @@ def _leaves(rebound: Expr, pull: Expr, left: Expr, reference: Expr, dt: float, k
 
 
 def _normal_target(
-    contact: Contact, duration: Expr, time: Expr, rebound: Expr, pull: Expr, inverse_mass: Expr, knob: Expr
+    law: Law, contact: Contact, duration: Expr, time: Expr, rebound: Expr, pull: Expr, inverse_mass: Expr, knob: Expr
 ) -> tuple[Expr, Expr]:
     """(softness, target): the velocity that the normal row asks for at the middle of the step.
 
@@ -88,7 +93,6 @@ def _normal_target(
     Soft (Catto, GDC 2011), deviation: the spring acts over what is left of the step, so that a contact that
     begins late in the step begins gently.
     """
-    law = contact.pair.law
     away = -ca.fmax(contact.gap, 0) / duration
     if not law.soft:
         return ca.SX(0), ca.if_else(contact.hit, positive(rebound + pull * (duration / 2 - time), knob), away)

@@ -8,8 +8,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.smooth import TINY_SQUARE
-from symphys.state import Layout
-from symphys.step.record import Keep, Repeat, over_again, whole
+from symphys.step.pieces import Pieces
 from symphys.world import Scheme, World
 
 Expr = Any
@@ -19,38 +18,60 @@ SLOWEST = 1.0
 """[m/s^2] least reference acceleration: what counts as fast when there is no gravity."""
 
 
+State = dict[str, Expr]
+"""The state's parts by name; see ``symphys.state.Layout``."""
+
+
 @dataclass(frozen=True)
-class Scene:
-    """What stays the same over a step.
+class Setting:
+    """What every part of a step may need to know.
 
     Attributes:
-        world, scheme, layout: what is simulated and how.
-        inputs: names of the forces and torques that ``u`` stacks.
-        u: (3 * inputs,), constant over the step.
+        scheme: how the step is taken.
+        gravity: (3,) [m/s^2].
         knob: smoothing [m/s].
-        keep, repeat: see ``record``: ``whole`` and ``over_again``, or those of a ``Recorder``.
+        reference: the acceleration [m/s^2] below which nothing counts as fast.
     """
 
-    world: World
     scheme: Scheme
-    layout: Layout
-    inputs: tuple[str, ...]
-    u: Expr
+    gravity: Expr
     knob: Expr
-    keep: Keep = whole
-    repeat: Repeat = over_again
-
-    @property
-    def gravity(self) -> Expr:
-        """(3,) [m/s^2]."""
-        return ca.vertcat(*self.world.gravity)
-
-    @property
-    def reference(self) -> Expr:
-        """The acceleration [m/s^2] below which nothing counts as fast."""
-        return ca.fmax(ca.sqrt(ca.dot(self.gravity, self.gravity) + TINY_SQUARE), SLOWEST)
+    reference: Expr
 
     @property
     def fast(self) -> Expr:
         """The speed [m/s] of approach above which a contact is an impact, not rest."""
         return 2 * self.reference * self.scheme.dt
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What stays the same over a step.
+
+    Attributes:
+        world: what is simulated.
+        setting: how.
+        inputs: names of the forces and torques that ``u`` stacks.
+        u: (3 * inputs,), constant over the step.
+        pieces: how the parts of the step are put together.
+    """
+
+    world: World
+    setting: Setting
+    inputs: tuple[str, ...]
+    u: Expr
+    pieces: Pieces
+
+
+def make_scene(
+    world: World, scheme: Scheme | None, inputs: tuple[str, ...], u: Expr, knob: Expr, pieces: Pieces
+) -> Scene:
+    """The scene of a world."""
+    gravity = ca.vertcat(*world.gravity)
+    setting = Setting(scheme or Scheme(), gravity, knob, pieces.do(reference, gravity))
+    return Scene(world, setting, inputs, u, pieces)
+
+
+def reference(gravity: Expr) -> Expr:
+    """|gravity|, or 1 m/s^2 if that is more."""
+    return ca.fmax(ca.sqrt(ca.dot(gravity, gravity) + TINY_SQUARE), SLOWEST)

@@ -17,7 +17,8 @@ import casadi as ca
 from symphys.step.impact import collide_now, find_cut, passing
 from symphys.step.pgs import Impulse
 from symphys.step.phase import Phase, advance
-from symphys.step.scene import Scene
+from symphys.step.row import ContactRow
+from symphys.step.scene import Scene, State
 from symphys.world import World
 
 Expr = Any
@@ -25,36 +26,38 @@ Expr = Any
 
 
 @dataclass(frozen=True)
-class StepResult:
-    """One step's new state and what happened in it; forces and gaps in the order of the world's pairs.
+class Report:
+    """What happened in a step; forces and gaps in the order of the world's pairs.
 
     Attributes:
-        x: the next state.
         forces: (3 * pairs,) impulse / dt on each pair's first body [N], world frame.
         gaps: (pairs,) at the start of the step [m].
         residual: largest change of a normal or friction impulse in a last sweep [N s].
         crowded: 1 if some body has two or more impacts at once (in one stretch), else 0.
     """
 
-    x: Expr
     forces: Expr
     gaps: Expr
     residual: Expr
     crowded: Expr
 
 
-def take_step(scene: Scene, x: Expr) -> StepResult:
-    """The expression of one step."""
-    dt = scene.scheme.dt
-    if not (scene.scheme.split and scene.scheme.time_of_impact and coupled(scene.world)):
+def take_step(scene: Scene, x: State) -> tuple[State, list[Phase]]:
+    """The state after one step, and the stretches and the impact that led there."""
+    scheme, dt = scene.setting.scheme, scene.setting.scheme.dt
+    if not (scheme.split and scheme.time_of_impact and coupled(scene.world)):
         phase = advance(scene, x, ca.SX(dt))
-        return _result(scene, phase.x, [phase])
+        return phase.x, [phase]
     cut = find_cut(scene, x)
     before = advance(scene, x, cut.first, spared=cut.fast)
     struck = collide_now(scene, before.x, cut)
-    rest = dt - cut.first
+    rest = scene.pieces.do(_rest, dt, cut.first)
     after = advance(scene, struck.x, rest, spared=passing(scene, struck.x, rest))
-    return _result(scene, after.x, [before, struck, after])
+    return after.x, [before, struck, after]
+
+
+def _rest(dt: float, first: Expr) -> Expr:
+    return dt - first
 
 
 def coupled(world: World) -> bool:
@@ -63,31 +66,41 @@ def coupled(world: World) -> bool:
     return any(count > 1 for count in sides.values())
 
 
-def _result(scene: Scene, x: Expr, phases: list[Phase]) -> StepResult:
-    forces: Expr = ca.SX.zeros(3 * len(scene.world.pairs))
-    residual: Expr = ca.SX(0)
-    crowded: Expr = ca.SX(0)
+def report(scene: Scene, phases: list[Phase]) -> Report:
+    """What happened in a step, from its stretches."""
+    do = scene.pieces.do
+    forces = tuple(ca.SX.zeros(3) for _ in scene.world.pairs)
+    residual, crowded = ca.SX(0), ca.SX(0)
     for phase in phases:
-        given = [i.linear(r.impulse_normal) for i, r in zip(phase.impulses, phase.rows, strict=True)]
-        forces += ca.vertcat(ca.SX(0, 1), *given) / scene.scheme.dt
+        given = zip(forces, phase.rows, phase.impulses, strict=True)
+        forces = tuple(do(_added, force, each.row, impulse, scene.setting.scheme.dt) for force, each, impulse in given)
         for new, old in zip(phase.impulses, phase.last, strict=True):
-            residual = ca.fmax(residual, _change(new.minus(old)))
-        crowded = ca.fmax(crowded, _crowded(phase))
-    gaps = ca.vertcat(ca.SX(0, 1), *(row.contact.gap for row in phases[0].rows))
-    return StepResult(x, forces, gaps, residual, crowded)
+            residual = do(_larger_change, residual, new, old)
+        crowded = do(_crowded, crowded, tuple((each.bodies, each.row.struck, each.row.leaving) for each in phase.rows))
+    gaps = tuple(contact.gap for contact in phases[0].contacts)
+    return Report(do(_stack, forces), do(_stack, gaps), residual, crowded)
 
 
-def _change(impulse: Impulse) -> Expr:
-    return ca.fmax(ca.fabs(impulse.normal), ca.norm_inf(impulse.tangent))
+def _added(force: Expr, row: ContactRow, impulse: Impulse, dt: float) -> Expr:
+    return force + impulse.linear(row.impulse_normal) / dt
 
 
-def _crowded(phase: Phase) -> Expr:
-    """1 if some body has two or more impacts in this stretch."""
+def _stack(columns: tuple[Expr, ...]) -> Expr:
+    return ca.densify(ca.vertcat(ca.SX(0, 1), *columns))
+
+
+def _larger_change(residual: Expr, new: Impulse, old: Impulse) -> Expr:
+    change = new.minus(old)
+    return ca.fmax(residual, ca.fmax(ca.fabs(change.normal), ca.norm_inf(change.tangent)))
+
+
+def _crowded(before: Expr, rows: tuple[tuple[tuple[int, ...], Expr, Expr], ...]) -> Expr:
+    """1 if some body has two or more impacts in this stretch, or had before."""
     counts: dict[int, Expr] = {}
-    for row in phase.rows:
-        for side in row.sides:
-            counts[side.body] = counts.get(side.body, 0) + ca.fmax(row.struck, row.leaving > 0)
-    result: Expr = ca.SX(0)
+    for bodies, struck, leaving in rows:
+        for body in bodies:
+            counts[body] = counts.get(body, 0) + ca.fmax(struck, leaving > 0)
+    result = before
     for count in counts.values():
         result = ca.fmax(result, count >= 2)
     return result

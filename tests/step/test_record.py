@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ import pytest
 from symphys.shapes import Plane, Sphere
 from symphys.state import Layout, initial_state
 from symphys.step import Piece, Recording, Slot, record_step, step_function
+from symphys.step.pieces import Pieces
 from symphys.step.record import Recorder
 from symphys.world import Body, Law, Scheme, World, make_world
 
@@ -33,7 +36,7 @@ def evaluate(piece: Piece, values: dict[Slot, np.ndarray]) -> np.ndarray:
     return np.array(ca.DM(result)).ravel()
 
 
-def run(recording: Recording, layout: Layout, x: np.ndarray, u: np.ndarray, knob: float) -> np.ndarray:
+def run(recording: Recording, layout: Layout, x: np.ndarray, u: np.ndarray, knob: float, p: Any = ()) -> np.ndarray:
     """The next state, piece by piece."""
     values: dict[Slot, np.ndarray] = {}
     after = np.zeros(layout.size)
@@ -42,7 +45,7 @@ def run(recording: Recording, layout: Layout, x: np.ndarray, u: np.ndarray, knob
             if slot.name in layout:
                 values[slot] = x[layout[slot.name]]
             elif slot.name:
-                values[slot] = {"u": u, "p": np.zeros(0), "smoothing": np.array([knob])}[slot.name]
+                values[slot] = {"u": u, "p": np.array(p), "smoothing": np.array([knob])}[slot.name]
         values[piece.output] = evaluate(piece, values)
         if piece.output in recording.results:
             after[recording.results[piece.output]] = values[piece.output]
@@ -79,27 +82,38 @@ def test_equal_parts_share_their_functions() -> None:
     assert distinct(20, 10) == distinct(2, 10) == distinct(2, 40)
 
 
-def test_what_is_kept_is_computed_once() -> None:
+def test_equal_parts_share_a_function_and_numbers_in_passing_are_no_part_of_it() -> None:
     recorder = Recorder()
-    x = recorder.argument("x", 2)
-    square = x[0] ** 2
-    kept = recorder.keep({"a": (square, x[1]), "b": [ca.vertcat(square, 3.0)]})
-    assert len(recorder.pieces) == 1
-    assert recorder.pieces[0].output.size == 1
-    assert kept["a"][1].element_hash() == x[1].element_hash()
-    assert kept["b"][0][0].element_hash() == kept["a"][0].element_hash()
-    assert recorder.keep(kept) is kept
+    x, y = ca.SX.sym("x", 2), ca.SX.sym("y", 2)
+    recorder.argument("x", x)
+    recorder.argument("y", y)
+
+    def part(tree: dict[str, ca.SX]) -> tuple[ca.SX, ca.SX, ca.SX]:
+        return tree["a"] ** 2, tree["b"], ca.SX(3)
+
+    square, passed, constant = recorder.do(part, {"a": x[0], "b": x[1]})
+    again, *_ = recorder.do(part, {"a": y[0], "b": y[1]})
+    first, second = recorder.pieces
+    assert first.function is second.function
+    assert (first.output.size, first.inputs[0].name, second.inputs[0].name) == (1, "x", "y")
+    assert recorder.value(passed).element_hash() == x[1].element_hash()
+    assert float(recorder.value(constant)) == 3
+    assert recorder.value(square).element_hash() != recorder.value(again).element_hash()
 
 
-def test_sweeps_that_change_places_are_not_copied() -> None:
-    """Where a state's numbers change their order from one time to the next, copying pieces would be wrong."""
-    recorder = Recorder()
-    x = recorder.argument("x", 2)
+def turn(pieces: Pieces, factor: float, state: ca.SX) -> ca.SX:
+    return pieces.do(turned, factor, state)
 
-    def turn(state: ca.SX) -> ca.SX:
-        return recorder.keep(ca.vertcat(state[1] + 1, 2 * state[0]))
 
-    recorder.give("next", recorder.repeat(6, turn, x))
+def turned(factor: float, state: ca.SX) -> ca.SX:
+    return ca.vertcat(state[1] + 1, factor * state[0])
+
+
+def test_sweeps_that_change_places_are_right() -> None:
+    """Each number moves to another place every time."""
+    recorder, x = Recorder(), ca.SX.sym("x", 2)
+    recorder.argument("x", x)
+    recorder.give("next", [recorder.repeat(6, turn, 2.0, x)])
     values = np.array([1.0, 2.0])
     memory = {slot: values for piece in recorder.pieces for slot in piece.inputs if slot.name == "x"}
     for piece in recorder.pieces:
@@ -108,3 +122,18 @@ def test_sweeps_that_change_places_are_not_copied() -> None:
     for _ in range(6):
         expected = np.array([expected[1] + 1, 2 * expected[0]])
     assert memory[recorder.pieces[-1].output] == pytest.approx(expected)
+
+
+def test_parameters_in_expressions_have_a_piece() -> None:
+    """A mass that follows from a radius is computed, once a step."""
+    radius = ca.SX.sym("radius")
+    world = make_world([Body.ball("ball", radius, 1000 * radius**3)], [Plane.ground()])
+    recording = record_step(world, parameters=[radius])
+    assert run(recording, Layout(world), *start(world), 0.0, np.array([0.1])) == pytest.approx(
+        np.array(step_function(world, parameters=[radius])(start(world)[0], [], 0.1, 0)).ravel()
+    )
+
+
+def start(world: World) -> tuple[np.ndarray, np.ndarray]:
+    """(x, u) at the start, above the ground."""
+    return np.array(initial_state(world, {"ball.position": [0, 0, 0.1]})).ravel(), np.zeros(0)

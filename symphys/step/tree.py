@@ -1,0 +1,107 @@
+"""Trees of expressions: dataclasses, tuples, lists and dicts with matrices among their leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
+from typing import Any
+
+import casadi as ca
+
+Expr = Any
+"""casadi SX"""
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """Where a tree has a matrix: its sparsity; ``pattern`` None: dense."""
+
+    rows: int
+    columns: int
+    pattern: tuple[int, ...] | None
+
+
+Code = float | tuple[int, int]
+"""An entry of a matrix: a constant, or (which slot, which place in it)."""
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """A matrix by its entries' codes, column by column; what lies between two parts of a step."""
+
+    leaf: Leaf
+    codes: tuple[Code, ...]
+
+
+@dataclass(frozen=True)
+class Knot:
+    """Where a tree forks: its kind, its keys, and what hangs below. Also what is no fork: ``keys`` hold that."""
+
+    kind: type
+    keys: tuple[Hashable, ...]
+    below: tuple[Any, ...]
+
+
+def outline(matrix: Expr) -> Leaf:
+    """The sparsity of an SX matrix."""
+    return Leaf(matrix.size1(), matrix.size2(), None if matrix.is_dense() else tuple(matrix.sparsity().find()))
+
+
+def dismantle(tree: Any, leaves: list[Expr]) -> Hashable:
+    """The shape of a tree, which compares equal for equal trees; its matrices are appended to ``leaves``.
+
+    Whatever is neither a matrix nor a fork (numbers, texts, functions) belongs to the shape.
+    """
+    kind = type(tree)
+    if kind is Numbers:
+        leaves.append(tree)
+        return tree.leaf  # type: ignore[no-any-return]
+    if kind is list or kind is tuple:
+        return Knot(kind, (), tuple([dismantle(part, leaves) for part in tree]))
+    if kind is dict:
+        return Knot(kind, tuple(tree), tuple([dismantle(part, leaves) for part in tree.values()]))
+    if isinstance(tree, ca.SX | ca.DM):
+        leaves.append(ca.SX(tree))
+        return outline(leaves[-1])
+    names = field_names(kind)
+    if names is not None:
+        return Knot(kind, (), tuple([dismantle(getattr(tree, name), leaves) for name in names]))
+    return Knot(kind, (tree,), ())
+
+
+@cache
+def field_names(kind: type) -> tuple[str, ...] | None:
+    """Of a dataclass; None for other types."""
+    return tuple(field.name for field in fields(kind)) if is_dataclass(kind) else None
+
+
+def rebuild(shape: Any, leaves: Iterator[Expr]) -> Any:
+    """The tree of this shape with other matrices."""
+    kind = type(shape)
+    if kind is Leaf:
+        return next(leaves)
+    if shape.kind is dict:
+        return dict(zip(shape.keys, [rebuild(part, leaves) for part in shape.below], strict=True))
+    if shape.keys:
+        return shape.keys[0]
+    parts = [rebuild(part, leaves) for part in shape.below]
+    return shape.kind(*parts) if field_names(shape.kind) is not None else shape.kind(parts)
+
+
+def leaves_of(shape: Any, found: list[Leaf]) -> None:
+    """The outlines of a tree's matrices, from its shape, in order."""
+    if type(shape) is Leaf:
+        found.append(shape)
+    else:
+        for part in shape.below:
+            leaves_of(part, found)
+
+
+def matrix(leaf: Leaf, entries: list[Expr]) -> Expr:
+    """A matrix of this sparsity from its entries."""
+    column = ca.vertcat(ca.SX(0, 1), *entries)
+    if leaf.pattern is None:
+        return ca.reshape(column, leaf.rows, leaf.columns)
+    sparsity = ca.Sparsity.nonzeros(leaf.rows, leaf.columns, list(leaf.pattern))
+    return ca.SX(sparsity, column)
