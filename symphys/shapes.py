@@ -122,8 +122,8 @@ POINTS: dict[tuple[type, type], int] = {
     (Sphere, Capsule): 1,
     (Sphere, Box): 1,
     (Capsule, Capsule): 5,
-    (Capsule, Box): 4,
-    (Box, Box): 12,
+    (Capsule, Box): 8,
+    (Box, Box): 16,
 }
 """In how many points two surfaces may touch at once: one candidate for each is looked at in every step."""
 

@@ -5,13 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from symphys.collide.box_box import box_box
 from symphys.collide.box_plane import box_plane
+from symphys.collide.capsule_box import capsule_box
+from symphys.collide.capsule_capsule import capsule_capsule
 from symphys.collide.capsule_plane import capsule_plane
 from symphys.collide.contact import Contact, flipped
+from symphys.collide.on_terrain import box_terrain, capsule_terrain, sphere_terrain
+from symphys.collide.sphere_box import sphere_box
+from symphys.collide.sphere_capsule import sphere_capsule
 from symphys.collide.sphere_plane import sphere_plane
 from symphys.collide.sphere_sphere import sphere_sphere
 from symphys.course import Course
-from symphys.shapes import Box, Capsule, Plane, Sphere, Surface
+from symphys.shapes import Box, Capsule, Plane, Sphere, Surface, Terrain
 
 __all__ = ["Contact", "collide"]
 
@@ -21,7 +27,15 @@ RULES: dict[tuple[type, type], Rule] = {
     (Sphere, Plane): sphere_plane,
     (Capsule, Plane): capsule_plane,
     (Box, Plane): box_plane,
+    (Sphere, Terrain): sphere_terrain,
+    (Capsule, Terrain): capsule_terrain,
+    (Box, Terrain): box_terrain,
     (Sphere, Sphere): sphere_sphere,
+    (Sphere, Capsule): sphere_capsule,
+    (Sphere, Box): sphere_box,
+    (Capsule, Capsule): capsule_capsule,
+    (Capsule, Box): capsule_box,
+    (Box, Box): box_box,
 }
 """Which rule covers which surfaces; ``shapes.POINTS`` says how many points each returns."""
 

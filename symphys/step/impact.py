@@ -123,6 +123,7 @@ def _row(setting: Setting, law: Law, contact: Contact, motions: Moving, struck: 
         softness=ca.SX(0),
         target=ca.SX(UNREACHED) if law.soft else ca.if_else(struck, rebound, resting),
         slip_target=ca.SX.zeros(3),
+        delay=ca.SX(0),
         leaving=struck,
         struck=struck,
         width=struck * width_of(setting, contact),

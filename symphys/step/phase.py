@@ -16,7 +16,7 @@ from symphys.course import at_rest
 from symphys.motion import BodyState, Motion, angular_velocity, free_motion, momentum
 from symphys.state import BODY_FIELDS
 from symphys.step.pgs import ZERO, Impulse, Momentum, Row, begin, relax
-from symphys.step.position import displacements, push_apart
+from symphys.step.position import close_gaps, displacements
 from symphys.step.row import ContactRow
 from symphys.step.rows import prepare
 from symphys.step.scene import Scene, State
@@ -74,12 +74,13 @@ def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = ())
 
     # velocities: warm start, then sweeps
     momenta = tuple(Momentum(m.mid_velocity, m.mid_momentum) for m in motions)
-    started = begin(pieces, rows, momenta, _warm_start(scene, rows, x, kick))
+    resumed = _warm_start(scene, rows, x, kick)
+    started = begin(pieces, rows, momenta, resumed)
     solved = relax(pieces, scene.setting.scheme.sweeps, tuple(rows), started)
 
     # positions
-    moved = displacements(scene, rows, contacts, solved, motions, duration)
-    shifts = push_apart(scene, rows, contacts, moved)
+    moved = displacements(scene, rows, resumed, solved, motions, duration)
+    shifts = close_gaps(scene, rows, contacts, list(zip(resumed, solved.impulses, strict=True)), moved)
 
     # the next state
     values: State = {"lag": half}

@@ -23,21 +23,19 @@ Shifts = tuple[Shift, ...]
 def displacements(
     scene: Scene,
     rows: Sequence[Row],
-    contacts: Sequence[Contact],
+    started: Sequence[Impulse],
     solved: Solution,
     motions: Sequence[Motion],
     duration: Expr,
 ) -> list[Shift]:
-    """Duration times the new velocities, less t* times what each impact changed: until t* it had not happened."""
+    """Duration times the new velocities, less what impulses would have done before they act."""
     do = scene.pieces.do
     shifts = [do(_drift, motion, momentum, duration) for motion, momentum in zip(motions, solved.momenta, strict=True)]
     if not scene.setting.scheme.time_of_impact:
         return shifts
-    for each, contact, impulse in zip(rows, contacts, solved.impulses, strict=True):
-        late = contact.hit, contact.time
+    for each, *impulses in zip(rows, started, solved.impulses, strict=True):
         for side, body in enumerate(each.bodies):
-            turning = motions[body].inverse_mid
-            shifts[body] = do(_delayed, shifts[body], each.row, side, impulse, late, turning)
+            shifts[body] = do(_delayed, shifts[body], each.row, side, impulses, motions[body].inverse_mid)
     return shifts
 
 
@@ -45,22 +43,43 @@ def _drift(motion: Motion, momentum: Momentum, duration: Expr) -> Shift:
     return Shift(duration * momentum.velocity, duration * apply(motion.inverse_mid, momentum.angular))
 
 
-def _delayed(shift: Shift, row: ContactRow, k: int, impulse: Impulse, late: tuple[Expr, Expr], turning: Expr) -> Shift:
-    """The displacement less that which the impulse on side k would have caused before the touch."""
-    side, (hit, time) = row.sides[k], late
+def _delayed(shift: Shift, row: ContactRow, k: int, impulses: list[Impulse], turning: Expr) -> Shift:
+    """The displacement less that which the impulse on side k would have caused before it acts.
+
+    What goes on from the last step has acted all the time, whatever rounding makes of the gap.
+    """
+    side, impulse = row.sides[k], impulses[1].minus(impulses[0])
     force, twist = impulse.linear(row.impulse_normal), impulse.angular(row.impulse_normal)
     torque = ca.cross(side.impulse_arm, force) + twist
-    early = hit * time * side.sign
+    early = row.delay * side.sign
     return Shift(shift.linear - early * side.inverse_mass * force, shift.angular - early * apply(turning, torque))
 
 
-def push_apart(scene: Scene, rows: Sequence[Row], contacts: Sequence[Contact], shifts: list[Shift]) -> Shifts:
-    """Gauss-Seidel on the displacements until no rigid contact overlaps; velocities are not touched."""
-    rigid = tuple((each, contact) for each, contact in zip(rows, contacts, strict=True) if not each.row.law.soft)
+def close_gaps(
+    scene: Scene,
+    rows: Sequence[Row],
+    contacts: Sequence[Contact],
+    impulses: Sequence[tuple[Impulse, Impulse]],
+    shifts: list[Shift],
+) -> Shifts:
+    """Gauss-Seidel on the displacements until no rigid contact overlaps, and those that last do not gape.
+
+    Velocities are not touched. ``impulses``: before the sweeps, which are those that last, and after them.
+    """
+    do, scheme = scene.pieces.do, scene.setting.scheme
+    rigid = tuple(
+        (each, contact, do(_lasts, contact, each.row, pair))
+        for each, contact, pair in zip(rows, contacts, impulses, strict=True)
+        if not each.row.law.soft
+    )
     state = (tuple(shifts), tuple(ca.SX(0) for _ in rigid))
-    scheme = scene.setting.scheme
-    context = (rigid, scheme.push_out)
-    return scene.pieces.repeat(scheme.position_sweeps, _push_all, context, state)[0]
+    return scene.pieces.repeat(scheme.position_sweeps, _push_all, (rigid, scheme.push_out), state)[0]
+
+
+def _lasts(contact: Contact, row: ContactRow, impulses: tuple[Impulse, Impulse]) -> Expr:
+    """1 if a contact carried load and still does."""
+    loaded = ca.logic_and(impulses[0].normal > 0, impulses[1].normal > 0)
+    return ca.logic_and(ca.logic_and(contact.hit, loaded), row.leaving <= 0)
 
 
 def _push_all(
@@ -68,25 +87,24 @@ def _push_all(
 ) -> tuple[Shifts, tuple[Expr, ...]]:
     """One pass over all rigid contacts."""
     (rigid, share), shifts, pushes = context, list(state[0]), list(state[1])
-    for k, (each, contact) in enumerate(rigid):
+    for k, (each, contact, lasts) in enumerate(rigid):
         moved = tuple(shifts[i] for i in each.bodies)
-        moved, pushes[k] = pieces.do(_push, each.row, contact, moved, pushes[k], share)
+        moved, pushes[k] = pieces.do(_push, each.row, contact, lasts, moved, pushes[k], share)
         for i, shift in zip(each.bodies, moved, strict=True):
             shifts[i] = shift
     return tuple(shifts), tuple(pushes)
 
 
-def _push(row: ContactRow, contact: Contact, moved: Shifts, old: Expr, share: Expr) -> tuple[Shifts, Expr]:
+def _push(
+    row: ContactRow, contact: Contact, lasts: Expr, moved: Shifts, old: Expr, share: float
+) -> tuple[Shifts, Expr]:
     gap = contact.meeting.gap_after(moved[0], moved[1] if len(moved) > 1 else UNMOVED)
-    new = _not_negative(old - share * gap * row.normal_mass)
+    free = old - share * gap * row.normal_mass
+    # at 0 the slope is that of ``free``: a body that exactly touches is held by the surface
+    new = ca.if_else(ca.logic_or(lasts, free >= 0), free, 0)
     step = (new - old) * row.normal
     pushed = []
     for side, shift in zip(row.sides, moved, strict=True):
         turn = apply(side.inverse_inertia, ca.cross(side.arm, step))
         pushed.append(Shift(shift.linear + side.sign * side.inverse_mass * step, shift.angular + side.sign * turn))
     return tuple(pushed), new
-
-
-def _not_negative(x: Expr) -> Expr:
-    """max(x, 0) with the slope of x at 0: a body that exactly touches is held by the surface."""
-    return ca.if_else(x >= 0, x, 0)

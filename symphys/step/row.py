@@ -58,6 +58,7 @@ class ContactRow:
         softness: gamma [1/kg] of a soft contact, 0 if rigid.
         target: normal velocity at the middle of the step [m/s].
         slip_target: (3,) tangential velocity that friction aims at [m/s].
+        delay: [s] the impulse acts on positions from then on; 0 for a contact that is not hit.
         leaving: hit chi: the share of the contact that is an impact, in [0, 1].
         struck: 1 if the surfaces meet at speed, else 0.
         width: of the smoothed normal projection [m/s]; 0 for fast approach.
@@ -75,6 +76,7 @@ class ContactRow:
     softness: Expr
     target: Expr
     slip_target: Expr
+    delay: Expr
     leaving: Expr
     struck: Expr
     width: Expr
@@ -105,6 +107,15 @@ def make_sides(motions: Moving, row_time: Expr, frame: Frame, applied: Frame) ->
         )
         for k, motion in enumerate(motions)
     )
+
+
+def free_slip(sides: Sequence[Side], motions: Moving) -> Expr:
+    """(3,) [m/s]: relative velocity of the touching points at mid-step, before any impulse."""
+    total = ca.SX.zeros(3)
+    for side, motion in zip(sides, motions, strict=True):
+        spin = apply(side.inverse_inertia, motion.mid_momentum)
+        total += side.sign * (motion.mid_velocity + ca.cross(spin, side.arm))
+    return total
 
 
 def inverse_masses(sides: Sequence[Side], n: Expr) -> tuple[Expr, Expr, Expr, Expr]:

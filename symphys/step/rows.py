@@ -12,6 +12,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.collide.contact import Contact
+from symphys.collide.touch import TINY_RATE
 from symphys.smooth import clip, positive
 from symphys.step.row import (
     UNREACHED,
@@ -19,6 +20,7 @@ from symphys.step.row import (
     Moving,
     at_touch,
     effective_masses,
+    free_slip,
     inverse_masses,
     make_sides,
 )
@@ -55,6 +57,7 @@ def prepare(setting: Setting, law: Law, contact: Contact, motions: Moving, durat
     sides = make_sides(motions, row_time, frame, applied)
     k_normal, *k_others = inverse_masses(sides, frame.normal)
     softness, target = _normal_target(law, contact, duration, time, rebound, pull, k_normal, knob)
+    landing = _landing(contact, duration, time, target, ca.dot(frame.normal, free_slip(sides, motions)))
     quick = contact.rate < -setting.fast
     slip = contact.hit * leaving * (half - time) * (acceleration - normal * pull)
     return ContactRow(
@@ -66,6 +69,7 @@ def prepare(setting: Setting, law: Law, contact: Contact, motions: Moving, durat
         softness=softness,
         target=ca.if_else(spared, UNREACHED, target),
         slip_target=slip if scheme.impact_friction else ca.SX.zeros(3),
+        delay=contact.hit * (time + (1 - leaving) * (landing - time)) if scheme.time_of_impact else ca.SX(0),
         leaving=leaving,
         struck=ca.SX(0) if law.soft else ca.logic_and(contact.hit, quick),
         width=width_of(setting, contact),
@@ -82,6 +86,17 @@ def _leaves(rebound: Expr, pull: Expr, left: Expr, reference: Expr, dt: float, k
     """chi: 1 if the rebound is still off the surface when the step ends, 0 if it has fallen back by then."""
     fall = ca.fmax(-pull, reference) * left
     return clip((2 * rebound - fall) / (fall + MARGIN * dt), 0, 1, knob)
+
+
+def _landing(contact: Contact, duration: Expr, time: Expr, target: Expr, free: Expr) -> Expr:
+    """The delay of an impulse after which the surfaces just touch at the end of the stretch.
+
+    What holds a body that lands and stays acts from the touch on, not at it: with all of it at t* the body would end
+    below the surface by a (t* - dt) t*/2, which for small gaps is large beside the gap. ``free`` is the normal velocity
+    at mid-step without the impulse.
+    """
+    share = (contact.gap + duration * target) / ca.fmax(target - free, TINY_RATE)
+    return ca.fmin(ca.fmax(share, 0), time)
 
 
 def _normal_target(

@@ -1,0 +1,70 @@
+"""Two points, one on each body, that may become a point of contact, and the direction across it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from symphys.collide.contact import Contact, Frame, Shift
+from symphys.collide.touch import contact_along
+from symphys.course import Parabola
+
+Expr = Any
+"""casadi SX, MX or DM"""
+
+
+@dataclass(frozen=True)
+class Witness:
+    """Points that two bodies carry, and a direction that turns with them.
+
+    Attributes:
+        points: courses of the two points [m], world frame.
+        arms: of the two points, from their bodies' centres of mass.
+        normal: course of a vector from the second surface to the first, of any length.
+        radii: of balls about the points [m].
+        off: 1 where the points are no candidates for contact.
+        far: the gap [m] that such points are said to have.
+        end: of the step [s].
+    """
+
+    points: tuple[Parabola, Parabola]
+    arms: tuple[Parabola, Parabola]
+    normal: Parabola
+    radii: tuple[Expr, Expr]
+    off: Expr
+    far: Expr
+    end: Expr
+
+    def gap(self, t: Expr) -> Expr:
+        """[m] at time t in the step."""
+        return ca.dot(self._direction(t), (self.points[0] - self.points[1]).at(t)) - self.radii[0] - self.radii[1]
+
+    def frame(self, t: Expr) -> Frame:
+        """See ``Meeting``."""
+        n, (a, b), (r_a, r_b) = self._direction(t), self.arms, self.radii
+        return Frame(n, (a.at(t) - r_a * n, b.at(t) + r_b * n))
+
+    def gap_after(self, first: Shift, second: Shift) -> Expr:
+        """See ``Meeting``."""
+        (a, b), (arm_a, arm_b) = self.points, self.arms
+        apart = first.moved(a.start, arm_a.start) - second.moved(b.start, arm_b.start)
+        gap = ca.dot(self._direction(self.end), apart) - self.radii[0] - self.radii[1]
+        return ca.if_else(self.off, self.far, gap)
+
+    def _direction(self, t: Expr) -> Expr:
+        n = self.normal.at(t)
+        return n / ca.sqrt(ca.dot(n, n))
+
+
+def contact_of(witness: Witness) -> Contact:
+    """The contact of a witness; none within the step where it is off."""
+    met, off = contact_along(witness.gap, witness.end, witness), witness.off
+    return Contact(
+        gap=ca.if_else(off, witness.far, met.gap),
+        rate=ca.if_else(off, 0, met.rate),
+        hit=ca.logic_and(met.hit, ca.logic_not(off)),
+        time=ca.if_else(off, witness.end, met.time),
+        meeting=witness,
+    )
