@@ -30,7 +30,10 @@ class Block:
 
     def reach(self, direction: Expr, t: Expr) -> Expr:
         """How far it extends from its centre along a vector, times the vector's length."""
-        return sum(h * ca.fabs(ca.dot(axis.at(t), direction)) for h, axis in zip(self.halves, self.axes, strict=True))
+        total: Expr = sum(
+            h * ca.fabs(ca.dot(axis.at(t), direction)) for h, axis in zip(self.halves, self.axes, strict=True)
+        )
+        return total
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,8 @@ class Face:
 
     def point(self, x: Expr, y: Expr) -> Parabola:
         """The course of the point at x, y [m] from its centre."""
-        return self.centre + x * self.u + y * self.v
+        course: Parabola = self.centre + x * self.u + y * self.v
+        return course
 
     def corners(self) -> list[Parabola]:
         """The courses of its corners, in order around it."""

@@ -20,7 +20,7 @@ class BoxField:
     Outside the nearest point of the surface counts, inside the nearest face.
     """
 
-    half_sizes: Expr
+    half_sizes: tuple[Expr, ...]
 
     def distance(self, point: Expr) -> Expr:
         """See ``Field``."""
@@ -39,7 +39,8 @@ class BoxField:
 
     def _over(self, point: Expr) -> Expr:
         """(3,): how far the point is beyond the faces."""
-        return ca.fabs(point) - ca.vertcat(*self.half_sizes)
+        reach: Expr = ca.fabs(point)
+        return reach - ca.vertcat(*self.half_sizes)
 
     def _nearest_face(self, over: Expr) -> Expr:
         """(3,): 1 for the axis of the nearest face; the first of equals."""

@@ -98,7 +98,7 @@ def solved(m: Expr, b: Expr) -> Expr:
 def ball_on_terrain(offset: Sequence[Any], radius: Expr, terrain: Terrain, a: Course) -> Contact:
     """The contact of a ball at body-frame ``offset`` with terrain."""
     path, world = a.path(offset), at_rest(a.dt)
-    axes = tuple(world.arm(unit) for unit in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+    axes = world.arm((1.0, 0.0, 0.0)), world.arm((0.0, 1.0, 0.0)), world.arm((0.0, 0.0, 1.0))
     surface = surface_of(terrain)
     contact, centre = None, path.start
     for _ in range(2):

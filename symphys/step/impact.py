@@ -125,6 +125,8 @@ def _row(setting: Setting, law: Law, contact: Contact, motions: Moving, struck: 
         slip_target=ca.SX.zeros(3),
         delay=ca.SX(0),
         leaving=struck,
+        lasts=ca.SX(0),
+        load=ca.SX(0),
         struck=struck,
         width=struck * width_of(setting, contact),
         knob=setting.knob,

@@ -55,6 +55,10 @@ class Impulse:
         """(3,) [N m s]: the torque impulse beside that of the linear one."""
         return n * self.spin + self.roll
 
+    def times(self, factor: Expr) -> Impulse:
+        """A share of it."""
+        return Impulse(factor * self.normal, factor * self.tangent, factor * self.spin, factor * self.roll)
+
     def minus(self, other: Impulse) -> Impulse:
         """The difference."""
         return Impulse(

@@ -69,7 +69,8 @@ def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = ())
     rows = []
     for pair, contact, off in zip(pairs, contacts, spared or [ca.SX(0)] * len(pairs), strict=True):
         moving = tuple(motions[i] for i in bodies_of(pair))
-        row = pieces.do(prepare, scene.setting, pair.law, contact, moving, duration, off)
+        force = x[f"{pair.name}.force"]
+        row = pieces.do(prepare, scene.setting, pair.law, contact, moving, duration, off, force)
         rows.append(Row(bodies_of(pair), row))
 
     # velocities: warm start, then sweeps
@@ -80,7 +81,7 @@ def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = ())
 
     # positions
     moved = displacements(scene, rows, resumed, solved, motions, duration)
-    shifts = close_gaps(scene, rows, contacts, list(zip(resumed, solved.impulses, strict=True)), moved)
+    shifts = close_gaps(scene, rows, contacts, solved.impulses, moved)
 
     # the next state
     values: State = {"lag": half}

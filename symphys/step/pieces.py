@@ -111,7 +111,7 @@ class Pieces(ABC):
     def _build(self, part: Callable[..., Any], shape: Any, known: Sequence[Any], columns: Sequence[Expr]) -> Template:
         """The template of a part for arguments of this structure."""
         symbols = [ca.SX.sym("a", column.numel()) for column in columns]
-        entries = [symbol.nonzeros() for symbol in symbols]
+        entries: list[list[Expr]] = [symbol.nonzeros() for symbol in symbols]
         outlines: list[Leaf] = []
         leaves_of(shape, outlines)
         arguments = (

@@ -48,7 +48,7 @@ def _delayed(shift: Shift, row: ContactRow, k: int, impulses: list[Impulse], tur
 
     What goes on from the last step has acted all the time, whatever rounding makes of the gap.
     """
-    side, impulse = row.sides[k], impulses[1].minus(impulses[0])
+    side, impulse = row.sides[k], impulses[1].minus(impulses[0].times(row.lasts))
     force, twist = impulse.linear(row.impulse_normal), impulse.angular(row.impulse_normal)
     torque = ca.cross(side.impulse_arm, force) + twist
     early = row.delay * side.sign
@@ -59,27 +59,26 @@ def close_gaps(
     scene: Scene,
     rows: Sequence[Row],
     contacts: Sequence[Contact],
-    impulses: Sequence[tuple[Impulse, Impulse]],
+    impulses: Sequence[Impulse],
     shifts: list[Shift],
 ) -> Shifts:
     """Gauss-Seidel on the displacements until no rigid contact overlaps, and those that last do not gape.
 
-    Velocities are not touched. ``impulses``: before the sweeps, which are those that last, and after them.
+    Velocities are not touched.
     """
     do, scheme = scene.pieces.do, scene.setting.scheme
     rigid = tuple(
-        (each, contact, do(_lasts, contact, each.row, pair))
-        for each, contact, pair in zip(rows, contacts, impulses, strict=True)
+        (each, contact, do(_lasts, each.row, impulse))
+        for each, contact, impulse in zip(rows, contacts, impulses, strict=True)
         if not each.row.law.soft
     )
     state = (tuple(shifts), tuple(ca.SX(0) for _ in rigid))
     return scene.pieces.repeat(scheme.position_sweeps, _push_all, (rigid, scheme.push_out), state)[0]
 
 
-def _lasts(contact: Contact, row: ContactRow, impulses: tuple[Impulse, Impulse]) -> Expr:
+def _lasts(row: ContactRow, impulse: Impulse) -> Expr:
     """1 if a contact carried load and still does."""
-    loaded = ca.logic_and(impulses[0].normal > 0, impulses[1].normal > 0)
-    return ca.logic_and(ca.logic_and(contact.hit, loaded), row.leaving <= 0)
+    return ca.logic_and(row.lasts, impulse.normal > row.load)
 
 
 def _push_all(

@@ -60,6 +60,8 @@ class ContactRow:
         slip_target: (3,) tangential velocity that friction aims at [m/s].
         delay: [s] the impulse acts on positions from then on; 0 for a contact that is not hit.
         leaving: hit chi: the share of the contact that is an impact, in [0, 1].
+        lasts: 1 if the contact carried load and goes on.
+        load: the least normal impulse that counts as load [N s].
         struck: 1 if the surfaces meet at speed, else 0.
         width: of the smoothed normal projection [m/s]; 0 for fast approach.
         knob: smoothing [m/s].
@@ -78,6 +80,8 @@ class ContactRow:
     slip_target: Expr
     delay: Expr
     leaving: Expr
+    lasts: Expr
+    load: Expr
     struck: Expr
     width: Expr
     knob: Expr

@@ -34,7 +34,15 @@ MARGIN = 1e-4
 """Width of chi's rise, as a share of the reference acceleration: a rebound that barely leaves is part rest."""
 
 
-def prepare(setting: Setting, law: Law, contact: Contact, motions: Moving, duration: Expr, spared: Expr) -> ContactRow:
+NEAR = 0.1
+"""Of the distance a_ref dt^2: surfaces that carried load and are that near to each other go on touching."""
+LOADED = 1e-3
+"""Of the weight of the effective mass: what counts as load. A smooth contact always carries a little."""
+
+
+def prepare(
+    setting: Setting, law: Law, contact: Contact, motions: Moving, duration: Expr, spared: Expr, force: Expr
+) -> ContactRow:
     """The row of one contact over a stretch of time.
 
     Args:
@@ -44,6 +52,7 @@ def prepare(setting: Setting, law: Law, contact: Contact, motions: Moving, durat
         motions: of the sides that can move.
         duration: of the stretch [s].
         spared: 1 for a contact that gives no impulse.
+        force: (3,) with which the contact acted at the end of the last step [N].
     """
     scheme, knob = setting.scheme, setting.knob
     time = contact.time if scheme.time_of_impact else ca.SX(0)
@@ -59,6 +68,10 @@ def prepare(setting: Setting, law: Law, contact: Contact, motions: Moving, durat
     softness, target = _normal_target(law, contact, duration, time, rebound, pull, k_normal, knob)
     landing = _landing(contact, duration, time, target, ca.dot(frame.normal, free_slip(sides, motions)))
     quick = contact.rate < -setting.fast
+    near = contact.gap < NEAR * setting.reference * scheme.dt**2
+    weight = LOADED * setting.reference / k_normal
+    lasts = ca.logic_and(ca.logic_and(near, ca.dot(applied.normal, force) > weight), leaving <= 0)
+    target = ca.if_else(ca.logic_and(lasts, ca.logic_not(contact.hit)), 0, target)
     slip = contact.hit * leaving * (half - time) * (acceleration - normal * pull)
     return ContactRow(
         law=law,
@@ -71,6 +84,8 @@ def prepare(setting: Setting, law: Law, contact: Contact, motions: Moving, durat
         slip_target=slip if scheme.impact_friction else ca.SX.zeros(3),
         delay=contact.hit * (time + (1 - leaving) * (landing - time)) if scheme.time_of_impact else ca.SX(0),
         leaving=leaving,
+        lasts=lasts,
+        load=weight * duration,
         struck=ca.SX(0) if law.soft else ca.logic_and(contact.hit, quick),
         width=width_of(setting, contact),
         knob=knob,

@@ -64,7 +64,7 @@ def dismantle(tree: Any, leaves: list[Expr]) -> Hashable:
     if isinstance(tree, ca.SX | ca.DM):
         leaves.append(ca.SX(tree))
         return outline(leaves[-1])
-    names = field_names(kind)
+    names = field_names(kind)  # type: ignore[arg-type]
     if names is not None:
         return Knot(kind, (), tuple([dismantle(getattr(tree, name), leaves) for name in names]))
     return Knot(kind, (tree,), ())
