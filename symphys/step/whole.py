@@ -54,7 +54,16 @@ def take_step(scene: Scene, x: Expr) -> StepResult:
     struck = collide_now(scene, before.x, cut)
     rest = dt - cut.first
     after = advance(scene, struck.x, rest, spared=passing(scene, struck.x, rest))
-    return _result(scene, after.x, [before, struck, after])
+    return _result(scene, after.x, [before, struck, after], cut.impact * _ahead(scene, before.x))
+
+
+def _ahead(scene: Scene, x: Expr) -> Expr:
+    """(3 * pairs,) [N s]: what persistent forces have given to the true velocities ahead of the impulses of sweeps.
+
+    Elsewhere the next stretch takes it off again; after an impact, where leapfrog begins anew, it stays.
+    """
+    forces = [x[scene.layout[f"{pair.name}.force"]] for pair in scene.world.pairs]
+    return x[scene.layout["lag"]] * ca.vertcat(ca.SX(0, 1), *forces)
 
 
 def coupled(world: World) -> bool:
@@ -63,8 +72,8 @@ def coupled(world: World) -> bool:
     return any(count > 1 for count in sides.values())
 
 
-def _result(scene: Scene, x: Expr, phases: list[Phase]) -> StepResult:
-    forces: Expr = ca.SX.zeros(3 * len(scene.world.pairs))
+def _result(scene: Scene, x: Expr, phases: list[Phase], ahead: Expr = 0) -> StepResult:
+    forces: Expr = ca.SX.zeros(3 * len(scene.world.pairs)) + ahead / scene.scheme.dt
     residual: Expr = ca.SX(0)
     crowded: Expr = ca.SX(0)
     for phase in phases:
