@@ -1,4 +1,4 @@
-"""Where the first number that is not finite comes from: the start, a step, a formula, or a derivative of one of them."""
+"""Where the first number that is not finite comes from: the start, a step, a formula, or a derivative of these."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _in_start(rollout: Rollout, course: Course) -> str:
     for values, columns in ((course.x[0], names[0]), (course.p, names[2]), (course.u.T, names[1])):
         bad = [name for name, value in zip(columns, values, strict=True) if not np.isfinite(value).all()]
         if bad:
-            return f"it begins with {_listed(bad)}, as the variables set it"
+            return f"it begins with {_listed(list(dict.fromkeys(bad)))}, as the variables set it"
     return ""
 
 
@@ -108,7 +108,7 @@ def _in_steps_back(rollout: Rollout, course: Course) -> str:
 
 
 def _cause(found: Blame | None, names: Sequence[Columns], results: Sequence[Columns] = ()) -> str:
-    """": 1 / 0, made from ball.mass, on the way to ball.velocity"; what goes beyond the named arguments is left out."""
+    """Such as ``: 1 / 0, made from ball.mass, on the way to ball.velocity``; arguments without a name are left out."""
     if found is None:
         return ""
     origins = dict.fromkeys(names[i][j] for i, j in found.arguments if i < len(names))

@@ -92,7 +92,9 @@ def terms(rollout: Sampled) -> Terms:
         lower=np.concatenate([limit.lower for limit in limits] or [np.zeros(0)]),
         upper=np.concatenate([limit.upper for limit in limits] or [np.zeros(0)]),
         names=tuple(limit.name for limit in limits for _ in range(limit.lower.size)),
-        means=_stack([cost.mean for cost in costs] + [value for _, value in targets] + [limit.mean for limit in limits]),
+        means=_stack(
+            [cost.mean for cost in costs] + [value for _, value in targets] + [limit.mean for limit in limits]
+        ),
     )
 
 
@@ -148,7 +150,7 @@ class _Limit:
         self.upper = np.tile(np.broadcast_to(constraint.upper, (size,)), count)
         violation = self._violation()
         self.penalty = np.sqrt(constraint.penalty * (rollout.dt if always else 1.0)) * violation
-        total = ca.sum1(violation)
+        total: Expr = ca.sum1(violation)
         self.error = ca.if_else(total >= 0, ca.mmax(violation), total) / constraint.tolerance  # mmax hides a NaN
 
     def _violation(self) -> Expr:

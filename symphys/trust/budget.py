@@ -112,7 +112,7 @@ def _energies(rollout: Rollout, record: Record) -> tuple[Array, Array, Array]:
 def _rigid_alone(rollout: Rollout, motion: Trajectory) -> NDArray[np.bool_]:
     """(N,) where no soft contact acts."""
     soft = np.array([pair.law.soft for pair in rollout.world.pairs], bool)
-    return ~acting(motion)[:, soft].any(axis=1)
+    return np.logical_not(acting(motion)[:, soft].any(axis=1))
 
 
 def _gain(motion: Trajectory, k: int, energy: float) -> dict[str, Any]:
@@ -121,6 +121,6 @@ def _gain(motion: Trajectory, k: int, energy: float) -> dict[str, Any]:
 
 def _thinned(time: Array, kinetic: Array, potential: Array, applied: Array, contact: Array) -> dict[str, list[float]]:
     keep = samples(len(time), MOST_SAMPLES)
-    sums = [np.concatenate([[0.0], np.cumsum(part)]) for part in (applied, contact)]
-    columns = zip(("time", "kinetic", "potential", "applied", "contact"), (time, kinetic, potential, *sums), strict=True)
-    return {name: column[keep].tolist() for name, column in columns}
+    given, taken = (np.concatenate([[0.0], np.cumsum(part)]) for part in (applied, contact))
+    columns = {"time": time, "kinetic": kinetic, "potential": potential, "applied": given, "contact": taken}
+    return {name: column[keep].tolist() for name, column in columns.items()}

@@ -52,7 +52,7 @@ def surface(contact: str) -> str:
 
 def acting(motion: Trajectory) -> NDArray[np.bool_]:
     """(N, C): whether a contact gives an impulse in a step."""
-    return np.abs(motion.contact_force).sum(axis=2) > 0
+    return np.asarray(np.abs(motion.contact_force).sum(axis=2) > 0)
 
 
 def touching(motion: Trajectory, k: int) -> list[str]:

@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 Tell = Callable[[str], None]
 
 
+@np.errstate(invalid="ignore", over="ignore")  # numbers that are not finite are told as such
 def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: None) -> dict[str, Any]:
     """The "trust" object of a result, for the exact rollout of ``z``.
 

@@ -8,6 +8,7 @@ exponentially with the distance from the end, in free flight like T - t.
 from __future__ import annotations
 
 from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 

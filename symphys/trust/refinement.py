@@ -36,8 +36,9 @@ def refine(transcription: Transcription, z: Array) -> dict[str, Any]:
 
     Returns:
         "refined": for dt / 2, dt / 4 and twice the sweeps the "objective", the "worst" error / tolerance, and
-        "gradient": per variable the change of the probe's gradient relative to its norm, in the variables' scales.
-        "order": of convergence in dt, of the "objective" and of the "gradient"; NaN where it cannot be seen.
+        "gradient": per variable the change of the probe's gradient relative to its norm, in the variables' scales;
+        None where it is flat.
+        "order": of convergence in dt, of the "objective" and of the "gradient"; None where it cannot be seen.
     """
     slopes = [_slope(probe(transcription)[1], z)]
     objectives = [transcription.judge(z).objective]
@@ -45,27 +46,26 @@ def refine(transcription: Transcription, z: Array) -> dict[str, Any]:
     for finer in finer_problems(transcription):
         verdict, slope = finer.judge(z), _slope(finer.gradient, z)
         changes = {block.name: change(block, slopes[0], slope) for block in transcription.shooting.blocks}
-        rows.append(
-            {"what": finer.what, "objective": verdict.objective, "worst": verdict.worst, "gradient": changes}
-        )
+        rows.append({"what": finer.what, "objective": verdict.objective, "worst": verdict.worst, "gradient": changes})
         objectives.append(verdict.objective)
         slopes.append(slope)
     return {"refined": rows, "order": {"objective": order(objectives[:3]), "gradient": order(slopes[:3])}}
 
 
-def change(block: Block, before: Array, after: Array) -> float:
-    """|after - before| / |before| of one variable's part of a gradient, in its scale; NaN where it is flat."""
+def change(block: Block, before: Array, after: Array) -> float | None:
+    """|after - before| / |before| of one variable's part of a gradient, in its scale; None where it is flat."""
     part = slice(block.start, block.stop)
     norm = float(np.linalg.norm(before[part] * block.scale))
-    return float(np.linalg.norm((after - before)[part] * block.scale)) / norm if norm else float("nan")
+    return float(np.linalg.norm((after - before)[part] * block.scale)) / norm if norm else None
 
 
-def order(values: Sequence[ArrayLike]) -> float:
-    """p of an error like dt^p, from values (of any one shape) at dt, dt / 2 and dt / 4; NaN within rounding."""
+def order(values: Sequence[ArrayLike]) -> float | None:
+    """p of an error like dt^p, from values (of any one shape) at dt, dt / 2 and dt / 4; None within rounding."""
     coarse, middle, fine = (np.asarray(value, float) for value in values)
     first, second = float(np.linalg.norm(coarse - middle)), float(np.linalg.norm(middle - fine))
-    if not min(first, second) > ROUNDING * float(np.linalg.norm(fine)):
-        return float("nan")
+    least = ROUNDING * float(np.linalg.norm(fine))
+    if not (least < first < np.inf and least < second < np.inf):
+        return None
     return float(np.log2(first / second))
 
 

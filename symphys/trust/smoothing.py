@@ -14,9 +14,11 @@ KNOBS = (1e-3, 1e-2, 1e-1)
 
 
 def smoothed(transcription: Transcription, z: NDArray[np.float64]) -> list[dict[str, Any]]:
-    """"objective" and "worst" error / tolerance of ``z`` at the problem's "smoothing" [m/s], or at ``KNOBS``.
+    """How ``z`` does in smoothed rollouts.
 
-    "own" says whether the problem's solvers use this smoothing.
+    Returns:
+        For the problem's own "smoothing" [m/s], or each of ``KNOBS`` where it has none, the "objective" and the "worst"
+        error / tolerance; "own" says which of the two it is.
     """
     own = transcription.problem.simulation.smoothing
     rows = []
