@@ -46,8 +46,18 @@ def mark_end(axes: Axes, end: float) -> None:
     """Where the gradient is not to be trusted any more, if anywhere."""
     if math.isfinite(end):
         axes.axvline(end, color=style.VERMILION, linewidth=1, linestyle=(0, (4, 2)))
-        label = f" no gradient reaches from the start beyond {show(end, 2)} s"
-        axes.text(end, 0.96, label, transform=axes.get_xaxis_transform(), va="top", color=style.VERMILION, fontsize=8)
+        late = end > np.mean(axes.get_xlim())
+        axes.annotate(
+            f"no gradient reaches from the start beyond {show(end, 2)} s",
+            (end, 0.97),
+            xycoords=axes.get_xaxis_transform(),
+            xytext=(-5 if late else 5, 0),
+            textcoords="offset points",
+            ha="right" if late else "left",
+            va="top",
+            color=style.VERMILION,
+            fontsize=8,
+        )
 
 
 def touches(motion: Trajectory) -> Array:

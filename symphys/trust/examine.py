@@ -17,16 +17,10 @@ Tell = Callable[[str], None]
 
 @np.errstate(invalid="ignore", over="ignore")  # numbers that are not finite are told as such
 def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: None) -> dict[str, Any]:
-    """The "trust" object of a result, for the exact rollout of ``z``.
+    """The "trust" object of a result, for the exact rollout of ``z`` (n,).
 
-    Every part says in its own module what its numbers are: ``gradient``, ``refined`` and ``order``, ``growth``,
-    ``smoothed``, ``energy`` and ``momentum``, ``contacts``. ``fault`` is a clause on the first number or derivative
-    that is not finite, empty if all are.
-
-    Args:
-        transcription: of the problem.
-        z: (n,) where to look.
-        tell: called with a few words before each part that takes time.
+    Each module of this room says what its numbers are. "fault" is a clause on the first number or derivative that is
+    not finite, empty if all are. ``tell`` is called with a few words before each part that takes time.
 
     Raises:
         NotFinite: there is no such motion; says where it ends and why.
