@@ -109,12 +109,14 @@ def of_gradient(level: str, growth: str) -> str:
 def of_growth(trust: Trust, level: str) -> str:
     """What the growth of changes advises."""
     far = reach(trust.growth)
-    if level == BAD and math.isnan(far.lost):
-        at = show(far.end, 2)
+    if not math.isnan(far.lost):
+        return f"Derivatives break off going back from the end at t = {show(far.lost)} s: begin from another guess."
+    if level == BAD:
         if math.isfinite(far.end):
             return (
-                f"Changes double every {show(far.doubling, 2)} s, so the gradient is not to be trusted beyond {at} s: "
-                "shorten the horizon to less than that, or use multiple shooting with stretches as short."
+                f"Changes double every {show(far.doubling, 2)} s, so the gradient is not to be trusted beyond "
+                f"{show(far.end, 2)} s: shorten the horizon to less than that, or use multiple shooting with "
+                "stretches as short."
             )
         return "The end is too sensitive for any gradient: shorten the horizon, or use multiple shooting."
     return {
