@@ -119,7 +119,7 @@ def test_advice_of_a_sound_solution() -> None:
         ({"refined": (Refined("dt / 2", 1.0, 0.5, {"throw": 0.9}),)}, "falls apart"),
         ({"growth": Growth(np.arange(9.0), 10.0 ** np.arange(8, -1, -1))}, "shorten the horizon to less than that"),
         ({"growth": Growth(np.arange(9.0), np.geomspace(1e3, 1, 9))}, "small steps are to be expected"),
-        ({"growth": Growth(np.arange(3.0), np.array([np.nan, 2.0, 1.0]))}, "break off going back from the end at t = 1"),
+        ({"growth": Growth(np.arange(3.0), np.array([np.nan, 2.0, 1.0]))}, "break off going back from the end"),
         ({"smoothed": (Smoothed(0.1, True, 9.0, 4.0),)}, "Without the smoothing"),
         ({"gained": 0.1, "gains": (Gain(7, 0.7, 0.1, ("a-b",)),)}, "a-b at t = 0.7 s, step 7"),
         ({"momentum": 1.0}, "fault of the engine"),
