@@ -7,6 +7,8 @@ from typing import Any
 
 import casadi as ca
 
+from symphys.smooth import length
+
 Expr = Any
 """casadi SX, MX or DM"""
 
@@ -47,6 +49,18 @@ def exponential(r: Expr) -> Expr:
         cos = cos * h2 + sign / factorial(2 * k)
         sinc = sinc * h2 + sign / factorial(2 * k + 1)
     return ca.vertcat(cos, sinc * r / 2)
+
+
+def logarithm(q: Expr) -> Expr:
+    """(3,): the rotation vector [rad] of a unit quaternion, of length pi at most; the inverse of ``exponential``."""
+    q = ca.if_else(q[0] < 0, -q, q)
+    sine = length(q[1:4])
+    return 2 * ca.atan2(sine, q[0]) / sine * q[1:4]
+
+
+def between(p: Expr, q: Expr) -> Expr:
+    """(3,): the rotation vector [rad] that turns orientation ``p`` into ``q``, world frame."""
+    return logarithm(multiply(q, ca.vertcat(p[0], -p[1:4])))
 
 
 def turn(q: Expr, r: Expr) -> Expr:

@@ -1,45 +1,97 @@
-"""``symphys check``: is the file valid, and its gradient right?"""
+"""``symphys check``: is the file valid, its gradient right, and how far do both reach?"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from symphys.cli.arguments import read_problems, read_settings, settings_option
-from symphys.cli.wording import number
+from symphys import files
+from symphys.cli.arguments import UsageFault, read_problems, read_settings, settings_option
 
 if TYPE_CHECKING:
-    from symphys.problem import Problem
+    from numpy.typing import NDArray
 
-TOLERANCE = 1e-4
-"""Largest |gradient - central difference| of a variable, relative to the norm of its gradient, that counts as right."""
+    from symphys.cli.examined import Examined
+    from symphys.problem import Problem
+    from symphys.transcription import Transcription
+    from symphys.trust.examine import Tell
 
 
 @click.command()
 @click.argument("source", metavar="FILE")
 @settings_option
-def check(source: str, assignments: tuple[str, ...]) -> int:
-    """Validate a problem file, and compare its gradient at the guess with central differences."""
+@click.option(
+    "--at",
+    "folder",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="RUN_FOLDER",
+    help="Look at what this run of the problem found, instead of the guess.",
+)
+def check(source: str, assignments: tuple[str, ...], folder: Path | None) -> int:
+    """Validate a problem file, and say how far its gradient and its motion can be trusted at the guess.
+
+    Exit code 1: the gradient disagrees with differences, or something is not finite.
+    """
+    from symphys.cli.examined import print_examined
     from symphys.problem import require_solvable
     from symphys.runs import check_tables
+    from symphys.trajectory import NotFinite
     from symphys.transcription import transcribe
-    from symphys.trust import compare_gradient
 
     (problem,) = read_problems([source], read_settings(assignments))
     check_tables(problem)
     click.echo("\n".join(describe(problem)))
     require_solvable(problem)
     transcription = transcribe(problem, backend="casadi")
-    compared = compare_gradient(transcription, transcription.shooting.start(0))
-    wrong = [row["variable"] for row in compared if not row["error"] <= TOLERANCE]
-    print_comparison(compared)
-    if wrong:
-        click.echo(
-            f"the gradient disagrees at the guess in {', '.join(wrong)}: it may lie on a kink; try another guess"
-        )
+    z = transcription.shooting.start(0) if folder is None else found(folder, transcription)
+    try:
+        examined = look(transcription, z)
+    except NotFinite as error:
+        click.echo(f"\n{error}")
         return 1
-    return 0
+    print_examined(examined)
+    return 1 if examined.wrong else 0
+
+
+def look(transcription: Transcription, z: NDArray[Any]) -> Examined:
+    """Examine ``z``."""
+    from symphys.cli.examined import Examined
+    from symphys.trust import examine
+
+    with telling() as tell:
+        return Examined.of(transcription.judge(z), examine(transcription, z, tell))
+
+
+@contextmanager
+def telling() -> Iterator[Tell]:
+    """What goes on as a line on stderr, if that is a terminal."""
+    from rich.console import Console
+
+    with Console(stderr=True).status("") as status:
+        yield lambda what: status.update(f"{what} ...")
+
+
+def found(folder: Path, transcription: Transcription) -> NDArray[Any]:
+    """(n,) what a run found; UsageFault where it is no run of this problem."""
+    import numpy as np
+
+    from symphys.runs import read_result
+
+    known, parts = read_result(folder / "result.json").z or {}, []
+    for block in transcription.shooting.blocks:
+        size = block.stop - block.start
+        values = known[block.name]["value"] if block.name in known else []
+        if len(values) != size:
+            raise UsageFault(
+                f"--at {folder}: this run found {len(values)} numbers for variable {block.name!r}, the problem has "
+                f"{size}; give a folder that `symphys solve` wrote for this file, and the same --set"
+            )
+        parts.append(np.array(files.numbers(values), float))
+    return np.concatenate(parts)
 
 
 def describe(problem: Problem) -> list[str]:
@@ -50,7 +102,7 @@ def describe(problem: Problem) -> list[str]:
         f"  time         {simulation.duration:g} s in {simulation.steps} steps of {simulation.dt:g} s",
         f"  bodies       {listed(body.name for body in world.bodies)}",
         f"  planes       {listed(plane.name for plane in world.statics)}",
-        f"  contacts     {listed(pair.name for pair in world.pairs)}",
+        f"  contacts     {listed(dict.fromkeys(pair.name.partition(':')[0] for pair in world.pairs))}",
     ]
     for variable in problem.variables:
         sets = listed(slot.name for slot in variable.slots)
@@ -68,23 +120,3 @@ def listed(names: Any) -> str:
 def moment(at: str | float) -> str:
     """When something is looked at."""
     return at if isinstance(at, str) else f"at {at:g} s"
-
-
-def print_comparison(compared: list[dict[str, Any]]) -> None:
-    """Print one row per variable."""
-    from rich.box import SIMPLE_HEAD
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    caption = "the gradient at the guess against central differences"
-    table = Table(box=SIMPLE_HEAD, caption=caption, caption_justify="left")
-    table.add_column("variable")
-    table.add_column("norm of gradient", justify="right")
-    table.add_column("relative error", justify="right")
-    table.add_column("")
-    for row in compared:
-        fine = row["error"] <= TOLERANCE
-        verdict = Text("agrees", style="green") if fine else Text("disagrees", style="red")
-        table.add_row(Text(row["variable"]), number(row["scale"]), number(row["error"]), verdict)
-    Console().print(table)

@@ -10,17 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from symphys.report import values
+from symphys.report.reading_examination import make_trust
 from symphys.report.records import (
     Array,
     Check,
     Effort,
-    GradientCheck,
     Origin,
-    Refined,
     ReportError,
     Run,
     Trace,
-    Trust,
     Variable,
 )
 
@@ -174,29 +172,6 @@ def make_variable(key: str, entry: object) -> Variable:
         guess=block("guess", np.nan),
         lower=block("lower", -np.inf),
         upper=block("upper", np.inf),
-    )
-
-
-def make_trust(entry: dict[str, object]) -> Trust:
-    """The object ``trust``."""
-    number = values.number
-    gradient = tuple(
-        GradientCheck(values.name(row.get("variable")), number(row.get("error")), number(row.get("scale")))
-        for row in values.tables(entry.get("gradient"))
-    )
-    refined = tuple(
-        Refined(values.name(row.get("what")), values.number(row.get("objective")), values.number(row.get("worst")))
-        for row in values.tables(entry.get("refined"))
-    )
-    steps = [values.number(row.get("step")) for row in values.tables(entry.get("gradient"))]
-    return Trust(
-        gradient=gradient,
-        step=values.number(entry.get("step", steps[0] if steps else None)),
-        refined=refined,
-        residual=values.number(entry.get("residual")),
-        deepest=values.number(entry.get("deepest")),
-        multiple_impacts=values.number(entry.get("multiple_impacts")),
-        energy=values.numbers(entry.get("energy")),
     )
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symphys.errors import SymphysError
+from symphys.report.examination import Trust
 
 Array = NDArray[np.float64]
 
@@ -55,53 +56,6 @@ class Variable:
     guess: Array
     lower: Array
     upper: Array
-
-
-@dataclass(frozen=True)
-class GradientCheck:
-    """|adjoint - central difference| of one variable, relative to ``scale``, the norm of its gradient."""
-
-    variable: str
-    error: float
-    scale: float
-
-
-@dataclass(frozen=True)
-class Refined:
-    """The same z simulated more finely: objective and largest error / tolerance."""
-
-    what: str
-    objective: float
-    worst: float
-
-
-@dataclass(frozen=True)
-class Trust:
-    """How far a solution can be trusted.
-
-    Attributes:
-        gradient: one per variable.
-        step: of the central differences, in units of each variable's scale.
-        refined: one per refinement.
-        residual: largest change of an impulse in the last sweep [N s].
-        deepest: deepest penetration [m].
-        multiple_impacts: steps with two or more impacts on a body.
-        energy: (steps + 1,) total energy [J]; empty where it was not recorded.
-    """
-
-    gradient: tuple[GradientCheck, ...] = ()
-    step: float = np.nan
-    refined: tuple[Refined, ...] = ()
-    residual: float = np.nan
-    deepest: float = np.nan
-    multiple_impacts: float = np.nan
-    energy: Array = field(default_factory=lambda: np.zeros(0))
-
-    @property
-    def known(self) -> bool:
-        """Whether anything was examined."""
-        numbers = (self.residual, self.deepest, self.multiple_impacts)
-        return bool(self.gradient or self.refined) or not all(np.isnan(numbers))
 
 
 @dataclass(frozen=True)

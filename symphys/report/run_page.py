@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from symphys import files
-from symphys.report import sections, style, trust, values, words
+from symphys.report import sections, style, values, words
 from symphys.report.contacts import draw_contacts, shown_pairs
 from symphys.report.convergence import draw_run
 from symphys.report.finding import is_run
@@ -20,8 +17,10 @@ from symphys.report.output import write_figures
 from symphys.report.reading import CONFIG, PROBLEM, read_run
 from symphys.report.recordings import GUESS, SCENE, TRAJECTORY, read_scene, read_trajectory
 from symphys.report.records import ReportError, Run, Scene, Trajectory
-from symphys.report.states import MOST_BODIES, controlled_bodies, draw_controls, draw_energy, draw_states, shown_bodies
+from symphys.report.states import MOST_BODIES, controlled_bodies, draw_controls, draw_states, shown_bodies
 from symphys.report.style import Picture
+from symphys.report.trust_figures import draw_energy, draw_growth
+from symphys.report.trust_section import trusted
 from symphys.report.variables import draw_variables
 
 PAGE = "report.html"
@@ -97,18 +96,18 @@ def draw(run: Run, recording: Recording) -> dict[str, Picture]:
         made += style.picture("states", "Position, velocity and angular velocity over time", draw_states(motion))
         made += style.picture("controls", "Forces and torques over time", draw_controls(motion))
         made += style.picture("contacts", "Contact forces and gaps over time", draw_contacts(motion, recording.scene))
-        made += style.picture("energy", "Total energy over time", draw_energy(motion.time, run.trust.energy))
+    made += style.picture("growth", "How changes grow until the end", draw_growth(run.trust.growth, motion))
+    made += style.picture("energy", "Energy over time", draw_energy(run.trust.energy))
     return {picture.name: picture for picture in made}
 
 
 def build(run: Run, recording: Recording, pictures: dict[str, Picture]) -> Html:
     """The page, from the verdict to the sources."""
-    lines = trust.findings(run, sizes(recording))
     cards = [
         sections.checks(run),
         motion_card(run, recording, pictures),
         sections.found(run, pictures),
-        sections.trusted(run, lines),
+        trusted(run, pictures),
         card(
             "Convergence",
             figures(only(pictures, "convergence"), "Pale: the lowest so far. Work counts one rollout as 1."),
@@ -135,7 +134,7 @@ def only(pictures: dict[str, Picture], name: str) -> list[Picture]:
 
 
 def motion_cards(motion: Trajectory | None, pictures: dict[str, Picture]) -> list[Html]:
-    """States, controls, contacts and energy over time."""
+    """States, controls and contacts over time."""
     if motion is None:
         return []
     bodies, pairs = len(motion.body_names), len(motion.contact_names)
@@ -148,25 +147,12 @@ def motion_cards(motion: Trajectory | None, pictures: dict[str, Picture]) -> lis
         card("States over time", figures(only(pictures, "states"), states), anchor="states"),
         card("Controls", figures(only(pictures, "controls"), acting), anchor="controls"),
         card("Contacts", figures(only(pictures, "contacts"), f"{force} {contacts}"), anchor="contacts"),
-        card("Energy", figures(only(pictures, "energy")), anchor="energy"),
     ]
 
 
 def shortened(shown: int, total: int, noun: str, which: str) -> str:
     """What a figure leaves out; empty if nothing."""
     return f"Shown are {shown} of {total} {noun}: those {which}." if shown < total else ""
-
-
-def sizes(recording: Recording) -> trust.Sizes:
-    """What residual and penetration are compared with."""
-    motion = recording.trajectory
-    radii = [ball.radius for body in recording.scene.bodies for ball in body.balls]
-    radius = min(radii, default=math.nan)
-    if motion is None or len(motion.time) < 2:
-        return trust.Sizes(radius=radius)
-    force = np.linalg.norm(np.nan_to_num(motion.contact_force), axis=2)
-    impulse = float((force * np.diff(motion.time)[:, None]).max(initial=0.0))
-    return trust.Sizes(impulse=impulse or math.nan, radius=radius, steps=len(motion.time) - 1)
 
 
 def sources(run: Run) -> Html:

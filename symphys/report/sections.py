@@ -13,7 +13,6 @@ from symphys.report.animation import animation
 from symphys.report.markup import Html, banner, card, facts, figures, fold, join, pill, stats, table, tag
 from symphys.report.records import Check, Run, Scene, Trajectory, Variable
 from symphys.report.style import Picture
-from symphys.report.trust import Finding, advice
 from symphys.report.variables import component_names, knotted
 from symphys.report.words import show
 
@@ -26,7 +25,6 @@ HOW_JUDGED = (
 HOW_DRAWN = (
     "Snapshots at even times, the later the darker, fewer where a body hardly moves; the spoke turns with the body."
 )
-MARKS = {"good": "good", "fair": "look closer", "bad": "do not rely on it", "unknown": "not judged"}
 CHAPTERS = (
     ("checks", "Checks"),
     ("motion", "Motion"),
@@ -162,23 +160,6 @@ def between(value: float, guess: float, low: float, high: float) -> Html:
     bar = tag("span", *spots, class_="range", aria_hidden="true")
     edge = min(value - low, high - value) <= 1e-6 * (high - low)
     return join([bar, tag("small", "at a bound")]) if edge else bar
-
-
-def trusted(run: Run, lines: Sequence[Finding]) -> Html:
-    """The panel "how far to trust this"."""
-    if not lines:
-        unknown = tag("p", "This run was not examined.") if run.readable else ""
-        return card("How far to trust this", unknown, anchor="trust")
-    rows = [[pill(line.level, MARKS[line.level]), line.what, line.number, line.meaning] for line in lines]
-    step = run.trust.step
-    note = f" Central differences with a step of {show(step, 2)}." if math.isfinite(step) else ""
-    return card(
-        "How far to trust this",
-        tag("p", advice(run, list(lines))),
-        table(["", "looked at", "number", "meaning"], rows, "tttt", "Trust"),
-        tag("p", f"As solved: objective {show(run.objective, 4)}.{note}", class_="caption"),
-        anchor="trust",
-    )
 
 
 def time_split(run: Run) -> Html:

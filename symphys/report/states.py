@@ -79,18 +79,3 @@ def draw_components(axes: Axes, time: Array, values: Array) -> None:
     flat = np.nan_to_num(values[np.isfinite(values)])
     if flat.size and np.ptp(flat) < 1e-9 * max(1.0, float(np.abs(flat).max())):
         axes.set_ylim(flat[0] - 1, flat[0] + 1)
-
-
-def draw_energy(time: Array, energy: Array) -> Figure | None:
-    """Total energy against time; None where it was not recorded at every state."""
-    if energy.size < 2 or energy.size != time.size or not np.isfinite(energy).any():
-        return None
-    figure = Figure(figsize=(style.WIDTH, 2.2), layout="constrained")
-    axes = figure.subplots()
-    shown, values = style.thin(time, energy[:, None])
-    axes.plot(shown, values[:, 0], color=style.BODIES[0])
-    axes.set(title="Total energy [J]", xlabel="time [s]")
-    style.set_linear(axes, "x")
-    style.set_linear(axes, "y")
-    axes.margins(x=0.01)
-    return figure

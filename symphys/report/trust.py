@@ -1,175 +1,127 @@
-"""How far a solution can be trusted: levels and plain words from the recorded numbers."""
+"""How far a solution can be trusted: every finding of an examination, and one paragraph of advice from them.
+
+``symphys check`` at a guess and the pages of runs tell it in these words.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
 
-from symphys.report.records import GradientCheck, Refined, Run, Trust
-from symphys.report.words import several, show
+from symphys.report.examination import Trust
+from symphys.report.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN, Finding, Judged, worst_of
+from symphys.report.trust_numerics import (
+    GRADIENT,
+    GRID,
+    GROWTH,
+    SMOOTHING,
+    gradient_finding,
+    growth_finding,
+    reach,
+    refined_finding,
+    slope_finding,
+    smoothed_findings,
+)
+from symphys.report.trust_physics import (
+    CONTACTS,
+    ENERGY,
+    balance_finding,
+    depth_finding,
+    gains_finding,
+    impacts_finding,
+    residual_finding,
+)
+from symphys.report.words import percent, show
 
-GOOD, FAIR, BAD, UNKNOWN = "good", "fair", "bad", "unknown"
-
-GRADIENT_LIMITS = (1e-4, 1e-2)
-"""Relative errors of a gradient: below the first it agrees, above the second it must not be used."""
-FLAT = 1e-6
-"""A gradient whose norm is below this is too small to be compared."""
-OBJECTIVE_LIMITS = (0.05, 0.3)
-"""Relative changes of the objective under refinement."""
-WORST_LIMITS = (1.0, 3.0)
-"""Error / tolerance of a solved run under refinement."""
-RESIDUAL_LIMITS = (1e-3, 5e-2)
-"""PGS residual as a share of the largest impulse."""
-DEPTH_LIMITS = (0.01, 0.05)
-"""Penetration as a share of the smallest radius."""
-
-
-@dataclass(frozen=True)
-class Sizes:
-    """What absolute numbers are compared with; nan where the recordings are missing.
-
-    Attributes:
-        impulse: the largest impulse of any contact in a step [N s].
-        radius: of the smallest sphere [m].
-        steps: how many steps the motion has.
-    """
-
-    impulse: float = math.nan
-    radius: float = math.nan
-    steps: float = math.nan
+FAULT = "fault"
+SUBJECTS = (GRADIENT, GROWTH, GRID, SMOOTHING, ENERGY, CONTACTS)
+VERDICTS = {GOOD: "agrees", FAIR: "agrees roughly", BAD: "disagrees", UNKNOWN: "not compared"}
+"""Of a gradient with differences."""
 
 
-@dataclass(frozen=True)
-class Finding:
-    """One line of the panel: a level, what was looked at, its number, and what that means."""
-
-    level: str
-    what: str
-    number: str
-    meaning: str
-
-
-def graded(value: float, limits: tuple[float, float]) -> str:
-    """The level of a number that had better be small."""
-    if math.isnan(value):
-        return UNKNOWN
-    return GOOD if value <= limits[0] else FAIR if value <= limits[1] else BAD
-
-
-def gradient_finding(check: GradientCheck) -> Finding:
-    """The adjoint gradient against central differences, for one variable."""
-    what, number = f"Gradient of {check.variable}", show(check.error, 2)
-    level = graded(check.error, GRADIENT_LIMITS)
-    if level in (FAIR, BAD) and check.scale <= FLAT:
-        return Finding(UNKNOWN, what, number, "The gradient is almost zero here, so the comparison says little.")
-    meaning = {
-        GOOD: "Agrees with finite differences.",
-        FAIR: "Agrees roughly; a bounce or a change between slip and stick may lie within the difference's step.",
-        BAD: "Does not agree: the motion has a kink here, or differences of so stiff a motion mean nothing.",
-        UNKNOWN: "Could not be compared.",
-    }[level]
-    return Finding(level, what, number, meaning)
+def findings(trust: Trust, judged: Judged) -> list[Finding]:
+    """Every line for which there is a number."""
+    lines = [Finding(FAULT, BAD, "A number that is not finite", "", f"{sentence(trust.fault)}")] if trust.fault else []
+    lines += [gradient_finding(check) for check in trust.gradient]
+    lines += [refined_finding(refined, judged) for refined in trust.refined]
+    lines += slope_finding(trust)
+    lines += [growth_finding(trust.growth)] if trust.growth.factor.size else []
+    lines += smoothed_findings(trust.smoothed, judged)
+    numbers = (
+        (trust.gained, gains_finding),
+        (trust.momentum, balance_finding),
+        (trust.residual, residual_finding),
+        (trust.deepest, depth_finding),
+        (trust.multiple_impacts, impacts_finding),
+    )
+    return lines + [find(trust) for number, find in numbers if not math.isnan(number)]
 
 
-def refined_finding(refined: Refined, run: Run) -> Finding:
-    """The same z, simulated more finely."""
-    finer = (refined.what or "a refinement").replace(" ", "\N{NO-BREAK SPACE}")
-    what = f"Simulated again with {finer}"
-    change = relative_change(run.objective, refined.objective)
-    number = f"objective {show(refined.objective)}"
-    if run.checks and not math.isnan(refined.worst):
-        number += f", worst error {show(refined.worst)} × tolerance"  # noqa: RUF001
-    if run.solved and run.checks:
-        level = graded(refined.worst, WORST_LIMITS)
-        meaning = {
-            GOOD: "Every check is still met.",
-            FAIR: "Misses a tolerance by a little: the solution depends on the time grid.",
-            BAD: "Misses by far: the solution belongs to this time grid, not to the physics.",
-            UNKNOWN: "Could not be simulated.",
-        }[level]
-        return Finding(level, what, number, meaning)
-    level = graded(change, OBJECTIVE_LIMITS)
-    meaning = "Could not be compared." if level == UNKNOWN else f"The objective changes by {show(100 * change, 2)} %."
-    return Finding(level, what, number, meaning)
+def slopes(trust: Trust) -> tuple[list[str], list[list[str]]]:
+    """Header and rows of a table of gradients: against differences, and by how much refinements change them."""
+    header = ["gradient of", "norm", "differs by", "", *(row.what for row in trust.refined)]
+    rows = []
+    for check in trust.gradient:
+        changes = [percent(row.gradient.get(check.variable, math.nan)) for row in trust.refined]
+        verdict = VERDICTS[gradient_finding(check).level]
+        rows.append([check.variable, show(check.scale), show(check.error, 2), verdict, *changes])
+    return header, rows
 
 
-def relative_change(before: float, after: float) -> float:
-    """|after - before| / |before|; nan if one is not finite."""
-    if not (math.isfinite(before) and math.isfinite(after)):
-        return math.nan
-    return abs(after - before) / max(abs(before), 1e-12)
+def answers(trust: Trust, judged: Judged) -> tuple[list[str], list[list[str]]]:
+    """Header and rows of a table of objective and worst error / tolerance by discretisation and smoothing."""
+    rows = [["as asked", show(judged.objective, 4), show(judged.worst, 4), ""]]
+    for row in trust.refined:
+        verdict = MARKS[refined_finding(row, judged).level]
+        rows.append([row.what, show(row.objective, 4), show(row.worst, 4), verdict])
+    for knob in trust.smoothed:
+        rows.append([f"smoothed {show(knob.smoothing)} m/s", show(knob.objective, 4), show(knob.worst, 4), ""])
+    return ["simulated", "objective", "worst / tolerance", ""], rows
 
 
-def residual_finding(trust: Trust, sizes: Sizes) -> Finding:
-    """How far the contact solver was from its end."""
-    share = trust.residual / sizes.impulse if sizes.impulse > 0 else math.nan
-    level = GOOD if trust.residual == 0 else graded(share, RESIDUAL_LIMITS)
-    meaning = {
-        GOOD: "Contact impulses had settled.",
-        FAIR: "Contact impulses still moved a little in the last sweep; more sweeps would settle them.",
-        BAD: "Contact impulses had not settled; raise the number of sweeps.",
-        UNKNOWN: "Largest change of an impulse in the last sweep.",
-    }[level]
-    return Finding(level, "Contact solver's residual", f"{show(trust.residual, 2)} N s", meaning)
+def advice(trust: Trust, judged: Judged) -> str:
+    """One paragraph: what the findings say together."""
+    lines = findings(trust, judged)
+    if trust.fault:
+        return f"Mend this first, since solvers cannot pass it: {trust.fault}."
+    level = {about: worst_of(each.level for each in lines if each.about == about) for about in SUBJECTS}
+    parts = (
+        of_gradient(level[GRADIENT], level[GROWTH]),
+        of_growth(trust, level[GROWTH]),
+        of_grid(level[GRID], judged.solved),
+        of_smoothing(level[SMOOTHING]),
+        of_physics(lines, level),
+    )
+    return " ".join(part for part in parts if part)
 
 
-def depth_finding(trust: Trust, sizes: Sizes) -> Finding:
-    """How deep bodies sank into each other."""
-    level = GOOD if trust.deepest <= 0 else graded(trust.deepest / sizes.radius, DEPTH_LIMITS)
-    meaning = {
-        GOOD: "Nothing to be seen beside the size of the bodies.",
-        FAIR: "Small beside the bodies, but visible; a smaller time step lessens it.",
-        BAD: "Bodies sink into each other; use a smaller time step or more position sweeps.",
-        UNKNOWN: "Largest overlap of two surfaces.",
-    }[level]
-    return Finding(level, "Deepest penetration", f"{show(trust.deepest, 2)} m", meaning)
-
-
-def impacts_finding(trust: Trust, sizes: Sizes) -> Finding:
-    """Steps in which the exact time of impact does not hold."""
-    number = show(trust.multiple_impacts)
-    if math.isfinite(sizes.steps):
-        number += f" of {several(int(sizes.steps), 'step')}"
-    if trust.multiple_impacts == 0:
-        return Finding(GOOD, "Several impacts of a body in one step", number, "Every impact was resolved in time.")
-    meaning = "Only one impact a body and step is resolved exactly; a smaller time step sets them apart."
-    return Finding(FAIR, "Several impacts of a body in one step", number, meaning)
-
-
-def findings(run: Run, sizes: Sizes) -> list[Finding]:
-    """Every line of the panel for which there is a number."""
-    trust = run.trust
-    lines = [gradient_finding(check) for check in trust.gradient]
-    lines += [refined_finding(refined, run) for refined in trust.refined]
-    if not math.isnan(trust.residual):
-        lines.append(residual_finding(trust, sizes))
-    if not math.isnan(trust.deepest):
-        lines.append(depth_finding(trust, sizes))
-    if not math.isnan(trust.multiple_impacts):
-        lines.append(impacts_finding(trust, sizes))
-    return lines
-
-
-def advice(run: Run, lines: list[Finding]) -> str:
-    """One short paragraph: what the lines say together."""
-    gradient = worst_of([line for line in lines if line.what.startswith("Gradient")])
-    grid = worst_of([line for line in lines if line.what.startswith("Simulated")])
-    rest = worst_of([line for line in lines if not line.what.startswith(("Gradient", "Simulated"))])
-    return " ".join(part for part in (of_gradient(gradient), of_grid(grid, run.solved), of_rest(rest)) if part)
-
-
-def worst_of(lines: list[Finding]) -> str:
-    """The worst level; unknown without any."""
-    order = (UNKNOWN, GOOD, FAIR, BAD)
-    return max((line.level for line in lines), key=order.index, default=UNKNOWN)
-
-
-def of_gradient(level: str) -> str:
+def of_gradient(level: str, growth: str) -> str:
     """What the comparison with finite differences advises."""
+    if level == BAD and growth == BAD:
+        return "Gradient and differences disagree, as they must where changes grow so fast."
     return {
-        GOOD: "The gradients are right, so a solver that uses them was led well.",
-        FAIR: "The gradients are right up to kinks nearby; a little smoothing may help a solver that stalls.",
-        BAD: "Near this solution gradients mislead: compare with a solver that needs none, or raise the smoothing.",
+        GOOD: "The gradient is right: it agrees with differences.",
+        FAIR: "The gradient is right up to kinks nearby; a little smoothing may help a solver that stalls.",
+        BAD: "Here the gradient misleads: use a solver that needs none, raise the smoothing, or begin elsewhere.",
+    }.get(level, "")
+
+
+def of_growth(trust: Trust, level: str) -> str:
+    """What the growth of changes advises."""
+    far = reach(trust.growth)
+    if not math.isnan(far.lost):
+        return f"Derivatives break off going back from the end at t = {show(far.lost)} s: begin from another guess."
+    if level == BAD:
+        if math.isfinite(far.end):
+            return (
+                f"Changes double every {show(far.doubling, 2)} s, so the gradient is not to be trusted beyond "
+                f"{show(far.end, 2)} s: shorten the horizon to less than that, or use multiple shooting with "
+                "stretches as short."
+            )
+        return "The end is too sensitive for any gradient: shorten the horizon, or use multiple shooting."
+    return {
+        GOOD: "It reaches over the whole horizon, since changes hardly grow on the way.",
+        FAIR: "The end is sensitive to what comes before, so small steps are to be expected.",
     }.get(level, "")
 
 
@@ -184,10 +136,29 @@ def of_grid(level: str, solved: bool) -> str:
     }.get(level, "")
 
 
-def of_rest(level: str) -> str:
-    """What the state of the contacts advises."""
-    return {
-        GOOD: "The contacts are resolved cleanly.",
-        FAIR: "The contacts are resolved with small errors, named above.",
-        BAD: "The contacts are not resolved well enough; mend that before anything else.",
-    }.get(level, "")
+def of_smoothing(level: str) -> str:
+    """What the smoothed rollout advises, where solvers use it."""
+    if level in (FAIR, BAD):
+        return "Without the smoothing that solvers see the answer is another: lower it, or solve again without."
+    return ""
+
+
+def of_physics(lines: Sequence[Finding], level: dict[str, str]) -> str:
+    """What energy, momentum and the contacts advise."""
+    parts = []
+    if level[ENERGY] in (FAIR, BAD):
+        worst = next(line for line in lines if line.about == ENERGY and line.level == level[ENERGY])
+        parts.append(f"Look at the energy: {worst.meaning}")
+    parts.append(
+        {
+            GOOD: "The contacts are resolved cleanly.",
+            FAIR: "The contacts are resolved with small errors, named below.",
+            BAD: "The contacts are not resolved well enough; mend that before anything else.",
+        }.get(level[CONTACTS], "")
+    )
+    return " ".join(part for part in parts if part)
+
+
+def sentence(clause: str) -> str:
+    """A clause with a capital letter and a full stop."""
+    return clause[:1].upper() + clause[1:] + "."

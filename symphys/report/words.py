@@ -46,6 +46,13 @@ def show(value: float, digits: int = 3) -> str:
     return sign(f"{mantissa:g}" if mantissa not in (1, -1) else f"{mantissa:.0f}") + f" × 10{power(exponent)}"  # noqa: RUF001
 
 
+def percent(share: float) -> str:
+    """A share >= 0 in percent; a dash for nan."""
+    if not math.isfinite(share):
+        return show(share)
+    return f"{show(100 * share, 2)} %" if share == 0 or share >= 1e-6 else "< 0.0001 %"
+
+
 def plain(value: float, decimals: int) -> str:
     """Without an exponent; trailing zeros after the point go, thousands are set apart from 10 000 on."""
     text = f"{value:.{decimals}f}"

@@ -82,11 +82,11 @@ def record_step(
 
     ``exact`` is the step at smoothing 0 only: what the knob would add is left out.
     """
-    (x, u, p, knob), layout, recorder = _arguments(world, inputs, parameters), Layout(world), Recorder()
-    for name, symbols in (("u", u), ("p", p), ("smoothing", knob), *_parts(layout, x).items()):
+    (x, u, p, knob), layout, recorder = arguments_of(world, inputs, parameters), Layout(world), Recorder()
+    for name, symbols in (("u", u), ("p", p), ("smoothing", knob), *parts_of(layout, x).items()):
         recorder.argument(name, symbols)
     scene = make_scene(world, scheme, tuple(inputs), u, ca.SX(0) if exact else knob, recorder)
-    after, _ = take_step(scene, _parts(layout, x))
+    after, _ = take_step(scene, parts_of(layout, x))
     owners: dict[str, list[str]] = {}
     for name in layout.names():
         owners.setdefault(name.rpartition(".")[0], []).append(name)
@@ -101,24 +101,25 @@ def _flat(
     world: World, scheme: Scheme | None, inputs: Sequence[str], parameters: Sequence[Any]
 ) -> tuple[list[Expr], Scene, State]:
     """The step's arguments, the scene of a step as one expression, and x in parts."""
-    arguments, pieces = _arguments(world, inputs, parameters), Inline()
+    arguments, pieces = arguments_of(world, inputs, parameters), Inline()
     for column in arguments:
         pieces.take(column)
     x, u, _, knob = arguments
     scene = make_scene(world, scheme, tuple(inputs), u, knob, pieces)
-    return arguments, scene, _parts(Layout(world), x)
+    return arguments, scene, parts_of(Layout(world), x)
 
 
 def _packed(scene: Scene, x: State) -> Expr:
     return Layout(scene.world).pack({name: scene.pieces.value(part) for name, part in x.items()})
 
 
-def _parts(layout: Layout, x: Expr) -> State:
+def parts_of(layout: Layout, x: Expr) -> State:
+    """The state's parts by name."""
     return {name: x[layout[name]] for name in layout.names()}
 
 
-def _arguments(world: World, inputs: Sequence[str], parameters: Sequence[Any]) -> list[Expr]:
-    """x, u, p and smoothing."""
+def arguments_of(world: World, inputs: Sequence[str], parameters: Sequence[Any]) -> list[Expr]:
+    """Symbols for x, u, p and smoothing."""
     known = {f"{body.name}.{field}" for body in world.bodies for field in INPUT_FIELDS}
     for name in inputs:
         if name not in known:

@@ -102,7 +102,13 @@ def collide_now(scene: Scene, x: State, cut: Cut) -> Phase:
     still = tuple(ZERO for _ in rows)
     solved = relax(scene.pieces, scene.setting.scheme.sweeps, tuple(rows), Solution(momenta, still, still))
     after = _with_velocities(scene, x, motions, solved.momenta, cut.impact)
-    return Phase(after, tuple(rows), tuple(contacts), solved.impulses, solved.last)
+    forces = (x[f"{pair.name}.force"] for pair in scene.world.pairs)
+    ahead = tuple(scene.pieces.do(_ahead, cut.impact, x["lag"], force) for force in forces)
+    return Phase(after, tuple(rows), tuple(contacts), solved.impulses, solved.last, ahead)
+
+
+def _ahead(impact: Expr, lag: Expr, force: Expr) -> Expr:
+    return impact * lag * force
 
 
 def _row(setting: Setting, law: Law, contact: Contact, motions: Moving, struck: Expr, impact: Expr) -> ContactRow:

@@ -31,13 +31,23 @@ SHORTEST_KICK = 1 / 8
 
 @dataclass(frozen=True)
 class Phase:
-    """A stretch that has been advanced; ``last`` are the impulses before the final sweep."""
+    """A stretch that has been advanced.
+
+    Attributes:
+        x: the state at its end.
+        rows, contacts: of the pairs.
+        impulses: what each has given.
+        last: the same before the final sweep.
+        ahead: (3,) each [N s]: what persistent forces had given to the true velocities ahead of the impulses of
+            sweeps. The next stretch takes it off again, but after an impact, where leapfrog begins anew, it stays.
+    """
 
     x: State
     rows: tuple[Row, ...]
     contacts: tuple[Contact, ...]
     impulses: tuple[Impulse, ...]
     last: tuple[Impulse, ...]
+    ahead: tuple[Expr, ...] = ()
 
 
 def look(scene: Scene, motions: Sequence[Motion], duration: Expr) -> list[Contact]:

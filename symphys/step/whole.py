@@ -74,6 +74,11 @@ def report(scene: Scene, phases: list[Phase]) -> Report:
     for phase in phases:
         given = zip(forces, phase.rows, phase.impulses, strict=True)
         forces = tuple(do(_added, force, each.row, impulse, scene.setting.scheme.dt) for force, each, impulse in given)
+        if phase.ahead:
+            forces = tuple(
+                do(_ahead, force, ahead, scene.setting.scheme.dt)
+                for force, ahead in zip(forces, phase.ahead, strict=True)
+            )
         for new, old in zip(phase.impulses, phase.last, strict=True):
             residual = do(_larger_change, residual, new, old)
         crowded = do(_crowded, crowded, tuple((each.bodies, each.row.struck, each.row.leaving) for each in phase.rows))
@@ -83,6 +88,10 @@ def report(scene: Scene, phases: list[Phase]) -> Report:
 
 def _added(force: Expr, row: ContactRow, impulse: Impulse, dt: float) -> Expr:
     return force + impulse.linear(row.impulse_normal) / dt
+
+
+def _ahead(force: Expr, ahead: Expr, dt: float) -> Expr:
+    return force + ahead / dt
 
 
 def _stack(columns: tuple[Expr, ...]) -> Expr:

@@ -1,7 +1,27 @@
 """From a problem to a shooting problem: the rollout, its costs and their derivatives as casadi functions."""
 
+from symphys.transcription.along import Rollout, symbolic_rollout
+from symphys.transcription.faults import first_derivative_fault, first_fault
 from symphys.transcription.judge import Check, Verdict
 from symphys.transcription.program import rollout_program
-from symphys.transcription.transcribe import Judge, Transcription, judge_for, transcribe
+from symphys.transcription.simulate import Record
+from symphys.transcription.terms import Terms, terms
+from symphys.transcription.transcribe import Judge, Transcription, judge_for, judge_of, transcribe
 
-__all__ = ["Check", "Judge", "Transcription", "Verdict", "judge_for", "rollout_program", "transcribe"]
+__all__ = [
+    "Check",
+    "Judge",
+    "Record",
+    "Rollout",
+    "Terms",
+    "Transcription",
+    "Verdict",
+    "first_derivative_fault",
+    "first_fault",
+    "judge_for",
+    "judge_of",
+    "rollout_program",
+    "symbolic_rollout",
+    "terms",
+    "transcribe",
+]

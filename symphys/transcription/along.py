@@ -49,11 +49,15 @@ class Rollout:
     p: Expr
 
     @cached_property
-    def x(self) -> Expr:
-        """(nx, N + 1) states; built when first asked for, since the whole step as one expression takes its time."""
+    def step(self) -> ca.Function:
+        """One step (x, u, p, smoothing) -> x_next; built when first asked for, since one expression takes its time."""
         scheme = self.problem.simulation.scheme()
-        step = step_function(self.world, scheme, self.inputs, self.parameters.symbols)
-        (x,) = roll_out(step, self.steps, self.x0, self.u, self.p, self.smoothing)
+        return step_function(self.world, scheme, self.inputs, self.parameters.symbols)
+
+    @cached_property
+    def x(self) -> Expr:
+        """(nx, N + 1) states."""
+        (x,) = roll_out(self.step, self.steps, self.x0, self.u, self.p, self.smoothing)
         return x
 
     @property
@@ -71,9 +75,13 @@ class Rollout:
         n = int(self.z.shape[0])
         return compile_formula(self.problem, self.world, self.inputs, self.parameters, formula, n)
 
+    def tick(self, when: str | float) -> int:
+        """The number of the state at the end, or nearest to a time [s]."""
+        return self.steps if isinstance(when, str) else round(when / self.dt)
+
     def at(self, formula: Formula, when: str | float) -> Expr:
         """(m,): the formula's value at the end or at the step nearest to a time; inputs are those of that step."""
-        k = self.steps if isinstance(when, str) else round(when / self.dt)
+        k = self.tick(when)
         u = self.u[:, min(k, self.steps - 1)]
         return self.compiled(formula)(self.x[:, k], u, self.p, k * self.dt, self.z)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
+from math import inf, isfinite, isnan, nan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,8 +51,9 @@ class Verdict:
 
     @property
     def worst(self) -> float:
-        """The largest ratio; NaN without checks."""
-        return max((check.ratio for check in self.checks), default=float("nan"))
+        """The largest ratio; NaN where one is NaN, and without checks."""
+        ratios = (check.ratio for check in self.checks)
+        return max(ratios, key=lambda ratio: inf if isnan(ratio) else ratio, default=nan)
 
 
 def verdict(problem: Problem, objective: float, costs: NDArray[np.float64], errors: NDArray[np.float64]) -> Verdict:

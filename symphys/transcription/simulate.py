@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -11,24 +12,43 @@ from numpy.typing import NDArray
 from symphys.rollout import roll_out
 from symphys.state import GIVEN, Layout
 from symphys.step import report_function
-from symphys.trajectory import Trajectory
+from symphys.trajectory import NotFinite, Trajectory
 from symphys.transcription.along import Rollout
+from symphys.transcription.faults import Course, first_fault
 
 Array = NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class Record:
+    """A rollout: all of its states and arguments, and the motion in them."""
+
+    course: Course
+    motion: Trajectory
+
+
 def recorder(rollout: Rollout) -> ca.Function:
-    """(z, smoothing) -> (x, u, forces, gaps, residual, crowded) of the whole horizon."""
+    """(z, smoothing) -> (x, u, p, forces, gaps, residual, crowded) of the whole horizon."""
     scheme = rollout.problem.simulation.scheme()
     step = report_function(rollout.world, scheme, rollout.inputs, rollout.parameters.symbols)
-    x0 = rollout.x[:, 0]
-    outputs = roll_out(step, rollout.steps, x0, rollout.u, rollout.p, rollout.smoothing)
-    return ca.Function("record", [rollout.z, rollout.smoothing], [outputs[0], rollout.u, *outputs[1:]])
+    outputs = roll_out(step, rollout.steps, rollout.x0, rollout.u, rollout.p, rollout.smoothing)
+    return ca.Function("record", [rollout.z, rollout.smoothing], [outputs[0], rollout.u, rollout.p, *outputs[1:]])
 
 
-def simulate(rollout: Rollout, record: ca.Function, z: Array, smoothing: float) -> Trajectory:
-    """The trajectory of z; NotFinite where it has none."""
-    x, u, forces, gaps, residual, crowded = (np.array(part).T for part in record(z, smoothing))
+def simulate(rollout: Rollout, record: ca.Function, z: Array, smoothing: float) -> Record:
+    """The rollout of z; NotFinite, which says where and why, if it has none."""
+    x, u, p, *happened = (np.array(part).T for part in record(z, smoothing))
+    course = Course(np.asarray(z, float), smoothing, x, u, p.ravel())
+    motion = _trajectory(rollout, x, u, *happened)
+    try:
+        return Record(course, motion.require_finite())
+    except NotFinite as error:
+        raise NotFinite(f"{error}; {first_fault(rollout, course)}") from None
+
+
+def _trajectory(
+    rollout: Rollout, x: Array, u: Array, forces: Array, gaps: Array, residual: Array, crowded: Array
+) -> Trajectory:
     world, steps = rollout.world, rollout.steps
     layout = Layout(world)
     bodies = {field: _stack([x[:, layout[f"{b.name}.{field}"]] for b in world.bodies]) for field in GIVEN}
@@ -43,7 +63,7 @@ def simulate(rollout: Rollout, record: ca.Function, z: Array, smoothing: float) 
         contact_gap=np.concatenate([gaps, gaps[-1:]]),
         residual=residual.ravel(),
         crowded=crowded.ravel(),
-    ).require_finite()
+    )
 
 
 def _stack(parts: list[Any]) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import casadi as ca
 import numpy as np
@@ -52,6 +52,8 @@ class Terms:
         penalties: scalar: quadratic penalties of violated constraints.
         errors: (e,) error / tolerance of each target, constraint and the goal: met where <= 1.
         constraints: (c,) values, with ``lower`` and ``upper`` (c,) as numbers and ``names`` one an entry.
+        means: (a,) the value of every formula, its mean over time where it is looked at always: what is differentiated
+            to examine a gradient, since it means the same on any time grid and its slope does not vanish at a solution.
     """
 
     costs: Expr
@@ -63,6 +65,7 @@ class Terms:
     lower: np.ndarray[Any, np.dtype[np.float64]]
     upper: np.ndarray[Any, np.dtype[np.float64]]
     names: tuple[str, ...]
+    means: Expr
 
 
 def terms(rollout: Sampled) -> Terms:
@@ -72,15 +75,15 @@ def terms(rollout: Sampled) -> Terms:
     targets = [(target, rollout.at(target.formula, target.at)) for target in problem.targets]
     limits = [_Limit(rollout, constraint) for constraint in problem.constraints]
     aims = [np.sqrt(target.weight) * value for target, value in targets]
-    objective = sum((value for value, _ in costs), ca.MX(0)) + sum((ca.sumsqr(aim) for aim in aims), ca.MX(0))
+    objective = sum((cost.value for cost in costs), ca.MX(0)) + sum((ca.sumsqr(aim) for aim in aims), ca.MX(0))
     errors = [_miss(target, value) for target, value in targets] + [limit.error for limit in limits]
     if problem.goal is not None:
         errors.append(goal_error(objective, problem.goal))
-    squares = [residual for _, residual in costs]
+    squares = [cost.residual for cost in costs]
     penalties = [limit.penalty for limit in limits]
     whole = None if any(r is None for r in squares) else _stack([*squares, *aims, *penalties])
     return Terms(
-        costs=_stack([value for value, _ in costs]),
+        costs=_stack([cost.value for cost in costs]),
         objective=objective,
         residuals=whole,
         penalties=sum((ca.sumsqr(penalty) for penalty in penalties), ca.MX(0)),
@@ -89,6 +92,9 @@ def terms(rollout: Sampled) -> Terms:
         lower=np.concatenate([limit.lower for limit in limits] or [np.zeros(0)]),
         upper=np.concatenate([limit.upper for limit in limits] or [np.zeros(0)]),
         names=tuple(limit.name for limit in limits for _ in range(limit.lower.size)),
+        means=_stack(
+            [cost.mean for cost in costs] + [value for _, value in targets] + [limit.mean for limit in limits]
+        ),
     )
 
 
@@ -101,8 +107,20 @@ def _stack(parts: list[Expr]) -> Expr:
     return ca.vertcat(ca.MX(0, 1), *(ca.vec(part) for part in parts))
 
 
-def _cost(rollout: Sampled, cost: Cost) -> tuple[Expr, Expr | None]:
-    """(weighted cost, residuals whose squares sum to it, or None)."""
+def _mean(samples: Expr) -> Expr:
+    """(m,): the mean of the columns."""
+    return ca.sum2(samples) / samples.shape[1]
+
+
+class _Cost(NamedTuple):
+    """A weighted cost, the residuals whose squares sum to it (or None), the mean of its formula."""
+
+    value: Expr
+    residual: Expr | None
+    mean: Expr
+
+
+def _cost(rollout: Sampled, cost: Cost) -> _Cost:
     if cost.at == "always":
         samples = rollout.over_steps(cost.formula)
         weight = cost.weight * rollout.dt * rollout.steps / samples.shape[1]
@@ -110,8 +128,8 @@ def _cost(rollout: Sampled, cost: Cost) -> tuple[Expr, Expr | None]:
         samples, weight = rollout.at(cost.formula, cost.at), cost.weight
     if cost.squares:
         residual = np.sqrt(weight) * ca.vec(samples)
-        return ca.sumsqr(residual), residual
-    return weight * ca.sum2(samples), None
+        return _Cost(ca.sumsqr(residual), residual, _mean(samples))
+    return _Cost(weight * ca.sum2(samples), None, _mean(samples))
 
 
 def _miss(target: Target, value: Expr) -> Expr:
@@ -119,26 +137,27 @@ def _miss(target: Target, value: Expr) -> Expr:
 
 
 class _Limit:
-    """One constraint: its values, bounds, penalty residuals and error."""
+    """One constraint: its values and their mean, bounds, penalty residuals and error."""
 
     def __init__(self, rollout: Sampled, constraint: Constraint) -> None:
         always = constraint.at == "always"
         values = rollout.after_steps(constraint.formula) if always else rollout.at(constraint.formula, constraint.at)
         count = values.shape[1]
         self.name = constraint.name
-        self.value = ca.vec(values)
+        self.value, self.mean = ca.vec(values), _mean(values)
         size = values.shape[0]
         self.lower = np.tile(np.broadcast_to(constraint.lower, (size,)), count)
         self.upper = np.tile(np.broadcast_to(constraint.upper, (size,)), count)
         violation = self._violation()
         self.penalty = np.sqrt(constraint.penalty * (rollout.dt if always else 1.0)) * violation
-        self.error = ca.mmax(violation) / constraint.tolerance
+        total: Expr = ca.sum1(violation)
+        self.error = ca.if_else(total >= 0, ca.mmax(violation), total) / constraint.tolerance  # mmax hides a NaN
 
     def _violation(self) -> Expr:
         """(c,) >= 0: how far each value lies outside its bounds."""
         total = ca.MX.zeros(self.value.shape[0])
         for bound, sign in ((self.lower, -1), (self.upper, 1)):
             finite = np.isfinite(bound)
-            distance = ca.fmax(sign * (self.value - ca.DM(np.where(finite, bound, 0.0))), 0)
-            total += ca.DM(finite.astype(float)) * distance
+            beyond = sign * (self.value - ca.DM(np.where(finite, bound, 0.0)))
+            total += ca.DM(finite.astype(float)) * (beyond + ca.fabs(beyond)) / 2  # fmax(beyond, 0) hides a NaN
         return total

@@ -20,11 +20,12 @@ from symphys.transcription.decision import blocks
 from symphys.transcription.functions import ExpressionFunctions, function_of
 from symphys.transcription.judge import Verdict, verdict
 from symphys.transcription.program import rollout_program
-from symphys.transcription.simulate import recorder, simulate
+from symphys.transcription.simulate import Record, recorder, simulate
 from symphys.transcription.terms import Terms, terms
 
 Array = NDArray[np.float64]
-Judge = Callable[[Array], Verdict]
+Judge = Callable[..., Verdict]
+"""(z, smoothing = 0) -> verdict."""
 PRICING_CALLS = 5
 """How often a function is timed; the fastest call counts."""
 
@@ -46,12 +47,16 @@ class Transcription:
     backend: Description
     build_seconds: float
 
-    def judge(self, z: Array) -> Verdict:
-        """How ``z`` does in the exact rollout."""
-        return self._judge(z)
+    def judge(self, z: Array, smoothing: float = 0.0) -> Verdict:
+        """How ``z`` does in the exact rollout, or in a smoothed one."""
+        return self._judge(z, smoothing)
 
     def simulate(self, z: Array, smoothing: float = 0.0) -> Trajectory:
         """The motion; NotFinite if there is none."""
+        return self.record(z, smoothing).motion
+
+    def record(self, z: Array, smoothing: float = 0.0) -> Record:
+        """The motion and the states and arguments that it is made from; NotFinite if there is none."""
         return simulate(self.rollout, self._recorder, z, smoothing)
 
     def prices(self, kinds: Iterable[str] = ("gradient", "jacobian")) -> dict[str, float]:
@@ -84,8 +89,8 @@ def judge_of(rollout: Rollout, asked: Terms) -> Judge:
     """A judge of candidates by the exact rollout, without the functions that solvers need."""
     numbers = function_of(rollout, "judge", [asked.objective, asked.costs, asked.errors])
 
-    def judge(z: Array) -> Verdict:
-        objective, costs, errors = numbers(z, 0.0)
+    def judge(z: Array, smoothing: float = 0.0) -> Verdict:
+        objective, costs, errors = numbers(z, smoothing)
         return verdict(rollout.problem, float(objective), np.array(costs).ravel(), np.array(errors).ravel())
 
     return judge

@@ -160,21 +160,6 @@ def test_show_draws_the_guess(run: Run, throw: Path) -> None:
     assert "ball" in page.read_text(encoding="utf-8")
 
 
-def test_check_describes_the_file_and_compares_gradients(run: Run, throw: Path) -> None:
-    code, out, _ = run("check", throw)
-    assert code == 0
-    for words in ("A short throw", "10 steps", "sets ball.velocity", "is at half a metre", "agrees"):
-        assert words in out
-
-
-def test_check_exits_1_where_the_gradient_is_wrong(run: Run, throw: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    wrong = [{"variable": "throw", "error": 0.5, "scale": 1.0}]
-    monkeypatch.setattr("symphys.trust.compare_gradient", lambda *given: wrong)
-    code, out, _ = run("check", throw)
-    assert code == 1
-    assert "disagrees" in out
-
-
 def test_list_names_problems_and_solvers(run: Run) -> None:
     code, out, _ = run("list")
     assert code == 0

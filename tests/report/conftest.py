@@ -130,7 +130,7 @@ def result(problem: str, title: str, solver: str, seed: int, rows: list[dict[str
                 {"what": "dt / 2", "objective": 1.31e-5, "worst": 0.31},
                 {"what": "sweeps x 2", "objective": 1.2e-5, "worst": 1.4},
             ],
-            "residual": 1e-9, "deepest": 1e-5, "multiple_impacts": 2, "energy": [],
+            "residual": 1e-9, "impulse": 0.5, "deepest": 1e-5, "size": 0.3, "multiple_impacts": 2, "steps": 500,
         },
         "versions": VERSIONS, "when": "2026-11-21T12:00:00+00:00", "command": f"symphys solve {problem}.toml --seeds 5",
         "backend": {

@@ -230,9 +230,19 @@ def test_components_are_named_as_in_the_problem_file(run_dir: Path, edit: Callab
 
 
 def test_energy_is_drawn_where_it_was_recorded(run_dir: Path, edit: Callable[..., None]) -> None:
-    edit(run_dir / "result.json", trust={"energy": list(range(501))})
+    times = [0.0, 1.0, 2.0]
+    energy = dict.fromkeys(("time", "kinetic", "potential", "applied", "contact"), times)
+    edit(run_dir / "result.json", trust={"energy": energy, "gained": 0.0, "growth": {"time": times, "factor": times}})
+    text = read(run_dir)
+    assert {"energy.svg", "growth.svg"} <= {path.name for path in (run_dir / "figures").iterdir()}
+    assert "Angular momentum is not checked" in Page(text).text
+
+
+@pytest.mark.parametrize("entry", [[1, 2], {"time": [0, 1]}, {"time": [0], "factor": ["nan"]}, "text", None])
+def test_what_cannot_be_drawn_is_left_out(run_dir: Path, edit: Callable[..., None], entry: object) -> None:
+    edit(run_dir / "result.json", trust={"energy": entry, "growth": entry, "gains": entry, "slides": entry})
     read(run_dir)
-    assert (run_dir / "figures" / "energy.svg").is_file()
+    assert not {"energy.svg", "growth.svg"} & {path.name for path in (run_dir / "figures").iterdir()}
 
 
 def test_pickled_arrays_are_refused(run_dir: Path) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,10 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from symphys.report import values
+from symphys.report.examination import Energy, Gain, GradientCheck, Growth, Refined, Smoothed, Trust
+from symphys.report.levels import BAD, FAIR, GOOD, UNKNOWN, Judged, graded
 from symphys.report.markup import Html, tag
 from symphys.report.output import slug
-from symphys.report.records import Trust
-from symphys.report.trust import BAD, FAIR, GOOD, UNKNOWN, Sizes, depth_finding, graded, residual_finding
+from symphys.report.trust import advice, answers, findings, slopes
+from symphys.report.trust_numerics import slope_finding, smoothed_findings
+from symphys.report.trust_physics import depth_finding, residual_finding
 from symphys.report.words import count, listed, seconds, show
 
 
@@ -73,8 +78,81 @@ def test_names_can_be_written(text: str) -> None:
 
 def test_levels() -> None:
     assert [graded(x, (1, 3)) for x in (0.5, 1, 2, 4, math.inf, math.nan)] == [GOOD, GOOD, FAIR, BAD, BAD, UNKNOWN]
-    trust = Trust(residual=1e-3, deepest=0.02)
-    assert residual_finding(trust, Sizes(impulse=0.1)).level == FAIR
-    assert residual_finding(trust, Sizes()).level == UNKNOWN
-    assert depth_finding(trust, Sizes(radius=0.1)).level == BAD
-    assert depth_finding(Trust(deepest=-1e-9), Sizes()).level == GOOD
+    assert residual_finding(Trust(residual=1e-3, impulse=0.1)).level == FAIR
+    assert residual_finding(Trust(residual=1e-3)).level == UNKNOWN
+    assert depth_finding(Trust(deepest=0.02, size=0.1)).level == BAD
+    assert depth_finding(Trust(deepest=-1e-9)).level == GOOD
+    named = depth_finding(Trust(deepest=0.02, size=0.1, depth_contact="box-ground", depth_time=1.5))
+    assert "box-ground at t = 1.5 s" in named.number
+
+
+SOUND = Trust(
+    gradient=(GradientCheck("throw", 1e-9, 1.0),),
+    refined=(Refined("dt / 2", 1.01, 0.5, {"throw": 0.01}), Refined("sweeps x 2", 1.0, 0.5, {"throw": 0.0})),
+    smoothed=(Smoothed(1e-3, False, 1.0, 0.5),),
+    growth=Growth(np.array([0.0, 1, 2]), np.array([3.0, 2, 1])),
+    gained=0.0,
+    drift=0.0,
+    momentum=1e-16,
+    residual=0.0,
+    deepest=0.0,
+    multiple_impacts=0.0,
+)
+MET = Judged(1.0, 0.5, True, True)
+
+
+def test_advice_of_a_sound_solution() -> None:
+    assert {line.level for line in findings(SOUND, MET)} == {GOOD}
+    assert advice(SOUND, MET) == (
+        "The gradient is right: it agrees with differences. It reaches over the whole horizon, since changes hardly "
+        "grow on the way. The result still meets every target when it is simulated more finely, so it is not an "
+        "accident of the time grid. The contacts are resolved cleanly."
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"fault": "cost 'c' is not finite at t = 1 s: 1 / 0"}, "Mend this first"),
+        ({"gradient": (GradientCheck("throw", 0.3, 1.0),)}, "the gradient misleads"),
+        ({"refined": (Refined("dt / 2", 1.0, 9.0),)}, "falls apart"),
+        ({"refined": (Refined("dt / 2", 1.0, 0.5, {"throw": 0.9}),)}, "falls apart"),
+        ({"growth": Growth(np.arange(9.0), 10.0 ** np.arange(8, -1, -1))}, "shorten the horizon to less than that"),
+        ({"growth": Growth(np.arange(9.0), np.geomspace(1e3, 1, 9))}, "small steps are to be expected"),
+        ({"growth": Growth(np.arange(3.0), np.array([np.nan, 2.0, 1.0]))}, "break off going back from the end"),
+        ({"smoothed": (Smoothed(0.1, True, 9.0, 4.0),)}, "Without the smoothing"),
+        ({"gained": 0.1, "gains": (Gain(7, 0.7, 0.1, ("a-b",)),)}, "a-b at t = 0.7 s, step 7"),
+        ({"momentum": 1.0}, "fault of the engine"),
+        ({"residual": 1.0, "impulse": 1.0}, "mend that before anything else"),
+    ],
+)
+def test_advice_names_what_is_wrong(change: dict[str, Any], words: str) -> None:
+    assert words not in advice(SOUND, MET)
+    energy = Energy(*(np.array([0.0, 1.0]) for _ in range(5)))
+    assert words in advice(replace(SOUND, energy=energy, **change), MET)
+
+
+def test_the_gradient_under_refinement() -> None:
+    rows = (Refined("dt / 2", 1.0, 0.5, {"a": 0.01, "b": np.nan}), Refined("dt / 4", 1.0, 0.5, {"a": 0.6, "b": 0.0}))
+    (line,) = slope_finding(Trust(refined=rows, order={"gradient": 1.04}))
+    assert line.level == BAD
+    assert "60 % with dt" in line.number
+    assert "dt to the power 1" in line.meaning
+    assert slope_finding(Trust(refined=(Refined("dt / 2", 1.0, 0.5),))) == []
+
+
+def test_smoothing_of_the_problem_and_smoothing_that_would_do_no_harm() -> None:
+    tried = tuple(Smoothed(knob, False, 1.0, worst) for knob, worst in ((1e-3, 0.5), (1e-2, 0.9), (1e-1, 4.0)))
+    assert "Up to 0.01 m/s" in smoothed_findings(tried, MET)[0].meaning
+    assert smoothed_findings(tried[2:], MET)[0].level == UNKNOWN
+    assert smoothed_findings((Smoothed(1e-2, True, 1.0, 0.9),), MET)[0].level == GOOD
+    assert smoothed_findings((Smoothed(1e-2, True, 5.0, 9.0),), MET)[0].level == BAD
+
+
+def test_tables_of_refinement() -> None:
+    header, rows = answers(SOUND, MET)
+    assert len(header) == len(rows[0]) == 4
+    assert [row[0] for row in rows] == ["as asked", "dt / 2", "sweeps x 2", "smoothed 0.001 m/s"]
+    header, rows = slopes(SOUND)
+    assert header[-2:] == ["dt / 2", "sweeps x 2"]
+    assert rows == [["throw", "1", "1 × 10⁻⁹", "agrees", "1 %", "0 %"]]  # noqa: RUF001

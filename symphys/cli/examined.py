@@ -1,0 +1,79 @@
+"""An examination as tables and a paragraph on the terminal, in the words of the reports."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from symphys import files
+from symphys.report.examination import Trust
+from symphys.report.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN, Judged
+from symphys.report.reading_examination import make_trust
+from symphys.report.trust import FAULT, VERDICTS, advice, answers, findings, slopes
+from symphys.report.trust_numerics import GRADIENT, GRID, reach
+from symphys.report.trust_physics import sliding
+from symphys.transcription import Verdict
+
+COLOURS = {GOOD: "green", FAIR: "yellow", BAD: "red", UNKNOWN: "dim"}
+WORDS = {text: COLOURS[level] for words in (MARKS, VERDICTS) for level, text in words.items()}
+WIDTH = 110
+"""Characters of a line that goes to no terminal."""
+IN_TABLES = (GRADIENT, GRID)
+"""What the tables above the findings say already."""
+
+
+@dataclass(frozen=True)
+class Examined:
+    """How something was judged, and how far that can be trusted."""
+
+    judged: Judged
+    trust: Trust
+
+    @classmethod
+    def of(cls, verdict: Verdict, trust: Mapping[str, Any]) -> Examined:
+        """From a verdict and what ``symphys.trust.examine`` has found."""
+        judged = Judged(verdict.objective, verdict.worst, verdict.solved, bool(verdict.checks))
+        return cls(judged, make_trust(files.strict(trust)))
+
+    @property
+    def wrong(self) -> bool:
+        """Whether a gradient differs from differences, or anything is not finite."""
+        levels = [line.level for line in findings(self.trust, self.judged) if line.about in (GRADIENT, FAULT)]
+        return FAIR in levels or BAD in levels or not math.isnan(reach(self.trust.growth).lost)
+
+
+def print_examined(examined: Examined) -> None:
+    """Print it."""
+    trust, judged = examined.trust, examined.judged
+    console = Console(width=None if sys.stdout.isatty() else WIDTH)
+    print_table(console, *slopes(trust))
+    print_table(console, *answers(trust, judged))
+    lines = [line for line in findings(trust, judged) if line.about not in IN_TABLES]
+    rows = [[line.what, line.number, MARKS[line.level], line.meaning] for line in lines]
+    print_table(console, ["looked at", "number", "", "meaning"], rows)
+    for paragraph in (sliding(trust), advice(trust, judged)):
+        if paragraph:
+            console.print(Text(printable(paragraph, console) + "\n"))
+
+
+def print_table(console: Console, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print a table; verdicts, whose column has no title, are kept in one line."""
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for title in header:
+        table.add_column(title, no_wrap=not title, overflow="fold")
+    for row in rows:
+        table.add_row(*(Text(printable(cell, console), style=WORDS.get(cell, "")) for cell in row))
+    console.print(table)
+
+
+def printable(text: str, console: Console) -> str:
+    """The text without what the terminal cannot show."""
+    return text.encode(console.encoding, "replace").decode(console.encoding)

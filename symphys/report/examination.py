@@ -1,0 +1,135 @@
+"""What was measured to say how far a solution can be trusted, as frozen records; ``nan`` is a number not known."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def nothing() -> Array:
+    """(0,)."""
+    return np.zeros(0)
+
+
+@dataclass(frozen=True)
+class GradientCheck:
+    """|adjoint - central difference| of one variable, relative to ``scale``, the norm of its gradient."""
+
+    variable: str
+    error: float
+    scale: float
+
+
+@dataclass(frozen=True)
+class Refined:
+    """The same z simulated more finely: objective, largest error / tolerance, relative change of each gradient."""
+
+    what: str
+    objective: float
+    worst: float
+    gradient: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def change(self) -> float:
+        """The largest change of a gradient that is known; nan if none is."""
+        known = [change for change in self.gradient.values() if not np.isnan(change)]
+        return max(known, default=np.nan)
+
+
+@dataclass(frozen=True)
+class Smoothed:
+    """The same z with contacts smoothed over ``smoothing`` [m/s]; ``own``: as the problem's solvers see it."""
+
+    smoothing: float
+    own: bool
+    objective: float
+    worst: float
+
+
+@dataclass(frozen=True)
+class Growth:
+    """``factor`` (k,): how much a change of the state at ``time`` (k,) [s] is magnified by the end; 1 at the end."""
+
+    time: Array = field(default_factory=nothing)
+    factor: Array = field(default_factory=nothing)
+
+
+@dataclass(frozen=True)
+class Energy:
+    """At ``time`` [s]: energies, and what forces and contacts have given by then [J]; (k,) each."""
+
+    time: Array = field(default_factory=nothing)
+    kinetic: Array = field(default_factory=nothing)
+    potential: Array = field(default_factory=nothing)
+    applied: Array = field(default_factory=nothing)
+    contact: Array = field(default_factory=nothing)
+
+
+@dataclass(frozen=True)
+class Gain:
+    """A step, beginning at ``time`` [s], in which contacts added energy [J]."""
+
+    step: int
+    time: float
+    energy: float
+    contacts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Slide:
+    """How far [m] two surfaces slid under load, and their largest speed [m/s] and when [s]."""
+
+    contact: str
+    distance: float
+    speed: float
+    time: float
+
+
+@dataclass(frozen=True)
+class Trust:
+    """How far a solution can be trusted.
+
+    Attributes:
+        gradient: one per variable.
+        step: of the central differences, in units of each variable's scale.
+        refined: one per refinement.
+        order: of convergence in dt, of "objective" and "gradient".
+        smoothed: one per smoothing tried.
+        growth: of changes, along the horizon.
+        energy: along the horizon.
+        gains, gained: the steps in which contacts added most energy, and all that they added [J].
+        drift: largest change of energy in a step that nothing accounts for [J].
+        momentum: largest change of momentum in a step that nothing accounts for, relative.
+        residual, impulse: largest change of an impulse in the last sweep, and largest impulse in a step [N s].
+        deepest, depth_contact, depth_time, size: deepest penetration [m], where, when; size of the smallest body [m].
+        multiple_impacts, steps: steps with two or more impacts on a body, of all.
+        slides: the contacts that slid furthest.
+        fault: where the first number that is not finite comes from; empty if all are finite.
+    """
+
+    gradient: tuple[GradientCheck, ...] = ()
+    step: float = np.nan
+    refined: tuple[Refined, ...] = ()
+    order: Mapping[str, float] = field(default_factory=dict)
+    smoothed: tuple[Smoothed, ...] = ()
+    growth: Growth = field(default_factory=Growth)
+    energy: Energy = field(default_factory=Energy)
+    gains: tuple[Gain, ...] = ()
+    gained: float = np.nan
+    drift: float = np.nan
+    momentum: float = np.nan
+    residual: float = np.nan
+    impulse: float = np.nan
+    deepest: float = np.nan
+    depth_contact: str = ""
+    depth_time: float = np.nan
+    size: float = np.nan
+    multiple_impacts: float = np.nan
+    steps: float = np.nan
+    slides: tuple[Slide, ...] = ()
+    fault: str = ""

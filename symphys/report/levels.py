@@ -1,0 +1,50 @@
+"""Levels: how much a number worries."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+GOOD, FAIR, BAD, UNKNOWN = "good", "fair", "bad", "unknown"
+MARKS = {GOOD: "good", FAIR: "look closer", BAD: "do not rely on it", UNKNOWN: "not judged"}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line: its subject, a level, what was looked at, its number, and what that means."""
+
+    about: str
+    level: str
+    what: str
+    number: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Judged:
+    """How what is examined was judged as it stands, and whether there is anything to meet."""
+
+    objective: float
+    worst: float
+    solved: bool
+    checked: bool
+
+
+def graded(value: float, limits: tuple[float, float]) -> str:
+    """The level of a number that had better be small."""
+    if math.isnan(value):
+        return UNKNOWN
+    return GOOD if value <= limits[0] else FAIR if value <= limits[1] else BAD
+
+
+def worst_of(levels: Iterable[str]) -> str:
+    """The worst level; unknown without any."""
+    return max(levels, key=(UNKNOWN, GOOD, FAIR, BAD).index, default=UNKNOWN)
+
+
+def relative_change(before: float, after: float) -> float:
+    """|after - before| / |before|; nan if one is not finite."""
+    if not (math.isfinite(before) and math.isfinite(after)):
+        return math.nan
+    return abs(after - before) / max(abs(before), 1e-12)

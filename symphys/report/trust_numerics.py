@@ -1,0 +1,184 @@
+"""Whether gradient and answer are those of the problem: differences, refinement, growth, smoothing."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from symphys.report.examination import GradientCheck, Growth, Refined, Smoothed, Trust
+from symphys.report.levels import BAD, FAIR, GOOD, UNKNOWN, Finding, Judged, graded, relative_change, worst_of
+from symphys.report.words import listed, percent, show
+
+GRADIENT, GRID, GROWTH, SMOOTHING = "gradient", "grid", "growth", "smoothing"
+
+GRADIENT_LIMITS = (1e-4, 1e-2)
+"""Relative errors of a gradient: below the first it agrees, above the second it must not be used."""
+FLAT = 1e-6
+"""A gradient whose norm is below this is too small to be compared."""
+OBJECTIVE_LIMITS = (0.05, 0.3)
+"""Relative changes of the objective under refinement."""
+WORST_LIMITS = (1.0, 3.0)
+"""Error / tolerance of a solved run under refinement."""
+SLOPE_LIMITS = (0.1, 0.5)
+"""Relative changes of the gradient under refinement: above the second it is another direction."""
+GROWTH_LIMITS = (1e2, 1e4)
+"""Of a change, from one time to another. At the second 0.1 mm become 1 m: what is linear ends there."""
+ORDERS = (0.3, 5.0)
+"""Orders of convergence between these are told; others are none."""
+
+
+def gradient_finding(check: GradientCheck) -> Finding:
+    """The adjoint gradient against central differences, for one variable."""
+    what, number = f"Gradient of {check.variable}", show(check.error, 2)
+    level = graded(check.error, GRADIENT_LIMITS)
+    if level in (FAIR, BAD) and check.scale <= FLAT:
+        return Finding(
+            GRADIENT, UNKNOWN, what, number, "The gradient is almost zero here, so the comparison says little."
+        )
+    meaning = {
+        GOOD: "Agrees with finite differences.",
+        FAIR: "Agrees roughly; a bounce or a change between slip and stick may lie within the difference's step.",
+        BAD: "Does not agree: the motion has a kink here, or differences of so stiff a motion mean nothing.",
+        UNKNOWN: "Could not be compared.",
+    }[level]
+    return Finding(GRADIENT, level, what, number, meaning)
+
+
+def refined_finding(refined: Refined, judged: Judged) -> Finding:
+    """The same z, simulated more finely."""
+    what = f"Simulated again with {unbroken(refined.what) or 'a refinement'}"
+    number = f"objective {show(refined.objective)}"
+    if judged.checked and not math.isnan(refined.worst):
+        number += f", worst error {show(refined.worst)} × tolerance"  # noqa: RUF001
+    if judged.solved and judged.checked:
+        level = graded(refined.worst, WORST_LIMITS)
+        meaning = {
+            GOOD: "Every check is still met.",
+            FAIR: "Misses a tolerance by a little: the solution depends on the time grid.",
+            BAD: "Misses by far: the solution belongs to this time grid, not to the physics.",
+            UNKNOWN: "Could not be simulated.",
+        }[level]
+        return Finding(GRID, level, what, number, meaning)
+    change = relative_change(judged.objective, refined.objective)
+    level = graded(change, OBJECTIVE_LIMITS)
+    meaning = "Could not be compared." if level == UNKNOWN else f"The objective changes by {percent(change)}."
+    return Finding(GRID, level, what, number, meaning)
+
+
+def slope_finding(trust: Trust) -> list[Finding]:
+    """What refinement does to the gradient; nothing where that was not measured."""
+    changes = [(unbroken(refined.what), refined.change) for refined in trust.refined]
+    known = [(what, change) for what, change in changes if not math.isnan(change)]
+    if not known:
+        return []
+    level = worst_of(graded(change, SLOPE_LIMITS) for _, change in known)
+    meaning = {
+        GOOD: "The gradient hardly depends on the discretisation.",
+        FAIR: "The gradient depends on the discretisation; a solver will notice, a smaller step helps.",
+        BAD: "Simulated more finely, the gradient is another one: it belongs to this time grid.",
+    }[level]
+    order = trust.order.get("gradient", math.nan)
+    if ORDERS[0] <= order <= ORDERS[1]:
+        meaning += f" Its error shrinks like dt to the power {show(order, 2)}."
+    told = ", ".join(f"{percent(change)} with {what}" for what, change in known)
+    return [Finding(GRID, level, "Change of the gradient", told, meaning)]
+
+
+def unbroken(text: str) -> str:
+    """The text on one line."""
+    return text.replace(" ", "\N{NO-BREAK SPACE}")
+
+
+@dataclass(frozen=True)
+class Reach:
+    """What a growth curve says.
+
+    Attributes:
+        total: the largest magnification of a change by the end.
+        start: when [s] a change is magnified most.
+        end: when [s] a change made then has grown beyond bounds, at the latest; inf if it never does.
+        doubling: [s] in which it doubles, from then on; inf where it does not grow.
+        lost: [s] before which the derivatives are not finite; nan if all are.
+    """
+
+    total: float
+    start: float
+    end: float
+    doubling: float
+    lost: float
+
+
+def reach(growth: Growth) -> Reach:
+    """How far a gradient reaches.
+
+    |dx_T/dx_s| <= |dx_T/dx_t| |dx_t/dx_s|: what the curve has fallen from s to t, a change has at least grown. So a
+    gradient with respect to the state at s is not to be trusted beyond the t where the curve has fallen by the second
+    of ``GROWTH_LIMITS``.
+    """
+    finite = np.isfinite(growth.factor)
+    time, factor = growth.time[finite], growth.factor[finite]
+    lost = np.nan if finite.all() or not finite.any() else float(time[0])
+    if not factor.size:
+        return Reach(np.nan, np.nan, np.inf, np.inf, np.nan)
+    first = int(factor.argmax())
+    grown = factor[first] / np.maximum(factor[first:], 1e-300)
+    beyond, half = grown > GROWTH_LIMITS[1], grown > np.sqrt(factor[first])
+    since = time[first:]
+    end = float(since[beyond.argmax()]) if beyond.any() else np.inf
+    doublings = np.log2(factor[first]) / 2
+    doubling = float(since[half.argmax()] - since[0]) / doublings if half.any() and doublings > 0 else np.inf
+    return Reach(float(factor[first]), float(time[first]), end, doubling, lost)
+
+
+def growth_finding(growth: Growth) -> Finding:
+    """How changes grow along the horizon."""
+    what, far = "Growth of a change until the end", reach(growth)
+    if not math.isnan(far.lost):
+        meaning = f"The derivatives are not finite before t = {show(far.lost)} s: nothing before can be optimised."
+        return Finding(GROWTH, BAD, what, show(far.total, 2), meaning)
+    level = graded(far.total, GROWTH_LIMITS)
+    meaning = {
+        GOOD: f"A change of 1 mm or 1 mm/s moves the end by about {show(far.total, 2)} mm at most.",
+        FAIR: f"The end is sensitive: a change of 1 mm at t = {show(far.start)} s moves it by "
+        f"{show(far.total / 1000, 2)} m, so a solver can take small steps only.",
+        BAD: f"A change at t = {show(far.start)} s doubles every {show(far.doubling, 2)} s{too_far(far)}.",
+        UNKNOWN: "Could not be measured.",
+    }[level]
+    return Finding(GROWTH, level, what, f"× {show(far.total, 2)}", meaning)  # noqa: RUF001
+
+
+def too_far(far: Reach) -> str:
+    """Where a gradient ends, as a clause."""
+    if not math.isfinite(far.end):
+        return ""
+    return f"; the gradient is not to be trusted beyond {show(far.end, 2)} s"
+
+
+def smoothed_findings(rows: tuple[Smoothed, ...], judged: Judged) -> list[Finding]:
+    """What smoothing changes: of the problem's own what it hides, else how much would do no harm."""
+    if not rows:
+        return []
+    what = f"Smoothed over {listed([show(row.smoothing) for row in rows])} m/s"
+    number = f"objective {listed([show(row.objective) for row in rows])}"
+    if rows[0].own:
+        change = relative_change(judged.objective, rows[0].objective)
+        level = GOOD if harmless(rows[0], judged) else FAIR if graded(change, OBJECTIVE_LIMITS) != BAD else BAD
+        meaning = {
+            GOOD: "What the solver sees is what happens without smoothing.",
+            FAIR: "The solver sees something a little better or worse than what happens: lower the smoothing at last.",
+            BAD: "The solver sees another problem than the one that is judged: lower the smoothing.",
+        }[level]
+        return [Finding(SMOOTHING, level, what, number, meaning)]
+    most = max((row.smoothing for row in rows if harmless(row, judged)), default=math.nan)
+    if math.isnan(most):
+        return [Finding(SMOOTHING, UNKNOWN, what, number, "Even the least of these would make it another problem.")]
+    return [Finding(SMOOTHING, GOOD, what, number, f"Up to {show(most)} m/s it would change little.")]
+
+
+def harmless(row: Smoothed, judged: Judged) -> bool:
+    """Whether this smoothing leaves the answer what it is."""
+    if judged.solved and judged.checked:
+        return row.worst <= WORST_LIMITS[0]
+    return relative_change(judged.objective, row.objective) <= OBJECTIVE_LIMITS[0]

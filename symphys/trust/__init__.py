@@ -1,0 +1,8 @@
+"""How far a gradient and a solution through contact can be trusted: one examination, for ``check`` and for every solve.
+
+Its numbers are told in words by ``symphys.report.trust``.
+"""
+
+from symphys.trust.examine import examine
+
+__all__ = ["examine"]

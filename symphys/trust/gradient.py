@@ -1,0 +1,84 @@
+"""The gradient against central differences."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.shooting import Block
+from symphys.transcription import Rollout, Terms, Transcription
+
+Array = NDArray[np.float64]
+
+DIFFERENCE_STEPS = (1e-4, 1e-5, 1e-6)
+"""Steps of the central differences, as shares of the scale; the best counts, and a wrong slope passes none."""
+EVERY_COMPONENT = 12
+"""Variables up to this size are differenced component by component, larger ones along as many random directions."""
+
+
+def compare_gradient(transcription: Transcription, z: Array) -> list[dict[str, Any]]:
+    """Adjoint against central differences, per variable.
+
+    What is differentiated is a fixed random combination of every formula that the problem asks for (``Terms.means``),
+    because at a solution the gradient of the objective itself is zero.
+
+    Returns:
+        For each variable "error", |adjoint - central difference| / scale; "scale", the norm of its slope; "step", the
+        step of the best difference as a share of the variable's scale. NaN where one is not finite.
+    """
+    value, gradient = probe(transcription)
+    slope = np.array(gradient(z)).ravel()
+    return [_compare_block(value, block, z, slope) for block in transcription.shooting.blocks]
+
+
+@lru_cache(maxsize=1)
+def probe(transcription: Transcription) -> tuple[ca.Function, ca.Function]:
+    """(z -> weights . every formula, z -> its gradient), exact contact."""
+    return probe_of(transcription.rollout, transcription.terms)
+
+
+def probe_of(rollout: Rollout, asked: Terms) -> tuple[ca.Function, ca.Function]:
+    """The probe of a rollout; its weights depend on the formulas alone, not on the time grid."""
+    weights = np.random.default_rng(0).uniform(0.5, 1.5, asked.means.shape[0])
+    combined = ca.dot(ca.DM(weights), ca.densify(asked.means))
+    z = ca.MX.sym("z", rollout.z.shape[0])
+
+    def exact(name: str, output: Any) -> ca.Function:
+        smooth = ca.Function(name, [rollout.z, rollout.smoothing], [ca.densify(output)])
+        return ca.Function(name, [z], [smooth(z, 0)])
+
+    return exact("probe", combined), exact("probe_gradient", ca.gradient(combined, rollout.z))
+
+
+def _compare_block(value: ca.Function, block: Block, z: Array, slope: Array) -> dict[str, Any]:
+    norm = float(np.linalg.norm(slope[block.start : block.stop]))
+    directions = _directions(block, block.stop - block.start, z.size)
+    errors = [max_or_nan(_mismatch(value, z, slope, d, step) for d in directions) for step in DIFFERENCE_STEPS]
+    known = [pair for pair in zip(errors, DIFFERENCE_STEPS, strict=True) if not np.isnan(pair[0])]
+    best, at = min(known, default=(np.nan, np.nan))
+    return {"variable": block.name, "error": best / norm if norm else best, "scale": norm, "step": at}
+
+
+def max_or_nan(numbers: Any) -> float:
+    """The largest; NaN if one is."""
+    return float(np.max(np.fromiter(numbers, float), initial=0.0))
+
+
+def _directions(block: Block, size: int, n: int) -> Array:
+    """(k, n): unit steps in the scale of each component, or random combinations of many."""
+    inside = np.eye(size)
+    if size > EVERY_COMPONENT:
+        inside = np.random.default_rng(1).standard_normal((EVERY_COMPONENT, size))
+        inside /= np.linalg.norm(inside, axis=1, keepdims=True)
+    whole = np.zeros((len(inside), n))
+    whole[:, block.start : block.stop] = inside * block.scale
+    return whole
+
+
+def _mismatch(value: ca.Function, z: Array, slope: Array, direction: Array, step: float) -> float:
+    high, low = (float(value(z + sign * step * direction)) for sign in (1, -1))
+    return abs((high - low) / (2 * step) - float(slope @ direction)) / float(np.linalg.norm(direction))

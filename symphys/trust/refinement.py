@@ -1,0 +1,94 @@
+"""The answer and its gradient under finer time steps and more sweeps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from symphys.problem import Problem
+from symphys.shooting import Block
+from symphys.transcription import Judge, Transcription, judge_of, symbolic_rollout, terms
+from symphys.trust.gradient import probe, probe_of
+
+Array = NDArray[np.float64]
+
+ROUNDING = 1e-9
+"""Relative changes below this say nothing about the order of convergence."""
+
+
+@dataclass(frozen=True)
+class Finer:
+    """A finer discretisation of a problem: how it judges, and the gradient of its probe."""
+
+    what: str
+    judge: Judge
+    gradient: ca.Function
+
+
+def refine(transcription: Transcription, z: Array) -> dict[str, Any]:
+    """How ``z`` does in finer discretisations.
+
+    Returns:
+        "refined": for dt / 2, dt / 4 and twice the sweeps the "objective", the "worst" error / tolerance, and
+        "gradient": per variable the change of the probe's gradient relative to its norm, in the variables' scales;
+        None where it is flat.
+        "order": of convergence in dt, of the "objective" and of the "gradient"; None where it cannot be seen.
+    """
+    slopes = [_slope(probe(transcription)[1], z)]
+    objectives = [transcription.judge(z).objective]
+    rows = []
+    for finer in finer_problems(transcription):
+        verdict, slope = finer.judge(z), _slope(finer.gradient, z)
+        changes = {block.name: change(block, slopes[0], slope) for block in transcription.shooting.blocks}
+        rows.append({"what": finer.what, "objective": verdict.objective, "worst": verdict.worst, "gradient": changes})
+        objectives.append(verdict.objective)
+        slopes.append(slope)
+    return {"refined": rows, "order": {"objective": order(objectives[:3]), "gradient": order(slopes[:3])}}
+
+
+def change(block: Block, before: Array, after: Array) -> float | None:
+    """|after - before| / |before| of one variable's part of a gradient, in its scale; None where it is flat."""
+    part = slice(block.start, block.stop)
+    norm = float(np.linalg.norm(before[part] * block.scale))
+    return float(np.linalg.norm((after - before)[part] * block.scale)) / norm if norm else None
+
+
+def order(values: Sequence[ArrayLike]) -> float | None:
+    """p of an error like dt^p, from values (of any one shape) at dt, dt / 2 and dt / 4; None within rounding."""
+    coarse, middle, fine = (np.asarray(value, float) for value in values)
+    first, second = float(np.linalg.norm(coarse - middle)), float(np.linalg.norm(middle - fine))
+    least = ROUNDING * float(np.linalg.norm(fine))
+    if not (least < first < np.inf and least < second < np.inf):
+        return None
+    return float(np.log2(first / second))
+
+
+@lru_cache(maxsize=1)
+def finer_problems(transcription: Transcription) -> list[Finer]:
+    """Made once for all runs of a problem."""
+    return [_finer(what, problem) for what, problem in _variants(transcription.problem)]
+
+
+def _finer(what: str, problem: Problem) -> Finer:
+    rollout = symbolic_rollout(problem)
+    asked = terms(rollout)
+    return Finer(what, judge_of(rollout, asked), probe_of(rollout, asked)[1])
+
+
+def _variants(problem: Problem) -> list[tuple[str, Problem]]:
+    simulation = problem.simulation
+    return [
+        ("dt / 2", replace(problem, simulation=replace(simulation, dt=simulation.dt / 2))),
+        ("dt / 4", replace(problem, simulation=replace(simulation, dt=simulation.dt / 4))),
+        ("sweeps x 2", replace(problem, simulation=replace(simulation, sweeps=2 * simulation.sweeps))),
+    ]
+
+
+def _slope(gradient: ca.Function, z: Array) -> Array:
+    return np.array(gradient(z)).ravel()

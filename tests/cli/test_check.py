@@ -1,0 +1,51 @@
+"""``symphys check``: a description, an examination in words, and an exit code."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+def test_check_describes_the_file_and_compares_gradients(run: Run, throw: Path) -> None:
+    code, out, _ = run("check", throw)
+    assert code == 0
+    for words in ("A short throw", "10 steps", "sets ball.velocity", "is at half a metre", "agrees"):
+        assert words in out
+
+
+def test_check_exits_1_where_the_gradient_is_wrong(run: Run, throw: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    wrong = [{"variable": "throw", "error": 0.5, "scale": 1.0}]
+    monkeypatch.setattr("symphys.trust.gradient.compare_gradient", lambda *given: wrong)
+    code, out, _ = run("check", throw)
+    assert code == 1
+    assert "disagrees" in out
+    assert "the gradient misleads" in " ".join(out.split())
+
+
+def test_check_exits_1_where_a_number_is_not_finite(run: Run, throw: Path) -> None:
+    text = throw.read_text(encoding="utf-8")
+    throw.write_text(text.replace("ball.position[0:2] - [0.5, 0]", "sqrt(ball.position[0] - 1)"), encoding="utf-8")
+    code, out, _ = run("check", throw)
+    assert code == 1
+    assert "target 'is at half a metre' is not finite at t = 0.2 s: sqrt(-0.8)" in " ".join(out.split())
+    pushed = text.replace("velocity", "force").replace("[1, 0]", "[1e308, 0]").replace("upper = 10", "")
+    throw.write_text(pushed.replace("mass = 1.0", "mass = 0.001"), encoding="utf-8")
+    code, out, _ = run("check", throw)
+    assert code == 1 and "not finite from step" in out and "it begins in the step from t = 0 s" in out
+
+
+def test_check_can_look_at_what_a_run_found(run: Run, throw: Path, unreachable: Path) -> None:
+    run("solve", throw, "--solver", "least_squares")
+    code, out, _ = run("check", throw, "--at", "reports/throw/least_squares-seed0")
+    assert code == 0
+    assert "still meets every target" in " ".join(out.split())
+    assert "still meets" not in " ".join(run("check", throw)[1].split())
+    other = throw.with_name("other.toml")
+    other.write_text(throw.read_text(encoding="utf-8").replace('name = "throw"', 'name = "kick"'), encoding="utf-8")
+    code, _, err = run("check", other, "--at", "reports/throw/least_squares-seed0")
+    assert code == 2 and "'kick'" in err
+    assert run("check", throw, "--at", "nowhere")[0] == 2
