@@ -65,6 +65,27 @@ class TraceRow:
     smoothing: float
 
 
+@dataclass(frozen=True)
+class StageResult:
+    """What one stage of smoothing came to.
+
+    Attributes:
+        smoothing: the knob.
+        status: how it ended; INTERRUPTED for one that is to go on.
+        z: (n,) its best point.
+        objective, miss: of that point at this smoothing; see ``TraceRow``. nan where nothing was evaluated.
+        counts, seconds: what the stage took, those before it left out.
+    """
+
+    smoothing: float
+    status: Status
+    z: Array
+    objective: float
+    miss: float
+    counts: Counts
+    seconds: float
+
+
 Monitor = Callable[[TraceRow], None]
 
 
@@ -78,6 +99,7 @@ class Outcome:
         z: (n,) the best point.
         trace: one row per iteration.
         counts: total work.
+        stages: those of smoothing that were begun, in their order.
         checkpoint: what the solver needs to go on exactly here; JSON-able numbers, strings and lists of numbers.
     """
 
@@ -86,4 +108,5 @@ class Outcome:
     z: Array
     trace: tuple[TraceRow, ...]
     counts: Counts
+    stages: tuple[StageResult, ...] = ()
     checkpoint: dict[str, object] = field(default_factory=dict)

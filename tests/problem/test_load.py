@@ -31,7 +31,7 @@ def test_switches_of_the_scheme(load: Load) -> None:
     text = "sweeps = 3\nposition_sweeps = 0\nwarm_start = false\ntime_of_impact = false\nimpact_friction = false"
     problem = load(("dt = 0.01", f"dt = 0.01\n{text}\npush_out = 0.5\nsmoothing = 0.1"))
     assert problem.simulation.scheme() == Scheme(0.01, 3, 0, 0.5, False, False, False)
-    assert problem.simulation.smoothing == 0.1
+    assert problem.simulation.smoothing == (0.1,)
 
 
 def test_initial_state(load: Load) -> None:
