@@ -99,8 +99,8 @@ class Outcome:
         z: (n,) the best point.
         trace: one row per iteration.
         counts: total work.
-        stages: those of smoothing that were begun, in their order.
         checkpoint: what the solver needs to go on exactly here; JSON-able numbers, strings and lists of numbers.
+        stages: those of smoothing that were begun, in their order; of an interrupted solve the last one is halfway.
     """
 
     status: Status
@@ -108,5 +108,5 @@ class Outcome:
     z: Array
     trace: tuple[TraceRow, ...]
     counts: Counts
-    stages: tuple[StageResult, ...] = ()
     checkpoint: dict[str, object] = field(default_factory=dict)
+    stages: tuple[StageResult, ...] = ()

@@ -41,7 +41,7 @@ def outcome(request: Request, meter: Meter, verdict: Verdict) -> Outcome:
     snapshot = meter.snapshot
     if verdict.status is not Status.INTERRUPTED or snapshot is None:
         z = meter.stages[-1].z if meter.stages else meter.clip(np.array(request.start, float))
-        return Outcome(verdict.status, verdict.advice, z, tuple(meter.rows), replace(meter.counts), meter.stages)
+        return Outcome(verdict.status, verdict.advice, z, tuple(meter.rows), replace(meter.counts), {}, meter.stages)
     rows = tuple(meter.rows[: snapshot.rows])
     return Outcome(
         verdict.status,
@@ -49,8 +49,8 @@ def outcome(request: Request, meter: Meter, verdict: Verdict) -> Outcome:
         snapshot.best.z,
         rows,
         snapshot.counts,
-        (*snapshot.stages, halfway(request.problem, snapshot)),
         to_checkpoint(request.solver, snapshot, rows),
+        (*snapshot.stages, halfway(request.problem, snapshot)),
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.errors import SymphysError
+from symphys.report.stage import Stage
 
 Array = NDArray[np.float64]
 
@@ -159,6 +160,7 @@ class Run:
         place: the folder's path below the report's folder, with forward slashes.
         readable: whether there is a result; if not, only names and ``faults`` mean anything.
         faults: what could not be read, one sentence each.
+        guess: "objective" and "worst" of what it started from, exactly.
     """
 
     folder: Path
@@ -180,6 +182,8 @@ class Run:
     trust: Trust
     origin: Origin
     trace: Trace
+    guess: Mapping[str, float]
+    stages: tuple[Stage, ...]
     faults: tuple[str, ...]
 
     @property

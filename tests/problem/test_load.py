@@ -34,6 +34,18 @@ def test_switches_of_the_scheme(load: Load) -> None:
     assert problem.simulation.smoothing == (0.1,)
 
 
+@pytest.mark.parametrize(
+    ("text", "stages"),
+    [("0", (0.0,)), ("0.05", (0.05,)), ("[0]", (0.0,)), ("[0.1, 0.01, 0]", (0.1, 0.01, 0.0)), ("[1, 0.5]", (1.0, 0.5))],
+)
+def test_smoothing_is_a_number_or_stages(load: Load, text: str, stages: tuple[float, ...]) -> None:
+    assert load(("dt = 0.01", f"dt = 0.01\nsmoothing = {text}")).simulation.smoothing == stages
+
+
+def test_without_smoothing_contact_is_exact(load: Load) -> None:
+    assert load().simulation.smoothing == (0.0,)
+
+
 def test_initial_state(load: Load) -> None:
     initial = load().initial
     assert list(initial) == [

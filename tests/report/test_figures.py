@@ -12,7 +12,7 @@ import pytest
 from symphys.report import style
 from symphys.report.checks import limits, ratios
 from symphys.report.contacts import pair_normals, shown_pairs
-from symphys.report.convergence import Curve, best_so_far, median_curve, miss_so_far
+from symphys.report.curves import Curve, best_so_far, median_curve, miss_so_far
 from symphys.report.finding import read_all, studies
 from symphys.report.motion import draw_motion
 from symphys.report.recordings import read_scene, read_trajectory
