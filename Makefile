@@ -24,6 +24,7 @@ typecheck: $(VENV)/.developing  ## check types on a folder of links laid out as 
 
 bench: $(VENV)/.benching  ## measure what BENCHMARKS.md reports; figures go to build/
 	$(BIN)/python benchmarks/ball_throw.py
+	$(BIN)/python benchmarks/continuation.py
 	$(BIN)/python benchmarks/spheres.py
 	$(BIN)/python benchmarks/limit.py build
 	$(BIN)/python benchmarks/pile.py build

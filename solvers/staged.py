@@ -4,7 +4,7 @@ What a stage hands on is a point and nothing else. Step lengths, damping and sig
 with are small because it has converged, and say nothing of the next one, whose merit is another function. A stage ends
 as a solve does, when it has converged, stalled or used up its budget, each stage having the whole of it; where the
 problem stops at the first point that meets everything, a stage stops at the first that does at its own smoothing. The
-last stage decides how the solve ended.
+last stage decides how the solve ended, and its best point is the solution: what an earlier one met counts for nothing.
 
 A solver knows nothing of this: it gives one function that minimises at the meter's smoothing.
 """
@@ -24,8 +24,8 @@ from symphys.solvers.outcome import Array, Counts, Monitor, StageResult, Status
 
 FINISHED: dict[str, object] = {}
 """The state of a stage that has nothing left to do."""
-FATAL = (Status.NOT_FINITE, Status.NOT_APPLICABLE, Status.FAILED)
-"""What ends the solve in whatever stage it happens."""
+FATAL = (Status.NOT_APPLICABLE, Status.FAILED)
+"""What ends the solve in whatever stage it happens. Numbers that are not finite may be so at one smoothing only."""
 
 Stage = Callable[[Meter, Array, "dict[str, object] | None"], Verdict]
 """Solve one stage from z, or from the solver's own state where a solve goes on; may raise Stop."""

@@ -128,20 +128,35 @@ def test_each_stage_has_the_whole_budget() -> None:
     assert found.status is Status.BUDGET
 
 
-@pytest.mark.parametrize("name", ["gradient", "least_squares", "cma", "ipopt"])
-def test_what_breaks_in_a_stage_ends_the_solve_with_the_point_before(name: str) -> None:
-    """The second stage cannot be simulated."""
-    problem = toy(
+def broken_at(knob: float) -> ShootingProblem:
+    """As ``moving``, but it cannot be simulated at one smoothing."""
+    return toy(
         1,
-        lambda z, s: ca.if_else(s == 0.5, np.nan, z - 1 - s),
+        lambda z, s: ca.if_else(s == knob, np.nan, z - 1 - s),
         errors=lambda z, s: ca.fabs(z - 1 - s) / 1e-3,
         guess=5.0,
-        smoothing=(1.0, 0.5, 0.0),
+        smoothing=KNOBS,
     )
-    found = solve(name, problem)
+
+
+@every_solver
+@pytest.mark.parametrize("knob", KNOBS[:2])
+def test_a_stage_that_cannot_be_simulated_is_passed(name: str, knob: float) -> None:
+    found = solve(name, broken_at(knob))
+    assert found.status is Status.MET
+    assert found.z == pytest.approx([1.0], abs=1e-3)
+    broken = found.stages[KNOBS.index(knob)]
+    assert broken.status is Status.NOT_FINITE
+    assert np.isnan(broken.objective)
+    assert broken.z == pytest.approx([5.0] if knob == KNOBS[0] else [2.0], abs=1e-3)
+
+
+@every_solver
+def test_a_last_stage_that_cannot_be_simulated_leaves_the_point_before(name: str) -> None:
+    found = solve(name, broken_at(0.0))
     assert found.status is Status.NOT_FINITE
-    assert found.z == pytest.approx([2.0], abs=1e-3)
-    assert [stage.status for stage in found.stages] == [Status.MET, Status.NOT_FINITE]
+    assert found.z == pytest.approx([1.1], abs=1e-3)
+    assert [stage.status for stage in found.stages] == [Status.MET, Status.MET, Status.NOT_FINITE]
 
 
 def test_a_foreign_error_belongs_to_its_stage() -> None:
