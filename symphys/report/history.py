@@ -14,6 +14,9 @@ from symphys.report.convergence import AXIS_TITLES, MISS_FLOOR, WORK, fit_values
 from symphys.report.records import Array, Run
 from symphys.report.stage import Stage, smoothed
 
+HEADROOM = 0.16
+"""Above and below the curves where names of stages stand over them, as a share of the axis."""
+
 
 @dataclass(frozen=True)
 class Panel:
@@ -86,6 +89,8 @@ def draw_panel(axes: Axes, run: Run, x: Array, panel: Panel, colour: str, named:
     ends = stages.exact_ends(run, x, panel.exact) if smoothed(run.stages) and panel.exact else []
     fit_values(axes, np.append(panel.values, [y for _, y, _ in ends]), panel.relative)
     axes.set_title(panel.title)
+    if named and smoothed(run.stages):
+        axes.margins(y=HEADROOM)
     if panel.relative:
         mark_tolerance([axes])
     if smoothed(run.stages):

@@ -96,8 +96,6 @@ def draw_bands(axes: Axes, run: Run, x: Array, named: bool) -> None:
                 va="top",
                 color=style.SOFT,
                 fontsize=7.5,
-                bbox={"boxstyle": "square,pad=0.15", "color": "white", "alpha": 0.8, "linewidth": 0},
-                zorder=5,
             )
 
 
