@@ -24,15 +24,17 @@ typecheck: $(VENV)/.developing  ## check types on a folder of links laid out as 
 
 bench: $(VENV)/.benching  ## measure what BENCHMARKS.md reports; figures go to build/
 	$(BIN)/python benchmarks/ball_throw.py
+	$(BIN)/python benchmarks/continuation.py
 	$(BIN)/python benchmarks/spheres.py
 	$(BIN)/python benchmarks/limit.py build
 	$(BIN)/python benchmarks/pile.py build
 	$(BIN)/python benchmarks/against_mujoco.py
 
 gallery: $(VENV)/.installed  ## make the figures of the README again
-	$(BIN)/symphys solve ball_throw bank_shot --out build/gallery
+	$(BIN)/symphys solve ball_throw bank_shot sled --out build/gallery
 	cp build/gallery/figures/ball_throw-motion.svg build/gallery/figures/ball_throw-convergence.svg \
 	    build/gallery/figures/bank_shot-motion.svg reports/gallery/
+	cp build/gallery/sled/ipopt-seed0/figures/convergence.svg reports/gallery/sled-stages.svg
 
 clean:  ## remove what the other targets made, reports aside
 	rm -rf $(VENV) build dist *.egg-info

@@ -18,7 +18,7 @@ from symphys.solvers.gradient import GRADIENT, GradientOptions
 from symphys.solvers.interface import Solver
 from symphys.solvers.ipopt_ import IPOPT, IpoptOptions
 from symphys.solvers.least_squares import LEAST_SQUARES, LeastSquaresOptions
-from symphys.solvers.outcome import Counts, Monitor, Outcome, Status, TraceRow
+from symphys.solvers.outcome import Counts, Monitor, Outcome, StageResult, Status, TraceRow
 from symphys.solvers.together import solve_together
 
 __all__ = [
@@ -31,6 +31,7 @@ __all__ = [
     "Monitor",
     "Outcome",
     "Solver",
+    "StageResult",
     "Status",
     "TraceRow",
     "solve_together",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import astuple, fields, is_dataclass
+from enum import Enum
 from functools import partial
 from typing import Any, TypeVar
 
@@ -12,13 +13,14 @@ import numpy as np
 from symphys.errors import SymphysError
 from symphys.shooting import ShootingProblem
 from symphys.solvers.meter import Point, Snapshot
-from symphys.solvers.outcome import Counts, TraceRow
+from symphys.solvers.outcome import Counts, StageResult, Status, TraceRow
 
 T = TypeVar("T")
 READERS: dict[str, Callable[[Any], Any]] = {
     "int": int,
     "float": float,
     "bool": bool,
+    "Status": Status,
     "Array": lambda value: np.array(value, float),
     "tuple[float, ...]": lambda value: tuple(float(number) for number in value),
 }
@@ -30,7 +32,7 @@ def to_checkpoint(solver: str, snapshot: Snapshot, rows: Iterable[TraceRow]) -> 
     best = snapshot.best
     return {
         "solver": solver,
-        "stage": snapshot.stage,
+        "stages": plain(snapshot.stages),
         "state": plain(snapshot.state),
         "best": {"z": plain(best.z), "merit": best.merit, "objective": best.objective, "errors": plain(best.errors)},
         "last": plain(snapshot.last),
@@ -52,13 +54,16 @@ def from_checkpoint(
         point = Point(z, float(best["merit"]), float(best["objective"]), errors, problem.met(errors))
         counts = Counts(*map(int, checkpoint["counts"]))
         rows = [revive(TraceRow, dict(zip(names(TraceRow), row, strict=True))) for row in checkpoint["rows"]]
-        stage, seconds = int(checkpoint["stage"]), float(checkpoint["seconds"])
+        stages = tuple(revive(StageResult, dict(each), Counts) for each in checkpoint["stages"])
+        seconds = float(checkpoint["seconds"])
         state, last = dict(checkpoint["state"]), np.array(checkpoint["last"], float)
     except (KeyError, TypeError, ValueError) as error:
         raise damaged(error) from error
     if z.shape != (problem.n,):
         raise SymphysError(f"this checkpoint has {z.size} variables, the problem {problem.n}")
-    return Snapshot(stage, state, point, last, counts, len(rows), seconds), state, rows
+    if tuple(stage.smoothing for stage in stages) != problem.smoothing[:-1][: len(stages)]:
+        raise SymphysError("this checkpoint has other stages of smoothing than the problem")
+    return Snapshot(stages, state, point, last, counts, len(rows), seconds), state, rows
 
 
 def revive(kind: type[T], values: dict[str, Any], *parts: type[Any]) -> T:
@@ -72,11 +77,13 @@ def revive(kind: type[T], values: dict[str, Any], *parts: type[Any]) -> T:
 
 
 def plain(value: object) -> Any:
-    """A dataclass, array, tuple or dict as dicts and lists of Python numbers."""
+    """A dataclass, array, tuple or dict as dicts and lists of Python numbers and text, enumerations by their values."""
     if is_dataclass(value) and not isinstance(value, type):
         return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
     if isinstance(value, np.ndarray):
         return value.tolist()
+    if isinstance(value, Enum):
+        return value.value
     if isinstance(value, dict):
         return {key: plain(each) for key, each in value.items()}
     return [plain(each) for each in value] if isinstance(value, tuple | list) else value

@@ -23,10 +23,11 @@ from symphys.solvers.checkpoint import damaged
 from symphys.solvers.cma_strategy import PLATEAU, Strategy, Trail, load
 from symphys.solvers.interface import Log, Solver
 from symphys.solvers.meter import Meter, Point, Verdict
-from symphys.solvers.options import at_least, check_stages, require
+from symphys.solvers.options import at_least, require
 from symphys.solvers.outcome import Array, Monitor, Outcome, Status
 from symphys.solvers.plateau import FLAT
-from symphys.solvers.session import Request, begin, converged, run
+from symphys.solvers.session import begin, converged, run
+from symphys.solvers.staged import Request
 
 BUDGETS = {"maxiter", "timeout"}
 CONVERGED = {"tolfun", "tolfunhist", "tolfunrel", "tolx", "ftarget"}
@@ -44,7 +45,6 @@ class CmaOptions:
         population: candidates in a generation; 0 is pycma's 4 + 3 ln n.
         evaluations: rollouts in each stage of smoothing; the generation that reaches it is the last.
         options: pycma's own, such as {tolfun = 1e-8, CMA_diagonal = 50}; cma.CMAOptions() lists them.
-        smoothing: stages of the knob, such as [0.1, 0.01, 0]; () is the problem's own.
     """
 
     __pydantic_config__: ClassVar[dict[str, object]] = {"extra": "forbid"}
@@ -53,14 +53,12 @@ class CmaOptions:
     population: int = 0
     evaluations: int = 10_000
     options: dict[str, Any] = field(default_factory=dict)
-    smoothing: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """ValueError that names the option and says what would be valid."""
         require(0 < self.sigma < math.inf, "sigma", "above 0")
         require(self.population == 0 or self.population > 2, "population", "0 or at least 3")
         at_least(0, evaluations=self.evaluations)
-        check_stages(self.smoothing)
 
 
 def solve(
@@ -89,7 +87,7 @@ def solve(
             meter.commit(begin(meter.value(z)), strategy.trail(), step=strategy.sigma)
         return search(meter, options, strategy)
 
-    return run(Request("cma", problem, start, options.smoothing, monitor, checkpoint, log), stage)
+    return run(Request("cma", problem, start, monitor, checkpoint, log), stage)
 
 
 def search(meter: Meter, options: CmaOptions, strategy: Strategy) -> Verdict:

@@ -20,12 +20,13 @@ from symphys.solvers.directions import METHODS, Habits, Memory, learn_length
 from symphys.solvers.interface import Log, Solver
 from symphys.solvers.line_search import ROUNDING, backtrack
 from symphys.solvers.meter import Meter, Point, Verdict
-from symphys.solvers.options import at_least, check_stages, require
+from symphys.solvers.options import at_least, require
 from symphys.solvers.outcome import Array, Monitor, Outcome, Status
 from symphys.solvers.plateau import REFUSALS, SHORTER, lost
 from symphys.solvers.probe import believed
 from symphys.solvers.progress import Progress
-from symphys.solvers.session import Request, begin, not_finite, run
+from symphys.solvers.session import begin, not_finite, run
+from symphys.solvers.staged import Request
 
 RATES: dict[str, tuple[float, ...]] = {
     "spectral": (1.0,),
@@ -64,7 +65,6 @@ class GradientOptions:
         tolerance: converged where the projected scaled gradient is below tolerance * (1 + |merit|).
         patience: stalled where the merit has not fallen by 1e-5 of itself in so many iterations at the last of the
             rates; 0 goes on regardless.
-        smoothing: stages of the knob, such as [0.1, 0.01, 0]; () is the problem's own.
     """
 
     __pydantic_config__: ClassVar[dict[str, object]] = {"extra": "forbid"}
@@ -78,7 +78,6 @@ class GradientOptions:
     backtracking: int = 5
     tolerance: float = 1e-6
     patience: int = 30
-    smoothing: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """ValueError that names the option and says what would be valid."""
@@ -89,7 +88,6 @@ class GradientOptions:
         require(self.method != "spectral" or len(self.rates) < 2, "rates", "one number with the spectral method")
         require(all(0 <= share < 1 for share in (self.momentum, *self.betas)), "momentum, betas", "in [0, 1)")
         require(self.clip > 0, "clip", "above 0")
-        check_stages(self.smoothing)
 
     def rate(self, iteration: int) -> float:
         """The rate in force: each of the rates has an equal share of the iterations."""
@@ -146,7 +144,7 @@ def solve(
             step = finished(meter, options, step) or advance(meter, options, step)
         return step
 
-    return run(Request("gradient", problem, start, options.smoothing, monitor, checkpoint, log), stage)
+    return run(Request("gradient", problem, start, monitor, checkpoint, log), stage)
 
 
 def first(meter: Meter, z: Array) -> State:

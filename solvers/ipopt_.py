@@ -27,9 +27,10 @@ from symphys.solvers.interface import Log, Solver
 from symphys.solvers.ipopt_functions import functions
 from symphys.solvers.ipopt_options import SILENT, check
 from symphys.solvers.meter import Meter, Verdict
-from symphys.solvers.options import at_least, check_stages, require
+from symphys.solvers.options import at_least, require
 from symphys.solvers.outcome import Array, Counts, Monitor, Outcome, Status
-from symphys.solvers.session import Request, begin, converged, run, silent
+from symphys.solvers.session import begin, converged, run, silent
+from symphys.solvers.staged import Request
 
 BUDGET = "the iterations are used up: raise `iterations`, or try the other `hessian`"
 ENDS: dict[str, tuple[Status, str]] = {
@@ -73,7 +74,6 @@ class IpoptOptions:
         tolerance: IPOPT's tol, on its scaled optimality error.
         hessian: "limited-memory" or "exact".
         options: IPOPT's own, such as {mu_strategy = "adaptive"}, passed on as they are.
-        smoothing: stages of the knob, such as [0.1, 0.01, 0]; () is the problem's own.
     """
 
     __pydantic_config__: ClassVar[dict[str, object]] = {"extra": "forbid"}
@@ -82,14 +82,12 @@ class IpoptOptions:
     tolerance: float = 1e-8
     hessian: Literal["limited-memory", "exact"] = "limited-memory"
     options: dict[str, Any] = field(default_factory=dict)
-    smoothing: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """ValueError that names the option and says what would be valid."""
         at_least(0, iterations=self.iterations)
         require(0 < self.tolerance < math.inf, "tolerance", "above 0")
         require(self.hessian in ("limited-memory", "exact"), "hessian", "limited-memory or exact")
-        check_stages(self.smoothing)
 
 
 @dataclass(frozen=True)
@@ -123,7 +121,7 @@ def solve(
             meter.commit(begin(meter.value(z)), state)
         return descend(meter, options, state, log or silent)
 
-    return run(Request("ipopt", problem, start, options.smoothing, monitor, checkpoint, log), stage)
+    return run(Request("ipopt", problem, start, monitor, checkpoint, log), stage)
 
 
 def descend(meter: Meter, options: IpoptOptions, state: State, log: Log) -> Verdict:

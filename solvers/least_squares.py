@@ -24,12 +24,13 @@ from symphys.solvers.checkpoint import revive
 from symphys.solvers.interface import Log, Solver
 from symphys.solvers.line_search import ROUNDING
 from symphys.solvers.meter import Meter, Point, Verdict
-from symphys.solvers.options import at_least, check_stages, require
+from symphys.solvers.options import at_least, require
 from symphys.solvers.outcome import Array, Monitor, Outcome, Status
 from symphys.solvers.plateau import REFUSALS, lost
 from symphys.solvers.probe import believed
 from symphys.solvers.progress import Progress
-from symphys.solvers.session import Request, begin, not_finite, run
+from symphys.solvers.session import begin, not_finite, run
+from symphys.solvers.staged import Request
 
 LOOSEST = 1 / 3
 """lambda falls at most to this share after a step that went as foreseen."""
@@ -60,7 +61,6 @@ class LeastSquaresOptions:
         tolerance: converged where the projected scaled gradient is below tolerance * (1 + merit), or where no column
             of the Jacobian is nearer to the residuals than this cosine.
         patience: stalled where the merit has not fallen by 1e-5 of itself in so many iterations; 0 goes on regardless.
-        smoothing: stages of the knob, such as [0.1, 0.01, 0]; () is the problem's own.
     """
 
     __pydantic_config__: ClassVar[dict[str, object]] = {"extra": "forbid"}
@@ -69,13 +69,11 @@ class LeastSquaresOptions:
     damping: float = 1e-3
     tolerance: float = 1e-8
     patience: int = 10
-    smoothing: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """ValueError that names the option and says what would be valid."""
         at_least(0, iterations=self.iterations, tolerance=self.tolerance, patience=self.patience)
         require(0 < self.damping < math.inf, "damping", "above 0")
-        check_stages(self.smoothing)
 
 
 @dataclass(frozen=True)
@@ -131,7 +129,7 @@ def solve(
             step = finished(meter, options, step) or advance(meter, step)
         return step
 
-    return run(Request("least_squares", problem, start, options.smoothing, monitor, checkpoint, log), stage)
+    return run(Request("least_squares", problem, start, monitor, checkpoint, log), stage)
 
 
 def first(meter: Meter, options: LeastSquaresOptions, z: Array) -> State:

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from symphys.shooting import ShootingProblem, Values
-from symphys.solvers.outcome import Array, Counts, Monitor, Status, TraceRow
+from symphys.solvers.outcome import Array, Counts, Monitor, StageResult, Status, TraceRow
 
 
 @dataclass(frozen=True)
@@ -78,14 +78,14 @@ class Snapshot:
     """All that a solve needs to go on: taken when an iteration is complete, never in its middle.
 
     Attributes:
-        stage: index of the stage of smoothing.
+        stages: of smoothing, that were over by then.
         state: the solver's own.
         best: of this stage.
         last: (n,) z of the last row of the trace.
         counts, rows, seconds: the work up to here, and how many rows of the trace tell of it.
     """
 
-    stage: int
+    stages: tuple[StageResult, ...]
     state: object
     best: Point
     last: Array
@@ -110,19 +110,21 @@ class Meter:
         self.rows: list[TraceRow] = []
         self.best: Point | None = None
         self.last: Array | None = None
-        self.stage, self.smoothing = 0, problem.smoothing
+        self.stages: tuple[StageResult, ...] = ()
+        self.smoothing = problem.smoothing[0]
         self.snapshot: Snapshot | None = None
         self.began, self.earlier = time.perf_counter(), 0.0
 
-    def enter(self, stage: int, smoothing: float, resumed: bool = False) -> None:
+    def enter(self, smoothing: float, resumed: bool = False) -> None:
         """Begin a stage, or go on with one; merits at another smoothing are not compared with those of this one."""
-        self.stage, self.smoothing = stage, smoothing
+        self.smoothing = smoothing
         if not resumed:
             self.best, self.last = None, None
 
     def restore(self, snapshot: Snapshot, rows: Iterable[TraceRow]) -> None:
         """Go on from a snapshot and its trace, as if there had been no break."""
         self.snapshot, self.best, self.last = snapshot, snapshot.best, snapshot.last
+        self.stages = snapshot.stages
         self.counts, self.rows = replace(snapshot.counts), list(rows)
         self.earlier, self.began = snapshot.seconds, time.perf_counter()
 
@@ -175,7 +177,7 @@ class Meter:
         numbers = (point.objective, best.objective, point.miss, gradient_norm, step, self.smoothing)
         row = TraceRow(*(len(self.rows), *work, *numbers))
         self.rows.append(row)
-        self.snapshot = Snapshot(self.stage, state, best, point.z, replace(self.counts), len(self.rows), row.seconds)
+        self.snapshot = Snapshot(self.stages, state, best, point.z, replace(self.counts), len(self.rows), row.seconds)
         if self.monitor:
             self.monitor(row)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from difflib import get_close_matches
 
@@ -19,11 +18,6 @@ def at_least(lowest: float, **options: float) -> None:
     """ValueError unless every option is at least ``lowest``; NaN never is."""
     for name, value in options.items():
         require(value >= lowest, name, f"at least {lowest:g}")
-
-
-def check_stages(smoothing: tuple[float, ...]) -> None:
-    """ValueError unless every stage of smoothing is a value that the knob can have."""
-    require(all(0 <= knob < math.inf for knob in smoothing), "smoothing", "finite numbers of at least 0")
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:

@@ -65,6 +65,27 @@ class TraceRow:
     smoothing: float
 
 
+@dataclass(frozen=True)
+class StageResult:
+    """What one stage of smoothing came to.
+
+    Attributes:
+        smoothing: the knob.
+        status: how it ended; INTERRUPTED for one that is to go on.
+        z: (n,) its best point.
+        objective, miss: of that point at this smoothing; see ``TraceRow``. nan where nothing was evaluated.
+        counts, seconds: what the stage took, those before it left out.
+    """
+
+    smoothing: float
+    status: Status
+    z: Array
+    objective: float
+    miss: float
+    counts: Counts
+    seconds: float
+
+
 Monitor = Callable[[TraceRow], None]
 
 
@@ -79,6 +100,7 @@ class Outcome:
         trace: one row per iteration.
         counts: total work.
         checkpoint: what the solver needs to go on exactly here; JSON-able numbers, strings and lists of numbers.
+        stages: those of smoothing that were begun, in their order; of an interrupted solve the last one is halfway.
     """
 
     status: Status
@@ -87,3 +109,4 @@ class Outcome:
     trace: tuple[TraceRow, ...]
     counts: Counts
     checkpoint: dict[str, object] = field(default_factory=dict)
+    stages: tuple[StageResult, ...] = ()

@@ -25,8 +25,9 @@ SAME = 1e-12
 STEP = 1e-4
 """Length of the step to points beside, in x = z / scale."""
 FLAT = (
-    "nothing that may vary has any influence there on what is missed, as where a ball passes another by: try another "
-    "guess (`symphys show FILE` draws it), or more seeds with a larger `spread`"
+    "nothing that may vary has any influence there on what is missed, as where friction holds a body (stages such as "
+    "smoothing = [0.1, 0.01, 0] in [simulation] let go of it) or a ball passes another by: try another guess "
+    "(`symphys show FILE` draws it), or more seeds with a larger `spread`"
 )
 
 

@@ -118,7 +118,7 @@ class ShootingProblem:
         squares: whether the merit is a sum of squared residuals; otherwise these cannot be asked for.
         constraint_names: one per entry of the constraints.
         constraint_lower, constraint_upper: (m,).
-        smoothing: the knob that solvers use unless told otherwise.
+        smoothing: stages of the knob, decreasing, at least one; each starts from the best point of the one before.
         stop_when_met: stop at the first point whose errors are all <= 1, instead of at a stationary point.
     """
 
@@ -130,7 +130,7 @@ class ShootingProblem:
     constraint_names: tuple[str, ...] = ()
     constraint_lower: Array = field(default_factory=lambda: np.zeros(0))
     constraint_upper: Array = field(default_factory=lambda: np.zeros(0))
-    smoothing: float = 0.0
+    smoothing: tuple[float, ...] = (0.0,)
     stop_when_met: bool = True
 
     @property

@@ -18,6 +18,12 @@ if TYPE_CHECKING:
     from symphys.solvers import TraceRow
 
 
+def at(row: TraceRow) -> str:
+    """Where a run is; the smoothing only where there is some, as its numbers are not the exact ones then."""
+    smoothed = f" at smoothing {row.smoothing:g}" if row.smoothing > 0 else ""
+    return f"iteration {row.iteration}, objective {number(row.best)}, worst {number(row.miss)}{smoothed}"
+
+
 @contextmanager
 def watch(runs: int) -> Iterator[Observer]:
     """An observer of a batch of so many runs."""
@@ -85,8 +91,7 @@ class Live:
     def advanced(self, job: Job, row: TraceRow) -> None:
         """Move the run's line on."""
         if job.name in self.tasks:
-            text = f"{job.name}: iteration {row.iteration}, objective {number(row.best)}, worst {number(row.miss)}"
-            self.progress.update(self.tasks[job.name], description=text)
+            self.progress.update(self.tasks[job.name], description=f"{job.name}: {at(row)}")
 
     def ended(self, job: Job, result: Result, skipped: bool) -> None:
         """Close the run's line."""

@@ -28,7 +28,7 @@ class Simulation:
         duration: [s], a whole number of steps.
         dt: time step [s].
         sweeps, position_sweeps, warm_start, push_out, time_of_impact, impact_friction, split: as in world.Scheme.
-        smoothing: [m/s] the knob that solvers use unless told otherwise; 0 is the exact contact law.
+        smoothing: [m/s] stages of the knob that solvers use, decreasing, at least one; 0 is the exact contact law.
     """
 
     duration: float
@@ -36,7 +36,7 @@ class Simulation:
     sweeps: int
     position_sweeps: int
     warm_start: bool
-    smoothing: float
+    smoothing: tuple[float, ...]
     push_out: float = 1.0
     time_of_impact: bool = True
     impact_friction: bool = True

@@ -16,7 +16,7 @@ WHOLE = 1e-9
 def read_simulation(table: SimulationTable, faults: Faults) -> Simulation:
     """The simulation; notes a step that does not fit."""
     check_steps(table.duration, table.dt, faults)
-    return Simulation(**table.model_dump())
+    return Simulation(**{**table.model_dump(), "smoothing": tuple(table.smoothing)})
 
 
 def check_steps(duration: float, dt: float, faults: Faults) -> None:

@@ -13,6 +13,7 @@ from symphys.report import style, words
 from symphys.report.finding import Entry, Study
 from symphys.report.markup import ICONS, Html, banner, card, dot, join, pill, table, tag
 from symphys.report.records import Run
+from symphys.report.stage import smoothed
 from symphys.report.words import show
 
 RUN_PAGE = "report.html"
@@ -154,14 +155,32 @@ def table_note(study: Study) -> str:
     text = "Work counts a rollout as 1 and each derivative by its measured price. Build includes compiling."
     if any(len(entry.runs) > 1 for entry in study.entries):
         text = "Medians over seeds that gave a number. " + text
-    return text
+    return f"{text} {smoothing_note(study)}".rstrip()
+
+
+def smoothing_note(study: Study) -> str:
+    """Which runs used stages of smoothing, and which; nothing where none did."""
+    used: dict[str, list[str]] = {}
+    for entry in study.entries:
+        for knobs in dict.fromkeys(stages_of(run) for run in entry.runs if smoothed(run.stages)):
+            used.setdefault(knobs, []).append(entry.solver)
+    told = [f"{knobs} m/s: {words.listed(list(dict.fromkeys(names)))}" for knobs, names in used.items()]
+    return f"Solved in stages of smoothing, {'; '.join(told)}. All that is told here is exact." if told else ""
+
+
+def stages_of(run: Run) -> str:
+    """The knobs of its stages."""
+    return words.listed([show(stage.smoothing) for stage in run.stages])
 
 
 def convergence_note(study: Study) -> str:
     """What the figure does not say by itself."""
     marked = any(len(entry.runs) > 1 for entry in study.entries)
     text = "Strong: the median over seeds; a run that has ended keeps its last value. " if marked else ""
-    return text + "Errors below a thousandth of the tolerance are drawn there."
+    text += "Errors below a thousandth of the tolerance are drawn there."
+    if any(smoothed(run.stages) for run in study.runs):
+        text += " Of a stage with smoothing only start and end are drawn, where they stand exactly."
+    return text
 
 
 def check_cell(study: Study, name: str, solver: str) -> Html:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,58 +10,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from symphys.report import style
+from symphys.report.curves import QUANTITIES, Curve, Quantity, curve, median_curve, miss_so_far
 from symphys.report.finding import Study
-from symphys.report.records import Array, Run, Trace
+from symphys.report.records import Array
 
 WORK, SECONDS = "equivalents", "seconds"
 AXIS_TITLES = {WORK: "work [rollout equivalents]", SECONDS: "time of the solve [s]"}
 MISS_FLOOR = 1e-3
 """Errors below this share of the tolerance are drawn as this: nothing is gained below it."""
-GRID = 300
-
-
-@dataclass(frozen=True)
-class Curve:
-    """A quantity that only falls, as a step function: ``y[i]`` holds from ``x[i]`` on."""
-
-    x: Array
-    y: Array
-
-
-def best_so_far(trace: Trace) -> Array:
-    """(rows,): the lowest objective up to each iteration, as the solver recorded it."""
-    recorded = trace["best"]
-    return recorded if np.isfinite(recorded).any() else np.fmin.accumulate(trace["objective"])
-
-
-def miss_so_far(trace: Trace) -> Array:
-    """(rows,): the smallest largest error / tolerance up to each iteration."""
-    return np.fmin.accumulate(trace["miss"]) if trace.rows else np.zeros(0)
-
-
-QUANTITIES: tuple[tuple[str, Callable[[Trace], Array]], ...] = (
-    ("Lowest objective so far", best_so_far),
-    ("Largest error / tolerance, smallest so far", miss_so_far),
-)
-
-
-def curve(run: Run, along: str, quantity: Callable[[Trace], Array]) -> Curve | None:
-    """One run's curve; None if nothing of it is finite."""
-    x, y = run.trace[along], quantity(run.trace)
-    known = np.isfinite(x) & np.isfinite(y)
-    return Curve(x[known], y[known]) if known.any() else None
-
-
-def median_curve(curves: Sequence[Curve]) -> Curve:
-    """The median of step functions from where all have begun; a curve that has ended keeps its last value."""
-    if len(curves) == 1:
-        return curves[0]
-    grid = np.unique(np.concatenate([c.x for c in curves]))
-    grid = grid[grid >= max(c.x[0] for c in curves)]
-    if grid.size > GRID:
-        grid = grid[np.linspace(0, grid.size - 1, GRID).round().astype(int)]
-    values = [c.y[np.searchsorted(c.x, grid, side="right") - 1] for c in curves]
-    return Curve(grid, np.median(values, axis=0))
 
 
 def draw_convergence(study: Study) -> Figure | None:
@@ -84,7 +39,7 @@ def draw_convergence(study: Study) -> Figure | None:
     return figure
 
 
-def draw_panel(axes: Axes, study: Study, along: str, quantity: Callable[[Trace], Array]) -> None:
+def draw_panel(axes: Axes, study: Study, along: str, quantity: Quantity) -> None:
     """Thin lines for seeds, a strong one for their median, a mark at each end."""
     marks = style.solver_marks(entry.solver for entry in study.entries)
     floor = MISS_FLOOR if quantity is miss_so_far else -np.inf
@@ -172,45 +127,3 @@ def add_legend(figure: Figure, study: Study) -> None:
         handles.append(Line2D([], [], color=style.GREY, linewidth=0.7, alpha=0.6))
         labels.append("thin: single seeds")
     style.legend_above(figure, handles, labels)
-
-
-def draw_run(run: Run) -> Figure | None:
-    """One run against its work: objective, errors, gradient norm, step; what was not recorded is left out."""
-    x = run.trace[WORK]
-    x = x if np.isfinite(x).any() else run.trace["iteration"]
-    shown = [
-        ("Objective", run.trace["objective"], best_so_far(run.trace)),
-        ("Largest error / tolerance", run.trace["miss"], None),
-        ("Norm of the gradient", run.trace["gradient_norm"], None),
-        ("Step" if not run.solver.startswith("cma") else "Step size σ", run.trace["step"], None),  # noqa: RUF001
-    ]
-    shown = [panel for panel in shown if np.isfinite(panel[1]).any()]
-    if run.trace.rows < 2 or not shown:
-        return None
-    colour = style.solver_marks([run.solver])[run.solver][0]
-    rows, columns = (2, 2) if len(shown) == 4 else (1, len(shown))
-    figure = Figure(figsize=(style.WIDTH, 0.6 + 2.0 * rows), layout="constrained")
-    panels = list(figure.subplots(rows, columns, sharex=True, squeeze=False).flat)
-    for axes, (title, values, best) in zip(panels, shown, strict=False):
-        relative = title.startswith("Largest")
-        draw_history(axes, x, np.maximum(values, MISS_FLOOR) if relative else values, best, colour)
-        fit_values(axes, np.maximum(values, MISS_FLOOR) if relative else values, relative)
-        axes.set_title(title)
-        if relative:
-            mark_tolerance([axes])
-    label = AXIS_TITLES[WORK] if np.isfinite(run.trace[WORK]).any() else "iteration"
-    for axes in panels[-columns:]:
-        axes.set_xlabel(label)
-    return figure
-
-
-def draw_history(axes: Axes, x: Array, values: Array, best: Array | None, colour: str) -> None:
-    """A recorded column, and the lowest so far behind it where that differs."""
-    known = np.isfinite(x) & np.isfinite(values)
-    if best is not None and np.any(best[known] < values[known]):
-        axes.plot(x[known], best[known], drawstyle="steps-post", color=colour, linewidth=2.4, alpha=0.25)
-    times, shown = style.thin(x[known], values[known][:, None], 500)
-    few = len(times) <= 40
-    axes.plot(times, shown[:, 0], color=colour, linewidth=1.4, marker="o" if few else "", markersize=3)
-    style.set_linear(axes, "x")
-    axes.margins(x=0.02)

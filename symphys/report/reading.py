@@ -21,6 +21,7 @@ from symphys.report.records import (
     Trace,
     Variable,
 )
+from symphys.report.stage import Stage
 
 RESULT = "result.json"
 CONFIG = "config.json"
@@ -76,6 +77,8 @@ def make_run(folder: Path, place: str, named: dict[str, object], result: dict[st
         trust=make_trust(values.table(result.get("trust"))),
         origin=make_origin(result),
         trace=trace,
+        guess=values.measures(result.get("guess")),
+        stages=tuple(make_stage(entry) for entry in values.tables(result.get("stages"))),
         faults=(),
     )
 
@@ -88,6 +91,17 @@ def make_effort(result: dict[str, object]) -> Effort:
         price=values.measures(result.get("price")),
         equivalents=values.number(result.get("equivalents")),
         seconds=values.measures(result.get("seconds")),
+    )
+
+
+def make_stage(entry: dict[str, object]) -> Stage:
+    """One of ``stages``."""
+    read = ("smoothing", "objective", "worst", "exact_objective", "exact_worst", "equivalents", "seconds")
+    return Stage(
+        status=values.name(entry.get("status")),
+        solved=entry.get("solved") is True,
+        counts=values.measures(entry.get("counts")),
+        **{key: values.number(entry.get(key)) for key in read},
     )
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from symphys.errors import SymphysError
 from symphys.report.examination import Trust
+from symphys.report.stage import Stage
 
 Array = NDArray[np.float64]
 
@@ -113,6 +114,7 @@ class Run:
         place: the folder's path below the report's folder, with forward slashes.
         readable: whether there is a result; if not, only names and ``faults`` mean anything.
         faults: what could not be read, one sentence each.
+        guess: "objective" and "worst" of what it started from, exactly.
     """
 
     folder: Path
@@ -134,6 +136,8 @@ class Run:
     trust: Trust
     origin: Origin
     trace: Trace
+    guess: Mapping[str, float]
+    stages: tuple[Stage, ...]
     faults: tuple[str, ...]
 
     @property

@@ -9,14 +9,16 @@ from pathlib import Path
 from symphys import files
 from symphys.report import sections, style, values, words
 from symphys.report.contacts import draw_contacts, shown_pairs
-from symphys.report.convergence import draw_run
 from symphys.report.finding import is_run
+from symphys.report.history import draw_run
 from symphys.report.markup import Html, card, figures, join, page, tag
 from symphys.report.motion import draw_motion
 from symphys.report.output import write_figures
 from symphys.report.reading import CONFIG, PROBLEM, read_run
 from symphys.report.recordings import GUESS, SCENE, TRAJECTORY, read_scene, read_trajectory
 from symphys.report.records import ReportError, Run, Scene, Trajectory
+from symphys.report.stage import smoothed
+from symphys.report.stages import stage_card
 from symphys.report.states import MOST_BODIES, controlled_bodies, draw_controls, draw_states, shown_bodies
 from symphys.report.style import Picture
 from symphys.report.trust_figures import draw_energy, draw_growth
@@ -108,9 +110,10 @@ def build(run: Run, recording: Recording, pictures: dict[str, Picture]) -> Html:
         motion_card(run, recording, pictures),
         sections.found(run, pictures),
         trusted(run, pictures),
+        stage_card(run),
         card(
             "Convergence",
-            figures(only(pictures, "convergence"), "Pale: the lowest so far. Work counts one rollout as 1."),
+            figures(only(pictures, "convergence"), how_drawn(run)),
             anchor="convergence",
         ),
         *motion_cards(recording.trajectory, pictures),
@@ -119,6 +122,11 @@ def build(run: Run, recording: Recording, pictures: dict[str, Picture]) -> Html:
     ]
     header = sections.header(run, cards)
     return join([header, sections.key_numbers(run), *cards, sections.FOOTER])
+
+
+def how_drawn(run: Run) -> str:
+    """What the figure of the convergence does not say by itself."""
+    return f"Pale: the lowest so far{' in its stage' * smoothed(run.stages)}. Work counts one rollout as 1."
 
 
 def motion_card(run: Run, recording: Recording, pictures: dict[str, Picture]) -> Html:

@@ -30,6 +30,7 @@ CHAPTERS = (
     ("motion", "Motion"),
     ("found", "Found"),
     ("trust", "Trust"),
+    ("stages", "Stages"),
     ("convergence", "Convergence"),
     ("states", "States"),
     ("contacts", "Contacts"),

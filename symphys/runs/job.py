@@ -41,7 +41,7 @@ class Job:
     @property
     def smooth(self) -> bool:
         """Whether the solver will ask for rollouts at a smoothing above 0."""
-        return self.problem.simulation.smoothing > 0 or any(knob > 0 for knob in getattr(self.options, "smoothing", ()))
+        return self.problem.simulation.smoothing[0] > 0
 
 
 def make_jobs(

@@ -37,6 +37,26 @@ class BlockRecord(TypedDict):
     upper: list[float | None]
 
 
+class StageRecord(TypedDict):
+    """One stage of smoothing, and its best point.
+
+    ``objective`` and ``worst`` (largest error / tolerance) are those at this smoothing; ``exact_objective``,
+    ``exact_worst`` and ``solved`` those of the exact rollout. ``counts``, ``equivalents`` and ``seconds`` are what the
+    stage took, those before it left out; ``status`` is how it ended.
+    """
+
+    smoothing: float
+    status: str
+    objective: float
+    worst: float
+    exact_objective: float
+    exact_worst: float
+    solved: bool
+    counts: dict[str, int]
+    equivalents: float
+    seconds: float
+
+
 @dataclass(frozen=True)
 class Result:
     """One solve, judged by the exact rollout at smoothing 0. What is not known is None.
@@ -56,6 +76,8 @@ class Result:
         equivalents: the whole work in rollouts.
         seconds: wall time of "build", "compile" and "solve"; what a solver loads beforehand is in none of them.
         trust: how far the solution can be trusted.
+        guess: what the run started from, exactly: "objective", and "worst", the largest error / tolerance.
+        stages: those of smoothing that were begun, in their order; the solution is the point of the last.
         versions: of everything that took part.
         when: UTC time of the end, ISO 8601.
         command: what was typed.
@@ -80,6 +102,8 @@ class Result:
     equivalents: float | None = None
     seconds: dict[str, float] | None = None
     trust: dict[str, Any] | None = None
+    guess: dict[str, float] | None = None
+    stages: list[StageRecord] | None = None
     versions: dict[str, str] = field(default_factory=dict)
     when: str = ""
     command: str = ""

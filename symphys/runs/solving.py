@@ -16,12 +16,17 @@ from symphys.runs.job import Job
 from symphys.runs.provenance import evaluated, stamp
 from symphys.runs.result import BlockRecord, CheckRecord, Result
 from symphys.runs.scene import scene
+from symphys.runs.stages import guess_record, stage_records
+from symphys.runs.work import equivalents, used
 from symphys.shooting import Array, ShootingProblem
-from symphys.solvers import Counts, Monitor, Outcome, Status, TraceRow, solver
+from symphys.solvers import Monitor, Outcome, Status, solver
 from symphys.trajectory import Trajectory
 from symphys.transcription import Check, Transcription, Verdict
 
-SMOOTHED = "what the solver's smoothed rollout meets, the exact one does not: lower the smoothing"
+SMOOTHED = (
+    "what the solver's smoothed rollout meets, the exact one does not: lower the smoothing, or add a stage at 0, "
+    "such as smoothing = [0.1, 0.01, 0]"
+)
 
 
 @dataclass(frozen=True)
@@ -142,22 +147,9 @@ def record(
         equivalents=equivalents(outcome.counts, price),
         seconds=seconds,
         trust=judgement.trust,
+        guess=guess_record(transcription, job.config.seed),
+        stages=stage_records(transcription, outcome, price),
     )
-
-
-def used(counts: Counts) -> list[str]:
-    """The kinds of evaluation whose price matters here."""
-    return ["gradient", *(kind for kind, count in priced(counts).items() if count and kind != "gradient")]
-
-
-def priced(counts: Counts | TraceRow) -> dict[str, int]:
-    """How often each kind of evaluation that is dearer than a rollout was done."""
-    return {"gradient": counts.gradients, "jacobian": counts.jacobians, "hessian": counts.hessians}
-
-
-def equivalents(counts: Counts | TraceRow, price: Mapping[str, float]) -> float:
-    """Work in rollouts: every evaluation times its measured price."""
-    return float(counts.rollouts + sum(count * price[kind] for kind, count in priced(counts).items() if count))
 
 
 def check_record(check: Check) -> CheckRecord:

@@ -68,10 +68,12 @@ def prepare(
     softness, target = _normal_target(law, contact, duration, time, rebound, pull, k_normal, knob)
     landing = _landing(contact, duration, time, target, ca.dot(frame.normal, free_slip(sides, motions)))
     quick = contact.rate < -setting.fast
-    near = contact.gap < NEAR * setting.reference * scheme.dt**2
     weight = LOADED * setting.reference / k_normal
-    lasts = ca.logic_and(ca.logic_and(near, ca.dot(applied.normal, force) > weight), leaving <= 0)
-    target = ca.if_else(ca.logic_and(lasts, ca.logic_not(contact.hit)), 0, target)
+    load, width = ca.dot(applied.normal, force), width_of(setting, contact)
+    lasts = _lasts(setting, law, contact, leaving, load > weight)
+    # on the central path a load keeps surfaces parting at w^2 / (4 k load): less that, what lasts is at rest
+    parting = width**2 / (4 * k_normal * ca.fmax(load, weight) * duration)
+    target = ca.if_else(lasts, -parting, target)
     slip = contact.hit * leaving * (half - time) * (acceleration - normal * pull)
     return ContactRow(
         law=law,
@@ -87,7 +89,7 @@ def prepare(
         lasts=lasts,
         load=weight * duration,
         struck=ca.SX(0) if law.soft else ca.logic_and(contact.hit, quick),
-        width=width_of(setting, contact),
+        width=width,
         knob=knob,
     )
 
@@ -101,6 +103,15 @@ def _leaves(rebound: Expr, pull: Expr, left: Expr, reference: Expr, dt: float, k
     """chi: 1 if the rebound is still off the surface when the step ends, 0 if it has fallen back by then."""
     fall = ca.fmax(-pull, reference) * left
     return clip((2 * rebound - fall) / (fall + MARGIN * dt), 0, 1, knob)
+
+
+def _lasts(setting: Setting, law: Law, contact: Contact, leaving: Expr, loaded: Expr) -> Expr:
+    """1 if the surfaces carried load, are near each other and do not part. Smoothed contacts hover, up to a height."""
+    if law.soft:
+        return ca.SX(0)
+    dt = setting.scheme.dt
+    near = contact.gap < (NEAR * setting.reference * dt + setting.knob) * dt
+    return ca.logic_and(ca.logic_and(near, loaded), leaving < 0.5)
 
 
 def _landing(contact: Contact, duration: Expr, time: Expr, target: Expr, free: Expr) -> Expr:

@@ -17,12 +17,12 @@ def smoothed(transcription: Transcription, z: NDArray[np.float64]) -> list[dict[
     """How ``z`` does in smoothed rollouts.
 
     Returns:
-        For the problem's own "smoothing" [m/s], or each of ``KNOBS`` where it has none, the "objective" and the "worst"
-        error / tolerance; "own" says which of the two it is.
+        For each "smoothing" [m/s] of the problem's own stages, or of ``KNOBS`` where it has none, the "objective" and
+        the "worst" error / tolerance; "own" says which of the two it is.
     """
-    own = transcription.problem.simulation.smoothing
+    own = [knob for knob in transcription.problem.simulation.smoothing if knob > 0]
     rows = []
-    for knob in (own,) if own > 0 else KNOBS:
+    for knob in own or KNOBS:
         verdict = transcription.judge(z, knob)
-        rows.append({"smoothing": knob, "own": own > 0, "objective": verdict.objective, "worst": verdict.worst})
+        rows.append({"smoothing": knob, "own": bool(own), "objective": verdict.objective, "worst": verdict.worst})
     return rows

@@ -56,6 +56,7 @@ CHANGES: list[tuple[str, str, str]] = [
     ("mass = 1.0", "mass = 1.0\nmass = 2.0", "line 9"),
     ("mass = 1.0", "mass = 1.0 # \0", "line 8"),
     ("dt = 0.02", "dt = 2e-10", "too many"),
+    ("dt = 0.02", "dt = 0.02\nsmoothing = [0, 0.1]", "simulation.smoothing: stages must decrease"),
     ('"ball.position"', "\"__import__('os').getpid()\"", "only functions by plain name"),
     ('"ball.position"', '"open(1)"', "unknown function"),
     ('"ball.position"', '"ball.position.__class__"', "at most one dot"),

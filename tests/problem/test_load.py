@@ -31,7 +31,19 @@ def test_switches_of_the_scheme(load: Load) -> None:
     text = "sweeps = 3\nposition_sweeps = 0\nwarm_start = false\ntime_of_impact = false\nimpact_friction = false"
     problem = load(("dt = 0.01", f"dt = 0.01\n{text}\npush_out = 0.5\nsmoothing = 0.1"))
     assert problem.simulation.scheme() == Scheme(0.01, 3, 0, 0.5, False, False, False)
-    assert problem.simulation.smoothing == 0.1
+    assert problem.simulation.smoothing == (0.1,)
+
+
+@pytest.mark.parametrize(
+    ("text", "stages"),
+    [("0", (0.0,)), ("0.05", (0.05,)), ("[0]", (0.0,)), ("[0.1, 0.01, 0]", (0.1, 0.01, 0.0)), ("[1, 0.5]", (1.0, 0.5))],
+)
+def test_smoothing_is_a_number_or_stages(load: Load, text: str, stages: tuple[float, ...]) -> None:
+    assert load(("dt = 0.01", f"dt = 0.01\nsmoothing = {text}")).simulation.smoothing == stages
+
+
+def test_without_smoothing_contact_is_exact(load: Load) -> None:
+    assert load().simulation.smoothing == (0.0,)
 
 
 def test_initial_state(load: Load) -> None:

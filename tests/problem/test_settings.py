@@ -25,6 +25,10 @@ def test_a_key_that_the_file_leaves_out(load: Load) -> None:
     assert load(settings={"simulation.sweeps": 20}).simulation.sweeps == 20
 
 
+def test_stages_of_smoothing(load: Load) -> None:
+    assert load(settings={"simulation.smoothing": [0.1, 0]}).simulation.smoothing == (0.1, 0.0)
+
+
 @pytest.mark.parametrize("key", ["body.ball.mass", "body.0.mass"])
 def test_a_table_by_name_or_index(load: Load, key: str) -> None:
     assert load(settings={key: 7}).parameters["ball.mass"] == 7

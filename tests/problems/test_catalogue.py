@@ -13,7 +13,7 @@ from symphys.errors import SymphysError
 from symphys.problem import load_problem
 
 
-@pytest.mark.parametrize("name", ["ball_throw", "bank_shot", "two_balls"])
+@pytest.mark.parametrize("name", ["ball_throw", "bank_shot", "sled", "two_balls"])
 def test_shipped_problems_are_valid(name: str) -> None:
     problem = load_problem(problems.catalogue()[name])
     assert problem.name == name

@@ -12,9 +12,10 @@ import pytest
 from symphys.report import style
 from symphys.report.checks import limits, ratios
 from symphys.report.contacts import pair_normals, shown_pairs
-from symphys.report.convergence import Curve, best_so_far, median_curve, miss_so_far
+from symphys.report.curves import Curve, best_so_far, median_curve, miss_so_far
 from symphys.report.finding import read_all, studies
 from symphys.report.motion import draw_motion
+from symphys.report.reading import read_run
 from symphys.report.recordings import read_scene, read_trajectory
 from symphys.report.records import Scene, ScenePlane, Trace, Trajectory
 from symphys.report.views import SIDE_XZ, SIDE_YZ, TOP, TOP_TURNED, choose_views, turn
@@ -35,10 +36,11 @@ def test_median_of_step_functions() -> None:
     assert middle.y.tolist() == [5, 4, 1]
 
 
-def test_best_and_miss_only_fall() -> None:
+def test_best_and_miss_only_fall(made: Path) -> None:
     trace = Trace({"objective": np.array([3.0, np.nan, 4, 1]), "miss": np.array([9.0, 2, 5, np.nan])}, 4)
-    assert best_so_far(trace).tolist() == [3, 3, 3, 1]
-    assert miss_so_far(trace).tolist() == [9, 2, 2, 2]
+    run = replace(read_run(made / "ball_throw" / "gradient-seed0", made), trace=trace)
+    assert best_so_far(run).tolist() == [3, 3, 3, 1]
+    assert miss_so_far(run).tolist() == [9, 2, 2, 2]
 
 
 def test_thinning_keeps_spikes() -> None:

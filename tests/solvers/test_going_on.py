@@ -16,13 +16,9 @@ EXACT: list[tuple[str, dict[str, Any]]] = [
     ("gradient", {}),
     ("gradient", {"method": "momentum", "rates": (0.02,)}),
     ("gradient", {"method": "adam"}),
-    ("gradient", {"smoothing": (0.1, 0.0)}),
     ("least_squares", {}),
-    ("least_squares", {"smoothing": (0.1, 0.0)}),
     ("cma", {}),
     ("cma", {"options": {"CMA_diagonal": 5}, "population": 7}),
-    ("cma", {"smoothing": (0.1, 0.0)}),
-    ("gradient", {"smoothing": (0.0, 0.1)}),
 ]
 every_solver = pytest.mark.parametrize("name", list(SOLVERS))
 

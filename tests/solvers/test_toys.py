@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import casadi as ca
 import numpy as np
 import pytest
 from toys import PENALTY, constrained, counted, quadratic, require, rosenbrock, solve, target, toy, values
@@ -192,19 +191,6 @@ def test_cma_leaves_the_global_random_stream_alone() -> None:
     before = np.random.get_state()[1].copy()
     solve("cma", target())
     assert np.array_equal(before, np.random.get_state()[1])
-
-
-@every_solver
-def test_stages_of_smoothing(name: str) -> None:
-    """The answer moves with the knob: x = 1 + s; what is met at s > 0 is no end."""
-    problem = toy(1, lambda z, s: z - 1 - s, errors=lambda z, s: ca.fabs(z - 1 - s) / 1e-3, guess=5.0, smoothing=0.25)
-    found = solve(name, problem, options={"smoothing": (1.0, 0.1, 0.0)})
-    assert found.status is Status.MET
-    assert found.z == pytest.approx([1.0], abs=1e-3)
-    knobs = [row.smoothing for row in found.trace]
-    assert sorted(set(knobs), reverse=True) == [1.0, 0.1, 0.0]
-    assert knobs == sorted(knobs, reverse=True)
-    assert solve(name, problem).z == pytest.approx([1.25], abs=1e-3)
 
 
 @every_way

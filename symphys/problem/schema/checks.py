@@ -18,6 +18,7 @@ RESERVED = frozenset({*FUNCTIONS, *CONSTANTS, *keyword.kwlist, "time", "gravity"
 IDENTIFIER = "[A-Za-z][A-Za-z0-9_]*"
 MAX_IDENTIFIER = 64
 MAX_LABEL = 100
+STAGES = "[0.1, 0.01, 0]"
 
 
 def fault(message: str) -> PydanticCustomError:
@@ -80,6 +81,22 @@ def nested(bound: bool) -> Callable[[object], Any]:
         return value
 
     return check
+
+
+def smoothing(value: object) -> list[float]:
+    """The stages of the smoothing knob, from large to small; a number is one stage."""
+    stages: list[float] = []
+    for stage in value if isinstance(value, list) else [value]:
+        if not is_number(stage):
+            raise fault(f"must be a number, or a list of stages such as {STAGES}, not {shown(stage)}")
+        if stage < 0:
+            raise fault(f"must be at least 0, not {shown(stage)}")
+        if stages and stage >= stages[-1]:
+            raise fault(f"stages must decrease, as in {STAGES}: {shown(stage)} comes after {stages[-1]:g}")
+        stages.append(float(stage))
+    if not stages:
+        raise fault(f"a list of stages needs at least one, as in {STAGES}")
+    return stages
 
 
 def moment(value: object) -> str | float:

@@ -14,6 +14,7 @@ from symphys.problem.schema.types import (
     Orientation,
     Positive,
     Share,
+    Smoothing,
     Table,
     Vector,
 )
@@ -38,8 +39,11 @@ class SimulationTable(Table):
     warm_start: bool = Field(
         default=DEFAULT.warm_start, description="start each step from the last one's contact forces"
     )
-    smoothing: NonNegative = Field(
-        default=0.0, description="width [m/s] of the smooth contact law for solvers; 0 is exact"
+    smoothing: Smoothing = Field(
+        default=0.0,
+        validate_default=True,
+        description="width [m/s] of the smooth contact law for solvers; 0 is exact. A list is stages, such as "
+        "[0.1, 0.01, 0]: each starts where the one before ended",
     )
     push_out: Share = Field(default=DEFAULT.push_out, description="share of a penetration that one step removes")
     time_of_impact: bool = Field(

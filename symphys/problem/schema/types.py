@@ -28,6 +28,12 @@ def numbers_schema() -> dict[str, Any]:
     return {"anyOf": [number, flat, nested_rows]}
 
 
+def stages_schema() -> dict[str, Any]:
+    """The JSON Schema of a number of at least 0, or a list of them."""
+    number = {"type": "number", "minimum": 0}
+    return {"anyOf": [number, {"type": "array", "items": number, "minItems": 1}]}
+
+
 NestedList = float | list[float] | list[list[float]]
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -62,6 +68,7 @@ Texts = Annotated[
     PlainValidator(checks.texts),
     WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}, "minItems": 1}]}),
 ]
+Smoothing = Annotated[list[float], PlainValidator(checks.smoothing), WithJsonSchema(stages_schema())]
 Interpolation = Literal["constant", "linear"]
 Stop = Literal["met", "converged"]
 

@@ -1,0 +1,128 @@
+"""Runs in stages of smoothing: each stage is judged exactly, and a run goes on in whatever stage it stopped."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from symphys.problem import Problem, load_problem
+from symphys.problems import find
+from symphys.runs import Job, Result, execute, make_jobs, read_result, run_batch
+from symphys.runs.workshop import Workshop
+from symphys.solvers import TraceRow
+from symphys.transcription import Transcription, transcribe
+
+KNOBS = [0.1, 0.01, 0.0]
+
+
+@cache
+def transcribed(knobs: tuple[float, ...]) -> Transcription:
+    """The sled."""
+    return transcribe(load_problem(find("sled"), {"simulation.smoothing": list(knobs)}))
+
+
+def once(problem: Problem, exact: bool) -> Transcription:
+    """A transcription for every run of the same stages."""
+    assert exact == (max(problem.simulation.smoothing) == 0)
+    return transcribed(problem.simulation.smoothing)
+
+
+def job(out: Path, knobs: Any = (0.1, 0.01, 0.0), solver: str = "least_squares", seeds: int = 1) -> list[Job]:
+    settings: dict[str, object] = {"simulation.smoothing": list(knobs)}
+    return make_jobs([load_problem(find("sled"), settings)], [solver], range(seeds), settings, out)
+
+
+def run(asked: Job, monitor: Callable[[TraceRow], None] = lambda row: None) -> Result:
+    return execute(asked, monitor, Workshop(once))
+
+
+def without_times(result: Result) -> list[dict[str, Any]]:
+    """The stages without what a clock has measured."""
+    assert result.stages is not None
+    return [{**stage, "seconds": 0.0, "equivalents": 0.0} for stage in result.stages]
+
+
+def test_each_stage_is_judged_exactly(tmp_path: Path) -> None:
+    (asked,), (first,) = job(tmp_path / "all"), job(tmp_path / "first", (0.1,))
+    whole, part = run(asked), run(first)
+    assert whole.stages is not None and part.stages is not None
+    assert [stage["smoothing"] for stage in whole.stages] == KNOBS
+    # the first stage alone is a run of its own, and the judge of runs says the same of it
+    assert part.objective == part.stages[0]["exact_objective"] == whole.stages[0]["exact_objective"]
+    assert part.worst == part.stages[0]["exact_worst"] == whole.stages[0]["exact_worst"]
+    assert not part.solved and not whole.stages[0]["solved"]
+    assert whole.stages[0]["exact_objective"] > 10 * whole.stages[0]["objective"]
+    last = whole.stages[-1]
+    assert (last["exact_objective"], last["exact_worst"], last["solved"]) == (whole.objective, whole.worst, True)
+    assert last["objective"] == pytest.approx(last["exact_objective"], rel=1e-9)
+
+
+def test_the_work_of_the_stages_is_that_of_the_run(tmp_path: Path) -> None:
+    (asked,) = job(tmp_path)
+    result = run(asked)
+    assert result.stages is not None and result.counts is not None and result.equivalents is not None
+    for kind, count in result.counts.items():
+        assert sum(stage["counts"][kind] for stage in result.stages) == count
+    assert sum(stage["equivalents"] for stage in result.stages) == pytest.approx(result.equivalents)
+    assert result.seconds is not None
+    assert sum(stage["seconds"] for stage in result.stages) <= result.seconds["solve"]
+
+
+def test_what_the_guess_is_worth(tmp_path: Path) -> None:
+    """It does not move: 1.118 m from its place, 111.8 tolerances."""
+    (asked,) = job(tmp_path)
+    assert run(asked).guess == pytest.approx({"objective": 1.25, "worst": 111.8}, rel=1e-3)
+
+
+def test_files_tell_of_the_stages(tmp_path: Path) -> None:
+    (asked,) = job(tmp_path)
+    result = run(asked)
+    assert repr(read_result(asked.folder.path / "result.json")) == repr(result)
+    with (asked.folder.path / "trace.csv").open(encoding="utf-8", newline="") as file:
+        knobs = [float(row["smoothing"]) for row in csv.DictReader(file)]
+    assert list(dict.fromkeys(knobs)) == KNOBS
+    log = (asked.folder.path / "log.txt").read_text(encoding="utf-8")
+    assert "stage 2 of 3: smoothing 0.01" in log
+
+
+@pytest.mark.parametrize("knob", KNOBS)
+def test_interrupted_in_any_stage_it_goes_on_to_the_same_end(tmp_path: Path, knob: float) -> None:
+    def press(row: TraceRow) -> None:
+        if row.smoothing == knob:
+            raise KeyboardInterrupt
+
+    (asked,), (broken,) = job(tmp_path / "whole"), job(tmp_path / "broken")
+    whole, stopped = run(asked), run(broken, press)
+    assert stopped.status == "interrupted"
+    assert stopped.stages is not None
+    assert [stage["smoothing"] for stage in stopped.stages] == KNOBS[: KNOBS.index(knob) + 1]
+    assert stopped.stages[-1]["status"] == "interrupted"
+    rest = run(broken)
+    assert (rest.z, rest.counts, rest.iterations) == (whole.z, whole.counts, whole.iterations)
+    assert without_times(rest) == without_times(whole)
+
+
+def test_side_by_side(tmp_path: Path, recorder: Any) -> None:
+    alone = run_batch(job(tmp_path / "a", seeds=3), 1, recorder, once)
+    beside = run_batch(job(tmp_path / "b", seeds=3), 1, recorder, once, together=True)
+    assert alone.solved and beside.solved
+    for one, other in zip(alone.results, beside.results, strict=True):
+        assert one is not None and other is not None
+        assert (one.z, one.counts) == (other.z, other.counts)
+        assert without_times(one) == without_times(other)
+
+
+def test_what_only_the_smoothed_rollout_meets_has_advice(tmp_path: Path) -> None:
+    (asked,) = job(tmp_path, (0.1,), "ipopt")
+    result = run(asked)
+    assert result.status == "met" and not result.solved
+    assert "add a stage at 0" in result.advice
+
+
+def test_the_kernel_has_the_knob_where_any_stage_turns_it(tmp_path: Path) -> None:
+    assert [job(tmp_path, knobs)[0].smooth for knobs in ((0.0,), (0.1, 0.0), (0.1,))] == [False, True, True]
