@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import dist
 from typing import Any
 
 import casadi as ca
@@ -43,9 +44,9 @@ def formula_names(values: Mapping[str, Array], variables: Sequence[Variable]) ->
 
 def check_overlap(plan: WorldPlan, values: Mapping[str, Array], faults: Faults) -> None:
     """Surfaces that may touch must not overlap at the start."""
-    overrides: dict[str, Any] = {name: float(values[name][0]) for name in plan.parameters() if name != "gravity"}
-    world = plan.world(overrides)
-    centres = [sphere_centres(world, index, values) for index in range(len(world.bodies))]
+    world = plan.world({name: parameter(values[name]) for name in plan.parameters()})
+    meeting = {side.body for pair in world.pairs for side in (pair.first, pair.second) if side.body is not None}
+    centres = {index: shape_centres(world, index, values) for index in meeting}
     deepest: dict[tuple[str, str], float] = {}
     for pair in world.pairs:
         depth = -gap(world, centres, pair.first, pair.second)
@@ -59,13 +60,18 @@ def check_overlap(plan: WorldPlan, values: Mapping[str, Array], faults: Faults) 
         faults.add(("body", index, "position"), message)
 
 
+def parameter(value: Array) -> float | tuple[float, ...]:
+    """A parameter's value as worlds take it."""
+    return float(value[0]) if value.size == 1 else tuple(value.tolist())
+
+
 def plan_index(plan: WorldPlan, name: str) -> int:
     """The index of a body."""
     return [body.name for body in plan.bodies].index(name)
 
 
-def sphere_centres(world: World, index: int, values: Mapping[str, Array]) -> Array:
-    """(spheres, 3): centres of a body's spheres in the world [m]."""
+def shape_centres(world: World, index: int, values: Mapping[str, Array]) -> Array:
+    """(shapes, 3): centres of a body's shapes in the world [m]."""
     body = world.bodies[index]
     position, orientation = values[f"{body.name}.position"], values[f"{body.name}.orientation"]
     turned = np.array(rotation.matrix(ca.DM(orientation)))
@@ -73,13 +79,15 @@ def sphere_centres(world: World, index: int, values: Mapping[str, Array]) -> Arr
     return np.asarray(position + offsets @ turned.T)
 
 
-def gap(world: World, centres: Sequence[Array], first: Side, second: Side) -> float:
-    """The distance between two surfaces [m]; negative when they overlap."""
+def gap(world: World, centres: Mapping[int, Array], first: Side, second: Side) -> float:
+    """The distance between two surfaces [m], negative when they overlap; inf for pairs that are not looked at."""
     assert first.body is not None
     shape, other = world.surface(first), world.surface(second)
-    assert isinstance(shape, Sphere)
+    if not isinstance(shape, Sphere):
+        return np.inf
     centre = centres[first.body][first.shape]
     if isinstance(other, Plane):
         return float(np.dot(other.normal, centre) - other.offset - shape.radius)
-    assert isinstance(other, Sphere) and second.body is not None
-    return float(np.linalg.norm(centre - centres[second.body][second.shape]) - shape.radius - other.radius)
+    if not isinstance(other, Sphere) or second.body is None:
+        return np.inf
+    return dist(centre, centres[second.body][second.shape]) - shape.radius - other.radius

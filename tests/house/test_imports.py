@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PHYSICS = {"shapes", "world", "state", "rotation", "smooth", "collide", "motion", "step", "rollout"}
+PHYSICS = {"shapes", "heightfield", "world", "state", "rotation", "smooth", "collide", "motion", "step", "rollout"}
 RUNTIME = set(sys.stdlib_module_names)
 
 
