@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import isfinite
+from math import hypot, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from symphys.problem.faults import Faults
 from symphys.problem.inertia import centre_of_mass, complaint, specific, volume
 from symphys.problem.parts import COMBINE, BodyPlan
 from symphys.problem.schema.physics import BodyTable, SurfaceTable
-from symphys.problem.sizes import sizes
+from symphys.problem.sizes import extent
 from symphys.problem.solids import read_orientation, read_shape
 from symphys.shapes import Shape
 
@@ -80,8 +80,8 @@ def check_inertia(place: tuple[str, int], table: BodyTable, shapes: Sequence[Sha
     elif shapes:
         centre = centre_of_mass(shapes)
         off = float(np.linalg.norm(centre))
-        extent = max(float(np.linalg.norm(shape.centre)) + largest(shape) for shape in shapes)
-        if not off <= OFF_CENTRE * extent:
+        size = max(hypot(*shape.centre) + extent(shape) for shape in shapes)
+        if not off <= OFF_CENTRE * size:
             key = "spheres" if table.shape.spheres else "parts"
             listed = ", ".join(f"{c:.6g}" for c in centre)
             faults.add(
@@ -89,11 +89,6 @@ def check_inertia(place: tuple[str, int], table: BodyTable, shapes: Sequence[Sha
                 f"the centre of mass of these {key} is {off:.4g} m from the body's origin, at [{listed}]; "
                 "subtract that from every centre, or give inertia",
             )
-
-
-def largest(shape: Shape) -> float:
-    """The largest size of a shape [m]."""
-    return max(float(np.max(value)) for value in sizes(shape).values())
 
 
 def read_state(table: BodyTable, index: int, faults: Faults) -> dict[str, Array]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from math import hypot
 from typing import Any
 
 from symphys.shapes import Box, Capsule, Shape, Sphere
@@ -19,6 +20,13 @@ def sizes(shape: Shape) -> dict[str, Any]:
     if isinstance(shape, Box):
         return {"size": tuple(2 * half for half in shape.half_sizes)}
     return {"radius": shape.radius, "length": 2 * shape.half_length}
+
+
+def extent(shape: Shape) -> float:
+    """From a shape's centre to its farthest point [m]."""
+    if isinstance(shape, Box):
+        return hypot(*shape.half_sizes)
+    return float(shape.radius + (shape.half_length if isinstance(shape, Capsule) else 0.0))
 
 
 def resized(shape: Shape, new: Mapping[str, Any]) -> Shape:

@@ -90,4 +90,4 @@ def gap(world: World, centres: Mapping[int, Array], first: Side, second: Side) -
         return float(np.dot(other.normal, centre) - other.offset - shape.radius)
     if not isinstance(other, Sphere) or second.body is None:
         return np.inf
-    return dist(centre, centres[second.body][second.shape]) - shape.radius - other.radius
+    return float(dist(centre, centres[second.body][second.shape]) - shape.radius - other.radius)
