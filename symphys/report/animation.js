@@ -1,5 +1,8 @@
 // Plays a recorded motion on a canvas: parallel projection, drag to turn. Comes after painter.js.
 
+const STILL = { p: [0, 0, 0], q: [1, 0, 0, 0] };
+const LOW = 0.12; // below this elevation hills would hide what moves between them, so they stay behind it
+
 class Player {
   constructor(root) {
     this.data = JSON.parse(root.querySelector("script").textContent);
@@ -10,11 +13,14 @@ class Player {
     this.output = root.querySelector("output");
     this.speed = root.querySelector("select");
     this.views = [...root.querySelectorAll("[data-view]")];
-    this.box = bounds(this.data);
+    this.fixtures = this.data.fixtures.map((solid) => place(solid, STILL, FIXED, true));
+    this.cells = this.data.terrain.flatMap((terrain) => mesh(terrain, this.data.planes));
+    const corners = this.fixtures.flatMap((solid) => extremes(solid)), edges = this.data.terrain.flatMap(rim);
+    this.box = widened(bounds(this.data), [...corners, ...edges]);
     this.patches = this.visible(this.data.planes);
     this.paths = this.data.bodies.map((_, b) => this.path(b));
     this.guesses = this.data.guess.map((flat) => triples(flat));
-    this.seen = mustSee(this.data, this.patches);
+    this.seen = mustSee(this.data, this.patches, this.box, [...corners, ...edges]);
     this.first = this.data.time[0];
     this.last = this.data.time[this.data.time.length - 1];
     this.time = this.first;
@@ -112,14 +118,16 @@ class Player {
   }
 
   draw() {
-    const painter = this.painter, [index, share] = this.frame();
+    const painter = this.painter, [index, share] = this.frame(), solids = this.solids(index, share);
     painter.fit(this.seen, this.azimuth, this.elevation);
     this.patches.forEach((p) => painter.drawPlane(p));
+    const cells = this.inDepth();
+    cells.forEach(({ cell }) => painter.drawCell(cell));
+    solids.forEach((solid) => painter.drawShadows(solid, this.patches, this.data.terrain));
+    inOrder(this.fixtures, painter.eye).forEach((solid) => painter.drawSolid(solid, this.data.planes));
     this.guesses.forEach((path) => painter.drawGuess(path));
     this.paths.forEach((path, b) => painter.drawPath(path, index, this.data.bodies[b].colour));
-    const balls = this.balls(index, share);
-    balls.forEach((ball) => painter.drawShadows(ball, this.patches));
-    balls.sort((a, b) => painter.depth(a.centre) - painter.depth(b.centre)).forEach((ball) => painter.drawBall(ball));
+    this.drawSolids(inOrder([...this.fixtures, ...solids], painter.eye), cells);
     painter.drawTriad();
     this.output.textContent = `${this.time.toFixed(2)} / ${this.last.toFixed(2)} s`;
     this.slider.value = String(Math.round(1000 * (this.time - this.first) / (this.last - this.first || 1)));
@@ -130,13 +138,35 @@ class Player {
     return triples(this.data.position).filter((_, i) => i % count === body);
   }
 
-  balls(index, share) {
+  solids(index, share) {
     return this.data.bodies.flatMap((body, b) => {
       const pose = this.pose(b, index, share);
-      return body.balls.map((s) => (
-        { centre: sum(pose.p, turn(pose.q, s.slice(1)), 1), radius: s[0], q: pose.q, colour: body.colour }
-      ));
+      return body.solids.map((solid) => place(solid, pose, body.colour, false));
     });
+  }
+
+  drawSolids(ordered, cells) { // what stands still is there already: again where it hides what was drawn since
+    const moving = [], painter = this.painter;
+    for (const solid of ordered) {
+      if (solid.fixed && !moving.some((other) => overlap(other, solid, painter.eye))) continue;
+      painter.drawSolid(solid, this.data.planes);
+      if (!solid.fixed) moving.push(solid);
+      if (!solid.fixed && this.elevation > LOW) this.hide(solid, cells);
+    }
+  }
+
+  inDepth() { // cells of terrain from the back to the front, each by its farthest corner
+    const depth = (cell) => Math.min(...cell.polygon.map((p) => this.painter.depth(p)));
+    return this.cells.map((cell) => ({ cell, depth: depth(cell) })).sort((a, b) => a.depth - b.depth);
+  }
+
+  hide(solid, cells) { // draw again the cells that are wholly nearer than the centre of a solid and lie over it
+    const painter = this.painter, depth = painter.depth(solid.centre), [x, y] = painter.place(solid.centre);
+    for (const { cell, depth: farthest } of cells) {
+      if (farthest <= depth) continue;
+      const [cx, cy] = painter.place(cell.polygon[0]);
+      if (Math.hypot(cx - x, cy - y) < (solid.reach + cell.width) * painter.scale) painter.drawCell(cell);
+    }
   }
 }
 

@@ -11,15 +11,17 @@ import numpy as np
 
 from symphys import files
 from symphys.report import sections, style, trust, values, words
-from symphys.report.contacts import draw_contacts, shown_pairs
+from symphys.report.contacts import by_surfaces, draw_contacts, shown_pairs
 from symphys.report.convergence import draw_run
 from symphys.report.finding import is_run
 from symphys.report.markup import Html, card, figures, join, page, tag
 from symphys.report.motion import draw_motion
 from symphys.report.output import write_figures
 from symphys.report.reading import CONFIG, PROBLEM, read_run
-from symphys.report.recordings import GUESS, SCENE, TRAJECTORY, read_scene, read_trajectory
-from symphys.report.records import ReportError, Run, Scene, Trajectory
+from symphys.report.recordings import GUESS, TRAJECTORY, read_trajectory
+from symphys.report.records import ReportError, Run, Trajectory
+from symphys.report.scene_file import SCENE, read_scene
+from symphys.report.scenery import Scene
 from symphys.report.states import MOST_BODIES, controlled_bodies, draw_controls, draw_energy, draw_states, shown_bodies
 from symphys.report.style import Picture
 from symphys.report.variables import draw_variables
@@ -138,11 +140,11 @@ def motion_cards(motion: Trajectory | None, pictures: dict[str, Picture]) -> lis
     """States, controls, contacts and energy over time."""
     if motion is None:
         return []
-    bodies, pairs = len(motion.body_names), len(motion.contact_names)
+    bodies, touching = len(motion.body_names), by_surfaces(motion)
     states = shortened(len(shown_bodies(motion)), bodies, "bodies", "that move most")
     controlled = len(controlled_bodies(motion))
     acting = shortened(min(controlled, MOST_BODIES), controlled, "bodies", "that come first")
-    contacts = shortened(len(shown_pairs(motion)), pairs, "pairs", "with the largest impulses")
+    contacts = shortened(len(shown_pairs(touching)), len(touching.contact_names), "pairs", "with the largest impulses")
     force = "A force is the step's impulse over its duration, so an impact is a spike whose height grows as dt shrinks."
     return [
         card("States over time", figures(only(pictures, "states"), states), anchor="states"),
@@ -160,8 +162,7 @@ def shortened(shown: int, total: int, noun: str, which: str) -> str:
 def sizes(recording: Recording) -> trust.Sizes:
     """What residual and penetration are compared with."""
     motion = recording.trajectory
-    radii = [ball.radius for body in recording.scene.bodies for ball in body.balls]
-    radius = min(radii, default=math.nan)
+    radius = min((solid.girth for body in recording.scene.bodies for solid in body.solids), default=math.nan)
     if motion is None or len(motion.time) < 2:
         return trust.Sizes(radius=radius)
     force = np.linalg.norm(np.nan_to_num(motion.contact_force), axis=2)
