@@ -27,7 +27,6 @@ from symphys.problem.statics import read_statics
 from symphys.problem.surfaces import (
     check_laws,
     check_mates,
-    check_ranks,
     check_varied,
     read_contact,
     read_pairs,
@@ -100,7 +99,6 @@ def build(path: Path, text: str, document: Document, faults: Faults) -> Problem:
     simulation = read_simulation(document.simulation, faults)
     plan, initial = read_plan(document, faults)
     faults.stop_if_any()
-    check_ranks(plan, faults)
     check_laws(plan, faults)
     known = quantities(initial, plan.parameters())
     variables = read_variables(document.variable, known, simulation, faults)

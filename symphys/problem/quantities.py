@@ -83,7 +83,8 @@ def unknown(name: str, known: Mapping[str, Quantity]) -> str:
     if key in ("friction", "restitution") and owner in owners:
         return f"{owner} states no {key}: give it a value there first, so that this variable has something to change"
     same_owner = [other for other in known if owner and other.startswith(f"{owner}.")]
-    return hint(name, same_owner or known)
+    stated = f"; what states no {key} has none to vary" if key in ("friction", "restitution") else ""
+    return hint(name, same_owner or known) + stated
 
 
 def limits(slot: Slot, known: Mapping[str, Quantity]) -> tuple[Array, Array]:

@@ -108,6 +108,7 @@ def rival_of(plan: WorldPlan, index: int, name: str, rivals: Rivals) -> tuple[in
 
 def check_laws(plan: WorldPlan, faults: Faults) -> None:
     """A contact is either soft or has restitution; a [[pair]] table must belong to surfaces that may touch."""
+    check_ranks(plan, faults)
     laws = {plan.owners(pair): pair.law for pair in plan.world({}).pairs}
     used = set()
     for owners, law in laws.items():

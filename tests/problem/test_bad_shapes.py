@@ -92,6 +92,11 @@ CASES = [
         'variable "v".sets',
         "no quantity",
     ),
+    (
+        terrain('height = "x"\n[[variable]]\nname = "v"\nsets = "hills.friction"'),
+        'variable "v".sets',
+        "what states no friction has none to vary",
+    ),
     # blocks
     (block("friction = 1"), 'block "ramp".shape', "required"),
     (block("shape = {}"), 'block "ramp".shape', "give one of sphere, box and capsule"),
