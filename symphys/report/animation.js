@@ -124,7 +124,7 @@ class Player {
     const cells = this.inDepth();
     cells.forEach(({ cell }) => painter.drawCell(cell));
     solids.forEach((solid) => painter.drawShadows(solid, this.patches, this.data.terrain));
-    inOrder(this.fixtures, painter.eye).forEach((solid) => painter.drawSolid(solid, this.data.planes));
+    this.drawFixtures(cells);
     this.guesses.forEach((path) => painter.drawGuess(path));
     this.paths.forEach((path, b) => painter.drawPath(path, index, this.data.bodies[b].colour));
     this.drawSolids(inOrder([...this.fixtures, ...solids], painter.eye), cells);
@@ -145,13 +145,20 @@ class Player {
     });
   }
 
+  drawFixtures(cells) {
+    for (const solid of inOrder(this.fixtures, this.painter.eye)) {
+      this.painter.drawSolid(solid, this.data.planes);
+      this.hide(solid, cells);
+    }
+  }
+
   drawSolids(ordered, cells) { // what stands still is there already: again where it hides what was drawn since
     const moving = [], painter = this.painter;
     for (const solid of ordered) {
       if (solid.fixed && !moving.some((other) => overlap(other, solid, painter.eye))) continue;
       painter.drawSolid(solid, this.data.planes);
       if (!solid.fixed) moving.push(solid);
-      if (!solid.fixed && this.elevation > LOW) this.hide(solid, cells);
+      if (!solid.fixed) this.hide(solid, cells);
     }
   }
 
@@ -160,13 +167,16 @@ class Player {
     return this.cells.map((cell) => ({ cell, depth: depth(cell) })).sort((a, b) => a.depth - b.depth);
   }
 
-  hide(solid, cells) { // draw again the cells that are wholly nearer than the centre of a solid and lie over it
-    const painter = this.painter, depth = painter.depth(solid.centre), [x, y] = painter.place(solid.centre);
-    for (const { cell, depth: farthest } of cells) {
-      if (farthest <= depth) continue;
-      const [cx, cy] = painter.place(cell.polygon[0]);
-      if (Math.hypot(cx - x, cy - y) < (solid.reach + cell.width) * painter.scale) painter.drawCell(cell);
-    }
+  hide(solid, cells) { // draw again the cells that lie over a solid and are nearer than what it stands on
+    if (this.elevation < LOW) return;
+    const { front, right, up } = this.painter.eye, level = { half: solid.half, radius: 0 };
+    const depth = dot(solid.centre, front) + support(level, [front[0], front[1], 0]);
+    const wide = support(solid, right), tall = support(solid, up);
+    const over = cells.filter(({ cell, depth: farthest }) => {
+      const d = sum(cell.polygon[0], solid.centre, -1);
+      return farthest > depth && Math.abs(dot(d, right)) < wide + cell.width && Math.abs(dot(d, up)) < tall + cell.width;
+    });
+    if (over.length) this.painter.within(solid, () => over.forEach(({ cell }) => this.painter.drawCell(cell)));
   }
 }
 

@@ -25,7 +25,7 @@ LINES = 8
 
 
 def draw_ground(axes: Axes, panel: Panel, trajectory: Trajectory, scene: Scene) -> None:
-    """All that stands still; planes hide what is below them."""
+    """All that stands still; planes and terrain hide what is below them."""
     for ground in scene.terrain:
         if panel.view.depth == 2:
             draw_heights(axes, panel, ground)
@@ -58,8 +58,8 @@ def draw_profile(axes: Axes, panel: Panel, trajectory: Trajectory, ground: Scene
     if near.any():
         highest = np.fmax.reduce(z[near], axis=0)
         axes.fill_between(along, highest, bottom, facecolor=BEHIND, edgecolor=style.FAINT, linewidth=0.8, zorder=1.4)
-    axes.fill_between(along, cut, bottom, **HATCH, zorder=1.54)
-    axes.plot(along, cut, color=style.GROUND_EDGE, linewidth=1.6, zorder=1.55)
+    axes.fill_between(along, cut, bottom, **HATCH, zorder=1.57)
+    axes.plot(along, cut, color=style.GROUND_EDGE, linewidth=1.6, zorder=1.58)
 
 
 def draw_heights(axes: Axes, panel: Panel, ground: SceneTerrain) -> None:

@@ -160,6 +160,15 @@ class Painter {
     return solid.fixed ? clip(around, planes) : around;
   }
 
+  within(solid, draw) { // draw over a solid and its edge, and nothing else
+    const pen = this.pen;
+    pen.save();
+    this.trace(this.silhouette({ ...solid, fixed: false, radius: solid.radius + 1.5 / this.scale }, []));
+    pen.clip();
+    draw();
+    pen.restore();
+  }
+
   drawBox(box, planes) {
     for (const face of faces(box)) {
       if (dot(face.normal, this.eye.front) <= 1e-6) continue;
