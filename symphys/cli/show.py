@@ -24,6 +24,7 @@ def show(source: str, assignments: tuple[str, ...], out: Path) -> None:
     transcription = transcribe(problem, backend="casadi")
     guess = transcription.shooting.start(0)
     folder = out / problem.name / "guess"
-    files.write_npz(folder / TRAJECTORY, transcription.simulate(guess).arrays())
-    files.write_json(folder / SCENE, scene(problem, transcription.shooting.by_block(guess)))
+    motion = transcription.simulate(guess)
+    files.write_npz(folder / TRAJECTORY, motion.arrays())
+    files.write_json(folder / SCENE, scene(problem, transcription.shooting.by_block(guess), motion))
     click.echo(write_motion(folder / TRAJECTORY, folder / SCENE, folder / "motion.html", title=problem.title))

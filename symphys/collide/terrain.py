@@ -26,6 +26,8 @@ CONVEX = 0.1
 """Least determinant of the squared distance's Hessian for Newton's method; else Gauss-Newton."""
 FOUND = 0.1
 """How far from perpendicular a line to the surface may be, as a share of its length, and count as a distance."""
+TINY_AREA = 1e-12
+"""[m^2] below which squares of lengths count as zero there."""
 Surface = Callable[[Expr], tuple[Expr, Expr, Expr]]
 """Of (2,) x, y: the height, its gradient (2,) and its Hessian (2, 2)."""
 
@@ -47,23 +49,14 @@ class Paraboloid:
 
     def distance(self, point: Expr) -> Expr:
         """See ``Field``."""
-        perpendicular, found = self._line(point)
-        height, slope, _ = self.surface(point[:2])
-        below = (point[2] - height) / ca.sqrt(1 + ca.dot(slope, slope))
-        return ca.if_else(found, perpendicular, below)
+        xy = nearest(self.surface, point)
+        height, slope, _ = self.surface(xy)
+        line = point - ca.vertcat(xy, height)
+        return ca.dot(line, upwards(slope))
 
     def normal(self, point: Expr) -> Expr:
         """See ``Field``."""
-        return upwards(self.surface(foot(self.surface, point))[1])
-
-    def _line(self, point: Expr) -> tuple[Expr, Expr]:
-        """The distance along the perpendicular, and whether there is one."""
-        xy = foot(self.surface, point)
-        height, slope, _ = self.surface(xy)
-        line, normal = point - ca.vertcat(xy, height), upwards(slope)
-        along = ca.dot(line, normal)
-        aside = line - along * normal
-        return along, ca.dot(aside, aside) <= FOUND**2 * ca.dot(line, line) + 1e-12
+        return upwards(self.surface(nearest(self.surface, point))[1])
 
 
 def upwards(slope: Expr) -> Expr:
@@ -85,6 +78,18 @@ def foot(surface: Surface, point: Expr) -> Expr:
     return xy
 
 
+def nearest(surface: Surface, point: Expr) -> Expr:
+    """(2,): x, y of the foot; of the place straight below where what was found is none, as far from a bent surface."""
+    xy = foot(surface, point)
+    height, slope, _ = surface(xy)
+    line, normal = point - ca.vertcat(xy, height), upwards(slope)
+    along = ca.dot(line, normal)
+    aside = line - along * normal
+    perpendicular = ca.dot(aside, aside) <= FOUND**2 * ca.dot(line, line) + TINY_AREA
+    same_side = along * (point[2] - surface(point[:2])[0]) >= -TINY_AREA
+    return ca.if_else(ca.logic_and(perpendicular, same_side), xy, point[:2])
+
+
 def determinant(m: Expr) -> Expr:
     """Of a (2, 2) matrix."""
     return m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]
@@ -102,7 +107,7 @@ def ball_on_terrain(offset: Sequence[Any], radius: Expr, terrain: Terrain, a: Co
     surface = surface_of(terrain)
     contact, centre = None, path.start
     for _ in range(2):
-        xy = foot(surface, centre)
+        xy = nearest(surface, centre)
         meeting = InField(
             Paraboloid(xy, *surface(xy)), radius, path, (a.arm(offset), STAYS), (path.start, STAYS.start), axes
         )

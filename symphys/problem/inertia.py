@@ -1,44 +1,102 @@
-"""Inertia of bodies: of compounds of spheres, and whether a given one is that of any real body."""
+"""Inertia of bodies: of solid shapes and compounds of them, and whether a given one is that of any real body."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.shapes import Scalar, Sphere
-from symphys.world import SOLID_SPHERE
+from symphys import rotation
+from symphys.shapes import UPRIGHT, Box, Scalar, Shape, Sphere
+from symphys.world import SOLID_SPHERE, is_zero
 
 Array = NDArray[np.float64]
+Tensor = list[list[Scalar]]
+"""(3, 3)"""
 ROUNDING = 1e-9
 """Relative slack for symmetry and the triangle inequality, which flat and thin bodies meet with equality."""
+NOISE = 1e-14
+"""Products of inertia below this share of the trace are rounding."""
 
 
-def volume(radius: Scalar) -> Scalar:
-    """Of a sphere [m^3]."""
-    return 4 / 3 * np.pi * radius**3
+def volume(shape: Shape) -> Scalar:
+    """Of a solid shape [m^3]; sizes may be symbols."""
+    if isinstance(shape, Box):
+        a, b, c = shape.half_sizes
+        return 8 * a * b * c
+    r = shape.radius
+    ball = 4 / 3 * np.pi * r * r * r
+    return ball if isinstance(shape, Sphere) else ball + 2 * np.pi * r * r * shape.half_length
 
 
-def shares(spheres: Sequence[Sphere]) -> Array:
-    """(n,): the share of each sphere in the mass, for equal density."""
-    volumes = np.array([volume(sphere.radius) for sphere in spheres])
-    return np.asarray(volumes / volumes.sum())
+def moments(shape: Shape) -> tuple[Scalar, Scalar, Scalar]:
+    """Inertia per mass [m^2] of a solid shape about its own centre, along its own axes."""
+    if isinstance(shape, Box):
+        a, b, c = (half * half / 3 for half in shape.half_sizes)
+        return b + c, a + c, a + b
+    r = shape.radius
+    ball = SOLID_SPHERE * r * r
+    if isinstance(shape, Sphere):
+        return ball, ball, ball
+    h = shape.half_length
+    ends = 2 * r / (2 * r + 3 * h)
+    across = ends * (ball + h * h + 3 / 4 * r * h) + (1 - ends) * (r * r / 4 + h * h / 3)
+    return across, across, ends * ball + (1 - ends) * r * r / 2
 
 
-def centre_of_mass(spheres: Sequence[Sphere]) -> Array:
-    """(3,): of solid spheres of equal density [m], body frame; parts that overlap count twice."""
-    return np.asarray(shares(spheres) @ np.array([sphere.centre for sphere in spheres], float))
+def shares(shapes: Sequence[Shape]) -> list[Scalar]:
+    """The share of each shape in the mass, for equal density."""
+    if len(shapes) == 1:
+        return [1.0]
+    volumes = [volume(shape) for shape in shapes]
+    whole = sum(volumes)
+    if whole == 0:
+        return [np.nan] * len(shapes)
+    return [part / whole for part in volumes]
 
 
-def specific(spheres: Sequence[Sphere]) -> Array:
-    """(3, 3): inertia per mass [m^2] of solid spheres of equal density about the body's origin."""
-    total = np.zeros((3, 3))
-    for share, sphere in zip(shares(spheres), spheres, strict=True):
-        c = np.array(sphere.centre, float)
-        own = SOLID_SPHERE * sphere.radius**2
-        total += share * ((own + c @ c) * np.eye(3) - np.outer(c, c))
+def centre_of_mass(shapes: Sequence[Shape]) -> Array:
+    """(3,): of solid shapes of equal density [m], body frame; parts that overlap count twice."""
+    return np.asarray(np.array(shares(shapes)) @ np.array([shape.centre for shape in shapes], float))
+
+
+def specific(shapes: Sequence[Shape]) -> Tensor:
+    """Inertia per mass [m^2] of solid shapes of equal density about the body's origin; sizes may be symbols."""
+    total: Tensor = [[0.0] * 3 for _ in range(3)]
+    for share, shape in zip(shares(shapes), shapes, strict=True):
+        own, c, turned = moments(shape), shape.centre, axes(shape)
+        arm = sum(x * x for x in c)
+        for i in range(3):
+            for j in range(3):
+                spun = sum(turned[i][k] * turned[j][k] * own[k] for k in range(3) if turned[i][k] * turned[j][k])
+                total[i][j] = total[i][j] + share * (spun + (arm if i == j else 0.0) - c[i] * c[j])
     return total
+
+
+def axes(shape: Shape) -> list[list[float]]:
+    """(3, 3): a shape's own axes as columns, body frame."""
+    if isinstance(shape, Sphere) or shape.orientation == UPRIGHT:
+        return [[float(i == j) for j in range(3)] for i in range(3)]
+    found: list[list[float]] = np.array(rotation.matrix(shape.orientation)).tolist()
+    return found
+
+
+def simplest(tensor: Tensor) -> Any:
+    """The tensor; its three principal moments if it is diagonal, one number if they are equal."""
+    diagonal = (tensor[0][0], tensor[1][1], tensor[2][2])
+    if not all(negligible(tensor[i][j], diagonal) for i, j in ((0, 1), (0, 2), (1, 2))):
+        return tuple(tuple(row) for row in tensor)
+    plain = all(isinstance(moment, float) for moment in diagonal)
+    return diagonal[0] if plain and diagonal[0] == diagonal[1] == diagonal[2] else diagonal
+
+
+def negligible(product: Scalar, diagonal: Sequence[Scalar]) -> bool:
+    """Whether a product of inertia is zero up to rounding."""
+    if all(isinstance(entry, int | float) for entry in (product, *diagonal)):
+        return bool(abs(product) <= NOISE * sum(diagonal))
+    return is_zero(product)
 
 
 def complaint(value: float | Sequence[float] | Sequence[Sequence[float]]) -> str:

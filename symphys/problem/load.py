@@ -12,7 +12,9 @@ from pydantic import ValidationError
 from symphys.problem.aims import Aims, read_aims
 from symphys.problem.bodies import read_body, read_state
 from symphys.problem.complaints import report
-from symphys.problem.faults import Faults
+from symphys.problem.crowd import check_crowd
+from symphys.problem.faults import Faults, Place
+from symphys.problem.meetings import Meetings
 from symphys.problem.model import NOTHING, Array, Problem
 from symphys.problem.plan import WorldPlan
 from symphys.problem.quantities import quantities
@@ -21,18 +23,18 @@ from symphys.problem.settings import apply_settings
 from symphys.problem.simulation import read_simulation
 from symphys.problem.source import parse_toml, read_source
 from symphys.problem.start import at_guess, check_overlap, formula_names
+from symphys.problem.statics import read_statics
 from symphys.problem.surfaces import (
-    check_count,
     check_laws,
     check_mates,
     check_varied,
     read_contact,
     read_pairs,
-    read_planes,
 )
 from symphys.problem.variables import read_variables
 
-SHARED_NAMES = ("body", "plane", "variable")
+MEMBERS = ("body", "plane", "block", "terrain")
+SHARED_NAMES = (*MEMBERS, "variable")
 OWN_NAMES = ("cost", "target", "constraint")
 
 
@@ -70,15 +72,26 @@ def read_document(data: Mapping[str, Any], faults: Faults) -> Document:
 
 
 def check_names(document: Document, faults: Faults) -> None:
-    """Bodies, planes and variables share one set of names; costs, targets and constraints have one each."""
-    for group in (SHARED_NAMES, *((key,) for key in OWN_NAMES)):
-        named = [(key, index, table.name) for key in group for index, table in enumerate(getattr(document, key))]
+    """Surfaces and variables share one set of names; costs, targets and constraints have one each."""
+    for kinds in (SHARED_NAMES, *((key,) for key in OWN_NAMES)):
+        named = [(key, index, table.name) for key in kinds for index, table in enumerate(getattr(document, key))]
         counts = Counter(name for _, _, name in named)
         seen: set[str] = set()
         for key, index, name in named:
             if counts[name] > 1 and name in seen:
-                faults.add((key, index, "name"), f'"{name}" is already the name of another {" or ".join(group)}')
+                faults.add((key, index, "name"), f'"{name}" is already the name of another {" or ".join(kinds)}')
             seen.add(name)
+    owners = {table.name: key for key in SHARED_NAMES for table in getattr(document, key)}
+    for place, group in groups(document):
+        if group in owners:
+            faults.add(place, f'"{group}" is already the name of a {owners[group]}; a group needs one of its own')
+
+
+def groups(document: Document) -> list[tuple[Place, str]]:
+    """Every mention of a group, with its place."""
+    members = [((key, index), table) for key in MEMBERS for index, table in enumerate(getattr(document, key))]
+    ground = [] if document.ground is None else [(("ground",), document.ground)]
+    return [((*place, "group"), table.group) for place, table in (*members, *ground) if table.group is not None]
 
 
 def build(path: Path, text: str, document: Document, faults: Faults) -> Problem:
@@ -116,16 +129,17 @@ def build(path: Path, text: str, document: Document, faults: Faults) -> Problem:
 def read_plan(document: Document, faults: Faults) -> tuple[WorldPlan, dict[str, Array]]:
     """The world's plan and the state of every body at the start."""
     bodies = tuple(read_body(index, table, faults) for index, table in enumerate(document.body))
-    planes = read_planes(document, faults)
-    names = [body.name for body in bodies] + [plane.name for plane in planes]
-    check_mates(bodies, names, document, faults)
-    check_count(bodies, planes, faults)
-    pairs = read_pairs(document.pair, names, faults)
+    statics = read_statics(document, [table.position for table in document.body], faults)
+    names = [part.name for part in (*bodies, *statics)]
+    shared = list(dict.fromkeys(group for _, group in groups(document)))
+    check_mates(bodies, names, shared, document, faults)
+    pairs = read_pairs(document.pair, names, shared, faults)
+    check_crowd(Meetings((*bodies, *statics), pairs), faults)
     initial: dict[str, Array] = {}
     for index, table in enumerate(document.body):
         initial |= read_state(table, index, faults)
     x, y, z = document.world.gravity
-    return WorldPlan(bodies, planes, pairs, read_contact(document.contact), (x, y, z)), initial
+    return WorldPlan(bodies, statics, pairs, read_contact(document.contact), (x, y, z)), initial
 
 
 def stop_when_met(document: Document, aims: Aims) -> bool:

@@ -1,124 +1,26 @@
-"""The plan of a world: bodies, planes and who touches whom under which law, with numbers that may be replaced.
+"""The plan of a world: bodies, statics and who touches whom under which law, with numbers that may be replaced.
 
 The rule for a pair of surfaces: what its [[pair]] table states holds. Else friction and restitution are the product
 of what the two surfaces state, torsion and rolling (lengths) their sum. Where neither states it, [contact] holds.
+A [[pair]] of two surfaces goes before one of a surface and a group, and that one before one of groups.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import prod
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.problem.inertia import specific, volume
-from symphys.shapes import Plane, Scalar, Sphere
-from symphys.world import Body, Law, Pair, World, all_pairs
+from symphys.problem.meetings import Meetings
+from symphys.problem.parts import COMBINE, VARIABLE, BodyPlan, PairPlan, Part, StaticPlan, Value
+from symphys.shapes import Scalar, Static
+from symphys.world import Body, Law, Pair, Side, World, points_of
 
 Array = NDArray[np.float64]
-Value = Callable[[str], Scalar]
-"""A parameter's value by name."""
-
-COMBINE: dict[str, Callable[[list[Scalar]], Scalar]] = {
-    "friction": prod,
-    "restitution": prod,
-    "torsion": sum,
-    "rolling": sum,
-}
-VARIABLE = ("friction", "restitution")
-"""The coefficients that are parameters where stated."""
-
-
-@dataclass(frozen=True)
-class BodyPlan:
-    """A body.
-
-    Attributes:
-        name: unique among bodies and planes.
-        mass: [kg].
-        density: [kg/m^3] if the mass follows a single sphere's radius, else None.
-        spheres: its surface; radius [m], centre (3,) [m] in the body frame.
-        hollow: whether a single sphere is a shell.
-        inertia: [kg m^2] as given; None: from mass and shape.
-        states: coefficients that its surface states, by name.
-        mates: names of the surfaces that it may touch; None: all.
-    """
-
-    name: str
-    mass: float
-    density: float | None
-    spheres: tuple[Sphere, ...]
-    hollow: bool
-    inertia: Any
-    states: Mapping[str, float]
-    mates: frozenset[str] | None
-
-    def parameters(self) -> dict[str, float]:
-        """Parameter names and values."""
-        own = {"mass": self.mass}
-        if len(self.spheres) == 1:
-            own["radius"] = self.spheres[0].radius
-        return {f"{self.name}.{key}": number for key, number in (own | stated(self.states)).items()}
-
-    def body(self, overrides: Mapping[str, Any], value: Value) -> Body:
-        """The body with its parameters' values; a mass given by density follows the radius unless overridden."""
-        mass = value(f"{self.name}.mass")
-        if len(self.spheres) != 1:
-            return Body(self.name, mass, self._inertia(mass), self.spheres)
-        radius = value(f"{self.name}.radius")
-        if self.density is not None and f"{self.name}.radius" in overrides and f"{self.name}.mass" not in overrides:
-            mass = self.density * volume(radius)
-        ball = Body.ball(self.name, radius, mass, self.hollow)
-        shapes = (replace(self.spheres[0], radius=radius),)
-        return replace(ball, shapes=shapes, inertia=ball.inertia if self.inertia is None else self.inertia)
-
-    def _inertia(self, mass: Scalar) -> Any:
-        if self.inertia is not None:
-            return self.inertia
-        tensor = specific(self.spheres)
-        diagonal = np.diag(tensor)
-        if np.any(tensor != np.diag(diagonal)):
-            return tuple(tuple(float(entry) * mass for entry in row) for row in tensor)
-        if np.all(diagonal == diagonal[0]):
-            return float(diagonal[0]) * mass
-        return tuple(float(moment) * mass for moment in diagonal)
-
-
-@dataclass(frozen=True)
-class PlanePlan:
-    """A static plane: unit normal (3,), offset [m], and the coefficients that it states."""
-
-    name: str
-    normal: tuple[float, float, float]
-    offset: float
-    states: Mapping[str, float]
-
-    def parameters(self) -> dict[str, float]:
-        """Parameter names and values."""
-        return {f"{self.name}.{key}": number for key, number in ({"offset": self.offset} | stated(self.states)).items()}
-
-
-@dataclass(frozen=True)
-class PairPlan:
-    """What a [[pair]] table states between two surfaces; ``states`` may hold frequency and damping too."""
-
-    name: str
-    between: frozenset[str]
-    collide: bool
-    states: Mapping[str, float]
-
-    def parameters(self) -> dict[str, float]:
-        """Parameter names and values."""
-        return {f"{self.name}.{key}": number for key, number in stated(self.states).items()}
-
-
-def stated(states: Mapping[str, float]) -> dict[str, float]:
-    """Those of the coefficients that may be varied."""
-    return {key: number for key, number in states.items() if key in VARIABLE}
 
 
 @dataclass(frozen=True)
@@ -126,24 +28,24 @@ class WorldPlan:
     """Everything that a world is built from.
 
     Attributes:
-        bodies, planes, pairs: in the file's order.
+        bodies, statics, pairs: in the file's order; of the statics first the ground, then planes, blocks, terrain.
         contact: the law where nothing else is stated.
         gravity: (3,) [m/s^2].
     """
 
     bodies: tuple[BodyPlan, ...]
-    planes: tuple[PlanePlan, ...]
+    statics: tuple[StaticPlan, ...]
     pairs: tuple[PairPlan, ...]
     contact: Law
     gravity: tuple[float, float, float]
 
     def parameters(self) -> dict[str, Array]:
-        """Every parameter with its value, (1,), or (3,) for gravity."""
-        numbers = {"gravity": np.array(self.gravity)}
-        parts: tuple[BodyPlan | PlanePlan | PairPlan, ...] = (*self.bodies, *self.planes, *self.pairs)
+        """Every parameter with its value: (1,), or (3,) for gravity, the size of a box and the place of a block."""
+        found = {"gravity": np.array(self.gravity)}
+        parts: tuple[Part | PairPlan, ...] = (*self.parts, *self.pairs)
         for part in parts:
-            numbers |= {name: np.array([number]) for name, number in part.parameters().items()}
-        return numbers
+            found |= {name: np.atleast_1d(np.array(numbers, float)) for name, numbers in part.parameters().items()}
+        return found
 
     def world(self, overrides: Mapping[str, Any]) -> World:
         """The world with some parameters replaced; KeyError for a name that is none."""
@@ -152,62 +54,77 @@ class WorldPlan:
             if name not in nominal:
                 raise KeyError(f"{name!r} is no parameter; there are {', '.join(nominal)}")
 
-        def value(name: str) -> Scalar:
-            return overrides[name] if name in overrides else float(nominal[name][0])
+        def value(name: str) -> Any:
+            count = nominal[name].size
+            if name not in overrides:
+                return float(nominal[name][0]) if count == 1 else tuple(nominal[name].tolist())
+            return overrides[name] if count == 1 else tuple(overrides[name][i] for i in range(count))
 
         bodies = tuple(plan.body(overrides, value) for plan in self.bodies)
-        planes = tuple(Plane(plan.name, plan.normal, value(f"{plan.name}.offset")) for plan in self.planes)
-        gravity = overrides.get("gravity", self.gravity)
-        return World(bodies, planes, self._pairs(bodies, planes, value), tuple(gravity[i] for i in range(3)))
+        statics = tuple(plan.static(value) for plan in self.statics)
+        return World(bodies, statics, self._pairs(bodies, statics, value), value("gravity"))
 
-    def _pairs(self, bodies: tuple[Body, ...], planes: tuple[Plane, ...], value: Value) -> tuple[Pair, ...]:
-        laws: dict[frozenset[str], Law | None] = {}
-        pairs = []
-        for pair in all_pairs(bodies, planes, self.contact):
-            owners = self.owners(pair)
-            key = frozenset(owners)
-            if key not in laws:
-                laws[key] = self.law(*owners, value) if self.meets(*owners) else None
-            law = laws[key]
-            if law is not None:
-                pairs.append(replace(pair, law=law))
-        return tuple(pairs)
+    @cached_property
+    def parts(self) -> tuple[Part, ...]:
+        """Bodies, then statics."""
+        return (*self.bodies, *self.statics)
+
+    @cached_property
+    def meetings(self) -> tuple[tuple[int, int], ...]:
+        """Every two parts that may touch, as places in ``parts``: each lets the other, and no [[pair]] forbids it."""
+        return tuple(Meetings(self.parts, self.pairs).pairs())
+
+    def _pairs(self, bodies: tuple[Body, ...], statics: tuple[Static, ...], value: Value) -> tuple[Pair, ...]:
+        """As ``world.all_pairs`` has them: first what is against statics, then what is against later bodies."""
+        laws = {(i, j): self.law(self.parts[i].name, self.parts[j].name, value) for i, j in self.meetings}
+        sides = [[Side(i, k) for k in range(len(body.shapes))] for i, body in enumerate(bodies)]
+        sides += [[Side(None, k)] for k in range(len(statics))]
+        both = [(a, b, laws[i, j]) for i, j in self.meetings for a in sides[i] for b in sides[j]]
+
+        def place(entry: tuple[Side, Side, Law]) -> tuple[int, ...]:
+            a, b, _ = entry
+            return (
+                (0, a.body or 0, a.shape, 0, b.shape) if b.body is None else (1, a.body or 0, a.shape, b.body, b.shape)
+            )
+
+        both.sort(key=place)
+        return tuple(pair for a, b, law in both for pair in points_of(bodies, statics, a, b, law))
 
     def owners(self, pair: Pair) -> tuple[str, str]:
-        """The names of the two bodies, or of the body and the plane."""
+        """The names of the two bodies, or of the body and the static surface."""
         sides = (pair.first, pair.second)
         first, second = (
-            self.planes[side.shape].name if side.body is None else self.bodies[side.body].name for side in sides
+            self.statics[side.shape].name if side.body is None else self.bodies[side.body].name for side in sides
         )
         return first, second
 
-    def meets(self, a: str, b: str) -> bool:
-        """Whether the two may touch: each lets the other, and no [[pair]] table forbids it."""
-        pair = self.pair(a, b)
-        return self._lets(a, b) and self._lets(b, a) and (pair is None or pair.collide)
-
-    def _lets(self, a: str, b: str) -> bool:
-        part = self._parts[a]
-        return not isinstance(part, BodyPlan) or part.mates is None or b in part.mates
+    def lets(self, a: str, b: str) -> bool:
+        """Whether ``a`` lets ``b`` touch it, as far as collides_with goes."""
+        mates, other = self._named[a].mates, self._named[b]
+        return mates is None or b in mates or other.group in mates
 
     def pair(self, a: str, b: str) -> PairPlan | None:
-        """The [[pair]] table of the two, if there is one."""
-        return self._tables.get(frozenset((a, b)))
+        """The [[pair]] table that holds for the two surfaces, if there is one."""
+        g, h = self._named[a].group, self._named[b].group
+        for names in ((a, b), (a, h), (g, b), (g, h)):
+            found = self._tables.get(frozenset(names))
+            if found is not None:
+                return found
+        return None
 
     @cached_property
-    def _parts(self) -> dict[str, BodyPlan | PlanePlan]:
-        parts: tuple[BodyPlan | PlanePlan, ...] = (*self.bodies, *self.planes)
-        return {part.name: part for part in parts}
+    def _named(self) -> dict[str, Part]:
+        return {part.name: part for part in self.parts}
 
     @cached_property
-    def _tables(self) -> dict[frozenset[str], PairPlan]:
-        return {pair.between: pair for pair in self.pairs}
+    def _tables(self) -> dict[frozenset[str | None], PairPlan]:
+        return {frozenset(pair.between): pair for pair in self.pairs}
 
     def law(self, a: str, b: str, value: Value) -> Law:
         """The contact law of the two by the rule above; friction and restitution with their parameters' values."""
         pair = self.pair(a, b)
         own = pair.states if pair else {}
-        states = {name: self._parts[name].states for name in (a, b)}
+        states = {name: self._named[name].states for name in (a, b)}
         found: dict[str, Scalar] = {}
         for key, combine in COMBINE.items():
             if pair and key in own:

@@ -20,13 +20,15 @@ SLOT = re.compile(r"\s*([^\[\]\s]+)\s*(?:\[\s*(-?\d{1,9})?\s*(:)?\s*(-?\d{1,9})?
 LIMITS: dict[str, tuple[float, float]] = {
     "mass": (0.0, inf),
     "radius": (0.0, inf),
+    "size": (0.0, inf),
+    "length": (0.0, inf),
     "friction": (0.0, inf),
     "restitution": (0.0, 1.0),
 }
-"""What is physical; mass and radius must exceed their limit."""
-OPEN = ("mass", "radius")
+"""What is physical; masses and sizes must exceed their limit."""
+OPEN = ("mass", "radius", "size", "length")
 LEAST_SHARE = 1e-3
-"""Mass and radius are not varied below this share of their value in the file, unless ``lower`` says so."""
+"""Masses and sizes are not varied below this share of their value in the file, unless ``lower`` says so."""
 
 
 class SlotError(ValueError):
@@ -81,13 +83,14 @@ def unknown(name: str, known: Mapping[str, Quantity]) -> str:
     if key in ("friction", "restitution") and owner in owners:
         return f"{owner} states no {key}: give it a value there first, so that this variable has something to change"
     same_owner = [other for other in known if owner and other.startswith(f"{owner}.")]
-    return hint(name, same_owner or known)
+    stated = f"; what states no {key} has none to vary" if key in ("friction", "restitution") else ""
+    return hint(name, same_owner or known) + stated
 
 
-def limits(slot: Slot, known: Mapping[str, Quantity]) -> tuple[float, float]:
-    """The bounds that hold where the file states none."""
+def limits(slot: Slot, known: Mapping[str, Quantity]) -> tuple[Array, Array]:
+    """(components,) twice: the bounds that hold where the file states none."""
     key = slot.name.rpartition(".")[2]
-    low, high = LIMITS.get(key, (-inf, inf))
+    low, high = (np.full(len(slot.components), limit) for limit in LIMITS.get(key, (-inf, inf)))
     if key in OPEN:
-        low = LEAST_SHARE * float(known[slot.name].nominal[0])
+        low = LEAST_SHARE * known[slot.name].nominal[list(slot.components)]
     return low, high

@@ -9,13 +9,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys import rotation
 from symphys.problem.faults import Faults
 from symphys.problem.model import Variable
 from symphys.problem.plan import WorldPlan
 from symphys.problem.quantities import Quantity
-from symphys.shapes import Plane, Sphere
-from symphys.world import Side, World
+from symphys.state import GIVEN, initial_state
+from symphys.step import gap_function
 
 Array = NDArray[np.float64]
 OVERLAP = 1e-3
@@ -43,13 +42,12 @@ def formula_names(values: Mapping[str, Array], variables: Sequence[Variable]) ->
 
 def check_overlap(plan: WorldPlan, values: Mapping[str, Array], faults: Faults) -> None:
     """Surfaces that may touch must not overlap at the start."""
-    overrides: dict[str, Any] = {name: float(values[name][0]) for name in plan.parameters() if name != "gravity"}
-    world = plan.world(overrides)
-    centres = [sphere_centres(world, index, values) for index in range(len(world.bodies))]
+    world = plan.world({name: parameter(values[name]) for name in plan.parameters()})
+    given = {f"{body.name}.{field}": values[f"{body.name}.{field}"] for body in world.bodies for field in GIVEN}
+    gaps = np.array(gap_function(world)(initial_state(world, given))).ravel()
     deepest: dict[tuple[str, str], float] = {}
-    for pair in world.pairs:
-        depth = -gap(world, centres, pair.first, pair.second)
-        owners = plan.owners(pair)
+    for pair, gap in zip(world.pairs, gaps, strict=True):
+        depth, owners = -gap, plan.owners(pair)
         if not depth <= max(OVERLAP, deepest.get(owners, OVERLAP)):
             deepest[owners] = depth
     for (a, b), depth in deepest.items():
@@ -59,27 +57,11 @@ def check_overlap(plan: WorldPlan, values: Mapping[str, Array], faults: Faults) 
         faults.add(("body", index, "position"), message)
 
 
+def parameter(value: Array) -> float | tuple[float, ...]:
+    """A parameter's value as worlds take it."""
+    return float(value[0]) if value.size == 1 else tuple(value.tolist())
+
+
 def plan_index(plan: WorldPlan, name: str) -> int:
     """The index of a body."""
     return [body.name for body in plan.bodies].index(name)
-
-
-def sphere_centres(world: World, index: int, values: Mapping[str, Array]) -> Array:
-    """(spheres, 3): centres of a body's spheres in the world [m]."""
-    body = world.bodies[index]
-    position, orientation = values[f"{body.name}.position"], values[f"{body.name}.orientation"]
-    turned = np.array(rotation.matrix(ca.DM(orientation)))
-    offsets = np.array([shape.centre for shape in body.shapes], float).reshape(-1, 3)
-    return np.asarray(position + offsets @ turned.T)
-
-
-def gap(world: World, centres: Sequence[Array], first: Side, second: Side) -> float:
-    """The distance between two surfaces [m]; negative when they overlap."""
-    assert first.body is not None
-    shape, other = world.surface(first), world.surface(second)
-    assert isinstance(shape, Sphere)
-    centre = centres[first.body][first.shape]
-    if isinstance(other, Plane):
-        return float(np.dot(other.normal, centre) - other.offset - shape.radius)
-    assert isinstance(other, Sphere) and second.body is not None
-    return float(np.linalg.norm(centre - centres[second.body][second.shape]) - shape.radius - other.radius)

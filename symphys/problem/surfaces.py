@@ -1,48 +1,18 @@
-"""Planes, contact and pairs: who may touch whom, and under which law."""
+"""Contact and pairs: who may touch whom, and under which law."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import isfinite
-
-import numpy as np
 
 from symphys.problem.bodies import states
 from symphys.problem.faults import Faults, Place
 from symphys.problem.model import Variable
-from symphys.problem.plan import BodyPlan, PairPlan, PlanePlan, WorldPlan
+from symphys.problem.parts import BodyPlan, PairPlan
+from symphys.problem.plan import WorldPlan
 from symphys.problem.schema import Document
-from symphys.problem.schema.physics import ContactTable, GroundTable, PairTable, PlaneTable
+from symphys.problem.schema.physics import ContactTable, PairTable
 from symphys.suggest import hint, quote
 from symphys.world import Law
-
-MAX_PAIRS = 100_000
-
-
-def read_planes(document: Document, faults: Faults) -> tuple[PlanePlan, ...]:
-    """The ground, if there is one, then the planes."""
-    ground = () if document.ground is None else (read_ground(document.ground),)
-    return ground + tuple(read_plane(i, table, faults) for i, table in enumerate(document.plane))
-
-
-def read_ground(table: GroundTable) -> PlanePlan:
-    """The horizontal plane called ground."""
-    return PlanePlan("ground", (0.0, 0.0, 1.0), table.height, states(table))
-
-
-def read_plane(index: int, table: PlaneTable, faults: Faults) -> PlanePlan:
-    """One plane."""
-    place = ("plane", index)
-    length = float(np.linalg.norm(table.normal))
-    if not (isfinite(length) and length > 1e-12):
-        faults.add((*place, "normal"), "must not be zero; [0, 0, 1] points up")
-        length = 1.0
-    normal = np.array(table.normal) / length
-    if (table.point is None) == (table.offset is None):
-        faults.add((*place, "offset"), "give either a point of the plane or its offset along the normal")
-    offset = table.offset if table.point is None else float(normal @ np.array(table.point))
-    x, y, z = (float(c) for c in normal)
-    return PlanePlan(table.name, (x, y, z), offset or 0.0, states(table))
 
 
 def read_contact(table: ContactTable) -> Law:
@@ -51,19 +21,23 @@ def read_contact(table: ContactTable) -> Law:
     return Law(**given) if table.damping is None else Law(**given, damping=table.damping)
 
 
-def read_pairs(tables: Sequence[PairTable], names: Sequence[str], faults: Faults) -> tuple[PairPlan, ...]:
+def read_pairs(
+    tables: Sequence[PairTable], names: Sequence[str], groups: Sequence[str], faults: Faults
+) -> tuple[PairPlan, ...]:
     """The [[pair]] tables; notes names that do not exist and pairs that are stated twice."""
     pairs: list[PairPlan] = []
+    first: dict[frozenset[str], int] = {}
     for index, table in enumerate(tables):
         place = ("pair", index)
         a, b = table.between
-        for name in table.between:
-            if name not in names:
-                faults.add((*place, "between"), f"no body or plane is called {quote(name)}; {hint(name, names)}")
+        for name in dict.fromkeys(table.between):
+            if name not in names and name not in groups:
+                known = [*names, *groups]
+                faults.add((*place, "between"), f"no surface or group is called {quote(name)}; {hint(name, known)}")
         between = frozenset((a, b))
-        if a == b:
+        if a == b and a in names:
             faults.add((*place, "between"), "names the same surface twice")
-        if any(pair.between == between for pair in pairs):
+        if first.setdefault(between, index) != index:
             faults.add((*place, "between"), f"{a} and {b} already have a [[pair]] table")
         own = states(table) | {
             key: value for key in ("frequency", "damping") if (value := getattr(table, key)) is not None
@@ -74,34 +48,77 @@ def read_pairs(tables: Sequence[PairTable], names: Sequence[str], faults: Faults
     return tuple(pairs)
 
 
-def check_mates(bodies: Sequence[BodyPlan], names: Sequence[str], document: Document, faults: Faults) -> None:
-    """Every name in collides_with must be another body's or a plane's."""
+def check_mates(
+    bodies: Sequence[BodyPlan], names: Sequence[str], groups: Sequence[str], document: Document, faults: Faults
+) -> None:
+    """Every name in collides_with must be another body's, a static surface's or a group's."""
+    known = {*names, *groups}
     for index, body in enumerate(bodies):
         for name in document.body[index].collides_with or ():
-            others = [other for other in names if other != body.name]
-            if name not in others:
-                message = f"no other body and no plane is called {quote(name)}; {hint(name, others)}"
+            if name not in known or name == body.name:
+                others = [other for other in (*names, *groups) if other != body.name]
+                message = f"no other body, no static surface and no group is called {quote(name)}; {hint(name, others)}"
                 faults.add(("body", index, "collides_with"), message)
 
 
-def check_count(bodies: Sequence[BodyPlan], planes: Sequence[PlanePlan], faults: Faults) -> None:
-    """All pairs of surfaces are looked at in every step, so there must not be too many."""
-    counts = [len(body.spheres) for body in bodies]
-    total = sum(counts)
-    pairs = (total * total - sum(count * count for count in counts)) // 2 + total * len(planes)
-    if pairs > MAX_PAIRS:
-        faults.stop(("body",), f"{pairs} pairs of surfaces could meet; at most {MAX_PAIRS} are allowed")
+def check_ranks(plan: WorldPlan, faults: Faults) -> None:
+    """Where two [[pair]] tables of a surface and a group both hold for two surfaces, they must say the same."""
+    groups = {part.name: part.group for part in plan.parts}
+    found: dict[tuple[str | None, str | None], Rivals] = {}
+    for index, pair in enumerate(plan.pairs):
+        own = {name for name in pair.between if name in groups}
+        others = pair.between - own
+        if len(own) == 1 and others:
+            (name,), (group,) = own, others
+            found.setdefault((group, groups[name]), {}).setdefault(statement(pair), []).append((index, name))
+    for (shared, home), rivals in found.items():
+        for index, name in (entry for entries in rivals.values() for entry in entries):
+            rival = rival_of(plan, index, name, found.get((home, shared), {}))
+            if rival is not None and rival[0] < index:
+                other = rival[1]
+                text = (
+                    f"for {name} and {other}, this table and pair[{rival[0]}] say different things; add a [[pair]] "
+                    f'between = ["{name}", "{other}"], which goes before both'
+                )
+                faults.add(("pair", index, "between"), text)
+
+
+Statement = tuple[object, ...]
+Rivals = dict[Statement, list[tuple[int, str]]]
+"""[[pair]] tables by what they say: (index, the surface that it names)."""
+
+
+def statement(pair: PairPlan) -> Statement:
+    """What a table says."""
+    return (pair.collide, *sorted(pair.states.items()))
+
+
+def rival_of(plan: WorldPlan, index: int, name: str, rivals: Rivals) -> tuple[int, str] | None:
+    """The first of other tables, with its surface, that contradicts a table for the surface called ``name``."""
+    bodies = {body.name for body in plan.bodies}
+    mine = statement(plan.pairs[index])
+    for place, other in (entry for said, entries in rivals.items() if said != mine for entry in entries):
+        table = plan.pair(name, other)
+        settled = table is not None and table.between == {name, other}
+        meet = bodies & {name, other} and plan.lets(name, other) and plan.lets(other, name)
+        if other != name and meet and not settled:
+            return place, other
+    return None
 
 
 def check_laws(plan: WorldPlan, faults: Faults) -> None:
     """A contact is either soft or has restitution; a [[pair]] table must belong to surfaces that may touch."""
-    laws = {frozenset(plan.owners(pair)): pair.law for pair in plan.world({}).pairs}
+    check_ranks(plan, faults)
+    laws = {plan.owners(pair): pair.law for pair in plan.world({}).pairs}
+    used = set()
     for owners, law in laws.items():
+        table = plan.pair(*owners)
+        used.add(table and table.name)
         if law.soft and law.restitution:
-            faults.add(law_place(plan, owners), f"{' and '.join(sorted(owners))}: {either(law)}")
+            faults.add(law_place(plan, table), f"{' and '.join(sorted(owners))}: {either(law)}")
     for index, pair in enumerate(plan.pairs):
-        if pair.collide and pair.between not in laws:
-            faults.add(("pair", index, "between"), "these two never touch, so that nothing can be stated about them")
+        if pair.collide and pair.name not in used:
+            faults.add(("pair", index, "between"), unused(plan, pair))
     check_damping(plan, faults)
 
 
@@ -125,11 +142,17 @@ def either(law: Law) -> str:
     )
 
 
-def law_place(plan: WorldPlan, owners: frozenset[str]) -> Place:
+def unused(plan: WorldPlan, pair: PairPlan) -> str:
+    """The message for a [[pair]] table that holds for no two surfaces."""
+    if pair.between <= {part.name for part in plan.parts}:
+        return "these two never touch, so that nothing can be stated about them"
+    return "no two of these ever touch, or tables that name them more closely go before this one: it has no effect"
+
+
+def law_place(plan: WorldPlan, table: PairPlan | None) -> Place:
     """Where the frequency of a pair is stated."""
-    for index, pair in enumerate(plan.pairs):
-        if pair.between == owners and "frequency" in pair.states:
-            return ("pair", index, "frequency")
+    if table and "frequency" in table.states:
+        return ("pair", plan.pairs.index(table), "frequency")
     return ("contact", "frequency")
 
 

@@ -52,8 +52,8 @@ class Reader:
             knots=self.table.knots,
             interpolation=self.table.interpolation,
             guess=self.numbers("guess", self.nominal(slots)),
-            lower=self.numbers("lower", max(low for low, _ in limit)),
-            upper=self.numbers("upper", min(high for _, high in limit)),
+            lower=self.numbers("lower", np.max([low for low, _ in limit], axis=0)),
+            upper=self.numbers("upper", np.min([high for _, high in limit], axis=0)),
             scale=scale,
             spread=self.numbers("spread", None) if self.table.spread is not None else scale / 10,
         )

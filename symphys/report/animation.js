@@ -1,5 +1,8 @@
 // Plays a recorded motion on a canvas: parallel projection, drag to turn. Comes after painter.js.
 
+const STILL = { p: [0, 0, 0], q: [1, 0, 0, 0] };
+const LOW = 0.12; // below this elevation hills would hide what moves between them, so they stay behind it
+
 class Player {
   constructor(root) {
     this.data = JSON.parse(root.querySelector("script").textContent);
@@ -10,11 +13,14 @@ class Player {
     this.output = root.querySelector("output");
     this.speed = root.querySelector("select");
     this.views = [...root.querySelectorAll("[data-view]")];
-    this.box = bounds(this.data);
+    this.fixtures = this.data.fixtures.map((solid) => place(solid, STILL, FIXED, true));
+    this.cells = this.data.terrain.flatMap((terrain) => mesh(terrain, this.data.planes));
+    const corners = this.fixtures.flatMap((solid) => extremes(solid)), edges = this.data.terrain.flatMap(rim);
+    this.box = widened(bounds(this.data), [...corners, ...edges]);
     this.patches = this.visible(this.data.planes);
     this.paths = this.data.bodies.map((_, b) => this.path(b));
     this.guesses = this.data.guess.map((flat) => triples(flat));
-    this.seen = mustSee(this.data, this.patches);
+    this.seen = mustSee(this.data, this.patches, this.box, [...corners, ...edges]);
     this.first = this.data.time[0];
     this.last = this.data.time[this.data.time.length - 1];
     this.time = this.first;
@@ -112,14 +118,16 @@ class Player {
   }
 
   draw() {
-    const painter = this.painter, [index, share] = this.frame();
+    const painter = this.painter, [index, share] = this.frame(), solids = this.solids(index, share);
     painter.fit(this.seen, this.azimuth, this.elevation);
     this.patches.forEach((p) => painter.drawPlane(p));
+    const cells = this.inDepth();
+    cells.forEach(({ cell }) => painter.drawCell(cell));
+    solids.forEach((solid) => painter.drawShadows(solid, this.patches, this.data.terrain));
+    this.drawFixtures(cells);
     this.guesses.forEach((path) => painter.drawGuess(path));
     this.paths.forEach((path, b) => painter.drawPath(path, index, this.data.bodies[b].colour));
-    const balls = this.balls(index, share);
-    balls.forEach((ball) => painter.drawShadows(ball, this.patches));
-    balls.sort((a, b) => painter.depth(a.centre) - painter.depth(b.centre)).forEach((ball) => painter.drawBall(ball));
+    this.drawSolids(inOrder([...this.fixtures, ...solids], painter.eye), cells);
     painter.drawTriad();
     this.output.textContent = `${this.time.toFixed(2)} / ${this.last.toFixed(2)} s`;
     this.slider.value = String(Math.round(1000 * (this.time - this.first) / (this.last - this.first || 1)));
@@ -130,13 +138,45 @@ class Player {
     return triples(this.data.position).filter((_, i) => i % count === body);
   }
 
-  balls(index, share) {
+  solids(index, share) {
     return this.data.bodies.flatMap((body, b) => {
       const pose = this.pose(b, index, share);
-      return body.balls.map((s) => (
-        { centre: sum(pose.p, turn(pose.q, s.slice(1)), 1), radius: s[0], q: pose.q, colour: body.colour }
-      ));
+      return body.solids.map((solid) => place(solid, pose, body.colour, false));
     });
+  }
+
+  drawFixtures(cells) {
+    for (const solid of inOrder(this.fixtures, this.painter.eye)) {
+      this.painter.drawSolid(solid, this.data.planes);
+      this.hide(solid, cells);
+    }
+  }
+
+  drawSolids(ordered, cells) { // what stands still is there already: again where it hides what was drawn since
+    const moving = [], painter = this.painter;
+    for (const solid of ordered) {
+      if (solid.fixed && !moving.some((other) => overlap(other, solid, painter.eye))) continue;
+      painter.drawSolid(solid, this.data.planes);
+      if (!solid.fixed) moving.push(solid);
+      if (!solid.fixed) this.hide(solid, cells);
+    }
+  }
+
+  inDepth() { // cells of terrain from the back to the front, each by its farthest corner
+    const depth = (cell) => Math.min(...cell.polygon.map((p) => this.painter.depth(p)));
+    return this.cells.map((cell) => ({ cell, depth: depth(cell) })).sort((a, b) => a.depth - b.depth);
+  }
+
+  hide(solid, cells) { // draw again the cells that lie over a solid and are nearer than what it stands on
+    if (this.elevation < LOW) return;
+    const { front, right, up } = this.painter.eye, level = { half: solid.half, radius: 0 };
+    const depth = dot(solid.centre, front) + support(level, [front[0], front[1], 0]);
+    const wide = support(solid, right), tall = support(solid, up);
+    const over = cells.filter(({ cell, depth: farthest }) => {
+      const d = sum(cell.polygon[0], solid.centre, -1);
+      return farthest > depth && Math.abs(dot(d, right)) < wide + cell.width && Math.abs(dot(d, up)) < tall + cell.width;
+    });
+    if (over.length) this.painter.within(solid, () => over.forEach(({ cell }) => this.painter.drawCell(cell)));
   }
 }
 

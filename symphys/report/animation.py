@@ -8,8 +8,9 @@ import numpy as np
 
 from symphys.report import style
 from symphys.report.markup import Html, dot, join, tag
-from symphys.report.records import Array, Scene, Trajectory
-from symphys.report.views import SIDE_YZ, TOP, balls_of, choose_views
+from symphys.report.records import Array, Trajectory
+from symphys.report.scenery import Scene, SceneTerrain, Solid
+from symphys.report.views import SIDE_YZ, TOP, choose_views, solids_of
 
 NUMBERS = 60_000
 """How many numbers a page carries at most for one motion, about 400 kB."""
@@ -71,6 +72,8 @@ def motion_data(trajectory: Trajectory, scene: Scene, guess: Trajectory | None, 
         "orientation": rounded(trajectory.orientation[chosen], 1e-4),
         "guess": [] if guess is None else [guess_data(guess, body) for body in range(len(guess.body_names))],
         "planes": [{"normal": rounded(p.normal, 1e-9), "offset": float(p.offset)} for p in scene.planes],
+        "fixtures": [solid_data(fixture.solid) for fixture in scene.fixtures],
+        "terrain": [terrain_data(ground) for ground in scene.terrain],
         "flat": views[0] == TOP,
         "along": "y" if views[0] == SIDE_YZ else "x",
         "axes": list(style.AXES),
@@ -78,10 +81,25 @@ def motion_data(trajectory: Trajectory, scene: Scene, guess: Trajectory | None, 
 
 
 def body_data(trajectory: Trajectory, scene: Scene, body: int) -> dict[str, object]:
-    """Colour and spheres (radius, centre) of a body."""
-    balls = balls_of(trajectory, scene, body)
-    spheres = [rounded(np.array([ball.radius, *ball.centre]), 1e-6) for ball in balls]
-    return {"colour": style.BODIES[body % len(style.BODIES)], "balls": spheres}
+    """Colour and solids of a body."""
+    solids = [solid_data(solid) for solid in solids_of(trajectory, scene, body)]
+    return {"colour": style.BODIES[body % len(style.BODIES)], "solids": solids}
+
+
+def solid_data(solid: Solid) -> dict[str, object]:
+    """Radius, half sizes of the inner box, centre and orientation; what is usual is left out."""
+    data: dict[str, object] = {"radius": solid.radius, "centre": rounded(solid.centre, 1e-6)}
+    if not solid.is_ball:
+        data |= {"half": rounded(solid.half, 1e-6), "q": rounded(solid.orientation, 1e-7)}
+    return data
+
+
+def terrain_data(ground: SceneTerrain) -> dict[str, object]:
+    """Rising x and y, and heights row after row; null where there is none."""
+    z = rounded(np.nan_to_num(ground.z), 1e-5)
+    holes = np.isnan(ground.z).ravel()
+    heights = [None if hole else height for height, hole in zip(z, holes, strict=True)]
+    return {"x": rounded(ground.x, 1e-6), "y": rounded(ground.y, 1e-6), "z": heights}
 
 
 def guess_data(guess: Trajectory, body: int) -> list[float]:

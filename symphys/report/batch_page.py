@@ -14,8 +14,10 @@ from symphys.report.finding import Study, read_all, studies
 from symphys.report.markup import Html, card, facts, figures, join, page, table, tag
 from symphys.report.motion import draw_motion
 from symphys.report.output import slug, write_figures
-from symphys.report.recordings import GUESS, SCENE, TRAJECTORY, read_scene, read_trajectory
-from symphys.report.records import ReportError, Run, Scene, Trajectory
+from symphys.report.recordings import GUESS, TRAJECTORY, read_trajectory
+from symphys.report.records import ReportError, Run, Trajectory
+from symphys.report.scene_file import SCENE, read_scene
+from symphys.report.scenery import Scene
 from symphys.report.style import Picture
 
 PAGE = "index.html"

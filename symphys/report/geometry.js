@@ -17,10 +17,10 @@ function camera(azimuth, elevation) { // orthonormal: right, up, towards the vie
 }
 
 function reach(body) { // from the body's centre to its farthest point
-  return Math.max(...body.balls.map((s) => s[0] + Math.hypot(s[1], s[2], s[3])));
+  return Math.max(...body.solids.map((s) => s.radius + Math.hypot(...s.centre) + Math.hypot(...(s.half || [0]))));
 }
 
-function bounds(data) { // box around all spheres at all frames
+function bounds(data) { // box around all bodies at all frames
   const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
   const count = data.bodies.length, radii = data.bodies.map(reach);
   triples(data.position).forEach((point, i) => point.forEach((x, k) => {
@@ -31,11 +31,23 @@ function bounds(data) { // box around all spheres at all frames
   return { low, high, size };
 }
 
-function mustSee(data, patches) { // points with the radius around each: some of every path, corners of the planes
+function widened(box, points) { // the box with what is near it of a set of points: a large thing counts to its near end
+  const near = 0.35 * box.size, low = [...box.low], high = [...box.high];
+  for (const p of points) {
+    [0, 1, 2].forEach((k) => {
+      low[k] = Math.min(low[k], Math.max(p[k], box.low[k] - near));
+      high[k] = Math.max(high[k], Math.min(p[k], box.high[k] + near));
+    });
+  }
+  return { low, high, size: box.size };
+}
+
+function mustSee(data, patches, box, more) { // points, each with a radius: some of every path, planes, and what is near
   const count = data.bodies.length, radii = data.bodies.map(reach), every = Math.ceil(data.position.length / 1500);
   const along = triples(data.position).map((point, i) => ({ point, radius: radii[i % count] }));
   const some = along.filter((_, i) => Math.floor(i / count) % every === 0 || i >= along.length - count);
-  return [...some, ...patches.flatMap((p) => p.quad.map((point) => ({ point, radius: 0 })))];
+  const limited = more.map((p) => p.map((x, k) => Math.min(box.high[k], Math.max(box.low[k], x))));
+  return [...some, ...[...patches.flatMap((p) => p.quad), ...limited].map((point) => ({ point, radius: 0 }))];
 }
 
 function corners(box, pad) {

@@ -9,8 +9,10 @@ from symphys.report import sections, style
 from symphys.report.contacts import draw_contacts
 from symphys.report.markup import card, figures, join, page, tag
 from symphys.report.motion import draw_motion
-from symphys.report.recordings import read_scene, read_trajectory
-from symphys.report.records import Scene, Trajectory
+from symphys.report.recordings import read_trajectory
+from symphys.report.records import Trajectory
+from symphys.report.scene_file import read_scene
+from symphys.report.scenery import Scene
 from symphys.report.states import draw_controls, draw_states
 from symphys.report.words import show
 

@@ -1,6 +1,6 @@
-// Draws one picture of the scene on a canvas. Comes after geometry.js.
+// Draws one picture of the scene on a canvas. Comes after solids.js and terrain.js.
 
-const INK = "#5c6b78", GRID = "#dfe5ea", PLANE = "#f1f4f6", EDGE = "#aab5bf", GUESS = "#98a4af";
+const INK = "#5c6b78", GRID = "#dfe5ea", PLANE = "#f1f4f6", EDGE = "#aab5bf", GUESS = "#98a4af", FIXED = "#b7c2cc";
 
 class Painter {
   constructor(canvas, axes) {
@@ -78,50 +78,128 @@ class Painter {
     this.line(path.slice(0, index + 1), colour, 1.6, 0.75);
   }
 
-  drawShadows(ball, patches) {
+  drawCell(cell) { // of terrain
+    this.trace(cell.polygon);
+    this.pen.closePath();
+    this.pen.fillStyle = shaded(cell.normal);
+    this.pen.fill();
+    this.pen.strokeStyle = "rgba(125,140,155,0.28)";
+    this.pen.lineWidth = 0.7;
+    this.pen.stroke();
+  }
+
+  drawShadows(solid, patches, terrain) { // straight down
+    for (const ground of terrain) {
+      const found = shadow(ground, solid);
+      if (found) this.drawShadow(found.points, found.height, support(solid, [0, 0, 1]));
+    }
     for (const { plane } of patches) {
-      const n = plane.normal, height = dot(ball.centre, n) - plane.offset;
-      if (n[2] < 0.5 || height < 0 || ball.radius === 0 || dot(n, this.eye.front) < 0.02) continue;
-      const foot = sum(ball.centre, n, -height);
+      const n = plane.normal, height = dot(solid.centre, n) - plane.offset;
+      if (n[2] < 0.5 || height < 0 || solid.girth === 0 || dot(n, this.eye.front) < 0.02) continue;
+      const foot = sum(solid.centre, n, -height);
       const across = cross(n, Math.abs(n[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0]);
-      const u = across.map((x) => x * ball.radius / Math.hypot(...across)), v = cross(n, u);
-      this.trace(this.rings[0].map((c) => sum(sum(foot, u, c[0]), v, c[1])));
-      this.pen.fillStyle = "#1f2d3a";
-      this.pen.globalAlpha = 0.04 + 0.16 * Math.exp(-(height - ball.radius) / (2 * ball.radius));
-      this.pen.fill();
-      this.pen.globalAlpha = 1;
+      const u = across.map((x) => x / Math.hypot(...across)), v = cross(n, u);
+      const around = outline(solid.half.map((a) => [dot(a, u), dot(a, v)]), solid.radius);
+      this.drawShadow(around.map((c) => sum(sum(foot, u, c[0]), v, c[1])), height, support(solid, n));
     }
   }
 
-  drawBall(ball) {
+  drawShadow(points, height, below) { // paler the higher the solid is, that reaches so far below its centre
+    this.trace(points);
+    this.pen.fillStyle = "#1f2d3a";
+    this.pen.globalAlpha = 0.04 + 0.16 * Math.exp(-Math.max(0, height - below) / (2 * below));
+    this.pen.fill();
+    this.pen.globalAlpha = 1;
+  }
+
+  drawSolid(solid, planes) {
+    const draw = { ball: "drawBall", capsule: "drawCapsule", box: "drawBox" }[solid.kind];
+    this[draw](solid, planes);
+  }
+
+  drawBall(ball, planes) {
     const pen = this.pen, [x, y] = this.place(ball.centre), r = Math.max(ball.radius * this.scale, 4);
     const shade = pen.createRadialGradient(x - 0.35 * r, y - 0.4 * r, 0.1 * r, x, y, r);
     shade.addColorStop(0, mix(ball.colour, "#ffffff", 0.55));
     shade.addColorStop(1, ball.colour);
-    pen.beginPath();
-    pen.arc(x, y, r, 0, 2 * Math.PI);
+    const trace = () => {
+      if (ball.fixed) { this.trace(this.silhouette(ball, planes)); pen.closePath(); return; }
+      pen.beginPath();
+      pen.arc(x, y, r, 0, 2 * Math.PI);
+    };
+    trace();
     pen.fillStyle = shade;
     pen.fill();
-    if (ball.radius > 0 && r > 5) this.drawRings(ball, x, y, r);
-    pen.beginPath();
-    pen.arc(x, y, r, 0, 2 * Math.PI);
-    pen.strokeStyle = mix(ball.colour, "#000000", 0.25);
-    pen.lineWidth = 1;
-    pen.stroke();
+    if (ball.radius > 0 && r > 5 && !ball.fixed) this.drawLines(this.rings.map((ring) => onBall(ring, ball)), r);
+    trace();
+    this.edge(ball.colour);
   }
 
-  drawRings(ball, x, y, r) { // the visible halves of three great circles show how the body turns
+  drawCapsule(capsule, planes) {
+    const pen = this.pen, [x, y] = this.place(capsule.centre), r = capsule.radius * this.scale;
+    const axis = capsule.half[2], ax = dot(axis, this.eye.right), ay = -dot(axis, this.eye.up), length = Math.hypot(ax, ay);
+    const side = length > 1e-9 * capsule.reach ? [-ay / length, ax / length] : [0, 1];
+    const sign = side[1] < 0 || (side[1] === 0 && side[0] < 0) ? -r : r, far = side.map((c) => sign * c);
+    const shade = pen.createLinearGradient(x - far[0], y - far[1], x + far[0], y + far[1]);
+    [[0, 0.15], [0.3, 0.55], [1, 0]].forEach(([at, white]) => shade.addColorStop(at, mix(capsule.colour, "#ffffff", white)));
+    const around = this.silhouette(capsule, planes);
+    this.trace(around);
+    pen.closePath();
+    pen.fillStyle = shade;
+    pen.fill();
+    if (r > 4 && !capsule.fixed) this.drawLines(stadium(capsule), r);
+    this.trace(around);
+    pen.closePath();
+    this.edge(capsule.colour);
+  }
+
+  silhouette(solid, planes) { // around what is seen, in the plane of its centre; of what stands still, what is above ground
+    const { right, up } = this.eye;
+    const points = outline(solid.half.map((a) => [dot(a, right), dot(a, up)]), solid.radius);
+    const around = points.map(([a, b]) => sum(sum(solid.centre, right, a), up, b));
+    return solid.fixed ? clip(around, planes) : around;
+  }
+
+  within(solid, draw) { // draw over a solid and its edge, and nothing else
+    const pen = this.pen;
+    pen.save();
+    this.trace(this.silhouette({ ...solid, fixed: false, radius: solid.radius + 1.5 / this.scale }, []));
+    pen.clip();
+    draw();
+    pen.restore();
+  }
+
+  drawBox(box, planes) {
+    for (const face of faces(box)) {
+      if (dot(face.normal, this.eye.front) <= 1e-6) continue;
+      const corners = box.fixed ? clip(face.corners, planes) : face.corners;
+      if (corners.length < 3) continue;
+      this.trace(corners);
+      this.pen.closePath();
+      this.pen.fillStyle = mix(box.colour, "#ffffff", 0.08 + 0.5 * Math.max(0, dot(face.normal, LIGHT)));
+      this.pen.fill();
+      this.pen.lineJoin = "round";
+      this.edge(box.colour);
+    }
+  }
+
+  edge(colour) {
+    this.pen.strokeStyle = mix(colour, "#000000", 0.25);
+    this.pen.lineWidth = 1;
+    this.pen.stroke();
+  }
+
+  drawLines(loops, r) { // what is visible of lines on a surface shows how the body turns: points p with normals n
     const pen = this.pen;
     pen.strokeStyle = "rgba(255,255,255,0.9)";
     pen.lineWidth = Math.min(3, Math.max(1, r * 0.07));
     pen.beginPath();
-    for (const ring of this.rings) {
+    for (const loop of loops) {
       let on = false;
-      for (const point of ring) {
-        const p = turn(ball.q, point);
-        if (dot(p, this.eye.front) < 0) { on = false; continue; }
-        const px = x + r * dot(p, this.eye.right), py = y - r * dot(p, this.eye.up);
-        if (on) pen.lineTo(px, py); else pen.moveTo(px, py);
+      for (const { n, p } of loop) {
+        if (dot(n, this.eye.front) < 0) { on = false; continue; }
+        const [x, y] = this.place(p);
+        if (on) pen.lineTo(x, y); else pen.moveTo(x, y);
         on = true;
       }
     }

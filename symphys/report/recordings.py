@@ -1,4 +1,4 @@
-"""The motion of a run folder: trajectory.npz, guess.npz and scene.json."""
+"""The motion of a run folder: trajectory.npz and guess.npz."""
 
 from __future__ import annotations
 
@@ -10,11 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from symphys.report import values
-from symphys.report.records import Array, Ball, ReportError, Scene, SceneBody, ScenePlane, Trajectory
+from symphys.report.records import Array, ReportError, Trajectory
 
 TRAJECTORY = "trajectory.npz"
 GUESS = "guess.npz"
-SCENE = "scene.json"
 
 UNREADABLE = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError, MemoryError)
 """What numpy and zipfile raise at files that are no archives of plain arrays."""
@@ -103,29 +102,3 @@ def trim(trajectory: Trajectory) -> Trajectory:
     for name in ("force", "torque", "contact_force"):
         cut[name] = cut[name][: keep - 1]
     return Trajectory(body_names=trajectory.body_names, contact_names=trajectory.contact_names, **cut)
-
-
-def read_scene(path: Path) -> Scene:
-    """Read the bodies' spheres and the planes. Raises ReportError."""
-    content = values.read_table(path)
-    bodies = tuple(
-        SceneBody(values.name(entry.get("name")), make_balls(entry.get("shapes")))
-        for entry in values.tables(content.get("bodies"))
-    )
-    planes = (make_plane(entry) for entry in values.tables(content.get("planes")))
-    return Scene(bodies, tuple(plane for plane in planes if plane is not None))
-
-
-def make_balls(shapes: object) -> tuple[Ball, ...]:
-    """The spheres among a body's shapes."""
-    spheres = [entry for entry in values.tables(shapes) if values.number(entry.get("radius")) > 0]
-    return tuple(Ball(values.number(entry["radius"]), values.vector(entry.get("centre"))) for entry in spheres)
-
-
-def make_plane(entry: dict[str, object]) -> ScenePlane | None:
-    """One of ``planes``; None if it has no direction."""
-    normal, offset = values.vector(entry.get("normal")), values.number(entry.get("offset", 0.0))
-    length = float(np.linalg.norm(normal))
-    if not (0 < length < np.inf and np.isfinite(offset)):
-        return None
-    return ScenePlane(values.name(entry.get("name")), normal / length, offset)

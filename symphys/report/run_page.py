@@ -8,15 +8,17 @@ from pathlib import Path
 
 from symphys import files
 from symphys.report import sections, style, values, words
-from symphys.report.contacts import draw_contacts, shown_pairs
+from symphys.report.contacts import by_surfaces, draw_contacts, shown_pairs
 from symphys.report.finding import is_run
 from symphys.report.history import draw_run
 from symphys.report.markup import Html, card, figures, join, page, tag
 from symphys.report.motion import draw_motion
 from symphys.report.output import write_figures
 from symphys.report.reading import CONFIG, PROBLEM, read_run
-from symphys.report.recordings import GUESS, SCENE, TRAJECTORY, read_scene, read_trajectory
-from symphys.report.records import ReportError, Run, Scene, Trajectory
+from symphys.report.recordings import GUESS, TRAJECTORY, read_trajectory
+from symphys.report.records import ReportError, Run, Trajectory
+from symphys.report.scene_file import SCENE, read_scene
+from symphys.report.scenery import Scene
 from symphys.report.stage import smoothed
 from symphys.report.stages import stage_card
 from symphys.report.states import MOST_BODIES, controlled_bodies, draw_controls, draw_states, shown_bodies
@@ -145,11 +147,11 @@ def motion_cards(motion: Trajectory | None, pictures: dict[str, Picture]) -> lis
     """States, controls and contacts over time."""
     if motion is None:
         return []
-    bodies, pairs = len(motion.body_names), len(motion.contact_names)
+    bodies, touching = len(motion.body_names), by_surfaces(motion)
     states = shortened(len(shown_bodies(motion)), bodies, "bodies", "that move most")
     controlled = len(controlled_bodies(motion))
     acting = shortened(min(controlled, MOST_BODIES), controlled, "bodies", "that come first")
-    contacts = shortened(len(shown_pairs(motion)), pairs, "pairs", "with the largest impulses")
+    contacts = shortened(len(shown_pairs(touching)), len(touching.contact_names), "pairs", "with the largest impulses")
     force = "A force is the step's impulse over its duration, so an impact is a spike whose height grows as dt shrinks."
     return [
         card("States over time", figures(only(pictures, "states"), states), anchor="states"),

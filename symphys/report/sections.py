@@ -11,7 +11,8 @@ import numpy as np
 from symphys.report import style, words
 from symphys.report.animation import animation
 from symphys.report.markup import Html, banner, card, facts, figures, fold, join, pill, stats, table, tag
-from symphys.report.records import Check, Run, Scene, Trajectory, Variable
+from symphys.report.records import Check, Run, Trajectory, Variable
+from symphys.report.scenery import Scene
 from symphys.report.style import Picture
 from symphys.report.variables import component_names, knotted
 from symphys.report.words import show
@@ -23,7 +24,7 @@ HOW_JUDGED = (
     "Judged by an exact rollout of the result, without smoothing. The bar ends at the error, the line is the tolerance."
 )
 HOW_DRAWN = (
-    "Snapshots at even times, the later the darker, fewer where a body hardly moves; the spoke turns with the body."
+    "Snapshots at even times, the later the darker, fewer where a body hardly moves; spokes and edges turn with it."
 )
 CHAPTERS = (
     ("checks", "Checks"),

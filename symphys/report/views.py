@@ -1,4 +1,4 @@
-"""From which sides a motion is best seen, and where its spheres are."""
+"""From which sides a motion is best seen, and where its solids are."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symphys.report.records import Array, Ball, Scene, Trajectory
+from symphys.report.records import Array, Trajectory
+from symphys.report.scenery import Scene, Solid
 
 NAMES = "xyz"
 STILL = 1e-3
@@ -34,6 +35,12 @@ class View:
         """Index of the world axis that is not seen."""
         return 3 - self.right - self.up
 
+    @property
+    def front(self) -> Array:
+        """(3,): towards the viewer."""
+        up = np.eye(3)[self.up] * (-1 if self.down else 1)
+        return np.cross(np.eye(3)[self.right], up)
+
     def flat(self, points: Array) -> Array:
         """(..., 2): the seen coordinates of (..., 3) points."""
         return points[..., [self.right, self.up]]
@@ -52,7 +59,7 @@ def choose_views(trajectory: Trajectory, scene: Scene) -> list[View]:
     least = STILL * max(float(spread.max()), 1e-9)
     if max(extent[0], extent[1]) <= least:
         extent = spread
-    has_floor = any(abs(plane.normal[2]) > 0.5 for plane in scene.planes)
+    has_floor = any(abs(plane.normal[2]) > 0.5 for plane in scene.planes) or scene.fixtures or scene.terrain
     along_x = extent[0] >= extent[1]
     if extent[2] <= least and not has_floor:
         return [TOP]
@@ -69,16 +76,22 @@ def turn(orientation: Array, direction: Array) -> Array:
     return direction + w * cross + np.cross(xyz, cross)
 
 
-def centres(trajectory: Trajectory, body: int, ball: Ball) -> Array:
-    """(N+1, 3) [m]: the path of a sphere's centre."""
-    return trajectory.position[:, body] + turn(trajectory.orientation[:, body], ball.centre)
+def centres(trajectory: Trajectory, body: int, solid: Solid) -> Array:
+    """(N+1, 3) [m]: the path of a solid's centre."""
+    return trajectory.position[:, body] + turn(trajectory.orientation[:, body], solid.centre)
 
 
-def balls_of(trajectory: Trajectory, scene: Scene, body: int) -> tuple[Ball, ...]:
-    """The spheres of a body; a point for one that has none."""
-    return scene.balls(trajectory.body_names[body]) or (Ball(0.0, np.zeros(3)),)
+def half_axes(orientation: Array, solid: Solid) -> Array:
+    """(..., 3, 3) [m]: the half axes of a solid's inner box as rows, in the world, for orientations (..., 4)."""
+    own = [half * turn(solid.orientation, axis) for half, axis in zip(solid.half, np.eye(3), strict=True)]
+    return np.stack([turn(orientation, axis) for axis in own], axis=-2)
+
+
+def solids_of(trajectory: Trajectory, scene: Scene, body: int) -> tuple[Solid, ...]:
+    """The surface of a body; a point for one that has none."""
+    return scene.solids(trajectory.body_names[body]) or (Solid(),)
 
 
 def reach(trajectory: Trajectory, scene: Scene, body: int) -> float:
-    """[m] from the body's centre to the farthest point of its spheres."""
-    return max(ball.radius + float(np.linalg.norm(ball.centre)) for ball in balls_of(trajectory, scene, body))
+    """[m] from the body's centre to the farthest point of its surface."""
+    return max(solid.reach for solid in solids_of(trajectory, scene, body))

@@ -8,24 +8,43 @@ from typing import Any
 import numpy as np
 
 from symphys.problem import Problem
-from symphys.shapes import Plane, Sphere
+from symphys.runs.window import Window, sample, window
+from symphys.shapes import Box, Fixture, Plane, Shape, Sphere, Static, Terrain
 from symphys.shooting import Array
+from symphys.trajectory import Trajectory
 
 
-def scene(problem: Problem, z: Mapping[str, Array]) -> dict[str, Any]:
-    """Shapes of the bodies and planes, lengths [m], with the parameters that ``z`` (by variable) sets."""
+def scene(problem: Problem, z: Mapping[str, Array], motion: Trajectory | None = None) -> dict[str, Any]:
+    """Shapes of the bodies and what stands still, lengths [m], with the parameters that ``z`` (by variable) sets.
+
+    Terrain is sampled where ``motion`` goes; without one, around the bodies at the start.
+    """
     world = problem.world(parameters(problem, z))
+    if motion is None:
+        places = np.array([problem.initial[f"{body.name}.position"] for body in world.bodies])
+    else:
+        places = motion.position.reshape(-1, 3)
+    near = window(world, places)
     return {
-        "bodies": [
-            {"name": body.name, "shapes": [sphere(s.radius, s.centre) for s in body.shapes if isinstance(s, Sphere)]}
-            for body in world.bodies
-        ],
-        "planes": [
-            {"name": plane.name, "normal": plain(plane.normal), "offset": float(plane.offset)}
-            for plane in world.statics
-            if isinstance(plane, Plane)
-        ],
+        "bodies": [{"name": body.name, "shapes": [solid(shape) for shape in body.shapes]} for body in world.bodies],
+        "planes": statics(world.statics, Plane, near),
+        "fixtures": statics(world.statics, Fixture, near),
+        "terrain": statics(world.statics, Terrain, near),
     }
+
+
+def statics(found: tuple[Static, ...], kind: type[Static], near: Window) -> list[dict[str, Any]]:
+    """Those of one kind as JSON."""
+    return [static_entry(static, near) for static in found if isinstance(static, kind)]
+
+
+def static_entry(static: Static, near: Window) -> dict[str, Any]:
+    """A static surface as JSON."""
+    if isinstance(static, Plane):
+        return {"name": static.name, "normal": plain(static.normal), "offset": float(static.offset)}
+    if isinstance(static, Fixture):
+        return {"name": static.name, "shape": solid(static.shape)}
+    return {"name": static.name, **sample(static, near)}
 
 
 def parameters(problem: Problem, z: Mapping[str, Array]) -> dict[str, Any]:
@@ -41,9 +60,14 @@ def parameters(problem: Problem, z: Mapping[str, Array]) -> dict[str, Any]:
     return {name: float(whole[0]) if whole.size == 1 else tuple(whole.tolist()) for name, whole in values.items()}
 
 
-def sphere(radius: Any, centre: Any) -> dict[str, Any]:
-    """A shape as JSON."""
-    return {"kind": "sphere", "radius": float(radius), "centre": plain(centre)}
+def solid(shape: Shape) -> dict[str, Any]:
+    """A shape as JSON: sizes as in problem files, ``centre`` (3,), and ``orientation`` (4,) w x y z."""
+    if isinstance(shape, Sphere):
+        return {"kind": "sphere", "radius": float(shape.radius), "centre": plain(shape.centre)}
+    placed = {"centre": plain(shape.centre), "orientation": plain(shape.orientation)}
+    if isinstance(shape, Box):
+        return {"kind": "box", "size": [2 * half for half in plain(shape.half_sizes)], **placed}
+    return {"kind": "capsule", "radius": float(shape.radius), "length": 2 * float(shape.half_length), **placed}
 
 
 def plain(vector: Any) -> list[float]:

@@ -116,7 +116,7 @@ def write(
     if judgement.trajectory is not None:
         files.write_npz(job.folder.path / TRAJECTORY, judgement.trajectory.arrays())
         z = transcription.shooting.by_block(outcome.z)
-        files.write_json(job.folder.path / SCENE, scene(job.problem, z))
+        files.write_json(job.folder.path / SCENE, scene(job.problem, z, judgement.trajectory))
     if outcome.status is Status.INTERRUPTED:
         files.write_json(job.folder.path / CHECKPOINT, outcome.checkpoint)
 

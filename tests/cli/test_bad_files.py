@@ -47,7 +47,7 @@ BRACKETS = 1_000_000
 CHANGES: list[tuple[str, str, str]] = [
     ("mass = 1.0", "mass = 1.0\ncolour = 3", "colour: unknown key"),
     ("[[target]]", "[[tarket]]", 'did you mean "target"'),
-    ("{ sphere = { radius = 0.1 } }", "{ cube = { side = 1.0 } }", "valid: sphere, spheres"),
+    ("{ sphere = { radius = 0.1 } }", "{ cube = { side = 1.0 } }", "valid: sphere, box, capsule, spheres, parts"),
     ("[0, 0, 1]", "[0, 1]", "a list of 3 numbers"),
     ("mass = 1.0", "mass = -1.0", "greater than 0"),
     ("mass = 1.0", "mass = nan", "a finite number"),

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PHYSICS = {"course", "shapes", "world", "state", "rotation", "smooth", "collide", "motion", "step", "rollout"}
+PHYSICS = {"course", "shapes", "heightfield", "world", "state", "rotation", "smooth", "collide", "motion", "step"}
+PHYSICS |= {"rollout"}
 RUNTIME = set(sys.stdlib_module_names)
 
 

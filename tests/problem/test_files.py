@@ -75,4 +75,4 @@ def test_many_tables_are_refused_soon(tmp_path: Path, valid: str) -> None:
     body = '[[body]]\nname = "b{}"\nmass = 1\nshape = {{ sphere = {{ radius = 1 }} }}\n'
     path = tmp_path / "crowd.toml"
     path.write_text(valid + "".join(body.format(i) for i in range(3000)))
-    assert "pairs of surfaces could meet" in message(path)
+    assert "points of contact in every step are too many" in message(path)

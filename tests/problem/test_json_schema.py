@@ -35,6 +35,19 @@ def test_every_table_and_key_is_there() -> None:
     assert body["properties"]["position"]["minItems"] == 3
 
 
+def test_shapes_are_there() -> None:
+    schema = json_schema()
+    shape = definition(schema, definition(schema, schema["properties"]["body"]["items"])["properties"]["shape"])
+    assert set(shape["properties"]) == {"sphere", "box", "capsule", "spheres", "parts"}
+    size = definition(schema, shape["properties"]["box"])["properties"]["size"]
+    assert (size["minItems"], size["maxItems"], size["items"]["exclusiveMinimum"]) == (3, 3, 0)
+    block = definition(schema, schema["properties"]["block"]["items"])
+    assert block["required"] == ["name", "shape"]
+    terrain = definition(schema, schema["properties"]["terrain"]["items"])
+    assert {"height", "heights", "spacing", "origin", "group", "friction"} <= set(terrain["properties"])
+    assert terrain["properties"]["heights"]["items"]["items"] == {"type": "number"}
+
+
 def test_ground_may_be_left_out_but_is_no_null() -> None:
     text = json.dumps(json_schema(), allow_nan=False)
     assert '"null"' not in text

@@ -18,7 +18,22 @@ from symphys.problem import load_problem
 from symphys.problem.schema import Document
 
 KEYS = sorted({*Document.model_fields, "name", "mass", "friction", "value", "at", "sets", "guess", "sphere", "radius"})
-TEXTS = ["", "ball", "ball.velocity", "ball.force[0:2]", "ball.mass", "gravity", "end", "always", "1 / time", "é", "-"]
+TEXTS = [
+    "x * y",
+    "pins",
+    "hills",
+    "",
+    "ball",
+    "ball.velocity",
+    "ball.force[0:2]",
+    "ball.mass",
+    "gravity",
+    "end",
+    "always",
+    "1 / time",
+    "é",
+    "-",
+]
 VALUES = st.recursive(
     st.one_of(
         st.booleans(),
@@ -33,6 +48,51 @@ VALUES = st.recursive(
     ),
     max_leaves=6,
 )
+
+
+SHAPES = """
+[simulation]
+duration = 1.0
+dt = 0.01
+
+[[body]]
+name = "tower"
+shape = { parts = [
+    { box = { size = [1, 2, 3] }, centre = [0, 0, 0.5] },
+    { capsule = { radius = 0.5, length = 1.0 }, centre = [0, 0, -1], orientation = { roll_deg = 90 } },
+] }
+mass = 2.0
+inertia = [1, 1, 1]
+position = [0, 0, 9]
+group = "pins"
+
+[[body]]
+name = "brick"
+shape = { box = { size = [1, 2, 3] } }
+density = 100.0
+position = [9, 0, 9]
+group = "pins"
+collides_with = ["hills", "pins"]
+
+[[block]]
+name = "ramp"
+shape = { box = { size = [2, 1, 0.2] } }
+orientation = { pitch_deg = 20 }
+
+[[terrain]]
+name = "hills"
+height = "sin(x) * y"
+
+[[terrain]]
+name = "dunes"
+heights = [[0, 1], [2, 3], [1, 1]]
+spacing = [1, 2]
+origin = [0, 1]
+
+[[pair]]
+between = ["pins", "ramp"]
+friction = 0.5
+"""
 
 
 @pytest.fixture(scope="module")
@@ -81,10 +141,10 @@ def test_any_bytes(path: Path, content: bytes) -> None:
         load_problem(path)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=300, deadline=None)
 @given(data=st.data())
 def test_a_valid_file_with_any_value_anywhere(path: Path, valid: str, data: st.DataObject) -> None:
-    document = copy.deepcopy(tomllib.loads(valid))
+    document = copy.deepcopy(tomllib.loads(data.draw(st.sampled_from([valid, SHAPES]))))
     for _ in range(data.draw(st.integers(1, 3))):
         put(document, data.draw(st.sampled_from(places(document))), data.draw(VALUES))
     load(path, "\n".join(f"{key} = {write(value)}" for key, value in document.items()))
@@ -107,8 +167,10 @@ def test_any_setting(path: Path, valid: str, key: list[str], value: object) -> N
     load(path, valid, {".".join(key): value})
 
 
-def test_the_rewritten_file_is_the_same(path: Path, valid: str) -> None:
-    text = "\n".join(f"{key} = {write(value)}" for key, value in tomllib.loads(valid).items())
-    assert tomllib.loads(text) == tomllib.loads(valid)
+@pytest.mark.parametrize("shapes", [False, True])
+def test_the_rewritten_file_is_the_same(path: Path, valid: str, shapes: bool) -> None:
+    original = SHAPES if shapes else valid
+    text = "\n".join(f"{key} = {write(value)}" for key, value in tomllib.loads(original).items())
+    assert tomllib.loads(text) == tomllib.loads(original)
     path.write_text(text)
     load_problem(path)

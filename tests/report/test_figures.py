@@ -16,8 +16,10 @@ from symphys.report.curves import Curve, best_so_far, median_curve, miss_so_far
 from symphys.report.finding import read_all, studies
 from symphys.report.motion import draw_motion
 from symphys.report.reading import read_run
-from symphys.report.recordings import read_scene, read_trajectory
-from symphys.report.records import Scene, ScenePlane, Trace, Trajectory
+from symphys.report.recordings import read_trajectory
+from symphys.report.records import Trace, Trajectory
+from symphys.report.scene_file import read_scene
+from symphys.report.scenery import Scene, ScenePlane
 from symphys.report.views import SIDE_XZ, SIDE_YZ, TOP, TOP_TURNED, choose_views, turn
 
 GROUND = Scene(planes=(ScenePlane("ground", np.array([0.0, 0.0, 1.0]), 0.0),))

@@ -15,12 +15,13 @@ import pytest
 from symphys.report import write_motion
 from symphys.report.animation import NUMBERS, motion_data
 from symphys.report.markup import HERE, SCRIPTS
-from symphys.report.recordings import read_scene, read_trajectory
+from symphys.report.recordings import read_trajectory
 from symphys.report.records import ReportError
+from symphys.report.scene_file import read_scene
 
 STAGE = """
 const gradient = () => ({ addColorStop() {} });
-const pen = new Proxy({}, { get: (_, key) => (key === "createRadialGradient" ? gradient : () => {}), set: () => true });
+const pen = new Proxy({}, { get: (_, key) => (key.startsWith("create") ? gradient : () => {}), set: () => true });
 const listeners = {};
 const element = (name) => ({
   textContent: DATA, clientWidth: 800, clientHeight: 400, dataset: { view: name }, getContext: () => pen,
@@ -80,7 +81,42 @@ def test_views_follow_the_motion(made: Path) -> None:
 @pytest.mark.skipif(shutil.which("node") is None, reason="needs node to run the page's script")
 @pytest.mark.parametrize("run", ["two_balls/gradient-seed0", "ball_throw/gradient-seed0"])
 def test_script_plays_to_the_end(made: Path, run: str) -> None:
-    data = json.dumps(json.dumps(data_of(made / run)))
+    plays_to_the_end(data_of(made / run))
+
+
+SHAPES = {
+    "bodies": [
+        {
+            "name": "ball",
+            "shapes": [
+                {"kind": "box", "size": [1, 1, 0.5]},
+                {"kind": "capsule", "radius": 0.2, "length": 1},
+                {"kind": "sphere", "radius": 0.1},
+            ],
+        }
+    ],
+    "planes": [{"name": "ground", "normal": [0, 0, 1], "offset": 0.0}],
+    "fixtures": [
+        {
+            "name": "ramp",
+            "shape": {"kind": "box", "size": [4, 2, 1], "centre": [1, 0, 0], "orientation": [1, 0.2, 0, 0]},
+        },
+        {"name": "post", "shape": {"kind": "capsule", "radius": 0.1, "length": 2, "centre": [5, 0, 1]}},
+        {"name": "knob", "shape": {"kind": "sphere", "radius": 0.5, "centre": [9, 0, 0]}},
+    ],
+    "terrain": [{"name": "hills", "x": [-1, 3, 9], "y": [-2, 2], "z": [[0, 1, "nan"], [0.2, 0, 0]]}],
+}
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="needs node to run the page's script")
+def test_script_plays_every_shape_to_the_end(run_dir: Path) -> None:
+    (run_dir / "scene.json").write_text(json.dumps(SHAPES))
+    plays_to_the_end(data_of(run_dir))
+
+
+def plays_to_the_end(motion: dict[str, Any]) -> None:
+    """Look from all sides, go to the middle, then play: time, button and the terminal show that it went well."""
+    data = json.dumps(json.dumps(motion))
     script = "".join((HERE / name).read_text(encoding="utf-8") for name in SCRIPTS)
     acts = """
     for (const key of ["space click", "side click", "top click"]) listeners[key]();

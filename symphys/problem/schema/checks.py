@@ -19,6 +19,9 @@ IDENTIFIER = "[A-Za-z][A-Za-z0-9_]*"
 MAX_IDENTIFIER = 64
 MAX_LABEL = 100
 STAGES = "[0.1, 0.01, 0]"
+LEAST_SIDE = 2
+MOST_HEIGHTS = 1024
+"""Each height of a terrain is in every contact with it, in every step."""
 
 
 def fault(message: str) -> PydanticCustomError:
@@ -66,6 +69,56 @@ def vector(count: int) -> Callable[[object], list[float]]:
         return [float(item) for item in value]
 
     return check
+
+
+def positive(count: int) -> Callable[[object], list[float]]:
+    """A list of ``count`` positive finite numbers."""
+
+    def check(value: object) -> list[float]:
+        numbers = vector(count)(value)
+        for number in numbers:
+            if number <= 0:
+                raise fault(f"must be {count} numbers greater than 0; one is {shown(number)}")
+        return numbers
+
+    return check
+
+
+def length(value: object) -> float:
+    """The straight part of a capsule."""
+    if not is_number(value) or value <= 0:
+        raise fault(f"must be a number greater than 0, not {shown(value)}; a capsule without length is a sphere")
+    return float(value)
+
+
+def spacing(value: object) -> list[float]:
+    """A positive number or two of them; always two come out."""
+    if not isinstance(value, list):
+        if not is_number(value) or value <= 0:
+            raise fault(f"must be a number greater than 0, or two: [along x, along y], not {shown(value)}")
+        value = [value, value]
+    return positive(2)(value)
+
+
+def grid(value: object) -> list[list[float]]:
+    """Rows of heights, equally long, not too many."""
+    rows: list[Any] = value if isinstance(value, list) else []
+    if not rows or not all(isinstance(row, list) for row in rows):
+        raise fault("must be a list of rows along y, each a list of heights along x [m]")
+    uneven = next((k for k, row in enumerate(rows) if len(row) != len(rows[0])), None)
+    if uneven is not None:
+        raise fault(f"row {uneven} has {len(rows[uneven])} heights, row 0 has {len(rows[0])}; rows are equally long")
+    if min(len(rows), len(rows[0])) < LEAST_SIDE:
+        raise fault(f"has {len(rows)} rows of {len(rows[0])}; {LEAST_SIDE} or more rows and columns are needed")
+    count = len(rows) * len(rows[0])
+    if count > MOST_HEIGHTS:
+        remedy = "take a coarser grid, or give height as a formula of x and y"
+        raise fault(f"has {count} heights ({len(rows)} x {len(rows[0])}), at most {MOST_HEIGHTS} are allowed; {remedy}")
+    for k, row in enumerate(rows):
+        for item in row:
+            if not is_number(item):
+                raise fault(f"must hold finite numbers; one in row {k} is {shown(item)}")
+    return [[float(item) for item in row] for row in rows]
 
 
 def nested(bound: bool) -> Callable[[object], Any]:

@@ -8,12 +8,14 @@ from pydantic import Field
 
 from symphys.problem.schema.aims import ConstraintTable, CostTable, ObjectiveTable, TargetTable, VariableTable
 from symphys.problem.schema.physics import (
+    BlockTable,
     BodyTable,
     ContactTable,
     GroundTable,
     PairTable,
     PlaneTable,
     SimulationTable,
+    TerrainTable,
     WorldTable,
 )
 from symphys.problem.schema.types import Label, Table
@@ -29,6 +31,8 @@ class Document(Table):
     body: list[BodyTable] = Field(min_length=1)
     ground: GroundTable | None = None
     plane: list[PlaneTable] = Field(default=[])
+    block: list[BlockTable] = Field(default=[])
+    terrain: list[TerrainTable] = Field(default=[])
     contact: ContactTable = ContactTable()
     pair: list[PairTable] = Field(default=[])
     variable: list[VariableTable] = Field(default=[])

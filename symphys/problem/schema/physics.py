@@ -1,4 +1,4 @@
-"""Tables that say what there is and how time passes: simulation, world, bodies, planes, contact."""
+"""Tables that say what there is and how time passes: simulation, world, bodies, static surfaces, contact."""
 
 from __future__ import annotations
 
@@ -6,15 +6,19 @@ from typing import Annotated
 
 from pydantic import Field
 
+from symphys.problem.schema.shapes import UPRIGHT, ShapeTable, SolidTable
 from symphys.problem.schema.types import (
     Finite,
+    Grid,
     Identifier,
     Inertia,
     NonNegative,
     Orientation,
+    Pair,
     Positive,
     Share,
     Smoothing,
+    Spacing,
     Table,
     Vector,
 )
@@ -82,63 +86,41 @@ class SurfaceTable(Table):
     rolling: NonNegative | None = Field(default=None, description="resists rolling: a radius [m]")
 
 
-class SphereTable(Table):
-    """A sphere about the centre of mass."""
+class MemberTable(SurfaceTable):
+    """A surface that may belong to a group."""
 
-    radius: Positive = Field(description="[m]")
-    hollow: bool = Field(
-        default=False, description="a thin shell instead of a solid sphere: I = 2/3 m r^2 instead of 2/5"
+    group: Identifier | None = Field(
+        default=None, description="a name shared by several surfaces, for collides_with and [[pair]]"
     )
 
 
-class PartTable(Table):
-    """One sphere of a compound."""
-
-    radius: Positive = Field(description="[m]")
-    centre: Vector = Field(default=[0.0, 0.0, 0.0], description="[m], from the centre of mass, in the body's frame")
-
-
-class ShapeTable(Table):
-    """Either one sphere or several."""
-
-    sphere: SphereTable | None = Field(default=None, description="{ radius = 0.5 }")
-    spheres: list[PartTable] | None = Field(
-        default=None,
-        min_length=1,
-        max_length=1000,
-        description="a compound: [{ radius = 0.1, centre = [0.2, 0, 0] }, ...]",
-    )
-
-
-class BodyTable(SurfaceTable):
+class BodyTable(MemberTable):
     """A rigid body and its state at the start, in world coordinates."""
 
     name: Identifier = Field(description="how formulas refer to it")
     shape: ShapeTable | None = Field(default=None, description="its surface; without one it touches nothing")
     mass: Positive | None = Field(default=None, description="[kg]")
-    density: Positive | None = Field(default=None, description="[kg/m^3], instead of mass, for solid spheres")
+    density: Positive | None = Field(default=None, description="[kg/m^3], instead of mass, for solid shapes")
     inertia: Inertia | None = Field(
         default=None,
         description="about the centre of mass [kg m^2]: a number, three principal moments or a 3 x 3 matrix",
     )
     position: Vector = Field(default=[0.0, 0.0, 0.0], description="of the centre of mass [m]")
-    orientation: Orientation = Field(
-        default=[1.0, 0.0, 0.0, 0.0], description="quaternion [w, x, y, z], or { roll_deg, pitch_deg, yaw_deg }"
-    )
+    orientation: Orientation = Field(default=[1.0, 0.0, 0.0, 0.0], description=UPRIGHT)
     velocity: Vector = Field(default=[0.0, 0.0, 0.0], description="[m/s]")
     angular_velocity: Vector = Field(default=[0.0, 0.0, 0.0], description="[rad/s]")
     collides_with: list[str] | None = Field(
-        default=None, description="names of the bodies and planes that it may touch; default: all"
+        default=None, description="names of the bodies, static surfaces and groups that it may touch; default: all"
     )
 
 
-class GroundTable(SurfaceTable):
+class GroundTable(MemberTable):
     """The floor: the horizontal plane called ground."""
 
     height: Finite = Field(default=0.0, description="z of the surface [m]")
 
 
-class PlaneTable(SurfaceTable):
+class PlaneTable(MemberTable):
     """A static wall: everything behind the plane is solid."""
 
     name: Identifier = Field(description="how pairs and settings refer to it")
@@ -147,6 +129,31 @@ class PlaneTable(SurfaceTable):
     offset: Finite | None = Field(
         default=None, description="distance of the plane from the origin along the normal [m]"
     )
+
+
+class BlockTable(MemberTable):
+    """A static solid: a ramp, a step, a post, a wall with an end."""
+
+    name: Identifier = Field(description="how pairs, formulas and settings refer to it")
+    shape: SolidTable = Field(description="its surface: { box = { size = [1, 1, 0.2] } }, or a sphere or capsule")
+    position: Vector = Field(default=[0.0, 0.0, 0.0], description="of its centre [m]")
+    orientation: Orientation = Field(default=[1.0, 0.0, 0.0, 0.0], description=UPRIGHT)
+
+
+class TerrainTable(MemberTable):
+    """Static ground of varying height: everything below is solid. Either a formula, or a grid of heights."""
+
+    name: Identifier = Field(description="how pairs and settings refer to it")
+    height: str | None = Field(
+        default=None, description='formula of x and y [m], twice differentiable: "0.1 * sin(3 * x)"'
+    )
+    heights: Grid | None = Field(
+        default=None,
+        description="z [m] on a grid, rows along y, columns along x; a smooth surface through them, that goes straight "
+        "on beyond the edges",
+    )
+    spacing: Spacing | None = Field(default=None, description="of the grid [m]: a number, or [along x, along y]")
+    origin: Pair | None = Field(default=None, description="x and y of the first height [m]; default [0, 0]")
 
 
 class ContactTable(Table):
@@ -163,7 +170,10 @@ class ContactTable(Table):
 class PairTable(SurfaceTable):
     """What holds between two surfaces, whatever they state."""
 
-    between: Annotated[list[str], Field(min_length=2, max_length=2)] = Field(description="two names: [body, other]")
+    between: Annotated[list[str], Field(min_length=2, max_length=2)] = Field(
+        description="two names of surfaces or groups; a table with two surfaces' names beats one with a group, and "
+        "that one a table with two groups"
+    )
     collide: bool = Field(default=True, description="false: the two pass through each other")
     frequency: NonNegative | None = Field(default=None, description="of a soft contact [Hz]; 0: rigid")
     damping: NonNegative | None = Field(default=None, description="damping ratio of the soft contact")

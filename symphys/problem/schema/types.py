@@ -20,6 +20,16 @@ def vector_schema(count: int) -> dict[str, Any]:
     return {"type": "array", "items": {"type": "number"}, "minItems": count, "maxItems": count}
 
 
+def positive_schema(count: int) -> dict[str, Any]:
+    """The JSON Schema of a list of ``count`` positive numbers."""
+    return {
+        "type": "array",
+        "items": {"type": "number", "exclusiveMinimum": 0},
+        "minItems": count,
+        "maxItems": count,
+    }
+
+
 def numbers_schema() -> dict[str, Any]:
     """The JSON Schema of a number, a list of numbers or a list of lists of numbers."""
     number = {"type": "number"}
@@ -41,6 +51,25 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
 Vector = Annotated[list[float], PlainValidator(checks.vector(3)), WithJsonSchema(vector_schema(3))]
+Pair = Annotated[list[float], PlainValidator(checks.vector(2)), WithJsonSchema(vector_schema(2))]
+Size = Annotated[list[float], PlainValidator(checks.positive(3)), WithJsonSchema(positive_schema(3))]
+Length = Annotated[float, PlainValidator(checks.length), WithJsonSchema({"type": "number", "exclusiveMinimum": 0})]
+Spacing = Annotated[
+    list[float],
+    PlainValidator(checks.spacing),
+    WithJsonSchema({"anyOf": [{"type": "number", "exclusiveMinimum": 0}, positive_schema(2)]}),
+]
+Grid = Annotated[
+    list[list[float]],
+    PlainValidator(checks.grid),
+    WithJsonSchema(
+        {
+            "type": "array",
+            "items": {"type": "array", "items": {"type": "number"}, "minItems": checks.LEAST_SIDE},
+            "minItems": checks.LEAST_SIDE,
+        }
+    ),
+]
 Quaternion = Annotated[list[float], PlainValidator(checks.vector(4)), WithJsonSchema(vector_schema(4))]
 Numbers = Annotated[NestedList, PlainValidator(checks.nested(bound=False)), WithJsonSchema(numbers_schema())]
 Bounds = Annotated[NestedList, PlainValidator(checks.nested(bound=True)), WithJsonSchema(numbers_schema())]

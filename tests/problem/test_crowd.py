@@ -1,0 +1,161 @@
+"""How many points of contact a world has: counted without listing them, refused where they are too many."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from symphys import shapes
+from symphys.errors import ProblemError
+from symphys.problem import Problem
+from symphys.problem.crowd import MOST_POINTS
+from symphys.problem.meetings import KINDS, Meetings
+from symphys.problem.parts import BlockPlan, BodyPlan, PairPlan, Part, PlanePlan
+from symphys.problem.plan import WorldPlan
+from symphys.shapes import Box, Capsule, Plane, Sphere, Terrain, contact_points
+from symphys.world import Law
+
+Load = Callable[..., Problem]
+Refused = Callable[..., ProblemError]
+Names = Callable[[ProblemError, str, str], None]
+
+BASE = "[simulation]\nduration = 1.0\ndt = 0.01\n[ground]\n"
+BOX = "{ box = { size = [1, 1, 1] } }"
+CUBE = Box((0.5, 0.5, 0.5))
+EACH, DOWN, TOUCH = (contact_points(CUBE, other) for other in (CUBE, Plane("ground"), Capsule(0.1, 0.5)))
+"""Points of a box against a box, the ground and a capsule."""
+
+
+def crowd(count: int, keys: str = "", shape: str = BOX) -> str:
+    body = '[[body]]\nname = "b{i}"\nshape = {shape}\nmass = 1\nposition = [{x}, 0, 1]\n{keys}\n'
+    return "".join(body.format(i=i, x=2 * i, shape=shape, keys=keys) for i in range(count))
+
+
+def test_number_contributors_and_remedy_are_named(refused: Refused, names: Names) -> None:
+    error = refused(text=BASE + crowd(40))
+    largest = rf"\(40 boxes against each other: {780 * EACH}, 40 boxes against ground: {40 * DOWN}\)"
+    names(error, "body", f"{780 * EACH + 40 * DOWN} points .* 2000 are allowed {largest}; let")
+    names(error, "body", "group, .* collides_with .* spheres in place of boxes")
+
+
+def test_groups_and_compounds_are_called_by_name(refused: Refused) -> None:
+    two = "{ parts = [{ box = { size = [1, 1, 1] } }, { capsule = { radius = 0.1, length = 1 } }] }"
+    message = str(refused(text=BASE + crowd(20, 'group = "pins"') + crowd(1, shape=two).replace("b0", "tower")))
+    assert f"20 boxes of pins against each other: {190 * EACH}" in message
+    assert f"20 boxes of pins against tower: {20 * (EACH + TOUCH)}" in message
+
+
+def test_spheres_are_not_advised_to_be_spheres(refused: Refused) -> None:
+    message = str(refused(text=BASE + crowd(80, shape="{ sphere = { radius = 0.1 } }")))
+    assert "3240 points" in message
+    assert "in place of" not in message
+
+
+def test_what_may_not_meet_does_not_count(load: Load) -> None:
+    apart = BASE + crowd(40, 'group = "g"') + '[[pair]]\nbetween = ["g", "g"]\ncollide = false\n'
+    assert len(load(text=apart).world().pairs) == 40 * DOWN
+    assert len(load(text=BASE + crowd(40, 'collides_with = ["ground"]')).world().pairs) == 40 * DOWN
+
+
+def test_the_most_that_is_allowed(load: Load, refused: Refused) -> None:
+    assert MOST_POINTS == 2000
+    text = BASE + crowd(2000 // DOWN, 'collides_with = ["ground"]')
+    assert len(load(text=text).world().pairs) == 2000
+    more = text + '[[body]]\nname = "one"\nshape = { sphere = { radius = 1 } }\nmass = 1\ncollides_with = ["ground"]\n'
+    assert "2001 points" in str(refused(text=more))
+
+
+def plans(count: int, **keys: object) -> list[Part]:
+    """Boxes b0, b1, ...; ``keys`` for all, functions of the index among them."""
+    chosen = [{key: value(i) if callable(value) else value for key, value in keys.items()} for i in range(count)]
+    usual = {"mates": None, "group": None}
+    return [
+        BodyPlan(f"b{i}", 1.0, None, (Box((1.0, 1.0, 1.0)),), False, 1.0, {}, **{**usual, **own})  # type: ignore[arg-type]
+        for i, own in enumerate(chosen)
+    ]
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        plans(50_000),
+        plans(50_000, group=lambda i: f"g{i % 7}", mates=lambda i: frozenset({f"g{i % 5}"})),
+        plans(20_000, mates=lambda i: frozenset({f"b{(i + 1) % 20_000}", f"b{(i - 1) % 20_000}"})),
+    ],
+    ids=["free", "groups", "chain"],
+)
+def test_tens_of_thousands_are_counted_at_once(parts: list[Part]) -> None:
+    began = time.perf_counter()
+    census = Meetings([*parts, PlanePlan("ground", (0, 0, 1), 0.0, {})], []).census(MOST_POINTS)
+    assert time.perf_counter() - began < 2
+    assert census.points > MOST_POINTS
+
+
+def random_parts(rng: np.random.Generator) -> tuple[list[Part], list[PairPlan]]:
+    """A few bodies and statics with random groups, mates and tables."""
+    groups = [None, "g", "h"]
+    surfaces = [Sphere(1.0), Box((1.0, 1.0, 1.0)), Capsule(1.0, 1.0)]
+    names = [f"b{i}" for i in range(6)] + ["plane", "block"]
+
+    def some(pool: list[str]) -> frozenset[str]:
+        return frozenset(str(name) for name in rng.choice(pool, rng.integers(0, 4)))
+
+    parts: list[Part] = []
+    for name in names[:6]:
+        held = tuple(surfaces[k] for k in rng.integers(0, 3, rng.integers(0, 3)))
+        mates = some(["g", "h", *(other for other in names if other != name)]) if rng.random() < 0.5 else None
+        parts.append(BodyPlan(name, 1.0, None, held, False, 1.0, {}, mates, groups[rng.integers(3)]))
+    parts.append(PlanePlan("plane", (0, 0, 1), 0.0, {}, groups[rng.integers(3)]))
+    parts.append(BlockPlan("block", Box((1.0, 1.0, 1.0)), {}, groups[rng.integers(3)]))
+    tables = {frozenset(str(n) for n in rng.choice([*names, "g", "h"], 2)) for _ in range(rng.integers(0, 6))}
+    kept = [table for table in sorted(tables, key=sorted) if len(table) == 2 or table <= {"g", "h"}]
+    return parts, [PairPlan("-".join(sorted(table)), table, bool(rng.random() < 0.4), {}) for table in kept]
+
+
+def contradicts(plan: WorldPlan, a: Part, b: Part) -> bool:
+    """Whether tables of one rank say different things about two parts; a file with such tables is refused."""
+    if any(pair.between == {a.name, b.name} for pair in plan.pairs):
+        return False
+    keys = [frozenset((a.name, b.group)), frozenset((b.name, a.group))]
+    return len({pair.collide for pair in plan.pairs if pair.between in keys}) > 1
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_kin_meet_as_their_members_do(seed: int) -> None:
+    """Counting and listing by kin gives what looking at every two parts gives."""
+    parts, tables = random_parts(np.random.default_rng(seed))
+    bodies = tuple(part for part in parts if isinstance(part, BodyPlan))
+    statics = tuple(part for part in parts if not isinstance(part, BodyPlan))
+    plan = WorldPlan(bodies, statics, tuple(tables), Law(), (0, 0, -9.81))
+    if any(contradicts(plan, a, b) for a, b in combinations(parts, 2)):
+        tables, plan = [], replace(plan, pairs=())
+    expected = []
+    for (i, a), (j, b) in combinations(enumerate(parts), 2):
+        table = plan.pair(a.name, b.name)
+        meet = i < len(bodies) and plan.lets(a.name, b.name) and plan.lets(b.name, a.name)
+        if meet and (table is None or table.collide) and a.surfaces and b.surfaces:
+            expected.append((i, j))
+    assert list(plan.meetings) == expected
+    points = sum(contact_points(s, t) for i, j in expected for s in parts[i].surfaces for t in parts[j].surfaces)
+    assert Meetings(parts, tables).census(MOST_POINTS).points == points
+    assert len(plan.world({}).pairs) == points
+
+
+def test_every_kind_of_surface_is_counted() -> None:
+    assert {type(kind) for kind in KINDS} == {Sphere, Capsule, Box, Plane, Terrain}
+    assert {kind for both in shapes.POINTS for kind in both} == {type(kind) for kind in KINDS}
+
+
+def test_surfaces_that_no_rule_covers(
+    refused: Refused, load: Load, names: Names, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delitem(shapes.POINTS, (Box, Terrain))
+    hills = '[[terrain]]\nname = "hills"\nheight = "x"\n'
+    names(refused(text=BASE + hills + crowd(2)), "body", "is not known: b0 and hills.*collides_with .* collide = false")
+    apart = '[[pair]]\nbetween = ["hills", "g"]\ncollide = false\n'
+    assert len(load(text=BASE + hills + crowd(2, 'group = "g"') + apart).world().pairs) == EACH + 2 * DOWN

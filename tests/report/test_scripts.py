@@ -1,0 +1,86 @@
+"""The geometry of the page's scripts, run by node."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from yard import area
+
+from symphys.report.markup import HERE
+from symphys.report.outlines import outline
+from symphys.report.scenery import Solid
+
+pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="needs node to run the page's script")
+
+
+def run_script(code: str) -> Any:
+    """What an expression of the page's geometry gives."""
+    script = "".join((HERE / name).read_text(encoding="utf-8") for name in ("geometry.js", "solids.js", "terrain.js"))
+    done = subprocess.run(
+        ["node", "-"],
+        input=f"{script}\nconsole.log(JSON.stringify({code}));",
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stderr == ""
+    return json.loads(done.stdout)
+
+
+EYE = "camera(-2, 0.4)"
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.3])
+def test_script_and_figures_have_the_same_outline(radius: float) -> None:
+    axes = np.random.default_rng(1).standard_normal((3, 2))
+    found = np.array(run_script(f"outline({axes.tolist()}, {radius})"))
+    assert area(found) == pytest.approx(area(outline(axes, radius)))
+
+
+def placed(solid: Solid, name: str, fixed: bool = False) -> str:
+    data = {
+        "radius": solid.radius,
+        "centre": solid.centre.tolist(),
+        "half": solid.half.tolist(),
+        "q": solid.orientation.tolist(),
+    }
+    if solid.is_ball:
+        del data["half"], data["q"]
+    return f"place({json.dumps(data)}, {{ p: [0, 0, 0], q: [1, 0, 0, 0] }}, '{name}', {str(fixed).lower()})"
+
+
+RAMP = Solid(0.0, np.array([2.0, 1, 0.1]))
+
+
+def test_what_lies_on_a_large_block_is_drawn_after_it() -> None:
+    """Also at its far end, where its centre is farther away than that of the block."""
+    for x, y in ((-1.8, 0.9), (1.8, 0.9), (1.8, -0.9), (-1.8, -0.9)):
+        for solid in (Solid(0.1, centre=np.array([x, y, 0.2])), Solid(0.0, np.full(3, 0.1), np.array([x, y, 0.2]))):
+            both = f"[{placed(solid, 'top')}, {placed(RAMP, 'ramp')}]"
+            assert run_script(f"inOrder({both}, {EYE}).map((s) => s.colour)") == ["ramp", "top"]
+            under = replace(solid, centre=solid.centre * [1, 1, -1])
+            both = f"[{placed(under, 'below')}, {placed(RAMP, 'ramp')}]"
+            assert run_script(f"inOrder({both}, {EYE}).map((s) => s.colour)") == ["below", "ramp"]
+
+
+def test_what_is_beside_each_other_does_not_overlap() -> None:
+    ramp, ball = placed(RAMP, "ramp"), placed(Solid(0.1, centre=np.array([0.0, 0, 3.0])), "ball")
+    assert run_script(f"overlap({ramp}, {ball}, {EYE})") is False
+    near = placed(Solid(0.1, centre=np.array([0.0, 0, 0.2])), "ball")
+    assert run_script(f"overlap({ramp}, {near}, {EYE})") is True
+
+
+def test_terrain_between_its_heights() -> None:
+    hills = "{ x: [0, 1, 2], y: [0, 2], z: [0, 1, 1, 0, 1, null] }"
+    assert run_script(f"heightAt({hills}, 0.25, 1)") == pytest.approx(0.25)
+    assert run_script(f"heightAt({hills}, 1.5, 1)") is None
+    assert run_script(f"heightAt({hills}, -1, 1)") is None
+    assert run_script(f"mesh({hills}, []).length") == 1
+    assert run_script(f"mesh({hills}, [{{ normal: [0, 0, 1], offset: 2 }}]).length") == 0
+    assert len(run_script(f"rim({hills})")) == 5

@@ -1,0 +1,116 @@
+"""What scene.json says of a world."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from symphys.problem import Problem, load_problem
+from symphys.runs.scene import scene
+from symphys.transcription import transcribe
+
+SHAPES = """
+[simulation]
+duration = 0.1
+dt = 0.01
+[[body]]
+name = "tower"
+shape = { parts = [
+    { box = { size = [1, 2, 3] }, orientation = { yaw_deg = 90 } },
+    { sphere = { radius = 0.5 }, centre = [0, 0, 1] },
+    { sphere = { radius = 0.5 }, centre = [0, 0, -1] },
+] }
+mass = 2.0
+position = [0, 0, 9]
+[[body]]
+name = "bar"
+shape = { capsule = { radius = 0.1, length = 2 } }
+mass = 1.0
+position = [4, 1, 9]
+[ground]
+[[block]]
+name = "ramp"
+shape = { box = { size = [2, 1, 0.5] } }
+position = [1, 2, 0]
+[[terrain]]
+name = "hills"
+height = "x - 2 * y"
+[[variable]]
+name = "build"
+sets = ["bar.length"]
+[[variable]]
+name = "where"
+sets = "ramp.position[0:2]"
+"""
+BALL = """
+[simulation]
+duration = 1.0
+dt = 0.1
+[[body]]
+name = "ball"
+shape = { sphere = { radius = 0.5 } }
+mass = 1.0
+position = [0, 0, 50]
+velocity = [20, 0, 0]
+[[terrain]]
+name = "hills"
+height = "sqrt(8 - x)"
+[[variable]]
+name = "throw"
+sets = "ball.velocity"
+"""
+Z = {"build": np.array([[3.0]]), "where": np.array([[7.0], [8.0]])}
+
+
+def problem_of(folder: Path, text: str) -> Problem:
+    path = folder / "problem.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_problem(path)
+
+
+def test_shapes_have_the_sizes_that_variables_set(tmp_path: Path) -> None:
+    found = scene(problem_of(tmp_path, SHAPES), Z)
+    tower, bar = found["bodies"]
+    box, ball, _ = tower["shapes"]
+    assert {**box, "orientation": None} == {"kind": "box", "size": [1, 2, 3], "centre": [0, 0, 0], "orientation": None}
+    assert box["orientation"] == pytest.approx([np.sqrt(0.5), 0, 0, np.sqrt(0.5)])
+    assert ball == {"kind": "sphere", "radius": 0.5, "centre": [0, 0, 1]}
+    upright = {"centre": [0, 0, 0], "orientation": [1, 0, 0, 0]}
+    assert bar["shapes"] == [{"kind": "capsule", "radius": 0.1, "length": 3.0, **upright}]
+    assert found["planes"] == [{"name": "ground", "normal": [0, 0, 1], "offset": 0}]
+    (ramp,) = found["fixtures"]
+    assert ramp == {
+        "name": "ramp",
+        "shape": {"kind": "box", "size": [2, 1, 0.5], "centre": [7, 8, 0], "orientation": [1, 0, 0, 0]},
+    }
+    json.dumps(found, allow_nan=False)
+
+
+def test_terrain_is_sampled_around_the_start(tmp_path: Path) -> None:
+    (hills,) = scene(problem_of(tmp_path, SHAPES), Z)["terrain"]
+    x, y, z = (np.array(hills[key]) for key in "xyz")
+    assert hills["name"] == "hills"
+    np.testing.assert_allclose(z, x - 2 * y[:, None], atol=1e-5)
+    assert x[0] < -1.8
+    assert x[-1] > 4 + 1.6
+    assert y[0] < -1.8
+    assert y[-1] > 1 + 1.6
+    assert z.shape == (len(y), len(x))
+    assert z.size <= 49 * 49
+
+
+def test_terrain_is_sampled_along_the_motion(tmp_path: Path) -> None:
+    """Where its formula has no value, there is none."""
+    problem = problem_of(tmp_path, BALL)
+    motion = transcribe(replace(problem, plan=replace(problem.plan, statics=())), backend="casadi").simulate(
+        np.array([20.0, 0, 0])
+    )
+    (hills,) = scene(problem, {}, motion)["terrain"]
+    x, z = np.array(hills["x"]), np.array(hills["z"])
+    assert x[-1] > 20.5
+    assert np.isnan(z[:, x > 8]).all()
+    assert np.isfinite(z[:, x < 8]).all()
