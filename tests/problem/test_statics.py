@@ -130,7 +130,7 @@ def test_settings_reach_blocks_and_terrain(load: Load) -> None:
 
 def test_surfaces_that_touch_in_several_points(load: Load) -> None:
     box = BASE.replace("sphere = { radius = 0.1 }", "box = { size = [1, 1, 1] }")
-    second = box[box.index("[[body]]") :].replace("ball", "other").replace("[0.5, 0.25, 2]", "[5, 0.25, 9]")
+    second = box[box.index("[[body]]") :].replace("ball", "other").replace("[0.5, 0.25, 2]", "[0.5, 0.25, 9]")
     names = [pair.name for pair in load(text=box + second + GRID + RAMP).world().pairs]
     cube = Box((0.5, 0.5, 0.5))
     each, down = contact_points(cube, cube), contact_points(cube, Terrain("dunes", max))
