@@ -143,9 +143,11 @@ class Scheme:
         warm_start: start each step from the contact forces of the last one.
         time_of_impact: resolve the instant of each impact inside the step; without it gradients through bounces
             are wrong at any step size.
-        split: where a body is part of several pairs, cut each step at its first impact, so that a blow changes the
-            forces of lasting contacts from its instant on; twice the work, without it gradients of a ball that rolls
-            into a cushion are wrong at any step size.
+        cuts: where a body is part of several pairs, how often a step is cut at an impact, so that impacts are taken
+            one after the other and a blow changes the forces of lasting contacts from its instant on. Each cut adds
+            the work of a step; without any, gradients of a ball that rolls into a cushion are wrong at any step size.
+            None: 2 where a body may be hit off its centre, as boxes are, else 1.
+        energy_cap: no impact raises the kinetic energy, which Newton's restitution with friction can.
         impact_friction: let friction at an impact aim at the velocity at the instant of impact.
     """
 
@@ -156,7 +158,8 @@ class Scheme:
     warm_start: bool = True
     time_of_impact: bool = True
     impact_friction: bool = True
-    split: bool = True
+    cuts: int | None = None
+    energy_cap: bool = True
 
 
 def make_world(

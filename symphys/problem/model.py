@@ -27,7 +27,8 @@ class Simulation:
     Attributes:
         duration: [s], a whole number of steps.
         dt: time step [s].
-        sweeps, position_sweeps, warm_start, push_out, time_of_impact, impact_friction, split: as in world.Scheme.
+        sweeps, position_sweeps, warm_start, push_out: as in world.Scheme.
+        time_of_impact, impact_friction, cuts, energy_cap: likewise.
         smoothing: [m/s] stages of the knob that solvers use, decreasing, at least one; 0 is the exact contact law.
     """
 
@@ -40,7 +41,8 @@ class Simulation:
     push_out: float = 1.0
     time_of_impact: bool = True
     impact_friction: bool = True
-    split: bool = True
+    cuts: int | None = None
+    energy_cap: bool = True
 
     @property
     def steps(self) -> int:
@@ -57,7 +59,8 @@ class Simulation:
             warm_start=self.warm_start,
             time_of_impact=self.time_of_impact,
             impact_friction=self.impact_friction,
-            split=self.split,
+            cuts=self.cuts,
+            energy_cap=self.energy_cap,
         )
 
 

@@ -11,8 +11,9 @@ import casadi as ca
 from symphys.collide import Contact
 from symphys.motion import Motion, angular_velocity
 from symphys.smooth import positive
-from symphys.step.pgs import ZERO, Momentum, Row, Solution, relax
+from symphys.step.pgs import ZERO, Momentum, Row, Solution
 from symphys.step.phase import Phase, bodies_of, expected_motions, look
+from symphys.step.restitution import rebound
 from symphys.step.row import UNREACHED, ContactRow, Moving, at_touch, effective_masses, inverse_masses, make_sides
 from symphys.step.rows import width_of
 from symphys.step.scene import Scene, Setting, State
@@ -22,9 +23,9 @@ Expr = Any
 """casadi SX, MX or DM"""
 
 MARGIN = 1e-6
-"""Of dt: the shortest stretch before or after an impact."""
+"""Of the stretch that is cut: the shortest one before or after an impact."""
 TOGETHER = 1e-9
-"""Of dt: impacts that are no further apart are one."""
+"""Of the time until then: impacts that are no further apart are one."""
 TOUCHING = 1e-3
 """Of the distance a_ref dt^2: surfaces that near to each other take part in an impact of their bodies."""
 
@@ -34,7 +35,7 @@ class Cut:
     """Where a step is cut in two.
 
     Attributes:
-        impact: 1 if the cut is an impact, 0 if it is the middle of a step without one.
+        impact: 1 if the cut is an impact, 0 if there is none.
         first: length of the first stretch [s].
         fast: per pair: 1 if it closes at speed.
         struck: per pair: 1 if it meets at speed then.
@@ -46,19 +47,23 @@ class Cut:
     struck: tuple[Expr, ...]
 
 
-def find_cut(scene: Scene, x: State) -> Cut:
-    """The first impact within the step, on paths under the persistent forces of the last step."""
-    do, dt = scene.pieces.do, scene.setting.scheme.dt
-    contacts = look(scene, expected_motions(scene, x, ca.SX(dt)), ca.SX(dt))
-    fast = [do(_closes_fast, scene.setting, p.law, c) for p, c in zip(scene.world.pairs, contacts, strict=True)]
-    earliest = ca.SX(0), ca.SX(dt)
+def find_cut(scene: Scene, x: State, duration: Expr, share: float) -> Cut:
+    """The first impact within ``duration`` [s], on paths under the persistent forces of the last step.
+
+    Without an impact the cut is at ``share`` of the duration.
+    """
+    do = scene.pieces.do
+    contacts = look(scene, expected_motions(scene, x, duration), duration)
+    fast = [do(closes_fast, scene.setting, p.law, c) for p, c in zip(scene.world.pairs, contacts, strict=True)]
+    earliest = ca.SX(0), duration
     for contact, closes in zip(contacts, fast, strict=True):
         earliest = do(_earlier, earliest, closes, contact.hit, contact.time)
     struck = [do(_is_struck, earliest, c, contact.hit, contact.time) for contact, c in zip(contacts, fast, strict=True)]
-    return Cut(earliest[0], do(_inside, earliest, dt), tuple(fast), tuple(struck))
+    return Cut(earliest[0], do(_inside, earliest, duration, share), tuple(fast), tuple(struck))
 
 
-def _closes_fast(setting: Setting, law: Law, contact: Contact) -> Expr:
+def closes_fast(setting: Setting, law: Law, contact: Contact) -> Expr:
+    """1 if a contact closes at a speed that makes its meeting an impact."""
     return ca.SX(0) if law.soft else contact.rate < -setting.fast
 
 
@@ -72,20 +77,10 @@ def _is_struck(earliest: tuple[Expr, Expr], closes: Expr, hit: Expr, time: Expr)
     return ca.logic_and(ca.logic_and(closes, hit), time <= earliest[1] * (1 + TOGETHER))
 
 
-def _inside(earliest: tuple[Expr, Expr], dt: float) -> Expr:
+def _inside(earliest: tuple[Expr, Expr], duration: Expr, share: float) -> Expr:
     """The length of the stretch before the cut."""
-    return ca.if_else(earliest[0], ca.fmin(ca.fmax(earliest[1], MARGIN * dt), (1 - MARGIN) * dt), dt / 2)
-
-
-def passing(scene: Scene, x: State, duration: Expr) -> list[Expr]:
-    """Per pair: 1 if it closes at speed but does not meet within ``duration``."""
-    contacts = look(scene, expected_motions(scene, x, duration), duration)
-    pairs = zip(scene.world.pairs, contacts, strict=True)
-    return [scene.pieces.do(_passes, scene.setting, pair.law, contact) for pair, contact in pairs]
-
-
-def _passes(setting: Setting, law: Law, contact: Contact) -> Expr:
-    return ca.logic_and(_closes_fast(setting, law, contact), ca.logic_not(contact.hit))
+    inside = ca.fmin(ca.fmax(earliest[1], MARGIN * duration), (1 - MARGIN) * duration)
+    return ca.if_else(earliest[0], inside, share * duration)
 
 
 def collide_now(scene: Scene, x: State, cut: Cut) -> Phase:
@@ -100,7 +95,7 @@ def collide_now(scene: Scene, x: State, cut: Cut) -> Phase:
         rows.append(Row(bodies_of(pair), row))
     momenta = tuple(Momentum(m.velocity, m.momentum_k) for m in motions)
     still = tuple(ZERO for _ in rows)
-    solved = relax(scene.pieces, scene.setting.scheme.sweeps, tuple(rows), Solution(momenta, still, still))
+    solved = rebound(scene, tuple(rows), Solution(momenta, still, still), motions)
     after = _with_velocities(scene, x, motions, solved.momenta, cut.impact)
     forces = (x[f"{pair.name}.force"] for pair in scene.world.pairs)
     ahead = tuple(scene.pieces.do(_ahead, cut.impact, x["lag"], force) for force in forces)
@@ -116,7 +111,7 @@ def _row(setting: Setting, law: Law, contact: Contact, motions: Moving, struck: 
     now, scheme = ca.SX(0), setting.scheme
     touching = ca.logic_and(impact, contact.gap < TOUCHING * setting.reference * scheme.dt**2)
     velocity, _, normal = at_touch(contact, motions, now)
-    rebound = law.restitution * positive(-ca.dot(normal, velocity), setting.knob)
+    speed = law.restitution * positive(-ca.dot(normal, velocity), setting.knob)
     frame = contact.meeting.frame(now)
     sides = make_sides(motions, now, frame, frame)
     resting = ca.if_else(touching, 0, UNREACHED)
@@ -127,7 +122,7 @@ def _row(setting: Setting, law: Law, contact: Contact, motions: Moving, struck: 
         frame.normal,
         **effective_masses(*inverse_masses(sides, frame.normal)),
         softness=ca.SX(0),
-        target=ca.SX(UNREACHED) if law.soft else ca.if_else(struck, rebound, resting),
+        target=ca.SX(UNREACHED) if law.soft else ca.if_else(struck, speed, resting),
         slip_target=ca.SX.zeros(3),
         delay=ca.SX(0),
         leaving=struck,

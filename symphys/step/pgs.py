@@ -55,6 +55,12 @@ class Impulse:
         """(3,) [N m s]: the torque impulse beside that of the linear one."""
         return n * self.spin + self.roll
 
+    def plus(self, other: Impulse) -> Impulse:
+        """The sum."""
+        return Impulse(
+            self.normal + other.normal, self.tangent + other.tangent, self.spin + other.spin, self.roll + other.roll
+        )
+
     def times(self, factor: Expr) -> Impulse:
         """A share of it."""
         return Impulse(factor * self.normal, factor * self.tangent, factor * self.spin, factor * self.roll)

@@ -26,7 +26,7 @@ def billiard(cushion: Law) -> World:
 
 def rolling_into(cushion: Law, dt: float, split: bool) -> ca.Function:
     """Start along x -> (x, its slope, velocity) 0.6 s after the hit; rolling at 1 m/s."""
-    lab = Lab(billiard(cushion), Scheme(dt=dt, split=split))
+    lab = Lab(billiard(cushion), Scheme(dt=dt, cuts=int(split)))
     z = ca.MX.sym("z")
     start = {
         "ball.position": ca.vertcat(z, 0, RADIUS),

@@ -26,6 +26,7 @@ from symphys.world import GRAVITY, Scheme
 
 Sweeps = Annotated[int, Field(ge=1, le=1000)]
 PositionSweeps = Annotated[int, Field(ge=0, le=1000)]
+Cuts = Annotated[int, Field(ge=0, le=8)]
 DEFAULT = Scheme()
 
 
@@ -56,10 +57,14 @@ class SimulationTable(Table):
     impact_friction: bool = Field(
         default=DEFAULT.impact_friction, description="friction at an impact aims at the velocity at that instant"
     )
-    split: bool = Field(
-        default=DEFAULT.split,
-        description="cut steps at the first impact where bodies have several contacts; without it gradients of a body "
-        "that is hit while it touches another are wrong",
+    cuts: Cuts | None = Field(
+        default=DEFAULT.cuts,
+        description="how often a step may be cut at an impact, so that impacts are taken one after the other; each "
+        "adds the work of a step. With 0 gradients of a body that is hit while it touches another are wrong. "
+        "Default: 2 where bodies may be hit off their centres, as boxes are, else 1",
+    )
+    energy_cap: bool = Field(
+        default=DEFAULT.energy_cap, description="no impact adds energy, which restitution with friction can"
     )
 
 

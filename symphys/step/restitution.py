@@ -1,0 +1,94 @@
+"""Restitution that adds no energy.
+
+Newton's law, a rebound speed of e times the speed of approach, can add energy where friction acts on a body off its
+centre (Kane's paradox; Stronge, Rigid body collisions with friction, Proc. R. Soc. A 431, 1990). A plastic impact never
+does: with impulse P and velocities u after it, the change of energy is P . u - P . K P / 2, where P . u <= 0 since
+friction opposes slip and nothing parts. What lies between the two is admissible, as cones are convex and the normal
+velocities lie in between; of that the impulse nearest to Newton's that does not raise the kinetic energy is taken.
+(Deviation from Stronge: his law bounds the work of the normal force alone.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+
+from symphys.motion import Motion, apply, inverse_inertia
+from symphys.shapes import Sphere
+from symphys.smooth import TINY_SQUARE
+from symphys.step.pgs import Impulse, Momentum, Row, Solution, relax
+from symphys.step.row import ContactRow
+from symphys.step.scene import Scene
+from symphys.world import World, is_zero
+
+Expr = Any
+"""casadi SX, MX or DM"""
+
+
+def eccentric_bodies(world: World) -> set[int]:
+    """The bodies on which contacts may act off the centre: on others friction cannot make a rebound add energy."""
+    return {
+        index
+        for index, body in enumerate(world.bodies)
+        if any(not isinstance(s, Sphere) or not all(is_zero(c) for c in s.centre) for s in body.shapes)
+    }
+
+
+def rebound(scene: Scene, rows: tuple[Row, ...], start: Solution, motions: Sequence[Motion]) -> Solution:
+    """The impulses of an impact, and the momenta after it."""
+    pieces, scheme = scene.pieces, scene.setting.scheme
+    if not (scheme.energy_cap and eccentric_bodies(scene.world)):
+        return relax(pieces, scheme.sweeps, rows, start)
+    dead = tuple(Row(each.bodies, pieces.do(_without_rebound, each.row)) for each in rows)
+    plastic = relax(pieces, scheme.sweeps, dead, start)
+    newton = relax(pieces, scheme.sweeps, rows, plastic)
+    sums: tuple[Expr, Expr, Expr] = (ca.SX(0), ca.SX(0), ca.SX(0))
+    for motion, *momenta in zip(motions, start.momenta, plastic.momenta, newton.momenta, strict=True):
+        sums = pieces.do(_energies, motion, momenta, sums)
+    share = pieces.do(_largest_share, sums)
+    return Solution(
+        tuple(pieces.do(_between_momenta, share, a, b) for a, b in zip(plastic.momenta, newton.momenta, strict=True)),
+        tuple(pieces.do(_between, share, a, b) for a, b in zip(plastic.impulses, newton.impulses, strict=True)),
+        tuple(pieces.do(_between, share, a, b) for a, b in zip(plastic.last, newton.last, strict=True)),
+    )
+
+
+def _without_rebound(row: ContactRow) -> ContactRow:
+    return replace(row, target=ca.fmin(row.target, 0))
+
+
+def _energies(motion: Motion, momenta: list[Momentum], sums: tuple[Expr, Expr, Expr]) -> tuple[Expr, Expr, Expr]:
+    """Coefficients of the change of kinetic energy, a s^2 + b s + c, at share s of the way to Newton's impulse."""
+    before, plastic, newton = momenta
+    turning = inverse_inertia(motion.inertia, motion.rotation)
+
+    def product(one: Momentum, other: Momentum) -> Expr:
+        turn = ca.dot(one.angular, apply(turning, other.angular))
+        return (motion.mass * ca.dot(one.velocity, other.velocity) + turn) / 2
+
+    way = Momentum(newton.velocity - plastic.velocity, newton.angular - plastic.angular)
+    a, b, c = sums
+    change = product(plastic, plastic) - product(before, before)
+    return a + product(way, way), b + 2 * product(way, plastic), c + change
+
+
+def _largest_share(sums: tuple[Expr, Expr, Expr]) -> Expr:
+    """The largest s in [0, 1] with a s^2 + b s + c <= 0, where c <= 0 up to rounding."""
+    a, b, c = sums[0], sums[1], ca.fmin(sums[2], 0)
+    root = ca.sqrt(ca.fmax(b * b - 4 * a * c, 0) + TINY_SQUARE)
+    share = ca.if_else(b >= 0, -2 * c / (ca.fmax(b, 0) + root), (root - b) / (2 * a + TINY_SQUARE))
+    return ca.if_else(a + b + c > 0, ca.fmin(share, 1), 1)
+
+
+def _between_momenta(share: Expr, plastic: Momentum, newton: Momentum) -> Momentum:
+    return Momentum(
+        plastic.velocity + share * (newton.velocity - plastic.velocity),
+        plastic.angular + share * (newton.angular - plastic.angular),
+    )
+
+
+def _between(share: Expr, plastic: Impulse, newton: Impulse) -> Impulse:
+    return plastic.plus(newton.minus(plastic).times(share))
