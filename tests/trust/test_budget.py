@@ -21,6 +21,7 @@ title = "A rod strikes the ground with its lower end"
 [simulation]
 duration = 0.2
 dt = 0.01
+energy_cap = false
 [world]
 gravity = [0, 0, 0]
 [[body]]
@@ -155,6 +156,11 @@ def test_energy_that_a_contact_adds_is_told_with_its_step(make):
     struck = int(np.argmax(np.abs(np.diff(record.motion.velocity[:, 0, 2])) > 0.1))
     assert (gain["step"], gain["time"]) == (struck, pytest.approx(0.01 * struck))
     assert found["momentum"] < 1e-12
+
+
+def test_an_impact_adds_no_energy_unless_asked_to(make):
+    rod = make(ROD.replace("energy_cap = false", ""))
+    assert budget(rod.rollout, rod.record(rod.shooting.start(0)))["gains"] == []
 
 
 def test_words_of_the_budget():

@@ -1,0 +1,87 @@
+"""Impacts off the centre: no energy from nowhere, momentum and plastic limits; several of them in one step."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from laboratory import Lab
+
+from symphys import rotation
+from symphys.shapes import Box, Plane, Sphere
+from symphys.world import Body, Law, Scheme, make_world
+
+SIZE = (0.2, 0.3, 0.1)
+MOMENTS = tuple((SIZE[(i + 1) % 3] ** 2 + SIZE[(i + 2) % 3] ** 2) / 12 for i in range(3))
+
+
+@lru_cache
+def falling(restitution, friction, cuts, capped, dt=0.01):
+    crate = Body("crate", 1.0, MOMENTS, (Box(tuple(s / 2 for s in SIZE)),))
+    world = make_world([crate], [Plane.ground()], Law(friction, restitution))
+    return Lab(world, Scheme(dt=dt, sweeps=20, cuts=cuts, energy_cap=capped))
+
+
+def start(seed, height, tilt, spin):
+    rng = np.random.default_rng(seed)
+    turn = rng.normal(size=3) * tilt
+    angle = np.linalg.norm(turn)
+    return {
+        "crate.position": [0, 0, height],
+        "crate.velocity": [1, 0.3, -1],
+        "crate.orientation": [np.cos(angle / 2), *(np.sin(angle / 2) * turn / angle)],
+        "crate.angular_velocity": rng.normal(size=3) * spin,
+    }
+
+
+def energies(states):
+    """Kinetic and potential energy [J] of a body of 1 kg at every step."""
+    found = []
+    fields = [states[f"crate.{f}"] for f in ("position", "orientation", "velocity", "angular_velocity")]
+    for p, q, v, w in zip(*fields, strict=True):
+        inside = np.array(rotation.matrix(q)).T @ w
+        found.append(0.5 * v @ v + 0.5 * inside @ (np.array(MOMENTS) * inside) + 9.81 * p[2])
+    return np.array(found)
+
+
+def largest_gain(capped):
+    """[J] in one step of some tumbling boxes that bounce with e = 1 and mu = 0.5."""
+    lab = falling(1.0, 0.5, 2, capped)
+    return max(np.diff(energies(lab.states(start(seed, 0.8, 1.0, 3), 1.0))).max() for seed in range(4))
+
+
+def test_newtons_law_with_friction_adds_energy_and_the_cap_does_not():
+    """What is left with it is the error of the free motion, at up to 30 rad/s."""
+    assert largest_gain(False) > 0.2
+    assert largest_gain(True) < 0.02
+
+
+@pytest.mark.parametrize(("restitution", "friction"), [(0.5, 0.0), (0.5, 0.2)])
+def test_the_cap_changes_nothing_where_newtons_law_takes_energy_out(restitution, friction):
+    at = start(1, 0.5, 0.5, 2)
+    with_it, without = (falling(restitution, friction, 2, capped).states(at, 0.25) for capped in (True, False))
+    for name, values in with_it.items():
+        assert values == pytest.approx(without[name], abs=1e-8), name
+
+
+def test_a_box_that_lands_on_one_corner_after_the_other_needs_the_cuts():
+    """Mean error of its place after the landing, against a step of a fortieth: an order of magnitude for two cuts."""
+    starts = [start(seed, 0.3, 0.05, 3) for seed in range(12)]
+    fine = falling(0.5, 0.4, 3, True, dt=0.00025)
+    exact = [fine.states(at, 0.26)["crate.position"][-1] for at in starts]
+
+    def error(cuts):
+        lab = falling(0.5, 0.4, cuts, True)
+        off = [lab.states(at, 0.26)["crate.position"][-1] - end for at, end in zip(starts, exact, strict=True)]
+        return np.mean(np.linalg.norm(off, axis=1))
+
+    assert error(2) < 1e-3
+    assert error(0) > 10 * error(2)
+
+
+def test_balls_are_not_held_back():
+    """Nothing is hit off its centre there, so that the cap would only cost time."""
+    ball = make_world([Body("ball", 1.0, 0.004, (Sphere(0.1),))], [Plane.ground()], Law(0.5, 1.0))
+    steps = [Lab(ball, Scheme(energy_cap=capped)).step.n_instructions() for capped in (True, False)]
+    assert steps[0] == steps[1]
