@@ -42,21 +42,26 @@ def first_root(gap: Expr, rate: Expr, bend: Expr, dt: Expr) -> Expr:
     return ca.fmin(ca.if_else(falls(gap, rate), 2 * gap, 0) / closing, dt)
 
 
-def contact_along(gap: Callable[[Expr], Expr], dt: Expr, meeting: Meeting) -> Contact:
+def contact_along(
+    gap: Callable[[Expr], Expr], dt: Expr, meeting: Meeting, newton_steps: int = NEWTON_STEPS
+) -> Contact:
     """The contact of surfaces whose gap [m] at any time t of the step is ``gap(t)``.
 
-    The first root by the parabola that osculates at t = 0, then Newton steps, which converge from there without
-    overshooting where the gap is a convex function of time, as that of convex shapes in uniform motion is.
+    The first root by the parabola that osculates at t = 0, then Newton steps. The gap of convex shapes in uniform
+    motion is a convex function of time: from before the root, or from beyond it while the gap still falls, these
+    converge without overshooting. Where the parabola leads to beyond the nearest approach they begin at the tangent's
+    root instead, which lies before it.
     """
     t = ca.SX.sym("t")
     value = gap(t)
     rate = ca.gradient(value, t)
     both, bend = ca.vertcat(value, rate), ca.gradient(rate, t)
     start, pace, curve = ca.vertsplit(ca.substitute(ca.vertcat(both, bend), t, 0))
-    time = first_root(start, pace, curve, dt)
-    for _ in range(NEWTON_STEPS):
+    time, straight = first_root(start, pace, curve, dt), start / ca.fmax(-pace, TINY_RATE)
+    for _ in range(newton_steps):
         here, slope = ca.vertsplit(ca.substitute(both, t, time))
-        time = ca.fmin(ca.fmax(time - here / ca.fmin(slope, -TINY_RATE), 0), dt)
+        better = ca.if_else(slope < 0, time - here / ca.fmin(slope, -TINY_RATE), straight)
+        time = ca.fmin(ca.fmax(better, 0), dt)
     time = ca.if_else(falls(start, pace), time, 0)
     here, slope = ca.vertsplit(ca.substitute(both, t, time))
     through = ca.logic_and(ca.logic_and(time > 0, time < dt), ca.logic_and(ca.fabs(here) < FOUND, slope < 0))
