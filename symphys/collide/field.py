@@ -85,4 +85,4 @@ def ball_in_field(
     centre = b.path(shape.centre)
     arms = (arm, b.arm(shape.centre))
     meeting = InField(field, radius, path - centre, arms, (path.start, centre.start), axes(b, shape))
-    return contact_along(meeting.gap, b.dt, meeting, NEWTON_STEPS)
+    return contact_along(meeting, b.dt, NEWTON_STEPS)
