@@ -93,14 +93,19 @@ def candidates(a: Block, b: Block) -> list[Parabola]:
     return [*a.axes, *b.axes, *(one.cross(other) for one in a.axes for other in b.axes)]
 
 
-def separations(a: Block, b: Block, directions: list[Parabola], t: Expr) -> list[Expr]:
-    """How far apart two boxes are along each of the directions at time t [m]; negative where they overlap."""
-    apart, found = (a.centre - b.centre).at(t), []
+def separations(a: Block, b: Block, directions: list[Parabola], t: Expr, since: Expr | None = None) -> list[Expr]:
+    """How far apart two boxes are along each of the directions at time t [m]; negative where they overlap.
+
+    With ``since``, an earlier time, boxes that have passed each other from then to t count as overlapping.
+    """
+    centres, found = a.centre - b.centre, []
     size = sum(a.halves) + sum(b.halves)
     for k, direction in enumerate(directions):
         along = direction.at(t)
         square = ca.dot(along, along)
-        distance = ca.fabs(ca.dot(apart, along)) - a.reach(along, t) - b.reach(along, t)
+        apart = ca.dot(centres.at(t), along)
+        before = apart if since is None else ca.dot(centres.at(since), direction.at(since))
+        distance = ca.if_else(before >= 0, apart, -apart) - a.reach(along, t) - b.reach(along, t)
         if k < len(a.axes) + len(b.axes):
             found.append(distance / ca.sqrt(square))
             continue

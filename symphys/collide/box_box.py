@@ -26,7 +26,7 @@ from symphys.shapes import Box
 Expr = Any
 """casadi SX"""
 
-RIM = 0.01
+RIM = 0.001
 """Of a face's size: how far beyond its rim a corner still counts, as a point of the rim. So no candidate comes and
 goes as boxes that lie flush creep by rounding; it is given up only where others have long been at the same place."""
 FLAT = 1e-9
@@ -64,7 +64,7 @@ def box_box(first: Box, second: Box, a: Course, b: Course) -> list[Contact]:
     """Sixteen points: the corners of each face over the other, and where their edges cross."""
     one, other = block(first, a), block(second, b)
     directions = candidates(one, other)
-    ends = [separations(one, other, directions, t) for t in (ca.SX(0), a.dt)]
+    ends = [separations(one, other, directions, t, since=0) for t in (ca.SX(0), a.dt)]
     time = meeting_time(ends[0], ends[1], a.dt)
     chosen, distance = farthest(directions, separations(one, other, directions, time))
     apart = (one.centre - other.centre).at(time)

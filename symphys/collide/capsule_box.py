@@ -25,7 +25,7 @@ def capsule_box(capsule: Capsule, box: Box, a: Course, b: Course) -> list[Contac
     found = [ball_in_field(a.path(end), a.arm(end), capsule.radius, box, field, b) for end in tips]
     rod, other = Block(a.path(capsule.centre), axes(a, capsule), (0.0, 0.0, capsule.half_length)), block(box, b)
     directions = [*rod.axes, *other.axes, *(rod.axes[2].cross(edge) for edge in other.axes)]
-    distances = [separations(rod, other, directions, t)[3:] for t in (ca.SX(0), a.dt)]
+    distances = [separations(rod, other, directions, t, since=0)[3:] for t in (ca.SX(0), a.dt)]
     shrunk = [[distance - capsule.radius for distance in some] for some in distances]
     time = meeting_time(shrunk[0], shrunk[1], a.dt)
     chosen, distance = farthest(directions[3:], separations(rod, other, directions, time)[3:])

@@ -47,7 +47,7 @@ def crossing(first: Capsule, second: Capsule, a: Course, b: Course) -> Contact:
     far = ca.sqrt(ca.dot(apart.start, apart.start)) + reach
     # the gap along the common perpendicular is the same from any points of the two axes
     anywhere = Witness(centres, centres, normal, (first.radius, second.radius), parallel, far, a.dt)
-    time = contact_along(anywhere.gap, a.dt, anywhere).time
+    time = contact_along(anywhere, a.dt).time
     s, u = nearest(apart.at(time), lines[0].at(time), lines[1].at(time))
     outside = ca.logic_or(ca.fabs(s) > first.half_length, ca.fabs(u) > second.half_length)
     points = centres[0] + s * lines[0], centres[1] + u * lines[1]

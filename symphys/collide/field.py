@@ -13,6 +13,9 @@ from symphys.collide.touch import contact_along
 from symphys.course import Course, Parabola
 from symphys.shapes import Box, Capsule
 
+NEWTON_STEPS = 5
+"""Towards the instant of touch: with 3 a tenth of what flies through a thin wall in one step is not seen to hit it."""
+
 
 class Field(Protocol):
     """Distances from a shape at the origin. Implementations are frozen dataclasses."""
@@ -82,4 +85,4 @@ def ball_in_field(
     centre = b.path(shape.centre)
     arms = (arm, b.arm(shape.centre))
     meeting = InField(field, radius, path - centre, arms, (path.start, centre.start), axes(b, shape))
-    return contact_along(meeting.gap, b.dt, meeting)
+    return contact_along(meeting, b.dt, NEWTON_STEPS)

@@ -10,6 +10,7 @@ import casadi as ca
 from symphys import rotation
 from symphys.course import Course, Parabola
 from symphys.shapes import UPRIGHT, Box, Capsule, Shape, Sphere
+from symphys.world import is_zero
 
 Expr = Any
 """casadi SX or a float"""
@@ -36,7 +37,7 @@ def placed(shape: Capsule | Box, point: Offset) -> Offset:
 
 def turned_by(orientation: tuple[Any, ...], vector: Offset) -> Offset:
     """A vector after a rotation; unchanged, and without arithmetic, where that is none."""
-    if orientation == UPRIGHT:
+    if all(is_zero(c - unit) for c, unit in zip(orientation, UPRIGHT, strict=True)):
         return vector
     x, y, z = ca.vertsplit(rotation.rotate(ca.vertcat(*map(ca.SX, orientation)), ca.vertcat(*map(ca.SX, vector))))
     return (x, y, z)

@@ -111,7 +111,7 @@ def ball_on_terrain(offset: Sequence[Any], radius: Expr, terrain: Terrain, a: Co
         meeting = InField(
             Paraboloid(xy, *surface(xy)), radius, path, (a.arm(offset), STAYS), (path.start, STAYS.start), axes
         )
-        contact = contact_along(meeting.gap, a.dt, meeting)
+        contact = contact_along(meeting, a.dt)
         centre = path.at(contact.time)
     assert contact is not None
     return contact

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, Protocol
 
 import casadi as ca
 
@@ -42,23 +43,63 @@ def first_root(gap: Expr, rate: Expr, bend: Expr, dt: Expr) -> Expr:
     return ca.fmin(ca.if_else(falls(gap, rate), 2 * gap, 0) / closing, dt)
 
 
-def contact_along(gap: Callable[[Expr], Expr], dt: Expr, meeting: Meeting) -> Contact:
-    """The contact of surfaces whose gap [m] at any time t of the step is ``gap(t)``.
+class Timed(Meeting, Protocol):
+    """A meeting that knows its gap at any time."""
 
-    The first root by the parabola that osculates at t = 0, then Newton steps, which converge from there without
-    overshooting where the gap is a convex function of time, as that of convex shapes in uniform motion is.
+    def gap(self, t: Expr) -> Expr:
+        """[m] at time t in the step."""
+        ...
+
+
+def contact_along(meeting: Timed, dt: Expr, newton_steps: int = NEWTON_STEPS) -> Contact:
+    """The contact of surfaces whose gap is a function of time.
+
+    The first root by the parabola that osculates at t = 0, then Newton steps. The gap of convex shapes in uniform
+    motion is a convex function of time: from before the root, or from beyond it while the gap still falls, these
+    converge without overshooting. Where the parabola leads to beyond the nearest approach they begin at the tangent's
+    root instead, which lies before it.
     """
-    t = ca.SX.sym("t")
-    value = gap(t)
-    rate = ca.gradient(value, t)
-    both, bend = ca.vertcat(value, rate), ca.gradient(rate, t)
-    start, pace, curve = ca.vertsplit(ca.substitute(ca.vertcat(both, bend), t, 0))
-    time = first_root(start, pace, curve, dt)
-    for _ in range(NEWTON_STEPS):
-        here, slope = ca.vertsplit(ca.substitute(both, t, time))
-        time = ca.fmin(ca.fmax(time - here / ca.fmin(slope, -TINY_RATE), 0), dt)
+    at = gap_rate_bend(meeting)
+    start, pace, curve = at(ca.SX(0))
+    time, straight = first_root(start, pace, curve, dt), start / ca.fmax(-pace, TINY_RATE)
+    for _ in range(newton_steps):
+        here, slope, _ = at(time)
+        better = ca.if_else(slope < 0, time - here / ca.fmin(slope, -TINY_RATE), straight)
+        time = ca.fmin(ca.fmax(better, 0), dt)
     time = ca.if_else(falls(start, pace), time, 0)
-    here, slope = ca.vertsplit(ca.substitute(both, t, time))
+    here, slope, _ = at(time)
     through = ca.logic_and(ca.logic_and(time > 0, time < dt), ca.logic_and(ca.fabs(here) < FOUND, slope < 0))
-    hit = ca.fmax(ca.substitute(value, t, dt) < 0, through)
+    hit = ca.fmax(at(dt)[0] < 0, through)
     return Contact(start, pace, hit, time, meeting)
+
+
+def gap_rate_bend(meeting: Timed) -> Callable[[Expr], list[Expr]]:
+    """The gap and its two derivatives at a time.
+
+    They are worked out with symbols in place of the expressions that the meeting is made of: casadi would otherwise
+    look through all that these depend on, each time.
+    """
+    t, symbols, values = ca.SX.sym("t"), list[Expr](), list[Expr]()
+    gap = on_symbols(meeting, symbols, values).gap(t)
+    rate = ca.gradient(gap, t)
+    function = ca.Function("gap", [t, *symbols], [gap, rate, ca.gradient(rate, t)])
+    return lambda time: list(function.call([time, *values]))
+
+
+def on_symbols(tree: Any, symbols: list[Expr], values: list[Expr]) -> Any:
+    """A tree of dataclasses and tuples with a symbol for each of its numbers, but for constants; they are appended."""
+    if isinstance(tree, ca.SX):
+        found = [number for number in tree.nonzeros() if not number.is_constant()]
+        symbols.append(ca.SX.sym("part", len(found)))
+        values.append(ca.vertcat(ca.SX(0, 1), *found))
+        fresh = iter(symbols[-1].nonzeros())
+        return ca.SX(
+            tree.sparsity(),
+            ca.vertcat(ca.SX(0, 1), *(n if n.is_constant() else next(fresh) for n in tree.nonzeros())),
+        )
+    if isinstance(tree, tuple):
+        return tuple(on_symbols(part, symbols, values) for part in tree)
+    if is_dataclass(tree) and not isinstance(tree, type):
+        parts = {each.name: on_symbols(getattr(tree, each.name), symbols, values) for each in fields(tree)}
+        return replace(tree, **parts)
+    return tree

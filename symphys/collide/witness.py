@@ -60,7 +60,7 @@ class Witness:
 
 def contact_of(witness: Witness) -> Contact:
     """The contact of a witness; none within the step where it is off."""
-    met, off = contact_along(witness.gap, witness.end, witness), witness.off
+    met, off = contact_along(witness, witness.end), witness.off
     return Contact(
         gap=ca.if_else(off, witness.far, met.gap),
         rate=ca.if_else(off, 0, met.rate),
