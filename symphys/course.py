@@ -58,6 +58,15 @@ STAYS = Parabola(ca.SX.zeros(3), ca.SX.zeros(3), ca.SX.zeros(3))
 """The course of a vector that is zero."""
 
 
+def chosen(condition: Expr, one: Parabola, other: Parabola) -> Parabola:
+    """The first course where the condition is 1, else the other."""
+    return Parabola(
+        ca.if_else(condition, one.start, other.start),
+        ca.if_else(condition, one.velocity, other.velocity),
+        ca.if_else(condition, one.acceleration, other.acceleration),
+    )
+
+
 @dataclass(frozen=True)
 class Course:
     """A body's pose over the step.

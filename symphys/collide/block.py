@@ -8,7 +8,8 @@ from typing import Any
 import casadi as ca
 
 from symphys.collide.placing import axes
-from symphys.course import Course, Parabola
+from symphys.collide.witness import steady
+from symphys.course import Course, Parabola, chosen
 from symphys.shapes import Box
 
 Expr = Any
@@ -18,6 +19,8 @@ PARALLEL = 1e-6
 """Square of the sine of the angle below which edges count as parallel."""
 FACES_FIRST = 1e-6
 """Of the boxes' size: how much farther apart than faces edges must be for a contact of edges."""
+TINY_CHANGE = 1e-15
+"""[m] a distance that changes less than this over the step does not change."""
 
 
 @dataclass(frozen=True)
@@ -68,11 +71,11 @@ def facing(box: Block, direction: Expr, t: Expr) -> Face:
     along = [ca.dot(axis.at(t), direction) for axis in box.axes]
     first = ca.logic_and(ca.fabs(along[0]) >= ca.fabs(along[1]), ca.fabs(along[0]) >= ca.fabs(along[2]))
     second = ca.logic_and(ca.logic_not(first), ca.fabs(along[1]) >= ca.fabs(along[2]))
-    chosen = (first, second, ca.logic_not(ca.logic_or(first, second)))
+    which = (first, second, ca.logic_not(ca.logic_or(first, second)))
 
     def pick(values: list[Any]) -> Any:
-        total = chosen[0] * values[0]
-        for share, value in zip(chosen[1:], values[1:], strict=True):
+        total = which[0] * values[0]
+        for share, value in zip(which[1:], values[1:], strict=True):
             total = total + share * value
         return total
 
@@ -88,50 +91,66 @@ def facing(box: Block, direction: Expr, t: Expr) -> Face:
     )
 
 
-def candidates(a: Block, b: Block) -> list[Parabola]:
-    """The directions along which two boxes can be apart: face normals of both, then edge across edge."""
-    return [*a.axes, *b.axes, *(one.cross(other) for one in a.axes for other in b.axes)]
+def faces_and_edges(a: Block, b: Block) -> tuple[list[Parabola], list[Parabola]]:
+    """The directions along which two boxes can be apart: face normals of both, and edge across edge."""
+    return [*a.axes, *b.axes], [one.cross(other) for one in a.axes for other in b.axes]
 
 
-def separations(a: Block, b: Block, directions: list[Parabola], t: Expr, since: Expr | None = None) -> list[Expr]:
-    """How far apart two boxes are along each of the directions at time t [m]; negative where they overlap.
+@dataclass(frozen=True)
+class Nearing:
+    """How two boxes come to overlap, along the direction along which they do so last.
 
-    With ``since``, an earlier time, boxes that have passed each other from then to t count as overlapping.
+    Attributes:
+        direction: its course, from the second to the first.
+        time: when they begin to overlap along it; 0 if they overlap from the start, the end of the step if never.
+        distance: along it, at the start [m].
+        apart: 1 if they never overlap along all directions at once.
     """
-    centres, found = a.centre - b.centre, []
+
+    direction: Parabola
+    time: Expr
+    distance: Expr
+    apart: Expr
+
+
+def nearing(a: Block, b: Block, faces: list[Parabola], edges: list[Parabola], dt: Expr, radius: Expr = 0.0) -> Nearing:
+    """How two boxes, the first of them grown by ``radius``, come to overlap; the first of equal directions."""
+    ends = [places(a, b, faces, edges, t, radius) for t in (ca.SX(0), dt)]
+    best, last, largest, first_exit = faces[0], ca.SX(-1), ca.SX(0), ca.SX(1)
+    for direction, (before, reach), (after, reach_after) in zip([*faces, *edges], *ends, strict=True):
+        side = ca.if_else(before >= 0, 1, -1)
+        start, end = side * before - reach, side * after - reach_after
+        enters = ca.if_else(start > 0, crossed(start, end), 0)
+        leaves = ca.if_else(start > 0, 1, crossed(start, end))
+        passes = crossed(-side * before - reach, -side * after - reach_after)
+        first_exit = ca.fmin(first_exit, ca.fmin(leaves, passes))
+        later = ca.logic_or(enters > last, ca.logic_and(enters == last, start > largest))
+        best, last = chosen(later, side * direction, best), ca.if_else(later, enters, last)
+        largest = ca.if_else(later, start, largest)
+    apart = ca.logic_or(last > first_exit, last >= 1)
+    return Nearing(steady(best, last * dt, dt), last * dt, largest, apart)
+
+
+def crossed(start: Expr, end: Expr) -> Expr:
+    """The share of the step after which a distance that changes evenly is 0; 1 if it never is."""
+    crosses = ca.logic_and(start * end <= 0, ca.fabs(start - end) > TINY_CHANGE)
+    return ca.if_else(crosses, start / ca.if_else(crosses, start - end, 1), 1)
+
+
+def places(
+    a: Block, b: Block, faces: list[Parabola], edges: list[Parabola], t: Expr, radius: Expr
+) -> list[tuple[Expr, Expr]]:
+    """Along each direction at time t: how far the first box is from the second, and how near is overlapping [m]."""
+    apart, found = (a.centre - b.centre).at(t), []
     size = sum(a.halves) + sum(b.halves)
-    for k, direction in enumerate(directions):
+    for k, direction in enumerate([*faces, *edges]):
         along = direction.at(t)
         square = ca.dot(along, along)
-        apart = ca.dot(centres.at(t), along)
-        before = apart if since is None else ca.dot(centres.at(since), direction.at(since))
-        distance = ca.if_else(before >= 0, apart, -apart) - a.reach(along, t) - b.reach(along, t)
-        if k < len(a.axes) + len(b.axes):
-            found.append(distance / ca.sqrt(square))
+        place, reach = ca.dot(apart, along), a.reach(along, t) + b.reach(along, t)
+        if k < len(faces):
+            found.append((place / ca.sqrt(square), reach / ca.sqrt(square) + radius))
             continue
-        edges = distance / ca.sqrt(ca.fmax(square, PARALLEL)) - FACES_FIRST * size
-        found.append(ca.if_else(square < PARALLEL, -2 * size, edges))
+        parallel, scale = square < PARALLEL, ca.sqrt(ca.fmax(square, PARALLEL))
+        across = ca.if_else(parallel, 2 * size, reach / scale + FACES_FIRST * size)
+        found.append((ca.if_else(parallel, 0, place / scale), across + radius))
     return found
-
-
-def meeting_time(before: list[Expr], after: list[Expr], dt: Expr) -> Expr:
-    """When two boxes stop being apart along every direction, from their distances at the start and the end."""
-    time: Expr = ca.SX(0)
-    for start, end in zip(before, after, strict=True):
-        share = ca.if_else(end < 0, start / ca.fmax(start - end, 1e-12), 1)
-        time = ca.fmax(time, ca.if_else(start > 0, dt * ca.fmin(share, 1), 0))
-    return time
-
-
-def farthest(directions: list[Parabola], distances: list[Expr]) -> tuple[Parabola, Expr]:
-    """The direction along which two boxes are farthest apart, and that distance; the first of equals."""
-    best, largest = directions[0], distances[0]
-    for direction, distance in zip(directions[1:], distances[1:], strict=True):
-        better = distance > largest
-        best = Parabola(
-            ca.if_else(better, direction.start, best.start),
-            ca.if_else(better, direction.velocity, best.velocity),
-            ca.if_else(better, direction.acceleration, best.acceleration),
-        )
-        largest = ca.fmax(distance, largest)
-    return best, largest

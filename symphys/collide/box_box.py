@@ -12,12 +12,12 @@ was on both bodies for the rest of the step.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
 
-from symphys.collide.block import Face, block, candidates, facing, farthest, meeting_time, separations
+from symphys.collide.block import Face, Nearing, block, faces_and_edges, facing, nearing
 from symphys.collide.contact import Contact, flipped
 from symphys.collide.witness import Witness, contact_of
 from symphys.course import Course, Parabola
@@ -41,37 +41,39 @@ class Approach:
         bodies: courses of the bodies that carry them.
         normal: course of the direction that keeps them apart, from the second to the first.
         time: when they are expected to meet [s].
+        apart: 1 if they stay apart over the step.
         far: the gap that points have which are no candidates [m].
     """
 
     bodies: tuple[Course, Course]
     normal: Parabola
     time: Expr
+    apart: Expr
     far: Expr
 
     def contact(self, points: tuple[Parabola, Parabola], normal: Parabola, on: Expr, radius: Expr = 0.0) -> Contact:
         """Of two points."""
         arms = points[0] - self.bodies[0].centre(), points[1] - self.bodies[1].centre()
-        off = ca.logic_not(on)
-        return contact_of(Witness(points, arms, normal, (radius, 0.0), off, self.far, self.bodies[0].dt))
+        met = contact_of(Witness(points, arms, normal, (radius, 0.0), ca.logic_not(on), self.far, self.bodies[0].dt))
+        return replace(met, hit=ca.logic_and(met.hit, ca.logic_not(self.apart)))
 
     def flipped(self) -> Approach:
         """Seen from the other box."""
-        return Approach((self.bodies[1], self.bodies[0]), -1 * self.normal, self.time, self.far)
+        return replace(self, bodies=(self.bodies[1], self.bodies[0]), normal=-1 * self.normal)
+
+
+def approach_of(near: Nearing, bodies: tuple[Course, Course], size: Expr) -> Approach:
+    """Of two boxes of a size."""
+    return Approach(bodies, near.direction, near.time, near.apart, ca.fmax(near.distance, 0) + size)
 
 
 def box_box(first: Box, second: Box, a: Course, b: Course) -> list[Contact]:
     """Sixteen points: the corners of each face over the other, and where their edges cross."""
     one, other = block(first, a), block(second, b)
-    directions = candidates(one, other)
-    ends = [separations(one, other, directions, t, since=0) for t in (ca.SX(0), a.dt)]
-    time = meeting_time(ends[0], ends[1], a.dt)
-    chosen, distance = farthest(directions, separations(one, other, directions, time))
-    apart = (one.centre - other.centre).at(time)
-    normal = ca.if_else(ca.dot(apart, chosen.at(time)) >= 0, 1, -1) * chosen
-    far = ca.fmax(distance, 0) + sum(first.half_sizes) + sum(second.half_sizes)
-    approach = Approach((a, b), normal, time, far)
-    face, ground = facing(one, -normal.at(time), time), facing(other, normal.at(time), time)
+    near = nearing(one, other, *faces_and_edges(one, other), a.dt)
+    approach = approach_of(near, (a, b), sum(first.half_sizes) + sum(second.half_sizes))
+    normal, time = approach.normal.at(near.time), near.time
+    face, ground = facing(one, -normal, time), facing(other, normal, time)
     return [
         *corners_over(face, ground, approach),
         *map(flipped, corners_over(ground, face, approach.flipped())),

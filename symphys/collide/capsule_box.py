@@ -6,10 +6,8 @@ the capsule.
 
 from __future__ import annotations
 
-import casadi as ca
-
-from symphys.collide.block import Block, block, facing, farthest, meeting_time, separations
-from symphys.collide.box_box import Approach, edges_across
+from symphys.collide.block import Block, block, facing, nearing
+from symphys.collide.box_box import approach_of, edges_across
 from symphys.collide.contact import Contact, flipped
 from symphys.collide.field import ball_in_field
 from symphys.collide.placing import axes, ends
@@ -24,16 +22,10 @@ def capsule_box(capsule: Capsule, box: Box, a: Course, b: Course) -> list[Contac
     field, tips = BoxField(box.half_sizes), ends(capsule)
     found = [ball_in_field(a.path(end), a.arm(end), capsule.radius, box, field, b) for end in tips]
     rod, other = Block(a.path(capsule.centre), axes(a, capsule), (0.0, 0.0, capsule.half_length)), block(box, b)
-    directions = [*rod.axes, *other.axes, *(rod.axes[2].cross(edge) for edge in other.axes)]
-    distances = [separations(rod, other, directions, t, since=0)[3:] for t in (ca.SX(0), a.dt)]
-    shrunk = [[distance - capsule.radius for distance in some] for some in distances]
-    time = meeting_time(shrunk[0], shrunk[1], a.dt)
-    chosen, distance = farthest(directions[3:], separations(rod, other, directions, time)[3:])
-    apart = (rod.centre - other.centre).at(time)
-    normal = ca.if_else(ca.dot(apart, chosen.at(time)) >= 0, 1, -1) * chosen
-    far = ca.fmax(distance, 0) + capsule.half_length + sum(box.half_sizes)
-    approach = Approach((a, b), normal, time, far)
-    ground = facing(other, normal.at(time), time)
+    edges = [rod.axes[2].cross(edge) for edge in other.axes]
+    near = nearing(rod, other, list(other.axes), edges, a.dt, capsule.radius)
+    approach = approach_of(near, (a, b), capsule.half_length + sum(box.half_sizes))
+    ground = facing(other, near.direction.at(near.time), near.time)
     found += edges_across([a.path(end) for end in tips], ground, approach, capsule.radius)
     side = CapsuleField(capsule.radius, capsule.half_length)
     corners = [ball_in_field(c, c - b.centre(), 0.0, capsule, side, a) for c in ground.corners()]

@@ -13,9 +13,10 @@ from symphys.collide.field import ball_in_field
 from symphys.collide.placing import axes, ends
 from symphys.collide.sphere_capsule import CapsuleField
 from symphys.collide.touch import contact_along
-from symphys.collide.witness import Witness, contact_of
-from symphys.course import Course, Parabola
+from symphys.collide.witness import Witness, contact_of, steady
+from symphys.course import Course, Parabola, chosen
 from symphys.shapes import Capsule
+from symphys.smooth import length
 
 PARALLEL = 1e-6
 """Square of the sine of the angle below which axes count as parallel."""
@@ -40,11 +41,12 @@ def crossing(first: Capsule, second: Capsule, a: Course, b: Course) -> Contact:
     """The contact between the ends of both; off where the nearest points are ends or the axes parallel."""
     centres, lines = (a.path(first.centre), b.path(second.centre)), (axes(a, first)[2], axes(b, second)[2])
     apart, across = centres[0] - centres[1], lines[0].cross(lines[1])
-    normal = ca.if_else(ca.dot(across.start, apart.start) >= 0, 1, -1) * across
     parallel = ca.dot(across.start, across.start) < PARALLEL
-    normal = Parabola(ca.if_else(parallel, ca.SX([0, 0, 1]), normal.start), normal.velocity, normal.acceleration)
+    upright = Parabola(ca.SX([0, 0, 1]), ca.SX.zeros(3), ca.SX.zeros(3))
+    sign = ca.if_else(ca.dot(across.start, apart.start) >= 0, 1, -1)
+    normal = steady(chosen(parallel, upright, sign * across), 0, a.dt)
     reach = first.radius + second.radius
-    far = ca.sqrt(ca.dot(apart.start, apart.start)) + reach
+    far = length(apart.start) + reach
     # the gap along the common perpendicular is the same from any points of the two axes
     anywhere = Witness(centres, centres, normal, (first.radius, second.radius), parallel, far, a.dt)
     time = contact_along(anywhere, a.dt).time

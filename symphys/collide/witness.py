@@ -10,6 +10,7 @@ import casadi as ca
 from symphys.collide.contact import Contact, Frame, Shift
 from symphys.collide.touch import contact_along
 from symphys.course import Parabola
+from symphys.smooth import length
 
 Expr = Any
 """casadi SX, MX or DM"""
@@ -55,7 +56,17 @@ class Witness:
 
     def _direction(self, t: Expr) -> Expr:
         n = self.normal.at(t)
-        return n / ca.sqrt(ca.dot(n, n))
+        return n / length(n)
+
+
+def steady(normal: Parabola, t: Expr, dt: Expr) -> Parabola:
+    """The course of a vector; one that changes by more than half of its length at ``t`` stays as it is then.
+
+    The common perpendicular of edges that are nearly parallel may turn right round within a step, or vanish.
+    """
+    now, change = normal.at(t), normal.at(dt) - normal.start
+    keep = 4 * ca.dot(change, change) < ca.dot(now, now)
+    return Parabola(ca.if_else(keep, normal.start, now), keep * normal.velocity, keep * normal.acceleration)
 
 
 def contact_of(witness: Witness) -> Contact:
