@@ -16,7 +16,7 @@ from symphys import rotation
 from symphys.collide import collide
 from symphys.collide.contact import Shift
 from symphys.course import Course, at_rest
-from symphys.shapes import Box, Capsule, Plane, Sphere, Surface, Terrain
+from symphys.shapes import Box, Capsule, Sphere, Surface
 
 Array = NDArray[np.float64]
 WIDTHS = {"sphere": 1, "capsule": 2, "box": 3}
@@ -88,7 +88,8 @@ def rule(first: str, second: str, static: bool = False, surface: Surface | None 
     found = contacts(first, second, symbols, static, surface)
     frames = [contact.meeting.frame(contact.time) for contact in found]
     columns = [ca.vertcat(*(getattr(c, name) for c in found)) for name in ("gap", "rate", "hit", "time")]
-    columns += [ca.horzcat(*(ca.densify(each) for each in column)).T for column in zip(*((f.normal, *f.arms) for f in frames))]
+    parts = zip(*((f.normal, *f.arms) for f in frames), strict=True)
+    columns += [ca.horzcat(*(ca.densify(each) for each in column)).T for column in parts]
     return ca.Function("meet", symbols, [ca.densify(ca.SX(column)) for column in columns])
 
 
