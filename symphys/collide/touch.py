@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass, replace
 from typing import Any, Protocol
 
@@ -89,14 +89,13 @@ def gap_rate_bend(meeting: Timed) -> Callable[[Expr], list[Expr]]:
 def on_symbols(tree: Any, symbols: list[Expr], values: list[Expr]) -> Any:
     """A tree of dataclasses and tuples with a symbol for each of its numbers, but for constants; they are appended."""
     if isinstance(tree, ca.SX):
-        found = [number for number in tree.nonzeros() if not number.is_constant()]
+        numbers: list[Expr] = tree.nonzeros()
+        found = [number for number in numbers if not number.is_constant()]
         symbols.append(ca.SX.sym("part", len(found)))
         values.append(ca.vertcat(ca.SX(0, 1), *found))
-        fresh = iter(symbols[-1].nonzeros())
-        return ca.SX(
-            tree.sparsity(),
-            ca.vertcat(ca.SX(0, 1), *(n if n.is_constant() else next(fresh) for n in tree.nonzeros())),
-        )
+        fresh: Iterator[Expr] = iter(symbols[-1].nonzeros())
+        entries = [n if n.is_constant() else next(fresh) for n in numbers]
+        return ca.SX(tree.sparsity(), ca.vertcat(ca.SX(0, 1), *entries))
     if isinstance(tree, tuple):
         return tuple(on_symbols(part, symbols, values) for part in tree)
     if is_dataclass(tree) and not isinstance(tree, type):
