@@ -31,9 +31,10 @@ bench: $(VENV)/.benching  ## measure what BENCHMARKS.md reports; figures go to b
 	$(BIN)/python benchmarks/against_mujoco.py
 
 gallery: $(VENV)/.installed  ## make the figures of the README again
-	$(BIN)/symphys solve ball_throw bank_shot sled --out build/gallery
+	$(BIN)/symphys solve ball_throw bank_shot sled basket knock putt --out build/gallery
 	cp build/gallery/figures/ball_throw-motion.svg build/gallery/figures/ball_throw-convergence.svg \
-	    build/gallery/figures/bank_shot-motion.svg reports/gallery/
+	    build/gallery/figures/bank_shot-motion.svg build/gallery/figures/basket-motion.svg \
+	    build/gallery/figures/knock-motion.svg build/gallery/figures/putt-motion.svg reports/gallery/
 	cp build/gallery/sled/ipopt-seed0/figures/convergence.svg reports/gallery/sled-stages.svg
 
 clean:  ## remove what the other targets made, reports aside

@@ -12,8 +12,27 @@ from symphys import problems
 from symphys.errors import SymphysError
 from symphys.problem import load_problem
 
+SHIPPED = [
+    "ball_throw",
+    "bank_shot",
+    "basket",
+    "bowling",
+    "juggle",
+    "knock",
+    "parcel",
+    "putt",
+    "row_of_balls",
+    "sled",
+    "stairs",
+    "two_balls",
+]
 
-@pytest.mark.parametrize("name", ["ball_throw", "bank_shot", "sled", "two_balls"])
+
+def test_all_are_listed_here() -> None:
+    assert list(problems.catalogue()) == SHIPPED
+
+
+@pytest.mark.parametrize("name", SHIPPED)
 def test_shipped_problems_are_valid(name: str) -> None:
     problem = load_problem(problems.catalogue()[name])
     assert problem.name == name

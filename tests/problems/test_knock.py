@@ -1,0 +1,55 @@
+"""A crate knocked by a ball: the impact by its formula, the slide by solvers that agree."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shipped import Array, shipped, solve, work
+
+KICK = [4.8734, 1.7859, -0.1319]
+"""As the time step goes to 0, from 10 ms, 5 ms and 2.5 ms."""
+BALL, CRATE, RADIUS, RESTITUTION = 0.5, 1.0, 0.1, 0.5
+INERTIA = CRATE * (0.3**2 + 0.4**2) / 12
+
+
+def hit(velocity: Array, side: float) -> Array:
+    """(3,): velocity and rate of turn of the crate after an impact in which the ball does not slip."""
+    arms = {"crate": np.array([-0.15, side]), "ball": np.array([RADIUS, 0.0])}
+    inverse = np.zeros((2, 2))
+    for name, mass, inertia in (("crate", CRATE, INERTIA), ("ball", BALL, 0.4 * BALL * RADIUS**2)):
+        across = np.array([-arms[name][1], arms[name][0]])
+        inverse += np.eye(2) / mass + np.outer(across, across) / inertia
+    impulse = np.linalg.solve(inverse, velocity * [1 + RESTITUTION, 1])
+    assert abs(impulse[1]) < 0.2 * impulse[0]  # friction holds
+    across = np.array([-arms["crate"][1], arms["crate"][0]])
+    return np.array([*impulse / CRATE, across @ impulse / INERTIA])
+
+
+def test_the_impact_is_that_of_the_formula() -> None:
+    """The crate stands on the floor all the time, and the floor has one step of 10 ms at most to brake it."""
+    made = shipped("knock")
+    motion = made.simulate(np.array(KICK))
+    after = hit(np.array(KICK[:2]), KICK[2] + KICK[1] * 0.25 / KICK[0])
+    assert np.allclose(after, [2.4008, 0.2734, 2.674], rtol=0, atol=1e-3)
+    k = int(np.argmax(motion.velocity[:, 0, 0] > 1))
+    brake = 0.3 * 9.81 * 0.01
+    assert np.allclose(motion.velocity[k, 0, :2], after[:2], rtol=0, atol=brake)
+    assert motion.velocity[k, 0, 0] < after[0]
+    assert motion.angular_velocity[k, 0, 2] == pytest.approx(after[2], abs=0.05)
+
+
+def test_least_squares_finds_the_kick() -> None:
+    found = solve("least_squares", shipped("knock"), polish=True)
+    assert np.allclose(found.z, KICK, rtol=0, atol=[1e-4, 4e-3, 3e-4])
+    assert found.counts.jacobians <= 7
+
+
+@pytest.mark.parametrize(("name", "most"), [("gradient", 40), ("ipopt", 18), ("cma", 350)])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_every_solver_knocks_it_into_place(name: str, most: int, seed: int) -> None:
+    """The way of the kick across and its place trade off against each other; its way along does not."""
+    made = shipped("knock")
+    found = solve(name, made, seed)
+    assert made.judge(found.z).solved
+    assert found.z[0] == pytest.approx(KICK[0], abs=0.02)
+    assert work(found) <= most

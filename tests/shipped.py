@@ -1,0 +1,37 @@
+"""The shipped problems, transcribed once, and solved with the options of their files."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys import problems
+from symphys.problem import load_problem, validate_options
+from symphys.solvers import Outcome, solver
+from symphys.transcription import Transcription, transcribe
+
+Array = NDArray[np.float64]
+
+
+@cache
+def shipped(name: str) -> Transcription:
+    """A shipped problem."""
+    return transcribe(load_problem(problems.find(name)))
+
+
+def solve(name: str, made: Transcription, seed: int = 0, polish: bool = False) -> Outcome:
+    """What ``symphys solve --solver NAME`` finds from that seed; ``polish``: it goes on when all is met."""
+    chosen, problem, shooting = solver(name), made.problem, made.shooting
+    if polish:
+        shooting = replace(shooting, stop_when_met=False)
+    options = validate_options(chosen.Options, problem.solver_tables.get(name, {}), problem.file, name)
+    return chosen.solve(shooting, shooting.start(seed), options, seed)
+
+
+def work(found: Outcome) -> int:
+    """Gradients and Jacobians, or rollouts where there are none."""
+    counts = found.counts
+    return counts.gradients + counts.jacobians or counts.rollouts
