@@ -1,9 +1,10 @@
-"""How far a simulation depends on its step, and what that costs: each engine against itself at a 64th of a millisecond.
+"""How far a simulation depends on its step, and what that costs: each engine against itself at a 64th of a ms.
 
-The measure of Erez, Tassa and Todorov (2015). Scenes: a box tumbling to rest; capsules dropped in a heap. Error: distance
-of the bodies' centres from where the same engine has them at the fine step, root mean square over bodies and samples of a
-window that ends before chance rules; curves are medians over initial states, bands their quartiles. Engines differ in
-their law of contact, so an error says nothing of the other engine's motion. Run with ``make bench-contact``.
+The measure of Erez, Tassa and Todorov (2015). Scenes: a box tumbling to rest; capsules dropped in a heap. Error:
+distance of the bodies' centres from where the same engine has them at the fine step, root mean square over bodies and
+samples of a window that ends before chance rules; curves are medians over initial states, bands their quartiles. The
+engines differ in their law of contact, so an error says nothing of the other engine's motion. Run with
+``make bench-contact``.
 """
 
 from __future__ import annotations
@@ -66,18 +67,24 @@ class There:
         return lambda batch, count: runs.places(runs.along(states[:batch], round(SAMPLE / dt), count))
 
 
-def study(engine: Here | There, window: float, steps: Sequence[float] = STEPS, fine: float = FINE) -> Curve:
-    """Errors (steps, batch) [m], and CPU seconds for a simulated one: alone, and one of eight side by side."""
-    count, batch = round(window / SAMPLE), len(engine.scene.start)
+def errors_of(engine: Here | There, window: float, steps: Sequence[float], fine: float) -> Array:
+    """(steps, batch) [m]: rms distance from the run at the fine step, over bodies and samples of the window."""
+    count, batch, errors = round(window / SAMPLE), len(engine.scene.start), []
     exact = engine.runner(fine)(batch, count)
-    errors, alone, eight = [], [], []
+    for dt in steps:
+        distance = np.linalg.norm(engine.runner(dt)(batch, count) - exact, axis=-1)
+        errors.append(np.sqrt((distance**2).mean(axis=(0, 2))))
+    return np.array(errors)
+
+
+def study(engine: Here | There, window: float, steps: Sequence[float] = STEPS) -> Curve:
+    """Errors, and CPU seconds for a simulated one: alone, and a share of eight side by side."""
+    count, costs = round(window / SAMPLE), []
     for dt in steps:
         run = engine.runner(dt)
-        distance = np.linalg.norm(run(batch, count) - exact, axis=-1)
-        errors.append(np.sqrt((distance**2).mean(axis=(0, 2))))
-        alone.append(cheapest(partial(run, 1, count)) / window)
-        eight.append(cheapest(partial(run, 8, count)) / window / min(8, batch))
-    return Curve(engine.name, tuple(steps), np.array(errors), np.array(alone), np.array(eight))
+        run(1, 1)  # builds
+        costs.append([cheapest(partial(run, batch, count)) / window / batch for batch in (1, 8)])
+    return Curve(engine.name, tuple(steps), errors_of(engine, window, steps, FINE), *np.array(costs).T)
 
 
 def cheapest(call: Callable[[], object]) -> float:

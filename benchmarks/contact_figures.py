@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -23,12 +25,16 @@ LOOKS = {
     "MuJoCo, default contact": (style.VERMILION, "o", "-"),
     "MuJoCo, stiff contact": (style.ORANGE, "s", "-"),
     "MuJoCo, default, RK4": (style.PURPLE, "^", "-"),
-    "MuJoCo, linear spring": (style.VERMILION, "o", "-"),
-    "MuJoCo, gradual spring": (style.ORANGE, "s", "-"),
+    "MuJoCo, linear spring": (style.PURPLE, "v", "-"),
+    "MuJoCo, gradual spring": (style.GREY, "D", "-"),
 }
 """Colour, marker and line of each curve that is drawn: MuJoCo's are warm."""
 ORDERS_FROM = 0.25
 """Where lines of an order begin, at the largest step."""
+
+NOTE: dict[str, Any] = {"fontsize": 7.5, "color": style.SOFT}
+ROUNDING, WORST = 1e-12, 30.0
+"""Of gradients: what counts as rounding; the top of a figure, above which nothing is left of a gradient."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +84,7 @@ def slope(axes: Axes, order: int, steps: Array, top: float) -> None:
     y = top * (x / x[1]) ** order
     axes.plot(x, y, "--", color=style.FAINT, linewidth=0.9, zorder=1)
     axes.annotate(
-        f"order {order}", (x[0], y[0]), xytext=(-4, -2), textcoords="offset points", ha="right", fontsize=7.5,
-        color=style.SOFT,
+        f"order {order}", (x[0], y[0]), xytext=(-4, -2), textcoords="offset points", ha="right", **NOTE,
     )  # fmt: skip
 
 
@@ -127,13 +132,21 @@ def save(figure: Figure, path: Path) -> None:
 def gradient_figure(panels: dict[str, list[Curve]], path: Path) -> None:
     """A panel for each case: relative error of the gradient against the step."""
     with style.paper():
-        figure = Figure(figsize=(style.WIDTH, 6.4), layout="constrained")
-        shared: dict[str, object] = {}
+        figure = Figure(figsize=(style.WIDTH, 6.8), layout="constrained")
+        shared: dict[str, Artist] = {}
         for (title, curves), axes in zip(panels.items(), figure.subplots(2, 2).flat, strict=True):
             logarithmic(axes, title, "step [ms]", "relative error of the gradient")
             for curve in curves:
                 draw(axes, 1e3 * np.array(curve.steps), curve.errors, curve.label)
+            lowest = min(np.median(curve.errors, axis=1).min() for curve in curves)
+            axes.set_ylim(max(lowest, 1e-17) / 5, WORST)
+            named_steps(axes, curves[0].steps)
+            if lowest > ROUNDING:
+                slope(axes, 1, 1e3 * np.array(curves[0].steps), 0.5 * float(curves[0].errors[0].min()))
+            else:
+                axes.axhspan(axes.get_ylim()[0], ROUNDING, color=style.GROUND, zorder=0)
+                axes.text(1e3 * curves[0].steps[0], ROUNDING / 2, "rounding", ha="right", va="top", **NOTE)
             handles, labels = axes.get_legend_handles_labels()
             shared |= dict(zip(labels, handles, strict=True))
-        style.legend_above(figure, list(shared.values()), list(shared))
+        figure.legend(list(shared.values()), list(shared), loc="outside upper left", ncols=3)
         save(figure, path)

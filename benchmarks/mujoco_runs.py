@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
-from mujoco import rollout
 from numpy.typing import NDArray
 from scenes import Scene
+
+try:
+    import mujoco
+    from mujoco import rollout
+except ImportError:  # what is measured of this engine alone goes without
+    mujoco = rollout = None
 
 Array = NDArray[np.float64]
 

@@ -70,6 +70,7 @@ class Scene:
         start: (batch, solids, 13) position, orientation w x y z, velocity, angular velocity (world frame).
         friction: of everything.
         gravity: downwards [m/s^2].
+        lean: gravity along x, as on an incline; this engine only.
     """
 
     name: str
@@ -77,11 +78,12 @@ class Scene:
     start: Array
     friction: float = 0.5
     gravity: float = 9.81
+    lean: float = 0.0
 
     def world(self, restitution: float = 0.0) -> World:
         """For this engine."""
         bodies, law = [solid.body() for solid in self.solids], Law(self.friction, restitution)
-        return make_world(bodies, [Plane.ground()], law, (0, 0, -self.gravity))
+        return make_world(bodies, [Plane.ground()], law, (self.lean, 0, -self.gravity))
 
     def states(self, world: World) -> Array:
         """(batch, nx) the initial states for this engine."""
@@ -130,4 +132,3 @@ def heap_of_capsules(side: int = 2, batch: int = 8) -> Scene:
     start[:, :, 10:] = rng.uniform(-2, 2, (batch, count, 3))
     solids: Sequence[Solid] = [Solid(f"c{i}", 1.0, (0.05, 0.07)) for i in range(count)]
     return Scene("heap", tuple(solids), start)
-
