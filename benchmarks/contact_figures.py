@@ -29,7 +29,7 @@ LOOKS = {
     "MuJoCo, gradual spring": (style.GREY, "D", "-"),
 }
 """Colour, marker and line of each curve that is drawn: MuJoCo's are warm."""
-ORDERS_FROM = 0.25
+ORDERS_FROM = 3e-5
 """Where lines of an order begin, at the largest step."""
 
 NOTE: dict[str, Any] = {"fontsize": 7.5, "color": style.SOFT}
