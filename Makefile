@@ -3,10 +3,10 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help demo test lint typecheck bench gallery clean
+.PHONY: help demo test lint typecheck bench bench-contact gallery clean
 
 help:  ## list the targets
-	@sed -n 's/^\([a-z]*\):.*## /make \1\t/p' Makefile
+	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
 
 demo: $(VENV)/.installed  ## solve the ball throw with every solver and write the report
 	$(BIN)/symphys solve problems/ball_throw.toml --out reports
@@ -22,13 +22,18 @@ typecheck: $(VENV)/.developing  ## check types on a folder of links laid out as 
 	cd build/farm/symphys && ln -s ../../../symphys/* ../../../solvers ../../../problems .
 	$(BIN)/mypy -p symphys
 
-bench: $(VENV)/.benching  ## measure what BENCHMARKS.md reports; figures go to build/
+bench: $(VENV)/.benching  ## measure what BENCHMARKS.md reports, contact aside; figures go to build/
 	$(BIN)/python benchmarks/ball_throw.py
 	$(BIN)/python benchmarks/continuation.py
 	$(BIN)/python benchmarks/spheres.py
 	$(BIN)/python benchmarks/limit.py build
 	$(BIN)/python benchmarks/pile.py build
 	$(BIN)/python benchmarks/against_mujoco.py
+
+bench-contact: $(VENV)/.benching  ## errors of contact against the step, gradients, what each trick buys; half an hour
+	$(BIN)/python benchmarks/gradients.py build
+	$(BIN)/python benchmarks/ablation.py
+	$(BIN)/python benchmarks/consistency.py build
 
 gallery: $(VENV)/.installed  ## make the figures of the README again
 	$(BIN)/symphys solve ball_throw bank_shot sled basket knock putt --out build/gallery

@@ -1,0 +1,120 @@
+"""Compiled rollouts of any world under any scheme, without a problem file: values, gradients, states along the way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.kernel import Call, Kernel, Layout, Place, Program, compile_program
+from symphys.state import Layout as Columns
+from symphys.step import record_step
+from symphys.world import Scheme, World
+
+Array = NDArray[np.float64]
+Expr = Any
+"""casadi SX"""
+WORDS = 2_000_000
+"""Of memory a lane for states in one call; longer rollouts are done in several calls, a state handed on."""
+
+
+class Rolling:
+    """Rollouts of one world under one scheme, eight states at a time in one thread."""
+
+    def __init__(
+        self,
+        world: World,
+        scheme: Scheme,
+        steps: int,
+        start: tuple[int, Callable[[Expr], Expr]] | None = None,
+        end: Callable[[Expr], Expr] | None = None,
+    ) -> None:
+        """Say what is rolled out; it is compiled when first needed.
+
+        Args:
+            world: bodies and what they touch.
+            scheme: time step and switches.
+            steps: of one call.
+            start: the size of z, and the state at the start as an expression of z; None: z is that state.
+            end: what is asked of the state at the end; None: all of it.
+        """
+        self.columns = Columns(world)
+        self.world, self.scheme, self.steps = world, scheme, steps
+        self.size, self.start = start or (self.columns.size, lambda z: z)
+        self.end = end or (lambda x: x)
+
+    @cached_property
+    def kernel(self) -> Kernel:
+        """The compiled rollout."""
+        return compile_program(self._program(), threads=1)
+
+    def ends(self, Z: Array) -> Array:
+        """(batch, m) what is asked of the ends of rollouts from (batch, n)."""
+        return self.kernel.forward(Z, [0.0])["end"]
+
+    def jacobian(self, z: Array) -> Array:
+        """(m, n): its derivatives, by the adjoint of the rollout."""
+        return self.kernel.jacobian(z, "end", [0.0])
+
+    def _program(self) -> Program:
+        layout, columns = Layout(), self.columns
+        z, knob = layout.take(self.size), layout.take(1)
+        x = layout.series(columns.size, self.steps + 1)
+        body = step_calls(self.world, self.scheme, layout, x, knob)
+        (symbols, state) = ca.SX.sym("z", self.size), ca.SX.sym("x", columns.size)
+        first = ca.Function("first", [symbols], [ca.densify(self.start(symbols))])
+        asked = ca.densify(self.end(state))
+        last = ca.Function("last", [state], [asked])
+        end = layout.take(int(asked.shape[0]))
+        return Program(
+            size=layout.size,
+            z=z,
+            knob=knob,
+            steps=self.steps,
+            outputs={"end": end},
+            prologue=(Call(first, (z,), (x.still(),)),),
+            body=tuple(body),
+            epilogue=(Call(last, (x.later(self.steps).still(),), (end,)),),
+        )
+
+
+def step_calls(world: World, scheme: Scheme, layout: Layout, x: Place, knob: Place) -> list[Call]:
+    """The calls of one exact time step, from the states ``x`` to the next ones."""
+    columns, recording = Columns(world), record_step(world, scheme, exact=True)
+    after, empty = x.later(), Place(0, 0)
+    places = {slot: Place(after.offset + s.start, s.stop - s.start, x.stride) for slot, s in recording.results.items()}
+    calls = []
+    for piece in recording.pieces:
+        for slot in piece.inputs:
+            if slot.name in columns:
+                part = columns[slot.name]
+                places[slot] = Place(x.offset + part.start, part.stop - part.start, x.stride)
+            elif slot.name:
+                places[slot] = knob if slot.name == "smoothing" else empty
+        places.setdefault(piece.output, layout.take(piece.output.size))
+        calls.append(Call(piece.function, tuple(places[slot] for slot in piece.inputs), (places[piece.output],)))
+    return calls
+
+
+class Walk:
+    """Long rollouts from one state to the next, in calls that memory allows."""
+
+    def __init__(self, world: World, scheme: Scheme, interval: int) -> None:
+        """States are asked for after every ``interval`` steps."""
+        most = max(1, WORDS // Columns(world).size)
+        lengths = (interval // k for k in range(1, interval + 1) if interval % k == 0)
+        self.rolling = Rolling(world, scheme, next(length for length in lengths if length <= most))
+        self.calls = interval // self.rolling.steps
+
+    def along(self, X: Array, count: int) -> Array:
+        """(count, batch, nx): the states after each interval, from (batch, nx)."""
+        states = []
+        for _ in range(count):
+            for _ in range(self.calls):
+                X = self.rolling.ends(X)
+            states.append(X)
+        return np.array(states)

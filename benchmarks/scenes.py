@@ -1,0 +1,134 @@
+"""Scenes of boxes and capsules for both engines: a world here, a model there, and the same initial states."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.shapes import Box, Capsule, Plane, Sphere
+from symphys.state import Layout, initial_state
+from symphys.world import Body, Law, World, make_world
+
+Array = NDArray[np.float64]
+KINDS = ("sphere", "capsule", "box")
+"""By how many sizes they have."""
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A box, a capsule or a ball.
+
+    Attributes:
+        name: of the body.
+        mass: [kg].
+        sizes: half edges (3,) of a box, radius and half length (2,) of a capsule, or radius (1,) of a ball [m].
+    """
+
+    name: str
+    mass: float
+    sizes: tuple[float, ...]
+
+    @property
+    def inertia(self) -> tuple[float, ...]:
+        """Principal moments about the centre [kg m^2], uniform density."""
+        if len(self.sizes) == 3:
+            squares = np.square(self.sizes)
+            return tuple(float(m) for m in self.mass / 3 * (squares.sum() - squares))
+        radius, half = (*self.sizes, 0.0)[:2]
+        tube, ends = 2 * half, 4 / 3 * radius  # cylinder and the two half balls, as lengths of the same section
+        m, n = self.mass * tube / (tube + ends), self.mass * ends / (tube + ends)
+        across = m * (radius**2 / 4 + half**2 / 3) + n * (0.4 * radius**2 + half**2 + 0.75 * half * radius)
+        return across, across, (m / 2 + 0.4 * n) * radius**2
+
+    def body(self) -> Body:
+        """For this engine."""
+        shapes = {1: lambda r: Sphere(r), 2: Capsule, 3: lambda *sizes: Box(sizes)}
+        return Body(self.name, self.mass, self.inertia, (shapes[len(self.sizes)](*self.sizes),))
+
+    def xml(self, contact: str) -> str:
+        """For MuJoCo, with the same mass and inertia."""
+        kind, sizes = KINDS[len(self.sizes) - 1], " ".join(map(str, self.sizes))
+        moments = " ".join(map(str, self.inertia))
+        return (
+            f'<body name="{self.name}"><freejoint/><inertial pos="0 0 0" mass="{self.mass}" diaginertia="{moments}"/>'
+            f'<geom type="{kind}" size="{sizes}" {contact}/></body>'
+        )
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Solids above the ground, and a batch of initial states.
+
+    Attributes:
+        name: of the scene.
+        solids: what may fall.
+        start: (batch, solids, 13) position, orientation w x y z, velocity, angular velocity (world frame).
+        friction: of everything.
+        gravity: downwards [m/s^2].
+        lean: gravity along x, as on an incline; this engine only.
+    """
+
+    name: str
+    solids: tuple[Solid, ...]
+    start: Array
+    friction: float = 0.5
+    gravity: float = 9.81
+    lean: float = 0.0
+
+    def world(self, restitution: float = 0.0) -> World:
+        """For this engine."""
+        bodies, law = [solid.body() for solid in self.solids], Law(self.friction, restitution)
+        return make_world(bodies, [Plane.ground()], law, (self.lean, 0, -self.gravity))
+
+    def states(self, world: World) -> Array:
+        """(batch, nx) the initial states for this engine."""
+        return np.array([np.array(ca.DM(initial_state(world, self.values(row)))).ravel() for row in self.start])
+
+    def values(self, row: Any) -> dict[str, Any]:
+        """An initial state by name, from (solids, 13) numbers or, for one solid, a casadi column of 13."""
+        row = row if isinstance(row, np.ndarray) else [row]
+        parts = {"position": slice(0, 3), "orientation": slice(3, 7)}
+        parts |= {"velocity": slice(7, 10), "angular_velocity": slice(10, 13)}
+        pairs = zip(self.solids, row, strict=True)
+        return {f"{solid.name}.{name}": body[part] for solid, body in pairs for name, part in parts.items()}
+
+    def places(self, world: World, X: Array) -> Array:
+        """(..., solids, 3) the centres, from states (..., nx) of this engine."""
+        layout = Layout(world)
+        return np.stack([X[..., layout[f"{solid.name}.position"]] for solid in self.solids], axis=-2)
+
+
+def turned(rng: np.random.Generator, count: int) -> Array:
+    """(count, 4) random orientations."""
+    q = rng.standard_normal((count, 4))
+    return q / np.linalg.norm(q, axis=1, keepdims=True)
+
+
+def tumbling_box(batch: int = 8) -> Scene:
+    """A flat box thrown on the ground, turning."""
+    rng = np.random.default_rng(1)
+    start = np.zeros((batch, 1, 13))
+    start[:, 0, :3] = [0, 0, 0.6]
+    start[:, 0, 3:7] = turned(rng, batch)
+    start[:, 0, 7:10] = [1, 0.5, 0]
+    start[:, 0, 10:] = rng.uniform(-6, 6, (batch, 3))
+    return Scene("box", (Solid("box", 1.0, (0.2, 0.15, 0.1)),), start)
+
+
+def heap_of_capsules(side: int = 2, batch: int = 8) -> Scene:
+    """``side`` cubed capsules in a grid, each turned at random, dropped on the ground and each other."""
+    rng, step = np.random.default_rng(2), 0.26
+    grid = np.stack(np.meshgrid(*3 * [np.arange(side) * step], indexing="ij"), axis=-1).reshape(-1, 3)
+    count = len(grid)
+    start = np.zeros((batch, count, 13))
+    start[:, :, :3] = grid - (side - 1) * step / 2 * np.array([1, 1, 0]) + [0, 0, 0.2]
+    start[:, :, 3:7] = turned(rng, batch * count).reshape(batch, count, 4)
+    start[:, :, 7:10] = [0, 0, -1]
+    start[:, :, 10:] = rng.uniform(-2, 2, (batch, count, 3))
+    solids: Sequence[Solid] = [Solid(f"c{i}", 1.0, (0.05, 0.07)) for i in range(count)]
+    return Scene("heap", tuple(solids), start)
