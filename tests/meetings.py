@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
 
 import casadi as ca
 import numpy as np
-from distances import Solid
+from distances import Solid, distance
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from symphys import rotation
 from symphys.collide import collide
 from symphys.collide.contact import Shift
 from symphys.course import Course, at_rest
-from symphys.shapes import Box, Capsule, Plane, Sphere, Surface, Terrain
+from symphys.shapes import Box, Capsule, Sphere, Surface
 
 Array = NDArray[np.float64]
 WIDTHS = {"sphere": 1, "capsule": 2, "box": 3}
@@ -88,7 +88,8 @@ def rule(first: str, second: str, static: bool = False, surface: Surface | None 
     found = contacts(first, second, symbols, static, surface)
     frames = [contact.meeting.frame(contact.time) for contact in found]
     columns = [ca.vertcat(*(getattr(c, name) for c in found)) for name in ("gap", "rate", "hit", "time")]
-    columns += [ca.horzcat(*(ca.densify(each) for each in column)).T for column in zip(*((f.normal, *f.arms) for f in frames))]
+    vectors = [[f.normal for f in frames], [f.arms[0] for f in frames], [f.arms[1] for f in frames]]
+    columns += [ca.horzcat(*(ca.densify(ca.SX(each)) for each in column)).T for column in vectors]
     return ca.Function("meet", symbols, [ca.densify(ca.SX(column)) for column in columns])
 
 
@@ -158,4 +159,35 @@ class Thing:
         return Solid(self.centre_of_mass(t) + body @ self.place[:3], axes, halves, radius)
 
 
-Draw = Callable[[np.random.Generator], Array]
+def random_turn(rng: np.random.Generator) -> Array:
+    """A unit quaternion."""
+    q = rng.normal(size=4)
+    return np.asarray(q / np.linalg.norm(q))
+
+
+def random_thing(rng: np.random.Generator, kind: str, static: bool = False) -> Thing:
+    """A shape of random size, placed and turned at random on a body that is turned at random and does not move."""
+    size = rng.uniform(0.1, 0.5, WIDTHS[kind])
+    place = np.concatenate([rng.uniform(-0.3, 0.3, 3), random_turn(rng)])
+    if static:
+        return Thing(kind, size, place)
+    return Thing(kind, size, place, np.concatenate([rng.uniform(-1, 1, 3), random_turn(rng), np.zeros(12)]))
+
+
+def moved_to(a: Thing, b: Thing, gap: float, rng: np.random.Generator) -> Thing:
+    """The first thing, shifted in a random direction until it is ``gap`` away from the second."""
+    way = rng.normal(size=3)
+    way /= np.linalg.norm(way)
+    start = b.at(0).centre - a.at(0).centre
+    share = brentq(lambda t: distance(shifted(a, start + t * way).at(0), b.at(0)) - gap, 0.0, 4.0, xtol=1e-14)
+    return shifted(a, start + share * way)
+
+
+def shifted(a: Thing, by: Array) -> Thing:
+    """The same thing elsewhere."""
+    return replace(a, motion=np.concatenate([a.motion[:3] + by, a.motion[3:]]))
+
+
+def flying(a: Thing, velocity: Any, spin: Any = (0, 0, 0), acceleration: Any = (0, 0, 0)) -> Thing:
+    """The same thing in motion."""
+    return replace(a, motion=np.concatenate([a.motion[:7], velocity, acceleration, spin, np.zeros(3)]))

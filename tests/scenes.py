@@ -118,7 +118,8 @@ def pose(rng: np.random.Generator, size: Array) -> tuple[Array, Array]:
 def motion(rng: np.random.Generator, most: float) -> Array:
     """A velocity: often none, along an axis, or next to nothing."""
     return np.asarray(
-        rng.choice([0.0, 0.0, 1e-9, 1.0, most]) * (rng.normal(size=3) if rng.random() < 0.5 else np.eye(3)[rng.integers(3)])
+        rng.choice([0.0, 0.0, 1e-9, 1.0, most])
+        * (rng.normal(size=3) if rng.random() < 0.5 else np.eye(3)[rng.integers(3)])
     )
 
 
