@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help demo test lint typecheck bench bench-contact gallery clean
+.PHONY: help demo test thorough lint typecheck bench bench-contact gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
@@ -13,6 +13,9 @@ demo: $(VENV)/.installed  ## solve the ball throw with every solver and write th
 
 test: $(VENV)/.developing  ## run the tests; ARGS="-m 'not slow'" passes options to pytest
 	$(BIN)/pytest $(ARGS)
+
+thorough: $(VENV)/.developing  ## run the tests that take minutes: ten thousand random scenes, tall towers, long rolls
+	$(BIN)/pytest -m thorough $(ARGS)
 
 lint: $(VENV)/.developing  ## check style and format
 	$(BIN)/ruff check . && $(BIN)/ruff format --check .

@@ -26,7 +26,10 @@ DT = 0.01
 SCHEMES: dict[str, Mapping[str, Any]] = {
     "whole": {},
     "no time of impact": {"time_of_impact": False},
-    "steps not cut": {"split": False},
+    "no cuts": {"cuts": 0},
+    "1 cut": {"cuts": 1},
+    "3 cuts": {"cuts": 3},
+    "no cap on energy": {"energy_cap": False},
     "no friction aim": {"impact_friction": False},
     "cold start": {"warm_start": False},
     "no position pass": {"position_sweeps": 0},

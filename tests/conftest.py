@@ -1,8 +1,19 @@
-"""Compiled kernels of all tests go into a cache of the checkout."""
+"""Compiled kernels of all tests go into a cache of the checkout; what takes minutes runs only when asked for."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
 
+import pytest
+
 os.environ.setdefault("SYMPHYS_CACHE", str(Path(__file__).parents[1] / "build" / "kernels"))
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out what is marked ``thorough``, unless the option -m names it."""
+    if "thorough" in config.option.markexpr:
+        return
+    left_out = [item for item in items if item.get_closest_marker("thorough")]
+    config.hook.pytest_deselected(items=left_out)
+    items[:] = [item for item in items if item not in left_out]

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
 
 import casadi as ca
 import numpy as np
-from distances import Solid
+from distances import Solid, distance
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from symphys import rotation
 from symphys.collide import collide
@@ -159,4 +159,35 @@ class Thing:
         return Solid(self.centre_of_mass(t) + body @ self.place[:3], axes, halves, radius)
 
 
-Draw = Callable[[np.random.Generator], Array]
+def random_turn(rng: np.random.Generator) -> Array:
+    """A unit quaternion."""
+    q = rng.normal(size=4)
+    return np.asarray(q / np.linalg.norm(q))
+
+
+def random_thing(rng: np.random.Generator, kind: str, static: bool = False) -> Thing:
+    """A shape of random size, placed and turned at random on a body that is turned at random and does not move."""
+    size = rng.uniform(0.1, 0.5, WIDTHS[kind])
+    place = np.concatenate([rng.uniform(-0.3, 0.3, 3), random_turn(rng)])
+    if static:
+        return Thing(kind, size, place)
+    return Thing(kind, size, place, np.concatenate([rng.uniform(-1, 1, 3), random_turn(rng), np.zeros(12)]))
+
+
+def moved_to(a: Thing, b: Thing, gap: float, rng: np.random.Generator) -> Thing:
+    """The first thing, shifted in a random direction until it is ``gap`` away from the second."""
+    way = rng.normal(size=3)
+    way /= np.linalg.norm(way)
+    start = b.at(0).centre - a.at(0).centre
+    share = brentq(lambda t: distance(shifted(a, start + t * way).at(0), b.at(0)) - gap, 0.0, 4.0, xtol=1e-14)
+    return shifted(a, start + share * way)
+
+
+def shifted(a: Thing, by: Array) -> Thing:
+    """The same thing elsewhere."""
+    return replace(a, motion=np.concatenate([a.motion[:3] + by, a.motion[3:]]))
+
+
+def flying(a: Thing, velocity: Any, spin: Any = (0, 0, 0), acceleration: Any = (0, 0, 0)) -> Thing:
+    """The same thing in motion."""
+    return replace(a, motion=np.concatenate([a.motion[:7], velocity, acceleration, spin, np.zeros(3)]))

@@ -65,7 +65,7 @@ def shape(kind: str, size: Any, centre: Any) -> Shape:
 
 
 @cache
-def lot(first: str, second: str, static: str, law: str) -> Lot:
+def lot(first: str, second: str, static: str, law: str, cuts: int | None = None) -> Lot:
     """A world and its derivatives."""
     size_a, size_b, centre, numbers = ca.SX.sym("a", 3), ca.SX.sym("b", 3), ca.SX.sym("c", 3), ca.SX.sym("n", 3)
     mass, friction, restitution = ca.vertsplit(numbers)
@@ -79,7 +79,7 @@ def lot(first: str, second: str, static: str, law: str) -> Lot:
         Body("b", 1.0, 0.03, (shape(second, size_b, ca.SX.zeros(3)),)),
     ]
     world = make_world(bodies, [STATICS[static]], laws[law])
-    step = step_function(world, Scheme(sweeps=3), parameters=[size_a, size_b, centre, numbers])
+    step = step_function(world, Scheme(sweeps=3, cuts=cuts), parameters=[size_a, size_b, centre, numbers])
     x, p, knob = ca.SX.sym("x", step.size1_in(0)), ca.SX.sym("p", 12), ca.SX.sym("s")
     after = step(x, ca.DM(0, 1), p, knob)
     weighted = ca.dot(after, ca.DM(np.linspace(1, 2, after.numel())))
@@ -121,9 +121,11 @@ def motion(rng: np.random.Generator, most: float) -> Array:
     return np.asarray(rng.choice([0.0, 0.0, 1e-9, 1.0, most]) * direction)
 
 
-def steps(structure: tuple[str, str, str, str], seed: int, count: int) -> Iterator[tuple[int, Array, Array]]:
+def steps(
+    structure: tuple[str, str, str, str], seed: int, count: int, cuts: int | None = None
+) -> Iterator[tuple[int, Array, Array]]:
     """(scene, x', slope) of three steps from each of ``count`` scenes."""
-    parts, rng = lot(*structure), np.random.default_rng(seed)
+    parts, rng = lot(*structure, cuts), np.random.default_rng(seed)
     for k in range(count):
         x, p, knob = draw(rng, parts.world)
         for _ in range(3):

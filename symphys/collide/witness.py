@@ -43,9 +43,10 @@ class Witness:
         return ca.dot(self._direction(t), (self.points[0] - self.points[1]).at(t)) - self.radii[0] - self.radii[1]
 
     def frame(self, t: Expr) -> Frame:
-        """See ``Meeting``."""
-        n, (a, b), (r_a, r_b) = self._direction(t), self.arms, self.radii
-        return Frame(n, (a.at(t) - r_a * n, b.at(t) + r_b * n))
+        """See ``Meeting``. Both arms go to one point, midway between the surfaces: no spin comes from nowhere."""
+        n, (a, b), (r_a, r_b) = self._direction(t), self.points, self.radii
+        half = ((a - b).at(t) - (r_a + r_b) * n) / 2
+        return Frame(n, (self.arms[0].at(t) - r_a * n - half, self.arms[1].at(t) + r_b * n + half))
 
     def gap_after(self, first: Shift, second: Shift) -> Expr:
         """See ``Meeting``."""

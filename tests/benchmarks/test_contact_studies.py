@@ -67,7 +67,7 @@ def test_mujoco_on_the_same_scene() -> None:
 def test_ablation_tells_the_tricks_apart() -> None:
     whole, without = (ablation.dropped_ball(Scheme(time_of_impact=t)) for t in (True, False))
     assert max(whole) < 1e-9 < 1e-2 < min(without)
-    cut, uncut = (ablation.cushion(Scheme(split=split)) for split in (True, False))
+    cut, uncut = (ablation.cushion(Scheme(cuts=cuts)) for cuts in (None, 0))
     assert cut[1] < 0.02 < 0.3 < uncut[1]
 
 
