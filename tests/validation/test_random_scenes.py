@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scenes import STRUCTURES, steps
+from random_worlds import STRUCTURES, steps
 
 Structure = tuple[str, str, str, str]
 FEW = (2, 4, 6, 7)
