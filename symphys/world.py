@@ -148,6 +148,8 @@ class Scheme:
             the work of a step; without any, gradients of a ball that rolls into a cushion are wrong at any step size.
             None: 2 where a body may be hit off its centre, as boxes are, else 1.
         energy_cap: no impact raises the kinetic energy, which Newton's restitution with friction can.
+        load_sharing: points of one body that lie in a plane share their load linearly, as on an elastic foundation;
+            without it the share of four corners depends on all that was before, and so does friction as they turn.
         impact_friction: let friction at an impact aim at the velocity at the instant of impact.
     """
 
@@ -160,6 +162,7 @@ class Scheme:
     impact_friction: bool = True
     cuts: int | None = None
     energy_cap: bool = True
+    load_sharing: bool = True
 
 
 def make_world(

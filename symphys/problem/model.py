@@ -28,7 +28,7 @@ class Simulation:
         duration: [s], a whole number of steps.
         dt: time step [s].
         sweeps, position_sweeps, warm_start, push_out: as in world.Scheme.
-        time_of_impact, impact_friction, cuts, energy_cap: likewise.
+        time_of_impact, impact_friction, cuts, energy_cap, load_sharing: likewise.
         smoothing: [m/s] stages of the knob that solvers use, decreasing, at least one; 0 is the exact contact law.
     """
 
@@ -43,6 +43,7 @@ class Simulation:
     impact_friction: bool = True
     cuts: int | None = None
     energy_cap: bool = True
+    load_sharing: bool = True
 
     @property
     def steps(self) -> int:
@@ -61,6 +62,7 @@ class Simulation:
             impact_friction=self.impact_friction,
             cuts=self.cuts,
             energy_cap=self.energy_cap,
+            load_sharing=self.load_sharing,
         )
 
 

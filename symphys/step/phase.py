@@ -20,6 +20,7 @@ from symphys.step.position import close_gaps, displacements
 from symphys.step.row import ContactRow
 from symphys.step.rows import prepare
 from symphys.step.scene import Scene, State
+from symphys.step.sharing import shared
 from symphys.world import Pair
 
 Expr = Any
@@ -85,7 +86,7 @@ def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = ())
 
     # velocities: warm start, then sweeps
     momenta = tuple(Momentum(m.mid_velocity, m.mid_momentum) for m in motions)
-    resumed = _warm_start(scene, rows, x, kick)
+    resumed = shared(scene, rows, _warm_start(scene, rows, x, kick))
     started = begin(pieces, rows, momenta, resumed)
     solved = relax(pieces, scene.setting.scheme.sweeps, tuple(rows), started)
 

@@ -66,6 +66,11 @@ class SimulationTable(Table):
     energy_cap: bool = Field(
         default=DEFAULT.energy_cap, description="no impact adds energy, which restitution with friction can"
     )
+    load_sharing: bool = Field(
+        default=DEFAULT.load_sharing,
+        description="points of a body that lie in a plane share their load linearly; without it the share depends on "
+        "all that was before",
+    )
 
 
 class WorldTable(Table):
