@@ -12,10 +12,10 @@ demo: $(VENV)/.installed  ## solve the ball throw with every solver and write th
 	$(BIN)/symphys solve problems/ball_throw.toml --out reports
 
 test: $(VENV)/.developing  ## run the tests; ARGS="-m 'not slow'" passes options to pytest
-	$(BIN)/pytest $(ARGS)
+	$(BIN)/pytest -n auto --dist loadfile $(ARGS)
 
 thorough: $(VENV)/.developing  ## run the tests that take minutes: ten thousand random scenes, tall towers, long rolls
-	$(BIN)/pytest -m thorough $(ARGS)
+	$(BIN)/pytest -n auto -m thorough $(ARGS)
 
 lint: $(VENV)/.developing  ## check style and format
 	$(BIN)/ruff check . && $(BIN)/ruff format --check .

@@ -11,7 +11,19 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from ablation_worlds import RADIUS, billiard, inclined, resting_box, slabs, slabs_start, spinning_ball, spinning_box
+from ablation_worlds import (
+    RADIUS,
+    billiard,
+    bouncing_box,
+    inclined,
+    mechanical_energy,
+    resting_box,
+    slabs,
+    slabs_start,
+    sliding_crate,
+    spinning_ball,
+    spinning_box,
+)
 from gradients import dropped
 from numpy.typing import NDArray
 from rolling import Rolling, Walk
@@ -30,6 +42,7 @@ SCHEMES: dict[str, Mapping[str, Any]] = {
     "1 cut": {"cuts": 1},
     "3 cuts": {"cuts": 3},
     "no cap on energy": {"energy_cap": False},
+    "no load sharing": {"load_sharing": False},
     "no friction aim": {"impact_friction": False},
     "cold start": {"warm_start": False},
     "no position pass": {"position_sweeps": 0},
@@ -135,6 +148,26 @@ def _slid(made: tuple[World, Array], scheme: Scheme) -> Array:
     return Walk(world, scheme, round(2 / scheme.dt)).along(start, 1)[0, 0]
 
 
+def turning(scheme: Scheme) -> float:
+    """A crate slides, turns and stops: error of its angle [rad], against linear loads at a 100th of the step."""
+    return abs(_angle(scheme) - _angle(Scheme(dt=DT / 100)))
+
+
+def _angle(scheme: Scheme) -> float:
+    world, start = sliding_crate()
+    q = Walk(world, scheme, round(1.5 / scheme.dt)).along(start, 1)[0, 0][Layout(world)["box.orientation"]]
+    return float(2 * np.arctan2(q[3], q[0]))
+
+
+def gained(scheme: Scheme) -> float:
+    """A box tumbles with e = 1 and friction, which takes energy: the most that it ever has above what it had [J]."""
+    scene = bouncing_box()
+    world = scene.world(1.0)
+    states = Walk(world, scheme, 1).along(scene.states(world), round(1 / scheme.dt))
+    energy = mechanical_energy(world, states)
+    return float((energy - np.minimum.accumulate(energy, axis=0)).max())
+
+
 def instructions(scheme: Scheme) -> float:
     """Of one step of a box on the ground."""
     return float(step_function(resting_box()[0], scheme).n_instructions())
@@ -148,6 +181,8 @@ MEASURES: dict[tuple[str, ...], Callable[[Scheme], Any]] = {
     ("rest [m]",): rest,
     ("stack: speed [m/s]", "height [m]"): stack,
     ("cone: inside [m]", "outside [m/s]"): cone,
+    ("turning [rad]",): turning,
+    ("gained [J]",): gained,
     ("instructions",): instructions,
 }
 

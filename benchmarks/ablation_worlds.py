@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 from scenes import Scene, Solid, turned
 
 from symphys.shapes import Plane
-from symphys.state import initial_state
+from symphys.state import Layout, initial_state
 from symphys.world import Law, Pair, World, make_world
 
 Array = NDArray[np.float64]
@@ -35,6 +37,24 @@ def spinning_box(batch: int = 16) -> Scene:
     return Scene("corner", (BOX,), start, 0.3)
 
 
+def bouncing_box(batch: int = 16) -> Scene:
+    """A box that is thrown on the ground, turned at random."""
+    return replace(spinning_box(batch), name="bounce", friction=0.5)
+
+
+def mechanical_energy(world: World, states: Array) -> Array:
+    """Kinetic and potential energy [J] of the one body of a world, from (..., nx) states."""
+    layout, (body,) = Layout(world), world.bodies
+    q = states[..., layout[f"{body.name}.orientation"]]
+    spin = states[..., layout[f"{body.name}.angular_velocity"]]
+    w, axis = q[..., :1], q[..., 1:]
+    twice = 2 * np.cross(axis, spin)
+    own = spin - w * twice + np.cross(axis, twice)
+    kinetic = body.mass * (states[..., layout[f"{body.name}.velocity"]] ** 2).sum(-1)
+    height = states[..., layout[f"{body.name}.position"]] @ np.array(world.gravity)
+    return np.asarray((kinetic + (own**2 * body.inertia).sum(-1)) / 2 - body.mass * height)
+
+
 def spinning_ball(batch: int = 16) -> Scene:
     """A ball above the ground with spin about every axis, in leaning gravity."""
     rng, start = np.random.default_rng(6), np.zeros((batch, 1, 13))
@@ -48,6 +68,13 @@ def resting_box() -> tuple[World, Array]:
     """A box on the ground that is given 0.1 m/s and a little spin."""
     world = make_world([BOX.body()], [Plane.ground()], Law(0.5))
     start = {"box.position": [0, 0, 0.1], "box.velocity": [0.1, 0.05, 0], "box.angular_velocity": [0, 0, 0.2]}
+    return world, np.array(ca.DM(initial_state(world, start))).T
+
+
+def sliding_crate() -> tuple[World, Array]:
+    """A box that is pushed along and turns."""
+    world = make_world([BOX.body()], [Plane.ground()], Law(0.3))
+    start = {"box.position": [0, 0, 0.1], "box.velocity": [2.4, 0.27, 0], "box.angular_velocity": [0, 0, 2.67]}
     return world, np.array(ca.DM(initial_state(world, start))).T
 
 

@@ -18,11 +18,15 @@ def nothing() -> Array:
 
 @dataclass(frozen=True)
 class GradientCheck:
-    """|adjoint - central difference| of one variable, relative to ``scale``, the norm of its gradient."""
+    """|adjoint - difference| of one variable, relative to ``scale``, the norm of its gradient.
+
+    ``jump``: where only differences of either side agree, what is between them, as a change of the variable.
+    """
 
     variable: str
     error: float
     scale: float
+    jump: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,12 @@ def make_trust(entry: dict[str, object]) -> Trust:
     gradient = values.tables(entry.get("gradient"))
     return Trust(
         gradient=tuple(
-            GradientCheck(values.name(row.get("variable")), number(row.get("error")), number(row.get("scale")))
+            GradientCheck(
+                values.name(row.get("variable")),
+                number(row.get("error")),
+                number(row.get("scale")),
+                number(row.get("jump", 0.0)),
+            )
             for row in gradient
         ),
         step=number(gradient[0].get("step")) if gradient else number(None),

@@ -15,6 +15,8 @@ GRADIENT, GRID, GROWTH, SMOOTHING = "gradient", "grid", "growth", "smoothing"
 
 GRADIENT_LIMITS = (1e-4, 1e-2)
 """Relative errors of a gradient: below the first it agrees, above the second it must not be used."""
+JUMP_LIMITS = (1e-3, 1e-1)
+"""Of jumps: a solver does not notice those below the first."""
 FLAT = 1e-6
 """A gradient whose norm is below this is too small to be compared."""
 OBJECTIVE_LIMITS = (0.05, 0.3)
@@ -37,6 +39,10 @@ def gradient_finding(check: GradientCheck) -> Finding:
         return Finding(
             GRADIENT, UNKNOWN, what, number, "The gradient is almost zero here, so the comparison says little."
         )
+    if level == GOOD and check.jump > 0:
+        small = f"as a change of {check.variable} by {show(check.jump, 2)} of its scale would"
+        meaning = f"Agrees on either side, but the motion jumps here, {small}: an impact at the very end of a step."
+        return Finding(GRADIENT, graded(check.jump, JUMP_LIMITS), what, number, meaning)
     meaning = {
         GOOD: "Agrees with finite differences.",
         FAIR: "Agrees roughly; a bounce or a change between slip and stick may lie within the difference's step.",

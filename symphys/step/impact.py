@@ -78,9 +78,10 @@ def _is_struck(earliest: tuple[Expr, Expr], closes: Expr, hit: Expr, time: Expr)
 
 
 def _inside(earliest: tuple[Expr, Expr], duration: Expr, share: float) -> Expr:
-    """The length of the stretch before the cut."""
-    inside = ca.fmin(ca.fmax(earliest[1], MARGIN * duration), (1 - MARGIN) * duration)
-    return ca.if_else(earliest[0], inside, share * duration)
+    """The length of the stretch before the cut; near an end it is shifted, not clamped, so that its slope stays."""
+    least, time = MARGIN * duration, earliest[1]
+    shift = ca.if_else(time < least, least, ca.if_else(time > duration - least, -least, 0))
+    return ca.if_else(earliest[0], time + shift, share * duration)
 
 
 def collide_now(scene: Scene, x: State, cut: Cut) -> Phase:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
@@ -18,6 +19,8 @@ DIFFERENCE_STEPS = (1e-4, 1e-5, 1e-6)
 """Steps of the central differences, as shares of the scale; the best counts, and a wrong slope passes none."""
 EVERY_COMPONENT = 12
 """Variables up to this size are differenced component by component, larger ones along as many random directions."""
+NOTICED = 1e-4
+"""Relative error of central differences from which each side is looked at by itself."""
 
 
 def compare_gradient(transcription: Transcription, z: Array) -> list[dict[str, Any]]:
@@ -27,8 +30,11 @@ def compare_gradient(transcription: Transcription, z: Array) -> list[dict[str, A
     because at a solution the gradient of the objective itself is zero.
 
     Returns:
-        For each variable "error", |adjoint - central difference| / scale; "scale", the norm of its slope; "step", the
-        step of the best difference as a share of the variable's scale. NaN where one is not finite.
+        For each variable "error", |adjoint - difference| / scale; "scale", the norm of its slope; "step", the step of
+        the best difference as a share of the variable's scale; NaN where one is not finite. "jump" is 0 where central
+        differences agree best. Where those of either side, without z itself, agree better, the value jumps at z, by
+        as much as a change of the variable by "jump" of its scale brings about. An impact at the very end of a step
+        does that: the time grid changes sides.
     """
     value, gradient = probe(transcription)
     slope = np.array(gradient(z)).ravel()
@@ -55,12 +61,24 @@ def probe_of(rollout: Rollout, asked: Terms) -> tuple[ca.Function, ca.Function]:
 
 
 def _compare_block(value: ca.Function, block: Block, z: Array, slope: Array) -> dict[str, Any]:
-    norm = float(np.linalg.norm(slope[block.start : block.stop]))
+    norm = float(np.linalg.norm(slope[block.start : block.stop])) or 1.0
     directions = _directions(block, block.stop - block.start, z.size)
-    errors = [max_or_nan(_mismatch(value, z, slope, d, step) for d in directions) for step in DIFFERENCE_STEPS]
+    middle, at = _best(lambda d, step: _mismatch(value, z, slope, d, step), directions)
+    found = {"variable": block.name, "scale": float(np.linalg.norm(slope[block.start : block.stop]))}
+    found |= {"error": middle / norm, "step": at, "jump": 0.0}
+    if middle > NOTICED * norm:
+        sides, near = _best(lambda d, step: _mismatch_beside(value, z, slope, d, step), directions)
+        if sides < middle:
+            jumps = [2 * near * _mismatch(value, z, slope, d, near) for d in directions]
+            found |= {"error": sides / norm, "step": near, "jump": max_or_nan(jumps) / norm}
+    return found
+
+
+def _best(mismatch: Callable[[Array, float], float], directions: Array) -> tuple[float, float]:
+    """(error, step): the least error of all steps, the worst of all directions; NaN if no step gives a number."""
+    errors = [max_or_nan(mismatch(d, step) for d in directions) for step in DIFFERENCE_STEPS]
     known = [pair for pair in zip(errors, DIFFERENCE_STEPS, strict=True) if not np.isnan(pair[0])]
-    best, at = min(known, default=(np.nan, np.nan))
-    return {"variable": block.name, "error": best / norm if norm else best, "scale": norm, "step": at}
+    return min(known, default=(np.nan, np.nan))
 
 
 def max_or_nan(numbers: Any) -> float:
@@ -82,3 +100,12 @@ def _directions(block: Block, size: int, n: int) -> Array:
 def _mismatch(value: ca.Function, z: Array, slope: Array, direction: Array, step: float) -> float:
     high, low = (float(value(z + sign * step * direction)) for sign in (1, -1))
     return abs((high - low) / (2 * step) - float(slope @ direction)) / float(np.linalg.norm(direction))
+
+
+def _mismatch_beside(value: ca.Function, z: Array, slope: Array, direction: Array, step: float) -> float:
+    """The larger error of either side's derivative at z, from three points beside it: of second order."""
+    errors = []
+    for side in (step, -step):
+        one, two, three = (float(value(z + k * side * direction)) for k in (1, 2, 3))
+        errors.append(abs((8 * two - 5 * one - 3 * three) / (2 * side) - float(slope @ direction)))
+    return max(errors) / float(np.linalg.norm(direction))

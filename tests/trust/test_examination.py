@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 import pytest
 
 from symphys.problem import load_problem
 from symphys.problems import find
+from symphys.shooting import Block
 from symphys.transcription import judge_for, transcribe
 from symphys.trust import examine
 from symphys.trust.gradient import _compare_block, compare_gradient, probe
@@ -34,6 +36,27 @@ def test_wrong_gradients_are_rejected(throw):
     wrong = np.array(gradient(THROW)).ravel()
     errors = [_compare_block(value, block, THROW, wrong)["error"] for block in throw.shooting.blocks]
     assert max(errors) > 1e-2
+
+
+def test_a_jump_is_told_from_a_wrong_gradient():
+    """The kick of the guess meets the crate after 0.05 s, the very end of a step: either side agrees."""
+    knock = transcribe(load_problem(find("knock")), backend="casadi")
+    kick, side = compare_gradient(knock, np.array([5.0, 0.0, -0.05]))
+    assert kick["error"] < 1e-4
+    assert 0 < kick["jump"] < 1e-4
+    assert (side["error"], side["jump"]) == (pytest.approx(0, abs=1e-6), 0)
+
+
+@pytest.mark.parametrize(("slope", "passes"), [(2.0, True), (1.0, False)])
+def test_a_kink_is_no_jump(slope, passes):
+    """The slope of one side of a kink is not that of both; a jump leaves both as they are."""
+    z = ca.SX.sym("z")
+    values = {True: 2 * z + 1e-6 * (z > 0), False: ca.fabs(z)}
+    one = np.ones(1)
+    block = Block("v", 0, (1, 1), 0 * one, -one, one, one, one)
+    row = _compare_block(ca.Function("f", [z], [values[passes]]), block, np.zeros(1), np.array([slope]))
+    assert (row["error"] < 1e-6) == passes
+    assert (row["jump"] == pytest.approx(1e-6 / 2, rel=1e-3)) == passes
 
 
 def test_examination_reports_refinements_and_contacts(throw):
