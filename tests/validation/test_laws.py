@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 import pytest
 from laboratory import Lab
 
+from symphys import rotation
 from symphys.shapes import Plane, Sphere
 from symphys.world import Body, Law, Scheme, World, make_world
 
@@ -137,3 +139,21 @@ def test_warm_start_carries_a_stack():
         sag[warm] = 1.8 - Lab(world, scheme).states(start, 3.0)["s4.position"][-1, 2]
     assert sag[True] < 1e-4
     assert sag[False] > 10 * sag[True]
+
+
+@pytest.mark.parametrize("angle", [1e-9, 0.5, 3.0, 3.2, 7.0, 25.0, 2000.0])
+def test_a_rotation_of_any_angle_is_one(angle):
+    """Also of several turns in a step."""
+    axis = np.array([1, -2, 0.5]) / np.sqrt(5.25)
+    q = np.array(rotation.exponential(ca.DM(angle * axis))).ravel()
+    exact = np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * axis])
+    assert min(np.abs(q - exact).max(), np.abs(q + exact).max()) < 1e-11
+
+
+def test_a_ball_may_spin_faster_than_a_turn_a_step():
+    """1000 rad/s at 10 ms: it hops off as one with its spin does, and orientations stay unit quaternions."""
+    lab = Lab(make_world([Body.ball("b", 0.1, 1.0)], [Plane.ground()], Law(0.1, 0.5)), Scheme())
+    states = lab.states({"b.position": [0, 0, 0.3], "b.angular_velocity": [0, 1000.0, 30.0]}, 1.0)
+    assert np.linalg.norm(states["b.orientation"], axis=1) == pytest.approx(1, abs=1e-10)
+    fall = np.sqrt(2 * 9.81 * 0.2)
+    assert states["b.velocity"][30, 0] == pytest.approx(0.1 * 1.5 * fall, rel=1e-9)

@@ -107,7 +107,7 @@ def test_v6_smoothing_makes_a_sigmoid_across_the_cone() -> None:
 def pulled_block(dt: float, cuts: int | None) -> Lab:
     """SimBenchmark, rolling: a block of 10 kg on the ground, mu .4, 25 balls of 1 kg on it, mu .8."""
     balls = [Body.ball(f"s{k}", 0.1, 1.0) for k in range(25)]
-    world = make_world([block("box", (2.0, 2.0, 0.1), 10.0), *balls], [Plane.ground()], Law(0.8, 0.0))
+    world = make_world([block("box", (2.0, 6.0, 0.1), 10.0), *balls], [Plane.ground()], Law(0.8, 0.0))
     world = among(world, {(0, None)} | {(0, k + 1) for k in range(25)})
     on_ground = Law(0.4, 0.0)
     pairs = tuple(replace(p, law=on_ground) if p.second.body is None else p for p in world.pairs)
@@ -126,7 +126,7 @@ def test_v9_balls_roll_on_a_pulled_block(dt: float, time: float, cuts: int | Non
     """150 N along y: a_box = (F - mu (M + n m) g) / (M + 2/7 n m) = .7385, a_ball = 2/7 of it, so v = 2.954, .844."""
     lab = pulled_block(dt, cuts)
     start = {"box.position": [0, 0, 0.1]}
-    start |= {f"s{k}.position": [0.5 * (k % 5 - 2), 0.5 * (k // 5 - 2) - 0.5, 0.3] for k in range(25)}
+    start |= {f"s{k}.position": [0.5 * (k % 5 - 2), 0.5 * (k // 5 - 2) + 2, 0.3] for k in range(25)}
     states = lab.states(start, time, u=ca.repmat(ca.DM([0, 150, 0]), 1, round(time / dt)))
     speeds = np.array([states[f"s{k}.velocity"][-1] for k in range(25)])
     assert states["box.velocity"][-1, 1] == pytest.approx(0.7385 * time, rel=1e-3)
