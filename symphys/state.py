@@ -2,7 +2,9 @@
 
 For each body: position (3) [m], orientation (4) [-] quaternion w x y z, velocity (3) [m/s] and angular_velocity (3)
 [rad/s] at t_k, world frame, and the force (3) [N] and torque (3) [N m] with which constraints act on it persistently.
-For each pair: force (3) [N] on its first body, and torque (3) [N m] if its law resists spinning. Last ``lag`` [s].
+For each pair: force (3) [N] on its first body, and torque (3) [N m] if its law resists spinning. For each joint: lock,
+the forces and torques of what it locks, and one number per coordinate for its motor, lower and upper limit and spring.
+Last ``lag`` [s].
 
 The velocities are the true ones at t_k: 0 at rest. The step needs them without the persistent forces of the last
 half step: v - lag force / m. ``lag`` is 0 at the start and dt/2 after the first step, so that no step is special.
@@ -25,6 +27,7 @@ BODY_FIELDS = (
     ("reaction_force", 3),
     ("reaction_torque", 3),
 )
+INPUT_FIELDS = ("force", "torque")
 GIVEN = ("position", "orientation", "velocity", "angular_velocity")
 """The fields of a body that an initial state may give."""
 
@@ -33,7 +36,7 @@ class Layout:
     """Where each named quantity lies in x."""
 
     def __init__(self, world: World) -> None:
-        """Lay out the bodies, then the pairs, then the lag."""
+        """Lay out the bodies, then the pairs, the joints and the lag."""
         self._slices: dict[str, slice] = {}
         self.size = 0
         for body in world.bodies:
@@ -43,6 +46,10 @@ class Layout:
             self._add(f"{pair.name}.force", 3)
             if pair.law.spins:
                 self._add(f"{pair.name}.torque", 3)
+        for joint in world.joints:
+            self._add(f"{joint.name}.lock", joint.locked)
+            for part in joint.acting:
+                self._add(f"{joint.name}.{part}", len(joint.kind.coordinates))
         self._add("lag", 1)
 
     def _add(self, name: str, length: int) -> None:
@@ -91,3 +98,19 @@ def initial_state(world: World, values: Mapping[str, Any]) -> Any:
         zero = [1.0, 0.0, 0.0, 0.0] if name.endswith(".orientation") else [0.0] * (part.stop - part.start)
         filled[name] = ca.vertcat(values.get(name, zero))
     return layout.pack(filled)
+
+
+def input_names(world: World) -> list[str]:
+    """What may act on a world from outside: forces and torques of bodies, commands of motors."""
+    forces = [f"{body.name}.{field}" for body in world.bodies for field in INPUT_FIELDS]
+    return [*forces, *(f"{joint.name}.command" for joint in world.joints if joint.driven)]
+
+
+def input_size(world: World, name: str) -> int:
+    """How many numbers an input has; KeyError if there is none of that name."""
+    if name not in input_names(world):
+        raise KeyError(f"no input is called {name!r}; there are {', '.join(sorted(input_names(world)))}")
+    owner, _, field = name.rpartition(".")
+    if field in INPUT_FIELDS:
+        return 3
+    return next(len(joint.kind.coordinates) for joint in world.joints if joint.name == owner)

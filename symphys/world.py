@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from symphys.joints import Joint
 from symphys.shapes import Scalar, Shape, Sphere, Static, Surface, contact_points, surface
 
 Vector = Sequence[Any]
@@ -112,12 +113,14 @@ class World:
         statics: planes, fixtures, terrain.
         pairs: every point of contact that is looked at, those of two surfaces one after the other; ``all_pairs``.
         gravity: (3,) [m/s^2].
+        joints: what holds bodies together.
     """
 
     bodies: tuple[Body, ...]
     statics: tuple[Static, ...] = ()
     pairs: tuple[Pair, ...] = ()
     gravity: tuple[Scalar, ...] = GRAVITY
+    joints: tuple[Joint, ...] = ()
 
     def body_index(self, name: str) -> int:
         """The index of the body called ``name``; KeyError if there is none."""

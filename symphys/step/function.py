@@ -8,7 +8,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.state import Layout
+from symphys.state import Layout, input_size
 from symphys.step.pieces import Inline
 from symphys.step.record import Piece, Recorder, Slot
 from symphys.step.scene import Scene, State, make_scene
@@ -20,7 +20,6 @@ Expr = Any
 
 MOST_INSTRUCTIONS = 100_000
 """Of a step in which what several parts compute alike is looked for: that saves a tenth, but takes its time."""
-INPUT_FIELDS = ("force", "torque")
 
 
 def step_function(
@@ -120,10 +119,6 @@ def parts_of(layout: Layout, x: Expr) -> State:
 
 def arguments_of(world: World, inputs: Sequence[str], parameters: Sequence[Any]) -> list[Expr]:
     """Symbols for x, u, p and smoothing."""
-    known = {f"{body.name}.{field}" for body in world.bodies for field in INPUT_FIELDS}
-    for name in inputs:
-        if name not in known:
-            raise KeyError(f"no input is called {name!r}; there are {', '.join(sorted(known))}")
     x = ca.SX.sym("x", Layout(world).size)
-    u = ca.SX.sym("u", 3 * len(inputs))
+    u = ca.SX.sym("u", sum(input_size(world, name) for name in inputs))
     return [x, u, ca.vertcat(ca.SX(0, 1), *parameters), ca.SX.sym("smoothing")]

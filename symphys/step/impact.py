@@ -11,7 +11,10 @@ import casadi as ca
 from symphys.collide import Contact
 from symphys.motion import Motion, angular_velocity
 from symphys.smooth import positive
-from symphys.step.pgs import ZERO, Momentum, Row, Solution
+from symphys.step.impulse import ZERO
+from symphys.step.jointed import locks_at
+from symphys.step.momentum import Momentum
+from symphys.step.pgs import Row, Solution
 from symphys.step.phase import Phase, bodies_of, expected_motions, look
 from symphys.step.restitution import rebound
 from symphys.step.row import UNREACHED, ContactRow, Moving, at_touch, effective_masses, inverse_masses, make_sides
@@ -95,12 +98,15 @@ def collide_now(scene: Scene, x: State, cut: Cut) -> Phase:
         row = scene.pieces.do(_row, scene.setting, pair.law, contact, moving, struck, cut.impact)
         rows.append(Row(bodies_of(pair), row))
     momenta = tuple(Momentum(m.velocity, m.momentum_k) for m in motions)
-    still = tuple(ZERO for _ in rows)
-    solved = rebound(scene, tuple(rows), Solution(momenta, still, still), motions)
+    joints = locks_at(scene, motions, momenta)
+    n, still = len(joints), (*(each.nothing for each in joints), *(ZERO for _ in rows))
+    every = (*(each.row for each in joints), *rows)
+    solved = rebound(scene, every, Solution(momenta, still, still), motions)
     after = _with_velocities(scene, x, motions, solved.momenta, cut.impact)
     forces = (x[f"{pair.name}.force"] for pair in scene.world.pairs)
     ahead = tuple(scene.pieces.do(_ahead, cut.impact, x["lag"], force) for force in forces)
-    return Phase(after, tuple(rows), tuple(contacts), solved.impulses, solved.last, ahead)
+    changes = tuple(zip(solved.impulses, solved.last, strict=True))
+    return Phase(after, tuple(rows), tuple(contacts), solved.impulses[n:], changes, ahead)
 
 
 def _ahead(impact: Expr, lag: Expr, force: Expr) -> Expr:

@@ -1,4 +1,4 @@
-"""Projected Gauss-Seidel over contact rows, on linear velocities and angular momenta.
+"""Projected Gauss-Seidel over the rows of contacts and joints, on linear velocities and angular momenta.
 
 Cost of a sweep: one visit to each row; nothing but V, L and the impulses is accumulated.
 """
@@ -7,72 +7,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
-import casadi as ca
-
-from symphys.motion import apply
-from symphys.smooth import onto_disc, positive
+from symphys.step.momentum import Momenta, Momentum
 from symphys.step.pieces import Pieces
-from symphys.step.row import ContactRow, Side
 
-Expr = Any
-"""casadi SX, MX or DM"""
-
-
-@dataclass(frozen=True)
-class Momentum:
-    """The sweeps' unknowns of one body at mid-step: velocity (3,) [m/s], angular momentum (3,) [N m s]."""
-
-    velocity: Expr
-    angular: Expr
+Given = Any
+"""What a row gives: ``impulse.Impulse`` of a contact, ``along.Along`` of a joint."""
 
 
-Momenta = tuple[Momentum, ...]
+class Solvable(Protocol):
+    """What sweeps visit. Implementations are frozen dataclasses."""
 
+    def visit(self, momenta: Momenta, old: Given) -> tuple[Momenta, Given]:
+        """One projection: the momenta of the row's bodies and what the row has given since the sweeps began."""
+        ...
 
-@dataclass(frozen=True)
-class Impulse:
-    """What a contact has given so far, on the pair's first body, world frame.
-
-    Attributes:
-        normal: along the normal [N s], >= 0.
-        tangent: (3,) friction [N s].
-        spin: torque impulse about the normal [N m s].
-        roll: (3,) torque impulse across the normal [N m s].
-    """
-
-    normal: Expr
-    tangent: Expr
-    spin: Expr
-    roll: Expr
-
-    def linear(self, n: Expr) -> Expr:
-        """(3,) [N s]."""
-        return n * self.normal + self.tangent
-
-    def angular(self, n: Expr) -> Expr:
-        """(3,) [N m s]: the torque impulse beside that of the linear one."""
-        return n * self.spin + self.roll
-
-    def plus(self, other: Impulse) -> Impulse:
-        """The sum."""
-        return Impulse(
-            self.normal + other.normal, self.tangent + other.tangent, self.spin + other.spin, self.roll + other.roll
-        )
-
-    def times(self, factor: Expr) -> Impulse:
-        """A share of it."""
-        return Impulse(factor * self.normal, factor * self.tangent, factor * self.spin, factor * self.roll)
-
-    def minus(self, other: Impulse) -> Impulse:
-        """The difference."""
-        return Impulse(
-            self.normal - other.normal, self.tangent - other.tangent, self.spin - other.spin, self.roll - other.roll
-        )
-
-
-ZERO = Impulse(ca.SX(0), ca.SX.zeros(3), ca.SX(0), ca.SX.zeros(3))
+    def given(self, momenta: Momenta, impulse: Given) -> Momenta:
+        """The momenta after an impulse."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -80,8 +33,8 @@ class Solution:
     """What the sweeps have come to: of all bodies, of all rows, and of all rows before the last sweep."""
 
     momenta: Momenta
-    impulses: tuple[Impulse, ...]
-    last: tuple[Impulse, ...]
+    impulses: tuple[Given, ...]
+    last: tuple[Given, ...]
 
 
 @dataclass(frozen=True)
@@ -89,7 +42,7 @@ class Row:
     """A row and the indices of the bodies on its moving sides."""
 
     bodies: tuple[int, ...]
-    row: ContactRow
+    row: Any  # Solvable
 
 
 def relax(pieces: Pieces, sweeps: int, rows: tuple[Row, ...], start: Solution) -> Solution:
@@ -101,7 +54,7 @@ def sweep(pieces: Pieces, rows: tuple[Row, ...], before: Solution) -> Solution:
     """One pass over all rows."""
     momenta, new = list(before.momenta), list(before.impulses)
     for k in visiting_order(rows):
-        visited, new[k] = pieces.do(visit, rows[k].row, of_bodies(momenta, rows[k]), new[k])
+        visited, new[k] = pieces.do(_visit, rows[k].row, of_bodies(momenta, rows[k]), new[k])
         spread(momenta, rows[k], visited)
     return Solution(tuple(momenta), tuple(new), before.impulses)
 
@@ -120,11 +73,11 @@ def visiting_order(rows: Sequence[Row]) -> list[int]:
     return order
 
 
-def begin(pieces: Pieces, rows: Sequence[Row], momenta: Momenta, impulses: Sequence[Impulse]) -> Solution:
+def begin(pieces: Pieces, rows: Sequence[Row], momenta: Momenta, impulses: Sequence[Given]) -> Solution:
     """Give the impulses that the sweeps start from."""
     started = list(momenta)
     for each, impulse in zip(rows, impulses, strict=True):
-        spread(started, each, pieces.do(give, each.row, of_bodies(started, each), impulse))
+        spread(started, each, pieces.do(_give, each.row, of_bodies(started, each), impulse))
     return Solution(tuple(started), tuple(impulses), tuple(impulses))
 
 
@@ -139,68 +92,9 @@ def spread(momenta: list[Momentum], row: Row, changed: Momenta) -> None:
         momenta[i] = momentum
 
 
-def give(row: ContactRow, momenta: Momenta, impulse: Impulse) -> Momenta:
-    """The momenta of the row's bodies after an impulse."""
-    linear, angular = impulse.linear(row.impulse_normal), impulse.angular(row.impulse_normal)
-    return tuple(
-        Momentum(
-            m.velocity + side.sign * side.inverse_mass * linear,
-            m.angular + side.sign * (ca.cross(side.impulse_arm, linear) + angular),
-        )
-        for side, m in zip(row.sides, momenta, strict=True)
-    )
+def _visit(row: Solvable, momenta: Momenta, old: Given) -> tuple[Momenta, Given]:
+    return row.visit(momenta, old)
 
 
-def visit(row: ContactRow, momenta: Momenta, old: Impulse) -> tuple[Momenta, Impulse]:
-    """One projection of each of the row's impulses, one after the other."""
-    zero = ca.SX.zeros(3)
-    normal = _normal(row, momenta, old)
-    momenta = give(row, momenta, Impulse(normal - old.normal, zero, ca.SX(0), zero))
-    tangent = _tangent(row, momenta, old, normal)
-    momenta = give(row, momenta, Impulse(ca.SX(0), tangent - old.tangent, ca.SX(0), zero))
-    if not row.law.spins:
-        return momenta, Impulse(normal, tangent, old.spin, old.roll)
-    spin, roll = _torques(row, momenta, old, normal)
-    momenta = give(row, momenta, Impulse(ca.SX(0), zero, spin - old.spin, roll - old.roll))
-    return momenta, Impulse(normal, tangent, spin, roll)
-
-
-def _normal(row: ContactRow, momenta: Momenta, old: Impulse) -> Expr:
-    """ln <- max(ln - m (n.u - b + gamma ln), 0), m = 1 / (k + gamma)."""
-    wanted = ca.dot(row.normal, _slip(row, momenta)) - row.target + row.softness * old.normal
-    return positive(old.normal - row.normal_mass * wanted, row.normal_mass * row.width)
-
-
-def _tangent(row: ContactRow, momenta: Momenta, old: Impulse, normal: Expr) -> Expr:
-    """The friction impulse, onto the disc of radius mu ln."""
-    slip = _slip(row, momenta) - row.slip_target
-    wanted = old.tangent - row.tangent_mass * _across(slip, row.normal)
-    return onto_disc(wanted, row.law.friction * normal, row.tangent_mass * row.knob, row.knob)
-
-
-def _torques(row: ContactRow, momenta: Momenta, old: Impulse, normal: Expr) -> tuple[Expr, Expr]:
-    """Torsional friction (an interval) and rolling friction (a disc), both limited by the normal impulse."""
-    n = row.normal
-    spin_width, roll_width = row.knob * row.spin_mass, row.knob * row.roll_mass
-    rate = sum(side.sign * _spin(m, side) for side, m in zip(row.sides, momenta, strict=True))
-    twist = n * (old.spin - row.spin_mass * ca.dot(n, rate))
-    spin = ca.dot(n, onto_disc(twist, row.law.torsion * normal, spin_width, row.knob))
-    wanted = old.roll - row.roll_mass * _across(rate, n)
-    roll = onto_disc(wanted, row.law.rolling * normal, roll_width, row.knob)
-    return spin, roll
-
-
-def _across(a: Expr, n: Expr) -> Expr:
-    return a - n * ca.dot(n, a)
-
-
-def _spin(momentum: Momentum, side: Side) -> Expr:
-    return apply(side.inverse_inertia, momentum.angular)
-
-
-def _slip(row: ContactRow, momenta: Momenta) -> Expr:
-    """(3,) [m/s]: relative velocity of the touching points."""
-    total = ca.SX.zeros(3)
-    for side, m in zip(row.sides, momenta, strict=True):
-        total += side.sign * (m.velocity + ca.cross(_spin(m, side), side.arm))
-    return total
+def _give(row: Solvable, momenta: Momenta, impulse: Given) -> Momenta:
+    return row.given(momenta, impulse)

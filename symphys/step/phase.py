@@ -15,7 +15,10 @@ from symphys.collide.contact import Shift
 from symphys.course import at_rest
 from symphys.motion import BodyState, Motion, angular_velocity, free_motion, momentum
 from symphys.state import BODY_FIELDS
-from symphys.step.pgs import ZERO, Impulse, Momentum, Row, begin, relax
+from symphys.step.impulse import ZERO, Impulse
+from symphys.step.jointed import hold, joint_rows, resumed, store_joint_forces
+from symphys.step.momentum import Momentum
+from symphys.step.pgs import Row, begin, relax
 from symphys.step.position import close_gaps, displacements
 from symphys.step.row import ContactRow
 from symphys.step.rows import prepare
@@ -26,9 +29,6 @@ from symphys.world import Pair
 Expr = Any
 """casadi SX, MX or DM"""
 
-SHORTEST_KICK = 1 / 8
-"""Of dt: impulses of a shorter stretch are stored as forces over this time; what an impact adds is no force."""
-
 
 @dataclass(frozen=True)
 class Phase:
@@ -38,7 +38,7 @@ class Phase:
         x: the state at its end.
         rows, contacts: of the pairs.
         impulses: what each has given.
-        last: the same before the final sweep.
+        changes: of every row, joints too, what it has given and what it had before the final sweep.
         ahead: (3,) each [N s]: what persistent forces had given to the true velocities ahead of the impulses of
             sweeps. The next stretch takes it off again, but after an impact, where leapfrog begins anew, it stays.
     """
@@ -47,7 +47,7 @@ class Phase:
     rows: tuple[Row, ...]
     contacts: tuple[Contact, ...]
     impulses: tuple[Impulse, ...]
-    last: tuple[Impulse, ...]
+    changes: tuple[tuple[Any, Any], ...]
     ahead: tuple[Expr, ...] = ()
 
 
@@ -72,35 +72,42 @@ def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = ())
     pieces, pairs = scene.pieces, scene.world.pairs
     kick, half = pieces.do(_times, duration, x["lag"])
 
-    # free motion, in which impacts find their instant
+    # free motion, in which impacts find their instant; what joints hold moves as the last step's forces say
     motions = free_motions(scene, x, duration)
-    contacts = look(scene, motions, duration)
+    paths = expected_motions(scene, x, duration) if scene.world.joints else motions
+    contacts = look(scene, paths, duration)
 
     # rows: where, when and how the surfaces meet
     rows = []
     for pair, contact, off in zip(pairs, contacts, spared or [ca.SX(0)] * len(pairs), strict=True):
-        moving = tuple(motions[i] for i in bodies_of(pair))
+        moving = tuple(paths[i] for i in bodies_of(pair))
         force = x[f"{pair.name}.force"]
         row = pieces.do(prepare, scene.setting, pair.law, contact, moving, duration, off, force)
         rows.append(Row(bodies_of(pair), row))
 
     # velocities: warm start, then sweeps
     momenta = tuple(Momentum(m.mid_velocity, m.mid_momentum) for m in motions)
-    resumed = shared(scene, rows, _warm_start(scene, rows, x, kick))
-    started = begin(pieces, rows, momenta, resumed)
-    solved = relax(pieces, scene.setting.scheme.sweeps, tuple(rows), started)
+    joints = joint_rows(scene, paths, momenta, duration, kick)
+    every, n = (*(each.row for each in joints), *rows), len(joints)
+    start = [*resumed(scene, joints, x, kick), *shared(scene, rows, _warm_start(scene, rows, x, kick))]
+    solved = relax(pieces, scene.setting.scheme.sweeps, every, begin(pieces, every, momenta, start))
+    impulses = solved.impulses[n:]
 
     # positions
-    moved = displacements(scene, rows, resumed, solved, motions, duration)
-    shifts = close_gaps(scene, rows, contacts, solved.impulses, moved)
+    moved = displacements(scene, rows, start[n:], solved.momenta, impulses, paths, duration)
+    shifts = close_gaps(scene, rows, contacts, impulses, [each.row for each in joints if each.fits], moved)
 
     # the next state
     values: State = {"lag": half}
-    resting = _store_forces(scene, rows, solved.impulses, kick, values)
-    for body, *parts in zip(scene.world.bodies, motions, solved.momenta, shifts, resting, strict=True):
+    resting = _store_forces(scene, rows, impulses, kick, values)
+    poses = [pieces.do(_pose, motion, shift) for motion, shift in zip(motions, shifts, strict=True)]
+    forces = store_joint_forces(scene, joints, solved.impulses[:n], rows, x, kick)
+    hold(scene, forces, poses, resting)
+    values |= forces if scene.setting.scheme.warm_start else {name: ca.SX.zeros(x[name].size1()) for name in forces}
+    for body, *parts in zip(scene.world.bodies, motions, solved.momenta, poses, resting, strict=True):
         stored = pieces.do(_store_body, *parts)
         values |= {f"{body.name}.{field}": value for field, value in stored.items()}
-    return Phase(values, tuple(rows), tuple(contacts), solved.impulses, solved.last)
+    return Phase(values, tuple(rows), tuple(contacts), impulses, tuple(zip(solved.impulses, solved.last, strict=True)))
 
 
 def free_motions(scene: Scene, x: State, duration: Expr) -> list[Motion]:
@@ -115,12 +122,12 @@ def expected_motions(scene: Scene, x: State, duration: Expr) -> list[Motion]:
 
 def _motions(scene: Scene, x: State, duration: Expr, freed: int, share: int) -> list[Motion]:
     """Motions with ``freed`` lags of the persistent forces in the velocities and ``share`` of them acting."""
-    applied = {name: scene.u[3 * i : 3 * i + 3] for i, name in enumerate(scene.inputs)}
     zero, lag = ca.SX.zeros(3), x["lag"]
     motions = []
     for body in scene.world.bodies:
         part = {name: x[f"{body.name}.{name}"] for name, _ in BODY_FIELDS}
-        push = tuple(applied.get(f"{body.name}.{name}", zero) for name in ("force", "torque"))
+        given = (scene.given(f"{body.name}.{name}") for name in ("force", "torque"))
+        push = tuple(zero if each is None else each for each in given)
         inertial, times = (body.mass, body.inertia), (freed, lag, share, duration)
         motions.append(scene.pieces.do(_motion, inertial, part, push, scene.setting.gravity, times))
     return motions
@@ -190,7 +197,7 @@ def _store_forces(
     pieces, scheme = scene.pieces, scene.setting.scheme
     total = [(ca.SX.zeros(3), ca.SX.zeros(3)) for _ in scene.world.bodies]
     for pair, each, impulse in zip(scene.world.pairs, rows, impulses, strict=True):
-        force, torque = pieces.do(_persistent, each.row, impulse, kick, SHORTEST_KICK * scheme.dt)
+        force, torque = pieces.do(_persistent, each.row, impulse, kick, scene.shortest_kick)
         values[f"{pair.name}.force"] = force if scheme.warm_start else ca.SX.zeros(3)
         if pair.law.spins:
             values[f"{pair.name}.torque"] = torque if scheme.warm_start else ca.SX.zeros(3)
@@ -210,13 +217,19 @@ def _summed(total: tuple[Expr, Expr], row: ContactRow, k: int, force: Expr, torq
     return total[0] + side.sign * force, total[1] + side.sign * turning
 
 
-def _store_body(motion: Motion, momentum: Momentum, shift: Shift, resting: tuple[Expr, Expr]) -> dict[str, Expr]:
+def _pose(motion: Motion, shift: Shift) -> tuple[Expr, Expr]:
+    """Position and orientation at the end of the stretch."""
+    return motion.position + shift.linear, rotation.turn(motion.orientation, shift.angular)
+
+
+def _store_body(
+    motion: Motion, momentum: Momentum, pose: tuple[Expr, Expr], resting: tuple[Expr, Expr]
+) -> dict[str, Expr]:
     """The body's pose and true velocities at the end of the stretch, by field."""
-    half, (force, torque) = motion.dt / 2, resting
-    orientation = rotation.turn(motion.orientation, shift.angular)
+    half, (force, torque), (position, orientation) = motion.dt / 2, resting, pose
     end_momentum = momentum.angular + half * (motion.torque + torque)
     return {
-        "position": motion.position + shift.linear,
+        "position": position,
         "orientation": orientation,
         "velocity": momentum.velocity + half * (motion.acceleration + force / motion.mass),
         "angular_velocity": angular_velocity(motion.inertia, orientation, end_momentum),

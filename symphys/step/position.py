@@ -9,7 +9,10 @@ import casadi as ca
 
 from symphys.collide.contact import UNMOVED, Contact, Shift
 from symphys.motion import Motion, apply
-from symphys.step.pgs import Impulse, Momentum, Row, Solution
+from symphys.step.impulse import Impulse
+from symphys.step.lock import LockRow
+from symphys.step.momentum import Momenta, Momentum
+from symphys.step.pgs import Row
 from symphys.step.pieces import Pieces
 from symphys.step.row import ContactRow
 from symphys.step.scene import Scene
@@ -24,16 +27,17 @@ def displacements(
     scene: Scene,
     rows: Sequence[Row],
     started: Sequence[Impulse],
-    solved: Solution,
+    momenta: Momenta,
+    given: Sequence[Impulse],
     motions: Sequence[Motion],
     duration: Expr,
 ) -> list[Shift]:
     """Duration times the new velocities, less what impulses would have done before they act."""
     do = scene.pieces.do
-    shifts = [do(_drift, motion, momentum, duration) for motion, momentum in zip(motions, solved.momenta, strict=True)]
+    shifts = [do(_drift, motion, momentum, duration) for motion, momentum in zip(motions, momenta, strict=True)]
     if not scene.setting.scheme.time_of_impact:
         return shifts
-    for each, *impulses in zip(rows, started, solved.impulses, strict=True):
+    for each, *impulses in zip(rows, started, given, strict=True):
         for side, body in enumerate(each.bodies):
             shifts[body] = do(_delayed, shifts[body], each.row, side, impulses, motions[body].inverse_mid)
     return shifts
@@ -60,9 +64,10 @@ def close_gaps(
     rows: Sequence[Row],
     contacts: Sequence[Contact],
     impulses: Sequence[Impulse],
+    locks: Sequence[Row],
     shifts: list[Shift],
 ) -> Shifts:
-    """Gauss-Seidel on the displacements until no rigid contact overlaps, and those that last do not gape.
+    """Gauss-Seidel on the displacements until joints fit, no rigid contact overlaps, and those that last do not gape.
 
     Velocities are not touched.
     """
@@ -73,7 +78,7 @@ def close_gaps(
         if not each.row.law.soft
     )
     state = (tuple(shifts), tuple(ca.SX(0) for _ in rigid))
-    return scene.pieces.repeat(scheme.position_sweeps, _push_all, (rigid, scheme.push_out), state)[0]
+    return scene.pieces.repeat(scheme.position_sweeps, _push_all, (tuple(locks), rigid, scheme.push_out), state)[0]
 
 
 def _lasts(row: ContactRow, impulse: Impulse) -> Expr:
@@ -84,14 +89,32 @@ def _lasts(row: ContactRow, impulse: Impulse) -> Expr:
 def _push_all(
     pieces: Pieces, context: tuple[Any, Expr], state: tuple[Shifts, tuple[Expr, ...]]
 ) -> tuple[Shifts, tuple[Expr, ...]]:
-    """One pass over all rigid contacts."""
-    (rigid, share), shifts, pushes = context, list(state[0]), list(state[1])
+    """One pass over all joints and rigid contacts."""
+    (locks, rigid, share), shifts, pushes = context, list(state[0]), list(state[1])
+    for each in locks:
+        fitted = pieces.do(_fit, each.row, tuple(shifts[i] for i in each.bodies))
+        for i, shift in zip(each.bodies, fitted, strict=True):
+            shifts[i] = shift
     for k, (each, contact, lasts) in enumerate(rigid):
         moved = tuple(shifts[i] for i in each.bodies)
         moved, pushes[k] = pieces.do(_push, each.row, contact, lasts, moved, pushes[k], share)
         for i, shift in zip(each.bodies, moved, strict=True):
             shifts[i] = shift
     return tuple(shifts), tuple(pushes)
+
+
+def _fit(row: LockRow, moved: Shifts) -> Shifts:
+    """Displacements after which the joint fits, to third order in the rotation: arms are those at the middle."""
+    linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
+    for side, shift in zip(row.sides, moved, strict=True):
+        linear += side.sign * (shift.linear + ca.cross(shift.angular, side.arm))
+        angular += side.sign * shift.angular
+    push, twist = row.seen.split(-ca.mtimes(row.mass, row.error + row.seen.forwards(linear, angular)))
+    fitted = []
+    for side, shift in zip(row.sides, moved, strict=True):
+        turn = apply(side.inverse_inertia, ca.cross(side.arm, push) + twist)
+        fitted.append(Shift(shift.linear + side.sign * side.inverse_mass * push, shift.angular + side.sign * turn))
+    return tuple(fitted)
 
 
 def _push(

@@ -19,7 +19,8 @@ import casadi as ca
 from symphys.motion import Motion, apply, inverse_inertia
 from symphys.shapes import Sphere
 from symphys.smooth import TINY_SQUARE
-from symphys.step.pgs import Impulse, Momentum, Row, Solution, relax
+from symphys.step.momentum import Momentum
+from symphys.step.pgs import Given, Row, Solution, relax
 from symphys.step.row import ContactRow
 from symphys.step.scene import Scene
 from symphys.world import World, is_zero
@@ -30,7 +31,8 @@ Expr = Any
 
 def eccentric_bodies(world: World) -> set[int]:
     """The bodies on which contacts may act off the centre: on others friction cannot make a rebound add energy."""
-    return {
+    held = {index for joint in world.joints for index in joint.bodies}
+    return held | {
         index
         for index, body in enumerate(world.bodies)
         if any(not isinstance(s, Sphere) or not all(is_zero(c) for c in s.centre) for s in body.shapes)
@@ -56,7 +58,9 @@ def rebound(scene: Scene, rows: tuple[Row, ...], start: Solution, motions: Seque
     )
 
 
-def _without_rebound(row: ContactRow) -> ContactRow:
+def _without_rebound(row: Any) -> Any:
+    if not isinstance(row, ContactRow):
+        return row
     return replace(row, target=ca.fmin(row.target, 0))
 
 
@@ -90,5 +94,5 @@ def _between_momenta(share: Expr, plastic: Momentum, newton: Momentum) -> Moment
     )
 
 
-def _between(share: Expr, plastic: Impulse, newton: Impulse) -> Impulse:
+def _between(share: Expr, plastic: Given, newton: Given) -> Given:
     return plastic.plus(newton.minus(plastic).times(share))

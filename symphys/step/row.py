@@ -12,6 +12,8 @@ from symphys.collide.contact import Contact, Frame
 from symphys.motion import Motion, apply
 from symphys.rotation import cross_matrix
 from symphys.smooth import TINY_SQUARE
+from symphys.step import impulse
+from symphys.step.momentum import Momenta
 from symphys.world import Law
 
 Expr = Any
@@ -85,6 +87,14 @@ class ContactRow:
     struck: Expr
     width: Expr
     knob: Expr
+
+    def visit(self, momenta: Momenta, old: impulse.Impulse) -> tuple[Momenta, impulse.Impulse]:
+        """See ``pgs.Solvable``."""
+        return impulse.visit(self, momenta, old)
+
+    def given(self, momenta: Momenta, given: impulse.Impulse) -> Momenta:
+        """See ``pgs.Solvable``."""
+        return impulse.give(self, momenta, given)
 
 
 def at_touch(contact: Contact, motions: Moving, t: Expr) -> tuple[Expr, Expr, Expr]:

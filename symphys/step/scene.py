@@ -8,12 +8,15 @@ from typing import Any
 import casadi as ca
 
 from symphys.smooth import TINY_SQUARE
+from symphys.state import input_size
 from symphys.step.pieces import Pieces
 from symphys.world import Scheme, World
 
 Expr = Any
 """casadi SX, MX or DM"""
 
+SHORTEST_KICK = 1 / 8
+"""Of dt; see ``Scene.shortest_kick``."""
 SLOWEST = 1.0
 """[m/s^2] least reference acceleration: what counts as fast when there is no gravity."""
 
@@ -52,7 +55,7 @@ class Scene:
         world: what is simulated.
         setting: how.
         inputs: names of the forces and torques that ``u`` stacks.
-        u: (3 * inputs,), constant over the step.
+        u: what the inputs stack, constant over the step.
         pieces: how the parts of the step are put together.
     """
 
@@ -61,6 +64,21 @@ class Scene:
     inputs: tuple[str, ...]
     u: Expr
     pieces: Pieces
+
+    def given(self, name: str) -> Expr | None:
+        """The input of this name; None if there is none."""
+        start = 0
+        for each in self.inputs:
+            size = input_size(self.world, each)
+            if each == name:
+                return self.u[start : start + size]
+            start += size
+        return None
+
+    @property
+    def shortest_kick(self) -> float:
+        """[s]: impulses of a shorter stretch are stored as forces over this time; what an impact adds is no force."""
+        return SHORTEST_KICK * self.setting.scheme.dt
 
 
 def make_scene(

@@ -16,7 +16,8 @@ from typing import Any
 import casadi as ca
 
 from symphys.shapes import Plane, Terrain
-from symphys.step.pgs import Impulse, Row
+from symphys.step.impulse import Impulse
+from symphys.step.pgs import Row
 from symphys.step.row import ContactRow
 from symphys.step.scene import Scene
 from symphys.world import Pair, World

@@ -14,9 +14,11 @@ from typing import Any
 
 import casadi as ca
 
+from symphys.step.along import Along
 from symphys.step.deferral import deferred
 from symphys.step.impact import Cut, collide_now, find_cut
-from symphys.step.pgs import Impulse
+from symphys.step.impulse import Impulse
+from symphys.step.pgs import Given
 from symphys.step.phase import Phase, advance
 from symphys.step.restitution import eccentric_bodies
 from symphys.step.row import ContactRow
@@ -93,7 +95,7 @@ def report(scene: Scene, phases: list[Phase]) -> Report:
                 do(_ahead, force, ahead, scene.setting.scheme.dt)
                 for force, ahead in zip(forces, phase.ahead, strict=True)
             )
-        for new, old in zip(phase.impulses, phase.last, strict=True):
+        for new, old in phase.changes:
             residual = do(_larger_change, residual, new, old)
         crowded = do(_crowded, crowded, tuple((each.bodies, each.row.struck, each.row.leaving) for each in phase.rows))
     gaps = tuple(contact.gap for contact in phases[0].contacts)
@@ -112,8 +114,10 @@ def _stack(columns: tuple[Expr, ...]) -> Expr:
     return ca.densify(ca.vertcat(ca.SX(0, 1), *columns))
 
 
-def _larger_change(residual: Expr, new: Impulse, old: Impulse) -> Expr:
+def _larger_change(residual: Expr, new: Given, old: Given) -> Expr:
     change = new.minus(old)
+    if isinstance(change, Along):
+        return ca.fmax(residual, ca.norm_inf(change.numbers))
     return ca.fmax(residual, ca.fmax(ca.fabs(change.normal), ca.norm_inf(change.tangent)))
 
 

@@ -1,0 +1,63 @@
+"""A kind of joint as data: what it locks, and which coordinates are left.
+
+Each side carries a socket, a point with three axes. ``a`` are the axes of the first side's socket, ``b`` those of the
+second's: columns of (3, 3), world frame. At coordinates 0 the sockets coincide.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+Expr = Any
+"""casadi SX, MX or DM"""
+
+
+@dataclass(frozen=True)
+class Placed:
+    """Both sockets of a joint in the world.
+
+    Attributes:
+        a, b: (3, 3) axes of the first and of the second side's socket.
+        apart: (3,) [m] from the second socket to the first.
+    """
+
+    a: Expr
+    b: Expr
+    apart: Expr
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """A motion that a joint leaves free.
+
+    Attributes:
+        name: ``angle`` or ``position``; with a number where there are two.
+        turns: whether it is a rotation [rad], else a displacement [m].
+        value: of the placed sockets.
+        axis: (3,) unit vector, world frame: about which, or along which, the first side moves as the value grows.
+    """
+
+    name: str
+    turns: bool
+    value: Callable[[Placed], Expr]
+    axis: Callable[[Placed], Expr]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What a joint locks.
+
+    Attributes:
+        name: in problem files.
+        slides: axes of the second socket along which the first may not move; None: it may not move at all.
+        turns: pairs (i, j): axis i of the first socket stays perpendicular to axis j of the second. A free rotation
+            less for each.
+        coordinates: what is left.
+    """
+
+    name: str
+    slides: tuple[int, ...] | None = None
+    turns: tuple[tuple[int, int], ...] = ()
+    coordinates: tuple[Coordinate, ...] = ()

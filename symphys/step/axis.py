@@ -1,0 +1,77 @@
+"""The row of one thing that acts along a coordinate of a joint: a motor, a limit, a spring.
+
+A sweep gives  impulse <- clip(keep impulse - slope rate - offset, low, high).  A velocity that is asked for with
+impulse bounds: keep 1, slope m, offset -m target, with m the effective mass. A law a + b rate of the force, solved for
+the rate after it: keep b K/(1 + b K), slope b/(1 + b K), offset a/(1 + b K), with K = 1/m.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from symphys.smooth import positive
+from symphys.step.along import Along, Directions, kicked, speeds
+from symphys.step.momentum import Momenta
+from symphys.step.row import Side
+
+Expr = Any
+"""casadi SX"""
+
+
+@dataclass(frozen=True)
+class AxisRow:
+    """What acts along one coordinate, as the sweeps see it; impulses in [N m s], or [N s] where it slides.
+
+    Attributes:
+        sides: arms at the row's instant, and to the common point for impulses.
+        seen, given_along: the one direction at the row's instant, and of the impulse.
+        keep, slope, offset: see the module.
+        low, high: bounds of the impulse; None where there is none.
+        width: of the smoothed bounds [N m s].
+    """
+
+    sides: tuple[Side, ...]
+    seen: Directions
+    given_along: Directions
+    keep: Expr
+    slope: Expr
+    offset: Expr
+    low: Expr | None
+    high: Expr | None
+    width: Expr
+
+    def carried(self, impulse: Along) -> Expr:
+        """(1,): what is stored of an impulse; also of a force."""
+        return impulse.numbers
+
+    def taken_up(self, stored: Expr) -> Along:
+        """The impulse that is stored so."""
+        return Along(stored)
+
+    def visit(self, momenta: Momenta, old: Along) -> tuple[Momenta, Along]:
+        """See ``pgs.Solvable``."""
+        rate = speeds(self.sides, self.seen, momenta)
+        new = self.keep * old.numbers - self.slope * rate - self.offset
+        if self.low is not None:
+            new = self.low + positive(new - self.low, self.width)
+        if self.high is not None:
+            new = self.high - positive(self.high - new, self.width)
+        return self.given(momenta, Along(new - old.numbers)), Along(new)
+
+    def given(self, momenta: Momenta, impulse: Along) -> Momenta:
+        """See ``pgs.Solvable``."""
+        return kicked(self.sides, self.given_along, momenta, impulse.numbers)
+
+
+def towards(target: Expr, mobility: Expr) -> dict[str, Expr]:
+    """The coefficients of a row that asks for a velocity."""
+    return {"keep": ca.SX(1), "slope": 1 / mobility, "offset": -target / mobility}
+
+
+def by_law(a: Expr, b: Expr, mobility: Expr) -> dict[str, Expr]:
+    """The coefficients of a row whose impulse is -(a + b rate)."""
+    share = 1 / (1 + b * mobility)
+    return {"keep": b * mobility * share, "slope": b * share, "offset": a * share}

@@ -1,0 +1,149 @@
+"""The rows of one joint over a stretch: seen at its middle, given at its start, so that motion about it keeps energy.
+
+Impulses act on one point of both sides. Rows and impulses both at the middle would cost a pendulum a fifth of its
+energy in five seconds. A rigid lock asks for no velocity at all, and the position pass takes back what is left of its
+error, of third order in a step. Asking for -error / dt (SHAKE) would do both at once, but feeds errors back through the
+forces that the sweeps start from, which is unstable as soon as these do not converge by half in a step: chains of four
+then burst.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from symphys.joints import Coordinate, Joint, Servo, TorqueMotor, VelocityMotor
+from symphys.smooth import clip
+from symphys.step.along import Directions, mobility, speeds
+from symphys.step.axis import AxisRow, by_law, towards
+from symphys.step.lock import LockRow, inverse
+from symphys.step.momentum import Momenta
+from symphys.step.row import Moving, Side
+from symphys.step.scene import Setting
+from symphys.step.sockets import Sockets, errors, free, locked
+
+Expr = Any
+"""casadi SX"""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Its length and the time over which forces act as impulses in it [s]; see ``phase``."""
+
+    duration: Expr
+    kick: Expr
+
+
+@dataclass(frozen=True)
+class AlongCoordinate:
+    """What every row along a coordinate needs: its sides and directions, value, rate before impulses, mobility."""
+
+    sides: tuple[Side, ...]
+    seen: Directions
+    given: Directions
+    value: Expr
+    rate: Expr
+    mobility: Expr
+
+
+def lock_row(setting: Setting, sockets: Sockets, motions: Moving, stretch: Stretch) -> LockRow:
+    """What the joint locks; soft if it gives way (Catto, GDC 2011)."""
+    joint, start, middle = sockets.joint, ca.SX(0), stretch.duration / 2
+    now = sockets.placed(start)
+    sides, seen = sockets.sides(motions, middle, start), locked(joint, sockets.placed(middle))
+    k, error = mobility(sides, seen), errors(joint, now)
+    share, softness = _softness(joint, ca.diag(k), setting.scheme.dt)
+    return LockRow(
+        sides=sides,
+        seen=seen,
+        given_along=locked(joint, now),
+        mass=inverse(k + ca.diag(softness)),
+        softness=softness,
+        target=-share * error / setting.scheme.dt,
+        error=error,
+        axes=now.a,
+    )
+
+
+def lock_now(sockets: Sockets, motions: Moving, momenta: Momenta) -> LockRow:
+    """What the joint locks, at the instant of an impact: it changes no velocity unless something else does."""
+    now = ca.SX(0)
+    placed = sockets.placed(now)
+    sides, seen = sockets.sides(motions, now, now), locked(sockets.joint, placed)
+    k = mobility(sides, seen)
+    zero = ca.SX(k.size1(), 1)
+    return LockRow(sides, seen, seen, inverse(k), zero, speeds(sides, seen, momenta), zero, placed.a)
+
+
+def _softness(joint: Joint, mobilities: Expr, dt: float) -> tuple[Expr, Expr]:
+    """(share of the error that velocities take back in a step, gamma), (n,) each."""
+    if not joint.soft:
+        return ca.SX(mobilities.size1(), 1), ca.SX(mobilities.size1(), 1)
+    omega = 2 * ca.pi * joint.frequency
+    stiffness, damper = omega**2 / mobilities, 2 * joint.damping * omega / mobilities
+    return dt * stiffness / (damper + dt * stiffness), 1 / (dt * (damper + dt * stiffness))
+
+
+def along_coordinate(
+    sockets: Sockets, coordinate: Coordinate, motions: Moving, momenta: Momenta, duration: Expr
+) -> AlongCoordinate:
+    """A coordinate over a stretch; ``momenta`` are those before any impulse of it."""
+    start, middle = ca.SX(0), duration / 2
+    now, sides = sockets.placed(start), sockets.sides(motions, middle, start)
+    seen = free(coordinate, sockets.placed(middle))
+    rate, value = speeds(sides, seen, momenta), coordinate.value(now)
+    return AlongCoordinate(sides, seen, free(coordinate, now), value, rate, mobility(sides, seen))
+
+
+def motor_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr, stretch: Stretch) -> AxisRow:
+    """A motor; the bounds of its torque are rounded off over what the knob makes of an effective mass."""
+    motor, width = joint.motor, setting.knob / at.mobility
+    if isinstance(motor, TorqueMotor):
+        torque = clip(command, -motor.torque, motor.torque, setting.knob)
+        return _row(at, by_law(-torque * stretch.kick, ca.SX(0), at.mobility), None, None, width)
+    assert isinstance(motor, Servo | VelocityMotor)
+    wanted = motor.gain * (command - at.value) if isinstance(motor, Servo) else command
+    target = clip(wanted, -motor.velocity, motor.velocity, setting.knob)
+    most = motor.torque * stretch.kick
+    return _row(at, towards(target, at.mobility), -most, most, width)
+
+
+def lower_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr, stretch: Stretch) -> AxisRow:
+    """A limit from below: it may be reached within the stretch, not passed, and pushes only."""
+    target = _towards_limit(setting, at.value - joint.limits.lower, stretch)
+    return _row(at, towards(target, at.mobility), ca.SX(0), None, setting.knob / at.mobility)
+
+
+def upper_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr, stretch: Stretch) -> AxisRow:
+    """A limit from above."""
+    target = -_towards_limit(setting, joint.limits.upper - at.value, stretch)
+    return _row(at, towards(target, at.mobility), None, ca.SX(0), setting.knob / at.mobility)
+
+
+def _towards_limit(setting: Setting, left: Expr, stretch: Stretch) -> Expr:
+    """The least rate away from a limit that is ``left`` away; what is beyond comes back within a step."""
+    return -ca.fmax(left, 0) / stretch.duration - ca.fmin(left, 0) / setting.scheme.dt
+
+
+def spring_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr, stretch: Stretch) -> AxisRow:
+    """A spring and damper.
+
+    The spring acts with k / (1 + (w dt / 2)^2), w^2 = k / m: of second order, keeps energy and is stable at any k. The
+    damper acts on the mean of the rates before and after.
+    """
+    spring, dt = joint.spring, setting.scheme.dt
+    assert spring is not None
+    stiffness = spring.stiffness / (1 + spring.stiffness * at.mobility * dt * dt / 4)
+    half = stretch.kick * spring.damping / 2
+    pull = stretch.kick * stiffness * (at.value - spring.rest) + half * at.rate
+    return _row(at, by_law(pull, half, at.mobility), None, None, ca.SX(0))
+
+
+ROWS = {"motor": motor_row, "lower": lower_row, "upper": upper_row, "spring": spring_row}
+"""By what acts along a coordinate."""
+
+
+def _row(at: AlongCoordinate, law: dict[str, Expr], low: Expr | None, high: Expr | None, width: Expr) -> AxisRow:
+    return AxisRow(at.sides, at.seen, at.given, **law, low=low, high=high, width=width)

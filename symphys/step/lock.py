@@ -1,0 +1,81 @@
+"""The row of what a joint locks: all of its directions at once, by the inverse of their effective mass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from symphys.step.along import Along, Directions, kicked, speeds
+from symphys.step.momentum import Momenta
+from symphys.step.row import Side
+
+Expr = Any
+"""casadi SX"""
+
+
+@dataclass(frozen=True)
+class LockRow:
+    """What a joint locks, as the sweeps see it.
+
+    Attributes:
+        sides: arms at the row's instant, and to the common point for impulses.
+        seen, given_along: directions at the row's instant, and of impulses.
+        mass: (n, n) inverse of mobility and softness.
+        softness: (n,) gamma of a joint that gives way, 0 if rigid.
+        target: (n,) velocities that the row asks for [m/s], [rad/s].
+        error: (n,) [m], [rad] at the start of the stretch.
+        axes: (3, 3) of the first socket at the start. Forces on a point are stored along these, so that they turn with
+            the body: a rod's pull stays along the rod.
+    """
+
+    sides: tuple[Side, ...]
+    seen: Directions
+    given_along: Directions
+    mass: Expr
+    softness: Expr
+    target: Expr
+    error: Expr
+    axes: Expr
+
+    def carried(self, impulse: Along) -> Expr:
+        """(n,): what is stored of an impulse; also of a force."""
+        if self.given_along.slides is not None:
+            return impulse.numbers
+        return ca.vertcat(ca.mtimes(self.axes.T, impulse.numbers[:3, 0]), impulse.numbers[3:, 0])
+
+    def taken_up(self, stored: Expr) -> Along:
+        """The impulse that is stored so."""
+        return Along(stored if self.given_along.slides is not None else in_world(self.axes, stored))
+
+    def visit(self, momenta: Momenta, old: Along) -> tuple[Momenta, Along]:
+        """See ``pgs.Solvable``."""
+        miss = speeds(self.sides, self.seen, momenta) - self.target + self.softness * old.numbers
+        change = Along(-ca.mtimes(self.mass, miss))
+        return self.given(momenta, change), old.plus(change)
+
+    def given(self, momenta: Momenta, impulse: Along) -> Momenta:
+        """See ``pgs.Solvable``."""
+        return kicked(self.sides, self.given_along, momenta, impulse.numbers)
+
+
+def in_world(axes: Expr, stored: Expr) -> Expr:
+    """(n,): numbers whose first three are along axes (3, 3), along the world's instead."""
+    return ca.vertcat(ca.mtimes(axes, stored[:3, 0]), stored[3:, 0])
+
+
+def inverse(k: Expr) -> Expr:
+    """Of a symmetric positive definite (n, n) matrix, by Cholesky's factor, without pivots."""
+    n = k.size1()
+    upper = ca.SX(n, n)
+    for i in range(n):
+        upper[i, i] = ca.sqrt(k[i, i] - sum(upper[p, i] ** 2 for p in range(i)))
+        for j in range(i + 1, n):
+            upper[i, j] = (k[i, j] - sum(upper[p, i] * upper[p, j] for p in range(i))) / upper[i, i]
+    rows = ca.SX(n, n)  # of the inverse of the upper factor
+    for j in range(n):
+        rows[j, j] = 1 / upper[j, j]
+        for i in reversed(range(j)):
+            rows[i, j] = -sum(upper[i, p] * rows[p, j] for p in range(i + 1, j + 1)) / upper[i, i]
+    return ca.mtimes(rows, rows.T)
