@@ -31,6 +31,9 @@ class AxisRow:
         keep, slope, offset: see the module.
         low, high: bounds of the impulse; None where there is none.
         width: of the smoothed bounds [N m s].
+        left: how far a limit is away at the start [rad], [m]; None for what is none.
+        inverse_mobility: effective mass.
+        landing: 1 for a limit that is struck: its impulse is an impact, not a force.
     """
 
     sides: tuple[Side, ...]
@@ -42,6 +45,15 @@ class AxisRow:
     low: Expr | None
     high: Expr | None
     width: Expr
+    left: Expr | None
+    inverse_mobility: Expr
+    landing: Expr
+
+    def fitting(self, moved: Expr) -> Expr:
+        """(1,): the impulse times a time that takes a limit back to where it is kept; see ``LockRow``."""
+        sign = 1 if self.low is not None else -1
+        beyond = self.left + sign * moved
+        return -sign * self.inverse_mobility * ca.fmin(beyond, 0)
 
     def carried(self, impulse: Along) -> Expr:
         """(1,): what is stored of an impulse; also of a force."""

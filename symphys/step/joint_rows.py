@@ -19,13 +19,17 @@ from symphys.smooth import clip
 from symphys.step.along import Directions, mobility, speeds
 from symphys.step.axis import AxisRow, by_law, towards
 from symphys.step.lock import LockRow, inverse
-from symphys.step.momentum import Momenta
+from symphys.step.momentum import Momenta, Momentum
 from symphys.step.row import Moving, Side
 from symphys.step.scene import Setting
 from symphys.step.sockets import Sockets, errors, free, locked
 
 Expr = Any
 """casadi SX"""
+
+NEVER = ca.SX(0)
+REACHED = 1e-4
+"""[rad], [m] in a step: what comes to a limit faster than that strikes it."""
 
 
 @dataclass(frozen=True)
@@ -38,13 +42,22 @@ class Stretch:
 
 @dataclass(frozen=True)
 class AlongCoordinate:
-    """What every row along a coordinate needs: its sides and directions, value, rate before impulses, mobility."""
+    """What every row along a coordinate needs.
+
+    Attributes:
+        sides, seen, given: as of any row.
+        value: [rad] or [m].
+        rate: at the middle of the stretch, before any impulse of it.
+        rate_now: at its start.
+        mobility: inverse of the effective mass.
+    """
 
     sides: tuple[Side, ...]
     seen: Directions
     given: Directions
     value: Expr
     rate: Expr
+    rate_now: Expr
     mobility: Expr
 
 
@@ -93,8 +106,10 @@ def along_coordinate(
     start, middle = ca.SX(0), duration / 2
     now, sides = sockets.placed(start), sockets.sides(motions, middle, start)
     seen = free(coordinate, sockets.placed(middle))
-    rate, value = speeds(sides, seen, momenta), coordinate.value(now)
-    return AlongCoordinate(sides, seen, free(coordinate, now), value, rate, mobility(sides, seen))
+    given, value = free(coordinate, now), coordinate.value(now)
+    before = tuple(Momentum(m.velocity, m.momentum_k) for m in motions)
+    rates = speeds(sides, seen, momenta), speeds(sockets.sides(motions, start, start), given, before)
+    return AlongCoordinate(sides, seen, given, value, *rates, mobility(sides, seen))
 
 
 def motor_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr, stretch: Stretch) -> AxisRow:
@@ -111,20 +126,25 @@ def motor_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr
 
 
 def lower_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr, stretch: Stretch) -> AxisRow:
-    """A limit from below: it may be reached within the stretch, not passed, and pushes only."""
-    target = _towards_limit(setting, at.value - joint.limits.lower, stretch)
-    return _row(at, towards(target, at.mobility), ca.SX(0), None, setting.knob / at.mobility)
+    """A limit from below: it may be reached within the stretch, not passed, and pushes only.
+
+    What is beyond it is taken back by the position pass, without velocity.
+    """
+    left = at.value - joint.limits.lower
+    law = towards(-ca.fmax(left, 0) / stretch.duration, at.mobility)
+    return _row(at, law, ca.SX(0), None, setting.knob / at.mobility, left, _strikes(setting, at, -at.rate_now))
 
 
 def upper_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr, stretch: Stretch) -> AxisRow:
     """A limit from above."""
-    target = -_towards_limit(setting, joint.limits.upper - at.value, stretch)
-    return _row(at, towards(target, at.mobility), None, ca.SX(0), setting.knob / at.mobility)
+    left = joint.limits.upper - at.value
+    law = towards(ca.fmax(left, 0) / stretch.duration, at.mobility)
+    return _row(at, law, None, ca.SX(0), setting.knob / at.mobility, left, _strikes(setting, at, at.rate_now))
 
 
-def _towards_limit(setting: Setting, left: Expr, stretch: Stretch) -> Expr:
-    """The least rate away from a limit that is ``left`` away; what is beyond comes back within a step."""
-    return -ca.fmax(left, 0) / stretch.duration - ca.fmin(left, 0) / setting.scheme.dt
+def _strikes(setting: Setting, at: AlongCoordinate, closing: Expr) -> Expr:
+    """1 if a limit is reached at speed: faster than what acts in two steps brings about."""
+    return closing > 4 * ca.fabs(at.rate - at.rate_now) + REACHED / setting.scheme.dt
 
 
 def spring_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr, stretch: Stretch) -> AxisRow:
@@ -145,5 +165,14 @@ ROWS = {"motor": motor_row, "lower": lower_row, "upper": upper_row, "spring": sp
 """By what acts along a coordinate."""
 
 
-def _row(at: AlongCoordinate, law: dict[str, Expr], low: Expr | None, high: Expr | None, width: Expr) -> AxisRow:
-    return AxisRow(at.sides, at.seen, at.given, **law, low=low, high=high, width=width)
+def _row(
+    at: AlongCoordinate,
+    law: dict[str, Expr],
+    low: Expr | None,
+    high: Expr | None,
+    width: Expr,
+    left: Expr | None = None,
+    landing: Expr = NEVER,
+) -> AxisRow:
+    bounds = {"low": low, "high": high, "width": width, "left": left, "landing": landing}
+    return AxisRow(at.sides, at.seen, at.given, **law, **bounds, inverse_mobility=1 / at.mobility)

@@ -14,7 +14,7 @@ from symphys.step.along import Along
 from symphys.step.axis import AxisRow
 from symphys.step.joint_rows import ROWS, Stretch, along_coordinate, lock_now, lock_row
 from symphys.step.lock import LockRow, in_world
-from symphys.step.momentum import Momenta
+from symphys.step.momentum import Momenta, Momentum
 from symphys.step.pgs import Row
 from symphys.step.row import ContactRow
 from symphys.step.scene import Scene, State
@@ -23,6 +23,9 @@ from symphys.world import World
 
 Expr = Any
 """casadi SX"""
+LIMITS = ("lower", "upper")
+Struck = Mapping[frozenset[int], Expr]
+"""Of bodies that hang together: 1 if one of their contacts is an impact."""
 Total = list[tuple[Expr, Expr]]
 """Force and torque on each body."""
 
@@ -34,7 +37,7 @@ class JointRow:
     Attributes:
         row: what sweeps visit.
         name, k: where the state keeps what it gave: component ``k`` of ``name``, all of it if None.
-        fits: whether the position pass closes it: what a joint locks that does not give way.
+        fits: whether the position pass closes it: limits, and what a joint locks that does not give way.
     """
 
     row: Row
@@ -58,7 +61,7 @@ def joint_rows(scene: Scene, motions: Sequence[Motion], momenta: Momenta, durati
             command = ca.SX(0) if command is None else command[k]
             for part in joint.acting:
                 row = Row(joint.bodies, do(ROWS[part], setting, joint, at, command, stretch))
-                rows.append(JointRow(row, f"{joint.name}.{part}", k))
+                rows.append(JointRow(row, f"{joint.name}.{part}", k, fits=part in LIMITS))
     return rows
 
 
@@ -111,27 +114,35 @@ def components(world: World) -> list[frozenset[int]]:
     return found
 
 
-def struck_by_component(scene: Scene, rows: Sequence[Row]) -> Mapping[frozenset[int], Expr]:
-    """Of each component: 1 if one of its contacts is an impact, whose share of joint forces does not last."""
+def struck_by_component(
+    scene: Scene, contacts: Sequence[Row], joints: Sequence[JointRow], given: Sequence[Along]
+) -> Struck:
+    """Of each component: 1 if a contact or a limit of it is an impact, whose share of joint forces does not last."""
     found = {}
     for group in components(scene.world):
-        meeting = tuple(each.row for each in rows if group & set(each.bodies))
-        found[group] = scene.pieces.do(_any_struck, meeting) if meeting else ca.SX(0)
+        meeting = tuple(each.row for each in contacts if group & set(each.bodies))
+        limits = tuple(
+            (each.row.row, impulse)
+            for each, impulse in zip(joints, given, strict=True)
+            if group & set(each.row.bodies) and each.name.rpartition(".")[2] in LIMITS
+        )
+        found[group] = scene.pieces.do(_any_struck, meeting, limits)
     return found
 
 
-def _any_struck(rows: tuple[ContactRow, ...]) -> Expr:
-    return ca.mmax(ca.vertcat(*(ca.fmax(row.struck, row.leaving > 0) for row in rows)))
+def _any_struck(rows: tuple[ContactRow, ...], limits: tuple[tuple[AxisRow, Along], ...]) -> Expr:
+    struck = [ca.fmax(row.struck, row.leaving > 0) for row in rows]
+    struck += [ca.logic_and(row.landing, impulse.numbers != 0) for row, impulse in limits]
+    return ca.mmax(ca.vertcat(ca.SX(0), *struck))
 
 
 def store_joint_forces(
-    scene: Scene, rows: Sequence[JointRow], given: Sequence[Along], contacts: Sequence[Row], x: State, kick: Expr
+    scene: Scene, rows: Sequence[JointRow], given: Sequence[Along], struck: Struck, x: State, kick: Expr
 ) -> State:
     """Persistent joint forces.
 
     In a stretch with an impact those of the last one stay: what held the impact is not to be told from them.
     """
-    struck = struck_by_component(scene, contacts)
     kept = dict[str, list[Expr]]()
     for each, impulse in zip(rows, given, strict=True):
         group = next(g for g in struck if set(each.row.bodies) & g)
@@ -148,6 +159,26 @@ def _lasting(row: LockRow | AxisRow, impulse: Along, old: Expr, struck: Expr, ki
 
 def _stacked(parts: tuple[Expr, ...]) -> Expr:
     return ca.vertcat(*parts)
+
+
+def keep_up(scene: Scene, momenta: Momenta, made: Momenta, struck: Struck, duration: Expr) -> Momenta:
+    """The momenta, with those that the displacements by joints stand for (as SHAKE has it), so that spin is kept.
+
+    Not in a stretch with an impact, where they make up for impulses that act late. They are no part of the forces that
+    the next sweeps start from.
+    """
+    if not scene.world.joints:
+        return momenta
+    found, dt = list(momenta), scene.setting.scheme.dt
+    for i in sorted({i for joint in scene.world.joints for i in joint.bodies}):
+        impact = next(impact for group, impact in struck.items() if i in group)
+        found[i] = scene.pieces.do(_kept_up, momenta[i], made[i], impact, duration, dt)
+    return tuple(found)
+
+
+def _kept_up(momentum: Momentum, made: Momentum, impact: Expr, duration: Expr, dt: float) -> Momentum:
+    share = ca.if_else(impact, 0, duration / dt**2)
+    return Momentum(momentum.velocity + share * made.velocity, momentum.angular + share * made.angular)
 
 
 def hold(scene: Scene, forces: State, poses: Sequence[tuple[Expr, Expr]], total: Total) -> None:

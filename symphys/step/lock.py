@@ -39,6 +39,10 @@ class LockRow:
     error: Expr
     axes: Expr
 
+    def fitting(self, moved: Expr) -> Expr:
+        """(n,): displacements by the directions moved to impulses times a time that close what is then left open."""
+        return -ca.mtimes(self.mass, self.error + moved)
+
     def carried(self, impulse: Along) -> Expr:
         """(n,): what is stored of an impulse; also of a force."""
         if self.given_along.slides is not None:

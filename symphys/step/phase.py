@@ -16,7 +16,7 @@ from symphys.course import at_rest
 from symphys.motion import BodyState, Motion, angular_velocity, free_motion, momentum
 from symphys.state import BODY_FIELDS
 from symphys.step.impulse import ZERO, Impulse
-from symphys.step.jointed import hold, joint_rows, resumed, store_joint_forces
+from symphys.step.jointed import hold, joint_rows, keep_up, resumed, store_joint_forces, struck_by_component
 from symphys.step.momentum import Momentum
 from symphys.step.pgs import Row, begin, relax
 from symphys.step.position import close_gaps, displacements
@@ -89,22 +89,24 @@ def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = ())
     momenta = tuple(Momentum(m.mid_velocity, m.mid_momentum) for m in motions)
     joints = joint_rows(scene, paths, momenta, duration, kick)
     every, n = (*(each.row for each in joints), *rows), len(joints)
-    start = [*resumed(scene, joints, x, kick), *shared(scene, rows, _warm_start(scene, rows, x, kick))]
+    start: list[Any] = [*resumed(scene, joints, x, kick), *shared(scene, rows, _warm_start(scene, rows, x, kick))]
     solved = relax(pieces, scene.setting.scheme.sweeps, every, begin(pieces, every, momenta, start))
     impulses = solved.impulses[n:]
 
     # positions
     moved = displacements(scene, rows, start[n:], solved.momenta, impulses, paths, duration)
-    shifts = close_gaps(scene, rows, contacts, impulses, [each.row for each in joints if each.fits], moved)
+    shifts, made = close_gaps(scene, rows, contacts, impulses, [each.row for each in joints if each.fits], moved)
 
     # the next state
     values: State = {"lag": half}
     resting = _store_forces(scene, rows, impulses, kick, values)
     poses = [pieces.do(_pose, motion, shift) for motion, shift in zip(motions, shifts, strict=True)]
-    forces = store_joint_forces(scene, joints, solved.impulses[:n], rows, x, kick)
+    struck = struck_by_component(scene, rows, joints, solved.impulses[:n])
+    forces = store_joint_forces(scene, joints, solved.impulses[:n], struck, x, kick)
+    momenta = keep_up(scene, solved.momenta, made, struck, duration)
     hold(scene, forces, poses, resting)
     values |= forces if scene.setting.scheme.warm_start else {name: ca.SX.zeros(x[name].size1()) for name in forces}
-    for body, *parts in zip(scene.world.bodies, motions, solved.momenta, poses, resting, strict=True):
+    for body, *parts in zip(scene.world.bodies, motions, momenta, poses, resting, strict=True):
         stored = pieces.do(_store_body, *parts)
         values |= {f"{body.name}.{field}": value for field, value in stored.items()}
     return Phase(values, tuple(rows), tuple(contacts), impulses, tuple(zip(solved.impulses, solved.last, strict=True)))

@@ -9,6 +9,7 @@ import casadi as ca
 
 from symphys.collide.contact import UNMOVED, Contact, Shift
 from symphys.motion import Motion, apply
+from symphys.step.axis import AxisRow
 from symphys.step.impulse import Impulse
 from symphys.step.lock import LockRow
 from symphys.step.momentum import Momenta, Momentum
@@ -66,10 +67,12 @@ def close_gaps(
     impulses: Sequence[Impulse],
     locks: Sequence[Row],
     shifts: list[Shift],
-) -> Shifts:
+) -> tuple[Shifts, Momenta]:
     """Gauss-Seidel on the displacements until joints fit, no rigid contact overlaps, and those that last do not gape.
 
-    Velocities are not touched.
+    Returns:
+        The displacements, and what joints did to them as momenta times a time: mass [kg m] and inertia [kg m^2] times
+        displacement. Velocities are not touched.
     """
     do, scheme = scene.pieces.do, scene.setting.scheme
     rigid = tuple(
@@ -77,8 +80,11 @@ def close_gaps(
         for each, contact, impulse in zip(rows, contacts, impulses, strict=True)
         if not each.row.law.soft
     )
-    state = (tuple(shifts), tuple(ca.SX(0) for _ in rigid))
-    return scene.pieces.repeat(scheme.position_sweeps, _push_all, (tuple(locks), rigid, scheme.push_out), state)[0]
+    none = Momentum(ca.SX.zeros(3), ca.SX.zeros(3))
+    state = (tuple(shifts), tuple(ca.SX(0) for _ in rigid), tuple(none for _ in shifts))
+    context = (tuple(locks), rigid, scheme.push_out)
+    shifts_after, _, made = scene.pieces.repeat(scheme.position_sweeps, _push_all, context, state)
+    return shifts_after, made
 
 
 def _lasts(row: ContactRow, impulse: Impulse) -> Expr:
@@ -86,35 +92,41 @@ def _lasts(row: ContactRow, impulse: Impulse) -> Expr:
     return ca.logic_and(row.lasts, impulse.normal > row.load)
 
 
-def _push_all(
-    pieces: Pieces, context: tuple[Any, Expr], state: tuple[Shifts, tuple[Expr, ...]]
-) -> tuple[Shifts, tuple[Expr, ...]]:
+Fitting = LockRow | AxisRow
+"""Rows of joints that the pass closes: locks and limits."""
+Passing = tuple[Shifts, tuple[Expr, ...], Momenta]
+"""Displacements, pushes of contacts, what joints did."""
+
+
+def _push_all(pieces: Pieces, context: tuple[Any, Any, float], state: Passing) -> Passing:
     """One pass over all joints and rigid contacts."""
-    (locks, rigid, share), shifts, pushes = context, list(state[0]), list(state[1])
+    (locks, rigid, share), (shifts, pushes, made) = context, map(list, state)
     for each in locks:
-        fitted = pieces.do(_fit, each.row, tuple(shifts[i] for i in each.bodies))
-        for i, shift in zip(each.bodies, fitted, strict=True):
-            shifts[i] = shift
+        own = tuple(shifts[i] for i in each.bodies), tuple(made[i] for i in each.bodies)
+        for i, shift, momentum in zip(each.bodies, *pieces.do(_fit, each.row, *own), strict=True):
+            shifts[i], made[i] = shift, momentum
     for k, (each, contact, lasts) in enumerate(rigid):
         moved = tuple(shifts[i] for i in each.bodies)
         moved, pushes[k] = pieces.do(_push, each.row, contact, lasts, moved, pushes[k], share)
         for i, shift in zip(each.bodies, moved, strict=True):
             shifts[i] = shift
-    return tuple(shifts), tuple(pushes)
+    return tuple(shifts), tuple(pushes), tuple(made)
 
 
-def _fit(row: LockRow, moved: Shifts) -> Shifts:
+def _fit(row: Fitting, moved: Shifts, made: Momenta) -> tuple[Shifts, Momenta]:
     """Displacements after which the joint fits, to third order in the rotation: arms are those at the middle."""
     linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
     for side, shift in zip(row.sides, moved, strict=True):
         linear += side.sign * (shift.linear + ca.cross(shift.angular, side.arm))
         angular += side.sign * shift.angular
-    push, twist = row.seen.split(-ca.mtimes(row.mass, row.error + row.seen.forwards(linear, angular)))
-    fitted = []
-    for side, shift in zip(row.sides, moved, strict=True):
-        turn = apply(side.inverse_inertia, ca.cross(side.arm, push) + twist)
-        fitted.append(Shift(shift.linear + side.sign * side.inverse_mass * push, shift.angular + side.sign * turn))
-    return tuple(fitted)
+    push, twist = row.given_along.split(row.fitting(row.seen.forwards(linear, angular)))
+    fitted, gained = [], []
+    for side, shift, m in zip(row.sides, moved, made, strict=True):
+        linear, angular = side.sign * push, side.sign * (ca.cross(side.impulse_arm, push) + twist)
+        turn = apply(side.inverse_inertia, angular)
+        fitted.append(Shift(shift.linear + side.inverse_mass * linear, shift.angular + turn))
+        gained.append(Momentum(m.velocity + side.inverse_mass * linear, m.angular + angular))
+    return tuple(fitted), tuple(gained) if isinstance(row, LockRow) else made
 
 
 def _push(

@@ -136,7 +136,7 @@ def test_v7_a_ball_hits_a_floating_linkage() -> None:
         total = sum(body.mass * states[f"{body.name}.velocity"] for body in world.bodies)
         assert total == pytest.approx(np.tile([50.0, 0, 0], (51, 1)), abs=1e-9)
         assert states["ball.velocity"][-1, 0] < 4.9
-        assert separations(world, states).max() < 5e-3
+        assert separations(world, states).max() < (1e-4 if cuts else 0.02)
 
 
 def test_a_parallelogram_stays_one() -> None:
