@@ -30,7 +30,8 @@ class Trajectory:
         force: (N, B, 3) applied at the centre of mass [N].
         torque: (N, B, 3) applied [N m].
         contact_names: (C,).
-        contact_force: (N, C, 3) on the pair's first body, impulse over the step / dt [N].
+        contact_force: (N, C, 3) on the pair's first body, impulse over the step / dt [N]. Leapfrog gives half of a
+            stretch's impulse in the next one: a contact that begins shows up to a quarter less in its first step.
         contact_gap: (N + 1, C) [m]; the last row repeats the one before it.
         residual: (N,) largest change of an impulse in the last sweep [N s].
         crowded: (N,) 1 where a body had two or more impacts in one step.
