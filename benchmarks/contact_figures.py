@@ -143,6 +143,7 @@ def gradient_figure(panels: dict[str, list[Curve]], path: Path) -> None:
             named_steps(axes, curves[0].steps)
             if lowest > ROUNDING:
                 slope(axes, 1, 1e3 * np.array(curves[0].steps), 0.5 * float(curves[0].errors[0].min()))
+                axes.set_ylabel("error against the engine at 1/32 ms")
             else:
                 axes.axhspan(axes.get_ylim()[0], ROUNDING, color=style.GROUND, zorder=0)
                 axes.text(1e3 * curves[0].steps[0], ROUNDING / 2, "rounding", ha="right", va="top", **NOTE)
