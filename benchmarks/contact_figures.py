@@ -104,7 +104,7 @@ def consistency_figure(panels: dict[str, list[Curve]], path: Path) -> None:
             for order in (1, 2):
                 slope(left, order, 1e3 * np.array(curves[0].steps), BELOW * least, reach=4)
             named_steps(left, curves[0].steps)
-        handles, labels = rows[0][0].get_legend_handles_labels()
+        handles, labels = rows[0][1].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper left", ncols=3)
         save(figure, path)
 
@@ -113,11 +113,8 @@ def shares(axes: Axes, curve: Curve) -> None:
     """The first curve once more, as one of eight side by side."""
     colour = LOOKS[curve.label][0]
     middle = np.median(curve.errors, axis=1)
-    axes.plot(1e3 * curve.eight, middle, ":", color=colour, linewidth=1.4)
-    axes.annotate(
-        "one of eight\nside by side", (1e3 * curve.eight[2], middle[2]), xytext=(-4, -3), textcoords="offset points",
-        fontsize=7.5, color=colour, ha="right", va="top",
-    )  # fmt: skip
+    label = f"{curve.label}, one of eight side by side"
+    axes.plot(1e3 * curve.eight, middle, ":", color=colour, linewidth=1.4, label=label)
 
 
 def save(figure: Figure, path: Path) -> None:
