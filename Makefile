@@ -33,7 +33,7 @@ bench: $(VENV)/.benching  ## measure what BENCHMARKS.md reports, contact aside; 
 	$(BIN)/python benchmarks/pile.py build
 	$(BIN)/python benchmarks/against_mujoco.py
 
-bench-contact: $(VENV)/.benching  ## errors of contact against the step, gradients, what each trick buys; half an hour
+bench-contact: $(VENV)/.benching  ## errors of contact against the step, gradients, what each trick buys; three quarters of an hour
 	$(BIN)/python benchmarks/gradients.py build
 	$(BIN)/python benchmarks/ablation.py
 	$(BIN)/python benchmarks/consistency.py build
