@@ -33,7 +33,7 @@ bench: $(VENV)/.benching  ## measure what BENCHMARKS.md reports, contact aside; 
 	$(BIN)/python benchmarks/pile.py build
 	$(BIN)/python benchmarks/against_mujoco.py
 
-bench-contact: $(VENV)/.benching  ## errors of contact against the step, gradients, what each trick buys; half an hour
+bench-contact: $(VENV)/.benching  ## errors of contact against the step, gradients, what each trick buys; three quarters of an hour
 	$(BIN)/python benchmarks/gradients.py build
 	$(BIN)/python benchmarks/ablation.py
 	$(BIN)/python benchmarks/consistency.py build
@@ -43,7 +43,7 @@ gallery: $(VENV)/.installed  ## make the figures of the README again
 	cp build/gallery/figures/ball_throw-motion.svg build/gallery/figures/ball_throw-convergence.svg \
 	    build/gallery/figures/bank_shot-motion.svg build/gallery/figures/basket-motion.svg \
 	    build/gallery/figures/knock-motion.svg build/gallery/figures/putt-motion.svg reports/gallery/
-	cp build/gallery/sled/ipopt-seed0/figures/convergence.svg reports/gallery/sled-stages.svg
+	cp build/gallery/sled/least_squares-seed0/figures/convergence.svg reports/gallery/sled-stages.svg
 
 clean:  ## remove what the other targets made, reports aside
 	rm -rf $(VENV) build dist *.egg-info

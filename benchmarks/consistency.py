@@ -69,22 +69,25 @@ class There:
 
 def errors_of(engine: Here | There, window: float, steps: Sequence[float], fine: float) -> Array:
     """(steps, batch) [m]: rms distance from the run at the fine step, over bodies and samples of the window."""
-    count, batch, errors = round(window / SAMPLE), len(engine.scene.start), []
+    count, batch = round(window / SAMPLE), len(engine.scene.start)
     exact = engine.runner(fine)(batch, count)
-    for dt in steps:
-        distance = np.linalg.norm(engine.runner(dt)(batch, count) - exact, axis=-1)
-        errors.append(np.sqrt((distance**2).mean(axis=(0, 2))))
-    return np.array(errors)
+    return np.array([distance(engine.runner(dt)(batch, count), exact) for dt in steps])
+
+
+def distance(places: Array, exact: Array) -> Array:
+    """(batch,) [m]: root mean square over samples and bodies, from (samples, batch, bodies, 3)."""
+    return np.asarray(np.sqrt((np.linalg.norm(places - exact, axis=-1) ** 2).mean(axis=(0, 2))))
 
 
 def study(engine: Here | There, window: float, steps: Sequence[float] = STEPS) -> Curve:
     """Errors, and CPU seconds for a simulated one: alone, and a share of eight side by side."""
-    count, costs = round(window / SAMPLE), []
+    count, batch = round(window / SAMPLE), len(engine.scene.start)
+    exact, errors, costs = engine.runner(FINE)(batch, count), [], []
     for dt in steps:
         run = engine.runner(dt)
-        run(1, 1)  # builds
-        costs.append([cheapest(partial(run, batch, count)) / window / batch for batch in (1, 8)])
-    return Curve(engine.name, tuple(steps), errors_of(engine, window, steps, FINE), *np.array(costs).T)
+        errors.append(distance(run(batch, count), exact))
+        costs.append([cheapest(partial(run, side, count)) / window / side for side in (1, 8)])
+    return Curve(engine.name, tuple(steps), np.array(errors), *np.array(costs).T)
 
 
 def cheapest(call: Callable[[], object]) -> float:
@@ -145,8 +148,8 @@ def main() -> None:
         for engine in engines:
             panels[title].append(study(engine, window))
             report(panels[title][-1])
-    sizes()
     consistency_figure(panels, Path(sys.argv[1] if len(sys.argv) > 1 else ".") / "contact-step.svg")
+    sizes()
 
 
 if __name__ == "__main__":

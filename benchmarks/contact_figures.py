@@ -29,8 +29,8 @@ LOOKS = {
     "MuJoCo, gradual spring": (style.GREY, "D", "-"),
 }
 """Colour, marker and line of each curve that is drawn: MuJoCo's are warm."""
-ORDERS_FROM = 3e-5
-"""Where lines of an order begin, at the largest step."""
+BELOW = 0.04
+"""Of the least error at the largest step: where lines of an order begin."""
 
 NOTE: dict[str, Any] = {"fontsize": 7.5, "color": style.SOFT}
 ROUNDING, WORST = 1e-12, 30.0
@@ -78,9 +78,9 @@ def named_steps(axes: Axes, steps: Sequence[float]) -> None:
     axes.set_xticks([1e3 * dt for dt in steps], [f"{1e3 * dt:.3g}" for dt in steps])
 
 
-def slope(axes: Axes, order: int, steps: Array, top: float) -> None:
-    """A thin line of an order through ``top`` at the largest step, over a factor of 8."""
-    x = np.array([steps.max() / 8, steps.max()])
+def slope(axes: Axes, order: int, steps: Array, top: float, reach: int = 8) -> None:
+    """A thin line of an order through ``top`` at the largest step, over a factor of ``reach``."""
+    x = np.array([steps.max() / reach, steps.max()])
     y = top * (x / x[1]) ** order
     axes.plot(x, y, "--", color=style.FAINT, linewidth=0.9, zorder=1)
     axes.annotate(
@@ -100,10 +100,11 @@ def consistency_figure(panels: dict[str, list[Curve]], path: Path) -> None:
                 draw(left, 1e3 * np.array(curve.steps), curve.errors, curve.label)
                 draw(right, 1e3 * curve.alone, curve.errors, curve.label, band=False)
             shares(right, curves[0])
+            least = min(float(np.median(curve.errors[0])) for curve in curves)
             for order in (1, 2):
-                slope(left, order, 1e3 * np.array(curves[0].steps), ORDERS_FROM)
+                slope(left, order, 1e3 * np.array(curves[0].steps), BELOW * least, reach=4)
             named_steps(left, curves[0].steps)
-        handles, labels = rows[0][0].get_legend_handles_labels()
+        handles, labels = rows[0][1].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper left", ncols=3)
         save(figure, path)
 
@@ -112,11 +113,8 @@ def shares(axes: Axes, curve: Curve) -> None:
     """The first curve once more, as one of eight side by side."""
     colour = LOOKS[curve.label][0]
     middle = np.median(curve.errors, axis=1)
-    axes.plot(1e3 * curve.eight, middle, ":", color=colour, linewidth=1.4)
-    axes.annotate(
-        "one of eight side by side", (1e3 * curve.eight[0], middle[0]), xytext=(4, 6), textcoords="offset points",
-        fontsize=7.5, color=colour,
-    )  # fmt: skip
+    label = f"{curve.label}, one of eight side by side"
+    axes.plot(1e3 * curve.eight, middle, ":", color=colour, linewidth=1.4, label=label)
 
 
 def save(figure: Figure, path: Path) -> None:
@@ -143,6 +141,7 @@ def gradient_figure(panels: dict[str, list[Curve]], path: Path) -> None:
             named_steps(axes, curves[0].steps)
             if lowest > ROUNDING:
                 slope(axes, 1, 1e3 * np.array(curves[0].steps), 0.5 * float(curves[0].errors[0].min()))
+                axes.set_ylabel("error against the engine at 1/32 ms")
             else:
                 axes.axhspan(axes.get_ylim()[0], ROUNDING, color=style.GROUND, zorder=0)
                 axes.text(1e3 * curves[0].steps[0], ROUNDING / 2, "rounding", ha="right", va="top", **NOTE)

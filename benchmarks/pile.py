@@ -58,6 +58,7 @@ def draw(results: list[dict[str, float]], path: Path) -> None:
         for label, key in curves.items():
             axis.loglog(rows, [r[key] for r in results], "o-", label=label)
         axis.set(xlabel="candidate rows", ylabel=title)
+        axis.minorticks_off()
         axis.grid(alpha=0.3)
         axis.legend(frameon=False)
     figure.savefig(path)

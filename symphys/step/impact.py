@@ -77,13 +77,17 @@ def _earlier(earliest: tuple[Expr, Expr], closes: Expr, hit: Expr, time: Expr) -
 
 
 def _is_struck(earliest: tuple[Expr, Expr], closes: Expr, hit: Expr, time: Expr) -> Expr:
-    return ca.logic_and(ca.logic_and(closes, hit), time <= earliest[1] * (1 + TOGETHER))
+    return ca.logic_and(ca.logic_and(closes, hit), time <= earliest[1] + TOGETHER * ca.fabs(earliest[1]))
 
 
 def _inside(earliest: tuple[Expr, Expr], duration: Expr, share: float) -> Expr:
-    """The length of the stretch before the cut; near an end it is shifted, not clamped, so that its slope stays."""
+    """The length of the stretch before the cut; near an end it is shifted, not clamped, so that its slope stays.
+
+    Surfaces that rounding has put beyond each other meet at a time below 0 (``touch.falls``).
+    """
     least, time = MARGIN * duration, earliest[1]
-    shift = ca.if_else(time < least, least, ca.if_else(time > duration - least, -least, 0))
+    early = least * (1 + ca.ceil(ca.fmax(-time, 0) / least))
+    shift = ca.if_else(time < least, early, ca.if_else(time > duration - least, -least, 0))
     return ca.if_else(earliest[0], time + shift, share * duration)
 
 

@@ -75,6 +75,21 @@ def test_a_hit_at_the_end_of_a_step_keeps_its_slope(beside):
     assert float(slope) == pytest.approx(after_cushion(0.1), abs=0.015)
 
 
+@pytest.mark.parametrize("gap", [-9e-13, -1e-16, 0.0, 9e-13])
+@pytest.mark.parametrize("dt", [0.01, 1e-5])
+def test_a_hit_on_the_boundary_of_two_steps_is_an_impact(gap, dt):
+    """On whichever side of 0 rounding has put the gap: Newton's rebound, and the slope of what it leads to."""
+    lab = Lab(billiard(Law(0.0, 0.8)), Scheme(dt=dt))
+    z = ca.MX.sym("z")
+    start = {"ball.position": ca.vertcat(1 - RADIUS - z, 0, RADIUS), "ball.velocity": [0.5, 0, 0]}
+    end = lab.trajectory(start, 2 * dt)[:, -1]
+    along = end[lab.layout["ball.position"]][0]
+    asked = ca.Function("asked", [z], [end[lab.layout["ball.velocity"]][0], ca.gradient(along, z)])
+    velocity, slope = map(float, asked(gap))
+    assert velocity == pytest.approx(-0.4, abs=0.2 * 9.81 * 3 * dt)  # the cloth acts too
+    assert slope == pytest.approx(0.8, abs=0.05)
+
+
 def wedge(angle: float, e: float) -> World:
     """Two walls whose normals are ``angle`` apart."""
     half = radians(angle / 2)
