@@ -31,6 +31,22 @@ class BodyState:
 
 
 @dataclass(frozen=True)
+class Held:
+    """A body of a tree of joints: how it moves with the tree's n coordinates; see ``step.chart``.
+
+    Attributes:
+        see: (6, n) velocity and angular velocity at mid-step for unit rates.
+        inertia: (3, 3) world frame, at mid-step [kg m^2].
+        push, twist: (n, 3) what unit impulses at the centre of mass, and unit torque impulses, do to the rates.
+    """
+
+    see: Expr
+    inertia: Expr
+    push: Expr
+    twist: Expr
+
+
+@dataclass(frozen=True)
 class Motion(Course):
     """A body's free motion over the step and the inertia that impulses meet.
 
@@ -42,6 +58,7 @@ class Motion(Course):
         mid_velocity, mid_momentum: (3,) velocity and angular momentum at t_k + dt/2.
         inverse_mid: inverse inertia at t_k + dt/2, world frame: scalar if isotropic, else (3, 3) [1/(kg m^2)].
         inverse_rate: its time derivative; None if isotropic.
+        held: if the body is part of a tree of joints.
     """
 
     mass: Expr
@@ -53,6 +70,7 @@ class Motion(Course):
     mid_momentum: Expr
     inverse_mid: Expr
     inverse_rate: Expr | None
+    held: Held | None = None
 
     def course(self) -> Course:
         """The motion without its inertia."""

@@ -3,7 +3,8 @@
 For each body: position (3) [m], orientation (4) [-] quaternion w x y z, velocity (3) [m/s] and angular_velocity (3)
 [rad/s] at t_k, world frame, and the force (3) [N] and torque (3) [N m] with which constraints act on it persistently.
 For each pair: force (3) [N] on its first body, and torque (3) [N m] if its law resists spinning. For each joint: lock,
-the forces and torques of what it locks, and one number per coordinate for its motor, lower and upper limit and spring.
+force and couple on its first side along its socket's axes (of a joint that closes a loop or gives way: the forces and
+torques of what it locks), and one number per coordinate for its motor, lower and upper limit and spring.
 Last ``lag`` [s].
 
 The velocities are the true ones at t_k: 0 at rest. The step needs them without the persistent forces of the last
@@ -17,6 +18,7 @@ from typing import Any
 
 import casadi as ca
 
+from symphys.joints import tree_joints
 from symphys.world import World
 
 BODY_FIELDS = (
@@ -27,6 +29,7 @@ BODY_FIELDS = (
     ("reaction_force", 3),
     ("reaction_torque", 3),
 )
+WRENCH = 6
 INPUT_FIELDS = ("force", "torque")
 GIVEN = ("position", "orientation", "velocity", "angular_velocity")
 """The fields of a body that an initial state may give."""
@@ -46,8 +49,9 @@ class Layout:
             self._add(f"{pair.name}.force", 3)
             if pair.law.spins:
                 self._add(f"{pair.name}.torque", 3)
-        for joint in world.joints:
-            self._add(f"{joint.name}.lock", joint.locked)
+        exact = tree_joints(world.joints)
+        for k, joint in enumerate(world.joints):
+            self._add(f"{joint.name}.lock", WRENCH if k in exact else joint.locked)
             for part in joint.acting:
                 self._add(f"{joint.name}.{part}", len(joint.kind.coordinates))
         self._add("lag", 1)

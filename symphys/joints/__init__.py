@@ -5,6 +5,7 @@ from symphys.joints.fixed import FIXED
 from symphys.joints.hinge import HINGE
 from symphys.joints.joint import Joint, Limits, Socket, Spring
 from symphys.joints.kind import Coordinate, Kind, Placed
+from symphys.joints.linkage import Link, Linkage, carriers, linkages, tree_joints
 from symphys.joints.motor import Motor, Servo, TorqueMotor, VelocityMotor
 from symphys.joints.slider import SLIDER
 from symphys.joints.universal import UNIVERSAL
@@ -22,6 +23,8 @@ __all__ = [
     "Joint",
     "Kind",
     "Limits",
+    "Link",
+    "Linkage",
     "Motor",
     "Placed",
     "Servo",
@@ -29,4 +32,7 @@ __all__ = [
     "Spring",
     "TorqueMotor",
     "VelocityMotor",
+    "carriers",
+    "linkages",
+    "tree_joints",
 ]

@@ -7,8 +7,8 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.motion import apply
-from symphys.step.momentum import Momenta, Momentum
+from symphys.step import row
+from symphys.step.momentum import Momentum, Rates
 from symphys.step.row import Side
 
 Expr = Any
@@ -61,39 +61,35 @@ class Directions:
         return linear, ca.mtimes(self.turns.T, numbers[m:, 0])
 
 
-def speeds(sides: tuple[Side, ...], directions: Directions, momenta: Momenta) -> Expr:
+def speeds(sides: tuple[Side, ...], directions: Directions, momenta: tuple[Any, ...]) -> Expr:
     """(n,): how fast the first side moves against the second along the directions."""
     linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
     for side, m in zip(sides, momenta, strict=True):
-        spin = apply(side.inverse_inertia, m.angular)
-        linear += side.sign * (m.velocity + ca.cross(spin, side.arm))
-        angular += side.sign * spin
+        linear += side.sign * side.speed(m)
+        angular += side.sign * side.spin(m)
     return directions.forwards(linear, angular)
 
 
-def kicked(sides: tuple[Side, ...], directions: Directions, momenta: Momenta, numbers: Expr) -> Momenta:
-    """The momenta after impulses (n,)."""
-    linear, angular = directions.split(numbers)
-    return tuple(
-        Momentum(
-            m.velocity + side.sign * side.inverse_mass * linear,
-            m.angular + side.sign * (ca.cross(side.impulse_arm, linear) + angular),
-        )
-        for side, m in zip(sides, momenta, strict=True)
-    )
+def kicked(
+    sides: tuple[Side, ...], directions: Directions, momenta: tuple[Any, ...], numbers: Expr, same: bool
+) -> tuple[Any, ...]:
+    """The momenta after impulses (n,); ``same``: both sides are of one tree of joints."""
+    return row.kicked(sides, momenta, *directions.split(numbers), same)
 
 
-def mobility(sides: tuple[Side, ...], directions: Directions) -> Expr:
-    """(n, n): the velocities along the directions that unit impulses along them bring about, at the row's instant."""
+def mobility(sides: tuple[Side, ...], directions: Directions, same: bool) -> Expr:
+    """(n, n): the velocities along the directions that unit impulses along them bring about."""
     n = (3 if directions.slides is None else directions.slides.size1()) + directions.turns.size1()
     columns = []
     for k in range(n):
         unit = ca.SX(n, 1)
         unit[k] = 1
-        linear, angular = directions.split(unit)
-        total = ca.SX(n, 1)
-        for side in sides:
-            spin = apply(side.inverse_inertia, ca.cross(side.arm, linear) + angular)
-            total += directions.forwards(side.inverse_mass * linear + ca.cross(spin, side.arm), spin)
-        columns.append(total)
+        columns.append(speeds(sides, directions, kicked(sides, directions, _still(sides), unit, same)))
     return ca.horzcat(*columns)
+
+
+def _still(sides: tuple[Side, ...]) -> tuple[Any, ...]:
+    zero = ca.SX.zeros(3)
+    return tuple(
+        Momentum(zero, zero) if side.reach is None else Rates(ca.SX(side.reach.push.size1(), 1)) for side in sides
+    )

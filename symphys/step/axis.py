@@ -14,11 +14,19 @@ import casadi as ca
 
 from symphys.smooth import positive
 from symphys.step.along import Along, Directions, kicked, speeds
-from symphys.step.momentum import Momenta
+from symphys.step.momentum import Rates
 from symphys.step.row import Side
 
 Expr = Any
 """casadi SX"""
+
+
+@dataclass(frozen=True)
+class OfTree:
+    """A coordinate of a tree: its index, and what a unit impulse along it does to the rates (n,)."""
+
+    index: int
+    gain: Expr
 
 
 @dataclass(frozen=True)
@@ -31,6 +39,8 @@ class AxisRow:
         keep, slope, offset: see the module.
         low, high: bounds of the impulse; None where there is none.
         width: of the smoothed bounds [N m s].
+        same: whether both sides are of one tree of joints.
+        of_tree: where the coordinate is one of a tree's.
         left: how far a limit is away at the start [rad], [m]; None for what is none.
         inverse_mobility: effective mass.
         landing: 1 for a limit that is struck: its impulse is an impact, not a force.
@@ -45,6 +55,8 @@ class AxisRow:
     low: Expr | None
     high: Expr | None
     width: Expr
+    same: bool
+    of_tree: OfTree | None
     left: Expr | None
     inverse_mobility: Expr
     landing: Expr
@@ -55,6 +67,12 @@ class AxisRow:
         beyond = self.left + sign * moved
         return -sign * self.inverse_mobility * ca.fmin(beyond, 0)
 
+    def rate(self, momenta: tuple[Any, ...]) -> Expr:
+        """Of the coordinate."""
+        if self.of_tree is None:
+            return speeds(self.sides, self.seen, momenta)
+        return momenta[0].numbers[self.of_tree.index]
+
     def carried(self, impulse: Along) -> Expr:
         """(1,): what is stored of an impulse; also of a force."""
         return impulse.numbers
@@ -63,9 +81,9 @@ class AxisRow:
         """The impulse that is stored so."""
         return Along(stored)
 
-    def visit(self, momenta: Momenta, old: Along) -> tuple[Momenta, Along]:
+    def visit(self, momenta: tuple[Any, ...], old: Along) -> tuple[tuple[Any, ...], Along]:
         """See ``pgs.Solvable``."""
-        rate = speeds(self.sides, self.seen, momenta)
+        rate = self.rate(momenta)
         new = self.keep * old.numbers - self.slope * rate - self.offset
         if self.low is not None:
             new = self.low + positive(new - self.low, self.width)
@@ -73,9 +91,12 @@ class AxisRow:
             new = self.high - positive(self.high - new, self.width)
         return self.given(momenta, Along(new - old.numbers)), Along(new)
 
-    def given(self, momenta: Momenta, impulse: Along) -> Momenta:
+    def given(self, momenta: tuple[Any, ...], impulse: Along) -> tuple[Any, ...]:
         """See ``pgs.Solvable``."""
-        return kicked(self.sides, self.given_along, momenta, impulse.numbers)
+        if self.of_tree is None:
+            return kicked(self.sides, self.given_along, momenta, impulse.numbers, self.same)
+        after = Rates(momenta[0].numbers + self.of_tree.gain * impulse.numbers)
+        return tuple(after for _ in self.sides)
 
 
 def towards(target: Expr, mobility: Expr) -> dict[str, Expr]:

@@ -12,9 +12,9 @@ from symphys.collide import Contact
 from symphys.motion import Motion, angular_velocity
 from symphys.smooth import positive
 from symphys.step.impulse import ZERO
-from symphys.step.jointed import locks_at
+from symphys.step.jointed import locks_at, make_trees, momenta_of
 from symphys.step.momentum import Momentum
-from symphys.step.pgs import Row, Solution
+from symphys.step.pgs import Solution
 from symphys.step.phase import Phase, bodies_of, expected_motions, look
 from symphys.step.restitution import rebound
 from symphys.step.row import UNREACHED, ContactRow, Moving, at_touch, effective_masses, inverse_masses, make_sides
@@ -96,28 +96,36 @@ def collide_now(scene: Scene, x: State, cut: Cut) -> Phase:
     duration = ca.SX(scene.setting.scheme.dt)
     motions = expected_motions(scene, x, duration)
     contacts = look(scene, motions, duration)
+    momenta = tuple(scene.pieces.do(_momentum, motion) for motion in motions)
+    trees = make_trees(scene, motions, momenta, ca.SX(0))
     rows = []
     for pair, contact, struck in zip(scene.world.pairs, contacts, cut.struck, strict=True):
-        moving = tuple(motions[i] for i in bodies_of(pair))
-        row = scene.pieces.do(_row, scene.setting, pair.law, contact, moving, struck, cut.impact)
-        rows.append(Row(bodies_of(pair), row))
-    momenta = tuple(Momentum(m.velocity, m.momentum_k) for m in motions)
-    joints = locks_at(scene, motions, momenta)
-    n, still = len(joints), (*(each.nothing for each in joints), *(ZERO for _ in rows))
-    every = (*(each.row for each in joints), *rows)
-    solved = rebound(scene, every, Solution(momenta, still, still), motions)
-    after = _with_velocities(scene, x, motions, solved.momenta, cut.impact)
+        bodies = bodies_of(pair)
+        moving = tuple(trees.motions[i] for i in bodies)
+        arguments = pair.law, contact, moving, struck, cut.impact, trees.same(bodies)
+        rows.append(trees.row(bodies, scene.pieces.do(_row, scene.setting, *arguments)))
+    locks = locks_at(scene, trees)
+    n, still = len(locks), (*(nothing for _, nothing in locks), *(ZERO for _ in rows))
+    every = (*(row for row, _ in locks), *rows)
+    solved = rebound(scene, every, Solution(trees.states, still, still), motions, trees)
+    after = _with_velocities(scene, x, motions, momenta_of(scene, trees, solved.momenta), cut.impact)
     forces = (x[f"{pair.name}.force"] for pair in scene.world.pairs)
     ahead = tuple(scene.pieces.do(_ahead, cut.impact, x["lag"], force) for force in forces)
     changes = tuple(zip(solved.impulses, solved.last, strict=True))
     return Phase(after, tuple(rows), tuple(contacts), solved.impulses[n:], changes, ahead)
 
 
+def _momentum(motion: Motion) -> Momentum:
+    return Momentum(motion.velocity, motion.momentum_k)
+
+
 def _ahead(impact: Expr, lag: Expr, force: Expr) -> Expr:
     return impact * lag * force
 
 
-def _row(setting: Setting, law: Law, contact: Contact, motions: Moving, struck: Expr, impact: Expr) -> ContactRow:
+def _row(
+    setting: Setting, law: Law, contact: Contact, motions: Moving, struck: Expr, impact: Expr, same: bool
+) -> ContactRow:
     """The row of a contact at the instant of an impact: of it where ``struck``, of its bodies where they touch."""
     now, scheme = ca.SX(0), setting.scheme
     touching = ca.logic_and(impact, contact.gap < TOUCHING * setting.reference * scheme.dt**2)
@@ -131,7 +139,7 @@ def _row(setting: Setting, law: Law, contact: Contact, motions: Moving, struck: 
         sides,
         frame.normal,
         frame.normal,
-        **effective_masses(*inverse_masses(sides, frame.normal)),
+        **effective_masses(*inverse_masses(sides, frame.normal, same)),
         softness=ca.SX(0),
         target=ca.SX(UNREACHED) if law.soft else ca.if_else(struck, speed, resting),
         slip_target=ca.SX.zeros(3),
@@ -142,6 +150,7 @@ def _row(setting: Setting, law: Law, contact: Contact, motions: Moving, struck: 
         struck=struck,
         width=struck * width_of(setting, contact),
         knob=setting.knob,
+        same=same,
     )
 
 

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 
-from symphys.motion import apply
 from symphys.smooth import onto_disc, positive
-from symphys.step.momentum import Momenta, Momentum
+from symphys.step.momentum import States
 
 if TYPE_CHECKING:
-    from symphys.step.row import ContactRow, Side
+    from symphys.step.row import ContactRow
 
 Expr = Any
 """casadi SX, MX or DM"""
@@ -62,19 +61,13 @@ class Impulse:
 ZERO = Impulse(ca.SX(0), ca.SX.zeros(3), ca.SX(0), ca.SX.zeros(3))
 
 
-def give(row: ContactRow, momenta: Momenta, impulse: Impulse) -> Momenta:
+def give(row: ContactRow, momenta: States, impulse: Impulse) -> States:
     """The momenta of the row's bodies after an impulse."""
     linear, angular = impulse.linear(row.impulse_normal), impulse.angular(row.impulse_normal)
-    return tuple(
-        Momentum(
-            m.velocity + side.sign * side.inverse_mass * linear,
-            m.angular + side.sign * (ca.cross(side.impulse_arm, linear) + angular),
-        )
-        for side, m in zip(row.sides, momenta, strict=True)
-    )
+    return row.kicked(momenta, linear, angular)
 
 
-def visit(row: ContactRow, momenta: Momenta, old: Impulse) -> tuple[Momenta, Impulse]:
+def visit(row: ContactRow, momenta: States, old: Impulse) -> tuple[States, Impulse]:
     """One projection of each of the row's impulses, one after the other."""
     zero = ca.SX.zeros(3)
     normal = _normal(row, momenta, old)
@@ -88,24 +81,24 @@ def visit(row: ContactRow, momenta: Momenta, old: Impulse) -> tuple[Momenta, Imp
     return momenta, Impulse(normal, tangent, spin, roll)
 
 
-def _normal(row: ContactRow, momenta: Momenta, old: Impulse) -> Expr:
+def _normal(row: ContactRow, momenta: States, old: Impulse) -> Expr:
     """ln <- max(ln - m (n.u - b + gamma ln), 0), m = 1 / (k + gamma)."""
     wanted = ca.dot(row.normal, _slip(row, momenta)) - row.target + row.softness * old.normal
     return positive(old.normal - row.normal_mass * wanted, row.normal_mass * row.width)
 
 
-def _tangent(row: ContactRow, momenta: Momenta, old: Impulse, normal: Expr) -> Expr:
+def _tangent(row: ContactRow, momenta: States, old: Impulse, normal: Expr) -> Expr:
     """The friction impulse, onto the disc of radius mu ln."""
     slip = _slip(row, momenta) - row.slip_target
     wanted = old.tangent - row.tangent_mass * _across(slip, row.normal)
     return onto_disc(wanted, row.law.friction * normal, row.tangent_mass * row.knob, row.knob)
 
 
-def _torques(row: ContactRow, momenta: Momenta, old: Impulse, normal: Expr) -> tuple[Expr, Expr]:
+def _torques(row: ContactRow, momenta: States, old: Impulse, normal: Expr) -> tuple[Expr, Expr]:
     """Torsional friction (an interval) and rolling friction (a disc), both limited by the normal impulse."""
     n = row.normal
     spin_width, roll_width = row.knob * row.spin_mass, row.knob * row.roll_mass
-    rate = sum(side.sign * _spin(m, side) for side, m in zip(row.sides, momenta, strict=True))
+    rate = sum(side.sign * side.spin(m) for side, m in zip(row.sides, momenta, strict=True))
     twist = n * (old.spin - row.spin_mass * ca.dot(n, rate))
     spin = ca.dot(n, onto_disc(twist, row.law.torsion * normal, spin_width, row.knob))
     wanted = old.roll - row.roll_mass * _across(rate, n)
@@ -117,13 +110,9 @@ def _across(a: Expr, n: Expr) -> Expr:
     return a - n * ca.dot(n, a)
 
 
-def _spin(momentum: Momentum, side: Side) -> Expr:
-    return apply(side.inverse_inertia, momentum.angular)
-
-
-def _slip(row: ContactRow, momenta: Momenta) -> Expr:
+def _slip(row: ContactRow, momenta: States) -> Expr:
     """(3,) [m/s]: relative velocity of the touching points."""
     total = ca.SX.zeros(3)
     for side, m in zip(row.sides, momenta, strict=True):
-        total += side.sign * (m.velocity + ca.cross(_spin(m, side), side.arm))
+        total += side.sign * side.speed(m)
     return total

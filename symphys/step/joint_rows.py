@@ -9,17 +9,17 @@ then burst.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
 
-from symphys.joints import Coordinate, Joint, Servo, TorqueMotor, VelocityMotor
+from symphys.joints import Joint, Servo, TorqueMotor, VelocityMotor
 from symphys.smooth import clip
 from symphys.step.along import Directions, mobility, speeds
-from symphys.step.axis import AxisRow, by_law, towards
+from symphys.step.axis import AxisRow, OfTree, by_law, towards
 from symphys.step.lock import LockRow, inverse
-from symphys.step.momentum import Momenta, Momentum
+from symphys.step.momentum import Momentum
 from symphys.step.row import Moving, Side
 from symphys.step.scene import Setting
 from symphys.step.sockets import Sockets, errors, free, locked
@@ -50,6 +50,7 @@ class AlongCoordinate:
         rate: at the middle of the stretch, before any impulse of it.
         rate_now: at its start.
         mobility: inverse of the effective mass.
+        same, of_tree: see ``AxisRow``.
     """
 
     sides: tuple[Side, ...]
@@ -59,14 +60,16 @@ class AlongCoordinate:
     rate: Expr
     rate_now: Expr
     mobility: Expr
+    same: bool
+    of_tree: OfTree | None
 
 
-def lock_row(setting: Setting, sockets: Sockets, motions: Moving, stretch: Stretch) -> LockRow:
+def lock_row(setting: Setting, sockets: Sockets, motions: Moving, stretch: Stretch, same: bool) -> LockRow:
     """What the joint locks; soft if it gives way (Catto, GDC 2011)."""
     joint, start, middle = sockets.joint, ca.SX(0), stretch.duration / 2
     now = sockets.placed(start)
     sides, seen = sockets.sides(motions, middle, start), locked(joint, sockets.placed(middle))
-    k, error = mobility(sides, seen), errors(joint, now)
+    k, error = mobility(sides, seen, same), errors(joint, now)
     share, softness = _softness(joint, ca.diag(k), setting.scheme.dt)
     return LockRow(
         sides=sides,
@@ -77,17 +80,18 @@ def lock_row(setting: Setting, sockets: Sockets, motions: Moving, stretch: Stret
         target=-share * error / setting.scheme.dt,
         error=error,
         axes=now.a,
+        same=same,
     )
 
 
-def lock_now(sockets: Sockets, motions: Moving, momenta: Momenta) -> LockRow:
+def lock_now(sockets: Sockets, motions: Moving, momenta: tuple[Any, ...], same: bool) -> LockRow:
     """What the joint locks, at the instant of an impact: it changes no velocity unless something else does."""
     now = ca.SX(0)
     placed = sockets.placed(now)
     sides, seen = sockets.sides(motions, now, now), locked(sockets.joint, placed)
-    k = mobility(sides, seen)
+    k = mobility(sides, seen, same)
     zero = ca.SX(k.size1(), 1)
-    return LockRow(sides, seen, seen, inverse(k), zero, speeds(sides, seen, momenta), zero, placed.a)
+    return LockRow(sides, seen, seen, inverse(k), zero, speeds(sides, seen, momenta), zero, placed.a, same)
 
 
 def _softness(joint: Joint, mobilities: Expr, dt: float) -> tuple[Expr, Expr]:
@@ -100,16 +104,33 @@ def _softness(joint: Joint, mobilities: Expr, dt: float) -> tuple[Expr, Expr]:
 
 
 def along_coordinate(
-    sockets: Sockets, coordinate: Coordinate, motions: Moving, momenta: Momenta, duration: Expr
+    sockets: Sockets, k: int, motions: Moving, momenta: tuple[Any, ...], duration: Expr, place: tuple[int, Expr] | bool
 ) -> AlongCoordinate:
-    """A coordinate over a stretch; ``momenta`` are those before any impulse of it."""
-    start, middle = ca.SX(0), duration / 2
+    """Coordinate ``k`` of a joint over a stretch.
+
+    Args:
+        sockets: of the joint.
+        k: which of its coordinates.
+        motions: of its moving sides.
+        momenta: what the sweeps know of them, before any impulse of the stretch.
+        duration: of the stretch [s].
+        place: of a joint of a tree: the index of its first coordinate and (n, n) gains of the tree; else whether both
+            sides are of one tree.
+    """
+    start, middle, coordinate = ca.SX(0), duration / 2, sockets.joint.kind.coordinates[k]
     now, sides = sockets.placed(start), sockets.sides(motions, middle, start)
-    seen = free(coordinate, sockets.placed(middle))
-    given, value = free(coordinate, now), coordinate.value(now)
+    seen, given = free(coordinate, sockets.placed(middle)), free(coordinate, now)
     before = tuple(Momentum(m.velocity, m.momentum_k) for m in motions)
-    rates = speeds(sides, seen, momenta), speeds(sockets.sides(motions, start, start), given, before)
-    return AlongCoordinate(sides, seen, given, value, *rates, mobility(sides, seen))
+    rate_now = speeds(tuple(replace(s, reach=None) for s in sockets.sides(motions, start, start)), given, before)
+    value = coordinate.value(now)
+    if isinstance(place, bool):
+        rate, k_of = speeds(sides, seen, momenta), mobility(sides, seen, place)
+        return AlongCoordinate(sides, seen, given, value, rate, rate_now, k_of, place, None)
+    index, gains = place[0] + k, place[1]
+    rate = momenta[0].numbers[index]
+    return AlongCoordinate(
+        sides, seen, given, value, rate, rate_now, gains[index, index], True, OfTree(index, gains[:, index])
+    )
 
 
 def motor_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr, stretch: Stretch) -> AxisRow:
@@ -150,12 +171,12 @@ def _strikes(setting: Setting, at: AlongCoordinate, closing: Expr) -> Expr:
 def spring_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr, stretch: Stretch) -> AxisRow:
     """A spring and damper.
 
-    The spring acts with k / (1 + (w dt / 2)^2), w^2 = k / m: of second order, keeps energy and is stable at any k. The
+    The spring acts with k / (1 + (w dt)^2 / 3), w^2 = k / m: of second order, keeps energy and is stable at any k. The
     damper acts on the mean of the rates before and after.
     """
     spring, dt = joint.spring, setting.scheme.dt
     assert spring is not None
-    stiffness = spring.stiffness / (1 + spring.stiffness * at.mobility * dt * dt / 4)
+    stiffness = spring.stiffness / (1 + spring.stiffness * at.mobility * dt * dt / 3)
     half = stretch.kick * spring.damping / 2
     pull = stretch.kick * stiffness * (at.value - spring.rest) + half * at.rate
     return _row(at, by_law(pull, half, at.mobility), None, None, ca.SX(0))
@@ -175,4 +196,6 @@ def _row(
     landing: Expr = NEVER,
 ) -> AxisRow:
     bounds = {"low": low, "high": high, "width": width, "left": left, "landing": landing}
-    return AxisRow(at.sides, at.seen, at.given, **law, **bounds, inverse_mobility=1 / at.mobility)
+    return AxisRow(
+        at.sides, at.seen, at.given, **law, **bounds, same=at.same, of_tree=at.of_tree, inverse_mobility=1 / at.mobility
+    )

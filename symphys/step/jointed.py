@@ -1,33 +1,89 @@
-"""Joints within a stretch: their rows, what these start from, and what is stored of what they gave."""
+"""Joints within a stretch: their trees and rows, what these start from, and what is stored of what they gave."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
 
-from symphys.joints import Joint
+from symphys.joints import carriers, linkages, tree_joints
 from symphys.motion import Motion
 from symphys.step.along import Along
 from symphys.step.axis import AxisRow
+from symphys.step.chart import Chart, body_momentum, make_chart
 from symphys.step.joint_rows import ROWS, Stretch, along_coordinate, lock_now, lock_row
-from symphys.step.lock import LockRow, in_world
-from symphys.step.momentum import Momenta, Momentum
+from symphys.step.lock import LockRow
+from symphys.step.momentum import Momenta, Moved, States
 from symphys.step.pgs import Row
-from symphys.step.row import ContactRow
 from symphys.step.scene import Scene, State
-from symphys.step.sockets import free, locked, sockets_at, sockets_of
+from symphys.step.sockets import sockets_of
 from symphys.world import World
 
 Expr = Any
 """casadi SX"""
 LIMITS = ("lower", "upper")
-Struck = Mapping[frozenset[int], Expr]
-"""Of bodies that hang together: 1 if one of their contacts is an impact."""
-Total = list[tuple[Expr, Expr]]
-"""Force and torque on each body."""
+
+
+@dataclass(frozen=True)
+class Trees:
+    """The trees of a world over a stretch.
+
+    Attributes:
+        charts: in the order of ``linkages``.
+        motions: of all bodies, those of trees with how they are held.
+        states: what the sweeps start from, without any impulse of the stretch.
+        carriers: for each body where the sweeps keep what they know of it.
+    """
+
+    charts: tuple[Chart, ...]
+    motions: tuple[Motion, ...]
+    states: States
+    carriers: tuple[int, ...]
+
+    def row(self, bodies: tuple[int, ...], row: Any) -> Row:
+        """A row on these bodies."""
+        return Row(bodies, row, tuple(self.carriers[i] for i in bodies))
+
+    def same(self, bodies: tuple[int, ...]) -> bool:
+        """Whether both are of one tree."""
+        return len(bodies) == 2 and self.carriers[bodies[0]] == self.carriers[bodies[1]]
+
+
+def make_trees(scene: Scene, motions: Sequence[Motion], free: Momenta, middle: Expr) -> Trees:
+    """The trees; ``free``: momenta of all bodies without any impulse of the stretch."""
+    joints, held = scene.world.joints, list(motions)
+    states: list[Moved] = list(free)
+    charts, touched = [], _touched(scene.world)
+    for tree in linkages(joints):
+        own = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
+        reached = tuple(body in touched for body in tree.bodies)
+        parts = tuple(motions[i] for i in tree.bodies), tuple(free[i] for i in tree.bodies)
+        chart = scene.pieces.do(make_chart, tree, own, reached, *parts, middle)
+        charts.append(chart)
+        for body, holds in zip(tree.bodies, chart.held, strict=True):
+            held[body], states[body] = replace(motions[body], held=holds), None
+        states[tree.root] = chart.free
+    return Trees(tuple(charts), tuple(held), tuple(states), carriers(len(motions), joints))
+
+
+def _touched(world: World) -> set[int]:
+    """Bodies on which contacts act, or joints that close loops or give way."""
+    exact = tree_joints(world.joints)
+    sides = {side.body for pair in world.pairs for side in (pair.first, pair.second)}
+    loose = {body for k, joint in enumerate(world.joints) if k not in exact for body in joint.bodies}
+    return {body for body in sides if body is not None} | loose
+
+
+def momenta_of(scene: Scene, trees: Trees, solved: States) -> Momenta:
+    """Of all bodies."""
+    found = list(solved)
+    for tree, chart in zip(linkages(scene.world.joints), trees.charts, strict=True):
+        rates = solved[tree.root]
+        for body, held in zip(tree.bodies, chart.held, strict=True):
+            found[body] = scene.pieces.do(body_momentum, held, trees.motions[body].mass, rates)
+    return tuple(found)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
@@ -35,52 +91,64 @@ class JointRow:
     """A row of a joint.
 
     Attributes:
-        row: what sweeps visit.
+        row: what sweeps, or the position pass, visit.
         name, k: where the state keeps what it gave: component ``k`` of ``name``, all of it if None.
-        fits: whether the position pass closes it: limits, and what a joint locks that does not give way.
     """
 
     row: Row
     name: str
     k: int | None = None
-    fits: bool = False
 
 
-def joint_rows(scene: Scene, motions: Sequence[Motion], momenta: Momenta, duration: Expr, kick: Expr) -> list[JointRow]:
-    """The rows of all joints over a stretch; ``momenta`` without any impulse of it."""
-    do, setting, rows = scene.pieces.do, scene.setting, []
-    stretch = Stretch(duration, kick)
-    for joint in scene.world.joints:
-        moving, own = tuple(motions[i] for i in joint.bodies), tuple(momenta[i] for i in joint.bodies)
-        sockets = do(sockets_of, joint, moving)
-        lock = Row(joint.bodies, do(lock_row, setting, sockets, moving, stretch))
-        rows.append(JointRow(lock, f"{joint.name}.lock", fits=not joint.soft))
-        for k, coordinate in enumerate(joint.kind.coordinates if joint.acting else ()):
-            at = do(along_coordinate, sockets, coordinate, moving, own, duration)
+def joint_rows(
+    scene: Scene, trees: Trees, paths: Sequence[Motion], duration: Expr, kick: Expr
+) -> tuple[list[JointRow], list[Row]]:
+    """(what the sweeps visit, what the position pass closes) of all joints over a stretch."""
+    do, setting, stretch = scene.pieces.do, scene.setting, Stretch(duration, kick)
+    visited, fitted = list[JointRow](), list[Row]()
+    places = _places(scene.world, trees)
+    for index, joint in enumerate(scene.world.joints):
+        moving = tuple(trees.motions[i] for i in joint.bodies)
+        bare = tuple(paths[i] for i in joint.bodies)
+        sockets, same = do(sockets_of, joint, bare), trees.same(joint.bodies)
+        if not joint.soft:
+            fitted.append(trees.row(joint.bodies, do(lock_row, setting, sockets, bare, stretch, False)))
+        if index not in places:
+            lock = do(lock_row, setting, sockets, moving, stretch, same)
+            visited.append(JointRow(trees.row(joint.bodies, lock), f"{joint.name}.lock"))
+        for k in range(len(joint.kind.coordinates)) if joint.acting else ():
+            states = tuple(trees.states[trees.carriers[i]] for i in joint.bodies)
+            at = do(along_coordinate, sockets, k, moving, states, duration, places.get(index, same))
             command = scene.given(f"{joint.name}.command")
             command = ca.SX(0) if command is None else command[k]
             for part in joint.acting:
-                row = Row(joint.bodies, do(ROWS[part], setting, joint, at, command, stretch))
-                rows.append(JointRow(row, f"{joint.name}.{part}", k, fits=part in LIMITS))
-    return rows
+                row = trees.row(joint.bodies, do(ROWS[part], setting, joint, at, command, stretch))
+                visited.append(JointRow(row, f"{joint.name}.{part}", k))
+                fitted += [row] if part in LIMITS else []
+    return visited, fitted
 
 
-@dataclass(frozen=True)
-class AtOnce:
-    """A lock at an instant, and no impulse of it."""
+def _places(world: World, trees: Trees) -> dict[int, tuple[int, Expr]]:
+    """Of each joint of a tree: its first coordinate, and the tree's gains."""
+    return {
+        link.joint: (link.start, chart.gains)
+        for tree, chart in zip(linkages(world.joints), trees.charts, strict=True)
+        for link in tree.links
+        if link.joint is not None
+    }
 
-    row: Row
-    nothing: Along
 
-
-def locks_at(scene: Scene, motions: Sequence[Motion], momenta: Momenta) -> list[AtOnce]:
-    """The rows of all joints at an instant at which velocities change: what they lock keeps its velocity."""
-    found = []
-    for joint in scene.world.joints:
-        moving, own = tuple(motions[i] for i in joint.bodies), tuple(momenta[i] for i in joint.bodies)
+def locks_at(scene: Scene, trees: Trees) -> list[tuple[Row, Along]]:
+    """The rows of joints that close loops or give way, at an instant at which velocities change; and no impulse."""
+    found, exact = [], tree_joints(scene.world.joints)
+    for index, joint in enumerate(scene.world.joints):
+        if index in exact:
+            continue
+        moving = tuple(trees.motions[i] for i in joint.bodies)
+        states = tuple(trees.states[trees.carriers[i]] for i in joint.bodies)
         sockets = scene.pieces.do(sockets_of, joint, moving)
-        row = scene.pieces.do(lock_now, sockets, moving, own)
-        found.append(AtOnce(Row(joint.bodies, row), Along(ca.SX(joint.locked, 1))))
+        row = scene.pieces.do(lock_now, sockets, moving, states, trees.same(joint.bodies))
+        found.append((trees.row(joint.bodies, row), Along(ca.SX(joint.locked, 1))))
     return found
 
 
@@ -103,112 +171,3 @@ def column(x: State, each: JointRow) -> Expr:
 
 def _again(row: LockRow | AxisRow, force: Expr, kick: Expr) -> Along:
     return row.taken_up(kick * force)
-
-
-def components(world: World) -> list[frozenset[int]]:
-    """The bodies that hang together by joints."""
-    found = [frozenset((i,)) for i in range(len(world.bodies))]
-    for joint in world.joints:
-        touched = [group for group in found if group & set(joint.bodies)]
-        found = [group for group in found if group not in touched] + [frozenset().union(*touched)]
-    return found
-
-
-def struck_by_component(
-    scene: Scene, contacts: Sequence[Row], joints: Sequence[JointRow], given: Sequence[Along]
-) -> Struck:
-    """Of each component: 1 if a contact or a limit of it is an impact, whose share of joint forces does not last."""
-    found = {}
-    for group in components(scene.world):
-        meeting = tuple(each.row for each in contacts if group & set(each.bodies))
-        limits = tuple(
-            (each.row.row, impulse)
-            for each, impulse in zip(joints, given, strict=True)
-            if group & set(each.row.bodies) and each.name.rpartition(".")[2] in LIMITS
-        )
-        found[group] = scene.pieces.do(_any_struck, meeting, limits)
-    return found
-
-
-def _any_struck(rows: tuple[ContactRow, ...], limits: tuple[tuple[AxisRow, Along], ...]) -> Expr:
-    struck = [ca.fmax(row.struck, row.leaving > 0) for row in rows]
-    struck += [ca.logic_and(row.landing, impulse.numbers != 0) for row, impulse in limits]
-    return ca.mmax(ca.vertcat(ca.SX(0), *struck))
-
-
-def store_joint_forces(
-    scene: Scene, rows: Sequence[JointRow], given: Sequence[Along], struck: Struck, x: State, kick: Expr
-) -> State:
-    """Persistent joint forces.
-
-    In a stretch with an impact those of the last one stay: what held the impact is not to be told from them.
-    """
-    kept = dict[str, list[Expr]]()
-    for each, impulse in zip(rows, given, strict=True):
-        group = next(g for g in struck if set(each.row.bodies) & g)
-        force = scene.pieces.do(
-            _lasting, each.row.row, impulse, column(x, each), struck[group], kick, scene.shortest_kick
-        )
-        kept.setdefault(each.name, []).append(force)
-    return {name: scene.pieces.do(_stacked, tuple(parts)) for name, parts in kept.items()}
-
-
-def _lasting(row: LockRow | AxisRow, impulse: Along, old: Expr, struck: Expr, kick: Expr, shortest: float) -> Expr:
-    return ca.if_else(struck, old, row.carried(impulse) / ca.fmax(kick, shortest))
-
-
-def _stacked(parts: tuple[Expr, ...]) -> Expr:
-    return ca.vertcat(*parts)
-
-
-def keep_up(scene: Scene, momenta: Momenta, made: Momenta, struck: Struck, duration: Expr) -> Momenta:
-    """The momenta, with those that the displacements by joints stand for (as SHAKE has it), so that spin is kept.
-
-    Not in a stretch with an impact, where they make up for impulses that act late. They are no part of the forces that
-    the next sweeps start from.
-    """
-    if not scene.world.joints:
-        return momenta
-    found, dt = list(momenta), scene.setting.scheme.dt
-    for i in sorted({i for joint in scene.world.joints for i in joint.bodies}):
-        impact = next(impact for group, impact in struck.items() if i in group)
-        found[i] = scene.pieces.do(_kept_up, momenta[i], made[i], impact, duration, dt)
-    return tuple(found)
-
-
-def _kept_up(momentum: Momentum, made: Momentum, impact: Expr, duration: Expr, dt: float) -> Momentum:
-    share = ca.if_else(impact, 0, duration / dt**2)
-    return Momentum(momentum.velocity + share * made.velocity, momentum.angular + share * made.angular)
-
-
-def hold(scene: Scene, forces: State, poses: Sequence[tuple[Expr, Expr]], total: Total) -> None:
-    """Adds to ``total`` what joint forces do to bodies at these poses: those at which the next step begins."""
-    for joint in scene.world.joints:
-        own = tuple(poses[i] for i in joint.bodies)
-        parts = tuple((part, forces[f"{joint.name}.{part}"]) for part in ("lock", *joint.acting))
-        for body, wrench in zip(joint.bodies, scene.pieces.do(_wrenches, joint, own, parts), strict=True):
-            total[body] = scene.pieces.do(_added, total[body], wrench)
-
-
-def _wrenches(
-    joint: Joint, poses: tuple[tuple[Expr, Expr], ...], parts: tuple[tuple[str, Expr], ...]
-) -> tuple[tuple[Expr, Expr], ...]:
-    """Force and torque on each moving side."""
-    sockets, now = sockets_at(joint, poses), ca.SX(0)
-    placed, arms = sockets.placed(now), sockets.common_arms(now)
-    linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
-    for part, numbers in parts:
-        along = [locked(joint, placed)] if part == "lock" else [free(c, placed) for c in joint.kind.coordinates]
-        if part == "lock" and joint.kind.slides is None:
-            numbers = in_world(placed.a, numbers)
-        columns = [numbers] if part == "lock" else ca.vertsplit(numbers)
-        for directions, values in zip(along, columns, strict=True):
-            force, torque = directions.split(values)
-            linear, angular = linear + force, angular + torque
-    first = linear, ca.cross(arms[0], linear) + angular
-    second = -linear, -ca.cross(arms[1], linear) - angular
-    return (first, second)[: len(poses)]
-
-
-def _added(total: tuple[Expr, Expr], wrench: tuple[Expr, Expr]) -> tuple[Expr, Expr]:
-    return total[0] + wrench[0], total[1] + wrench[1]

@@ -8,7 +8,6 @@ from typing import Any
 import casadi as ca
 
 from symphys.step.along import Along, Directions, kicked, speeds
-from symphys.step.momentum import Momenta
 from symphys.step.row import Side
 
 Expr = Any
@@ -28,6 +27,7 @@ class LockRow:
         error: (n,) [m], [rad] at the start of the stretch.
         axes: (3, 3) of the first socket at the start. Forces on a point are stored along these, so that they turn with
             the body: a rod's pull stays along the rod.
+        same: whether both sides are of one tree of joints.
     """
 
     sides: tuple[Side, ...]
@@ -38,6 +38,7 @@ class LockRow:
     target: Expr
     error: Expr
     axes: Expr
+    same: bool
 
     def fitting(self, moved: Expr) -> Expr:
         """(n,): displacements by the directions moved to impulses times a time that close what is then left open."""
@@ -53,15 +54,15 @@ class LockRow:
         """The impulse that is stored so."""
         return Along(stored if self.given_along.slides is not None else in_world(self.axes, stored))
 
-    def visit(self, momenta: Momenta, old: Along) -> tuple[Momenta, Along]:
+    def visit(self, momenta: tuple[Any, ...], old: Along) -> tuple[tuple[Any, ...], Along]:
         """See ``pgs.Solvable``."""
         miss = speeds(self.sides, self.seen, momenta) - self.target + self.softness * old.numbers
         change = Along(-ca.mtimes(self.mass, miss))
         return self.given(momenta, change), old.plus(change)
 
-    def given(self, momenta: Momenta, impulse: Along) -> Momenta:
+    def given(self, momenta: tuple[Any, ...], impulse: Along) -> tuple[Any, ...]:
         """See ``pgs.Solvable``."""
-        return kicked(self.sides, self.given_along, momenta, impulse.numbers)
+        return kicked(self.sides, self.given_along, momenta, impulse.numbers, self.same)
 
 
 def in_world(axes: Expr, stored: Expr) -> Expr:

@@ -17,4 +17,14 @@ class Momentum:
     angular: Expr
 
 
+@dataclass(frozen=True)
+class Rates:
+    """The sweeps' unknowns of a tree of bodies at mid-step: rates (n,) of its coordinates [m/s], [rad/s]."""
+
+    numbers: Expr
+
+
+Moved = Momentum | Rates | None
+"""Of a body; of a tree, at its root; None for the other bodies of a tree."""
 Momenta = tuple[Momentum, ...]
+States = tuple[Moved, ...]

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from symphys.step.momentum import Momenta, Momentum
+from symphys.step.momentum import Moved, States
 from symphys.step.pieces import Pieces
 
 Given = Any
@@ -19,11 +19,11 @@ Given = Any
 class Solvable(Protocol):
     """What sweeps visit. Implementations are frozen dataclasses."""
 
-    def visit(self, momenta: Momenta, old: Given) -> tuple[Momenta, Given]:
+    def visit(self, momenta: States, old: Given) -> tuple[States, Given]:
         """One projection: the momenta of the row's bodies and what the row has given since the sweeps began."""
         ...
 
-    def given(self, momenta: Momenta, impulse: Given) -> Momenta:
+    def given(self, momenta: States, impulse: Given) -> States:
         """The momenta after an impulse."""
         ...
 
@@ -32,17 +32,24 @@ class Solvable(Protocol):
 class Solution:
     """What the sweeps have come to: of all bodies, of all rows, and of all rows before the last sweep."""
 
-    momenta: Momenta
+    momenta: States
     impulses: tuple[Given, ...]
     last: tuple[Given, ...]
 
 
 @dataclass(frozen=True)
 class Row:
-    """A row and the indices of the bodies on its moving sides."""
+    """A row.
+
+    Attributes:
+        bodies: indices of those on its moving sides.
+        row: Solvable.
+        carriers: where the sweeps keep what they know of those bodies: at themselves, or at the root of their tree.
+    """
 
     bodies: tuple[int, ...]
-    row: Any  # Solvable
+    row: Any
+    carriers: tuple[int, ...]
 
 
 def relax(pieces: Pieces, sweeps: int, rows: tuple[Row, ...], start: Solution) -> Solution:
@@ -65,15 +72,15 @@ def visiting_order(rows: Sequence[Row]) -> list[int]:
     left = list(range(len(rows)))
     busy: set[int] = set()
     while left:
-        free = (k for k in left if busy.isdisjoint(rows[k].bodies))
+        free = (k for k in left if busy.isdisjoint(rows[k].carriers))
         k = next(free, left[0])
-        busy = set(rows[k].bodies)
+        busy = set(rows[k].carriers)
         left.remove(k)
         order.append(k)
     return order
 
 
-def begin(pieces: Pieces, rows: Sequence[Row], momenta: Momenta, impulses: Sequence[Given]) -> Solution:
+def begin(pieces: Pieces, rows: Sequence[Row], momenta: States, impulses: Sequence[Given]) -> Solution:
     """Give the impulses that the sweeps start from."""
     started = list(momenta)
     for each, impulse in zip(rows, impulses, strict=True):
@@ -81,20 +88,20 @@ def begin(pieces: Pieces, rows: Sequence[Row], momenta: Momenta, impulses: Seque
     return Solution(tuple(started), tuple(impulses), tuple(impulses))
 
 
-def of_bodies(momenta: Sequence[Momentum], row: Row) -> Momenta:
+def of_bodies(momenta: Sequence[Moved], row: Row) -> States:
     """The momenta of the row's bodies."""
-    return tuple(momenta[i] for i in row.bodies)
+    return tuple(momenta[i] for i in row.carriers)
 
 
-def spread(momenta: list[Momentum], row: Row, changed: Momenta) -> None:
+def spread(momenta: list[Moved], row: Row, changed: States) -> None:
     """Put the momenta of the row's bodies back."""
-    for i, momentum in zip(row.bodies, changed, strict=True):
+    for i, momentum in zip(row.carriers, changed, strict=True):
         momenta[i] = momentum
 
 
-def _visit(row: Solvable, momenta: Momenta, old: Given) -> tuple[Momenta, Given]:
+def _visit(row: Solvable, momenta: States, old: Given) -> tuple[States, Given]:
     return row.visit(momenta, old)
 
 
-def _give(row: Solvable, momenta: Momenta, impulse: Given) -> Momenta:
+def _give(row: Solvable, momenta: States, impulse: Given) -> States:
     return row.given(momenta, impulse)

@@ -15,8 +15,9 @@ from symphys.collide.contact import Shift
 from symphys.course import at_rest
 from symphys.motion import BodyState, Motion, angular_velocity, free_motion, momentum
 from symphys.state import BODY_FIELDS
+from symphys.step.holding import given_by_joints, hold, keep_up, kept_forces, outside, struck_by_component, tree_forces
 from symphys.step.impulse import ZERO, Impulse
-from symphys.step.jointed import hold, joint_rows, keep_up, resumed, store_joint_forces, struck_by_component
+from symphys.step.jointed import joint_rows, make_trees, momenta_of, resumed
 from symphys.step.momentum import Momentum
 from symphys.step.pgs import Row, begin, relax
 from symphys.step.position import close_gaps, displacements
@@ -77,39 +78,51 @@ def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = ())
     paths = expected_motions(scene, x, duration) if scene.world.joints else motions
     contacts = look(scene, paths, duration)
 
-    # rows: where, when and how the surfaces meet
+    # trees of joints, whose velocities are solved for in the coordinates that joints leave
+    free = tuple(pieces.do(_mid_momentum, motion) for motion in motions)
+    trees = make_trees(scene, paths, free, half)
+
+    # rows: where, when and how the surfaces meet, what acts along the coordinates of joints
     rows = []
     for pair, contact, off in zip(pairs, contacts, spared or [ca.SX(0)] * len(pairs), strict=True):
-        moving = tuple(paths[i] for i in bodies_of(pair))
-        force = x[f"{pair.name}.force"]
-        row = pieces.do(prepare, scene.setting, pair.law, contact, moving, duration, off, force)
-        rows.append(Row(bodies_of(pair), row))
+        bodies, force = bodies_of(pair), x[f"{pair.name}.force"]
+        arguments = tuple(trees.motions[i] for i in bodies), duration, off, force, trees.same(bodies)
+        rows.append(trees.row(bodies, pieces.do(prepare, scene.setting, pair.law, contact, *arguments)))
+    joints, fitted = joint_rows(scene, trees, paths, duration, kick)
 
     # velocities: warm start, then sweeps
-    momenta = tuple(Momentum(m.mid_velocity, m.mid_momentum) for m in motions)
-    joints = joint_rows(scene, paths, momenta, duration, kick)
     every, n = (*(each.row for each in joints), *rows), len(joints)
     start: list[Any] = [*resumed(scene, joints, x, kick), *shared(scene, rows, _warm_start(scene, rows, x, kick))]
-    solved = relax(pieces, scene.setting.scheme.sweeps, every, begin(pieces, every, momenta, start))
-    impulses = solved.impulses[n:]
+    solved = relax(pieces, scene.setting.scheme.sweeps, every, begin(pieces, every, trees.states, start))
+    impulses, momenta = solved.impulses[n:], momenta_of(scene, trees, solved.momenta)
 
     # positions
-    moved = displacements(scene, rows, start[n:], solved.momenta, impulses, paths, duration)
-    shifts, made = close_gaps(scene, rows, contacts, impulses, [each.row for each in joints if each.fits], moved)
+    moved, late = displacements(scene, trees, rows, start[n:], momenta, impulses, duration)
+    meetings = list(zip(rows, contacts, impulses, strict=True))
+    shifts, made = close_gaps(scene, trees, meetings, fitted, moved, late)
 
     # the next state
     values: State = {"lag": half}
     resting = _store_forces(scene, rows, impulses, kick, values)
     poses = [pieces.do(_pose, motion, shift) for motion, shift in zip(motions, shifts, strict=True)]
-    struck = struck_by_component(scene, rows, joints, solved.impulses[:n])
-    forces = store_joint_forces(scene, joints, solved.impulses[:n], struck, x, kick)
-    momenta = keep_up(scene, solved.momenta, made, struck, duration)
-    hold(scene, forces, poses, resting)
-    values |= forces if scene.setting.scheme.warm_start else {name: ca.SX.zeros(x[name].size1()) for name in forces}
+    if scene.world.joints:
+        struck = struck_by_component(scene, rows, joints, solved.impulses[:n])
+        forces = kept_forces(scene, joints, solved.impulses[:n], struck, x, kick)
+        others = [(each, given) for each, given in zip(every, solved.impulses, strict=True) if outside(each)]
+        changes = given_by_joints(scene, free, momenta, [motion.mass for motion in motions], others)
+        forces |= tree_forces(scene, paths, changes, struck, x, kick)
+        hold(scene, forces, poses, resting)
+        momenta = keep_up(scene, momenta, made, struck, duration)
+        warm = scene.setting.scheme.warm_start
+        values |= forces if warm else {name: ca.SX.zeros(x[name].size1()) for name in forces}
     for body, *parts in zip(scene.world.bodies, motions, momenta, poses, resting, strict=True):
         stored = pieces.do(_store_body, *parts)
         values |= {f"{body.name}.{field}": value for field, value in stored.items()}
     return Phase(values, tuple(rows), tuple(contacts), impulses, tuple(zip(solved.impulses, solved.last, strict=True)))
+
+
+def _mid_momentum(motion: Motion) -> Momentum:
+    return Momentum(motion.mid_velocity, motion.mid_momentum)
 
 
 def free_motions(scene: Scene, x: State, duration: Expr) -> list[Motion]:

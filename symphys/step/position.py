@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
 from symphys.collide.contact import UNMOVED, Contact, Shift
-from symphys.motion import Motion, apply
+from symphys.motion import Held, Motion, apply
 from symphys.step.axis import AxisRow
 from symphys.step.impulse import Impulse
+from symphys.step.jointed import Trees
 from symphys.step.lock import LockRow
-from symphys.step.momentum import Momenta, Momentum
+from symphys.step.momentum import Momenta, Momentum, Moved, Rates
 from symphys.step.pgs import Row
 from symphys.step.pieces import Pieces
-from symphys.step.row import ContactRow
+from symphys.step.row import ContactRow, Side
 from symphys.step.scene import Scene
 
 Expr = Any
@@ -24,51 +26,61 @@ Expr = Any
 Shifts = tuple[Shift, ...]
 
 
+Displaced = Shift | Rates | None
+"""Of a body; of a tree along its coordinates, at its root; None for other bodies of a tree."""
+
+
 def displacements(
     scene: Scene,
+    trees: Trees,
     rows: Sequence[Row],
     started: Sequence[Impulse],
     momenta: Momenta,
     given: Sequence[Impulse],
-    motions: Sequence[Motion],
     duration: Expr,
-) -> list[Shift]:
-    """Duration times the new velocities, less what impulses would have done before they act."""
+) -> tuple[list[Shift], list[Displaced]]:
+    """Duration times the new velocities, and less what impulses would have done before they act, at the carriers."""
     do = scene.pieces.do
-    shifts = [do(_drift, motion, momentum, duration) for motion, momentum in zip(motions, momenta, strict=True)]
+    shifts = [do(_drift, motion, momentum, duration) for motion, momentum in zip(trees.motions, momenta, strict=True)]
+    late = [_still(state) for state in trees.states]
     if not scene.setting.scheme.time_of_impact:
-        return shifts
+        return shifts, late
     for each, *impulses in zip(rows, started, given, strict=True):
-        for side, body in enumerate(each.bodies):
-            shifts[body] = do(_delayed, shifts[body], each.row, side, impulses, motions[body].inverse_mid)
-    return shifts
+        for side, (body, carrier) in enumerate(zip(each.bodies, each.carriers, strict=True)):
+            late[carrier] = do(_delayed, late[carrier], each.row, side, impulses, trees.motions[body].inverse_mid)
+    return shifts, late
 
 
 def _drift(motion: Motion, momentum: Momentum, duration: Expr) -> Shift:
     return Shift(duration * momentum.velocity, duration * apply(motion.inverse_mid, momentum.angular))
 
 
-def _delayed(shift: Shift, row: ContactRow, k: int, impulses: list[Impulse], turning: Expr) -> Shift:
+def _delayed(late: Displaced, row: ContactRow, k: int, impulses: list[Impulse], turning: Expr) -> Displaced:
     """The displacement less that which the impulse on side k would have caused before it acts.
 
     What goes on from the last step has acted all the time, whatever rounding makes of the gap.
     """
     side, impulse = row.sides[k], impulses[1].minus(impulses[0].times(row.lasts))
     force, twist = impulse.linear(row.impulse_normal), impulse.angular(row.impulse_normal)
-    torque = ca.cross(side.impulse_arm, force) + twist
     early = row.delay * side.sign
-    return Shift(shift.linear - early * side.inverse_mass * force, shift.angular - early * apply(turning, torque))
+    if isinstance(late, Rates) and side.reach is not None:
+        return Rates(late.numbers - early * (ca.mtimes(side.reach.push, force) + ca.mtimes(side.reach.twist, twist)))
+    assert isinstance(late, Shift)
+    torque = ca.cross(side.impulse_arm, force) + twist
+    return Shift(late.linear - early * side.inverse_mass * force, late.angular - early * apply(turning, torque))
 
 
 def close_gaps(
     scene: Scene,
-    rows: Sequence[Row],
-    contacts: Sequence[Contact],
-    impulses: Sequence[Impulse],
-    locks: Sequence[Row],
+    trees: Trees,
+    rows: Sequence[tuple[Row, Contact, Impulse]],
+    joints: Sequence[Row],
     shifts: list[Shift],
+    late: list[Displaced],
 ) -> tuple[Shifts, Momenta]:
-    """Gauss-Seidel on the displacements until joints fit, no rigid contact overlaps, and those that last do not gape.
+    """Gauss-Seidel on the displacements until no rigid contact overlaps, and those that last do not gape; then joints.
+
+    What is on a tree is pushed along the tree's coordinates, so that joints are left with errors of third order only.
 
     Returns:
         The displacements, and what joints did to them as momenta times a time: mass [kg m] and inertia [kg m^2] times
@@ -76,15 +88,51 @@ def close_gaps(
     """
     do, scheme = scene.pieces.do, scene.setting.scheme
     rigid = tuple(
-        (each, contact, do(_lasts, each.row, impulse))
-        for each, contact, impulse in zip(rows, contacts, impulses, strict=True)
-        if not each.row.law.soft
+        (each, contact, do(_lasts, each.row, impulse)) for each, contact, impulse in rows if not each.row.law.soft
+    )
+    limits = tuple(each for each in joints if _of_tree(each))
+    context = Passing(tuple(shifts), trees.motions, rigid, limits, scheme.push_out)
+    before: Pushed = tuple(late), tuple(ca.SX(0) for _ in rigid)
+    along, _ = scene.pieces.repeat(scheme.position_sweeps, _push_all, context, before)
+    pushed = tuple(
+        do(_displaced, shift, trees.motions[i].held, along[trees.carriers[i]]) for i, shift in enumerate(shifts)
     )
     none = Momentum(ca.SX.zeros(3), ca.SX.zeros(3))
-    state = (tuple(shifts), tuple(ca.SX(0) for _ in rigid), tuple(none for _ in shifts))
-    context = (tuple(locks), rigid, scheme.push_out)
-    shifts_after, _, made = scene.pieces.repeat(scheme.position_sweeps, _push_all, context, state)
-    return shifts_after, made
+    locks = tuple(each for each in joints if not _of_tree(each))
+    return scene.pieces.repeat(scheme.position_sweeps, _fit_all, locks, (pushed, tuple(none for _ in shifts)))
+
+
+Pushed = tuple[tuple[Displaced, ...], tuple[Expr, ...]]
+"""What pushes did to bodies and trees; pushes of contacts."""
+
+
+@dataclass(frozen=True)
+class Passing:
+    """What stays the same over the sweeps of the pass over contacts.
+
+    Attributes:
+        shifts: of the bodies before it.
+        motions: of the bodies.
+        rigid: contacts, and whether they last.
+        limits: of coordinates of trees.
+        share: of an overlap that a step takes back.
+    """
+
+    shifts: Shifts
+    motions: tuple[Motion, ...]
+    rigid: tuple[tuple[Row, Contact, Expr], ...]
+    limits: tuple[Row, ...]
+    share: float
+
+
+def _still(state: Moved) -> Displaced:
+    if state is None:
+        return None
+    return Rates(ca.SX(state.numbers.leaf.rows, 1)) if isinstance(state, Rates) else UNMOVED
+
+
+def _of_tree(each: Row) -> bool:
+    return isinstance(each.row, AxisRow) and each.row.of_tree is not None
 
 
 def _lasts(row: ContactRow, impulse: Impulse) -> Expr:
@@ -92,34 +140,93 @@ def _lasts(row: ContactRow, impulse: Impulse) -> Expr:
     return ca.logic_and(row.lasts, impulse.normal > row.load)
 
 
-Fitting = LockRow | AxisRow
-"""Rows of joints that the pass closes: locks and limits."""
-Passing = tuple[Shifts, tuple[Expr, ...], Momenta]
-"""Displacements, pushes of contacts, what joints did."""
+def _displaced(shift: Shift, held: Held | None, along: Displaced) -> Shift:
+    """A body's displacement with what pushes have added."""
+    if held is not None and isinstance(along, Rates):
+        more = ca.mtimes(held.see, along.numbers)
+        return Shift(shift.linear + more[:3], shift.angular + more[3:])
+    if isinstance(along, Shift):
+        return Shift(shift.linear + along.linear, shift.angular + along.angular)
+    return shift
 
 
-def _push_all(pieces: Pieces, context: tuple[Any, Any, float], state: Passing) -> Passing:
-    """One pass over all joints and rigid contacts."""
-    (locks, rigid, share), (shifts, pushes, made) = context, map(list, state)
-    for each in locks:
-        own = tuple(shifts[i] for i in each.bodies), tuple(made[i] for i in each.bodies)
-        for i, shift, momentum in zip(each.bodies, *pieces.do(_fit, each.row, *own), strict=True):
-            shifts[i], made[i] = shift, momentum
-    for k, (each, contact, lasts) in enumerate(rigid):
-        moved = tuple(shifts[i] for i in each.bodies)
-        moved, pushes[k] = pieces.do(_push, each.row, contact, lasts, moved, pushes[k], share)
-        for i, shift in zip(each.bodies, moved, strict=True):
-            shifts[i] = shift
-    return tuple(shifts), tuple(pushes), tuple(made)
+def _push_all(pieces: Pieces, context: Passing, state: Pushed) -> Pushed:
+    """One pass over all rigid contacts and limits."""
+    along, pushes = list(state[0]), list(state[1])
+    for k, (each, contact, lasts) in enumerate(context.rigid):
+        own = tuple(along[i] for i in each.carriers)
+        moved = tuple(
+            pieces.do(_displaced, context.shifts[i], context.motions[i].held, a)
+            for i, a in zip(each.bodies, own, strict=True)
+        )
+        after, pushes[k] = pieces.do(_push, each.row, contact, lasts, moved, own, pushes[k], context.share)
+        for i, displaced in zip(each.carriers, after, strict=True):
+            along[i] = displaced
+    for each in context.limits:
+        before = tuple(context.shifts[i] for i in each.bodies)
+        along[each.carriers[0]] = pieces.do(_back, each.row, before, along[each.carriers[0]])
+    return tuple(along), tuple(pushes)
 
 
-def _fit(row: Fitting, moved: Shifts, made: Momenta) -> tuple[Shifts, Momenta]:
-    """Displacements after which the joint fits, to third order in the rotation: arms are those at the middle."""
+def _push(
+    row: ContactRow,
+    contact: Contact,
+    lasts: Expr,
+    moved: Shifts,
+    along: tuple[Displaced, ...],
+    old: Expr,
+    share: float,
+) -> tuple[tuple[Displaced, ...], Expr]:
+    gap = contact.meeting.gap_after(moved[0], moved[1] if len(moved) > 1 else UNMOVED)
+    free = old - share * gap * row.normal_mass
+    # at 0 the slope is that of ``free``: a body that exactly touches is held by the surface
+    new = ca.if_else(ca.logic_or(lasts, free >= 0), free, 0)
+    step = (new - old) * row.normal
+    if row.same:
+        after = along[0]
+        for side in row.sides:
+            after = _pushed(side, after, step)
+        return tuple(after for _ in row.sides), new
+    return tuple(_pushed(side, each, step) for side, each in zip(row.sides, along, strict=True)), new
+
+
+def _pushed(side: Side, along: Displaced, step: Expr) -> Displaced:
+    if isinstance(along, Rates) and side.reach is not None:
+        return Rates(along.numbers + side.sign * ca.mtimes(side.reach.push, step))
+    assert isinstance(along, Shift)
+    turn = apply(side.inverse_inertia, ca.cross(side.arm, step))
+    return Shift(along.linear + side.sign * side.inverse_mass * step, along.angular + side.sign * turn)
+
+
+def _back(row: AxisRow, before: Shifts, along: Rates) -> Rates:
+    """The displacement along a tree's coordinates that takes a limit of one back to where it is kept."""
+    assert row.of_tree is not None
+    moved = _relative(row, before) + along.numbers[row.of_tree.index]
+    return Rates(along.numbers + row.of_tree.gain * row.fitting(moved))
+
+
+def _relative(row: LockRow | AxisRow, moved: Shifts) -> Expr:
+    """Of the first side against the second along the row's directions, to third order in the rotation."""
     linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
     for side, shift in zip(row.sides, moved, strict=True):
         linear += side.sign * (shift.linear + ca.cross(shift.angular, side.arm))
         angular += side.sign * shift.angular
-    push, twist = row.given_along.split(row.fitting(row.seen.forwards(linear, angular)))
+    return row.seen.forwards(linear, angular)
+
+
+def _fit_all(pieces: Pieces, locks: tuple[Row, ...], state: tuple[Shifts, Momenta]) -> tuple[Shifts, Momenta]:
+    """One pass over what joints lock."""
+    shifts, made = map(list, state)
+    for each in locks:
+        own = tuple(shifts[i] for i in each.bodies), tuple(made[i] for i in each.bodies)
+        for i, shift, momentum in zip(each.bodies, *pieces.do(_fit, each.row, *own), strict=True):
+            shifts[i], made[i] = shift, momentum
+    return tuple(shifts), tuple(made)
+
+
+def _fit(row: LockRow | AxisRow, moved: Shifts, made: Momenta) -> tuple[Shifts, Momenta]:
+    """Displacements after which the joint fits."""
+    push, twist = row.given_along.split(row.fitting(_relative(row, moved)))
     fitted, gained = [], []
     for side, shift, m in zip(row.sides, moved, made, strict=True):
         linear, angular = side.sign * push, side.sign * (ca.cross(side.impulse_arm, push) + twist)
@@ -127,18 +234,3 @@ def _fit(row: Fitting, moved: Shifts, made: Momenta) -> tuple[Shifts, Momenta]:
         fitted.append(Shift(shift.linear + side.inverse_mass * linear, shift.angular + turn))
         gained.append(Momentum(m.velocity + side.inverse_mass * linear, m.angular + angular))
     return tuple(fitted), tuple(gained) if isinstance(row, LockRow) else made
-
-
-def _push(
-    row: ContactRow, contact: Contact, lasts: Expr, moved: Shifts, old: Expr, share: float
-) -> tuple[Shifts, Expr]:
-    gap = contact.meeting.gap_after(moved[0], moved[1] if len(moved) > 1 else UNMOVED)
-    free = old - share * gap * row.normal_mass
-    # at 0 the slope is that of ``free``: a body that exactly touches is held by the surface
-    new = ca.if_else(ca.logic_or(lasts, free >= 0), free, 0)
-    step = (new - old) * row.normal
-    pushed = []
-    for side, shift in zip(row.sides, moved, strict=True):
-        turn = apply(side.inverse_inertia, ca.cross(side.arm, step))
-        pushed.append(Shift(shift.linear + side.sign * side.inverse_mass * step, shift.angular + side.sign * turn))
-    return tuple(pushed), new

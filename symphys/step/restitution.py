@@ -19,7 +19,8 @@ import casadi as ca
 from symphys.motion import Motion, apply, inverse_inertia
 from symphys.shapes import Sphere
 from symphys.smooth import TINY_SQUARE
-from symphys.step.momentum import Momentum
+from symphys.step.jointed import Trees, momenta_of
+from symphys.step.momentum import Momentum, Moved, Rates
 from symphys.step.pgs import Given, Row, Solution, relax
 from symphys.step.row import ContactRow
 from symphys.step.scene import Scene
@@ -39,20 +40,21 @@ def eccentric_bodies(world: World) -> set[int]:
     }
 
 
-def rebound(scene: Scene, rows: tuple[Row, ...], start: Solution, motions: Sequence[Motion]) -> Solution:
+def rebound(scene: Scene, rows: tuple[Row, ...], start: Solution, motions: Sequence[Motion], trees: Trees) -> Solution:
     """The impulses of an impact, and the momenta after it."""
     pieces, scheme = scene.pieces, scene.setting.scheme
     if not (scheme.energy_cap and eccentric_bodies(scene.world)):
         return relax(pieces, scheme.sweeps, rows, start)
-    dead = tuple(Row(each.bodies, pieces.do(_without_rebound, each.row)) for each in rows)
+    dead = tuple(replace(each, row=pieces.do(_without_rebound, each.row)) for each in rows)
     plastic = relax(pieces, scheme.sweeps, dead, start)
     newton = relax(pieces, scheme.sweeps, rows, plastic)
     sums: tuple[Expr, Expr, Expr] = (ca.SX(0), ca.SX(0), ca.SX(0))
-    for motion, *momenta in zip(motions, start.momenta, plastic.momenta, newton.momenta, strict=True):
+    bodies = (momenta_of(scene, trees, solution.momenta) for solution in (start, plastic, newton))
+    for motion, *momenta in zip(motions, *bodies, strict=True):
         sums = pieces.do(_energies, motion, momenta, sums)
     share = pieces.do(_largest_share, sums)
     return Solution(
-        tuple(pieces.do(_between_momenta, share, a, b) for a, b in zip(plastic.momenta, newton.momenta, strict=True)),
+        tuple(pieces.do(_between_states, share, a, b) for a, b in zip(plastic.momenta, newton.momenta, strict=True)),
         tuple(pieces.do(_between, share, a, b) for a, b in zip(plastic.impulses, newton.impulses, strict=True)),
         tuple(pieces.do(_between, share, a, b) for a, b in zip(plastic.last, newton.last, strict=True)),
     )
@@ -87,7 +89,11 @@ def _largest_share(sums: tuple[Expr, Expr, Expr]) -> Expr:
     return ca.if_else(a + b + c > 0, ca.fmin(share, 1), 1)
 
 
-def _between_momenta(share: Expr, plastic: Momentum, newton: Momentum) -> Momentum:
+def _between_states(share: Expr, plastic: Moved, newton: Moved) -> Moved:
+    if plastic is None or newton is None:
+        return None
+    if isinstance(plastic, Rates) or isinstance(newton, Rates):
+        return Rates(plastic.numbers + share * (newton.numbers - plastic.numbers))
     return Momentum(
         plastic.velocity + share * (newton.velocity - plastic.velocity),
         plastic.angular + share * (newton.angular - plastic.angular),

@@ -13,7 +13,7 @@ from symphys.motion import Motion, apply
 from symphys.rotation import cross_matrix
 from symphys.smooth import TINY_SQUARE
 from symphys.step import impulse
-from symphys.step.momentum import Momenta
+from symphys.step.momentum import Momentum, Rates
 from symphys.world import Law
 
 Expr = Any
@@ -27,6 +27,21 @@ UNREACHED = -1e6
 
 
 @dataclass(frozen=True)
+class Reach:
+    """One side of a row on a tree of joints with n coordinates.
+
+    Attributes:
+        see, spin: (3, n) velocity of the touching point and angular velocity for unit rates.
+        push, twist: (n, 3) what unit impulses at the point, and unit torque impulses, do to the rates.
+    """
+
+    see: Expr
+    spin: Expr
+    push: Expr
+    twist: Expr
+
+
+@dataclass(frozen=True)
 class Side:
     """One moving side of a row.
 
@@ -36,6 +51,7 @@ class Side:
         inverse_inertia: at the row's instant: scalar or (3, 3) [1/(kg m^2)].
         arm: (3,) [m] at the row's instant.
         impulse_arm: (3,) [m] where the impulse is applied.
+        reach: if the body is part of a tree of joints.
     """
 
     sign: int
@@ -43,6 +59,66 @@ class Side:
     inverse_inertia: Expr
     arm: Expr
     impulse_arm: Expr
+    reach: Reach | None = None
+
+    def spin(self, m: Any) -> Expr:
+        """(3,) [rad/s], from what the sweeps know of the body."""
+        if self.reach is not None:
+            return ca.mtimes(self.reach.spin, m.numbers)
+        return apply(self.inverse_inertia, m.angular)
+
+    def speed(self, m: Any) -> Expr:
+        """(3,) [m/s] of the touching point."""
+        if self.reach is not None:
+            return ca.mtimes(self.reach.see, m.numbers)
+        return m.velocity + ca.cross(self.spin(m), self.arm)
+
+    def kicked(self, m: Any, linear: Expr, angular: Expr) -> Any:
+        """What the sweeps know of the body after impulses on the first side."""
+        linear, angular = self.sign * linear, self.sign * angular
+        if self.reach is not None:
+            return Rates(m.numbers + ca.mtimes(self.reach.push, linear) + ca.mtimes(self.reach.twist, angular))
+        return Momentum(
+            m.velocity + self.inverse_mass * linear, m.angular + ca.cross(self.impulse_arm, linear) + angular
+        )
+
+
+def kicked(sides: Sequence[Side], momenta: Sequence[Any], linear: Expr, angular: Expr, same: bool) -> tuple[Any, ...]:
+    """Both sides after impulses on the first; ``same``: both are of one tree."""
+    if not same:
+        return tuple(side.kicked(m, linear, angular) for side, m in zip(sides, momenta, strict=True))
+    after = momenta[0]
+    for side in sides:
+        after = side.kicked(after, linear, angular)
+    return tuple(after for _ in sides)
+
+
+def reach_of(motion: Motion, t: Expr, arm: Expr, impulse_arm: Expr) -> Reach | None:
+    """The reach of a side at a row's instant."""
+    held = motion.held
+    if held is None:
+        return None
+    turning = apply(motion.inverse_inertia(t), held.inertia)
+    spin = ca.mtimes(turning, held.see[3:, :])
+    see = held.see[:3, :] - ca.mtimes(cross_matrix(arm), spin)
+    return Reach(see, spin, held.push + ca.mtimes(held.twist, cross_matrix(impulse_arm)), held.twist)
+
+
+def mobilities(sides: Sequence[Side], same: bool) -> tuple[Expr, Expr]:
+    """(3, 3) each: relative velocity for unit impulses at the point, relative spin for unit torque impulses."""
+    push, twist = ca.SX.zeros(3, 3), ca.SX.zeros(3, 3)
+    for i, side in enumerate(sides):
+        if side.reach is None:
+            inverse, arm = apply(side.inverse_inertia, ca.SX.eye(3)), cross_matrix(side.arm)
+            push += side.inverse_mass * ca.SX.eye(3) - ca.mtimes(arm, ca.mtimes(inverse, arm))
+            twist += inverse
+            continue
+        for j, other in enumerate(sides):
+            if other.reach is not None and (same or i == j):
+                sign = side.sign * other.sign
+                push += sign * ca.mtimes(side.reach.see, other.reach.push)
+                twist += sign * ca.mtimes(side.reach.spin, other.reach.twist)
+    return push, twist
 
 
 @dataclass(frozen=True)
@@ -67,6 +143,7 @@ class ContactRow:
         struck: 1 if the surfaces meet at speed, else 0.
         width: of the smoothed normal projection [m/s]; 0 for fast approach.
         knob: smoothing [m/s].
+        same: whether both sides are of one tree of joints.
     """
 
     law: Law
@@ -87,12 +164,17 @@ class ContactRow:
     struck: Expr
     width: Expr
     knob: Expr
+    same: bool
 
-    def visit(self, momenta: Momenta, old: impulse.Impulse) -> tuple[Momenta, impulse.Impulse]:
+    def kicked(self, momenta: tuple[Any, ...], linear: Expr, angular: Expr) -> tuple[Any, ...]:
+        """The momenta of the row's bodies after impulses on the first side."""
+        return kicked(self.sides, momenta, linear, angular, self.same)
+
+    def visit(self, momenta: tuple[Any, ...], old: impulse.Impulse) -> tuple[tuple[Any, ...], impulse.Impulse]:
         """See ``pgs.Solvable``."""
         return impulse.visit(self, momenta, old)
 
-    def given(self, momenta: Momenta, given: impulse.Impulse) -> Momenta:
+    def given(self, momenta: tuple[Any, ...], given: impulse.Impulse) -> tuple[Any, ...]:
         """See ``pgs.Solvable``."""
         return impulse.give(self, momenta, given)
 
@@ -118,6 +200,7 @@ def make_sides(motions: Moving, row_time: Expr, frame: Frame, applied: Frame) ->
             inverse_inertia=motion.inverse_inertia(row_time),
             arm=frame.arms[k],
             impulse_arm=applied.arms[k],
+            reach=reach_of(motion, row_time, frame.arms[k], applied.arms[k]),
         )
         for k, motion in enumerate(motions)
     )
@@ -132,14 +215,11 @@ def free_slip(sides: Sequence[Side], motions: Moving) -> Expr:
     return total
 
 
-def inverse_masses(sides: Sequence[Side], n: Expr) -> tuple[Expr, Expr, Expr, Expr]:
+def inverse_masses(sides: Sequence[Side], n: Expr, same: bool) -> tuple[Expr, Expr, Expr, Expr]:
     """k along the normal, across it, and for torques about it and across it."""
-    push, twist = ca.SX.zeros(3, 3), ca.SX.zeros(3, 3)
-    for side in sides:
-        inverse = apply(side.inverse_inertia, ca.SX.eye(3))
-        arm = cross_matrix(side.arm)
-        push += side.inverse_mass * ca.SX.eye(3) - ca.mtimes(arm, ca.mtimes(inverse, arm))
-        twist += inverse
+    push, twist = mobilities(sides, same)
+    if any(side.reach is not None for side in sides):
+        push, twist = (push + push.T) / 2, (twist + twist.T) / 2
     return along(push, n), across(push, n), along(twist, n), across(twist, n)
 
 

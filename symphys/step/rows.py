@@ -41,7 +41,14 @@ LOADED = 1e-3
 
 
 def prepare(
-    setting: Setting, law: Law, contact: Contact, motions: Moving, duration: Expr, spared: Expr, force: Expr
+    setting: Setting,
+    law: Law,
+    contact: Contact,
+    motions: Moving,
+    duration: Expr,
+    spared: Expr,
+    force: Expr,
+    same: bool,
 ) -> ContactRow:
     """The row of one contact over a stretch of time.
 
@@ -53,6 +60,7 @@ def prepare(
         duration: of the stretch [s].
         spared: 1 for a contact that gives no impulse.
         force: (3,) with which the contact acted at the end of the last step [N].
+        same: whether both sides are of one tree of joints.
     """
     scheme, knob = setting.scheme, setting.knob
     time = contact.time if scheme.time_of_impact else ca.SX(0)
@@ -64,7 +72,7 @@ def prepare(
     row_time = half + leaving * (time - half)
     frame, applied = contact.meeting.frame(row_time), contact.meeting.frame(leaving * time)
     sides = make_sides(motions, row_time, frame, applied)
-    k_normal, *k_others = inverse_masses(sides, frame.normal)
+    k_normal, *k_others = inverse_masses(sides, frame.normal, same)
     softness, target = _normal_target(law, contact, duration, time, rebound, pull, k_normal, knob)
     landing = _landing(contact, duration, time, target, ca.dot(frame.normal, free_slip(sides, motions)))
     quick = contact.rate < -setting.fast
@@ -91,6 +99,7 @@ def prepare(
         struck=ca.SX(0) if law.soft else ca.logic_and(contact.hit, quick),
         width=width,
         knob=knob,
+        same=same,
     )
 
 

@@ -11,7 +11,7 @@ from symphys import rotation
 from symphys.course import Course, Parabola, at_rest
 from symphys.joints import Coordinate, Joint, Placed
 from symphys.step.along import Directions
-from symphys.step.row import Moving, Side
+from symphys.step.row import Moving, Side, reach_of
 
 Expr = Any
 """casadi SX"""
@@ -51,7 +51,14 @@ class Sockets:
         """The moving sides of rows that see the sockets at one time and give impulses at another."""
         arms, impulse_arms = self.lever_arms(seen), self.common_arms(given)
         return tuple(
-            Side(1 - 2 * k, 1 / motion.mass, motion.inverse_inertia(seen), arms[k], impulse_arms[k])
+            Side(
+                1 - 2 * k,
+                1 / motion.mass,
+                motion.inverse_inertia(seen),
+                arms[k],
+                impulse_arms[k],
+                reach_of(motion, seen, arms[k], impulse_arms[k]),
+            )
             for k, motion in enumerate(motions)
         )
 

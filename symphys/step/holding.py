@@ -1,0 +1,198 @@
+"""What joints gave in a stretch: what is kept of it, and what it does to bodies where the next one begins."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import casadi as ca
+
+from symphys.joints import Joint, linkages, tree_joints
+from symphys.motion import Motion
+from symphys.step.along import Along
+from symphys.step.axis import AxisRow
+from symphys.step.impulse import Impulse
+from symphys.step.jointed import LIMITS, JointRow, column
+from symphys.step.lock import LockRow, in_world
+from symphys.step.momentum import Momenta, Momentum
+from symphys.step.pgs import Row
+from symphys.step.row import ContactRow
+from symphys.step.scene import Scene, State
+from symphys.step.sockets import free, locked, sockets_at
+from symphys.step.wrench import wrenches
+from symphys.world import World
+
+Expr = Any
+"""casadi SX"""
+Struck = Mapping[frozenset[int], Expr]
+"""Of bodies that hang together: 1 if one of their contacts is an impact."""
+Total = list[tuple[Expr, Expr]]
+"""Force and torque on each body."""
+Poses = Sequence[tuple[Expr, Expr]]
+"""Positions and orientations."""
+
+
+def components(world: World) -> list[frozenset[int]]:
+    """The bodies that hang together by joints."""
+    found = [frozenset((i,)) for i in range(len(world.bodies))]
+    for joint in world.joints:
+        touched = [group for group in found if group & set(joint.bodies)]
+        found = [group for group in found if group not in touched] + [frozenset().union(*touched)]
+    return found
+
+
+def struck_by_component(
+    scene: Scene, contacts: Sequence[Row], joints: Sequence[JointRow], given: Sequence[Along]
+) -> Struck:
+    """Of each component: 1 if a contact or a limit of it is an impact, whose share of joint forces does not last."""
+    found = {}
+    for group in components(scene.world):
+        meeting = tuple(each.row for each in contacts if group & set(each.bodies))
+        limits = tuple(
+            (each.row.row, impulse)
+            for each, impulse in zip(joints, given, strict=True)
+            if group & set(each.row.bodies) and each.name.rpartition(".")[2] in LIMITS
+        )
+        found[group] = scene.pieces.do(_any_struck, meeting, limits)
+    return found
+
+
+def _any_struck(rows: tuple[ContactRow, ...], limits: tuple[tuple[AxisRow, Along], ...]) -> Expr:
+    struck = [ca.fmax(row.struck, row.leaving > 0) for row in rows]
+    struck += [ca.logic_and(row.landing, impulse.numbers != 0) for row, impulse in limits]
+    return ca.mmax(ca.vertcat(ca.SX(0), *struck))
+
+
+def kept_forces(
+    scene: Scene, rows: Sequence[JointRow], given: Sequence[Along], struck: Struck, x: State, kick: Expr
+) -> State:
+    """Persistent forces of rows that sweeps visit.
+
+    In a stretch with an impact those of the last one stay: what held the impact is not to be told from them.
+    """
+    kept = dict[str, list[Expr]]()
+    for each, impulse in zip(rows, given, strict=True):
+        row, impact, old = each.row.row, of_body(struck, each.row.bodies[0]), column(x, each)
+        force = scene.pieces.do(_lasting, row, impulse, old, impact, kick, scene.shortest_kick)
+        kept.setdefault(each.name, []).append(force)
+    return {name: scene.pieces.do(_stacked, tuple(parts)) for name, parts in kept.items()}
+
+
+def of_body(struck: Struck, body: int) -> Expr:
+    """Whether what hangs on a body is struck."""
+    return next(impact for group, impact in struck.items() if body in group)
+
+
+def _lasting(row: LockRow | AxisRow, impulse: Along, old: Expr, struck: Expr, kick: Expr, shortest: float) -> Expr:
+    return ca.if_else(struck, old, row.carried(impulse) / ca.fmax(kick, shortest))
+
+
+def _stacked(parts: tuple[Expr, ...]) -> Expr:
+    return ca.vertcat(*parts)
+
+
+def tree_forces(
+    scene: Scene, paths: Sequence[Motion], changes: Sequence[Momentum], struck: Struck, x: State, kick: Expr
+) -> State:
+    """The same of joints of trees, from what they gave to each body: ``changes``, impulses about centres of mass."""
+    kept, joints = dict[str, Expr](), scene.world.joints
+    for tree in linkages(joints):
+        own = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
+        parts = tuple(paths[i] for i in tree.bodies), tuple(changes[i] for i in tree.bodies)
+        for joint, wrench in zip(own, scene.pieces.do(wrenches, tree, own, *parts), strict=True):
+            if joint is not None:
+                name = f"{joint.name}.lock"
+                arguments = wrench, x[name], of_body(struck, joint.first), kick, scene.shortest_kick
+                kept[name] = scene.pieces.do(_still_acting, *arguments)
+    return kept
+
+
+def _still_acting(impulse: Expr, old: Expr, struck: Expr, kick: Expr, shortest: float) -> Expr:
+    return ca.if_else(struck, old, impulse / ca.fmax(kick, shortest))
+
+
+def outside(row: Row) -> bool:
+    """Whether a row's impulses are none of a tree's joints: not a motor or limit of one."""
+    return not (isinstance(row.row, AxisRow) and row.row.of_tree is not None)
+
+
+def given_by_joints(
+    scene: Scene, before: Momenta, after: Momenta, masses: Sequence[Expr], others: Sequence[tuple[Row, Any]]
+) -> list[Momentum]:
+    """What joints of trees gave to each body: the change of its momenta less what other rows gave."""
+    do = scene.pieces.do
+    changes = [do(_change, m, a, b) for m, a, b in zip(masses, before, after, strict=True)]
+    for each, impulse in others:
+        for k, body in enumerate(each.bodies):
+            changes[body] = do(_less, changes[body], each.row, k, impulse)
+    return changes
+
+
+def _change(mass: Expr, before: Momentum, after: Momentum) -> Momentum:
+    return Momentum(mass * (after.velocity - before.velocity), after.angular - before.angular)
+
+
+def _less(change: Momentum, row: Any, k: int, impulse: Impulse | Along) -> Momentum:
+    side = row.sides[k]
+    if isinstance(impulse, Along):
+        linear, angular = row.given_along.split(impulse.numbers)
+    else:
+        linear, angular = impulse.linear(row.impulse_normal), impulse.angular(row.impulse_normal)
+    turning = ca.cross(side.impulse_arm, linear) + angular
+    return Momentum(change.velocity - side.sign * linear, change.angular - side.sign * turning)
+
+
+def hold(scene: Scene, forces: State, poses: Poses, total: Total) -> None:
+    """Adds to ``total`` what joint forces do to bodies at these poses: those at which the next step begins."""
+    exact = tree_joints(scene.world.joints)
+    for index, joint in enumerate(scene.world.joints):
+        own = tuple(poses[i] for i in joint.bodies)
+        names = ("lock",) if index in exact else ("lock", *joint.acting)
+        parts = tuple((part, forces[f"{joint.name}.{part}"]) for part in names)
+        found = scene.pieces.do(_on_bodies, joint, own, parts, index in exact)
+        for body, wrench in zip(joint.bodies, found, strict=True):
+            total[body] = scene.pieces.do(_added, total[body], wrench)
+
+
+def _on_bodies(
+    joint: Joint, poses: tuple[tuple[Expr, Expr], ...], parts: tuple[tuple[str, Expr], ...], exact: bool
+) -> tuple[tuple[Expr, Expr], ...]:
+    """Force and torque on each moving side."""
+    sockets, now = sockets_at(joint, poses), ca.SX(0)
+    placed, arms = sockets.placed(now), sockets.common_arms(now)
+    linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
+    for part, numbers in parts:
+        if exact:
+            linear, angular = ca.mtimes(placed.a, numbers[:3]), ca.mtimes(placed.a, numbers[3:])
+            continue
+        if part == "lock" and joint.kind.slides is None:
+            numbers = in_world(placed.a, numbers)
+        along = [locked(joint, placed)] if part == "lock" else [free(c, placed) for c in joint.kind.coordinates]
+        columns = [numbers] if part == "lock" else ca.vertsplit(numbers)
+        for directions, values in zip(along, columns, strict=True):
+            force, torque = directions.split(values)
+            linear, angular = linear + force, angular + torque
+    first = linear, ca.cross(arms[0], linear) + angular
+    second = -linear, -ca.cross(arms[1], linear) - angular
+    return (first, second)[: len(poses)]
+
+
+def _added(total: tuple[Expr, Expr], wrench: tuple[Expr, Expr]) -> tuple[Expr, Expr]:
+    return total[0] + wrench[0], total[1] + wrench[1]
+
+
+def keep_up(scene: Scene, momenta: Momenta, made: Momenta, struck: Struck, duration: Expr) -> Momenta:
+    """The momenta, with those that the displacements by joints stand for (as SHAKE has it), so that spin is kept.
+
+    Not in a stretch with an impact, where they make up for impulses that act late. They are no part of the forces that
+    the next sweeps start from.
+    """
+    found, dt = list(momenta), scene.setting.scheme.dt
+    for i in sorted({i for joint in scene.world.joints for i in joint.bodies}):
+        found[i] = scene.pieces.do(_kept_up, momenta[i], made[i], of_body(struck, i), duration, dt)
+    return tuple(found)
+
+
+def _kept_up(momentum: Momentum, made: Momentum, impact: Expr, duration: Expr, dt: float) -> Momentum:
+    share = ca.if_else(impact, 0, duration / dt**2)
+    return Momentum(momentum.velocity + share * made.velocity, momentum.angular + share * made.angular)
