@@ -2,10 +2,9 @@
 
 For each body: position (3) [m], orientation (4) [-] quaternion w x y z, velocity (3) [m/s] and angular_velocity (3)
 [rad/s] at t_k, world frame, and the force (3) [N] and torque (3) [N m] with which constraints act on it persistently.
-For each pair: force (3) [N] on its first body, and torque (3) [N m] if its law resists spinning. For each joint: lock,
-force and couple on its first side along its socket's axes (of a joint that closes a loop or gives way: the forces and
-torques of what it locks), and one number per coordinate for its motor, lower and upper limit and spring.
-Last ``lag`` [s].
+For each pair: force (3) [N] on its first body, and torque (3) [N m] if its law resists spinning. For each joint: if
+it closes a loop or gives way lock, the forces and torques of what it locks; and a number per coordinate for its motor,
+lower and upper limit and spring. Last ``lag`` [s].
 
 The velocities are the true ones at t_k: 0 at rest. The step needs them without the persistent forces of the last
 half step: v - lag force / m. ``lag`` is 0 at the start and dt/2 after the first step, so that no step is special.
@@ -29,7 +28,6 @@ BODY_FIELDS = (
     ("reaction_force", 3),
     ("reaction_torque", 3),
 )
-WRENCH = 6
 INPUT_FIELDS = ("force", "torque")
 GIVEN = ("position", "orientation", "velocity", "angular_velocity")
 """The fields of a body that an initial state may give."""
@@ -51,7 +49,8 @@ class Layout:
                 self._add(f"{pair.name}.torque", 3)
         exact = tree_joints(world.joints)
         for k, joint in enumerate(world.joints):
-            self._add(f"{joint.name}.lock", WRENCH if k in exact else joint.locked)
+            if k not in exact:
+                self._add(f"{joint.name}.lock", joint.locked)
             for part in joint.acting:
                 self._add(f"{joint.name}.{part}", len(joint.kind.coordinates))
         self._add("lag", 1)

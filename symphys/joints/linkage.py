@@ -1,4 +1,4 @@
-"""Which bodies hang together by rigid joints, as trees: their velocities are solved for in coordinates that joints leave.
+"""Which bodies hang together by rigid joints, as trees: their velocities are those of coordinates that joints leave.
 
 Joints that close a loop or give way are no part of a tree; sweeps visit them as they visit contacts.
 """

@@ -1,8 +1,8 @@
 """The velocities of a tree of bodies in the coordinates that its joints leave, and what impulses do to them.
 
 Velocities are seen at the middle of a stretch and impulses given at its start, as rows of joints are (``joint_rows``):
-a body's velocity is ``see`` times the rates of the coordinates, with arms at the middle; impulses of locks, which act at
-the start on one point of both sides, do nothing along the free motions of the start. So
+a body's velocity is ``see`` times the rates of the coordinates, with arms at the middle; impulses of locks, which act
+at the start on one point of both sides, do nothing along the free motions of the start. So
 sum of free_motion . (momentum - free momentum) = sum of free_motion . impulses,  free motions being those of the start,
 holds whatever the locks give: joints are held exactly, and the sweeps know contacts, motors and limits only.
 """
@@ -15,11 +15,12 @@ from typing import Any
 
 import casadi as ca
 
+from symphys.course import Course
 from symphys.joints import Joint, Linkage, Placed
 from symphys.motion import Held, Motion
 from symphys.step.elimination import Eliminated
 from symphys.step.momentum import Momentum, Rates
-from symphys.step.sockets import sockets_of
+from symphys.step.sockets import sockets_on
 
 Expr = Any
 """casadi SX"""
@@ -60,9 +61,9 @@ def make_chart(
         free: their momenta without any impulse of the stretch.
         middle: when velocities are seen [s].
     """
-    seen, given = (_columns(linkage, joints, motions, t, common) for t, common in ((middle, False), (ca.SX(0), True)))
+    seen, given = (columns_of(linkage, joints, motions, t, common) for t, common in ((middle, False), (ca.SX(0), True)))
     inertias = [_inertia(motion, middle) for motion in motions]
-    matrix = Eliminated(_mass_matrix(linkage, seen, given, [m.mass for m in motions], inertias))
+    matrix = Eliminated(mass_matrix(linkage, seen, given, [m.mass for m in motions], inertias))
     right: dict[int, Expr] = {}
     for columns, momentum, motion in zip(given, free, motions, strict=True):
         for k, (velocity, spin) in columns.items():
@@ -73,8 +74,8 @@ def make_chart(
         Held(_matrix(s, n), inertia, *(_responses(matrix, g, n) if acts else 2 * (ca.SX(n, 3),)))
         for s, g, inertia, acts in zip(seen, given, inertias, reached, strict=True)
     )
-    gains = ca.horzcat(*(_dense(matrix.solve({k: ca.SX(1)}), n) for k in range(n)))
-    return Chart(Rates(_dense(matrix.solve(right), n)), held, gains)
+    gains = ca.horzcat(*(dense(matrix.solve({k: ca.SX(1)}), n) for k in range(n)))
+    return Chart(Rates(dense(matrix.solve(right), n)), held, gains)
 
 
 def _inertia(motion: Motion, t: Expr) -> Expr:
@@ -83,19 +84,18 @@ def _inertia(motion: Motion, t: Expr) -> Expr:
     return ca.SX.eye(3) / inverse if ca.SX(inverse).is_scalar() else ca.inv_minor(inverse)
 
 
-def _columns(
-    linkage: Linkage, joints: Sequence[Joint | None], motions: Sequence[Motion], t: Expr, common: bool
+def columns_of(
+    linkage: Linkage, joints: Sequence[Joint | None], courses: Sequence[Course], t: Expr, common: bool
 ) -> list[Columns]:
     """Of each link: how its body moves with each coordinate, with arms at time t, or to the common points."""
     place = {link.body: k for k, link in enumerate(linkage.links)}
     found: list[Columns] = []
-    for link, joint, motion in zip(linkage.links, joints, motions, strict=True):
+    for link, joint, course in zip(linkage.links, joints, courses, strict=True):
         if joint is None:
             found.append(_floating())
             continue
-        above = () if link.parent is None else (motions[place[link.parent]],)
-        sides = (motion, *above) if link.sign > 0 else (*above, motion)
-        sockets = sockets_of(joint, sides)
+        above = () if link.parent is None else (courses[place[link.parent]],)
+        sockets = sockets_on(joint, (course, *above) if link.sign > 0 else (*above, course))
         arms = sockets.common_arms(t) if common else sockets.lever_arms(t)
         own, other = arms if link.sign > 0 else arms[::-1]
         columns: Columns = {}
@@ -123,9 +123,10 @@ def free_motions_of(joint: Joint, placed: Placed) -> list[tuple[Expr, Expr]]:
     return [(zero, ca.SX.eye(3)[:, k]) for k in range(free)]
 
 
-def _mass_matrix(
+def mass_matrix(
     linkage: Linkage, seen: list[Columns], given: list[Columns], masses: Sequence[Expr], inertias: Sequence[Expr]
 ) -> list[dict[int, Expr]]:
+    """By rows: the momenta of rates as seen, along the free motions as given; inertias (3, 3) in the world frame."""
     rows: list[dict[int, Expr]] = [{} for _ in range(linkage.size)]
     for see, give, mass, inertia in zip(seen, given, masses, inertias, strict=True):
         momenta = {j: (mass * velocity, ca.mtimes(inertia, spin)) for j, (velocity, spin) in see.items()}
@@ -149,12 +150,13 @@ def _responses(matrix: Eliminated, given: Columns, n: int) -> tuple[Expr, Expr]:
     for which in (0, 1):
         units = [{k: column[which][axis] for k, column in given.items()} for axis in range(3)]
         parts.append(
-            ca.horzcat(*(_dense(matrix.solve({k: v for k, v in u.items() if not v.is_zero()}), n) for u in units))
+            ca.horzcat(*(dense(matrix.solve({k: v for k, v in u.items() if not v.is_zero()}), n) for u in units))
         )
     return parts[0], parts[1]
 
 
-def _dense(entries: dict[int, Expr], n: int) -> Expr:
+def dense(entries: dict[int, Expr], n: int) -> Expr:
+    """(n,) of a sparse vector."""
     return ca.vertcat(*(ca.SX(entries.get(k, 0)) for k in range(n)))
 
 

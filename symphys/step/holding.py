@@ -8,18 +8,16 @@ from typing import Any
 import casadi as ca
 
 from symphys.joints import Joint, linkages, tree_joints
-from symphys.motion import Motion
 from symphys.step.along import Along
+from symphys.step.articulate import consistent
 from symphys.step.axis import AxisRow
-from symphys.step.impulse import Impulse
-from symphys.step.jointed import LIMITS, JointRow, column
+from symphys.step.jointed import LIMITS, JointRow, own
 from symphys.step.lock import LockRow, in_world
 from symphys.step.momentum import Momenta, Momentum
 from symphys.step.pgs import Row
 from symphys.step.row import ContactRow
 from symphys.step.scene import Scene, State
 from symphys.step.sockets import free, locked, sockets_at
-from symphys.step.wrench import wrenches
 from symphys.world import World
 
 Expr = Any
@@ -72,8 +70,8 @@ def kept_forces(
     """
     kept = dict[str, list[Expr]]()
     for each, impulse in zip(rows, given, strict=True):
-        row, impact, old = each.row.row, of_body(struck, each.row.bodies[0]), column(x, each)
-        force = scene.pieces.do(_lasting, row, impulse, old, impact, kick, scene.shortest_kick)
+        row, impact, old = each.row.row, of_body(struck, each.row.bodies[0]), x[each.name]
+        force = scene.pieces.do(_lasting, row, impulse, old, each.k, impact, kick, scene.shortest_kick)
         kept.setdefault(each.name, []).append(force)
     return {name: scene.pieces.do(_stacked, tuple(parts)) for name, parts in kept.items()}
 
@@ -83,88 +81,41 @@ def of_body(struck: Struck, body: int) -> Expr:
     return next(impact for group, impact in struck.items() if body in group)
 
 
-def _lasting(row: LockRow | AxisRow, impulse: Along, old: Expr, struck: Expr, kick: Expr, shortest: float) -> Expr:
-    return ca.if_else(struck, old, row.carried(impulse) / ca.fmax(kick, shortest))
+def _lasting(
+    row: LockRow | AxisRow, impulse: Along, old: Expr, k: int | None, struck: Expr, kick: Expr, shortest: float
+) -> Expr:
+    return ca.if_else(struck, own(old, k), row.carried(impulse) / ca.fmax(kick, shortest))
 
 
 def _stacked(parts: tuple[Expr, ...]) -> Expr:
     return ca.vertcat(*parts)
 
 
-def tree_forces(
-    scene: Scene, paths: Sequence[Motion], changes: Sequence[Momentum], struck: Struck, x: State, kick: Expr
-) -> State:
-    """The same of joints of trees, from what they gave to each body: ``changes``, impulses about centres of mass."""
-    kept, joints = dict[str, Expr](), scene.world.joints
-    for tree in linkages(joints):
-        own = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
-        parts = tuple(paths[i] for i in tree.bodies), tuple(changes[i] for i in tree.bodies)
-        for joint, wrench in zip(own, scene.pieces.do(wrenches, tree, own, *parts), strict=True):
-            if joint is not None:
-                name = f"{joint.name}.lock"
-                arguments = wrench, x[name], of_body(struck, joint.first), kick, scene.shortest_kick
-                kept[name] = scene.pieces.do(_still_acting, *arguments)
-    return kept
-
-
-def _still_acting(impulse: Expr, old: Expr, struck: Expr, kick: Expr, shortest: float) -> Expr:
-    return ca.if_else(struck, old, impulse / ca.fmax(kick, shortest))
-
-
-def outside(row: Row) -> bool:
-    """Whether a row's impulses are none of a tree's joints: not a motor or limit of one."""
-    return not (isinstance(row.row, AxisRow) and row.row.of_tree is not None)
-
-
-def given_by_joints(
-    scene: Scene, before: Momenta, after: Momenta, masses: Sequence[Expr], others: Sequence[tuple[Row, Any]]
-) -> list[Momentum]:
-    """What joints of trees gave to each body: the change of its momenta less what other rows gave."""
-    do = scene.pieces.do
-    changes = [do(_change, m, a, b) for m, a, b in zip(masses, before, after, strict=True)]
-    for each, impulse in others:
-        for k, body in enumerate(each.bodies):
-            changes[body] = do(_less, changes[body], each.row, k, impulse)
-    return changes
-
-
-def _change(mass: Expr, before: Momentum, after: Momentum) -> Momentum:
-    return Momentum(mass * (after.velocity - before.velocity), after.angular - before.angular)
-
-
-def _less(change: Momentum, row: Any, k: int, impulse: Impulse | Along) -> Momentum:
-    side = row.sides[k]
-    if isinstance(impulse, Along):
-        linear, angular = row.given_along.split(impulse.numbers)
-    else:
-        linear, angular = impulse.linear(row.impulse_normal), impulse.angular(row.impulse_normal)
-    turning = ca.cross(side.impulse_arm, linear) + angular
-    return Momentum(change.velocity - side.sign * linear, change.angular - side.sign * turning)
-
-
 def hold(scene: Scene, forces: State, poses: Poses, total: Total) -> None:
-    """Adds to ``total`` what joint forces do to bodies at these poses: those at which the next step begins."""
+    """Adds to ``total`` what joint forces do to bodies at these poses: those at which the next step begins.
+
+    What the joints of trees lock is left out: it does nothing along the free motions of the tree.
+    """
     exact = tree_joints(scene.world.joints)
     for index, joint in enumerate(scene.world.joints):
-        own = tuple(poses[i] for i in joint.bodies)
-        names = ("lock",) if index in exact else ("lock", *joint.acting)
+        held = tuple(poses[i] for i in joint.bodies)
+        names = joint.acting if index in exact else ("lock", *joint.acting)
+        if not names:
+            continue
         parts = tuple((part, forces[f"{joint.name}.{part}"]) for part in names)
-        found = scene.pieces.do(_on_bodies, joint, own, parts, index in exact)
+        found = scene.pieces.do(_on_bodies, joint, held, parts)
         for body, wrench in zip(joint.bodies, found, strict=True):
             total[body] = scene.pieces.do(_added, total[body], wrench)
 
 
 def _on_bodies(
-    joint: Joint, poses: tuple[tuple[Expr, Expr], ...], parts: tuple[tuple[str, Expr], ...], exact: bool
+    joint: Joint, poses: tuple[tuple[Expr, Expr], ...], parts: tuple[tuple[str, Expr], ...]
 ) -> tuple[tuple[Expr, Expr], ...]:
     """Force and torque on each moving side."""
     sockets, now = sockets_at(joint, poses), ca.SX(0)
     placed, arms = sockets.placed(now), sockets.common_arms(now)
     linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
     for part, numbers in parts:
-        if exact:
-            linear, angular = ca.mtimes(placed.a, numbers[:3]), ca.mtimes(placed.a, numbers[3:])
-            continue
         if part == "lock" and joint.kind.slides is None:
             numbers = in_world(placed.a, numbers)
         along = [locked(joint, placed)] if part == "lock" else [free(c, placed) for c in joint.kind.coordinates]
@@ -196,3 +147,25 @@ def keep_up(scene: Scene, momenta: Momenta, made: Momenta, struck: Struck, durat
 def _kept_up(momentum: Momentum, made: Momentum, impact: Expr, duration: Expr, dt: float) -> Momentum:
     share = ca.if_else(impact, 0, duration / dt**2)
     return Momentum(momentum.velocity + share * made.velocity, momentum.angular + share * made.angular)
+
+
+def fitting(
+    scene: Scene, momenta: Sequence[Momentum], poses: Poses, velocities: Sequence[tuple[Expr, Expr]]
+) -> list[tuple[Expr, Expr]]:
+    """Velocities and angular velocities; those of trees as they fit their joints at these poses.
+
+    Args:
+        scene: what is simulated.
+        momenta: of the bodies.
+        poses: of the bodies.
+        velocities: of bodies that are not part of a tree.
+    """
+    found, joints = list(velocities), scene.world.joints
+    for tree in linkages(joints):
+        along = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
+        bodies = [scene.world.bodies[i] for i in tree.bodies]
+        inertials = tuple((body.mass, body.inertia) for body in bodies)
+        parts = tuple(poses[i] for i in tree.bodies), tuple(momenta[i] for i in tree.bodies)
+        for i, fits in zip(tree.bodies, scene.pieces.do(consistent, tree, along, inertials, *parts), strict=True):
+            found[i] = fits
+    return found

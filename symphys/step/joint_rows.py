@@ -28,6 +28,8 @@ Expr = Any
 """casadi SX"""
 
 NEVER = ca.SX(0)
+REDUNDANT = 1e-6
+"""Of the mobility of both bodies by themselves."""
 REACHED = 1e-4
 """[rad], [m] in a step: what comes to a limit faster than that strikes it."""
 
@@ -69,7 +71,7 @@ def lock_row(setting: Setting, sockets: Sockets, motions: Moving, stretch: Stret
     joint, start, middle = sockets.joint, ca.SX(0), stretch.duration / 2
     now = sockets.placed(start)
     sides, seen = sockets.sides(motions, middle, start), locked(joint, sockets.placed(middle))
-    k, error = mobility(sides, seen, same), errors(joint, now)
+    k, error = regular_mobility(sides, seen, same), errors(joint, now)
     share, softness = _softness(joint, ca.diag(k), setting.scheme.dt)
     return LockRow(
         sides=sides,
@@ -89,9 +91,18 @@ def lock_now(sockets: Sockets, motions: Moving, momenta: tuple[Any, ...], same: 
     now = ca.SX(0)
     placed = sockets.placed(now)
     sides, seen = sockets.sides(motions, now, now), locked(sockets.joint, placed)
-    k = mobility(sides, seen, same)
+    k = regular_mobility(sides, seen, same)
     zero = ca.SX(k.size1(), 1)
     return LockRow(sides, seen, seen, inverse(k), zero, speeds(sides, seen, momenta), zero, placed.a, same)
+
+
+def regular_mobility(sides: tuple[Side, ...], seen: Directions, same: bool) -> Expr:
+    """(n, n): with a trace of what a tree locks already, as the hinges of a parallelogram do."""
+    k = mobility(sides, seen, same)
+    if all(side.reach is None for side in sides):
+        return k
+    apart = tuple(replace(side, reach=None) for side in sides)
+    return k + REDUNDANT * ca.diag(ca.diag(mobility(apart, seen, False)))
 
 
 def _softness(joint: Joint, mobilities: Expr, dt: float) -> tuple[Expr, Expr]:

@@ -156,7 +156,7 @@ def resumed(scene: Scene, rows: Sequence[JointRow], x: State, kick: Expr) -> lis
     """What the sweeps start from: the last step's forces over this stretch's kick."""
     if not scene.setting.scheme.warm_start:
         return [Along(ca.SX(numbers_of(each.row.row), 1)) for each in rows]
-    return [scene.pieces.do(_again, each.row.row, column(x, each), kick) for each in rows]
+    return [scene.pieces.do(_again, each.row.row, x[each.name], each.k, kick) for each in rows]
 
 
 def numbers_of(row: LockRow | AxisRow) -> int:
@@ -164,10 +164,10 @@ def numbers_of(row: LockRow | AxisRow) -> int:
     return row.error.leaf.rows if isinstance(row, LockRow) else 1
 
 
-def column(x: State, each: JointRow) -> Expr:
-    """What the state holds of a row."""
-    return x[each.name] if each.k is None else x[each.name][each.k]
+def own(stored: Expr, k: int | None) -> Expr:
+    """What is a row's of a stored column."""
+    return stored if k is None else stored[k]
 
 
-def _again(row: LockRow | AxisRow, force: Expr, kick: Expr) -> Along:
-    return row.taken_up(kick * force)
+def _again(row: LockRow | AxisRow, stored: Expr, k: int | None, kick: Expr) -> Along:
+    return row.taken_up(kick * own(stored, k))

@@ -13,9 +13,11 @@ from symphys import rotation
 from symphys.collide import Contact, collide
 from symphys.collide.contact import Shift
 from symphys.course import at_rest
-from symphys.motion import BodyState, Motion, angular_velocity, free_motion, momentum
+from symphys.joints import linkages
+from symphys.motion import BodyState, Motion, angular_velocity, free_motion, inertia_matrix, momentum
 from symphys.state import BODY_FIELDS
-from symphys.step.holding import given_by_joints, hold, keep_up, kept_forces, outside, struck_by_component, tree_forces
+from symphys.step.articulate import accelerations
+from symphys.step.holding import fitting, hold, keep_up, kept_forces, struck_by_component
 from symphys.step.impulse import ZERO, Impulse
 from symphys.step.jointed import joint_rows, make_trees, momenta_of, resumed
 from symphys.step.momentum import Momentum
@@ -108,16 +110,16 @@ def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = ())
     if scene.world.joints:
         struck = struck_by_component(scene, rows, joints, solved.impulses[:n])
         forces = kept_forces(scene, joints, solved.impulses[:n], struck, x, kick)
-        others = [(each, given) for each, given in zip(every, solved.impulses, strict=True) if outside(each)]
-        changes = given_by_joints(scene, free, momenta, [motion.mass for motion in motions], others)
-        forces |= tree_forces(scene, paths, changes, struck, x, kick)
         hold(scene, forces, poses, resting)
         momenta = keep_up(scene, momenta, made, struck, duration)
         warm = scene.setting.scheme.warm_start
         values |= forces if warm else {name: ca.SX.zeros(x[name].size1()) for name in forces}
-    for body, *parts in zip(scene.world.bodies, motions, momenta, poses, resting, strict=True):
-        stored = pieces.do(_store_body, *parts)
-        values |= {f"{body.name}.{field}": value for field, value in stored.items()}
+    ended = [pieces.do(_end_momentum, *parts) for parts in zip(motions, momenta, resting, strict=True)]
+    apart = [pieces.do(_velocities, *parts) for parts in zip(motions, ended, poses, strict=True)]
+    moving = fitting(scene, ended, poses, apart)
+    for body, pose, velocities, reaction in zip(scene.world.bodies, poses, moving, resting, strict=True):
+        stored = (*pose, *velocities, *reaction)
+        values |= {f"{body.name}.{field}": value for (field, _), value in zip(BODY_FIELDS, stored, strict=True)}
     return Phase(values, tuple(rows), tuple(contacts), impulses, tuple(zip(solved.impulses, solved.last, strict=True)))
 
 
@@ -131,8 +133,30 @@ def free_motions(scene: Scene, x: State, duration: Expr) -> list[Motion]:
 
 
 def expected_motions(scene: Scene, x: State, duration: Expr) -> list[Motion]:
-    """Each body's motion from its true velocity under the persistent forces of the last step."""
-    return _motions(scene, x, duration, 0, 1)
+    """Each body's motion from its true velocity under the persistent forces of the last step, as joints let it."""
+    found, joints = _motions(scene, x, duration, 0, 1), scene.world.joints
+    gravity = scene.setting.gravity
+    for tree in linkages(joints):
+        own = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
+        motions = tuple(found[i] for i in tree.bodies)
+        wrenches = tuple(scene.pieces.do(_wrench, motion) for motion in motions)
+        for i, change in zip(tree.bodies, scene.pieces.do(accelerations, tree, own, motions, wrenches), strict=True):
+            found[i] = scene.pieces.do(_as_held, found[i], change, gravity)
+    return found
+
+
+def _wrench(motion: Motion) -> tuple[Expr, Expr]:
+    return motion.mass * motion.acceleration, motion.torque
+
+
+def _as_held(motion: Motion, change: tuple[Expr, Expr], gravity: Expr) -> Motion:
+    """The motion with the accelerations that joints leave."""
+    turned, w = motion.rotation, motion.angular_velocity
+    tensor = ca.mtimes(turned, ca.mtimes(inertia_matrix(motion.inertia), turned.T))
+    torque = ca.mtimes(tensor, change[1]) + ca.cross(w, ca.mtimes(tensor, w))
+    force = motion.mass * (change[0] - gravity)
+    state = BodyState(motion.position, motion.orientation, motion.velocity, motion.momentum_k, force, torque)
+    return free_motion(motion.mass, motion.inertia, state, gravity, motion.dt)
 
 
 def _motions(scene: Scene, x: State, duration: Expr, freed: int, share: int) -> list[Motion]:
@@ -237,17 +261,14 @@ def _pose(motion: Motion, shift: Shift) -> tuple[Expr, Expr]:
     return motion.position + shift.linear, rotation.turn(motion.orientation, shift.angular)
 
 
-def _store_body(
-    motion: Motion, momentum: Momentum, pose: tuple[Expr, Expr], resting: tuple[Expr, Expr]
-) -> dict[str, Expr]:
-    """The body's pose and true velocities at the end of the stretch, by field."""
-    half, (force, torque), (position, orientation) = motion.dt / 2, resting, pose
-    end_momentum = momentum.angular + half * (motion.torque + torque)
-    return {
-        "position": position,
-        "orientation": orientation,
-        "velocity": momentum.velocity + half * (motion.acceleration + force / motion.mass),
-        "angular_velocity": angular_velocity(motion.inertia, orientation, end_momentum),
-        "reaction_force": force,
-        "reaction_torque": torque,
-    }
+def _end_momentum(motion: Motion, momentum: Momentum, resting: tuple[Expr, Expr]) -> Momentum:
+    """At the end of the stretch."""
+    half, (force, torque) = motion.dt / 2, resting
+    return Momentum(
+        momentum.velocity + half * (motion.acceleration + force / motion.mass),
+        momentum.angular + half * (motion.torque + torque),
+    )
+
+
+def _velocities(motion: Motion, momentum: Momentum, pose: tuple[Expr, Expr]) -> tuple[Expr, Expr]:
+    return momentum.velocity, angular_velocity(motion.inertia, pose[1], momentum.angular)

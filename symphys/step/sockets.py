@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -65,12 +66,12 @@ class Sockets:
 
 def sockets_of(joint: Joint, motions: Moving) -> Sockets:
     """The sockets of a joint whose moving sides have these motions."""
-    return _sockets(joint, [motion.course() for motion in motions])
+    return sockets_on(joint, [motion.course() for motion in motions])
 
 
-def _sockets(joint: Joint, courses: list[Course]) -> Sockets:
-    if joint.second is None:
-        courses.append(at_rest(courses[0].dt))
+def sockets_on(joint: Joint, courses: Sequence[Course]) -> Sockets:
+    """The sockets of a joint whose moving sides have these courses."""
+    courses = [*courses, *([at_rest(courses[0].dt)] if joint.second is None else [])]
     axes = []
     for course, socket in zip(courses, joint.sockets, strict=True):
         turned = rotation.matrix(ca.SX(ca.vertcat(*socket.orientation)))
@@ -83,7 +84,7 @@ def _sockets(joint: Joint, courses: list[Course]) -> Sockets:
 def sockets_at(joint: Joint, poses: tuple[tuple[Expr, Expr], ...]) -> Sockets:
     """The sockets of a joint whose moving sides are at these positions and orientations."""
     zero = ca.SX.zeros(3)
-    return _sockets(joint, [Course(p, rotation.matrix(q), zero, zero, zero, zero, ca.SX(0)) for p, q in poses])
+    return sockets_on(joint, [Course(p, rotation.matrix(q), zero, zero, zero, zero, ca.SX(0)) for p, q in poses])
 
 
 def locked(joint: Joint, placed: Placed) -> Directions:

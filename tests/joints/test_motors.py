@@ -77,7 +77,7 @@ def test_servo_holds_against_gravity() -> None:
 def test_velocity_motor_turns_at_its_command() -> None:
     for command, rate in ((1.0, 1.0), (-9.0, -3.0)):
         _, rates = swung(rod(motor=VelocityMotor(1.0, 3.0)), 1.0, command)
-        assert rates[-1] == pytest.approx(rate, abs=1e-4)
+        assert rates[-1] == pytest.approx(rate, abs=1e-3)
 
 
 @pytest.mark.parametrize("dt", [0.01, 0.005])
