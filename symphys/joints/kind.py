@@ -37,12 +37,14 @@ class Coordinate:
         turns: whether it is a rotation [rad], else a displacement [m].
         value: of the placed sockets.
         axis: (3,) unit vector, world frame: about which, or along which, the first side moves as the value grows.
+        fixed_in_first: whether the axis moves with the first side, else with the second.
     """
 
     name: str
     turns: bool
     value: Callable[[Placed], Expr]
     axis: Callable[[Placed], Expr]
+    fixed_in_first: bool = False
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,6 @@ UNIVERSAL = Kind(
     turns=((0, 1),),
     coordinates=(
         Coordinate("angle1", True, swing, lambda placed: placed.b[:, 1]),
-        Coordinate("angle2", True, twist, lambda placed: placed.a[:, 0]),
+        Coordinate("angle2", True, twist, lambda placed: placed.a[:, 0], fixed_in_first=True),
     ),
 )

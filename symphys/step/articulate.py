@@ -1,8 +1,7 @@
 """Trees of joints at one instant: accelerations under known forces, and velocities that fit the joints.
 
-Forces of joints need not be known: they do nothing along the free motions of the instant, J^T f = 0, so
-J^T (M (J q'' + bias) + w x I w - forces) = 0 gives the accelerations of the coordinates, and J^T (M J q' - momenta) = 0
-the velocities that momenta stand for.
+Forces of joints need not be known: they do nothing along the free motions of the instant, so that along these the rates
+of change of momenta equal the other forces, and momenta those that velocities stand for.
 """
 
 from __future__ import annotations
@@ -14,10 +13,9 @@ import casadi as ca
 
 from symphys import rotation
 from symphys.course import Course
-from symphys.joints import Joint, Linkage
+from symphys.joints import Joint, Link, Linkage
 from symphys.motion import Motion, inertia_matrix
-from symphys.step.chart import Columns, columns_of, dense, mass_matrix
-from symphys.step.elimination import Eliminated
+from symphys.step import screws
 from symphys.step.momentum import Momentum
 
 Expr = Any
@@ -27,90 +25,106 @@ Wrench = tuple[Expr, Expr]
 
 
 def accelerations(
-    linkage: Linkage, joints: Sequence[Joint | None], motions: Sequence[Motion], wrenches: Sequence[Wrench]
+    linkage: Linkage, joints: screws.Held, motions: Sequence[Motion], wrenches: Sequence[Wrench]
 ) -> tuple[Wrench, ...]:
     """Of the bodies of a tree, from their poses and velocities and all forces but the joints'."""
-    t = ca.SX.sym("t")
-    courses = [_turning(motion) for motion in motions]
-    moving = columns_of(linkage, joints, courses, t, common=False)
-    still = [{k: tuple(_at_start(part, t) for part in column) for k, column in columns.items()} for columns in moving]
-    masses, inertias = [m.mass for m in motions], [_inertia(m.inertia, m.rotation) for m in motions]
-    matrix = Eliminated(mass_matrix(linkage, still, still, masses, inertias))
-    rates = matrix.solve(_projected(still, [_momentum(m, i) for m, i in zip(motions, inertias, strict=True)], masses))
-    biases = [_rate_of_change(columns, rates, t) for columns in moving]
-    right: dict[int, Expr] = {}
-    for columns, motion, inertia, bias, (force, torque) in zip(still, motions, inertias, biases, wrenches, strict=True):
-        w = motion.angular_velocity
-        push = force - motion.mass * bias[0]
-        twist = torque - ca.mtimes(inertia, bias[1]) - ca.cross(w, ca.mtimes(inertia, w))
-        for k, (velocity, spin) in columns.items():
-            right[k] = right.get(k, 0) + ca.dot(velocity, push) + ca.dot(spin, twist)
-    speeding = matrix.solve(right)
+    origin, now = motions[0].position, ca.SX(0)
+    along = screws.screws(linkage, joints, motions, now, origin)
+    places = [m.position - origin for m in motions]
+    tensors = [world_inertia(m.inertia, m.rotation) for m in motions]
+    matrix = _matrix(linkage, [m.mass for m in motions], tensors, places, along)
+    momenta = [
+        screws.about_origin(place, m.mass * m.velocity, ca.mtimes(tensor, m.angular_velocity))
+        for place, m, tensor in zip(places, motions, tensors, strict=True)
+    ]
+    rates = matrix.solve(screws.along_screws(linkage, along, momenta))
+    biases = _biases(linkage, joints, along, rates)
+    moving = screws.summed_down(linkage, along, rates)
+    lacking = []
+    for m, place, tensor, screw, bias, (force, torque) in zip(
+        motions, places, tensors, moving, biases, wrenches, strict=True
+    ):
+        linear, angular = _at(bias, screw, place)
+        w = screw[:3]
+        turning = ca.mtimes(tensor, angular) + ca.cross(w, ca.mtimes(tensor, w))
+        lacking.append(screws.about_origin(place, force - m.mass * linear, torque - turning))
+    speeding = matrix.solve(screws.along_screws(linkage, along, lacking))
+    changes = screws.summed_down(linkage, along, speeding)
     return tuple(
-        (linear + bias[0], angular + bias[1])
-        for (linear, angular), bias in zip((_moved(c, speeding) for c in still), biases, strict=True)
+        _at(change + bias, screw, place)
+        for change, bias, screw, place in zip(changes, biases, moving, places, strict=True)
     )
 
 
 def consistent(
     linkage: Linkage,
-    joints: Sequence[Joint | None],
+    joints: screws.Held,
     inertials: Sequence[tuple[Expr, Expr]],
     poses: Sequence[tuple[Expr, Expr]],
     momenta: Sequence[Momentum],
-) -> tuple[tuple[Expr, Expr], ...]:
+) -> tuple[Wrench, ...]:
     """Velocity and angular velocity of each body: those that fit the joints and have the momenta along free motions."""
-    zero = ca.SX.zeros(3)
+    zero, origin = ca.SX.zeros(3), poses[0][0]
     turned = [rotation.matrix(q) for _, q in poses]
     courses = [Course(p, r, zero, zero, zero, zero, ca.SX(0)) for (p, _), r in zip(poses, turned, strict=True)]
-    columns = columns_of(linkage, joints, courses, ca.SX(0), common=True)
+    along = screws.screws(linkage, joints, courses, ca.SX(0), origin)
+    places = [p - origin for p, _ in poses]
     masses = [mass for mass, _ in inertials]
-    tensors = [_inertia(inertia, r) for (_, inertia), r in zip(inertials, turned, strict=True)]
-    matrix = Eliminated(mass_matrix(linkage, columns, columns, masses, tensors))
-    rates = matrix.solve(_projected(columns, momenta, masses))
-    return tuple(_moved(each, rates) for each in columns)
+    tensors = [world_inertia(inertia, r) for (_, inertia), r in zip(inertials, turned, strict=True)]
+    matrix = _matrix(linkage, masses, tensors, places, along)
+    counted = [
+        screws.about_origin(place, mass * momentum.velocity, momentum.angular)
+        for place, mass, momentum in zip(places, masses, momenta, strict=True)
+    ]
+    rates = matrix.solve(screws.along_screws(linkage, along, counted))
+    moving = screws.summed_down(linkage, along, rates)
+    return tuple(screws.at_place(screw, place) for screw, place in zip(moving, places, strict=True))
 
 
-def _turning(motion: Motion) -> Course:
-    """The body's course without its accelerations."""
-    zero = ca.SX.zeros(3)
-    return Course(motion.position, motion.rotation, motion.velocity, zero, motion.angular_velocity, zero, motion.dt)
+def _matrix(
+    linkage: Linkage, masses: Sequence[Expr], tensors: Sequence[Expr], places: Sequence[Expr], along: list[Expr]
+) -> screws.Eliminated:
+    parts = zip(masses, tensors, places, strict=True)
+    inertias = [screws.inertia_of(mass, tensor, place, place) for mass, tensor, place in parts]
+    return screws.mass_matrix(linkage, inertias, along, along)
 
 
-def _at_start(expression: Expr, t: Expr) -> Expr:
-    return ca.substitute(expression, t, ca.SX(0))
+def _biases(linkage: Linkage, joints: screws.Held, along: Sequence[Expr], rates: dict[int, Expr]) -> list[Expr]:
+    """(6,) rates of change of the bodies' screws while the coordinates' rates do not change."""
+    moving = screws.summed_down(linkage, along, rates)
+    found: list[Expr] = []
+    for k, (link, parent, joint) in enumerate(zip(linkage.links, screws.parents(linkage), joints, strict=True)):
+        total = ca.SX.zeros(6) if parent is None else found[parent]
+        if joint is None:
+            velocity, spin = moving[k][3:], moving[k][:3]  # the root's centre of mass is at the origin
+            found.append(total + ca.vertcat(ca.SX.zeros(3), ca.cross(velocity, spin)))
+            continue
+        for place, j in enumerate(screws.own(link)):
+            carrier = _carrier(link, joint, place, k, parent)
+            if carrier is not None:
+                total = total + rates.get(j, 0) * _carried(moving[carrier], along[j])
+        found.append(total)
+    return found
 
 
-def _rate_of_change(columns: Columns, rates: dict[int, Expr], t: Expr) -> Wrench:
-    """Of a body's velocities, at rates that do not change."""
-    velocity, spin = _moved(columns, rates)
-    both = ca.vertcat(velocity, spin)
-    change = _at_start(ca.jtimes(both, t, ca.SX(1)), t)
-    return change[:3], change[3:]
+def _carrier(link: Link, joint: Joint, place: int, child: int, parent: int | None) -> int | None:
+    """The link on whose body the axis of a coordinate is fixed; None: the world."""
+    first = bool(joint.kind.coordinates) and joint.kind.coordinates[place].fixed_in_first
+    return child if first == (link.sign > 0) else parent
 
 
-def _moved(columns: Columns, rates: dict[int, Expr]) -> Wrench:
-    velocity, spin = ca.SX.zeros(3), ca.SX.zeros(3)
-    for k, (along, about) in columns.items():
-        velocity, spin = velocity + along * rates.get(k, 0), spin + about * rates.get(k, 0)
-    return velocity, spin
+def _carried(moving: Expr, screw: Expr) -> Expr:
+    """(6,): how a screw that is fixed in a body changes as the body moves."""
+    w, v = moving[:3], moving[3:]
+    return ca.vertcat(ca.cross(w, screw[:3]), ca.cross(w, screw[3:]) + ca.cross(v, screw[:3]))
 
 
-def _inertia(inertia: Expr, turned: Expr) -> Expr:
+def _at(change: Expr, screw: Expr, place: Expr) -> Wrench:
+    """Acceleration of the centre of mass at ``place`` and angular acceleration, from the screw and its rate of change."""
+    velocity = screws.at_place(screw, place)[0]
+    return change[3:] + ca.cross(change[:3], place) + ca.cross(screw[:3], velocity), change[:3]
+
+
+def world_inertia(inertia: Expr, turned: Expr) -> Expr:
     """(3, 3), world frame."""
     return ca.mtimes(turned, ca.mtimes(inertia_matrix(inertia), turned.T))
-
-
-def _momentum(motion: Motion, inertia: Expr) -> Momentum:
-    return Momentum(motion.velocity, ca.mtimes(inertia, motion.angular_velocity))
-
-
-def _projected(columns: Sequence[Columns], momenta: Sequence[Momentum], masses: Sequence[Expr]) -> dict[int, Expr]:
-    right: dict[int, Expr] = {}
-    for each, momentum, mass in zip(columns, momenta, masses, strict=True):
-        for k, (velocity, spin) in each.items():
-            right[k] = right.get(k, 0) + mass * ca.dot(velocity, momentum.velocity) + ca.dot(spin, momentum.angular)
-    return right
-
-
-__all__ = ["accelerations", "consistent", "dense"]

@@ -140,7 +140,7 @@ def along_coordinate(
     index, gains = place[0] + k, place[1]
     rate = momenta[0].numbers[index]
     return AlongCoordinate(
-        sides, seen, given, value, rate, rate_now, gains[index, index], True, OfTree(index, gains[:, index])
+        sides, seen, given, value, rate, rate_now, gains[index][index], True, OfTree(index, gains[index])
     )
 
 

@@ -12,7 +12,7 @@ from symphys.joints import carriers, linkages, tree_joints
 from symphys.motion import Motion
 from symphys.step.along import Along
 from symphys.step.axis import AxisRow
-from symphys.step.chart import Chart, body_momentum, make_chart
+from symphys.step.chart import Chart, body_momenta, make_chart
 from symphys.step.joint_rows import ROWS, Stretch, along_coordinate, lock_now, lock_row
 from symphys.step.lock import LockRow
 from symphys.step.momentum import Momenta, Moved, States
@@ -80,9 +80,9 @@ def momenta_of(scene: Scene, trees: Trees, solved: States) -> Momenta:
     """Of all bodies."""
     found = list(solved)
     for tree, chart in zip(linkages(scene.world.joints), trees.charts, strict=True):
-        rates = solved[tree.root]
-        for body, held in zip(tree.bodies, chart.held, strict=True):
-            found[body] = scene.pieces.do(body_momentum, held, trees.motions[body].mass, rates)
+        momenta = scene.pieces.do(body_momenta, tree, chart, solved[tree.root])
+        for body, momentum in zip(tree.bodies, momenta, strict=True):
+            found[body] = momentum
     return tuple(found)  # type: ignore[arg-type]
 
 
