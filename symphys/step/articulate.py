@@ -16,6 +16,7 @@ from symphys.course import Course
 from symphys.joints import Joint, Link, Linkage
 from symphys.motion import Motion, inertia_matrix
 from symphys.step import screws
+from symphys.step.elimination import Eliminated
 from symphys.step.momentum import Momentum
 
 Expr = Any
@@ -83,10 +84,10 @@ def consistent(
 
 def _matrix(
     linkage: Linkage, masses: Sequence[Expr], tensors: Sequence[Expr], places: Sequence[Expr], along: list[Expr]
-) -> screws.Eliminated:
+) -> Eliminated:
     parts = zip(masses, tensors, places, strict=True)
     inertias = [screws.inertia_of(mass, tensor, place, place) for mass, tensor, place in parts]
-    return screws.mass_matrix(linkage, inertias, along, along)
+    return Eliminated(screws.mass_matrix(linkage, inertias, along, along))
 
 
 def _biases(linkage: Linkage, joints: screws.Held, along: Sequence[Expr], rates: dict[int, Expr]) -> list[Expr]:
@@ -120,7 +121,7 @@ def _carried(moving: Expr, screw: Expr) -> Expr:
 
 
 def _at(change: Expr, screw: Expr, place: Expr) -> Wrench:
-    """Acceleration of the centre of mass at ``place`` and angular acceleration, from the screw and its rate of change."""
+    """Acceleration of the centre of mass, at ``place``, and angular acceleration: from a screw and its change."""
     velocity = screws.at_place(screw, place)[0]
     return change[3:] + ca.cross(change[:3], place) + ca.cross(screw[:3], velocity), change[:3]
 

@@ -23,9 +23,9 @@ Expr = Any
 
 @dataclass(frozen=True)
 class OfTree:
-    """A coordinate of a tree: its index, and what a unit impulse along it does to the rates (n,)."""
+    """A coordinate of a tree: its rate (1, n) by what sweeps know, and what a unit impulse does to that (n,)."""
 
-    index: int
+    see: Expr
     gain: Expr
 
 
@@ -71,7 +71,7 @@ class AxisRow:
         """Of the coordinate."""
         if self.of_tree is None:
             return speeds(self.sides, self.seen, momenta)
-        return momenta[0].numbers[self.of_tree.index]
+        return ca.mtimes(self.of_tree.see, momenta[0].numbers)
 
     def carried(self, impulse: Along) -> Expr:
         """(1,): what is stored of an impulse; also of a force."""
@@ -95,7 +95,7 @@ class AxisRow:
         """See ``pgs.Solvable``."""
         if self.of_tree is None:
             return kicked(self.sides, self.given_along, momenta, impulse.numbers, self.same)
-        after = Rates(momenta[0].numbers + self.of_tree.gain * impulse.numbers)
+        after = Rates(momenta[0].numbers + ca.mtimes(self.of_tree.gain, impulse.numbers))
         return tuple(after for _ in self.sides)
 
 

@@ -18,7 +18,8 @@ import casadi as ca
 from symphys.joints import Linkage
 from symphys.motion import Held, Motion, apply
 from symphys.step import screws
-from symphys.step.elimination import Eliminated
+from symphys.step.elimination import Sparse
+from symphys.step.limbs import Limbs, matrix_of
 from symphys.step.momentum import Momentum, Rates
 
 Expr = Any
@@ -29,11 +30,16 @@ Expr = Any
 class Chart:
     """A tree over a stretch.
 
+    Sweeps know the rates of the root and what those of limbs have beside what they do as the root moves (``limbs``):
+    all here is by these numbers.
+
     Attributes:
-        free: rates of the coordinates without any impulse of the stretch.
+        free: them without any impulse of the stretch.
         held: of each link: how its body moves with the rates, and what impulses on it do to them; None for bodies on
             which nothing acts but the tree's own joints.
-        gains: (n,) each: what a unit impulse along a coordinate does to the rates; None where nothing acts along it.
+        gains: for each coordinate its rate by the numbers (1, n), and what a unit impulse along it does to them (n,);
+            None where nothing acts along it.
+        rates: (n, n) the numbers to the rates of the coordinates.
         seen: (6,) screw of each coordinate at mid-step.
         places: (3,) of each body at mid-step, from the origin of the screws.
         inertias: (3, 3) of each body, world frame, at mid-step.
@@ -41,7 +47,8 @@ class Chart:
 
     free: Rates
     held: tuple[Held | None, ...]
-    gains: tuple[Expr | None, ...]
+    gains: tuple[tuple[Expr, Expr] | None, ...]
+    rates: Expr
     seen: tuple[Expr, ...]
     places: tuple[Expr, ...]
     inertias: tuple[Expr, ...]
@@ -70,20 +77,30 @@ def make_chart(
     places, counted = ([m.centre().at(t) - origin for m in motions] for t in (middle, start))
     inertias = [_inertia(motion, middle) for motion in motions]
     parts = zip(motions, inertias, counted, places, strict=True)
-    matrix = screws.mass_matrix(linkage, [screws.inertia_of(m.mass, *rest) for m, *rest in parts], seen, given)
+    masses = [screws.inertia_of(m.mass, *rest) for m, *rest in parts]
+    matrix = Limbs(screws.mass_matrix(linkage, masses, seen, given), screws.limbs(linkage))
     momenta = [
         screws.about_origin(place, motion.mass * momentum.velocity, momentum.angular)
         for place, motion, momentum in zip(counted, motions, free, strict=True)
     ]
     held = []
     for k, path in enumerate(screws.paths(linkage)):
-        see = _see([seen[j] if j in path else None for j in range(n)], places[k])
+        see = _see(matrix.seen({j: seen[j] for j in path}), places[k], n)
         response = _response(matrix, {j: given[j] for j in path}, counted[k], n) if reached[k] else None
         held.append(None if response is None else Held(see, inertias[k], *response))
     acting = {k for link, joint in zip(linkage.links, joints, strict=True) for k in screws.own(link) if acts(joint)}
-    gains = tuple(dense(matrix.solve({k: ca.SX(1)}), n) if k in acting else None for k in range(n))
-    rates = Rates(dense(matrix.solve(screws.along_screws(linkage, given, momenta)), n))
-    return Chart(rates, tuple(held), gains, tuple(seen), tuple(places), tuple(inertias))
+    gains = tuple(_gain(matrix, k, n) if k in acting else None for k in range(n))
+    free_rates = Rates(dense(matrix.solve(screws.along_screws(linkage, given, momenta)), n))
+    rates = matrix_of(matrix.follows, n)
+    return Chart(free_rates, tuple(held), gains, rates, tuple(seen), tuple(places), tuple(inertias))
+
+
+def _gain(matrix: Limbs, k: int, n: int) -> tuple[Expr, Expr]:
+    rate = matrix.seen({k: ca.SX(1)})
+    row = ca.SX(1, n)
+    for j, value in rate.items():
+        row[0, j] = value
+    return row, dense(matrix.solve({k: ca.SX(1)}), n)
 
 
 def acts(joint: Any) -> bool:
@@ -97,13 +114,13 @@ def _inertia(motion: Motion, t: Expr) -> Expr:
     return ca.SX.eye(3) / inverse if ca.SX(inverse).is_scalar() else ca.inv_minor(inverse)
 
 
-def _see(seen: Sequence[Expr | None], place: Expr) -> Expr:
+def _see(seen: dict[int, Expr], place: Expr, n: int) -> Expr:
     """(6, n): velocity above angular velocity."""
-    columns = [ca.SX(6, 1) if s is None else ca.vertcat(*screws.at_place(s, place)) for s in seen]
+    columns = [ca.vertcat(*screws.at_place(seen[k], place)) if k in seen else ca.SX(6, 1) for k in range(n)]
     return ca.sparsify(ca.horzcat(*columns))
 
 
-def _response(matrix: Eliminated, given: dict[int, Expr], place: Expr, n: int) -> tuple[Expr, Expr]:
+def _response(matrix: Limbs, given: dict[int, Expr], place: Expr, n: int) -> tuple[Expr, Expr]:
     """(n, 3) each: what unit impulses at the centre of mass, and unit torque impulses, do to the rates."""
     unit, zero = ca.SX.eye(3), ca.SX.zeros(3)
     found = []
@@ -114,14 +131,18 @@ def _response(matrix: Eliminated, given: dict[int, Expr], place: Expr, n: int) -
     return found[0], found[1]
 
 
-def dense(entries: dict[int, Expr], n: int) -> Expr:
-    """(n,) of a sparse vector."""
-    return ca.vertcat(*(ca.SX(entries.get(k, 0)) for k in range(n)))
+def dense(entries: Sparse, n: int) -> Expr:
+    """(n,) of a sparse vector, zeros left out."""
+    found = ca.SX(n, 1)
+    for k, value in entries.items():
+        found[k] = value
+    return found
 
 
 def body_momenta(linkage: Linkage, chart: Chart, rates: Rates) -> tuple[Momentum, ...]:
     """Of the bodies of a tree."""
-    amounts = {k: rates.numbers[k] for k in range(linkage.size)}
+    numbers = ca.mtimes(chart.rates, rates.numbers)
+    amounts = {k: numbers[k] for k in range(linkage.size)}
     moving = screws.summed_down(linkage, chart.seen, amounts)
     found = []
     for screw, place, inertia in zip(moving, chart.places, chart.inertias, strict=True):

@@ -115,7 +115,7 @@ def _softness(joint: Joint, mobilities: Expr, dt: float) -> tuple[Expr, Expr]:
 
 
 def along_coordinate(
-    sockets: Sockets, k: int, motions: Moving, momenta: tuple[Any, ...], duration: Expr, place: tuple[int, Expr] | bool
+    sockets: Sockets, k: int, motions: Moving, momenta: tuple[Any, ...], duration: Expr, place: tuple[int, Any] | bool
 ) -> AlongCoordinate:
     """Coordinate ``k`` of a joint over a stretch.
 
@@ -125,7 +125,7 @@ def along_coordinate(
         motions: of its moving sides.
         momenta: what the sweeps know of them, before any impulse of the stretch.
         duration: of the stretch [s].
-        place: of a joint of a tree: the index of its first coordinate and (n, n) gains of the tree; else whether both
+        place: of a joint of a tree: the index of its first coordinate and gains of the tree's chart; else whether both
             sides are of one tree.
     """
     start, middle, coordinate = ca.SX(0), duration / 2, sockets.joint.kind.coordinates[k]
@@ -138,10 +138,9 @@ def along_coordinate(
         rate, k_of = speeds(sides, seen, momenta), mobility(sides, seen, place)
         return AlongCoordinate(sides, seen, given, value, rate, rate_now, k_of, place, None)
     index, gains = place[0] + k, place[1]
-    rate = momenta[0].numbers[index]
-    return AlongCoordinate(
-        sides, seen, given, value, rate, rate_now, gains[index][index], True, OfTree(index, gains[index])
-    )
+    row, gain = gains[index]
+    rate = ca.mtimes(row, momenta[0].numbers)
+    return AlongCoordinate(sides, seen, given, value, rate, rate_now, ca.mtimes(row, gain), True, OfTree(row, gain))
 
 
 def motor_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr, stretch: Stretch) -> AxisRow:

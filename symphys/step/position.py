@@ -201,8 +201,8 @@ def _pushed(side: Side, along: Displaced, step: Expr) -> Displaced:
 def _back(row: AxisRow, before: Shifts, along: Rates) -> Rates:
     """The displacement along a tree's coordinates that takes a limit of one back to where it is kept."""
     assert row.of_tree is not None
-    moved = _relative(row, before) + along.numbers[row.of_tree.index]
-    return Rates(along.numbers + row.of_tree.gain * row.fitting(moved))
+    moved = _relative(row, before) + ca.mtimes(row.of_tree.see, along.numbers)
+    return Rates(along.numbers + ca.mtimes(row.of_tree.gain, row.fitting(moved)))
 
 
 def _relative(row: LockRow | AxisRow, moved: Shifts) -> Expr:

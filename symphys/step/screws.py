@@ -1,4 +1,4 @@
-"""Trees of bodies in screws: pairs (w, v) of an angular velocity and the velocity of the point of the body at an origin.
+"""Trees of bodies in screws: pairs (w, v) of an angular velocity and the velocity of the body's point at an origin.
 
 The origin is where the root's centre of mass is at the start of a stretch. Momenta about it are pairs (l, p) likewise,
 (6,) columns both. A coordinate's screw is how all that hangs on it moves for a unit rate, one for the whole subtree.
@@ -16,7 +16,6 @@ import casadi as ca
 from symphys.course import Course
 from symphys.joints import Joint, Link, Linkage, Placed
 from symphys.rotation import cross_matrix
-from symphys.step.elimination import Eliminated
 from symphys.step.sockets import Sockets, sockets_on
 
 Expr = Any
@@ -56,7 +55,7 @@ def screws(linkage: Linkage, joints: Held, courses: Sequence[Course], t: Expr, o
 
 
 def floating(place: Expr) -> list[Expr]:
-    """Of a root: velocity of its centre of mass, which is at ``place``, and angular velocity, along the world's axes."""
+    """Of a root whose centre of mass is at ``place``: its velocity and angular velocity, along the world's axes."""
     unit, zero = ca.SX.eye(3), ca.SX.zeros(3)
     slides = [ca.vertcat(zero, unit[:, k]) for k in range(3)]
     return slides + [ca.vertcat(unit[:, k], ca.cross(place, unit[:, k])) for k in range(3)]
@@ -80,7 +79,7 @@ def free_motions_of(joint: Joint, placed: Placed) -> list[tuple[Expr, Expr]]:
 
 
 def inertia_of(mass: Expr, inertia: Expr, counted: Expr, seen: Expr) -> Expr:
-    """(6, 6): the momentum of a body about the origin for a screw; its centre of mass is counted at one place, seen at one.
+    """(6, 6): the momentum of a body about the origin for a screw, its centre of mass counted and seen at two places.
 
     ``inertia``: (3, 3) about the centre of mass, world frame.
     """
@@ -109,8 +108,10 @@ def summed_down(linkage: Linkage, along: Sequence[Expr], amounts: Mapping[int, E
     return found
 
 
-def mass_matrix(linkage: Linkage, inertias: Sequence[Expr], seen: Sequence[Expr], given: Sequence[Expr]) -> Eliminated:
-    """Momenta along the screws that are given, of rates along those that are seen; factored."""
+def mass_matrix(
+    linkage: Linkage, inertias: Sequence[Expr], seen: Sequence[Expr], given: Sequence[Expr]
+) -> list[dict[int, Expr]]:
+    """By rows: momenta along the screws that are given, of rates along those that are seen."""
     rows: list[dict[int, Expr]] = [{} for _ in range(linkage.size)]
     for link, path, inertia in zip(linkage.links, paths(linkage), summed_up(linkage, inertias), strict=True):
         for k in own(link):
@@ -121,7 +122,21 @@ def mass_matrix(linkage: Linkage, inertias: Sequence[Expr], seen: Sequence[Expr]
             push = ca.mtimes(inertia.T, given[k]) if given is not seen else momentum
             for i in above:
                 rows[k][i] = rows[i][k] if given is seen else ca.dot(push, seen[i])
-    return Eliminated(rows)
+    return rows
+
+
+def limbs(linkage: Linkage) -> list[list[int]]:
+    """The coordinates of what hangs on the root, limb by limb."""
+    above, limb_of, found = parents(linkage), dict[int, int](), list[list[int]]()
+    for k, link in enumerate(linkage.links[1:], 1):
+        parent = above[k]
+        limb = limb_of.get(parent if parent is not None else 0)
+        if limb is None:
+            limb = len(found)
+            found.append([])
+        limb_of[k] = limb
+        found[limb] += own(link)
+    return [limb for limb in found if limb]
 
 
 def own(link: Link) -> range:
