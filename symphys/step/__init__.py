@@ -1,5 +1,6 @@
 """One time step, as a branch-free casadi expression."""
 
+from symphys.step.coordinates import joint_quantities, joint_quantity_names, reading_function, readings
 from symphys.step.function import Recording, record_step, report_function, step_function
 from symphys.step.probe import gap_function, slip_function
 from symphys.step.record import Piece, Slot
@@ -9,6 +10,10 @@ __all__ = [
     "Recording",
     "Slot",
     "gap_function",
+    "joint_quantities",
+    "joint_quantity_names",
+    "reading_function",
+    "readings",
     "record_step",
     "report_function",
     "slip_function",

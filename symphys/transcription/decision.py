@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from symphys.problem import Problem, Variable
 from symphys.shooting import Block
-from symphys.state import initial_state
+from symphys.state import initial_state, input_columns, inputs_size
 from symphys.transcription.names import Parameters, spans
 from symphys.world import World
 
@@ -40,11 +40,11 @@ def start_of(problem: Problem, world: World, inputs: Sequence[str], parameters: 
     """The rollout's start as a function of z."""
     initial = {name: ca.MX(ca.DM(value)) for name, value in problem.initial.items()}
     physical = {name: ca.MX(value) for name, value in zip(parameters.names, parameters.nominal, strict=True)}
-    u = ca.MX.zeros(3 * len(inputs), problem.simulation.steps)
+    u = ca.MX.zeros(inputs_size(world, inputs), problem.simulation.steps)
     for variable, (first, last) in zip(problem.variables, spans(problem.variables), strict=True):
         part = z[first:last]
         if variable.kind == "control":
-            u = u + _spread_inputs(problem, variable, inputs, part)
+            u = u + _spread_inputs(problem, variable, input_columns(world, inputs), part)
             continue
         values = initial if variable.kind == "initial" else physical
         for slot in variable.slots:
@@ -67,13 +67,13 @@ def _unit(q: Expr) -> Expr:
     return q / ca.norm_2(q)
 
 
-def _spread_inputs(problem: Problem, variable: Variable, inputs: Sequence[str], part: Expr) -> Expr:
+def _spread_inputs(problem: Problem, variable: Variable, columns: Mapping[str, slice], part: Expr) -> Expr:
     """(nu, N): a control's knots as inputs of every step, in the rows that its slots name."""
     count = variable.guess.size // variable.knots
-    place = ca.DM(3 * len(inputs), count)
+    place = ca.DM(max(column.stop for column in columns.values()), count)
     for slot in variable.slots:
         for k, component in enumerate(slot.components):
-            place[3 * list(inputs).index(slot.name) + component, k] = 1
+            place[columns[slot.name].start + component, k] = 1
     knots = ca.reshape(part, count, variable.knots)
     weights = knot_weights(variable.knots, problem.simulation.steps, variable.interpolation)
     return ca.mtimes(ca.mtimes(place, knots), weights)

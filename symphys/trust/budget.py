@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from symphys import rotation
 from symphys.motion import momentum
-from symphys.state import Layout
+from symphys.state import Layout, input_columns, inputs_size
 from symphys.trajectory import Trajectory
 from symphys.transcription import Record, Rollout
 from symphys.trust.bodies import bodies, parameters
@@ -89,9 +89,9 @@ def _energies(rollout: Rollout, record: Record) -> tuple[Array, Array, Array]:
     """Kinetic and potential energy (N + 1,) and the work of applied forces in each step (N,) [J]."""
     world, layout, p = rollout.world, Layout(rollout.world), parameters(rollout)
     x, after = ca.SX.sym("x", layout.size), ca.SX.sym("after", layout.size)
-    u = ca.SX.sym("u", 3 * len(rollout.inputs))
+    u = ca.SX.sym("u", inputs_size(world, rollout.inputs))
     kinetic, potential, work = ca.SX(0), ca.SX(0), ca.SX(0)
-    given = {name: u[3 * i : 3 * i + 3] for i, name in enumerate(rollout.inputs)}
+    given = {name: u[part] for name, part in input_columns(world, rollout.inputs).items()}
     for body in world.bodies:
         at = {field: x[layout[f"{body.name}.{field}"]] for field in ("position", "orientation", "velocity")}
         spin = x[layout[f"{body.name}.angular_velocity"]]
