@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -45,7 +46,7 @@ def uncounted(rollout: Rollout, record: Record) -> Mask:
         for sign, limit in ((-1, joint.limits.lower), (1, joint.limits.upper)):
             if limit is not None:
                 bound = number(rollout, record, limit)
-                there = (sign * (value - bound) + reach >= 0).any(axis=1)
+                there: Mask = np.any(sign * (value - bound) + reach >= 0, axis=1)
                 found |= there[:-1] | there[1:]
     return found
 
@@ -66,6 +67,6 @@ def coordinates(rollout: Rollout, record: Record) -> Iterator[tuple[Joint, Array
             yield joint, motion.joint_value[:, j, :count], motion.joint_rate[:, j, :count]
 
 
-def number(rollout: Rollout, record: Record, value: object) -> float:
+def number(rollout: Rollout, record: Record, value: Any) -> float:
     """A number of the world, which a parameter may be."""
     return float(ca.Function("number", [parameters(rollout)], [ca.SX(value)])(record.course.p))

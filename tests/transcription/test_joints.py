@@ -176,3 +176,34 @@ def test_a_record_without_joints_says_so(make: Make) -> None:
     assert motion.joint_value.shape == motion.joint_rate.shape == (81, 0, 0)
     assert motion.joint_torque.shape == (80, 0, 0)
     assert motion.joint_separation.shape == (81, 0)
+
+
+def test_a_linear_command_is_that_of_its_time(make: Make) -> None:
+    """A force that grows from 0 to 10 N moves 1 kg by 10 / 6 m in a second; half a step of delay would cost 25 mm."""
+    text = """
+[simulation]
+duration = 1.0
+dt = 0.01
+
+[[body]]
+name = "cart"
+mass = 1.0
+inertia = 0.1
+
+[[joint]]
+name = "rail"
+between = ["world", "cart"]
+slider = { axis = [1, 0, 0] }
+motor = { torque = { torque = 50 } }
+
+[[variable]]
+name = "push"
+sets = "rail.command"
+knots = 2
+interpolation = "linear"
+guess = [0, 10]
+"""
+    made = make(text)
+    motion = made.simulate(made.shooting.start(0))
+    assert motion.joint_value[-1, 0, 0] == pytest.approx(10 / 6, abs=2e-4)
+    assert motion.joint_rate[-1, 0, 0] == pytest.approx(5, abs=2e-3)
