@@ -188,6 +188,12 @@ def test_motors(load: Load, text: str, motor: object) -> None:
     assert knee(load((MOTOR, text), text=LEG)).motor == motor
 
 
+def test_settings_go_by_names(load: Load) -> None:
+    joint = knee(load(text=LEG, settings={"joint.knee.motor.servo.gain": 3.0, "joint.knee.limits_deg": [-10, 10]}))
+    assert joint.motor == Servo(3, 30, 8)
+    assert joint.limits.upper == pytest.approx(np.pi / 18)
+
+
 def test_limits_at_one_end(load: Load) -> None:
     assert knee(load((LIMITS, "limits = [-inf, 1]"), text=LEG)).limits == Limits(None, 1.0)
     assert knee(load((LIMITS, "limits_deg = [0, inf]"), text=LEG)).limits == Limits(0.0, None)

@@ -68,7 +68,10 @@ class SpringTable(Table):
 
 
 class JointTable(Table):
-    """What holds two bodies together, or a body to the world; coordinates are 0 as the bodies lie in the file."""
+    """What holds two bodies together, or a body to the world; coordinates are 0 as the bodies lie in the file.
+
+    One of ball, hinge, slider, universal and fixed says how.
+    """
 
     name: Identifier = Field(description="how formulas, variables and settings refer to it")
     between: Annotated[list[str], Field(min_length=2, max_length=2)] = Field(
