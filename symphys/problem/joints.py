@@ -170,6 +170,9 @@ class Reader:
         degrees = [] if table.limits_deg is None else np.deg2rad(table.limits_deg).tolist()
         ends = degrees if table.limits is None else table.limits
         low, high = (end if isfinite(end) else None for end in ends or (np.inf, np.inf))
+        if not slides and any(end is not None and abs(end) > np.pi for end in (low, high)):
+            text = "an angle lies between -180 and 180 degrees (-pi and pi); -inf and inf are no bounds"
+            self.add("limits" if table.limits is not None else "limits_deg", text)
         return Limits(low, high)
 
 

@@ -94,6 +94,8 @@ CASES = [
     (HINGE, "fixed = {}", 'joint "knee".spring', "fixed joint has no coordinate"),
     (HINGE, "slider = { axis = [0, 0, 1] }", 'joint "knee".limits_deg', r"slider has no angle; give limits \[m\]"),
     (LIMITS, "limits_deg = [90, -90]", 'joint "knee".limits_deg', "lower end, 90, must not be above the upper, -90"),
+    (LIMITS, "limits_deg = [-200, 90]", 'joint "knee".limits_deg', "an angle lies between -180 and 180"),
+    (LIMITS, "limits = [-inf, 4]", 'joint "knee".limits', "an angle lies between"),
     (LIMITS, "limits = [inf, inf]", 'joint "knee".limits', "lower end, inf"),
     (LIMITS, "limits = [nan, 1]", 'joint "knee".limits', r"\[lower, upper\]; one is nan"),
     (LIMITS, "limits = 3", 'joint "knee".limits', r"two numbers, \[lower, upper\], not 3"),
