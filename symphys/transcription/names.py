@@ -73,6 +73,8 @@ def compile_formula(
         ca.SX.sym("z", n),
     )
     names = _namespace(problem, world, inputs, parameters, at)
+    if not formula.names.isdisjoint(joint_quantity_names(world)):
+        names.update(joint_quantities(world, at.x))
     value = formula.evaluate({name: names[name] for name in formula.names})
     return ca.Function("formula", at.arguments(), [ca.SX(value)])
 
@@ -88,7 +90,6 @@ def _namespace(
     names.update({name: at.u[part] for name, part in input_columns(world, inputs).items()})
     names.update({name: ca.DM(value) for name, value in problem.parameters.items()})
     names.update(zip(parameters.names, parameters.symbols, strict=True))
-    names.update(joint_quantities(world, at.x))
     for variable, (start, stop) in zip(problem.variables, spans(problem.variables), strict=True):
         names[variable.name] = at.z[start:stop]
     return names
