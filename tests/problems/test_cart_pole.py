@@ -69,7 +69,7 @@ def test_the_cart_moves_as_its_equations_say() -> None:
     assert motion.joint_separation.max() < 1e-5
 
 
-@pytest.mark.parametrize(("name", "most"), [("gradient", 150), ("least_squares", 8), ("ipopt", 25)])
+@pytest.mark.parametrize(("name", "most"), [("gradient", 150), ("least_squares", 8), ("ipopt", 25), ("cma", 6000)])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_every_solver_swings_it_up(name: str, most: int, seed: int) -> None:
     """By the other equations too, whatever the forces are."""
