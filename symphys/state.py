@@ -12,7 +12,7 @@ half step: v - lag force / m. ``lag`` is 0 at the start and dt/2 after the first
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import casadi as ca
@@ -103,17 +103,34 @@ def initial_state(world: World, values: Mapping[str, Any]) -> Any:
     return layout.pack(filled)
 
 
+def input_sizes(world: World) -> dict[str, int]:
+    """What may act on a world from outside, and how many numbers each has: forces and torques, commands of motors."""
+    forces = {f"{body.name}.{field}": 3 for body in world.bodies for field in INPUT_FIELDS}
+    return forces | {f"{joint.name}.command": len(joint.kind.coordinates) for joint in world.joints if joint.driven}
+
+
 def input_names(world: World) -> list[str]:
-    """What may act on a world from outside: forces and torques of bodies, commands of motors."""
-    forces = [f"{body.name}.{field}" for body in world.bodies for field in INPUT_FIELDS]
-    return [*forces, *(f"{joint.name}.command" for joint in world.joints if joint.driven)]
+    """The names of ``input_sizes``."""
+    return list(input_sizes(world))
 
 
 def input_size(world: World, name: str) -> int:
     """How many numbers an input has; KeyError if there is none of that name."""
-    if name not in input_names(world):
-        raise KeyError(f"no input is called {name!r}; there are {', '.join(sorted(input_names(world)))}")
-    owner, _, field = name.rpartition(".")
-    if field in INPUT_FIELDS:
-        return 3
-    return next(len(joint.kind.coordinates) for joint in world.joints if joint.name == owner)
+    sizes = input_sizes(world)
+    if name not in sizes:
+        raise KeyError(f"no input is called {name!r}; there are {', '.join(sorted(sizes))}")
+    return sizes[name]
+
+
+def input_columns(world: World, inputs: Sequence[str]) -> dict[str, slice]:
+    """Where each of these inputs lies in u, which stacks them; KeyError for a name that is none."""
+    columns, start, sizes = dict[str, slice](), 0, input_sizes(world)
+    for name in inputs:
+        stop = start + (sizes[name] if name in sizes else input_size(world, name))
+        columns[name], start = slice(start, stop), stop
+    return columns
+
+
+def inputs_size(world: World, inputs: Sequence[str]) -> int:
+    """How many numbers u has, which stacks these inputs."""
+    return max((part.stop for part in input_columns(world, inputs).values()), default=0)

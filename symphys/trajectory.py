@@ -18,7 +18,7 @@ class NotFinite(SymphysError):
 
 @dataclass(frozen=True)
 class Trajectory:
-    """N steps of B bodies with C pairs; world frame, SI units, velocities true at their time.
+    """N steps of B bodies with C pairs and J joints; world frame, SI units, velocities true at their time.
 
     Attributes:
         time: (N + 1,) [s].
@@ -35,6 +35,11 @@ class Trajectory:
         contact_gap: (N + 1, C) [m]; the last row repeats the one before it.
         residual: (N,) largest change of an impulse in the last sweep [N s].
         crowded: (N,) 1 where a body had two or more impacts in one step.
+        joint_names: (J,).
+        joint_value, joint_rate: (N + 1, J, K) coordinates [rad] or [m] and their rates; K is that of the joint that has
+            most, NaN where another has fewer.
+        joint_torque: (N, J, K) of motors [N m] or [N]; 0 without one.
+        joint_separation: (N + 1, J) how far apart the sockets are, as far as a joint holds them together [m].
     """
 
     time: Array
@@ -50,6 +55,11 @@ class Trajectory:
     contact_gap: Array
     residual: Array
     crowded: Array
+    joint_names: tuple[str, ...]
+    joint_value: Array
+    joint_rate: Array
+    joint_torque: Array
+    joint_separation: Array
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
         """Every field as an array, ready for ``numpy.savez``."""

@@ -104,6 +104,8 @@ def describe(problem: Problem) -> list[str]:
         f"  planes       {listed(plane.name for plane in world.statics)}",
         f"  contacts     {listed(dict.fromkeys(pair.name.partition(':')[0] for pair in world.pairs))}",
     ]
+    if world.joints:
+        lines.append(f"  joints       {listed(f'{joint.name} ({joint.kind.name})' for joint in world.joints)}")
     for variable in problem.variables:
         sets = listed(slot.name for slot in variable.slots)
         lines.append(f"  variable     {variable.name}: {variable.guess.size} numbers, sets {sets}")

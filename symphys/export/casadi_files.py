@@ -73,7 +73,7 @@ def _readme(transcription: Transcription, functions: dict[str, ca.Function], ver
         "z, what may be chosen": words.decision_lines(problem),
         "The guess of z": textwrap.wrap(", ".join(map(repr, transcription.shooting.start(0).tolist())), 110),
         "x, the state": words.state_lines(rollout),
-        "u, forces and torques, constant over a step": words.input_lines(rollout),
+        "u, forces, torques and commands, constant over a step": words.input_lines(rollout),
         "p, parameters": words.parameter_lines(rollout),
         "errors, each error / tolerance, met where <= 1": words.error_lines(problem),
         "constraints, their values": words.constraint_lines(transcription),

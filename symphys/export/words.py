@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from symphys.joints import Joint, Servo, TorqueMotor, VelocityMotor
 from symphys.problem import Problem, Slot, Variable
-from symphys.state import Layout
+from symphys.state import Layout, input_columns, input_size
 from symphys.transcription import Transcription
 from symphys.transcription.along import Rollout
+from symphys.world import World
 
 UNITS = {
     "position": "m",
@@ -29,47 +31,75 @@ UNITS = {
 """By the last part of a name; world frame."""
 
 
-def unit(name: str) -> str:
+TURNING = {
+    **dict.fromkeys(("motor", "lower", "upper", "spring", "torque"), "N m"),
+    **{"lock": "N, then N m", "gain": "1/s", "velocity": "rad/s", "rest": "rad"},
+    **{"stiffness": "N m/rad", "damping": "N m s/rad"},
+}
+SLIDING = {
+    **dict.fromkeys(("motor", "lower", "upper", "spring", "torque"), "N"),
+    **{"lock": "N, then N m", "gain": "1/s", "velocity": "m/s", "rest": "m"},
+    **{"stiffness": "N/m", "damping": "N s/m"},
+}
+"""Of what belongs to joints, likewise."""
+
+
+def unit(name: str, world: World) -> str:
     """In brackets; nothing where it is not known."""
-    key = name.rpartition(".")[2]
-    return f" [{UNITS[key]}]" if key in UNITS else ""
+    owner, _, key = name.rpartition(".")
+    joint = next((joint for joint in world.joints if joint.name == owner), None)
+    found = UNITS.get(key) if joint is None else joint_unit(joint, key)
+    return f" [{found}]" if found else ""
+
+
+def joint_unit(joint: Joint, key: str) -> str | None:
+    """Of a quantity of a joint; a command has that of what its motor follows."""
+    units = SLIDING if any(not coordinate.turns for coordinate in joint.kind.coordinates) else TURNING
+    if key != "command":
+        return units.get(key)
+    followed = {Servo: "rest", VelocityMotor: "velocity", TorqueMotor: "torque"}
+    return next(units[what] for kind, what in followed.items() if isinstance(joint.motor, kind))
 
 
 def decision_lines(problem: Problem) -> list[str]:
     """One line a variable: its place in z, what it sets."""
-    sets = [(variable.guess.size, f"{variable.name}: {_sets(problem, variable)}") for variable in problem.variables]
+    world = problem.world()
+    sets = [
+        (variable.guess.size, f"{variable.name}: {_sets(problem, world, variable)}") for variable in problem.variables
+    ]
     return _placed("z", sets)
 
 
-def _sets(problem: Problem, variable: Variable) -> str:
-    slots = ", ".join(_slot(problem, slot) + unit(slot.name) for slot in variable.slots)
+def _sets(problem: Problem, world: World, variable: Variable) -> str:
+    slots = ", ".join(_slot(problem, world, slot) + unit(slot.name, world) for slot in variable.slots)
     knots = f"; {variable.knots} knots, {variable.interpolation}, one after the other" if variable.knots > 1 else ""
     return slots + knots
 
 
-def _slot(problem: Problem, slot: Slot) -> str:
-    """What a slot sets; forces and torques have three components."""
+def _slot(problem: Problem, world: World, slot: Slot) -> str:
+    """What a slot sets."""
     known = {**problem.initial, **problem.parameters}
-    whole = len(known[slot.name]) if slot.name in known else 3
+    whole = len(known[slot.name]) if slot.name in known else input_size(world, slot.name)
     return slot.name if len(slot.components) == whole else f"{slot.name}[{','.join(map(str, slot.components))}]"
 
 
 def state_lines(rollout: Rollout) -> list[str]:
     """One line a quantity of the state."""
-    layout = Layout(rollout.world)
-    return _placed("x", [(layout[name].stop - layout[name].start, name + unit(name)) for name in layout.names()])
+    layout, world = Layout(rollout.world), rollout.world
+    return _placed("x", [(layout[name].stop - layout[name].start, name + unit(name, world)) for name in layout.names()])
 
 
 def input_lines(rollout: Rollout) -> list[str]:
     """One line an input of a step."""
-    return _placed("u", [(3, name + unit(name)) for name in rollout.inputs])
+    columns, world = input_columns(rollout.world, rollout.inputs), rollout.world
+    return _placed("u", [(part.stop - part.start, name + unit(name, world)) for name, part in columns.items()])
 
 
 def parameter_lines(rollout: Rollout) -> list[str]:
     """One line a parameter of a step."""
     names, symbols = rollout.parameters.names, rollout.parameters.symbols
     sizes = [int(symbol.shape[0]) for symbol in symbols]
-    return _placed("p", [(size, name + unit(name)) for size, name in zip(sizes, names, strict=True)])
+    return _placed("p", [(size, name + unit(name, rollout.world)) for size, name in zip(sizes, names, strict=True)])
 
 
 def error_names(problem: Problem) -> list[str]:

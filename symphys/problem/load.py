@@ -14,6 +14,7 @@ from symphys.problem.bodies import read_body, read_state
 from symphys.problem.complaints import report
 from symphys.problem.crowd import check_crowd
 from symphys.problem.faults import Faults, Place
+from symphys.problem.joints import read_joints
 from symphys.problem.meetings import Meetings
 from symphys.problem.model import NOTHING, Array, Problem
 from symphys.problem.plan import WorldPlan
@@ -22,7 +23,7 @@ from symphys.problem.schema import Document
 from symphys.problem.settings import apply_settings
 from symphys.problem.simulation import read_simulation
 from symphys.problem.source import parse_toml, read_source
-from symphys.problem.start import at_guess, check_overlap, formula_names
+from symphys.problem.start import at_guess, check_joints, check_overlap, formula_names
 from symphys.problem.statics import read_statics
 from symphys.problem.surfaces import (
     check_laws,
@@ -32,9 +33,10 @@ from symphys.problem.surfaces import (
     read_pairs,
 )
 from symphys.problem.variables import read_variables
+from symphys.state import input_sizes
 
 MEMBERS = ("body", "plane", "block", "terrain")
-SHARED_NAMES = (*MEMBERS, "variable")
+SHARED_NAMES = (*MEMBERS, "joint", "variable")
 OWN_NAMES = ("cost", "target", "constraint")
 
 
@@ -100,13 +102,14 @@ def build(path: Path, text: str, document: Document, faults: Faults) -> Problem:
     plan, initial = read_plan(document, faults)
     faults.stop_if_any()
     check_laws(plan, faults)
-    known = quantities(initial, plan.parameters())
+    known = quantities(initial, plan.parameters(), input_sizes(plan.world({})))
     variables = read_variables(document.variable, known, simulation, faults)
     check_varied(plan, variables, faults)
     faults.stop_if_any()
     start = at_guess(known, variables)
     check_overlap(plan, start, faults)
-    aims = read_aims(document, simulation, formula_names(start, variables), faults)
+    check_joints(plan, start, faults)
+    aims = read_aims(document, simulation, formula_names(plan, start, variables), faults)
     faults.stop_if_any()
     return Problem(
         name=path.stem,
@@ -134,12 +137,14 @@ def read_plan(document: Document, faults: Faults) -> tuple[WorldPlan, dict[str, 
     shared = list(dict.fromkeys(group for _, group in groups(document)))
     check_mates(bodies, names, shared, document, faults)
     pairs = read_pairs(document.pair, names, shared, faults)
-    check_crowd(Meetings((*bodies, *statics), pairs), faults)
     initial: dict[str, Array] = {}
     for index, table in enumerate(document.body):
         initial |= read_state(table, index, faults)
+    joints = read_joints(document.joint, [body.name for body in bodies], initial, faults)
     x, y, z = document.world.gravity
-    return WorldPlan(bodies, statics, pairs, read_contact(document.contact), (x, y, z)), initial
+    plan = WorldPlan(bodies, statics, pairs, read_contact(document.contact), (x, y, z), joints)
+    check_crowd(Meetings(plan.parts, (*pairs, *plan.jointed)), faults)
+    return plan, initial
 
 
 def stop_when_met(document: Document, aims: Aims) -> bool:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.problem.joint_plan import JointPlan
 from symphys.problem.meetings import Meetings
 from symphys.problem.parts import COMBINE, VARIABLE, BodyPlan, PairPlan, Part, StaticPlan, Value
 from symphys.shapes import Scalar, Static
@@ -31,6 +32,7 @@ class WorldPlan:
         bodies, statics, pairs: in the file's order; of the statics first the ground, then planes, blocks, terrain.
         contact: the law where nothing else is stated.
         gravity: (3,) [m/s^2].
+        joints: in the file's order.
     """
 
     bodies: tuple[BodyPlan, ...]
@@ -38,11 +40,12 @@ class WorldPlan:
     pairs: tuple[PairPlan, ...]
     contact: Law
     gravity: tuple[float, float, float]
+    joints: tuple[JointPlan, ...] = ()
 
     def parameters(self) -> dict[str, Array]:
         """Every parameter with its value: (1,), or (3,) for gravity, the size of a box and the place of a block."""
         found = {"gravity": np.array(self.gravity)}
-        parts: tuple[Part | PairPlan, ...] = (*self.parts, *self.pairs)
+        parts: tuple[Part | PairPlan | JointPlan, ...] = (*self.parts, *self.pairs, *self.joints)
         for part in parts:
             found |= {name: np.atleast_1d(np.array(numbers, float)) for name, numbers in part.parameters().items()}
         return found
@@ -62,7 +65,9 @@ class WorldPlan:
 
         bodies = tuple(plan.body(overrides, value) for plan in self.bodies)
         statics = tuple(plan.static(value) for plan in self.statics)
-        return World(bodies, statics, self._pairs(bodies, statics, value), value("gravity"))
+        places = {body.name: index for index, body in enumerate(bodies)}
+        joints = tuple(plan.joint(places, value) for plan in self.joints)
+        return World(bodies, statics, self._pairs(bodies, statics, value), value("gravity"), joints)
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:
@@ -71,8 +76,13 @@ class WorldPlan:
 
     @cached_property
     def meetings(self) -> tuple[tuple[int, int], ...]:
-        """Every two parts that may touch, as places in ``parts``: each lets the other, and no [[pair]] forbids it."""
-        return tuple(Meetings(self.parts, self.pairs).pairs())
+        """Every two parts that may touch, as places in ``parts``: each lets the other, and nothing forbids it."""
+        return tuple(Meetings(self.parts, (*self.pairs, *self.jointed)).pairs())
+
+    @cached_property
+    def jointed(self) -> tuple[PairPlan, ...]:
+        """As [[pair]] tables: the bodies that joints hold together do not touch each other."""
+        return tuple(joint.apart for joint in self.joints if joint.apart is not None)
 
     def _pairs(self, bodies: tuple[Body, ...], statics: tuple[Static, ...], value: Value) -> tuple[Pair, ...]:
         """As ``world.all_pairs`` has them: first what is against statics, then what is against later bodies."""

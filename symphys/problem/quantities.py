@@ -15,7 +15,6 @@ from symphys.suggest import hint, quote
 
 Array = NDArray[np.float64]
 
-INPUTS = ("force", "torque")
 SLOT = re.compile(r"\s*([^\[\]\s]+)\s*(?:\[\s*(-?\d{1,9})?\s*(:)?\s*(-?\d{1,9})?\s*\])?\s*")
 LIMITS: dict[str, tuple[float, float]] = {
     "mass": (0.0, inf),
@@ -26,6 +25,8 @@ LIMITS: dict[str, tuple[float, float]] = {
     "restitution": (0.0, 1.0),
 }
 """What is physical; masses and sizes must exceed their limit."""
+ACTING = ("gain", "torque", "velocity", "stiffness", "damping")
+"""Parameters of motors and springs, which must not be negative."""
 OPEN = ("mass", "radius", "size", "length")
 LEAST_SHARE = 1e-3
 """Masses and sizes are not varied below this share of their value in the file, unless ``lower`` says so."""
@@ -43,11 +44,12 @@ class Quantity:
     nominal: Array
 
 
-def quantities(initial: Mapping[str, Array], parameters: Mapping[str, Array]) -> dict[str, Quantity]:
-    """Every quantity by name: states at the start, inputs of bodies, then parameters."""
+def quantities(
+    initial: Mapping[str, Array], parameters: Mapping[str, Array], inputs: Mapping[str, int]
+) -> dict[str, Quantity]:
+    """Every quantity by name: states at the start, inputs with their sizes, then parameters."""
     found = {name: Quantity("initial", value) for name, value in initial.items()}
-    bodies = dict.fromkeys(name.split(".")[0] for name in initial)
-    found |= {f"{body}.{key}": Quantity("control", np.zeros(3)) for body in bodies for key in INPUTS}
+    found |= {name: Quantity("control", np.zeros(size)) for name, size in inputs.items()}
     return found | {name: Quantity("parameter", value) for name, value in parameters.items()}
 
 
@@ -87,10 +89,16 @@ def unknown(name: str, known: Mapping[str, Quantity]) -> str:
     return hint(name, same_owner or known) + stated
 
 
+def physical(name: str, kind: Kind) -> tuple[float, float]:
+    """Least and largest value of a quantity that is physical."""
+    key = name.rpartition(".")[2]
+    return (0.0, inf) if kind == "parameter" and key in ACTING else LIMITS.get(key, (-inf, inf))
+
+
 def limits(slot: Slot, known: Mapping[str, Quantity]) -> tuple[Array, Array]:
     """(components,) twice: the bounds that hold where the file states none."""
     key = slot.name.rpartition(".")[2]
-    low, high = (np.full(len(slot.components), limit) for limit in LIMITS.get(key, (-inf, inf)))
+    low, high = (np.full(len(slot.components), limit) for limit in physical(slot.name, known[slot.name].kind))
     if key in OPEN:
         low = LEAST_SHARE * known[slot.name].nominal[list(slot.components)]
     return low, high

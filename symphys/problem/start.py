@@ -10,11 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.problem.faults import Faults
+from symphys.problem.joint_plan import WORLD
 from symphys.problem.model import Variable
 from symphys.problem.plan import WorldPlan
 from symphys.problem.quantities import Quantity
+from symphys.problem.sockets import MEET
 from symphys.state import GIVEN, initial_state
-from symphys.step import gap_function
+from symphys.step import gap_function, joint_quantities, readings
+from symphys.world import World
 
 Array = NDArray[np.float64]
 OVERLAP = 1e-3
@@ -33,18 +36,20 @@ def at_guess(known: Mapping[str, Quantity], variables: Sequence[Variable]) -> di
     return values
 
 
-def formula_names(values: Mapping[str, Array], variables: Sequence[Variable]) -> dict[str, Any]:
+def formula_names(plan: WorldPlan, values: Mapping[str, Array], variables: Sequence[Variable]) -> dict[str, Any]:
     """Every name that a formula may use, with a value of its shape."""
     named: dict[str, Any] = {name: ca.DM(value) for name, value in values.items() if "-" not in name}
     named["time"] = ca.DM(0.0)
+    if plan.joints:
+        world, x = start_of(plan, values)
+        named.update({name: ca.evalf(ca.SX(value)) for name, value in joint_quantities(world, x).items()})
     return named | {variable.name: ca.DM(variable.guess) for variable in variables}
 
 
 def check_overlap(plan: WorldPlan, values: Mapping[str, Array], faults: Faults) -> None:
     """Surfaces that may touch must not overlap at the start."""
-    world = plan.world({name: parameter(values[name]) for name in plan.parameters()})
-    given = {f"{body.name}.{field}": values[f"{body.name}.{field}"] for body in world.bodies for field in GIVEN}
-    gaps = np.array(gap_function(world)(initial_state(world, given))).ravel()
+    world, x = start_of(plan, values)
+    gaps = np.array(gap_function(world)(x)).ravel()
     deepest: dict[tuple[str, str], float] = {}
     for pair, gap in zip(world.pairs, gaps, strict=True):
         depth, owners = -gap, plan.owners(pair)
@@ -55,6 +60,32 @@ def check_overlap(plan: WorldPlan, values: Mapping[str, Array], faults: Faults) 
         verb = "overlaps" if any(body.name == b for body in plan.bodies) else "sinks into"
         message = f"{a} {verb} {b} by {depth:.4g} m at the start; at most {OVERLAP:g} m is allowed"
         faults.add(("body", index, "position"), message)
+
+
+def start_of(plan: WorldPlan, values: Mapping[str, Array]) -> tuple[World, Any]:
+    """The world and its state (DM) at the start of the guess."""
+    world = plan.world({name: parameter(values[name]) for name in plan.parameters()})
+    given = {f"{body.name}.{field}": values[f"{body.name}.{field}"] for body in world.bodies for field in GIVEN}
+    return world, initial_state(world, given)
+
+
+def check_joints(plan: WorldPlan, values: Mapping[str, Array], faults: Faults) -> None:
+    """Joints must hold together at the start of the guess, within their limits."""
+    if not plan.joints:
+        return
+    world, x = start_of(plan, values)
+    for index, (joint, reading) in enumerate(zip(plan.joints, readings(world, x).values(), strict=True)):
+        both, place = f"{joint.second or WORLD} and {joint.first}", ("joint", index)
+        apart, tilt = (round(float(ca.evalf(ca.SX(part))), 9) for part in (reading.separation, reading.tilt))
+        if not max(apart, tilt) <= MEET:
+            text = f"{apart:.4g} m and {tilt:.4g} rad from where the joint holds them; one variable must move both"
+            faults.add((*place, "between"), f"the guess of a variable puts {both} {text}")
+        low, high = joint.limits.lower, joint.limits.upper
+        for value in np.array(ca.evalf(ca.SX(reading.value))).ravel().round(9) + 0.0:
+            if (low is not None and value < low - MEET) or (high is not None and value > high + MEET):
+                text = f"leave out where {both} are at the start, at {value:.6g}; it is 0 as the bodies lie in the file"
+                key = "limits" if faults.data["joint"][index].get("limits") is not None else "limits_deg"
+                faults.add((*place, key), text)
 
 
 def parameter(value: Array) -> float | tuple[float, ...]:

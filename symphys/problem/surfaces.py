@@ -144,6 +144,8 @@ def either(law: Law) -> str:
 
 def unused(plan: WorldPlan, pair: PairPlan) -> str:
     """The message for a [[pair]] table that holds for no two surfaces."""
+    if any(pair.between == jointed.between for jointed in plan.jointed):
+        return "a joint holds these two, which do not touch unless it says collide = true"
     if pair.between <= {part.name for part in plan.parts}:
         return "these two never touch, so that nothing can be stated about them"
     return "no two of these ever touch, or tables that name them more closely go before this one: it has no effect"

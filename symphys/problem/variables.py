@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from math import inf
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 
 from symphys.problem.faults import Faults, Place
 from symphys.problem.model import Kind, Simulation, Slot, Variable
-from symphys.problem.quantities import LIMITS, OPEN, Quantity, SlotError, limits, read_slot
+from symphys.problem.quantities import OPEN, Quantity, SlotError, limits, physical, read_slot
 from symphys.problem.schema.aims import VariableTable
 from symphys.problem.schema.types import NestedList
 
@@ -87,7 +86,9 @@ class Reader:
         if kind != "control":
             for key in ("knots", "interpolation"):
                 if key in self.table.model_fields_set and (key, knots) != ("knots", 1):
-                    self.add(key, "only a force or a torque varies over time; leave this key out")
+                    self.add(
+                        key, "only a force or a torque, or the command of a motor, varies over time; leave this key out"
+                    )
             return
         most = simulation.steps + linear
         if knots > most:
@@ -142,7 +143,7 @@ class Reader:
         """Bounds must not allow a negative mass, and the like; a quaternion must not be zero."""
         for slot in variable.slots:
             name = slot.name.rpartition(".")[2]
-            low, high = LIMITS.get(name, (-inf, inf))
+            low, high = physical(slot.name, variable.kind)
             if np.any(variable.lower < low) or (name in OPEN and np.any(variable.lower <= low)):
                 self.add("lower", f"{slot.name} must {'be greater than' if name in OPEN else 'be at least'} {low:g}")
             if np.any(variable.upper > high):

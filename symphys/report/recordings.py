@@ -5,7 +5,9 @@ from __future__ import annotations
 import zipfile
 import zlib
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -50,7 +52,9 @@ def make_trajectory(arrays: Mapping[str, Array]) -> Trajectory:
     """Check the shapes; quantities that are absent become nan, orientations the identity."""
     time = np.asarray(arrays["time"], float).reshape(-1)
     count, bodies = shape_of(arrays["position"], time.size)
-    contacts = names_of(arrays, "contact_names")
+    contacts, joints = names_of(arrays, "contact_names"), names_of(arrays, "joint_names")
+    value = np.asarray(arrays.get("joint_value", np.zeros((0, 0, 0))))
+    along = (len(joints), value.shape[2] if value.ndim == 3 else 0)
 
     def quantity(key: str, shape: tuple[int, ...], missing: float = np.nan) -> Array:
         read = np.asarray(arrays[key], float) if key in arrays else np.full(shape, missing)
@@ -71,6 +75,11 @@ def make_trajectory(arrays: Mapping[str, Array]) -> Trajectory:
         contact_names=contacts,
         contact_force=quantity("contact_force", (count - 1, len(contacts), 3), 0.0),
         contact_gap=quantity("contact_gap", (count, len(contacts))),
+        joint_names=joints,
+        joint_value=quantity("joint_value", (count, *along)),
+        joint_rate=quantity("joint_rate", (count, *along)),
+        joint_torque=quantity("joint_torque", (count - 1, *along)),
+        joint_separation=quantity("joint_separation", (count, len(joints))),
     )
 
 
@@ -98,7 +107,9 @@ def trim(trajectory: Trajectory) -> Trajectory:
         raise ValueError("no state is finite")
     if keep == finite.size:
         return trajectory
-    cut = {name: array[:keep] for name, array in vars(trajectory).items() if isinstance(array, np.ndarray)}
-    for name in ("force", "torque", "contact_force"):
+    cut: dict[str, Any] = {
+        name: array[:keep] for name, array in vars(trajectory).items() if isinstance(array, np.ndarray)
+    }
+    for name in ("force", "torque", "contact_force", "joint_torque"):
         cut[name] = cut[name][: keep - 1]
-    return Trajectory(body_names=trajectory.body_names, contact_names=trajectory.contact_names, **cut)
+    return replace(trajectory, **cut)

@@ -149,7 +149,10 @@ class Run:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """The recorded motion, as in trajectory.npz: N steps, B bodies, C contacts; world frame, SI units."""
+    """The recorded motion, as in trajectory.npz: N steps, B bodies, C contacts; world frame, SI units.
+
+    J joints of K coordinates at most, none in older records; see ``symphys.trajectory``.
+    """
 
     time: Array
     body_names: tuple[str, ...]
@@ -162,3 +165,8 @@ class Trajectory:
     contact_names: tuple[str, ...]
     contact_force: Array
     contact_gap: Array
+    joint_names: tuple[str, ...]
+    joint_value: Array
+    joint_rate: Array
+    joint_torque: Array
+    joint_separation: Array

@@ -1,6 +1,8 @@
 """One time step, as a branch-free casadi expression."""
 
+from symphys.step.coordinates import joint_quantities, joint_quantity_names, reading_function, readings
 from symphys.step.function import Recording, record_step, report_function, step_function
+from symphys.step.jointed import components
 from symphys.step.probe import gap_function, slip_function
 from symphys.step.record import Piece, Slot
 
@@ -8,7 +10,12 @@ __all__ = [
     "Piece",
     "Recording",
     "Slot",
+    "components",
     "gap_function",
+    "joint_quantities",
+    "joint_quantity_names",
+    "reading_function",
+    "readings",
     "record_step",
     "report_function",
     "slip_function",

@@ -8,7 +8,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.state import Layout, input_size
+from symphys.state import Layout, inputs_size
 from symphys.step.pieces import Inline
 from symphys.step.record import Piece, Recorder, Slot
 from symphys.step.scene import Scene, State, make_scene
@@ -31,7 +31,7 @@ def step_function(
         world: bodies, planes, pairs; its numbers may be SX symbols listed in ``parameters``.
         scheme: time step, sweeps and switches.
         inputs: names such as ``ball.force`` [N] or ``ball.torque`` [N m] (world frame, at the centre of mass),
-            constant over the step; u stacks them, 3 each.
+            or ``knee.command`` of a motor, constant over the step; u stacks them.
         parameters: the SX symbols that p stacks.
 
     Returns:
@@ -120,5 +120,5 @@ def parts_of(layout: Layout, x: Expr) -> State:
 def arguments_of(world: World, inputs: Sequence[str], parameters: Sequence[Any]) -> list[Expr]:
     """Symbols for x, u, p and smoothing."""
     x = ca.SX.sym("x", Layout(world).size)
-    u = ca.SX.sym("u", sum(input_size(world, name) for name in inputs))
+    u = ca.SX.sym("u", inputs_size(world, inputs))
     return [x, u, ca.vertcat(ca.SX(0, 1), *parameters), ca.SX.sym("smoothing")]

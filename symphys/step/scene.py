@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.smooth import TINY_SQUARE
-from symphys.state import input_size
+from symphys.state import input_columns
 from symphys.step.pieces import Pieces
 from symphys.world import Scheme, World
 
@@ -67,13 +67,8 @@ class Scene:
 
     def given(self, name: str) -> Expr | None:
         """The input of this name; None if there is none."""
-        start = 0
-        for each in self.inputs:
-            size = input_size(self.world, each)
-            if each == name:
-                return self.u[start : start + size]
-            start += size
-        return None
+        columns = input_columns(self.world, self.inputs).get(name)
+        return None if columns is None else self.u[columns]
 
     @property
     def shortest_kick(self) -> float:

@@ -12,10 +12,9 @@ import numpy as np
 from symphys.expression import Formula
 from symphys.problem import Problem
 from symphys.rollout import roll_out
-from symphys.state import GIVEN
 from symphys.step import step_function
 from symphys.transcription.decision import start_of
-from symphys.transcription.names import Parameters, compile_formula, input_names, varied_parameters
+from symphys.transcription.names import Parameters, compile_formula, input_names, moving_names, varied_parameters
 from symphys.world import World
 
 Expr = Any
@@ -92,7 +91,7 @@ class Rollout:
     def over_steps(self, formula: Formula) -> Expr:
         """(m, N or 2N): samples whose mean is the time average; 2N for what moves (trapezoid)."""
         before = self._mapped(formula, self.x[:, :-1], np.arange(self.steps))
-        if not formula_moves(formula):
+        if not self.moves(formula):
             return before
         return ca.horzcat(before, self.after_steps(formula))
 
@@ -102,13 +101,16 @@ class Rollout:
         shared = ca.repmat(z, 1, self.steps) if self._uses_z(formula) else ca.DM(z.shape[0], self.steps)
         return stage(x, self.u, p, ca.DM(ticks * self.dt).T, shared)
 
+    def moves(self, formula: Formula) -> bool:
+        """Whether the formula depends on what changes within a step."""
+        return not self._moving.isdisjoint(formula.names)
+
+    @cached_property
+    def _moving(self) -> frozenset[str]:
+        return moving_names(self.world)
+
     def _uses_z(self, formula: Formula) -> bool:
         return any(variable.name in formula.names for variable in self.problem.variables)
-
-
-def formula_moves(formula: Formula) -> bool:
-    """Whether the formula depends on what changes within a step."""
-    return any(name == "time" or name.rpartition(".")[2] in GIVEN for name in formula.names)
 
 
 def symbolic_rollout(problem: Problem) -> Rollout:

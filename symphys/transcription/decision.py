@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,12 +11,16 @@ import numpy as np
 
 from symphys.problem import Problem, Variable
 from symphys.shooting import Block
-from symphys.state import initial_state
+from symphys.state import initial_state, input_columns, inputs_size
 from symphys.transcription.names import Parameters, spans
 from symphys.world import World
 
 Expr = Any
 """casadi MX"""
+
+
+MIDDLE, START = 0.5, 0.0
+"""When a linear control is looked at in a step: forces act over it, motors as an impulse at its start (leapfrog)."""
 
 
 @dataclass(frozen=True)
@@ -40,11 +44,11 @@ def start_of(problem: Problem, world: World, inputs: Sequence[str], parameters: 
     """The rollout's start as a function of z."""
     initial = {name: ca.MX(ca.DM(value)) for name, value in problem.initial.items()}
     physical = {name: ca.MX(value) for name, value in zip(parameters.names, parameters.nominal, strict=True)}
-    u = ca.MX.zeros(3 * len(inputs), problem.simulation.steps)
+    u = ca.MX.zeros(inputs_size(world, inputs), problem.simulation.steps)
     for variable, (first, last) in zip(problem.variables, spans(problem.variables), strict=True):
         part = z[first:last]
         if variable.kind == "control":
-            u = u + _spread_inputs(problem, variable, inputs, part)
+            u = u + _spread_inputs(problem, variable, input_columns(world, inputs), part)
             continue
         values = initial if variable.kind == "initial" else physical
         for slot in variable.slots:
@@ -67,30 +71,31 @@ def _unit(q: Expr) -> Expr:
     return q / ca.norm_2(q)
 
 
-def _spread_inputs(problem: Problem, variable: Variable, inputs: Sequence[str], part: Expr) -> Expr:
+def _spread_inputs(problem: Problem, variable: Variable, columns: Mapping[str, slice], part: Expr) -> Expr:
     """(nu, N): a control's knots as inputs of every step, in the rows that its slots name."""
     count = variable.guess.size // variable.knots
-    place = ca.DM(3 * len(inputs), count)
+    place = ca.DM(max(column.stop for column in columns.values()), count)
     for slot in variable.slots:
         for k, component in enumerate(slot.components):
-            place[3 * list(inputs).index(slot.name) + component, k] = 1
+            place[columns[slot.name].start + component, k] = 1
     knots = ca.reshape(part, count, variable.knots)
-    weights = knot_weights(variable.knots, problem.simulation.steps, variable.interpolation)
+    when = START if all(slot.name.endswith(".command") for slot in variable.slots) else MIDDLE
+    weights = knot_weights(variable.knots, problem.simulation.steps, variable.interpolation, when)
     return ca.mtimes(ca.mtimes(place, knots), weights)
 
 
-def knot_weights(knots: int, steps: int, interpolation: str) -> Expr:
-    """(knots, steps) sparse: the share of each knot in each step, at the step's middle.
+def knot_weights(knots: int, steps: int, interpolation: str, when: float = MIDDLE) -> Expr:
+    """(knots, steps) sparse: the share of each knot in each step, at this part of it.
 
     "constant": the horizon is cut into equal parts, one a knot. "linear": knots lie at equal distances from the
     start to the end of the horizon, values between them are interpolated.
     """
-    middle = (np.arange(steps) + 0.5) / steps
+    middle, at = ((np.arange(steps) + part) / steps for part in (MIDDLE, when))
     columns = np.arange(steps)
     if interpolation == "constant" or knots == 1:
         rows = np.minimum((middle * knots).astype(int), knots - 1)
         return ca.DM.triplet(rows.tolist(), columns.tolist(), ca.DM.ones(steps), knots, steps)
-    place = middle * (knots - 1)
+    place = at * (knots - 1)
     left = np.minimum(place.astype(int), knots - 2)
     share = place - left
     rows = np.concatenate([left, left + 1])

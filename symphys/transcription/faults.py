@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.problem import Constraint, Cost, Target
-from symphys.state import Layout
-from symphys.transcription.along import Rollout, formula_moves
+from symphys.state import Layout, input_columns
+from symphys.transcription.along import Rollout
 from symphys.transcription.blame import Blame, blame
 
 Array = NDArray[np.float64]
@@ -129,7 +129,7 @@ def _instants(rollout: Rollout) -> Iterator[tuple[str, Asked, int, int]]:
             continue
         if kind == "cost":
             yield from ((kind, asked, k, k) for k in range(steps))
-        if kind == "constraint" or formula_moves(asked.formula):
+        if kind == "constraint" or rollout.moves(asked.formula):
             yield from ((kind, asked, k, k - 1) for k in range(1, steps + 1))
 
 
@@ -141,7 +141,8 @@ def _argument_names(rollout: Rollout) -> tuple[Columns, Columns, Columns]:
     """Of x, u and p; components of one quantity share its name."""
     layout = Layout(rollout.world)
     states = [layout.owner(column) for column in range(layout.size)]
-    inputs = [name for name in rollout.inputs for _ in range(3)]
+    columns = input_columns(rollout.world, rollout.inputs)
+    inputs = [name for name, part in columns.items() for _ in range(part.start, part.stop)]
     known = rollout.parameters
     sizes = zip(known.names, known.symbols, strict=True)
     return states, inputs, [name for name, symbol in sizes for _ in range(symbol.shape[0])]

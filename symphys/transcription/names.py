@@ -10,7 +10,8 @@ import casadi as ca
 
 from symphys.expression import Formula
 from symphys.problem import Problem, Variable
-from symphys.state import GIVEN, Layout
+from symphys.state import GIVEN, Layout, input_columns, input_sizes, inputs_size
+from symphys.step import joint_quantities, joint_quantity_names
 from symphys.world import World
 
 Expr = Any
@@ -56,7 +57,7 @@ def varied_parameters(problem: Problem) -> Parameters:
 
 
 def input_names(problem: Problem) -> tuple[str, ...]:
-    """The forces and torques that some variable sets, in the order of first mention."""
+    """The forces, torques and commands that some variable sets, in the order of first mention."""
     return tuple(dict.fromkeys(slot.name for v in problem.variables if v.kind == "control" for slot in v.slots))
 
 
@@ -66,12 +67,14 @@ def compile_formula(
     """A formula as a casadi function of (x, u, p, time, z)."""
     at = Instant(
         ca.SX.sym("x", Layout(world).size),
-        ca.SX.sym("u", 3 * len(inputs)),
+        ca.SX.sym("u", inputs_size(world, inputs)),
         ca.vertcat(ca.SX(0, 1), *parameters.symbols),
         ca.SX.sym("time"),
         ca.SX.sym("z", n),
     )
     names = _namespace(problem, world, inputs, parameters, at)
+    if not formula.names.isdisjoint(joint_quantity_names(world)):
+        names.update(joint_quantities(world, at.x))
     value = formula.evaluate({name: names[name] for name in formula.names})
     return ca.Function("formula", at.arguments(), [ca.SX(value)])
 
@@ -83,13 +86,19 @@ def _namespace(
     names: dict[str, Expr] = {"time": at.time}
     for body in world.bodies:
         names.update({f"{body.name}.{field}": at.x[layout[f"{body.name}.{field}"]] for field in GIVEN})
-        names.update({f"{body.name}.{field}": ca.SX.zeros(3) for field in ("force", "torque")})
-    names.update({name: at.u[3 * i : 3 * i + 3] for i, name in enumerate(inputs)})
+    names.update({name: ca.SX.zeros(size) for name, size in input_sizes(world).items()})
+    names.update({name: at.u[part] for name, part in input_columns(world, inputs).items()})
     names.update({name: ca.DM(value) for name, value in problem.parameters.items()})
     names.update(zip(parameters.names, parameters.symbols, strict=True))
     for variable, (start, stop) in zip(problem.variables, spans(problem.variables), strict=True):
         names[variable.name] = at.z[start:stop]
     return names
+
+
+def moving_names(world: World) -> frozenset[str]:
+    """The names that change within a step."""
+    states = {f"{body.name}.{field}" for body in world.bodies for field in GIVEN}
+    return frozenset({"time", *states, *joint_quantity_names(world)})
 
 
 def spans(variables: Sequence[Variable]) -> list[tuple[int, int]]:

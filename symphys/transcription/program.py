@@ -11,7 +11,7 @@ from symphys.expression import Formula
 from symphys.kernel import Call, Layout, Place, Program
 from symphys.state import Layout as Columns
 from symphys.step import Slot, record_step
-from symphys.transcription.along import Rollout, formula_moves
+from symphys.transcription.along import Rollout
 from symphys.transcription.decision import start_of
 from symphys.transcription.terms import Terms, terms
 
@@ -57,7 +57,7 @@ class Samples:
     def over_steps(self, formula: Formula) -> Expr:
         """(m, N or 2N): see ``Rollout.over_steps``."""
         before = self._series(formula, 0)
-        return ca.horzcat(before, self.after_steps(formula)) if formula_moves(formula) else before
+        return ca.horzcat(before, self.after_steps(formula)) if self.rollout.moves(formula) else before
 
     def _series(self, formula: Formula, shift: int) -> Expr:
         function = self.rollout.compiled(formula)

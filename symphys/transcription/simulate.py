@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.rollout import roll_out
-from symphys.state import GIVEN, Layout
-from symphys.step import report_function
+from symphys.state import GIVEN, Layout, input_columns
+from symphys.step import reading_function, report_function
 from symphys.trajectory import NotFinite, Trajectory
 from symphys.transcription.along import Rollout
 from symphys.transcription.faults import Course, first_fault
@@ -39,7 +39,7 @@ def simulate(rollout: Rollout, record: ca.Function, z: Array, smoothing: float) 
     """The rollout of z; NotFinite, which says where and why, if it has none."""
     x, u, p, *happened = (np.array(part).T for part in record(z, smoothing))
     course = Course(np.asarray(z, float), smoothing, x, u, p.ravel())
-    motion = _trajectory(rollout, x, u, *happened)
+    motion = _trajectory(rollout, x, u, p.ravel(), *happened)
     try:
         return Record(course, motion.require_finite())
     except NotFinite as error:
@@ -47,11 +47,13 @@ def simulate(rollout: Rollout, record: ca.Function, z: Array, smoothing: float) 
 
 
 def _trajectory(
-    rollout: Rollout, x: Array, u: Array, forces: Array, gaps: Array, residual: Array, crowded: Array
+    rollout: Rollout, x: Array, u: Array, p: Array, forces: Array, gaps: Array, residual: Array, crowded: Array
 ) -> Trajectory:
     world, steps = rollout.world, rollout.steps
     layout = Layout(world)
-    bodies = {field: _stack([x[:, layout[f"{b.name}.{field}"]] for b in world.bodies]) for field in GIVEN}
+    bodies: dict[str, Any] = {
+        field: _stack([x[:, layout[f"{body.name}.{field}"]] for body in world.bodies]) for field in GIVEN
+    }
     return Trajectory(
         time=np.arange(steps + 1, dtype=np.float64) * rollout.dt,
         body_names=tuple(body.name for body in world.bodies),
@@ -63,6 +65,7 @@ def _trajectory(
         contact_gap=np.concatenate([gaps, gaps[-1:]]),
         residual=residual.ravel(),
         crowded=crowded.ravel(),
+        **_joints(rollout, x, p),
     )
 
 
@@ -70,8 +73,34 @@ def _stack(parts: list[Any]) -> Array:
     return np.stack(parts, axis=1)
 
 
+def _joints(rollout: Rollout, x: Array, p: Array) -> dict[str, Any]:
+    """The fields of joints."""
+    joints = rollout.world.joints
+    counts = [len(joint.kind.coordinates) for joint in joints]
+    read = reading_function(rollout.world, rollout.parameters.symbols).map(rollout.steps + 1)
+    *parts, separation = (np.array(part).T for part in read(x.T, np.tile(p[:, None], rollout.steps + 1)))
+    value, rate, torque = (_split(part, counts) for part in parts)
+    return {
+        "joint_names": tuple(joint.name for joint in joints),
+        "joint_value": value,
+        "joint_rate": rate,
+        "joint_torque": torque[1:],
+        "joint_separation": separation,
+    }
+
+
+def _split(columns: Array, counts: list[int]) -> Array:
+    """(N, J, K): the coordinates of all joints side by side, by joint."""
+    apart = np.full((len(columns), len(counts), max(counts, default=0)), np.nan)
+    start = 0
+    for j, count in enumerate(counts):
+        apart[:, j, :count] = columns[:, start : start + count]
+        start += count
+    return apart
+
+
 def _applied(rollout: Rollout, u: Array, field: str) -> Array:
     """(N, B, 3): the inputs of this kind, zero for bodies without any."""
     zero = np.zeros((rollout.steps, 3))
-    columns = {name: u[:, 3 * i : 3 * i + 3] for i, name in enumerate(rollout.inputs)}
+    columns = {name: u[:, part] for name, part in input_columns(rollout.world, rollout.inputs).items()}
     return _stack([columns.get(f"{body.name}.{field}", zero) for body in rollout.world.bodies])

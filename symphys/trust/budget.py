@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from symphys import rotation
 from symphys.motion import momentum
-from symphys.state import Layout
+from symphys.state import Layout, input_columns, inputs_size
 from symphys.trajectory import Trajectory
 from symphys.transcription import Record, Rollout
 from symphys.trust.bodies import bodies, parameters
 from symphys.trust.contacts import acting, touching
 from symphys.trust.growth import samples
+from symphys.trust.joints import floating, joint_work, uncounted
 
 Array = NDArray[np.float64]
 Expr = Any
@@ -35,19 +36,23 @@ def budget(rollout: Rollout, record: Record) -> dict[str, Any]:
 
     Returns:
         "energy": at some 400 instants "time" [s], "kinetic" and "potential" [J] (0 at the origin), and up to then
-        "applied", the work of applied forces and torques, and "contact", what contacts gave (negative: took) [J].
+        "applied", the work of applied forces and torques, motors and springs, and "contact", what contacts, limits of
+        joints and joints that give way gave (negative: took) [J].
         "gains": the steps in which rigid contacts gave most, each with "step", "time" [s], "energy" [J], "contacts";
         steps in which a soft contact acts are left out, since it gives back what it has stored. "gained" [J]: the sum
         of all such steps. "drift" [J]: the largest change in a step that neither forces nor contacts account for.
         "momentum": the largest part of a body's linear momentum that impulses of gravity, forces and contacts leave
-        unexplained in a step, relative to the largest momentum or impulse; rounding, if the engine is right.
+        unexplained in a step, relative to the largest momentum or impulse; rounding, if the engine is right. Bodies
+        that joints hold together count as one; those that are held by the world are left out.
     """
     motion = record.motion
     kinetic, potential, applied = _energies(rollout, record)
+    applied += joint_work(rollout, record)
     surplus = np.diff(kinetic + potential) - applied
-    touched = np.abs(motion.contact_force).sum(axis=(1, 2)) > 0
+    by_joints = uncounted(rollout, record)
+    touched = (np.abs(motion.contact_force).sum(axis=(1, 2)) > 0) | by_joints
     contact = np.where(touched, surplus, 0.0)
-    gains = np.where(_rigid_alone(rollout, motion), contact, 0.0)
+    gains = np.where(_rigid_alone(rollout, motion) & ~by_joints, contact, 0.0)
     floor = GAIN * kinetic.max() + 1e-12 * np.abs(potential).max()
     gains = np.where(gains > floor, gains, 0.0)
     first = np.argsort(-gains, kind="stable")[:MOST_GAINS]
@@ -61,7 +66,7 @@ def budget(rollout: Rollout, record: Record) -> dict[str, Any]:
 
 
 def momentum_gap(rollout: Rollout, record: Record) -> float:
-    """The largest unexplained change of a body's momentum in a step; see ``budget``.
+    """The largest unexplained change of momentum in a step, of bodies or what hangs together; see ``budget``.
 
     Momenta are those of the leapfrog: without what persistent forces, half a step ahead, have done already.
     """
@@ -70,8 +75,12 @@ def momentum_gap(rollout: Rollout, record: Record) -> float:
     memory = np.stack([x[:, layout[f"{name}.reaction_force"]] for name in motion.body_names], axis=1)
     held = numbers.mass[:, None] * motion.velocity - x[:, layout["lag"], None] * memory
     impulses = dt * (numbers.mass[:, None] * numbers.gravity + motion.force + contact_forces(rollout, motion))
+    groups = floating(rollout)
+    held, impulses = (
+        np.stack([of[:, g].sum(axis=1) for g in groups], axis=1) if groups else of[:, :0] for of in (held, impulses)
+    )
     gap = np.diff(held, axis=0) - impulses
-    size = max(np.abs(held).max(), np.abs(impulses).max())
+    size = max(np.abs(held).max(initial=0.0), np.abs(impulses).max(initial=0.0))
     return float(np.abs(gap).max() / size) if size > 0 else 0.0
 
 
@@ -89,9 +98,9 @@ def _energies(rollout: Rollout, record: Record) -> tuple[Array, Array, Array]:
     """Kinetic and potential energy (N + 1,) and the work of applied forces in each step (N,) [J]."""
     world, layout, p = rollout.world, Layout(rollout.world), parameters(rollout)
     x, after = ca.SX.sym("x", layout.size), ca.SX.sym("after", layout.size)
-    u = ca.SX.sym("u", 3 * len(rollout.inputs))
+    u = ca.SX.sym("u", inputs_size(world, rollout.inputs))
     kinetic, potential, work = ca.SX(0), ca.SX(0), ca.SX(0)
-    given = {name: u[3 * i : 3 * i + 3] for i, name in enumerate(rollout.inputs)}
+    given = {name: u[part] for name, part in input_columns(world, rollout.inputs).items()}
     for body in world.bodies:
         at = {field: x[layout[f"{body.name}.{field}"]] for field in ("position", "orientation", "velocity")}
         spin = x[layout[f"{body.name}.angular_velocity"]]

@@ -48,6 +48,20 @@ def test_shapes_are_there() -> None:
     assert terrain["properties"]["heights"]["items"]["items"] == {"type": "number"}
 
 
+def test_joints_are_there() -> None:
+    schema = json_schema()
+    joint = definition(schema, schema["properties"]["joint"]["items"])
+    assert joint["required"] == ["name", "between"]
+    assert {"ball", "hinge", "slider", "universal", "fixed", "point", "anchors", "motor", "spring"} <= set(
+        joint["properties"]
+    )
+    assert all("description" in key for key in joint["properties"].values())
+    motor = definition(schema, joint["properties"]["motor"])
+    servo = definition(schema, motor["properties"]["servo"])
+    assert servo["required"] == ["gain", "torque", "velocity"]
+    assert servo["properties"]["torque"]["exclusiveMinimum"] == 0
+
+
 def test_ground_may_be_left_out_but_is_no_null() -> None:
     text = json.dumps(json_schema(), allow_nan=False)
     assert '"null"' not in text

@@ -17,6 +17,7 @@ SHIPPED = [
     "bank_shot",
     "basket",
     "bowling",
+    "cart_pole",
     "juggle",
     "knock",
     "parcel",

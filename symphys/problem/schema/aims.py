@@ -30,11 +30,11 @@ class VariableTable(Table):
 
     name: Identifier = Field(description="how formulas and results refer to it")
     sets: Texts = Field(
-        description='what it sets: "ball.velocity", "ball.force[0:2]", "ground.friction", or a list; '
+        description='what it sets: "ball.velocity", "ball.force[0:2]", "knee.command", "ground.friction", or a list; '
         "an orientation (w, x, y, z) is normalised"
     )
     guess: Numbers | None = Field(
-        default=None, description="where solvers start; default: what the file says (forces: 0)"
+        default=None, description="where solvers start; default: what the file says (forces and commands: 0)"
     )
     lower: Bounds | None = Field(default=None, description="default: none, or what is physical")
     upper: Bounds | None = Field(default=None, description="default: none, or what is physical")
@@ -45,8 +45,10 @@ class VariableTable(Table):
         default=None,
         description="standard deviation with which seeds above 0 perturb the guess; default: a tenth of scale",
     )
-    knots: Knots = Field(default=1, description="for forces and torques: number of values over the duration")
-    interpolation: Interpolation = Field(default="constant", description="of forces and torques between knots")
+    knots: Knots = Field(default=1, description="for forces, torques and commands: number of values over the duration")
+    interpolation: Interpolation = Field(
+        default="constant", description="of forces, torques and commands between knots"
+    )
 
 
 class CostTable(Table):

@@ -71,6 +71,19 @@ def vector(count: int) -> Callable[[object], list[float]]:
     return check
 
 
+def ends(value: object) -> list[float]:
+    """A lower and an upper bound; either may be infinite."""
+    if not isinstance(value, list) or len(value) != 2:
+        raise fault(f"must be two numbers, [lower, upper], not {shown(value)}")
+    for item in value:
+        if not is_number(item, bound=True):
+            raise fault(f"must be two numbers, [lower, upper]; one is {shown(item)}; -inf or inf is no bound")
+    low, high = (float(item) for item in value)
+    if low == math.inf or high == -math.inf or low > high:
+        raise fault(f"the lower end, {low:g}, must not be above the upper, {high:g}; [-inf, inf] is no bound at all")
+    return [low, high]
+
+
 def positive(count: int) -> Callable[[object], list[float]]:
     """A list of ``count`` positive finite numbers."""
 

@@ -7,6 +7,7 @@ from typing import Any
 from pydantic import Field
 
 from symphys.problem.schema.aims import ConstraintTable, CostTable, ObjectiveTable, TargetTable, VariableTable
+from symphys.problem.schema.joints import JointTable
 from symphys.problem.schema.physics import (
     BlockTable,
     BodyTable,
@@ -35,6 +36,7 @@ class Document(Table):
     terrain: list[TerrainTable] = Field(default=[])
     contact: ContactTable = ContactTable()
     pair: list[PairTable] = Field(default=[])
+    joint: list[JointTable] = Field(default=[])
     variable: list[VariableTable] = Field(default=[])
     cost: list[CostTable] = Field(default=[])
     target: list[TargetTable] = Field(default=[])

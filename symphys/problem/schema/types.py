@@ -52,6 +52,7 @@ NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
 Vector = Annotated[list[float], PlainValidator(checks.vector(3)), WithJsonSchema(vector_schema(3))]
 Pair = Annotated[list[float], PlainValidator(checks.vector(2)), WithJsonSchema(vector_schema(2))]
+Ends = Annotated[list[float], PlainValidator(checks.ends), WithJsonSchema(vector_schema(2))]
 Size = Annotated[list[float], PlainValidator(checks.positive(3)), WithJsonSchema(positive_schema(3))]
 Length = Annotated[float, PlainValidator(checks.length), WithJsonSchema({"type": "number", "exclusiveMinimum": 0})]
 Spacing = Annotated[

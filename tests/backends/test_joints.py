@@ -1,0 +1,124 @@
+"""Joints: a compiled kernel gives what casadi does, values and gradients."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pytest
+from toys import require
+
+from symphys.problem import load_problem
+from symphys.transcription import Transcription, transcribe
+
+LEG = """
+[simulation]
+duration = 0.3
+dt = 0.01
+sweeps = 3
+cuts = 0
+
+[[body]]
+name = "hull"
+shape = { box = { size = [0.3, 0.2, 0.1] } }
+mass = 2.0
+position = [0, 0, 0.57]
+
+[[body]]
+name = "thigh"
+shape = { capsule = { radius = 0.04, length = 0.2 } }
+mass = 1.0
+position = [0, 0, 0.42]
+
+[[body]]
+name = "shin"
+shape = { capsule = { radius = 0.03, length = 0.2 } }
+mass = 0.5
+position = [0, 0, 0.16]
+
+[ground]
+friction = 0.6
+
+[[pair]]
+between = ["hull", "shin"]
+collide = false
+
+[[joint]]
+name = "rail"
+between = ["world", "hull"]
+slider = { axis = [0, 0, 1] }
+
+[[joint]]
+name = "hip"
+between = ["hull", "thigh"]
+universal = { axes = [[0, 1, 0], [1, 0, 0]] }
+point = [0, 0, 0.54]
+motor = { velocity = { torque = 5, velocity = 6 } }
+limits_deg = [-40, 60]
+
+[[joint]]
+name = "knee"
+between = ["thigh", "shin"]
+hinge = { axis = [0, 1, 0] }
+point = [0, 0, 0.29]
+motor = { servo = { gain = 20, torque = 30, velocity = 8 } }
+limits_deg = [-90, 5]
+spring = { stiffness = 5, damping = 0.1 }
+
+[[variable]]
+name = "bend"
+sets = "knee.command"
+knots = 3
+guess = [-0.2, -0.5, 0.1]
+spread = 0.1
+
+[[variable]]
+name = "swing"
+sets = "hip.command"
+guess = [0.5, 0.3]
+spread = 0.2
+
+[[variable]]
+name = "stiff"
+sets = "knee.stiffness"
+
+[[variable]]
+name = "fall"
+sets = ["hull.velocity[2]", "thigh.velocity[2]", "shin.velocity[2]"]
+guess = -1.5
+
+[[target]]
+name = "place"
+value = "[hull.position[2] - 0.4, hip.angle, 0.1 * knee.rate]"
+tolerance = 0.1
+
+[[cost]]
+name = "effort"
+at = "always"
+squares = "knee.torque"
+weight = 0.01
+"""
+
+
+@cache
+def leg(backend: str) -> Transcription:
+    require(backend)
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "leg.toml"
+        file.write_text(LEG, encoding="utf-8")
+        return transcribe(load_problem(file), backend=backend, threads=1)
+
+
+@pytest.mark.parametrize("smoothing", [0.0, 1e-3])
+def test_a_kernel_gives_what_casadi_does(smoothing: float) -> None:
+    """Of a leg that lands on its foot, by commands, a stiffness and the speed of the fall."""
+    Z = np.array([leg("casadi").shooting.start(seed) for seed in range(3)])
+    exact, compiled = (leg(backend).shooting.evaluator.gradient(Z, smoothing) for backend in ("casadi", "simd"))
+    assert exact.gradient is not None
+    assert compiled.gradient is not None
+    assert compiled.merit == pytest.approx(exact.merit, rel=1e-9)
+    assert compiled.gradient == pytest.approx(exact.gradient, rel=1e-7, abs=1e-9 * np.abs(exact.gradient).max())
+    assert np.abs(exact.gradient).min() > 0
+    assert np.abs(leg("casadi").simulate(Z[0]).contact_force).max() > 0

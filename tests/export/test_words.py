@@ -1,0 +1,71 @@
+"""What the numbers of an exported problem with joints are: sizes and units."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from symphys.export import words
+from symphys.problem import load_problem
+from symphys.transcription.along import symbolic_rollout
+
+ARM = """
+[simulation]
+duration = 0.1
+dt = 0.01
+
+[[body]]
+name = "cart"
+mass = 1.0
+inertia = 0.1
+
+[[body]]
+name = "arm"
+mass = 1.0
+inertia = 0.1
+position = [0, 0, -0.5]
+
+[[joint]]
+name = "rail"
+between = ["world", "cart"]
+slider = { axis = [1, 0, 0] }
+motor = { torque = { torque = 5 } }
+
+[[joint]]
+name = "wrist"
+between = ["cart", "arm"]
+universal = { axes = [[0, 1, 0], [1, 0, 0]] }
+point = [0, 0, 0]
+motor = { servo = { gain = 5, torque = 5, velocity = 5 } }
+
+[[variable]]
+name = "push"
+sets = "rail.command"
+knots = 2
+
+[[variable]]
+name = "aim"
+sets = "wrist.command"
+
+[[variable]]
+name = "strong"
+sets = "wrist.torque"
+"""
+
+
+def test_commands_have_their_sizes_and_units(tmp_path: Path) -> None:
+    file = tmp_path / "arm.toml"
+    file.write_text(ARM, encoding="utf-8")
+    problem = load_problem(file)
+    rollout = symbolic_rollout(problem)
+    squeezed = [" ".join(line.split()) for line in words.decision_lines(problem) + words.input_lines(rollout)]
+    assert squeezed == [
+        "z[0..1] push: rail.command [N]; 2 knots, constant, one after the other",
+        "z[2..3] aim: wrist.command [rad]",
+        "z[4] strong: wrist.torque [N m]",
+        "u[0] rail.command [N]",
+        "u[1..2] wrist.command [rad]",
+    ]
+    states = [" ".join(line.split()) for line in words.state_lines(rollout)]
+    assert any(line.endswith("rail.motor [N]") for line in states)
+    assert any(line.endswith("wrist.motor [N m]") for line in states)
+    assert [" ".join(line.split()) for line in words.parameter_lines(rollout)] == ["p[0] wrist.torque [N m]"]
