@@ -2,7 +2,7 @@
 
 from symphys.step.coordinates import joint_quantities, joint_quantity_names, reading_function, readings
 from symphys.step.function import Recording, record_step, report_function, step_function
-from symphys.step.jointed import components
+from symphys.step.holding import components
 from symphys.step.probe import gap_function, slip_function
 from symphys.step.record import Piece, Slot
 

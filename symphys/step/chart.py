@@ -141,7 +141,7 @@ def dense(entries: Sparse, n: int) -> Expr:
 
 def body_momenta(linkage: Linkage, chart: Chart, rates: Rates) -> tuple[Momentum, ...]:
     """Of the bodies of a tree."""
-    numbers = ca.mtimes(chart.rates, rates.numbers)
+    numbers = apply(chart.rates, rates.numbers)
     amounts = {k: numbers[k] for k in range(linkage.size)}
     moving = screws.summed_down(linkage, chart.seen, amounts)
     found = []

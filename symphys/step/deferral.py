@@ -9,7 +9,7 @@ import casadi as ca
 
 from symphys.collide import Contact
 from symphys.step.impact import Cut, closes_fast
-from symphys.step.phase import bodies_of, expected_motions, look
+from symphys.step.paths import bodies_of, expected_motions, look
 from symphys.step.restitution import eccentric_bodies
 from symphys.step.scene import Scene, Setting, State
 from symphys.world import Law

@@ -14,8 +14,9 @@ from symphys.smooth import positive
 from symphys.step.impulse import ZERO
 from symphys.step.jointed import locks_at, make_trees, momenta_of
 from symphys.step.momentum import Momentum
+from symphys.step.paths import bodies_of, expected_motions, look
 from symphys.step.pgs import Solution
-from symphys.step.phase import Phase, bodies_of, expected_motions, look
+from symphys.step.phase import Phase
 from symphys.step.restitution import rebound
 from symphys.step.row import UNREACHED, ContactRow, Moving, at_touch, effective_masses, inverse_masses, make_sides
 from symphys.step.rows import width_of

@@ -40,7 +40,8 @@ class Limbs:
 
     def _following(self, index: int) -> dict[tuple[int, int], Expr]:
         """T of a limb, by (its index, the root's)."""
-        limb, found = self._limbs[index], {}
+        limb = self._limbs[index]
+        found: dict[tuple[int, int], Expr] = {}
         for j in self._root:
             right = {a: -self._rows[k][j] for a, k in enumerate(limb) if j in self._rows[k]}
             found |= {(limb[a], j): value for a, value in self._blocks[index].solve(right).items()}

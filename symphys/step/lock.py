@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.step.along import Along, Directions, kicked, speeds
+from symphys.step.elimination import Eliminated
 from symphys.step.row import Side
 
 Expr = Any
@@ -71,16 +72,8 @@ def in_world(axes: Expr, stored: Expr) -> Expr:
 
 
 def inverse(k: Expr) -> Expr:
-    """Of a symmetric positive definite (n, n) matrix, by Cholesky's factor, without pivots."""
+    """(n, n): of a mobility, which is not symmetric where impulses are given with other arms than seen."""
     n = k.size1()
-    upper = ca.SX(n, n)
-    for i in range(n):
-        upper[i, i] = ca.sqrt(k[i, i] - sum(upper[p, i] ** 2 for p in range(i)))
-        for j in range(i + 1, n):
-            upper[i, j] = (k[i, j] - sum(upper[p, i] * upper[p, j] for p in range(i))) / upper[i, i]
-    rows = ca.SX(n, n)  # of the inverse of the upper factor
-    for j in range(n):
-        rows[j, j] = 1 / upper[j, j]
-        for i in reversed(range(j)):
-            rows[i, j] = -sum(upper[i, p] * rows[p, j] for p in range(i + 1, j + 1)) / upper[i, i]
-    return ca.mtimes(rows, rows.T)
+    matrix = Eliminated([{j: k[i, j] for j in range(n)} for i in range(n)])
+    columns = (matrix.solve({j: ca.SX(1)}) for j in range(n))
+    return ca.horzcat(*(ca.vertcat(*(column[i] for i in range(n))) for column in columns))

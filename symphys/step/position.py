@@ -143,7 +143,7 @@ def _lasts(row: ContactRow, impulse: Impulse) -> Expr:
 def _displaced(shift: Shift, held: Held | None, along: Displaced) -> Shift:
     """A body's displacement with what pushes have added."""
     if held is not None and isinstance(along, Rates):
-        more = ca.mtimes(held.see, along.numbers)
+        more = apply(held.see, along.numbers)
         return Shift(shift.linear + more[:3], shift.angular + more[3:])
     if isinstance(along, Shift):
         return Shift(shift.linear + along.linear, shift.angular + along.angular)
@@ -192,7 +192,7 @@ def _push(
 
 def _pushed(side: Side, along: Displaced, step: Expr) -> Displaced:
     if isinstance(along, Rates) and side.reach is not None:
-        return Rates(along.numbers + side.sign * ca.mtimes(side.reach.push, step))
+        return Rates(along.numbers + side.sign * apply(side.reach.push, step))
     assert isinstance(along, Shift)
     turn = apply(side.inverse_inertia, ca.cross(side.arm, step))
     return Shift(along.linear + side.sign * side.inverse_mass * step, along.angular + side.sign * turn)
@@ -216,7 +216,7 @@ def _relative(row: LockRow | AxisRow, moved: Shifts) -> Expr:
 
 def _fit_all(pieces: Pieces, locks: tuple[Row, ...], state: tuple[Shifts, Momenta]) -> tuple[Shifts, Momenta]:
     """One pass over what joints lock."""
-    shifts, made = map(list, state)
+    shifts, made = list(state[0]), list(state[1])
     for each in locks:
         own = tuple(shifts[i] for i in each.bodies), tuple(made[i] for i in each.bodies)
         for i, shift, momentum in zip(each.bodies, *pieces.do(_fit, each.row, *own), strict=True):

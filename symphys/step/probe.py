@@ -10,7 +10,7 @@ import casadi as ca
 from symphys.collide import Contact
 from symphys.state import Layout
 from symphys.step.function import arguments_of, parts_of
-from symphys.step.phase import bodies_of, expected_motions, look
+from symphys.step.paths import bodies_of, expected_motions, look
 from symphys.step.pieces import Inline
 from symphys.step.row import Moving, at_touch
 from symphys.step.scene import Scene, make_scene

@@ -92,8 +92,10 @@ def _largest_share(sums: tuple[Expr, Expr, Expr]) -> Expr:
 def _between_states(share: Expr, plastic: Moved, newton: Moved) -> Moved:
     if plastic is None or newton is None:
         return None
-    if isinstance(plastic, Rates) or isinstance(newton, Rates):
+    if isinstance(plastic, Rates):
+        assert isinstance(newton, Rates)
         return Rates(plastic.numbers + share * (newton.numbers - plastic.numbers))
+    assert isinstance(newton, Momentum)
     return Momentum(
         plastic.velocity + share * (newton.velocity - plastic.velocity),
         plastic.angular + share * (newton.angular - plastic.angular),

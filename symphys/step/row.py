@@ -116,8 +116,8 @@ def mobilities(sides: Sequence[Side], same: bool) -> tuple[Expr, Expr]:
         for j, other in enumerate(sides):
             if other.reach is not None and (same or i == j):
                 sign = side.sign * other.sign
-                push += sign * ca.mtimes(side.reach.see, other.reach.push)
-                twist += sign * ca.mtimes(side.reach.spin, other.reach.twist)
+                push += sign * apply(side.reach.see, other.reach.push)
+                twist += sign * apply(side.reach.spin, other.reach.twist)
     return push, twist
 
 

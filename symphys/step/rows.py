@@ -41,14 +41,7 @@ LOADED = 1e-3
 
 
 def prepare(
-    setting: Setting,
-    law: Law,
-    contact: Contact,
-    motions: Moving,
-    duration: Expr,
-    spared: Expr,
-    force: Expr,
-    same: bool,
+    setting: Setting, law: Law, contact: Contact, motions: Moving, duration: Expr, spared: Expr, force: Expr, same: bool
 ) -> ContactRow:
     """The row of one contact over a stretch of time.
 
