@@ -95,10 +95,10 @@ def test_figures_are_files_too(run_dir: Path) -> None:
     )
 
 
-def test_knots_and_controls_are_drawn(made: Path, tmp_path: Path) -> None:
-    page = Page(read(made / "two_balls" / "gradient-seed0"))
+def test_knots_and_controls_are_drawn(batch: Path) -> None:
+    page = Page(read(batch / "two_balls" / "gradient-seed0"))
     assert "push: 480 knots of 2 components" in page.text
-    assert {"controls.svg", "variables.svg"} <= {p.name for p in (made / "two_balls/gradient-seed0/figures").iterdir()}
+    assert {"controls.svg", "variables.svg"} <= {p.name for p in (batch / "two_balls/gradient-seed0/figures").iterdir()}
 
 
 def test_remade_page_is_the_same(run_dir: Path) -> None:
@@ -167,8 +167,8 @@ def test_every_file_but_the_result_may_be_broken(run_dir: Path, content: bytes) 
     assert "trajectory.npz: not an archive of plain arrays" in text
 
 
-def test_run_without_motion_says_so(made: Path) -> None:
-    text = Page(read(made / "ball_throw" / "ipopt-seed0")).text
+def test_run_without_motion_says_so(batch: Path) -> None:
+    text = Page(read(batch / "ball_throw" / "ipopt-seed0")).text
     assert "Not solved" in text
     assert "not a finite number" in text
     assert "start from a slower throw" in text
