@@ -22,6 +22,8 @@ Expr = Any
 Moving = tuple[Motion, ...]
 """The motions of the sides that can move: of the first, or of both."""
 
+HELD = 1e-9
+"""Of a body's own mobility: what it keeps in directions in which joints do not let it move."""
 UNREACHED = -1e6
 """[m/s] a normal velocity that no row reaches: it gives no impulse."""
 
@@ -108,11 +110,14 @@ def mobilities(sides: Sequence[Side], same: bool) -> tuple[Expr, Expr]:
     """(3, 3) each: relative velocity for unit impulses at the point, relative spin for unit torque impulses."""
     push, twist = ca.SX.zeros(3, 3), ca.SX.zeros(3, 3)
     for i, side in enumerate(sides):
+        inverse = apply(side.inverse_inertia, ca.SX.eye(3))
         if side.reach is None:
-            inverse, arm = apply(side.inverse_inertia, ca.SX.eye(3)), cross_matrix(side.arm)
+            arm = cross_matrix(side.arm)
             push += side.inverse_mass * ca.SX.eye(3) - ca.mtimes(arm, ca.mtimes(inverse, arm))
             twist += inverse
             continue
+        push += HELD * side.inverse_mass * ca.SX.eye(3)
+        twist += HELD * inverse
         for j, other in enumerate(sides):
             if other.reach is not None and (same or i == j):
                 sign = side.sign * other.sign
