@@ -95,7 +95,7 @@ def columns(study: Study) -> list[Column]:
 
 def built(run: Run) -> float:
     """[s] before the solve: build and compile."""
-    return run.effort.seconds.get("build", math.nan) + float(np.nan_to_num(run.effort.seconds.get("compile", 0.0)))
+    return run.effort.seconds.get("build", math.nan) + run.effort.seconds.get("compile", 0.0)
 
 
 LEAST_IS_BEST = ("work in rollouts", "solve")

@@ -76,6 +76,6 @@ def draw_components(axes: Axes, time: Array, values: Array) -> None:
     style.set_linear(axes, "x")
     style.set_linear(axes, "y")
     axes.margins(x=0.01, y=0.08)
-    flat = np.nan_to_num(values[np.isfinite(values)])
+    flat = values[np.isfinite(values)]
     if flat.size and np.ptp(flat) < 1e-9 * max(1.0, float(np.abs(flat).max())):
         axes.set_ylim(flat[0] - 1, flat[0] + 1)

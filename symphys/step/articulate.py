@@ -26,7 +26,7 @@ Wrench = tuple[Expr, Expr]
 
 
 def accelerations(
-    linkage: Linkage, joints: screws.Held, motions: Sequence[Motion], wrenches: Sequence[Wrench]
+    linkage: Linkage, joints: screws.Joints, motions: Sequence[Motion], wrenches: Sequence[Wrench]
 ) -> tuple[Wrench, ...]:
     """Of the bodies of a tree, from their poses and velocities and all forces but the joints'."""
     origin, now = motions[0].position, ca.SX(0)
@@ -59,7 +59,7 @@ def accelerations(
 
 def consistent(
     linkage: Linkage,
-    joints: screws.Held,
+    joints: screws.Joints,
     inertials: Sequence[tuple[Expr, Expr]],
     poses: Sequence[tuple[Expr, Expr]],
     momenta: Sequence[Momentum],
@@ -90,7 +90,7 @@ def _matrix(
     return Eliminated(screws.mass_matrix(linkage, inertias, along, along))
 
 
-def _biases(linkage: Linkage, joints: screws.Held, along: Sequence[Expr], rates: dict[int, Expr]) -> list[Expr]:
+def _biases(linkage: Linkage, joints: screws.Joints, along: Sequence[Expr], rates: dict[int, Expr]) -> list[Expr]:
     """(6,) rates of change of the bodies' screws while the coordinates' rates do not change."""
     moving = screws.summed_down(linkage, along, rates)
     found: list[Expr] = []

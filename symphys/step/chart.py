@@ -56,7 +56,7 @@ class Chart:
 
 def make_chart(
     linkage: Linkage,
-    joints: screws.Held,
+    joints: screws.Joints,
     reached: Sequence[bool],
     motions: Sequence[Motion],
     free: Sequence[Momentum],

@@ -70,14 +70,6 @@ class Limbs:
                     found[j] = found.get(j, 0) + columns[k] * share
         return found
 
-    def rates(self, numbers: Mapping[int, Expr]) -> dict[int, Expr]:
-        """The rates of all coordinates from (r, z)."""
-        found = dict(numbers)
-        for follows in self.follows:
-            for (k, j), share in follows.items():
-                found[k] = found.get(k, 0) + share * numbers[j]
-        return found
-
 
 def _renumbered(row: Sparse, indices: Sequence[int]) -> Sparse:
     return {a: row[k] for a, k in enumerate(indices) if k in row}

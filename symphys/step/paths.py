@@ -11,9 +11,9 @@ import casadi as ca
 from symphys.collide import Contact, collide
 from symphys.course import at_rest
 from symphys.joints import linkages
-from symphys.motion import BodyState, Motion, free_motion, inertia_matrix, momentum
+from symphys.motion import BodyState, Motion, free_motion, momentum
 from symphys.state import BODY_FIELDS
-from symphys.step.articulate import accelerations
+from symphys.step.articulate import accelerations, world_inertia
 from symphys.step.scene import Scene, State
 from symphys.world import Pair
 
@@ -62,7 +62,7 @@ def _wrench(motion: Motion) -> tuple[Expr, Expr]:
 def _as_held(motion: Motion, change: tuple[Expr, Expr], gravity: Expr) -> Motion:
     """The motion with the accelerations that joints leave."""
     turned, w = motion.rotation, motion.angular_velocity
-    tensor = ca.mtimes(turned, ca.mtimes(inertia_matrix(motion.inertia), turned.T))
+    tensor = world_inertia(motion.inertia, turned)
     torque = ca.mtimes(tensor, change[1]) + ca.cross(w, ca.mtimes(tensor, w))
     force = motion.mass * (change[0] - gravity)
     state = BodyState(motion.position, motion.orientation, motion.velocity, motion.momentum_k, force, torque)

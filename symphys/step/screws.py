@@ -20,7 +20,7 @@ from symphys.step.sockets import Sockets, sockets_on
 
 Expr = Any
 """casadi SX"""
-Held = Sequence[Joint | None]
+Joints = Sequence[Joint | None]
 """The joint of each link; None for a root that floats."""
 
 
@@ -39,7 +39,7 @@ def paths(linkage: Linkage) -> list[list[int]]:
     return found
 
 
-def screws(linkage: Linkage, joints: Held, courses: Sequence[Course], t: Expr, origin: Expr) -> list[Expr]:
+def screws(linkage: Linkage, joints: Joints, courses: Sequence[Course], t: Expr, origin: Expr) -> list[Expr]:
     """(6,) for each coordinate, at time t."""
     found: list[Expr] = []
     for link, joint, parent, course in zip(linkage.links, joints, parents(linkage), courses, strict=True):

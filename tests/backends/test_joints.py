@@ -2,16 +2,9 @@
 
 from __future__ import annotations
 
-from functools import cache
-from pathlib import Path
-from tempfile import TemporaryDirectory
-
 import numpy as np
 import pytest
-from toys import require
-
-from symphys.problem import load_problem
-from symphys.transcription import Transcription, transcribe
+from agreement import assert_kernel_gives_what_casadi_does, transcribed
 
 LEG = """
 [simulation]
@@ -102,23 +95,12 @@ weight = 0.01
 """
 
 
-@cache
-def leg(backend: str) -> Transcription:
-    require(backend)
-    with TemporaryDirectory() as folder:
-        file = Path(folder) / "leg.toml"
-        file.write_text(LEG, encoding="utf-8")
-        return transcribe(load_problem(file), backend=backend, threads=1)
-
-
 @pytest.mark.parametrize("smoothing", [0.0, 1e-3])
 def test_a_kernel_gives_what_casadi_does(smoothing: float) -> None:
     """Of a leg that lands on its foot, by commands, a stiffness and the speed of the fall."""
-    Z = np.array([leg("casadi").shooting.start(seed) for seed in range(3)])
-    exact, compiled = (leg(backend).shooting.evaluator.gradient(Z, smoothing) for backend in ("casadi", "simd"))
-    assert exact.gradient is not None
-    assert compiled.gradient is not None
-    assert compiled.merit == pytest.approx(exact.merit, rel=1e-9)
-    assert compiled.gradient == pytest.approx(exact.gradient, rel=1e-7, abs=1e-9 * np.abs(exact.gradient).max())
-    assert np.abs(exact.gradient).min() > 0
-    assert np.abs(leg("casadi").simulate(Z[0]).contact_force).max() > 0
+    assert_kernel_gives_what_casadi_does(LEG, smoothing)
+
+
+def test_the_leg_lands() -> None:
+    leg = transcribed(LEG, "casadi")
+    assert np.abs(leg.simulate(leg.shooting.start(0)).contact_force).max() > 0

@@ -2,16 +2,8 @@
 
 from __future__ import annotations
 
-from functools import cache
-from pathlib import Path
-from tempfile import TemporaryDirectory
-
-import numpy as np
 import pytest
-from toys import require
-
-from symphys.problem import load_problem
-from symphys.transcription import Transcription, transcribe
+from agreement import assert_kernel_gives_what_casadi_does
 
 YARD = """
 [simulation]
@@ -63,20 +55,6 @@ tolerance = 0.1
 """
 
 
-@cache
-def yard(backend: str) -> Transcription:
-    require(backend)
-    with TemporaryDirectory() as folder:
-        file = Path(folder) / "yard.toml"
-        file.write_text(YARD, encoding="utf-8")
-        return transcribe(load_problem(file), backend=backend, threads=1)
-
-
 @pytest.mark.parametrize("smoothing", [0.0, 1e-3])
 def test_a_kernel_gives_what_casadi_does(smoothing: float) -> None:
-    Z = np.array([yard("casadi").shooting.start(seed) for seed in range(3)])
-    exact, compiled = (yard(backend).shooting.evaluator.gradient(Z, smoothing) for backend in ("casadi", "simd"))
-    assert exact.gradient is not None and compiled.gradient is not None
-    assert compiled.merit == pytest.approx(exact.merit, rel=1e-9)
-    assert compiled.gradient == pytest.approx(exact.gradient, rel=1e-7, abs=1e-9 * np.abs(exact.gradient).max())
-    assert np.abs(exact.gradient).min() > 0
+    assert_kernel_gives_what_casadi_does(YARD, smoothing)
