@@ -38,6 +38,8 @@ squares of the residuals. smoothing [m/s] >= 0 rounds off contact; 0 is the exac
 def casadi_files(transcription: Transcription, version: str) -> dict[str, bytes]:
     """name -> content of every file."""
     functions = {"step": dense_step(transcription.rollout)}
+    if transcription.rollout.feedback is not None:
+        functions["control"] = transcription.rollout.feedback
     for name, results in RESULTS.items():
         function = getattr(transcription.functions, name)
         if function is not None:

@@ -15,7 +15,6 @@ import numpy as np
 from symphys.export import words
 from symphys.kernel import Layout, Program
 from symphys.kernel.plain import plain_source, table
-from symphys.step import step_function
 from symphys.transcription import Transcription, rollout_program
 from symphys.transcription.along import Rollout
 
@@ -49,9 +48,8 @@ def identifier(name: str) -> str:
 
 
 def dense_step(rollout: Rollout) -> ca.Function:
-    """The step of a rollout, a function (x, u, p, smoothing) -> x_next of dense vectors."""
-    scheme = rollout.problem.simulation.scheme()
-    step = step_function(rollout.world, scheme, rollout.inputs, rollout.parameters.symbols)
+    """The step of a rollout, a function (x, u, p, smoothing) -> x_next of dense vectors; controllers come before it."""
+    step = rollout.step
     arguments = step.sx_in()
     return ca.Function("step", arguments, [ca.densify(step(*arguments))], step.name_in(), step.name_out())
 

@@ -86,7 +86,9 @@ def _slot(problem: Problem, world: World, slot: Slot) -> str:
 def state_lines(rollout: Rollout) -> list[str]:
     """One line a quantity of the state."""
     layout, world = Layout(rollout.world), rollout.world
-    return _placed("x", [(layout[name].stop - layout[name].start, name + unit(name, world)) for name in layout.names()])
+    parts = [(name + unit(name, world), layout[name]) for name in layout.names()]
+    parts += [(f"{name}{unit(name, world)}, one step before", part) for name, part in rollout.memory.columns.items()]
+    return _placed("x", [(part.stop - part.start, text) for text, part in parts])
 
 
 def input_lines(rollout: Rollout) -> list[str]:

@@ -1,5 +1,6 @@
 """Problem files: reading, validation, and the model that everything after works with."""
 
+from symphys.problem.feedback import Controller, Sensor
 from symphys.problem.json_schema import json_schema
 from symphys.problem.load import load_problem
 from symphys.problem.model import Constraint, Cost, Problem, Simulation, Slot, Target, Variable
@@ -8,8 +9,10 @@ from symphys.problem.solvable import require_solvable
 
 __all__ = [
     "Constraint",
+    "Controller",
     "Cost",
     "Problem",
+    "Sensor",
     "Simulation",
     "Slot",
     "Target",

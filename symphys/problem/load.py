@@ -7,23 +7,26 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import casadi as ca
 from pydantic import ValidationError
 
 from symphys.problem.aims import Aims, read_aims
 from symphys.problem.bodies import read_body, read_state
 from symphys.problem.complaints import report
+from symphys.problem.controllers import read_controllers
 from symphys.problem.crowd import check_crowd
 from symphys.problem.faults import Faults, Place
 from symphys.problem.joints import read_joints
 from symphys.problem.meetings import Meetings
 from symphys.problem.model import NOTHING, Array, Problem
 from symphys.problem.plan import WorldPlan
-from symphys.problem.quantities import quantities
+from symphys.problem.quantities import quantities, weight_quantities
 from symphys.problem.schema import Document
+from symphys.problem.sensors import read_sensors
 from symphys.problem.settings import apply_settings
 from symphys.problem.simulation import read_simulation
 from symphys.problem.source import parse_toml, read_source
-from symphys.problem.start import at_guess, check_joints, check_overlap, formula_names
+from symphys.problem.start import at_guess, check_joints, check_overlap, formula_names, sensor_names
 from symphys.problem.statics import read_statics
 from symphys.problem.surfaces import (
     check_laws,
@@ -36,17 +39,20 @@ from symphys.problem.variables import read_variables
 from symphys.state import input_sizes
 
 MEMBERS = ("body", "plane", "block", "terrain")
-SHARED_NAMES = (*MEMBERS, "joint", "variable")
+SHARED_NAMES = (*MEMBERS, "joint", "sensor", "controller", "variable")
 OWN_NAMES = ("cost", "target", "constraint")
 
 
-def load_problem(path: str | Path, settings: Mapping[str, object] = NOTHING) -> Problem:
+def load_problem(
+    path: str | Path, settings: Mapping[str, object] = NOTHING, functions: Mapping[str, ca.Function] = NOTHING
+) -> Problem:
     """Read and validate a problem file.
 
     Args:
         path: the TOML file.
         settings: values that replace those in the file, by dotted key: ``simulation.dt``, ``body.ball.mass`` or
             ``body.0.mass``, ``ground.friction``, ``solver.gradient.iterations``, ``target.<name>.tolerance``.
+        functions: for controllers with ``function``, by name: casadi functions of (sensed, time, weights).
 
     Raises:
         ProblemError: names the file and every fault found, each with table, key and what would be valid.
@@ -57,7 +63,7 @@ def load_problem(path: str | Path, settings: Mapping[str, object] = NOTHING) -> 
     apply_settings(data, settings, str(path))
     faults = Faults(str(path), data)
     document = read_document(data, faults)
-    return build(path, text, document, faults)
+    return build(path, text, document, faults, functions)
 
 
 def read_document(data: Mapping[str, Any], faults: Faults) -> Document:
@@ -96,13 +102,20 @@ def groups(document: Document) -> list[tuple[Place, str]]:
     return [((*place, "group"), table.group) for place, table in (*members, *ground) if table.group is not None]
 
 
-def build(path: Path, text: str, document: Document, faults: Faults) -> Problem:
+def build(
+    path: Path, text: str, document: Document, faults: Faults, functions: Mapping[str, ca.Function] = NOTHING
+) -> Problem:
     """The problem; each stage needs the ones before without fault."""
     simulation = read_simulation(document.simulation, faults)
     plan, initial = read_plan(document, faults)
     faults.stop_if_any()
     check_laws(plan, faults)
     known = quantities(initial, plan.parameters(), input_sizes(plan.world({})))
+    sensors = read_sensors(document.sensor, sensor_names(plan, at_guess(known, ())), faults)
+    faults.stop_if_any()
+    controllers = read_controllers(document.controller, sensors, known, functions, faults)
+    faults.stop_if_any()
+    known |= weight_quantities(controllers)
     variables = read_variables(document.variable, known, simulation, faults)
     check_varied(plan, variables, faults)
     faults.stop_if_any()
@@ -126,6 +139,8 @@ def build(path: Path, text: str, document: Document, faults: Faults) -> Problem:
         goal=document.objective.goal,
         stop_when_met=stop_when_met(document, aims),
         solver_tables=document.solver,
+        sensors=sensors,
+        controllers=controllers,
     )
 
 

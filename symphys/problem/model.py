@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.expression import Formula
+from symphys.problem.feedback import Controller, Sensor
 from symphys.problem.plan import WorldPlan
 from symphys.world import Scheme, World
 
 Array = NDArray[np.float64]
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 
-Kind = Literal["initial", "parameter", "control"]
+Kind = Literal["initial", "parameter", "control", "weight"]
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ class Slot:
     """Where a variable's components go.
 
     Attributes:
-        name: ``ball.velocity``, ``ball.mass``, ``gravity``, ``ground.friction``, ``ball.force``, ...
+        name: ``ball.velocity``, ``ball.mass``, ``gravity``, ``ground.friction``, ``ball.force``, ``brain.weights``, ...
         components: the indices that are set; (0,) for a number.
     """
 
@@ -85,7 +86,8 @@ class Variable:
 
     Attributes:
         name: as in the file.
-        kind: what is set: the state at the start, a physical parameter, or a force or torque over time.
+        kind: what is set: the state at the start, a physical parameter, a force or torque over time, or the numbers of
+            a controller.
         slots: all with the same number of components.
         knots: values over the duration; 1 unless a control. ``constant``: knot k holds over the k-th of ``knots``
             equal parts of the duration. ``linear``: knots at equal distances from start to end.
@@ -188,6 +190,7 @@ class Problem:
         goal: the objective should come down to this; None for no goal.
         stop_when_met: stop at the first point that meets everything, instead of at an optimum.
         solver_tables: the raw [solver.NAME] tables by NAME.
+        sensors, controllers: in the file's order.
     """
 
     name: str
@@ -206,6 +209,13 @@ class Problem:
     goal: float | None
     stop_when_met: bool
     solver_tables: dict[str, dict[str, object]]
+    sensors: tuple[Sensor, ...] = ()
+    controllers: tuple[Controller, ...] = ()
+
+    @property
+    def weights(self) -> dict[str, Array]:
+        """The numbers of all controllers as the file has them, by names such as ``brain.weights``."""
+        return {name: value for controller in self.controllers for name, value in controller.weights.items()}
 
     def world(self, overrides: Mapping[str, Any] = NOTHING) -> World:
         """The world with its numbers, some replaced.

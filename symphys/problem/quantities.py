@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.problem.feedback import Controller
 from symphys.problem.model import Kind, Slot
 from symphys.suggest import hint, quote
 
@@ -47,10 +48,15 @@ class Quantity:
 def quantities(
     initial: Mapping[str, Array], parameters: Mapping[str, Array], inputs: Mapping[str, int]
 ) -> dict[str, Quantity]:
-    """Every quantity by name: states at the start, inputs with their sizes, then parameters."""
+    """Every quantity of a world by name: states at the start, inputs with their sizes, then parameters."""
     found = {name: Quantity("initial", value) for name, value in initial.items()}
     found |= {name: Quantity("control", np.zeros(size)) for name, size in inputs.items()}
     return found | {name: Quantity("parameter", value) for name, value in parameters.items()}
+
+
+def weight_quantities(controllers: Iterable[Controller]) -> dict[str, Quantity]:
+    """The numbers of controllers by name, such as ``brain.weights``."""
+    return {name: Quantity("weight", value) for controller in controllers for name, value in controller.weights.items()}
 
 
 def read_slot(text: str, known: Mapping[str, Quantity]) -> Slot:

@@ -16,7 +16,7 @@ from symphys.problem.plan import WorldPlan
 from symphys.problem.quantities import Quantity
 from symphys.problem.sockets import MEET
 from symphys.state import GIVEN, initial_state
-from symphys.step import gap_function, joint_quantities, readings
+from symphys.step import accelerometers, body_quantities, gap_function, joint_quantities, readings
 from symphys.world import World
 
 Array = NDArray[np.float64]
@@ -40,10 +40,16 @@ def formula_names(plan: WorldPlan, values: Mapping[str, Array], variables: Seque
     """Every name that a formula may use, with a value of its shape."""
     named: dict[str, Any] = {name: ca.DM(value) for name, value in values.items() if "-" not in name}
     named["time"] = ca.DM(0.0)
-    if plan.joints:
-        world, x = start_of(plan, values)
-        named.update({name: ca.evalf(ca.SX(value)) for name, value in joint_quantities(world, x).items()})
+    world, x = start_of(plan, values)
+    still = {body.name: values[f"{body.name}.velocity"] for body in world.bodies}
+    found = joint_quantities(world, x) | body_quantities(world, x) | accelerometers(world, x, still, 1.0)
+    named.update({name: ca.evalf(ca.SX(value)) for name, value in found.items()})
     return named | {variable.name: ca.DM(variable.guess) for variable in variables}
+
+
+def sensor_names(plan: WorldPlan, values: Mapping[str, Array]) -> dict[str, Any]:
+    """Every name that a sensor may read, with a value of its shape: all but the variables."""
+    return formula_names(plan, values, ())
 
 
 def check_overlap(plan: WorldPlan, values: Mapping[str, Array], faults: Faults) -> None:

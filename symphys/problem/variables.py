@@ -17,6 +17,7 @@ from symphys.problem.schema.types import NestedList
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+WEIGHTS = 0.1
 
 
 class Reader:
@@ -103,8 +104,10 @@ class Reader:
         return values[0] if same else None
 
     def usual_scale(self, slots: Sequence[Slot], kind: Kind) -> Array | float:
-        """Parameters vary by their own size, everything else by 1."""
+        """Parameters vary by their own size, numbers of controllers by WEIGHTS, everything else by 1."""
         value = self.nominal(slots)
+        if kind == "weight":
+            return WEIGHTS
         if kind != "parameter" or value is None:
             return 1.0
         return np.where(value == 0, 1.0, np.abs(value))
@@ -180,17 +183,15 @@ def read_variables(
 ) -> tuple[Variable, ...]:
     """All variables; notes quantities that are set twice."""
     found = [Reader(index, table, known, faults).read(simulation) for index, table in enumerate(tables)]
-    owners: dict[tuple[str, int], str] = {}
+    owners: dict[str, NDArray[np.intp]] = {name: np.full(quantity.nominal.size, -1) for name, quantity in known.items()}
     for index, variable in enumerate(found):
-        for name, component in entries(variable):
-            if (name, component) in owners:
-                text = f"{name}[{component}] is already set by variable {owners[name, component]}"
+        for slot in variable.slots if variable else ():
+            owner, components = owners[slot.name], list(slot.components)
+            taken = owner[components] >= 0
+            if taken.any():
+                component = components[int(np.argmax(taken))]
+                text = f"{slot.name}[{component}] is already set by variable {tables[owner[component]].name}"
                 faults.add(("variable", index, "sets"), text)
                 break
-            owners[name, component] = tables[index].name
+            owner[components] = index
     return tuple(variable for variable in found if variable)
-
-
-def entries(variable: Variable | None) -> list[tuple[str, int]]:
-    """Every number that a variable sets: (quantity, component)."""
-    return [(slot.name, component) for slot in (variable.slots if variable else ()) for component in slot.components]

@@ -4,7 +4,7 @@ from symphys.transcription.along import Rollout, symbolic_rollout
 from symphys.transcription.faults import first_derivative_fault, first_fault
 from symphys.transcription.judge import Check, Verdict
 from symphys.transcription.program import rollout_program
-from symphys.transcription.simulate import Record
+from symphys.transcription.simulate import Record, plain
 from symphys.transcription.terms import Terms, terms
 from symphys.transcription.transcribe import Judge, Transcription, judge_for, judge_of, transcribe
 
@@ -20,6 +20,7 @@ __all__ = [
     "first_fault",
     "judge_for",
     "judge_of",
+    "plain",
     "rollout_program",
     "symbolic_rollout",
     "terms",

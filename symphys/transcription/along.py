@@ -13,7 +13,9 @@ from symphys.expression import Formula
 from symphys.problem import Problem
 from symphys.rollout import roll_out
 from symphys.step import step_function
+from symphys.transcription.control import Control
 from symphys.transcription.decision import start_of
+from symphys.transcription.memory import Memory, memory_of
 from symphys.transcription.names import Parameters, compile_formula, input_names, moving_names, varied_parameters
 from symphys.world import World
 
@@ -30,10 +32,11 @@ class Rollout:
         world: its numbers, with symbols (SX) for the parameters that variables set.
         inputs: names of the inputs that u stacks.
         parameters: what p stacks.
+        memory: what states x hold after those of the world.
         z: (n,) decision vector.
         smoothing: scalar.
         x0: (nx,) initial state.
-        u: (nu, N).
+        given: (nu, N) inputs as variables give them; controllers add to them.
         p: (np,).
     """
 
@@ -41,23 +44,79 @@ class Rollout:
     world: World
     inputs: tuple[str, ...]
     parameters: Parameters
+    memory: Memory
     z: Expr
     smoothing: Expr
     x0: Expr
-    u: Expr
+    given: Expr
     p: Expr
 
     @cached_property
     def step(self) -> ca.Function:
         """One step (x, u, p, smoothing) -> x_next; built when first asked for, since one expression takes its time."""
         scheme = self.problem.simulation.scheme()
-        return step_function(self.world, scheme, self.inputs, self.parameters.symbols)
+        return self.remembering(step_function(self.world, scheme, self.inputs, self.parameters.symbols))
+
+    def remembering(self, step: ca.Function) -> ca.Function:
+        """A function (x, u, p, smoothing) -> (x_next, ...) of the world's state, for states with memory."""
+        if self.memory.size == step.size1_in(0):
+            return step
+        x, u = ca.MX.sym("x", self.memory.size), ca.MX.sym("u", step.size1_in(1))
+        p, knob = ca.MX.sym("p", step.size1_in(2)), ca.MX.sym("smoothing")
+        after, *others = call(step, x[: step.size1_in(0)], u, p, knob)
+        whole = ca.vertcat(after, self.memory.after(x, u, self.inputs))
+        return ca.Function(step.name(), [x, u, p, knob], [whole, *others]).expand()
 
     @cached_property
+    def control(self) -> Control:
+        """Sensors and controllers."""
+        return Control(self.problem, self.world, self.inputs, self.parameters, self.memory)
+
+    @cached_property
+    def feedback(self) -> ca.Function | None:
+        """(x, u, p, time) -> the inputs of the step from x; None without controllers."""
+        return self.control.function() if self.problem.controllers else None
+
+    @cached_property
+    def closed(self) -> ca.Function:
+        """``step`` with the controllers in it; see ``close``."""
+        return self.close(self.step)
+
+    def close(self, step: ca.Function) -> ca.Function:
+        """From (x, u, p, smoothing) -> (x_next, ...) to the same of ([u; time] as variables give it) with u at the end.
+
+        Without controllers the second argument is u alone, and u is not among the results.
+        """
+        if self.feedback is None:
+            return step
+        x, given = ca.MX.sym("x", self.memory.size), ca.MX.sym("given", step.size1_in(1) + 1)
+        p, knob = ca.MX.sym("p", step.size1_in(2)), ca.MX.sym("smoothing")
+        u = self.feedback(x, given[:-1], p, given[-1])
+        results = call(step, x, u, p, knob)
+        return ca.Function(f"closed_{step.name()}", [x, given, p, knob], [*results, u])
+
+    def rolled(self, step: ca.Function) -> tuple[Expr, Expr, list[Expr]]:
+        """States (nx, N + 1), inputs (nu, N) and what else a step gives, N columns each; ``step`` is not closed."""
+        given = self.given
+        if self.feedback is not None:
+            given = ca.vertcat(given, ca.DM(np.arange(self.steps) * self.dt).T)
+        x, *others = roll_out(self.close(step), self.steps, self.x0, given, self.p, self.smoothing)
+        return (x, self.given, others) if self.feedback is None else (x, others[-1], others[:-1])
+
+    @cached_property
+    def _motion(self) -> tuple[Expr, Expr]:
+        x, u, _ = self.rolled(self.step)
+        return x, u
+
+    @property
     def x(self) -> Expr:
         """(nx, N + 1) states."""
-        (x,) = roll_out(self.step, self.steps, self.x0, self.u, self.p, self.smoothing)
-        return x
+        return self._motion[0]
+
+    @property
+    def u(self) -> Expr:
+        """(nu, N) inputs."""
+        return self.given if self.feedback is None else self._motion[1]
 
     @property
     def steps(self) -> int:
@@ -71,8 +130,7 @@ class Rollout:
 
     def compiled(self, formula: Formula) -> ca.Function:
         """The formula as a casadi function of (x, u, p, time, z)."""
-        n = int(self.z.shape[0])
-        return compile_formula(self.problem, self.world, self.inputs, self.parameters, formula, n)
+        return compile_formula(self.problem, self.world, self.inputs, self.parameters, self.memory, formula)
 
     def tick(self, when: str | float) -> int:
         """The number of the state at the end, or nearest to a time [s]."""
@@ -116,12 +174,14 @@ class Rollout:
 def symbolic_rollout(problem: Problem) -> Rollout:
     """The rollout of a problem over its horizon."""
     parameters, inputs = varied_parameters(problem), input_names(problem)
-    world = problem.world(_overrides(parameters))
+    world = problem.world(parameters.overrides())
     z = ca.MX.sym("z", sum(v.guess.size for v in problem.variables))
     smoothing = ca.MX.sym("smoothing")
-    start = start_of(problem, world, inputs, parameters, z)
-    return Rollout(problem, world, inputs, parameters, z, smoothing, start.x0, start.u, start.p)
+    start, memory = start_of(problem, world, inputs, parameters, z), memory_of(problem, world)
+    return Rollout(problem, world, inputs, parameters, memory, z, smoothing, memory.start(start.x0), start.u, start.p)
 
 
-def _overrides(parameters: Parameters) -> dict[str, Any]:
-    return dict(zip(parameters.names, parameters.symbols, strict=True))
+def call(function: ca.Function, *arguments: Expr) -> list[Expr]:
+    """All results of a call."""
+    results = function(*arguments)
+    return list(results) if isinstance(results, tuple) else [results]

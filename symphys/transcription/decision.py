@@ -25,7 +25,7 @@ MIDDLE, START = 0.5, 0.0
 
 @dataclass(frozen=True)
 class Start:
-    """x0 (nx,), u (nu, N) and p (np,) as expressions of z."""
+    """x0 (nx,) without memory, u (nu, N) as variables give it and p (np,), as expressions of z."""
 
     x0: Expr
     u: Expr
@@ -60,6 +60,8 @@ def start_of(problem: Problem, world: World, inputs: Sequence[str], parameters: 
 
 def _replace(value: Expr, components: Sequence[int], part: Expr) -> Expr:
     """``value`` with the named components taken from ``part``."""
+    if list(components) == list(range(value.shape[0])):
+        return part
     rows = [value[i] for i in range(value.shape[0])]
     for k, component in enumerate(components):
         rows[component] = part[k]

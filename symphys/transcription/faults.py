@@ -28,8 +28,9 @@ class Course:
     Attributes:
         z: (n,) decision vector.
         smoothing: [m/s].
-        x: (N + 1, nx) states, with the memory of forces.
+        x: (N + 1, nx) states, with all memory.
         u: (N, nu) inputs.
+        given: (N, nu) inputs as variables give them, to which controllers add.
         p: (np,) parameters.
     """
 
@@ -37,11 +38,21 @@ class Course:
     smoothing: float
     x: Array
     u: Array
+    given: Array
     p: Array
 
     def step_arguments(self, k: int) -> list[Array]:
         """Of the step function at step k."""
         return [self.x[k], self.u[k], self.p, np.array([self.smoothing])]
+
+    def control_arguments(self, k: int, dt: float) -> list[Array]:
+        """Of the controllers at step k."""
+        return [self.x[k], self.given[k], self.p, np.array([k * dt])]
+
+    def closed_arguments(self, k: int, rollout: Rollout) -> list[Array]:
+        """Of the step with its controllers."""
+        time = [] if rollout.feedback is None else [k * rollout.dt]
+        return [self.x[k], np.array([*self.given[k], *time]), self.p, np.array([self.smoothing])]
 
 
 def first_fault(rollout: Rollout, course: Course) -> str:
@@ -57,7 +68,7 @@ def first_derivative_fault(rollout: Rollout, course: Course) -> str:
 
 def _in_start(rollout: Rollout, course: Course) -> str:
     names = _argument_names(rollout)
-    for values, columns in ((course.x[0], names[0]), (course.p, names[2]), (course.u.T, names[1])):
+    for values, columns in ((course.x[0], names[0]), (course.p, names[2]), (course.given.T, names[1])):
         bad = [name for name, value in zip(columns, values, strict=True) if not np.isfinite(value).all()]
         if bad:
             return f"it begins with {_listed(list(dict.fromkeys(bad)))}, as the variables set it"
@@ -65,10 +76,15 @@ def _in_start(rollout: Rollout, course: Course) -> str:
 
 
 def _in_steps(rollout: Rollout, course: Course) -> str:
-    bad = ~np.isfinite(course.x[1:]).all(axis=1)
+    bad = ~(np.isfinite(course.x[1:]).all(axis=1) & np.isfinite(course.u).all(axis=1))
     if not bad.any():
         return ""
     k = int(np.argmax(bad))
+    if rollout.feedback is not None and not np.isfinite(course.u[k]).all():
+        states, inputs, parameters = _argument_names(rollout)
+        names = (states, inputs, parameters, ("time",))
+        found = blame(rollout.feedback, course.control_arguments(k, rollout.dt))
+        return f"it begins in what controllers give at t = {k * rollout.dt:g} s{_cause(found, names, names[1:2])}"
     found = blame(rollout.step, course.step_arguments(k))
     names = _argument_names(rollout)
     return f"it begins in the step from t = {k * rollout.dt:g} s{_cause(found, names, names[:1])}"
@@ -95,10 +111,13 @@ def _derivative_clause(rollout: Rollout, course: Course, kind: str, asked: Asked
 
 
 def _in_steps_back(rollout: Rollout, course: Course) -> str:
-    backward = rollout.step.reverse(1)
-    adjoint = np.ones(course.x.shape[1])
+    backward = rollout.closed.expand().reverse(1)
+    adjoint, results = np.ones(course.x.shape[1]), [np.zeros(course.x.shape[1])]
+    if rollout.feedback is not None:
+        results.append(np.zeros(course.u.shape[1]))
     for k in reversed(range(rollout.steps)):
-        arguments = [*course.step_arguments(k), np.zeros_like(adjoint), adjoint]
+        seeds = [adjoint, *(np.zeros(result.size) for result in results[1:])]
+        arguments = [*course.closed_arguments(k, rollout), *results, *seeds]
         adjoint = np.array(backward(*arguments)[0]).ravel()
         if not np.isfinite(adjoint).all():
             names, found = _argument_names(rollout), blame(backward, arguments)
@@ -141,6 +160,7 @@ def _argument_names(rollout: Rollout) -> tuple[Columns, Columns, Columns]:
     """Of x, u and p; components of one quantity share its name."""
     layout = Layout(rollout.world)
     states = [layout.owner(column) for column in range(layout.size)]
+    states += [name for name, part in rollout.memory.columns.items() for _ in range(part.start, part.stop)]
     columns = input_columns(rollout.world, rollout.inputs)
     inputs = [name for name, part in columns.items() for _ in range(part.start, part.stop)]
     known = rollout.parameters

@@ -12,6 +12,7 @@ from symphys.kernel import Call, Layout, Place, Program
 from symphys.state import Layout as Columns
 from symphys.step import Slot, record_step
 from symphys.transcription.along import Rollout
+from symphys.transcription.control_calls import control_calls
 from symphys.transcription.decision import start_of
 from symphys.transcription.terms import Terms, terms
 
@@ -29,9 +30,10 @@ class Samples:
         """Places for z, knob, times, parameters, inputs and states."""
         self.rollout, self.problem, self.steps, self.dt = rollout, rollout.problem, rollout.steps, rollout.dt
         self.layout = Layout()
-        nx, nu, np_ = (int(part.shape[0]) for part in (rollout.x0, rollout.u, rollout.p))
+        nx, nu, np_ = (int(part.shape[0]) for part in (rollout.x0, rollout.given, rollout.p))
         self.z, self.knob = self.layout.take(int(rollout.z.shape[0])), self.layout.take(1)
-        self.p, self.u = self.layout.take(np_), self.layout.series(nu, self.steps)
+        self.p, self.given = self.layout.take(np_), self.layout.series(nu, self.steps)
+        self.u = self.given if rollout.feedback is None else self.layout.series(nu, self.steps)
         self.x = self.layout.series(nx, self.steps + 1)
         self.time = self.layout.series(1, self.steps + 1)
         self.calls: list[Call] = []
@@ -83,7 +85,7 @@ def rollout_program(rollout: Rollout, exact: bool = False) -> Program:
     """
     samples = Samples(rollout)
     asked = terms(samples)
-    body = _step(samples, exact)
+    body = [*control_calls(rollout, samples), *_step(samples, exact)]
     epilogue, outputs = _epilogue(samples, asked)
     times = tuple(np.arange(rollout.steps + 1) * rollout.dt)
     return Program(
@@ -118,7 +120,18 @@ def _step(samples: Samples, exact: bool) -> list[Call]:
                 places[slot] = arguments[slot.name]
         places.setdefault(piece.output, samples.layout.take(piece.output.size))
         calls.append(Call(piece.function, tuple(places[slot] for slot in piece.inputs), (places[piece.output],)))
+    if rollout.memory.columns:
+        calls.append(_remember(samples))
     return calls
+
+
+def _remember(samples: Samples) -> Call:
+    """What the next step's sensors need to know of this one."""
+    memory, inputs = samples.rollout.memory, samples.rollout.inputs
+    x, u = ca.SX.sym("x", samples.x.size), ca.SX.sym("u", samples.u.size)
+    function = ca.Function("remember", [x, u], [ca.densify(memory.after(x, u, inputs))])
+    width = Columns(samples.rollout.world).size
+    return Call(function, (samples.x, samples.u), (_part(samples.x.later(), slice(width, memory.size)),))
 
 
 def _part(place: Place, columns: slice) -> Place:
@@ -129,9 +142,9 @@ def _part(place: Place, columns: slice) -> Place:
 def _prologue(samples: Samples) -> Call:
     rollout = samples.rollout
     start = start_of(samples.problem, rollout.world, rollout.inputs, rollout.parameters, rollout.z)
-    results = [ca.densify(ca.vec(part)) for part in (start.x0, start.u, start.p)]
+    results = [ca.densify(ca.vec(part)) for part in (rollout.memory.start(start.x0), start.u, start.p)]
     function = ca.Function("start", [rollout.z], results).expand()
-    u = Place(samples.u.offset, samples.u.size * samples.steps)
+    u = Place(samples.given.offset, samples.given.size * samples.steps)
     return Call(function, (samples.z,), (samples.x.still(), u, samples.p))
 
 

@@ -9,7 +9,6 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.rollout import roll_out
 from symphys.state import GIVEN, Layout, input_columns
 from symphys.step import reading_function, report_function
 from symphys.trajectory import NotFinite, Trajectory
@@ -28,17 +27,17 @@ class Record:
 
 
 def recorder(rollout: Rollout) -> ca.Function:
-    """(z, smoothing) -> (x, u, p, forces, gaps, residual, crowded) of the whole horizon."""
+    """(z, smoothing) -> (x, u, given, p, forces, gaps, residual, crowded) of the whole horizon."""
     scheme = rollout.problem.simulation.scheme()
     step = report_function(rollout.world, scheme, rollout.inputs, rollout.parameters.symbols)
-    outputs = roll_out(step, rollout.steps, rollout.x0, rollout.u, rollout.p, rollout.smoothing)
-    return ca.Function("record", [rollout.z, rollout.smoothing], [outputs[0], rollout.u, rollout.p, *outputs[1:]])
+    x, u, happened = rollout.rolled(rollout.remembering(step))
+    return ca.Function("record", [rollout.z, rollout.smoothing], [x, u, rollout.given, rollout.p, *happened])
 
 
 def simulate(rollout: Rollout, record: ca.Function, z: Array, smoothing: float) -> Record:
     """The rollout of z; NotFinite, which says where and why, if it has none."""
-    x, u, p, *happened = (np.array(part).T for part in record(z, smoothing))
-    course = Course(np.asarray(z, float), smoothing, x, u, p.ravel())
+    x, u, given, p, *happened = (np.array(part).T for part in record(z, smoothing))
+    course = Course(np.asarray(z, float), smoothing, x, u, given, p.ravel())
     motion = _trajectory(rollout, x, u, p.ravel(), *happened)
     try:
         return Record(course, motion.require_finite())
@@ -69,6 +68,11 @@ def _trajectory(
     )
 
 
+def plain(rollout: Rollout, x: Array) -> Array:
+    """The states without memory."""
+    return x[:, : Layout(rollout.world).size]
+
+
 def _stack(parts: list[Any]) -> Array:
     return np.stack(parts, axis=1)
 
@@ -78,7 +82,9 @@ def _joints(rollout: Rollout, x: Array, p: Array) -> dict[str, Any]:
     joints = rollout.world.joints
     counts = [len(joint.kind.coordinates) for joint in joints]
     read = reading_function(rollout.world, rollout.parameters.symbols).map(rollout.steps + 1)
-    *parts, separation = (np.array(part).T for part in read(x.T, np.tile(p[:, None], rollout.steps + 1)))
+    *parts, separation = (
+        np.array(part).T for part in read(plain(rollout, x).T, np.tile(p[:, None], rollout.steps + 1))
+    )
     value, rate, torque = (_split(part, counts) for part in parts)
     return {
         "joint_names": tuple(joint.name for joint in joints),

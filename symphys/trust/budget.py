@@ -15,7 +15,7 @@ from symphys import rotation
 from symphys.motion import momentum
 from symphys.state import Layout, input_columns, inputs_size
 from symphys.trajectory import Trajectory
-from symphys.transcription import Record, Rollout
+from symphys.transcription import Record, Rollout, plain
 from symphys.trust.bodies import bodies, parameters
 from symphys.trust.contacts import acting, touching
 from symphys.trust.growth import samples
@@ -112,9 +112,10 @@ def _energies(rollout: Rollout, record: Record) -> tuple[Array, Array, Array]:
         for field, way in (("force", moved), ("torque", turned)):
             work += ca.dot(given.get(f"{body.name}.{field}", ca.SX.zeros(3)), way)
     states, course = ca.Function("energies", [x, p], [kinetic, potential]), record.course
-    both = states.map(len(course.x))(course.x.T, np.tile(course.p[:, None], len(course.x)))
+    x_k = plain(rollout, course.x)
+    both = states.map(len(x_k))(x_k.T, np.tile(course.p[:, None], len(course.x)))
     works = ca.Function("work", [x, after, u], [work]).map(rollout.steps)
-    done = works(course.x[:-1].T, course.x[1:].T, course.u.T)
+    done = works(x_k[:-1].T, x_k[1:].T, course.u.T)
     return np.array(both[0]).ravel(), np.array(both[1]).ravel(), np.array(done).ravel()
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from symphys.step import slip_function
 from symphys.trajectory import Trajectory
-from symphys.transcription import Record, Rollout
+from symphys.transcription import Record, Rollout, plain
 from symphys.trust.bodies import bodies
 
 Array = NDArray[np.float64]
@@ -80,7 +80,7 @@ def slip_speeds(rollout: Rollout, record: Record) -> Array:
     scheme = rollout.problem.simulation.scheme()
     slip = slip_function(rollout.world, scheme, rollout.inputs, rollout.parameters.symbols).map(rollout.steps)
     course = record.course
-    return np.array(slip(course.x[:-1].T, course.u.T, np.tile(course.p[:, None], rollout.steps))).T
+    return np.array(slip(plain(rollout, course.x)[:-1].T, course.u.T, np.tile(course.p[:, None], rollout.steps))).T
 
 
 def _deepest(rollout: Rollout, motion: Trajectory) -> dict[str, Any]:

@@ -58,12 +58,14 @@ def backwards(rollout: Rollout, record: Record, ends: Array) -> Iterator[tuple[i
         Derivatives in the same order and units; of an orientation only its rotation is changed, not its length.
     """
     course, columns, units = record.course, state_columns(rollout), state_units(rollout, record)
-    backward, unused = rollout.step.reverse(ends.shape[1]), np.zeros(course.x.shape[1])
+    backward = rollout.closed.reverse(ends.shape[1])
+    results = [np.zeros(rollout.closed.numel_out(i)) for i in range(rollout.closed.n_out())]
+    inert = [np.zeros((len(result), ends.shape[1])) for result in results[1:]]
     adjoint = np.zeros((course.x.shape[1], ends.shape[1]))
     adjoint[columns] = ends * units[:, None]
     yield rollout.steps, ends
     for k in reversed(range(rollout.steps)):
-        adjoint = np.array(backward(*course.step_arguments(k), unused, adjoint)[0])
+        adjoint = np.array(backward(*course.closed_arguments(k, rollout), *results, adjoint, *inert)[0])
         yield k, _turned(rollout, course.x[k], adjoint)[columns] / units[:, None]
 
 

@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PHYSICS = {"course", "shapes", "heightfield", "world", "state", "rotation", "smooth", "collide", "motion", "step"}
-PHYSICS |= {"rollout", "joints"}
+PHYSICS |= {"rollout", "joints", "controllers"}
 RUNTIME = set(sys.stdlib_module_names)
 
 

@@ -7,6 +7,7 @@ from typing import Any
 from pydantic import Field
 
 from symphys.problem.schema.aims import ConstraintTable, CostTable, ObjectiveTable, TargetTable, VariableTable
+from symphys.problem.schema.control import ControllerTable, SensorTable
 from symphys.problem.schema.joints import JointTable
 from symphys.problem.schema.physics import (
     BlockTable,
@@ -37,6 +38,8 @@ class Document(Table):
     contact: ContactTable = ContactTable()
     pair: list[PairTable] = Field(default=[])
     joint: list[JointTable] = Field(default=[])
+    sensor: list[SensorTable] = Field(default=[])
+    controller: list[ControllerTable] = Field(default=[])
     variable: list[VariableTable] = Field(default=[])
     cost: list[CostTable] = Field(default=[])
     target: list[TargetTable] = Field(default=[])

@@ -1,0 +1,38 @@
+"""A controller that is any casadi function."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+Expr = Any
+"""casadi SX or MX"""
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """u = function(sensed, time, weights); see ``Law``. The function must be expandable to scalar operations (SX)."""
+
+    function: ca.Function
+
+    @property
+    def senses(self) -> int:
+        """See ``Law``."""
+        return int(self.function.numel_in(0))
+
+    @property
+    def outputs(self) -> int:
+        """See ``Law``."""
+        return int(self.function.numel_out(0))
+
+    @property
+    def sizes(self) -> Mapping[str, int]:
+        """See ``Law``."""
+        return {"weights": int(self.function.numel_in(2))}
+
+    def act(self, sensed: Expr, time: Expr, numbers: Mapping[str, Expr]) -> Expr:
+        """See ``Law``."""
+        return self.function(sensed, time, numbers["weights"])

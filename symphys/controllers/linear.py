@@ -1,0 +1,36 @@
+"""Linear feedback: gains times what is sensed, and offsets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+Expr = Any
+"""casadi SX or MX"""
+
+
+@dataclass(frozen=True)
+class Linear:
+    """u = K o + b; see ``Law``. ``gains`` holds K row by row (m n,), ``offsets`` b (m,)."""
+
+    senses: int
+    outputs: int
+
+    @property
+    def sizes(self) -> Mapping[str, int]:
+        """See ``Law``."""
+        return {"gains": self.outputs * self.senses, "offsets": self.outputs}
+
+    def act(self, sensed: Expr, time: Expr, numbers: Mapping[str, Expr]) -> Expr:
+        """See ``Law``."""
+        return rows_times(numbers["gains"], sensed, self.outputs) + numbers["offsets"]
+
+
+def rows_times(matrix: Expr, vector: Expr, rows: int) -> Expr:
+    """(rows,) the product of a matrix, given row by row as one column, with a vector."""
+    if not rows or not vector.shape[0]:
+        return type(vector).zeros(rows)
+    return ca.mtimes(ca.reshape(matrix, vector.shape[0], rows).T, vector)

@@ -1,0 +1,40 @@
+"""Sines of one shared frequency and its multiples."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+Expr = Any
+"""casadi SX or MX"""
+
+
+@dataclass(frozen=True)
+class Periodic:
+    """u = b + sum over h = 1 .. harmonics of s_h sin(2 pi h f t) + c_h cos(2 pi h f t); see ``Law``.
+
+    ``frequency`` f [Hz], ``offsets`` b (m,), ``sines`` and ``cosines`` (m harmonics,): s_1, s_2, ... one after the
+    other. Nothing is sensed.
+    """
+
+    outputs: int
+    harmonics: int = 1
+    senses: int = 0
+
+    @property
+    def sizes(self) -> Mapping[str, int]:
+        """See ``Law``."""
+        count = self.outputs * self.harmonics
+        return {"frequency": 1, "offsets": self.outputs, "sines": count, "cosines": count}
+
+    def act(self, sensed: Expr, time: Expr, numbers: Mapping[str, Expr]) -> Expr:
+        """See ``Law``."""
+        result = numbers["offsets"]
+        for h in range(self.harmonics):
+            phase = 2 * ca.pi * (h + 1) * numbers["frequency"] * time
+            part = slice(h * self.outputs, (h + 1) * self.outputs)
+            result = result + numbers["sines"][part] * ca.sin(phase) + numbers["cosines"][part] * ca.cos(phase)
+        return result

@@ -1,0 +1,54 @@
+"""Sensors and controllers of a problem after validation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.controllers import Law
+from symphys.expression import Formula
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """Something that controllers may use.
+
+    Attributes:
+        name: as in the file.
+        formulas: of its parts, one after the other.
+        size: how many numbers they come to.
+    """
+
+    name: str
+    formulas: tuple[Formula, ...]
+    size: int
+
+
+@dataclass(frozen=True)
+class Controller:
+    """What drives inputs in every step.
+
+    Attributes:
+        name: as in the file.
+        law: how outputs follow from what is sensed.
+        senses: names of the sensors, whose values are joined.
+        drives: for each output the name of an input and the component that it is added to.
+        scale: (m,) factors of the outputs.
+        numbers: the law's numbers as the file has them, by the names of ``law.sizes``.
+    """
+
+    name: str
+    law: Law
+    senses: tuple[str, ...]
+    drives: tuple[tuple[str, int], ...]
+    scale: Array = field(repr=False)
+    numbers: dict[str, Array] = field(repr=False)
+
+    @property
+    def weights(self) -> dict[str, Array]:
+        """The numbers by the names that variables use: ``brain.weights``."""
+        return {f"{self.name}.{key}": value for key, value in self.numbers.items()}

@@ -1,0 +1,80 @@
+"""Tables of sensors and controllers: what is sensed, and how motors and forces follow from it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from symphys.problem.schema.types import Finite, Identifier, NonNegative, Numbers, Table, Texts
+
+Width = Annotated[int, Field(ge=1, le=100_000)]
+Activation = Literal["tanh", "relu", "linear"]
+
+
+class SensorTable(Table):
+    """A vector that controllers may use, in the velocities that are reported."""
+
+    name: Identifier = Field(description="how controllers refer to it")
+    reads: Texts = Field(
+        description='formulas, joined one after the other: "knee.angle", "knee.rate", "knee.command" (of the step '
+        'before), "knee.torque", "torso.orientation", "torso.gyro", "torso.accelerometer", "foot.contact_force", '
+        '"torso.position[2]", "sin(2 * pi * time)"'
+    )
+
+
+class LinearTable(Table):
+    """Gains times what is sensed, and offsets."""
+
+    gains: Numbers | None = Field(default=None, description="for each output a list with a number for each input; or 0")
+    offsets: Numbers | None = Field(default=None, description="a number for each output; default 0")
+
+
+class PeriodicTable(Table):
+    """Sines of one frequency and its multiples, about offsets."""
+
+    frequency: Finite = Field(description="[Hz]")
+    harmonics: Annotated[int, Field(ge=1, le=100)] = 1
+    offsets: Numbers | None = Field(default=None, description="a number for each output; default 0")
+    sines: Numbers | None = Field(
+        default=None, description="a number for each output, or a list of them for each harmonic; default 0"
+    )
+    cosines: Numbers | None = Field(default=None, description="likewise")
+
+
+class NetTable(Table):
+    """A multi-layer perceptron; its weights are a layer's matrix row by row, then its biases, layer after layer."""
+
+    hidden: list[Width] = Field(default=[], description="the width of each hidden layer; none: one layer")
+    activation: Activation = Field(default="tanh", description="of hidden layers")
+    output: Activation = Field(default="linear", description='of the last layer; with "tanh" outputs are bounded')
+    biases: bool = True
+    skip: bool = Field(default=False, description="adds a matrix from the inputs straight to the outputs")
+    weights: str | None = Field(
+        default=None, description="a .npy file with all of them, beside this file; default: random"
+    )
+    spread: NonNegative = Field(
+        default=1.0, description="random weights have this standard deviation, over the root of a layer's inputs"
+    )
+    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="of random weights")
+
+
+class FunctionTable(Table):
+    """A casadi function that Python gives: load_problem(..., functions={name: function})."""
+
+    weights: Numbers | None = Field(default=None, description="its numbers at the start; default 0")
+
+
+class ControllerTable(Table):
+    """What drives inputs, step after step. Where several drive the same input, their outputs add up."""
+
+    name: Identifier = Field(
+        description='variables set its numbers: "name.weights", "name.gains", "name.frequency", ...'
+    )
+    drives: Texts = Field(description='"knee.command", "ball.force[0:2]", or a list')
+    senses: list[str] = Field(default=[], description="names of sensors, joined one after the other")
+    scale: Numbers = Field(default=1.0, description="factor of all outputs, or one for each")
+    linear: LinearTable | None = Field(default=None, description="{ gains = [[0.1, 0.2]] }")
+    periodic: PeriodicTable | None = Field(default=None, description="{ frequency = 1.5 }")
+    net: NetTable | None = Field(default=None, description="{ hidden = [32, 32] }")
+    function: FunctionTable | None = Field(default=None, description="{ weights = [0, 0] }, and a function from Python")
