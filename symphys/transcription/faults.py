@@ -81,10 +81,9 @@ def _in_steps(rollout: Rollout, course: Course) -> str:
         return ""
     k = int(np.argmax(bad))
     if rollout.feedback is not None and not np.isfinite(course.u[k]).all():
-        states, inputs, parameters = _argument_names(rollout)
-        names = (states, inputs, parameters, ("time",))
+        known = [*_argument_names(rollout), ("time",)]
         found = blame(rollout.feedback, course.control_arguments(k, rollout.dt))
-        return f"it begins in what controllers give at t = {k * rollout.dt:g} s{_cause(found, names, names[1:2])}"
+        return f"it begins in what controllers give at t = {k * rollout.dt:g} s{_cause(found, known, known[1:2])}"
     found = blame(rollout.step, course.step_arguments(k))
     names = _argument_names(rollout)
     return f"it begins in the step from t = {k * rollout.dt:g} s{_cause(found, names, names[:1])}"
