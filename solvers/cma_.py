@@ -44,7 +44,8 @@ class CmaOptions:
         sigma: first standard deviation, in units of scale.
         population: candidates in a generation; 0 is pycma's 4 + 3 ln n.
         evaluations: rollouts in each stage of smoothing; the generation that reaches it is the last.
-        options: pycma's own, such as {tolfun = 1e-8, CMA_diagonal = 50}; cma.CMAOptions() lists them.
+        options: pycma's own, such as {tolfun = 1e-8, CMA_diagonal = 50}; cma.CMAOptions() lists them. With more than
+            2,000 variables the covariance is diagonal.
     """
 
     __pydantic_config__: ClassVar[dict[str, object]] = {"extra": "forbid"}

@@ -35,6 +35,8 @@ PLATEAU = "tolflatfitness"
 """The criterion that ends a search on a plateau: more generations in a row without a difference than this option."""
 DEFAULTS = {PLATEAU: 50}
 """Where pycma's own default is not used."""
+MOST_FULL = 2000
+"""Variables up to which the covariance is a full matrix; beyond it is diagonal (Ros, Hansen 2008)."""
 CONFUSED = {"tolfun", "tolfunhist", "tolfunrel", "flat fitness"}
 """Criteria that take a plateau for convergence."""
 DRIFTED = "this checkpoint leads elsewhere with the present versions of pycma and numpy: start afresh without it"
@@ -75,7 +77,8 @@ class Strategy:
         self.start, self.scale, self.free = start, meter.scale, meter.lower < meter.upper
         bounds = [sides(bound / meter.scale, self.free) for bound in (meter.lower, meter.upper)]
         named = {name: getattr(cma, options[name]) for name in TEXTS if name in options}
-        own = {**DEFAULTS, **options, **named, **QUIET, "bounds": bounds, "randn": self.draw}
+        diagonal = {"CMA_diagonal": True} if self.free.sum() > MOST_FULL else {}
+        own = {**DEFAULTS, **diagonal, **options, **named, **QUIET, "bounds": bounds, "randn": self.draw}
         if population:
             own["popsize"] = population
         with pycma():

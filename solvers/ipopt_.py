@@ -21,6 +21,7 @@ from typing import Any, ClassVar, Literal
 import casadi as ca
 import numpy as np
 
+from symphys.errors import SymphysError
 from symphys.shooting import ShootingProblem
 from symphys.solvers.checkpoint import revive
 from symphys.solvers.interface import Log, Solver
@@ -142,6 +143,8 @@ def descend(meter: Meter, options: IpoptOptions, state: State, log: Log) -> Verd
 
 def build(meter: Meter, options: IpoptOptions, iterations: int, watch: Watch, text: Path) -> Any:
     """The nlpsol over x = z / scale, the knob as its parameter."""
+    if meter.problem.nlp.expression is None:
+        raise SymphysError("IPOPT needs expressions, and nets this large have none; take gradient or cma")
     nlp, derivatives = functions(meter.problem.nlp, meter.scale, options.hessian == "exact")
     own = {
         **SILENT,

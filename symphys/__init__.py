@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from symphys.state import Layout, initial_state
     from symphys.step import step_function
     from symphys.trajectory import Trajectory
-    from symphys.transcription.transcribe import Transcription, transcribe
+    from symphys.transcription import Transcription, transcribe
     from symphys.world import Body, Law, Scheme, World, make_world
 
 __version__ = "0.1.0"

@@ -88,7 +88,7 @@ class Nlp:
     """Objective and constraints for NLP solvers: casadi functions of (z, smoothing), to be called on symbols.
 
     Attributes:
-        expression: -> (objective, constraints); can be differentiated as often as you like.
+        expression: -> (objective, constraints); can be differentiated as often as you like. None: there is none.
         value: -> (objective, constraints), compiled; None: use the expression.
         gradient: -> (objective, its gradient (n,)), compiled; None likewise.
         jacobian: -> (constraints, their Jacobian (m, n)), compiled; None likewise.

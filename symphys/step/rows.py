@@ -60,7 +60,8 @@ def prepare(
     velocity, acceleration, normal = at_touch(contact, motions, time)
     pull = ca.dot(normal, acceleration)
     rebound = law.restitution * positive(-ca.dot(normal, velocity), knob)
-    leaving = contact.hit * _leaves(rebound, pull, duration - time, setting.reference, scheme.dt, knob)
+    hit = ca.if_else(spared, 0, contact.hit)  # at the end of a stretch rounding decides whether a spared one meets
+    leaving = hit * _leaves(rebound, pull, duration - time, setting.reference, scheme.dt, knob)
     half = duration / 2
     row_time = half + leaving * (time - half)
     frame, applied = contact.meeting.frame(row_time), contact.meeting.frame(leaving * time)
@@ -75,7 +76,7 @@ def prepare(
     # on the central path a load keeps surfaces parting at w^2 / (4 k load): less that, what lasts is at rest
     parting = width**2 / (4 * k_normal * ca.fmax(load, weight) * duration)
     target = ca.if_else(lasts, -parting, target)
-    slip = contact.hit * leaving * (half - time) * (acceleration - normal * pull)
+    slip = hit * leaving * (half - time) * (acceleration - normal * pull)
     return ContactRow(
         law=law,
         sides=sides,
@@ -85,11 +86,11 @@ def prepare(
         softness=softness,
         target=ca.if_else(spared, UNREACHED, target),
         slip_target=slip if scheme.impact_friction else ca.SX.zeros(3),
-        delay=contact.hit * (time + (1 - leaving) * (landing - time)) if scheme.time_of_impact else ca.SX(0),
+        delay=hit * (time + (1 - leaving) * (landing - time)) if scheme.time_of_impact else ca.SX(0),
         leaving=leaving,
         lasts=lasts,
         load=weight * duration,
-        struck=ca.SX(0) if law.soft else ca.logic_and(contact.hit, quick),
+        struck=ca.SX(0) if law.soft else ca.logic_and(hit, quick),
         width=width,
         knob=knob,
         same=same,

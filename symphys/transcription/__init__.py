@@ -6,7 +6,8 @@ from symphys.transcription.judge import Check, Verdict
 from symphys.transcription.program import rollout_program
 from symphys.transcription.simulate import Record, plain
 from symphys.transcription.terms import Terms, terms
-from symphys.transcription.transcribe import Judge, Transcription, judge_for, judge_of, transcribe
+from symphys.transcription.transcribe import transcribe
+from symphys.transcription.transcription import Judge, Transcription, judge_for, judge_of
 
 __all__ = [
     "Check",

@@ -171,9 +171,10 @@ class Rollout:
         return any(variable.name in formula.names for variable in self.problem.variables)
 
 
-def symbolic_rollout(problem: Problem) -> Rollout:
-    """The rollout of a problem over its horizon."""
-    parameters, inputs = varied_parameters(problem), input_names(problem)
+def symbolic_rollout(problem: Problem, inputs: tuple[str, ...] | None = None) -> Rollout:
+    """The rollout of a problem over its horizon; ``inputs`` may name more than the problem itself makes use of."""
+    parameters = varied_parameters(problem)
+    inputs = input_names(problem) if inputs is None else inputs
     world = problem.world(parameters.overrides())
     z = ca.MX.sym("z", sum(v.guess.size for v in problem.variables))
     smoothing = ca.MX.sym("smoothing")

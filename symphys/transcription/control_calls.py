@@ -21,7 +21,9 @@ Expr = Any
 class Places(Protocol):
     """Where a program keeps a rollout."""
 
+    rollout: Rollout
     layout: Layout
+    knob: Place
     x: Place
     given: Place
     u: Place

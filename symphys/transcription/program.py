@@ -12,7 +12,7 @@ from symphys.kernel import Call, Layout, Place, Program
 from symphys.state import Layout as Columns
 from symphys.step import Slot, record_step
 from symphys.transcription.along import Rollout
-from symphys.transcription.control_calls import control_calls
+from symphys.transcription.control_calls import Places, control_calls
 from symphys.transcription.decision import start_of
 from symphys.transcription.terms import Terms, terms
 
@@ -85,7 +85,7 @@ def rollout_program(rollout: Rollout, exact: bool = False) -> Program:
     """
     samples = Samples(rollout)
     asked = terms(samples)
-    body = [*control_calls(rollout, samples), *_step(samples, exact)]
+    body = [*control_calls(rollout, samples), *step_calls(samples, exact)]
     epilogue, outputs = _epilogue(samples, asked)
     times = tuple(np.arange(rollout.steps + 1) * rollout.dt)
     return Program(
@@ -101,8 +101,8 @@ def rollout_program(rollout: Rollout, exact: bool = False) -> Program:
     )
 
 
-def _step(samples: Samples, exact: bool) -> list[Call]:
-    """The calls of one time step."""
+def step_calls(samples: Places, exact: bool) -> list[Call]:
+    """The calls of one time step, from ``x`` and ``u`` to the ``x`` after."""
     rollout = samples.rollout
     columns = Columns(rollout.world)
     recording = record_step(
@@ -125,7 +125,7 @@ def _step(samples: Samples, exact: bool) -> list[Call]:
     return calls
 
 
-def _remember(samples: Samples) -> Call:
+def _remember(samples: Places) -> Call:
     """What the next step's sensors need to know of this one."""
     memory, inputs = samples.rollout.memory, samples.rollout.inputs
     x, u = ca.SX.sym("x", samples.x.size), ca.SX.sym("u", samples.u.size)

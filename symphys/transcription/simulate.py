@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,7 +35,7 @@ def recorder(rollout: Rollout) -> ca.Function:
     return ca.Function("record", [rollout.z, rollout.smoothing], [x, u, rollout.given, rollout.p, *happened])
 
 
-def simulate(rollout: Rollout, record: ca.Function, z: Array, smoothing: float) -> Record:
+def simulate(rollout: Rollout, record: Callable[..., Any], z: Array, smoothing: float) -> Record:
     """The rollout of z; NotFinite, which says where and why, if it has none."""
     x, u, given, p, *happened = (np.array(part).T for part in record(z, smoothing))
     course = Course(np.asarray(z, float), smoothing, x, u, given, p.ravel())

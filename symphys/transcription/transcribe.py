@@ -1,105 +1,19 @@
-"""The transcription: one rollout, as the shooting problem that solvers see, and the functions of judge and recorder."""
+"""From a problem to its transcription: one rollout, as the shooting problem that solvers see."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from functools import cached_property
 from time import perf_counter
 
-import casadi as ca
-import numpy as np
-from numpy.typing import NDArray
-
-from symphys.backends import BEST, Description, Source, choose
+from symphys.backends import BEST, Source, choose
 from symphys.problem import Problem
 from symphys.shooting import ShootingProblem
-from symphys.trajectory import Trajectory
-from symphys.transcription.along import Rollout, symbolic_rollout
+from symphys.transcription.along import symbolic_rollout
 from symphys.transcription.decision import blocks
-from symphys.transcription.functions import ExpressionFunctions, function_of
-from symphys.transcription.judge import Verdict, verdict
+from symphys.transcription.functions import ExpressionFunctions
+from symphys.transcription.large import has_large_nets, transcribe_large
 from symphys.transcription.program import rollout_program
-from symphys.transcription.simulate import Record, recorder, simulate
-from symphys.transcription.terms import Terms, terms
-
-Array = NDArray[np.float64]
-Judge = Callable[..., Verdict]
-"""(z, smoothing = 0) -> verdict."""
-PRICING_CALLS = 5
-"""How often a function is timed; the fastest call counts."""
-
-
-@dataclass(frozen=True, eq=False)
-class Transcription:
-    """A problem, its shooting problem, and the exact rollout that judges and records; equal to itself only.
-
-    Attributes:
-        backend: what evaluates the shooting problem.
-        build_seconds: until there were expressions; ``backend.seconds`` come on top.
-    """
-
-    problem: Problem
-    rollout: Rollout
-    terms: Terms
-    functions: ExpressionFunctions
-    shooting: ShootingProblem
-    backend: Description
-    build_seconds: float
-
-    def judge(self, z: Array, smoothing: float = 0.0) -> Verdict:
-        """How ``z`` does in the exact rollout, or in a smoothed one."""
-        return self._judge(z, smoothing)
-
-    def simulate(self, z: Array, smoothing: float = 0.0) -> Trajectory:
-        """The motion; NotFinite if there is none."""
-        return self.record(z, smoothing).motion
-
-    def record(self, z: Array, smoothing: float = 0.0) -> Record:
-        """The motion and the states and arguments that it is made from; NotFinite if there is none."""
-        return simulate(self.rollout, self._recorder, z, smoothing)
-
-    def prices(self, kinds: Iterable[str] = ("gradient", "jacobian")) -> dict[str, float]:
-        """Measured cost of one "gradient", "jacobian" or "hessian" in rollouts, at the guess, one at a time.
-
-        A Jacobian is that of the residuals, or of the constraints where there are none. Hessians are those of
-        casadi's virtual machine, whatever the backend.
-        """
-        z, evaluator = self.shooting.start(0), self.shooting.evaluator
-        one = _fastest(lambda: evaluator.value(z[None], 0.0))
-        calls: dict[str, Callable[[], object]] = {"gradient": lambda: evaluator.gradient(z[None], 0.0)}
-        if self.shooting.squares:
-            calls["jacobian"] = lambda: evaluator.jacobian(z[None], 0.0)
-        elif self.terms.names:
-            constraints = self.shooting.nlp.jacobian or self.functions.constraint_jacobian
-            calls["jacobian"] = lambda: constraints(z, 0.0)
-        calls["hessian"] = lambda: self.functions.hessian(z, 0.0)
-        return {kind: _fastest(calls[kind]) / one for kind in kinds if kind in calls}
-
-    @cached_property
-    def _judge(self) -> Judge:
-        return judge_of(self.rollout, self.terms)
-
-    @cached_property
-    def _recorder(self) -> ca.Function:
-        return recorder(self.rollout)
-
-
-def judge_of(rollout: Rollout, asked: Terms) -> Judge:
-    """A judge of candidates by the exact rollout, without the functions that solvers need."""
-    numbers = function_of(rollout, "judge", [asked.objective, asked.costs, asked.errors])
-
-    def judge(z: Array, smoothing: float = 0.0) -> Verdict:
-        objective, costs, errors = numbers(z, smoothing)
-        return verdict(rollout.problem, float(objective), np.array(costs).ravel(), np.array(errors).ravel())
-
-    return judge
-
-
-def judge_for(problem: Problem) -> Judge:
-    """The judge of a problem."""
-    rollout = symbolic_rollout(problem)
-    return judge_of(rollout, terms(rollout))
+from symphys.transcription.terms import terms
+from symphys.transcription.transcription import Transcription
 
 
 def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threads: int | None = None) -> Transcription:
@@ -111,6 +25,8 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
         backend: what evaluates it, a name of ``symphys.backends.NAMES``.
         threads: that share a batch; None: one for each processor.
     """
+    if has_large_nets(problem):
+        return transcribe_large(problem, exact, backend, threads)
     began = perf_counter()
     rollout = symbolic_rollout(problem)
     asked = terms(rollout)
@@ -130,13 +46,3 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
         stop_when_met=problem.stop_when_met,
     )
     return Transcription(problem, rollout, asked, functions, shooting, chosen.description, built)
-
-
-def _fastest(call: Callable[[], object]) -> float:
-    """Seconds of the fastest of a few calls."""
-    times = []
-    for _ in range(PRICING_CALLS):
-        began = perf_counter()
-        call()
-        times.append(perf_counter() - began)
-    return min(times)

@@ -1,0 +1,131 @@
+"""Evaluates problems with large nets: one decision vector at a time, or many robots that share their weights."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.shooting import Values
+from symphys.transcription.large.layers import Layers
+from symphys.transcription.large.made import Made, Stage
+from symphys.transcription.large.passes import Backward, Way, aim_arguments, forward
+
+Array = NDArray[np.float64]
+LEAST_ROBOTS = 8
+"""In a thread: what fills the lanes of a kernel."""
+
+
+@dataclass(frozen=True)
+class Shared:
+    """Robots with shared weights.
+
+    Attributes:
+        merit, objective: (B,).
+        errors: (B, e).
+        small: (B, s) gradient of each robot's merit with respect to what robots do not share; None if not asked for.
+        weights: for each net (w,) the gradient of the sum of merits; None likewise.
+    """
+
+    merit: Array
+    objective: Array
+    errors: Array
+    small: Array | None = None
+    weights: tuple[Array, ...] | None = None
+
+
+class LargeEvaluator:
+    """See ``Evaluator``; and ``shared`` for robots that share their weights."""
+
+    def __init__(self, made: Made, stage: Stage, threads: int, real: Any = np.float64) -> None:
+        """``threads`` share the robots of a call; ``real``: precision of the nets, numpy.float64 or float32."""
+        self.made, self.stage, self.threads, self.real = made, stage, threads, real
+
+    def shared(self, weights: Sequence[Array], Z: Array, smoothing: float = 0.0, gradient: bool = False) -> Shared:
+        """Roll out robots.
+
+        Args:
+            weights: of each net, in the order of the file, shared by all robots.
+            Z: (B, s) what robots do not share: the entries ``made.split.small`` of z.
+            smoothing: [m/s].
+            gradient: whether derivatives are wanted.
+        """
+        nets = self._nets(weights)
+        count = max(1, min(self.threads, len(Z) // LEAST_ROBOTS))
+        parts = np.array_split(Z, count)
+        if count == 1:
+            found = [self._part(nets, parts[0], smoothing, gradient)]
+        else:
+            with ThreadPoolExecutor(count) as pool:
+                found = list(pool.map(lambda part: self._part(nets, part, smoothing, gradient), parts))
+        merit, objective, errors = (
+            np.concatenate([getattr(part, name) for part in found]) for name in ("merit", "objective", "errors")
+        )
+        if not gradient:
+            return Shared(merit, objective, errors)
+        small = np.concatenate([part.small for part in found if part.small is not None])
+        sums = zip(*(part.weights for part in found if part.weights is not None), strict=True)
+        return Shared(merit, objective, errors, small, tuple(np.sum(own, axis=0) for own in sums))
+
+    def way(self, z: Array, smoothing: float) -> Way:
+        """The motion of one decision vector."""
+        parts = self.made.split
+        nets = self._nets([own.at(z) for own in parts.weights])
+        return forward(self.made, self.stage, nets, z[None, parts.small], smoothing)
+
+    def _nets(self, weights: Sequence[Array]) -> list[Layers]:
+        return [
+            Layers(controller.law, own, self.real)  # type: ignore[arg-type]
+            for controller, own in zip(self.made.split.nets, weights, strict=True)
+        ]
+
+    def _part(self, nets: Sequence[Layers], Z: Array, smoothing: float, gradient: bool) -> Shared:
+        way = forward(self.made, self.stage, nets, Z, smoothing)
+        values = Shared(*self._values(way))
+        if not gradient:
+            return values
+        small, weights = Backward(self.made, self.stage, nets, way, smoothing).run()
+        return Shared(values.merit, values.objective, values.errors, small, tuple(weights))
+
+    def _values(self, way: Way) -> tuple[Array, Array, Array]:
+        found = [self.made.aims.value.call(aim_arguments(self.made, way, b)) for b in range(len(way.z))]
+        merit, objective, errors = (np.array([np.array(row[i]).ravel() for row in found]) for i in range(3))
+        return merit[:, 0], objective[:, 0], errors
+
+    def value(self, Z: Array, smoothing: float) -> Values:
+        """See ``Evaluator``."""
+        return self._each(Z, smoothing, gradient=False)
+
+    def gradient(self, Z: Array, smoothing: float) -> Values:
+        """See ``Evaluator``."""
+        return self._each(Z, smoothing, gradient=True)
+
+    def residuals(self, Z: Array, smoothing: float) -> Values:
+        """There are none: see ``ShootingProblem.squares``."""
+        raise NotImplementedError("a problem with large nets has no residuals")
+
+    def jacobian(self, Z: Array, smoothing: float) -> Values:
+        """There is none."""
+        raise NotImplementedError("a problem with large nets has no Jacobian")
+
+    def _each(self, Z: Array, smoothing: float, gradient: bool) -> Values:
+        split_, found = self.made.split, []
+        for z in Z:
+            weights = [own.at(z) for own in split_.weights]
+            found.append(self.shared(weights, z[None, split_.small], smoothing, gradient))
+        merit, objective, errors = (
+            np.concatenate([getattr(each, name) for each in found]) for name in ("merit", "objective", "errors")
+        )
+        if not gradient:
+            return Values(merit, objective, errors)
+        slopes = np.zeros((len(Z), split_.n))
+        for row, each in zip(slopes, found, strict=True):
+            assert each.small is not None and each.weights is not None
+            row[split_.small] = each.small[0]
+            for own, slope in zip(split_.weights, each.weights, strict=True):
+                own.add(row, slope)
+        return Values(merit, objective, errors, gradient=slopes)

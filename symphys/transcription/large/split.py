@@ -1,0 +1,103 @@
+"""A problem with large nets taken apart: what steps compute, and the nets beside them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.controllers import Net
+from symphys.problem import Controller, Problem
+from symphys.transcription.along import Rollout, symbolic_rollout
+from symphys.transcription.names import input_names, spans
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+MOST_WEIGHTS = 4096
+"""Of a net that is computed within the compiled step, where every lane holds weights of its own."""
+
+
+def is_large(controller: Controller) -> bool:
+    """Whether a controller is a net that matrix products should compute."""
+    return isinstance(controller.law, Net) and controller.law.sizes["weights"] > MOST_WEIGHTS
+
+
+def has_large_nets(problem: Problem) -> bool:
+    """Whether any is."""
+    return any(is_large(controller) for controller in problem.controllers)
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Where the weights of one net come from.
+
+    Attributes:
+        nominal: (w,) as the file has them.
+        of_z, of_net: (k,) which entries of z are which weights; an entry of z may be several weights.
+    """
+
+    nominal: Array
+    of_z: Indices
+    of_net: Indices
+
+    def at(self, z: Array) -> Array:
+        """(w,) at a decision vector."""
+        weights = self.nominal.copy()
+        weights[self.of_net] = z[self.of_z]
+        return weights
+
+    def add(self, gradient: Array, of_weights: Array) -> None:
+        """Add the gradient of the weights to that of z."""
+        np.add.at(gradient, self.of_z, of_weights[self.of_net])
+
+
+@dataclass(frozen=True)
+class Split:
+    """A problem taken apart.
+
+    Attributes:
+        rollout: of the problem without its large nets, whose inputs they add to.
+        small: (s,) the entries of z that it depends on.
+        n: the length of z.
+        nets: the controllers that are large nets.
+        places: for each (nu, m) which input an output is added to, scaled.
+        weights: for each.
+    """
+
+    rollout: Rollout
+    small: Indices
+    n: int
+    nets: tuple[Controller, ...]
+    places: tuple[Array, ...]
+    weights: tuple[Weights, ...]
+
+
+def split(problem: Problem) -> Split:
+    """Take a problem apart."""
+    nets = tuple(controller for controller in problem.controllers if is_large(controller))
+    names = {name for controller in nets for name in controller.weights}
+    parts = list(zip(problem.variables, spans(problem.variables), strict=True))
+    kept = [(v, span) for v, span in parts if not any(slot.name in names for slot in v.slots)]
+    others = tuple(controller for controller in problem.controllers if controller not in nets)
+    rest = replace(problem, variables=tuple(v for v, _ in kept), controllers=others)
+    rollout = symbolic_rollout(rest, input_names(problem))
+    return Split(
+        rollout=rollout,
+        small=np.concatenate([np.zeros(0, int), *(np.arange(*span) for _, span in kept)]),
+        n=sum(v.guess.size for v in problem.variables),
+        nets=nets,
+        places=tuple(np.array(ca.DM(rollout.control.place(controller)).full()) for controller in nets),
+        weights=tuple(_weights(problem, controller) for controller in nets),
+    )
+
+
+def _weights(problem: Problem, controller: Controller) -> Weights:
+    name, of_z, of_net = f"{controller.name}.weights", [np.zeros(0, int)], [np.zeros(0, int)]
+    for variable, (first, last) in zip(problem.variables, spans(problem.variables), strict=True):
+        for slot in variable.slots:
+            if slot.name == name:
+                of_z.append(np.arange(first, last))
+                of_net.append(np.array(slot.components, int))
+    return Weights(controller.numbers["weights"], np.concatenate(of_z), np.concatenate(of_net))

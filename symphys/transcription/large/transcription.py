@@ -1,0 +1,132 @@
+"""The transcription of a problem with large nets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.backends import BEST, Description
+from symphys.kernel import KernelUnavailable, ProgramError, processors
+from symphys.problem import Problem
+from symphys.shooting import Nlp, ShootingProblem
+from symphys.step import report_function
+from symphys.transcription.decision import blocks
+from symphys.transcription.functions import ExpressionFunctions
+from symphys.transcription.judge import Verdict, verdict
+from symphys.transcription.large.evaluator import LargeEvaluator
+from symphys.transcription.large.made import KernelStage, Made, make
+from symphys.transcription.large.passes import Way, aim_arguments
+from symphys.transcription.simulate import Record, simulate
+from symphys.transcription.transcription import Transcription, fastest
+
+Array = NDArray[np.float64]
+PLAIN = ("casadi", "c")
+
+
+@dataclass(frozen=True, eq=False)
+class LargeTranscription(Transcription):
+    """See ``Transcription``; ``rollout`` is that of the problem without its large nets.
+
+    Attributes:
+        made: what it is computed with.
+    """
+
+    made: Made
+
+    @property
+    def examinable(self) -> bool:
+        """See ``Transcription``."""
+        return False
+
+    def judge(self, z: Array, smoothing: float = 0.0) -> Verdict:
+        """See ``Transcription``."""
+        way = self._plain.way(z, smoothing)
+        _, objective, errors, costs = (
+            np.array(part).ravel() for part in self.made.aims.value.call(aim_arguments(self.made, way, 0))
+        )
+        return verdict(self.problem, float(objective[0]), costs, errors)
+
+    def record(self, z: Array, smoothing: float = 0.0) -> Record:
+        """See ``Transcription``."""
+        way = self._plain.way(z, smoothing)
+        return simulate(self.rollout, lambda *_: self._happened(way, smoothing), way.z[0], smoothing)
+
+    def prices(self, kinds: Iterable[str] = ("gradient",)) -> dict[str, float]:
+        """See ``Transcription``."""
+        z, evaluator = self.shooting.start(0)[None], self.shooting.evaluator
+        one = fastest(lambda: evaluator.value(z, 0.0))
+        return {kind: fastest(lambda: evaluator.gradient(z, 0.0)) / one for kind in kinds if kind == "gradient"}
+
+    @cached_property
+    def _plain(self) -> LargeEvaluator:
+        """The judge's: casadi's virtual machine."""
+        return LargeEvaluator(self.made, self.made.plain, 1)
+
+    def _happened(self, way: Way, smoothing: float) -> list[Any]:
+        """What ``recorder`` gives, of the first robot."""
+        rollout, steps = self.rollout, self.rollout.steps
+        scheme = rollout.problem.simulation.scheme()
+        step = rollout.remembering(report_function(rollout.world, scheme, rollout.inputs, rollout.parameters.symbols))
+        x, u, given, p = way.x[:, 0].T, way.u[:, 0].T, way.given[:, 0].T, way.p[0]
+        _, *happened = step.map(steps)(x[:, :-1], u, np.tile(p[:, None], steps), smoothing)
+        return [x, u, given, p[:, None], *happened]
+
+
+def transcribe_large(
+    problem: Problem, exact: bool = False, backend: str = BEST, threads: int | None = None
+) -> LargeTranscription:
+    """See ``transcribe``: "simd32" has nets in single precision, and steps in double all the same."""
+    began = perf_counter()
+    made = make(problem)
+    built = perf_counter() - began
+    evaluator, description = _evaluator(made, exact, backend, processors() if threads is None else threads)
+    shooting = ShootingProblem(
+        name=problem.name,
+        blocks=blocks(problem),
+        evaluator=evaluator,
+        nlp=Nlp(None),
+        squares=False,
+        constraint_names=made.aims.terms.names,
+        constraint_lower=made.aims.terms.lower,
+        constraint_upper=made.aims.terms.upper,
+        smoothing=problem.simulation.smoothing,
+        stop_when_met=problem.stop_when_met,
+    )
+    functions = ExpressionFunctions(made.rollout, made.aims.terms)
+    return LargeTranscription(
+        problem, made.rollout, made.aims.terms, functions, shooting, description, built, made=made
+    )
+
+
+def _evaluator(made: Made, exact: bool, backend: str, threads: int) -> tuple[LargeEvaluator, Description]:
+    """The evaluator that is asked for, or casadi's with a note."""
+    note, began = "", perf_counter()
+    if backend not in PLAIN:
+        try:
+            stage = made.compiled(exact)
+        except (KernelUnavailable, ProgramError) as error:
+            note = f"casadi's virtual machine evaluates, which is slower: {error}"
+        else:
+            real = np.float32 if backend == "simd32" else np.float64
+            return LargeEvaluator(made, stage, threads, real), _description(stage, backend, threads, began)
+    return LargeEvaluator(made, made.plain, threads), Description("casadi", threads=threads, note=note)
+
+
+def _description(stage: KernelStage, backend: str, threads: int, began: float) -> Description:
+    report, single = stage.kernel.report, backend == "simd32"
+    return Description(
+        "simd32" if single else "simd",
+        report.lanes,
+        threads,
+        "single" if single else "double",
+        report.compiler,
+        report.cached,
+        perf_counter() - began,
+        "nets by matrix products" + (" in single precision, steps in double" if single else ""),
+    )

@@ -1,0 +1,185 @@
+"""Large nets, by matrix products between steps, do what the same nets do within the compiled step."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from symphys.problem import load_problem
+from symphys.transcription import Transcription, transcribe
+from symphys.transcription.large import LargeEvaluator, LargeTranscription, passes, split
+
+Array = NDArray[np.float64]
+
+HOPPING = """
+[simulation]
+duration = 0.5
+dt = 0.01
+smoothing = 0.02
+
+[[body]]
+name = "torso"
+shape = { sphere = { radius = 0.1 } }
+mass = 1.0
+position = [0, 0, 0.6]
+collides_with = []
+
+[[body]]
+name = "foot"
+shape = { sphere = { radius = 0.1 } }
+mass = 0.3
+position = [0.05, 0, 0.13]
+
+[[joint]]
+name = "leg"
+between = ["torso", "foot"]
+slider = { axis = [0, 0, 1] }
+motor = { servo = { gain = 20, torque = 40, velocity = 3 } }
+
+[ground]
+friction = 0.5
+
+[[sensor]]
+name = "body"
+reads = ["torso.position", "torso.accelerometer", "leg.command"]
+
+[[sensor]]
+name = "leg_state"
+reads = ["leg.position", "leg.rate", "sin(9 * time)", "foot.contact_force[2]"]
+
+[[controller]]
+name = "brain"
+drives = "leg.command"
+senses = ["leg_state", "body"]
+scale = 0.3
+net = { hidden = [6, 5], output = "tanh", ACTIVATION }
+
+[[controller]]
+name = "other"
+drives = "leg.command"
+senses = ["leg_state"]
+net = { hidden = [4], skip = true, biases = false, activation = "relu" }
+
+[[controller]]
+name = "small"
+drives = "leg.command"
+senses = ["leg_state"]
+linear = { gains = [[0.1, 0.01, 0, 0]] }
+
+[[variable]]
+name = "weights"
+sets = "brain.weights"
+
+[[variable]]
+name = "gains"
+sets = "small.gains"
+
+[[variable]]
+name = "start"
+sets = "torso.velocity"
+guess = [0.1, 0, 0.2]
+
+[[cost]]
+name = "effort"
+at = "always"
+squares = "[leg.torque, start]"
+weight = 0.01
+
+[[cost]]
+name = "middle"
+at = 0.25
+value = "foot.position[0] * leg.command"
+
+[[target]]
+name = "there"
+value = "torso.position - [0.2, 0, 0.7]"
+tolerance = 0.1
+"""
+
+
+@pytest.fixture(params=['activation = "tanh"', 'activation = "relu", biases = false', "skip = true"])
+def both(
+    request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> tuple[Transcription, LargeTranscription]:
+    """The same problem with its nets in the step, and beside it."""
+    path = tmp_path / "hopping.toml"
+    path.write_text(HOPPING.replace("ACTIVATION", request.param))
+    within = transcribe(load_problem(path), backend="casadi")
+    monkeypatch.setattr(split, "MOST_WEIGHTS", 10)
+    beside = transcribe(load_problem(path))
+    assert isinstance(beside, LargeTranscription)
+    return within, beside
+
+
+def points(made: Transcription) -> Array:
+    """(2, n) near the guess."""
+    start = made.shooting.start(0)
+    return start + 0.05 * np.random.default_rng(5).standard_normal((2, start.size))
+
+
+@pytest.mark.parametrize("smoothing", [0.0, 0.05])
+def test_values_and_gradients(both: tuple[Transcription, LargeTranscription], smoothing: float) -> None:
+    """To rounding, which impacts amplify, whatever the length of segments."""
+    within, beside = both
+    Z = points(within)
+    a = within.shooting.evaluator.gradient(Z, smoothing)
+    assert a.gradient is not None
+    for words in (10, passes.SEGMENT_WORDS):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(passes, "SEGMENT_WORDS", words)
+            b = beside.shooting.evaluator.gradient(Z, smoothing)
+        assert b.gradient is not None
+        assert np.allclose(a.merit, b.merit, rtol=1e-12)
+        assert np.allclose(a.errors, b.errors, rtol=1e-12)
+        assert np.allclose(a.gradient, b.gradient, rtol=1e-7, atol=1e-8 * np.abs(a.gradient).max())
+
+
+def test_robots_share_weights(both: tuple[Transcription, LargeTranscription], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Many robots at once, over threads: each one's own gradient, and the sum of those of the weights."""
+    beside = both[1]
+    evaluator = beside.shooting.evaluator
+    assert isinstance(evaluator, LargeEvaluator)
+    parts = evaluator.made.split
+    z = points(beside)[0]
+    Z = np.tile(z[parts.small], (19, 1)) + 0.01 * np.random.default_rng(1).standard_normal((19, len(parts.small)))
+    whole = np.tile(z, (19, 1))
+    whole[:, parts.small] = Z
+    alone = evaluator.gradient(whole, 0.0)
+    weights = [own.at(z) for own in parts.weights]
+    monkeypatch.setattr(evaluator, "threads", 2)
+    shared = evaluator.shared(weights, Z, gradient=True)
+    assert alone.gradient is not None and shared.small is not None and shared.weights is not None
+    assert np.allclose(shared.merit, alone.merit, rtol=1e-12)
+    assert np.allclose(shared.small, alone.gradient[:, parts.small], rtol=1e-7, atol=1e-8)
+    total = np.zeros(parts.n)
+    for own, slope in zip(parts.weights, shared.weights, strict=True):
+        own.add(total, slope)
+    expected = alone.gradient.sum(axis=0)
+    expected[parts.small] = 0
+    assert np.allclose(total, expected, rtol=1e-7, atol=1e-8 * np.abs(expected).max())
+
+
+def test_judge_and_motion(both: tuple[Transcription, LargeTranscription]) -> None:
+    """Casadi's rollouts of both agree, motion and contacts included."""
+    within, beside = both
+    z = points(within)[0]
+    a, b = within.judge(z), beside.judge(z)
+    assert a.objective == pytest.approx(b.objective, rel=1e-12)
+    motions = [made.simulate(z).arrays() for made in both]
+    for name, values in motions[0].items():
+        if values.dtype.kind == "f":
+            assert np.allclose(values, motions[1][name], rtol=1e-9, atol=1e-9, equal_nan=True), name
+
+
+def test_single_precision_of_nets(both: tuple[Transcription, LargeTranscription]) -> None:
+    """Nets in single precision cost six digits, not more."""
+    beside = both[1]
+    single = transcribe(beside.problem, backend="simd32")
+    Z = points(beside)
+    a, b = (made.shooting.evaluator.gradient(Z, 0.0) for made in (beside, single))
+    assert a.gradient is not None and b.gradient is not None
+    assert np.allclose(a.gradient, b.gradient, atol=1e-4 * np.abs(a.gradient).max())
+    assert not np.array_equal(a.gradient, b.gradient)
