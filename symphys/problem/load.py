@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from symphys.problem.aims import Aims, read_aims
 from symphys.problem.bodies import read_body, read_state
+from symphys.problem.carry import carry
 from symphys.problem.complaints import report
 from symphys.problem.controllers import read_controllers
 from symphys.problem.crowd import check_crowd
@@ -156,6 +157,8 @@ def read_plan(document: Document, faults: Faults) -> tuple[WorldPlan, dict[str, 
     for index, table in enumerate(document.body):
         initial |= read_state(table, index, faults)
     joints = read_joints(document.joint, [body.name for body in bodies], initial, faults)
+    if not faults.issues:
+        initial = carry(joints, initial, faults)
     x, y, z = document.world.gravity
     plan = WorldPlan(bodies, statics, pairs, read_contact(document.contact), (x, y, z), joints)
     check_crowd(Meetings(plan.parts, (*pairs, *plan.jointed)), faults)

@@ -84,6 +84,14 @@ def ends(value: object) -> list[float]:
     return [low, high]
 
 
+def coordinates(value: object) -> list[float]:
+    """A finite number, or one for each coordinate of a joint; a list comes out."""
+    numbers: list[Any] = value if isinstance(value, list) else [value]
+    if not numbers or not all(is_number(number) for number in numbers):
+        raise fault(f"must be a number, or a list with one for each coordinate, not {shown(value)}")
+    return [float(number) for number in numbers]
+
+
 def positive(count: int) -> Callable[[object], list[float]]:
     """A list of ``count`` positive finite numbers."""
 
