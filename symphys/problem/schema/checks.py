@@ -50,6 +50,11 @@ def identifier(value: object) -> str:
     return value
 
 
+def prefix(value: object) -> str:
+    """What can begin a name, or nothing."""
+    return "" if value == "" else identifier(value)
+
+
 def label(value: object) -> str:
     """A name for people: one line of text."""
     if not isinstance(value, str) or not value.strip() or not value.isprintable() or len(value) > MAX_LABEL:
