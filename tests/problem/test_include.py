@@ -143,6 +143,36 @@ def test_prefixes_reach_tables_of_any_kind() -> None:
     }
 
 
+BRAIN = """
+[[sensor]]
+name = "gaze"
+reads = ["knee.angle", "torso.gyro"]
+
+[[controller]]
+name = "brain"
+drives = "knee.command"
+senses = ["gaze"]
+net = { weights = "gaze.npy", biases = false }
+"""
+
+
+def test_a_robot_brings_its_controller(load_both: Load, tmp_path: Path) -> None:
+    """With a prefix; weights lie beside the file that names them."""
+    weights = [0.1, 0.2, 0.3, 0.4]
+    (tmp_path / "parts").mkdir()
+    np.save(tmp_path / "parts" / "gaze.npy", weights)
+    fewer = ("knee.angle - 0.5", "left_knee.angle")
+    text = MAIN.replace('robot.toml"', 'robot.toml"\nprefix = "left_"').replace(*fewer)
+    problem = load_both(robot=("[[variable]]", BRAIN + "[[variable]]"), problem=(MAIN, text))
+    (controller,) = problem.controllers
+    assert (controller.name, controller.senses, controller.drives) == (
+        "left_brain",
+        ("left_gaze",),
+        (("left_knee.command", 0),),
+    )
+    assert controller.numbers["weights"].tolist() == weights
+
+
 def test_every_list_of_a_problem_is_put_together() -> None:
     lists = {name for name, key in json_schema()["properties"].items() if key.get("type") == "array"}
     assert set(LISTS) == lists

@@ -31,7 +31,7 @@ FAULTS = [
     (("[contact]\nfriction = 0.3", "contact = 3"), ("", ""), "parts/robot.toml: contact: must be a table, not 3"),
     (("[contact]", "[[contact]]"), ("", ""), "parts/robot.toml: contact: must be a table, not a list of 1"),
     (("[contact]", "[contct]"), ("", ""), 'parts/robot.toml: contct: unknown key; did you mean "contact"'),
-    (("[contact]\nfriction = 0.3", "[sensor_x]"), ("", ""), "parts/robot.toml: sensor_x: unknown key; valid: "),
+    (("[contact]\nfriction = 0.3", "[qqq]"), ("", ""), "parts/robot.toml: qqq: unknown key; valid: "),
     (
         ("[contact]\nfriction = 0.3", "terrain = 3"),
         ("", ""),
@@ -76,6 +76,11 @@ FAULTS = [
         ('group = "robot"', 'group = "ball"'),
         ("", ""),
         'parts/robot.toml: body "torso".group: "ball" is .* of main.toml',
+    ),
+    (
+        ("[[plane]]", '[[sensor]]\nname = "gaze"\nreads = "knee.angl"\n[[plane]]'),
+        ("", ""),
+        'parts/robot.toml: sensor "gaze".reads: .*"knee.angle"',
     ),
     (("", ""), ("knee.angle", "kne.angle"), 'main.toml: target "bent".value: .*did you mean "knee.angle"'),
     (("", ""), ("duration = 1.0", "duration = -1"), "main.toml: simulation.duration: must be greater"),
