@@ -1,4 +1,4 @@
-"""The shipped problem files, and how a name on the command line finds one."""
+"""The shipped problem and robot files, and how a name on the command line finds a problem."""
 
 from __future__ import annotations
 
@@ -19,6 +19,11 @@ FOLDER = Path(__file__).parent
 def catalogue() -> dict[str, Path]:
     """Every shipped problem file by its name without ``.toml``."""
     return {path.stem: path for path in sorted(FOLDER.glob("*.toml"))}
+
+
+def robots() -> dict[str, Path]:
+    """Every shipped robot file by the path under which a problem includes it: ``robots/arm.toml``."""
+    return {f"robots/{path.name}": path for path in sorted((FOLDER / "robots").glob("*.toml"))}
 
 
 def find(name_or_path: str | Path) -> Path:

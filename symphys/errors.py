@@ -17,10 +17,12 @@ class Issue:
     Attributes:
         where: table and key, as written in the file, for instance ``body[0].mass``; may be empty.
         message: what is wrong and what would be valid.
+        file: where it is, if that is another file than the problem's: one that it includes.
     """
 
     where: str
     message: str
+    file: str = ""
 
     def __str__(self) -> str:
         """Return ``where: message``."""
@@ -34,7 +36,7 @@ class ProblemError(SymphysError):
         """Keep the file's name and its faults; the message lists the first ten."""
         self.file = file
         self.issues = tuple(issues)
-        lines = [f"{file}: {issue}" for issue in self.issues[:10]]
+        lines = [f"{issue.file or file}: {issue}" for issue in self.issues[:10]]
         if len(self.issues) > len(lines):
             lines.append(f"{file}: and {len(self.issues) - len(lines)} more")
         super().__init__("\n".join(lines))

@@ -7,7 +7,7 @@ import click
 
 @click.command("list")
 def listing() -> None:
-    """List the shipped problems and the solvers."""
+    """List the shipped problems, the robots that problems include, and the solvers."""
     from symphys import problems
     from symphys.problem import load_problem
     from symphys.solvers import SOLVERS
@@ -15,6 +15,9 @@ def listing() -> None:
     click.echo("problems:")
     for name, path in problems.catalogue().items():
         click.echo(f"  {name:<20} {load_problem(path).title}")
+    click.echo("robots, for [[include]]:")
+    for file in problems.robots():
+        click.echo(f"  {file}")
     click.echo("solvers:")
     for solver in SOLVERS.values():
         click.echo(f"  {solver.name:<20} {solver.summary}")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, NoReturn
 
 from symphys.errors import Issue, ProblemError
@@ -12,20 +14,56 @@ Place = Sequence[str | int]
 """Keys and indices from the top of the file, for instance ("body", 0, "mass")."""
 
 
-class Faults:
-    """The faults found so far in one file."""
+@dataclass(frozen=True)
+class Origin:
+    """Where something was written: the file's name, its parsed content, and the place there."""
 
-    def __init__(self, file: str, data: Mapping[str, Any]) -> None:
-        """Keep the file's name and its parsed content, from which places take names."""
+    file: str
+    data: Mapping[str, Any]
+    place: Place
+
+
+Origins = Mapping[tuple[str | int, ...], Origin]
+"""Of tables in lists, and of keys in other tables, by their places in what files that include others become."""
+
+
+class Faults:
+    """The faults found so far in one file, and in those that it includes."""
+
+    def __init__(self, file: str, data: Mapping[str, Any], origins: Origins = MappingProxyType({})) -> None:
+        """Keep the file's name and its parsed content, from which places take names; ``origins``: what is included."""
         self.file = file
         self.data = data
+        self.origins = origins
         self.issues: list[Issue] = []
 
     def add(self, place: Place, message: str) -> None:
         """Note a fault."""
-        issue = Issue(describe_place(place, self.data), message)
+        self.add_at(self.origin(place), message)
+
+    def add_at(self, origin: Origin, message: str) -> None:
+        """Note a fault where something was written."""
+        file = "" if origin.file == self.file else origin.file
+        issue = Issue(describe_place(origin.place, origin.data), message, file)
         if issue not in self.issues[-1000:]:
             self.issues.append(issue)
+
+    def origin(self, place: Place) -> Origin:
+        """Where what is at a place was written."""
+        found = self.origins.get(tuple(place[:2]))
+        if found is None:
+            return Origin(self.file, self.data, place)
+        return Origin(found.file, found.data, (*found.place, *place[2:]))
+
+    def called(self, place: Place, beside: Place) -> str:
+        """``pair[3] of robot.toml``: what to call a place in a message about the place ``beside``."""
+        origin = self.origin(place)
+        return describe_place(origin.place, origin.data) + self.elsewhere(beside, place)
+
+    def elsewhere(self, place: Place, other: Place) -> str:
+        """`` of robot.toml``: the file of ``other``, if that is not the file of ``place``."""
+        file = self.origin(other).file
+        return "" if file == self.origin(place).file else f" of {file}"
 
     def stop_if_any(self) -> None:
         """Raise all that was found as one ProblemError; return if there is nothing."""

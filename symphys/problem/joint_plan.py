@@ -26,6 +26,7 @@ class JointPlan:
         frequency: [Hz] of a joint that gives way; 0: rigid.
         damping: its damping ratio.
         collide: whether the two bodies may touch each other.
+        start: the coordinates at the start; empty: all 0, as the bodies lie in the file.
     """
 
     name: str
@@ -39,6 +40,7 @@ class JointPlan:
     frequency: float = 0.0
     damping: float = 1.0
     collide: bool = False
+    start: tuple[float, ...] = ()
 
     @property
     def apart(self) -> PairPlan | None:

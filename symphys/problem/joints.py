@@ -89,6 +89,7 @@ class Reader:
         self.check_damping()
         second, first = (None if name == WORLD else name for name in table.between)
         assert first is not None
+        limits = self.limits(kind)
         return JointPlan(
             name=table.name,
             kind=kind,
@@ -96,11 +97,12 @@ class Reader:
             second=second,
             sockets=read_sockets(self.place, table, self.initial, self.faults),
             motor=self.motor(table.motor),
-            limits=self.limits(kind),
+            limits=limits,
             spring=read_spring(table.spring),
             frequency=table.frequency,
             damping=1.0 if table.damping is None else table.damping,
             collide=table.collide,
+            start=self.start(kind, limits),
         )
 
     def check_between(self) -> None:
@@ -132,7 +134,7 @@ class Reader:
         """What acts along coordinates needs some."""
         if kind.coordinates:
             return
-        for key in ("motor", "limits", "limits_deg", "spring"):
+        for key in ("motor", "limits", "limits_deg", "start", "start_deg", "spring"):
             if getattr(self.table, key) is not None:
                 which = f"a {kind.name} joint has no coordinate along which it could act"
                 self.add(key, f"{which}; leave it out, or take a hinge, a slider or a universal joint")
@@ -174,6 +176,29 @@ class Reader:
             text = "an angle lies between -180 and 180 degrees (-pi and pi); -inf and inf are no bounds"
             self.add("limits" if table.limits is not None else "limits_deg", text)
         return Limits(low, high)
+
+    def start(self, kind: Kind, limits: Limits) -> tuple[float, ...]:
+        """In rad or m, within the limits; empty if none is given."""
+        table = self.table
+        key, given = ("start", table.start) if table.start_deg is None else ("start_deg", table.start_deg)
+        if given is None or not kind.coordinates:
+            return ()
+        count, turns = len(kind.coordinates), kind.coordinates[0].turns
+        if table.start is not None and table.start_deg is not None:
+            self.add("start_deg", "start is given too; leave one out")
+        if key == "start_deg" and not turns:
+            self.add(key, f"a {kind.name} has no angle; give start [m]")
+        if len(given) != count:
+            self.add(key, f"a {kind.name} has {count} coordinate{'s' * (count > 1)}, but {len(given)} are given")
+        values = tuple(np.deg2rad(given).tolist() if key == "start_deg" else given)
+        for value, written in zip(values, given, strict=True):
+            if turns and abs(value) > np.pi:
+                self.add(key, "an angle lies between -180 and 180 degrees (-pi and pi)")
+            elif (limits.lower is not None and value < limits.lower) or (
+                limits.upper is not None and value > limits.upper
+            ):
+                self.add(key, f"{written:g} is beyond the limits of this joint")
+        return values
 
 
 def read_spring(table: SpringTable | None) -> Spring | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,13 +11,16 @@ from pydantic import ValidationError
 
 from symphys.problem.aims import Aims, read_aims
 from symphys.problem.bodies import read_body, read_state
+from symphys.problem.carry import carry
 from symphys.problem.complaints import report
 from symphys.problem.controllers import read_controllers
 from symphys.problem.crowd import check_crowd
 from symphys.problem.faults import Faults, Place
+from symphys.problem.include import with_included
 from symphys.problem.joints import read_joints
 from symphys.problem.meetings import Meetings
 from symphys.problem.model import NOTHING, Array, Problem
+from symphys.problem.placing import placed
 from symphys.problem.plan import WorldPlan
 from symphys.problem.quantities import quantities, weight_quantities
 from symphys.problem.schema import Document
@@ -60,10 +62,20 @@ def load_problem(
     path = Path(path)
     text = read_source(path)
     data = parse_toml(path, text)
-    apply_settings(data, settings, str(path))
-    faults = Faults(str(path), data)
-    document = read_document(data, faults)
-    return build(path, text, document, faults, functions)
+    early, late = (
+        {key: value for key, value in settings.items() if of_includes(key) is which} for which in (True, False)
+    )
+    apply_settings(data, early, str(path))
+    merged = with_included(path, text, data)
+    apply_settings(merged.data, late, str(path), merged.shared)
+    faults = Faults(str(path), merged.data, merged.origins)
+    document = placed(read_document(merged.data, faults), merged, faults)
+    return build(path, merged.text, document, faults, functions)
+
+
+def of_includes(key: str) -> bool:
+    """Whether a setting says what is included, and must be known before all others."""
+    return key.partition(".")[0] in ("include", "included")
 
 
 def read_document(data: Mapping[str, Any], faults: Faults) -> Document:
@@ -83,16 +95,19 @@ def check_names(document: Document, faults: Faults) -> None:
     """Surfaces and variables share one set of names; costs, targets and constraints have one each."""
     for kinds in (SHARED_NAMES, *((key,) for key in OWN_NAMES)):
         named = [(key, index, table.name) for key in kinds for index, table in enumerate(getattr(document, key))]
-        counts = Counter(name for _, _, name in named)
-        seen: set[str] = set()
+        seen: dict[str, Place] = {}
         for key, index, name in named:
-            if counts[name] > 1 and name in seen:
-                faults.add((key, index, "name"), f'"{name}" is already the name of another {" or ".join(kinds)}')
-            seen.add(name)
-    owners = {table.name: key for key in SHARED_NAMES for table in getattr(document, key)}
+            place: Place = (key, index, "name")
+            if name in seen:
+                text = f'"{name}" is already the name of another {" or ".join(kinds)}'
+                faults.add(place, text + faults.elsewhere(place, seen[name]))
+            seen.setdefault(name, place)
+    owners = {table.name: (key, k) for key in SHARED_NAMES for k, table in enumerate(getattr(document, key))}
     for place, group in groups(document):
         if group in owners:
-            faults.add(place, f'"{group}" is already the name of a {owners[group]}; a group needs one of its own')
+            owner = owners[group]
+            text = f'"{group}" is already the name of a {owner[0]}{faults.elsewhere(place, owner)}'
+            faults.add(place, f"{text}; a group needs one of its own")
 
 
 def groups(document: Document) -> list[tuple[Place, str]]:
@@ -156,6 +171,8 @@ def read_plan(document: Document, faults: Faults) -> tuple[WorldPlan, dict[str, 
     for index, table in enumerate(document.body):
         initial |= read_state(table, index, faults)
     joints = read_joints(document.joint, [body.name for body in bodies], initial, faults)
+    if not faults.issues:
+        initial = carry(joints, initial, faults)
     x, y, z = document.world.gravity
     plan = WorldPlan(bodies, statics, pairs, read_contact(document.contact), (x, y, z), joints)
     check_crowd(Meetings(plan.parts, (*pairs, *plan.jointed)), faults)

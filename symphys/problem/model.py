@@ -180,7 +180,7 @@ class Problem:
         name: the file's stem.
         title, description: for people.
         file: the path as given.
-        text: the source.
+        text: the source, with the texts of included files, so that it can be loaded again without them.
         simulation: how time passes.
         plan: bodies, planes and their laws, from which ``world`` builds.
         initial: for every body ``<body>.position`` (3,) [m], ``.orientation`` (4,) unit quaternion w x y z,

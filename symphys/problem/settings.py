@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from symphys.errors import Issue, ProblemError
@@ -18,11 +18,18 @@ class SettingError(Exception):
     """Why a setting has no place."""
 
 
-def apply_settings(data: dict[str, Any], settings: Mapping[str, object], file: str) -> None:
-    """Change ``data`` in place; ProblemError names every setting that has no place in the file."""
+def apply_settings(
+    data: dict[str, Any], settings: Mapping[str, object], file: str, shared: Collection[str] = ()
+) -> None:
+    """Change ``data`` in place; ProblemError names every setting that has no place in the file.
+
+    ``shared``: lists with tables of included files, which are not replaced as a whole.
+    """
     issues = []
     for path, value in settings.items():
         try:
+            if path in shared:
+                raise SettingError("included files have tables in this list; set what is in them by name")
             assign(data, path, value)
         except SettingError as error:
             issues.append(Issue(f"setting {quote(path)}", str(error)))

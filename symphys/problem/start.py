@@ -85,7 +85,8 @@ def check_joints(plan: WorldPlan, values: Mapping[str, Array], faults: Faults) -
         apart, tilt = (round(float(ca.evalf(ca.SX(part))), 9) for part in (reading.separation, reading.tilt))
         if not max(apart, tilt) <= MEET:
             text = f"{apart:.4g} m and {tilt:.4g} rad from where the joint holds them; one variable must move both"
-            faults.add((*place, "between"), f"the guess of a variable puts {both} {text}")
+            cause = "the start of other joints, or " * any(plan.start for plan in plan.joints)
+            faults.add((*place, "between"), f"{cause}the guess of a variable puts {both} {text}")
         low, high = joint.limits.lower, joint.limits.upper
         for value in np.array(ca.evalf(ca.SX(reading.value))).ravel().round(9) + 0.0:
             if (low is not None and value < low - MEET) or (high is not None and value > high + MEET):

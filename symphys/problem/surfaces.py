@@ -38,7 +38,8 @@ def read_pairs(
         if a == b and a in names:
             faults.add((*place, "between"), "names the same surface twice")
         if first.setdefault(between, index) != index:
-            faults.add((*place, "between"), f"{a} and {b} already have a [[pair]] table")
+            other = faults.elsewhere(place, ("pair", first[between]))
+            faults.add((*place, "between"), f"{a} and {b} already have a [[pair]] table{other}")
         own = states(table) | {
             key: value for key in ("frequency", "damping") if (value := getattr(table, key)) is not None
         }
@@ -75,12 +76,13 @@ def check_ranks(plan: WorldPlan, faults: Faults) -> None:
         for index, name in (entry for entries in rivals.values() for entry in entries):
             rival = rival_of(plan, index, name, found.get((home, shared), {}))
             if rival is not None and rival[0] < index:
-                other = rival[1]
+                other, place = rival[1], ("pair", index)
                 text = (
-                    f"for {name} and {other}, this table and pair[{rival[0]}] say different things; add a [[pair]] "
+                    f"for {name} and {other}, this table and {faults.called(('pair', rival[0]), place)} say different "
+                    "things; add a [[pair]] "
                     f'between = ["{name}", "{other}"], which goes before both'
                 )
-                faults.add(("pair", index, "between"), text)
+                faults.add((*place, "between"), text)
 
 
 Statement = tuple[object, ...]

@@ -64,7 +64,7 @@ def importers(wanted: str) -> set[str]:
         ("symphys.report", {"cli"}),
         ("symphys.export", {"cli"}),
         ("symphys.doctor", {"cli"}),
-        ("symphys.problems", {"cli"}),
+        ("symphys.problems", {"cli", "problem"}),
         ("matplotlib", {"report"}),
         ("pydantic", {"problem"}),
         ("click", {"cli"}),

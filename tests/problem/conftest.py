@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
+from included import MAIN, ROBOT
 
 from symphys.errors import ProblemError
 from symphys.problem import Problem, load_problem
@@ -113,3 +114,40 @@ def names() -> Callable[[ProblemError, str, str], None]:
         assert str(error).startswith(error.file)
 
     return names
+
+
+@pytest.fixture
+def write_both(tmp_path: Path) -> Callable[..., Path]:
+    """Writes the two files, changed, and tells the problem's path."""
+
+    def write(robot: tuple[str, str] = ("", ""), problem: tuple[str, str] = ("", ""), more: str = "") -> Path:
+        (tmp_path / "parts").mkdir(exist_ok=True)
+        for name, text, (old, new) in (("parts/robot.toml", ROBOT, robot), ("main.toml", MAIN, problem)):
+            assert old in text
+            (tmp_path / name).write_text(text.replace(old, new, 1) + more * (name == "main.toml"), encoding="utf-8")
+        return tmp_path / "main.toml"
+
+    return write
+
+
+@pytest.fixture
+def load_both(write_both: Callable[..., Path]) -> Load:
+    """A function that loads them, changed."""
+
+    def load(*, settings: Mapping[str, object] | None = None, **changes: object) -> Problem:
+        return load_problem(write_both(**changes), settings or {})
+
+    return load
+
+
+@pytest.fixture
+def refused_both(write_both: Callable[..., Path]) -> Callable[..., list[str]]:
+    """The lines of the error, with paths from the problem's folder on."""
+
+    def refused(*, settings: Mapping[str, object] | None = None, **changes: object) -> list[str]:
+        path = write_both(**changes)
+        with pytest.raises(ProblemError) as caught:
+            load_problem(path, settings or {})
+        return str(caught.value).replace(f"{path.parent}/", "").splitlines()
+
+    return refused

@@ -26,7 +26,8 @@ def definition(schema: dict[str, Any], reference: dict[str, Any]) -> dict[str, A
 def test_every_table_and_key_is_there() -> None:
     schema = json_schema()
     assert set(schema["properties"]) == set(Document.model_fields)
-    assert schema["required"] == ["simulation", "body"]
+    assert schema["required"] == ["simulation"]
+    assert schema["anyOf"] == [{"required": ["body"]}, {"required": ["include"]}]
     assert schema["additionalProperties"] is False
     body = definition(schema, schema["properties"]["body"]["items"])
     assert {"name", "shape", "mass", "friction", "collides_with"} <= set(body["properties"])
@@ -87,3 +88,13 @@ def test_solver_options() -> None:
 
 def test_without_solvers_any_option_passes() -> None:
     assert "properties" not in json_schema()["properties"]["solver"]
+
+
+def test_a_problem_may_include_its_bodies() -> None:
+    schema = json_schema()
+    include = definition(schema, schema["properties"]["include"]["items"])
+    assert set(include["properties"]) == {"file", "position", "yaw_deg", "prefix"}
+    assert include["required"] == ["file"]
+    assert all("description" in key for key in include["properties"].values())
+    joint = definition(schema, schema["properties"]["joint"]["items"])
+    assert {"start", "start_deg"} <= set(joint["properties"])

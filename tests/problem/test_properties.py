@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from included import MAIN, ROBOT
 
 from symphys.errors import ProblemError
 from symphys.problem import load_problem
@@ -148,6 +149,24 @@ def test_a_valid_file_with_any_value_anywhere(path: Path, valid: str, data: st.D
     for _ in range(data.draw(st.integers(1, 3))):
         put(document, data.draw(st.sampled_from(places(document))), data.draw(VALUES))
     load(path, "\n".join(f"{key} = {write(value)}" for key, value in document.items()))
+
+
+@settings(max_examples=150, deadline=None)
+@given(data=st.data())
+def test_a_valid_robot_with_any_value_anywhere(path: Path, data: st.DataObject) -> None:
+    """In the robot file, in the problem, or in a setting."""
+    robot, problem = tomllib.loads(ROBOT), tomllib.loads(MAIN.replace("knee.", "l_knee."))
+    problem["include"] = [{"file": "robot.toml", "position": [1, 2, 3], "yaw_deg": 10, "prefix": "l_"}]
+    for _ in range(data.draw(st.integers(1, 2))):
+        document = data.draw(st.sampled_from([robot, problem]))
+        put(document, data.draw(st.sampled_from(places(document))), data.draw(VALUES))
+    for name, document in (("robot.toml", robot), ("main.toml", problem)):
+        text = "\n".join(f"{key} = {write(value)}" for key, value in document.items())
+        (path.parent / name).write_text(text, encoding="utf-8", errors="replace")
+    keys = st.lists(st.sampled_from(["include", "body", "0", "file", "l_torso", "mass", "prefix"]), max_size=3)
+    changed = data.draw(st.dictionaries(keys.map(".".join), VALUES, max_size=1))
+    with contextlib.suppress(ProblemError):
+        load_problem(path.parent / "main.toml", changed).world()
 
 
 @settings(max_examples=200, deadline=None)

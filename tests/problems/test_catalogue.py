@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from symphys import problems
+from symphys.cli import main
 from symphys.errors import SymphysError
 from symphys.problem import load_problem
 
@@ -96,3 +97,13 @@ def test_the_folder_is_no_package_of_its_own() -> None:
     module = importlib.util.module_from_spec(spec)
     with pytest.raises(ImportError, match=r"symphys\.problems, but was imported as 'problems'"):
         spec.loader.exec_module(module)
+
+
+def test_robots_are_listed_apart_from_problems(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["list"]) == 0
+    listed = capsys.readouterr().out.split("robots, for [[include]]:")
+    assert "cart_pole" in listed[0]
+    assert "robots/" not in listed[0]
+    assert "robots/table_robot.toml" in listed[1]
+    with pytest.raises(SymphysError, match="no shipped problem"):
+        problems.find("table_robot")

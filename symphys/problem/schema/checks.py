@@ -50,6 +50,11 @@ def identifier(value: object) -> str:
     return value
 
 
+def prefix(value: object) -> str:
+    """What can begin a name, or nothing."""
+    return "" if value == "" else identifier(value)
+
+
 def label(value: object) -> str:
     """A name for people: one line of text."""
     if not isinstance(value, str) or not value.strip() or not value.isprintable() or len(value) > MAX_LABEL:
@@ -82,6 +87,14 @@ def ends(value: object) -> list[float]:
     if low == math.inf or high == -math.inf or low > high:
         raise fault(f"the lower end, {low:g}, must not be above the upper, {high:g}; [-inf, inf] is no bound at all")
     return [low, high]
+
+
+def coordinates(value: object) -> list[float]:
+    """A finite number, or one for each coordinate of a joint; a list comes out."""
+    numbers: list[Any] = value if isinstance(value, list) else [value]
+    if not numbers or not all(is_number(number) for number in numbers):
+        raise fault(f"must be a number, or a list with one for each coordinate, not {shown(value)}")
+    return [float(number) for number in numbers]
 
 
 def positive(count: int) -> Callable[[object], list[float]]:

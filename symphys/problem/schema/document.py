@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
 from symphys.problem.schema.aims import ConstraintTable, CostTable, ObjectiveTable, TargetTable, VariableTable
 from symphys.problem.schema.control import ControllerTable, SensorTable
+from symphys.problem.schema.include import MOST_INCLUDES, IncludedTable, IncludeTable
 from symphys.problem.schema.joints import JointTable
 from symphys.problem.schema.physics import (
     BlockTable,
@@ -26,11 +27,15 @@ from symphys.problem.schema.types import Label, Table
 class Document(Table):
     """A symphys problem."""
 
+    model_config = ConfigDict(json_schema_extra={"anyOf": [{"required": ["body"]}, {"required": ["include"]}]})
+
     title: Label | None = Field(default=None, description="one line; default: the file's name")
     description: str = Field(default="", description="what the problem is about")
     simulation: SimulationTable
     world: WorldTable = WorldTable()
-    body: list[BodyTable] = Field(min_length=1)
+    include: list[IncludeTable] = Field(default=[], max_length=MOST_INCLUDES)
+    included: list[IncludedTable] = Field(default=[], max_length=MOST_INCLUDES)
+    body: list[BodyTable] = Field(default=[], min_length=1, validate_default=True)
     ground: GroundTable | None = None
     plane: list[PlaneTable] = Field(default=[])
     block: list[BlockTable] = Field(default=[])

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from symphys.problem.schema.types import Ends, Finite, Identifier, NonNegative, Positive, Table, Vector
+from symphys.problem.schema.types import Coordinates, Ends, Finite, Identifier, NonNegative, Positive, Table, Vector
 
 AXIS = "[x, y, z], world coordinates at the start, any length but 0"
 
@@ -70,7 +70,7 @@ class SpringTable(Table):
 class JointTable(Table):
     """What holds two bodies together, or a body to the world; coordinates are 0 as the bodies lie in the file.
 
-    One of ball, hinge, slider, universal and fixed says how.
+    With ``start`` they begin elsewhere. One of ball, hinge, slider, universal and fixed says how.
     """
 
     name: Identifier = Field(description="how formulas, variables and settings refer to it")
@@ -97,6 +97,12 @@ class JointTable(Table):
         default=None, description="[lower, upper] of every coordinate [rad], or [m]; -inf and inf are none"
     )
     limits_deg: Ends | None = Field(default=None, description="the same in degrees, where the joint turns")
+    start: Coordinates | None = Field(
+        default=None,
+        description="the coordinate at the start [rad], or [m], or a list of all; default 0. The second body, and all "
+        "that hangs on it, is carried there from where it lies in the file",
+    )
+    start_deg: Coordinates | None = Field(default=None, description="the same in degrees, where the joint turns")
     spring: SpringTable | None = Field(default=None, description="{ stiffness = 5, damping = 0.1, rest = 0 }")
     frequency: NonNegative = Field(default=0.0, description="of a joint that gives way [Hz]; 0: rigid")
     damping: NonNegative | None = Field(default=None, description="damping ratio of a joint that gives way; default 1")

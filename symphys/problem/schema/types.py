@@ -30,6 +30,12 @@ def positive_schema(count: int) -> dict[str, Any]:
     }
 
 
+def coordinates_schema() -> dict[str, Any]:
+    """The JSON Schema of a number or a list of numbers."""
+    number = {"type": "number"}
+    return {"anyOf": [number, {"type": "array", "items": number, "minItems": 1}]}
+
+
 def numbers_schema() -> dict[str, Any]:
     """The JSON Schema of a number, a list of numbers or a list of lists of numbers."""
     number = {"type": "number"}
@@ -53,6 +59,7 @@ Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
 Vector = Annotated[list[float], PlainValidator(checks.vector(3)), WithJsonSchema(vector_schema(3))]
 Pair = Annotated[list[float], PlainValidator(checks.vector(2)), WithJsonSchema(vector_schema(2))]
 Ends = Annotated[list[float], PlainValidator(checks.ends), WithJsonSchema(vector_schema(2))]
+Coordinates = Annotated[list[float], PlainValidator(checks.coordinates), WithJsonSchema(coordinates_schema())]
 Size = Annotated[list[float], PlainValidator(checks.positive(3)), WithJsonSchema(positive_schema(3))]
 Length = Annotated[float, PlainValidator(checks.length), WithJsonSchema({"type": "number", "exclusiveMinimum": 0})]
 Spacing = Annotated[
