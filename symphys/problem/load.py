@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +16,14 @@ from symphys.problem.complaints import report
 from symphys.problem.controllers import read_controllers
 from symphys.problem.crowd import check_crowd
 from symphys.problem.faults import Faults, Place
+from symphys.problem.feedback import Controller, Sensor
 from symphys.problem.include import with_included
 from symphys.problem.joints import read_joints
 from symphys.problem.meetings import Meetings
-from symphys.problem.model import NOTHING, Array, Problem
+from symphys.problem.model import NOTHING, Array, Problem, Simulation, Variable
 from symphys.problem.placing import placed
 from symphys.problem.plan import WorldPlan
-from symphys.problem.quantities import quantities, weight_quantities
+from symphys.problem.quantities import Quantity, quantities, weight_quantities
 from symphys.problem.schema import Document
 from symphys.problem.sensors import read_sensors
 from symphys.problem.settings import apply_settings
@@ -126,19 +127,12 @@ def build(
     faults.stop_if_any()
     check_laws(plan, faults)
     known = quantities(initial, plan.parameters(), input_sizes(plan.world({})))
-    sensors = read_sensors(document.sensor, sensor_names(plan, at_guess(known, ())), faults)
-    faults.stop_if_any()
-    controllers = read_controllers(document.controller, sensors, known, functions, faults)
-    faults.stop_if_any()
+    sensors, controllers = read_control(document, plan, known, functions, faults)
     known |= weight_quantities(controllers)
     variables = read_variables(document.variable, known, simulation, faults)
     check_varied(plan, variables, faults)
     faults.stop_if_any()
-    start = at_guess(known, variables)
-    check_overlap(plan, start, faults)
-    check_joints(plan, start, faults)
-    aims = read_aims(document, simulation, formula_names(plan, start, variables), faults)
-    faults.stop_if_any()
+    aims = read_asked(document, simulation, plan, at_guess(known, variables), variables, faults)
     return Problem(
         name=path.stem,
         title=document.title or path.stem,
@@ -157,6 +151,37 @@ def build(
         sensors=sensors,
         controllers=controllers,
     )
+
+
+def read_control(
+    document: Document,
+    plan: WorldPlan,
+    known: Mapping[str, Quantity],
+    functions: Mapping[str, ca.Function],
+    faults: Faults,
+) -> tuple[tuple[Sensor, ...], tuple[Controller, ...]]:
+    """Sensors and controllers without fault."""
+    sensors = read_sensors(document.sensor, sensor_names(plan, at_guess(known, ())), faults)
+    faults.stop_if_any()
+    controllers = read_controllers(document.controller, sensors, known, functions, faults)
+    faults.stop_if_any()
+    return sensors, controllers
+
+
+def read_asked(
+    document: Document,
+    simulation: Simulation,
+    plan: WorldPlan,
+    start: Mapping[str, Array],
+    variables: Sequence[Variable],
+    faults: Faults,
+) -> Aims:
+    """What is asked for; ``start`` is as the guess has it, and must be one that can be."""
+    check_overlap(plan, start, faults)
+    check_joints(plan, start, faults)
+    aims = read_aims(document, simulation, formula_names(plan, start, variables), faults)
+    faults.stop_if_any()
+    return aims
 
 
 def read_plan(document: Document, faults: Faults) -> tuple[WorldPlan, dict[str, Array]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -216,6 +217,12 @@ class Problem:
     def weights(self) -> dict[str, Array]:
         """The numbers of all controllers as the file has them, by names such as ``brain.weights``."""
         return {name: value for controller in self.controllers for name, value in controller.weights.items()}
+
+    @property
+    def identity(self) -> str:
+        """All that makes the problem this one: its text, and a digest of the numbers that controllers begin with."""
+        digest = hashlib.sha256(b"".join(value.tobytes() for value in self.weights.values()))
+        return f"{self.text}\n{digest.hexdigest()}" if self.controllers else self.text
 
     def world(self, overrides: Mapping[str, Any] = NOTHING) -> World:
         """The world with its numbers, some replaced.

@@ -46,7 +46,7 @@ def make_config(
     options: dict[str, object],
     backend: str,
 ) -> Config:
-    """The configuration with its key; ``text`` is the problem file's source."""
+    """The configuration with its key; ``text`` is the problem's ``identity``."""
     parts = [text, settings, solver, options, seed, backend, __version__]
     canonical = json.dumps(files.strict(parts), sort_keys=True, allow_nan=False)
     key = hashlib.sha256(canonical.encode()).hexdigest()

@@ -66,7 +66,7 @@ def make_jobs(
             options = solver_options(problem, name)
             plain = dataclasses.asdict(options)
             for seed in seeds:
-                config = make_config(problem.name, problem.text, name, seed, settings, plain, backend)
+                config = make_config(problem.name, problem.identity, name, seed, settings, plain, backend)
                 jobs.append(Job(problem, config, options, RunFolder.of(out, problem.name, name, seed), command))
     return jobs
 

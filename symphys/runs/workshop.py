@@ -22,7 +22,7 @@ class Workshop:
 
     def __call__(self, job: Job) -> Transcription:
         """The job's problem as a shooting problem."""
-        subject = (job.problem.file, job.problem.text, repr(job.config.settings), job.smooth)
+        subject = (job.problem.file, job.problem.identity, repr(job.config.settings), job.smooth)
         if self.made is None or self.made[0] != subject:
             self.made = None
             self.made = (subject, self.transcribe(job.problem, not job.smooth))
