@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from symphys.state import Layout, initial_state
     from symphys.step import step_function
     from symphys.trajectory import Trajectory
-    from symphys.transcription import Transcription, transcribe
+    from symphys.transcription import Transcription
+    from symphys.transcription.transcribe import transcribe
     from symphys.world import Body, Law, Scheme, World, make_world
 
 __version__ = "0.1.0"
