@@ -40,6 +40,12 @@ LOADED = 1e-3
 """Of the weight of the effective mass: what counts as load. A smooth contact always carries a little."""
 
 
+# What changes in the impulse of a contact that lasts acts on positions from t* on, which is 0 for a body at rest. On a
+# tree of joints, where sweeps seldom converge, a foot that stands has gaps of rounding: there t* goes as the root of a
+# gap, and a gradient through a second of standing grew to 1e18. If changes acted at once, feet would quiver by 1e-2 m/s;
+# from the middle of the stretch on, a robot of 16 servos comes to rest to 1e-15 m/s with 20 sweeps.
+
+
 def prepare(
     setting: Setting, law: Law, contact: Contact, motions: Moving, duration: Expr, spared: Expr, force: Expr, same: bool
 ) -> ContactRow:
@@ -76,6 +82,9 @@ def prepare(
     # on the central path a load keeps surfaces parting at w^2 / (4 k load): less that, what lasts is at rest
     parting = width**2 / (4 * k_normal * ca.fmax(load, weight) * duration)
     target = ca.if_else(lasts, -parting, target)
+    delay = hit * (time + (1 - leaving) * (landing - time))
+    if any(side.reach is not None for side in sides):
+        delay = ca.if_else(lasts, half, delay)
     slip = hit * leaving * (half - time) * (acceleration - normal * pull)
     return ContactRow(
         law=law,
@@ -86,7 +95,7 @@ def prepare(
         softness=softness,
         target=ca.if_else(spared, UNREACHED, target),
         slip_target=slip if scheme.impact_friction else ca.SX.zeros(3),
-        delay=hit * (time + (1 - leaving) * (landing - time)) if scheme.time_of_impact else ca.SX(0),
+        delay=delay if scheme.time_of_impact else ca.SX(0),
         leaving=leaving,
         lasts=lasts,
         load=weight * duration,
