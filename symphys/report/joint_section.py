@@ -60,11 +60,13 @@ def motors_told(every: Sequence[Channel]) -> str:
     full = sorted((c for c in driven if c.share > 0), key=lambda c: -c.share)
     if not driven:
         return ""
+    only = len(driven) == 1
     if not full:
-        return "No motor is ever saturated: each could give more at all times."
+        never = "The motor is never saturated: it" if only else "No motor is ever saturated: each"
+        return f"{never} could give more at all times."
+    if only:
+        return f"The motor of {full[0].name} is saturated for {percent(full[0].share)} of the time."
     most = f"{full[0].name}, for {percent(full[0].share)} of the time"
-    if len(driven) == 1:
-        return f"The motor of {most}, gives the most that it can."
     verb = "is" if len(full) == 1 else "are"
     which = "" if len(full) == 1 else "most of all "
     return f"{len(full)} of {several(len(driven), 'motor')} {verb} saturated at some time, {which}{most}."

@@ -15,6 +15,8 @@ from symphys.report.views import View, turn
 
 AXES = {"hinge": ((0, 0),), "slider": ((1, 0),), "universal": ((1, 1), (0, 0))}
 """Which axes of a joint are drawn: (side, axis of that side's socket)."""
+SQUARE = ("slider", "fixed")
+"""Kinds whose mark is a square."""
 BAR = 0.065
 """[in] half length of the bar along an axis"""
 
@@ -60,7 +62,7 @@ def draw_pivots(axes: Axes, view: View, trajectory: Trajectory, scene: Scene, sh
         for side, direction in axes_of(joint):
             half = BAR / scale * view.flat(on_side(trajectory, joint, side, direction, shot, False))
             axes.plot(*np.array([place - half, place + half]).T, color=style.INK, linewidth=0.8, zorder=7)
-        shape = "s" if joint.kind in ("slider", "fixed") else "o"
+        shape = "s" if joint.kind in SQUARE else "o"
         axes.plot(
             *place, shape, markersize=2.5, color="white", markeredgecolor=style.INK, markeredgewidth=0.7, zorder=7.1
         )

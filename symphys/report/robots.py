@@ -91,17 +91,21 @@ class Whole:
             self.draw_solid(body, solid, mixed(colour[body], strength), base + 0.02 * (1 + rank) / (1 + len(solids)))
 
     def solids(self) -> list[tuple[float, int, Solid]]:
-        """Each with its body, and with how near it is to the viewer."""
+        """Each with its body, and with how near it is to the viewer; a point for what is free and has no surface."""
+        held = linked(self.trajectory, self.scene)
         return [
             (float(centres(self.trajectory, body, solid)[self.shot] @ self.view.front), body, solid)
             for body, name in enumerate(self.trajectory.body_names)
-            for solid in self.scene.solids(name)
+            for solid in self.scene.solids(name) or (() if body in held else (Solid(),))
         ]
 
     def draw_solid(self, body: int, solid: Solid, colour: Array, zorder: float) -> None:
         """Its outline, filled, and the edges of a box."""
         turned = self.trajectory.orientation[self.shot, body]
         centre = self.view.flat(self.trajectory.position[self.shot, body] + turn(turned, solid.centre))
+        if solid.radius == 0 and solid.is_ball:
+            self.axes.plot(*centre, "o", color=tuple(colour), markersize=3, zorder=zorder)
+            return
         half = half_axes(turned, solid)
         around = centre + outline(self.view.flat(half), solid.radius)
         patch = Circle((centre[0], centre[1]), solid.radius) if solid.is_ball else Polygon(around)

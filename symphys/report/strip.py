@@ -26,8 +26,8 @@ LEFT, RIGHT, BOTTOM, TOP, GAP, BETWEEN = 0.72, 0.1, 0.42, 0.3, 0.1, 0.18
 """[in] margins, and gaps between columns and rows"""
 TALLEST, LOWEST = 2.4, 0.75
 """[in] a picture is at most and at least"""
-FAR = 3.0
-"""A window stands still where all that happens fits into so many sizes of the bodies."""
+FAR, FAR_ON_RAILS = 2.0, 6.0
+"""A window stands still where all fits into so many sizes of the bodies: of free ones, and of those the world holds."""
 MARGIN = 0.06
 EDGE = 0.14
 """[in] Numbers are at least so far from the sides of a picture, so that those of neighbours do not meet."""
@@ -93,7 +93,7 @@ def make_strip(view: View, trajectory: Trajectory, scene: Scene, shots: Sequence
     low, high = (part[list(shots)] for part in extents(trajectory, scene, view, linked(trajectory, scene)))
     size, union = (high - low).max(axis=0), high.max(axis=0) - low.min(axis=0)
     middle = (low + high) / 2
-    still = union <= FAR * size
+    still = union <= (FAR if all(joint.second for joint in scene.joints) else FAR_ON_RAILS) * size
     size = np.where(still, union, size)
     corner = np.where(still, low.min(axis=0), middle - size / 2)
     room = float(size.max())
