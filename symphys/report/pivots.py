@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -57,12 +58,24 @@ def bones(trajectory: Trajectory, scene: Scene, shot: int) -> Iterator[tuple[int
 
 def draw_pivots(axes: Axes, view: View, trajectory: Trajectory, scene: Scene, shot: int, scale: float) -> None:
     """The marks of all joints at one time, on top of all; ``scale`` [in/m]."""
-    for joint in drawable(trajectory, scene):
+    joints = drawable(trajectory, scene)
+    bars = []
+    for joint in joints:
         place = view.flat(pivot(trajectory, joint, shot))
         for side, direction in axes_of(joint):
             half = BAR / scale * view.flat(on_side(trajectory, joint, side, direction, shot, False))
-            axes.plot(*np.array([place - half, place + half]).T, color=style.INK, linewidth=0.8, zorder=7)
-        shape = "s" if joint.kind in SQUARE else "o"
-        axes.plot(
-            *place, shape, markersize=2.5, color="white", markeredgecolor=style.INK, markeredgewidth=0.7, zorder=7.1
-        )
+            bars += [place - half, place + half]
+    draw_lines(axes, np.array(bars), style.INK, 0.8, 7)
+    for shape, square in (("o", False), ("s", True)):
+        chosen = [pivot(trajectory, joint, shot) for joint in joints if (joint.kind in SQUARE) == square]
+        if chosen:
+            (mark,) = axes.plot(*view.flat(np.array(chosen)).T, shape, color="white", markersize=2.5, zorder=7.1)
+            mark.set(markeredgecolor=style.INK, markeredgewidth=0.7)
+
+
+def draw_lines(axes: Axes, ends: Array, colour: Any, width: float, zorder: float) -> None:
+    """Lines between each two of these points, as one path; ``ends`` holds (2,) points, in any shape."""
+    if ends.size:
+        pairs = ends.reshape(-1, 2, 2)
+        parts = np.concatenate([pairs, np.full((len(pairs), 1, 2), np.nan)], axis=1).reshape(-1, 2)
+        axes.plot(*parts.T, color=colour, linewidth=width, zorder=zorder)

@@ -14,7 +14,7 @@ from symphys.report import style
 from symphys.report.limbs import colours, linked, traced
 from symphys.report.outlines import inner_edges, outline
 from symphys.report.panel import Panel
-from symphys.report.pivots import bones, draw_pivots
+from symphys.report.pivots import bones, draw_lines, draw_pivots
 from symphys.report.records import Array, Trajectory
 from symphys.report.scenery import Scene, Solid
 from symphys.report.views import View, centres, half_axes, solids_of, turn
@@ -35,18 +35,12 @@ def draw_robots(axes: Axes, panel: Panel, trajectory: Trajectory, scene: Scene, 
 
 
 def spaced(trajectory: Trajectory, scene: Scene, view: View) -> list[int]:
-    """The snapshots: the last, and before it those by which all linked bodies have moved on far enough."""
-    bodies = list(linked(trajectory, scene))
-    low, high = extents(trajectory, scene, view, bodies)
-    middle, size = (low + high) / 2, (high - low).max(axis=0)
-    last = len(trajectory.time) - 1
-    travel = float(np.linalg.norm(np.diff(middle, axis=0), axis=1).sum())
-    least = max(APART, travel / (MOST * float(size.max()))) * size
-    kept = [last]
-    for shot in range(last - 1, -1, -1):
-        if (np.abs(middle[shot] - middle[kept]) >= least).any(axis=1).all():
-            kept.append(shot)
-    return kept[::-1]
+    """The snapshots: first, last and between at even distances, if linked bodies go far enough; else the last."""
+    low, high = extents(trajectory, scene, view, linked(trajectory, scene))
+    gone = ((low + high) / 2 - (low[0] + high[0]) / 2) / (high - low).max(axis=0)
+    along = gone[:, np.abs(gone[-1]).argmax()]
+    parts = min(int(abs(along[-1]) / APART), MOST)
+    return sorted({int(np.abs(along - along[-1] * part / parts).argmin()) for part in range(parts)} | {len(along) - 1})
 
 
 def extents(trajectory: Trajectory, scene: Scene, view: View, bodies: Sequence[int]) -> tuple[Array, Array]:
@@ -84,8 +78,10 @@ class Whole:
         """From the back to the front; paler with less ``strength``, over snapshots of a lower ``order``."""
         colour = colours(self.trajectory, self.scene)
         base = 2.5 + 0.25 * order / MOST
-        for body, line in bones(self.trajectory, self.scene, self.shot):
-            self.axes.plot(*self.view.flat(line).T, color=mixed(colour[body], strength), linewidth=1.6, zorder=base)
+        lines = list(bones(self.trajectory, self.scene, self.shot))
+        for each in dict.fromkeys(colour[body] for body, _ in lines):
+            ends = [self.view.flat(line) for body, line in lines if colour[body] == each]
+            draw_lines(self.axes, np.array(ends), tuple(mixed(each, strength)), 1.6, base)
         solids = sorted(self.solids(), key=lambda entry: entry[0])
         for rank, (_, body, solid) in enumerate(solids):
             self.draw_solid(body, solid, mixed(colour[body], strength), base + 0.02 * (1 + rank) / (1 + len(solids)))
@@ -112,8 +108,8 @@ class Whole:
         patch.set(facecolor=tuple(mixed(colour, 0.42)), edgecolor=tuple(colour), linewidth=0.8, zorder=zorder)
         self.axes.add_patch(patch)
         if solid.radius == 0:
-            for edge in inner_edges(half, self.view.front):
-                self.axes.plot(*(centre + self.view.flat(edge)).T, color=tuple(colour), linewidth=0.6, zorder=zorder)
+            edges = centre + self.view.flat(inner_edges(half, self.view.front))
+            draw_lines(self.axes, edges, tuple(colour), 0.6, zorder)
 
 
 def mixed(colour: str | Array, strength: float) -> Array:
