@@ -202,6 +202,7 @@ def data_of(load: Load, arrays: dict[str, Any], scene: dict[str, Any] = SCENE) -
 
 def test_the_camera_goes_along_only_with_what_travels_far(load: Load) -> None:
     assert data_of(load, motion())["follow"] is None
+    assert data_of(load, motion(speed=1.0))["follow"] is None
     follow = data_of(load, motion(speed=5.0))["follow"]
     assert follow["bodies"] == list(range(9))
     assert 0.5 < follow["radius"] < 1.2
