@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -22,9 +23,9 @@ BEYOND = "#e9edf0"
 FULL = style.VERMILION
 TARGET = style.INK
 DASHES, DOTS = (0, (3, 1.6)), (0, (1, 1.5))
-NEAR = 10
-"""Limits and bounds are shown unless they are farther away than so many times what is drawn."""
-LEAST_TURN, LEAST_SLIDE, LEAST_TORQUE = 0.1, 1e-3, 1e-3
+NEAR = 16
+"""Limits are shown unless they are farther away than so many times what is drawn."""
+LEAST_TURN, LEAST_SLIDE, LEAST_TORQUE = 0.1, 0.02, 1e-3
 """[rad], [m], [N m] or [N]: what an axis shows at least."""
 Draw = Callable[[Axes, Array, Channel, str], None]
 
@@ -37,18 +38,19 @@ def draw_joints(trajectory: Trajectory, scene: Scene) -> tuple[Figure | None, Fi
     if len(every) <= FEW:
         return draw_rows(every, trajectory, scene), None
     angles = draw_grid(make_grid(every, trajectory, scene), draw_value, trajectory, scene)
-    add_keys(angles, every, torques=False)
+    add_keys(angles, value_keys(every))
     driven = [channel for channel in every if channel.driven]
     if not driven:
         return angles, None
     torques = draw_grid(make_grid(driven, trajectory, scene), draw_torque, trajectory, scene)
-    add_keys(torques, driven, torques=True)
+    add_keys(torques, torque_keys(driven))
     return angles, torques
 
 
 def draw_rows(every: list[Channel], trajectory: Trajectory, scene: Scene) -> Figure:
     """A row for each coordinate, its torque beside it if any has a motor."""
-    columns = 2 if any(channel.driven for channel in every) else 1
+    driven = [channel for channel in every if channel.driven]
+    columns = 2 if driven else 1
     figure = Figure(figsize=(style.WIDTH, 0.8 + 1.7 * len(every)), layout="constrained")
     grid = figure.subplots(len(every), columns, sharex=True, squeeze=False)
     for row, channel in enumerate(every):
@@ -65,7 +67,7 @@ def draw_rows(every: list[Channel], trajectory: Trajectory, scene: Scene) -> Fig
             axes.tick_params(labelbottom=row == len(every) - 1 or not every[row + 1].driven)
     for axes in grid[-1]:
         axes.set_xlabel("time [s]")
-    add_keys(figure, every, torques=columns == 2)
+    add_keys(figure, [*value_keys(every), *torque_keys(driven)])
     return figure
 
 
@@ -104,10 +106,10 @@ def draw_value(axes: Axes, time: Array, channel: Channel, colour: str) -> None:
 
 def draw_torque(axes: Axes, time: Array, channel: Channel, colour: str) -> None:
     """What the motor gives, its bounds, and where it is at them."""
-    low, high = window(np.append(channel.torque, 0.0), [-channel.bound, channel.bound], LEAST_TORQUE)
-    for edge in (-channel.bound, channel.bound):
-        if low <= edge <= high:
-            axes.axhline(edge, color=style.GROUND_EDGE, linewidth=0.9, linestyle=DOTS, zorder=1.5)
+    bounds = [-channel.bound, channel.bound] if np.isfinite(channel.bound) else [0.0]
+    low, high = window(np.append(channel.torque, bounds), [], LEAST_TORQUE)
+    for edge in bounds:
+        axes.axhline(edge, color=style.GROUND_EDGE, linewidth=0.9, linestyle=DOTS, zorder=1.5)
     steps = np.append(channel.torque, channel.torque[-1:])
     axes.plot(time, steps, color=colour, drawstyle="steps-post", linewidth=1.2, zorder=3)
     for sign in (-1, 1):
@@ -117,7 +119,7 @@ def draw_torque(axes: Axes, time: Array, channel: Channel, colour: str) -> None:
             axes.fill_between(ends, 0, sign * channel.bound, color=FULL, alpha=0.16, linewidth=0, zorder=2)
     dress(axes, f"{channel.name} [{channel.torque_unit}]", low, high)
     if channel.share > 0:
-        axes.set_title(f"{percent(channel.share)} saturated", loc="right", color=FULL, fontweight="normal")
+        axes.set_title(percent(channel.share), loc="right", color=FULL)
 
 
 def window(told: Array, edges: list[float], least: float) -> tuple[float, float]:
@@ -148,18 +150,31 @@ def dress(axes: Axes, title: str, low: float, high: float) -> None:
     axes.set_ylim(low, high)
 
 
-def add_keys(figure: Figure, every: list[Channel], torques: bool) -> None:
-    """What lines and areas mean, of those that there are."""
-    keys: list[tuple[Line2D | Patch, str]] = []
-    values = not torques or len(every) <= FEW
-    if values:
-        keys.append((Line2D([], [], color=style.BODIES[0]), "angle or position"))
-        if any(channel.target is not None for channel in every):
-            keys.append((Line2D([], [], color=TARGET, linewidth=1.0, linestyle=DASHES), "what the servo was told"))
-        if any(np.isfinite([channel.joint.lower, channel.joint.upper]).any() for channel in every):
-            keys.append((Patch(facecolor=BEYOND, edgecolor=style.GROUND_EDGE, linewidth=0.8), "beyond a limit"))
-    if torques:
+Key = tuple[Artist, str]
+"""What is drawn, and what it means."""
+
+
+def value_keys(every: list[Channel]) -> list[Key]:
+    """Of pictures of coordinates, those that there are."""
+    keys: list[Key] = [(Line2D([], [], color=style.BODIES[0]), "angle or position")]
+    if any(channel.target is not None for channel in every):
+        keys.append((Line2D([], [], color=TARGET, linewidth=1.0, linestyle=DASHES), "what the servo was told"))
+    if any(np.isfinite([channel.joint.lower, channel.joint.upper]).any() for channel in every):
+        keys.append((Patch(facecolor=BEYOND, edgecolor=style.GROUND_EDGE, linewidth=0.8), "beyond a limit"))
+    return keys
+
+
+def torque_keys(driven: list[Channel]) -> list[Key]:
+    """Of pictures of torques, those that there are."""
+    keys: list[Key] = []
+    if any(channel.bound > 0 for channel in driven):
         keys.append((Line2D([], [], color=style.GROUND_EDGE, linestyle=DOTS), "most that a motor can give"))
-    if torques and any(channel.share > 0 for channel in every):
-        keys.append((Line2D([], [], color=FULL, linewidth=2.4), "saturated: it gives the most"))
-    style.legend_above(figure, [handle for handle, _ in keys], [label for _, label in keys])
+    if any(channel.share > 0 for channel in driven):
+        keys.append((Line2D([], [], color=FULL, linewidth=2.4), "saturated: it gives the most, and for how long"))
+    return keys
+
+
+def add_keys(figure: Figure, keys: list[Key]) -> None:
+    """A row above all."""
+    if keys:
+        style.legend_above(figure, [artist for artist, _ in keys], [label for _, label in keys])

@@ -19,6 +19,8 @@ FEW = 4
 """So many have a row each, with angle and torque side by side."""
 WIDE, TALL = 4, 6
 """Columns side by side, and joints in a column, at most."""
+UNEVEN = 2
+"""The longest column has at most so many times the joints of the shortest."""
 
 Grid = list[list[Channel | None]]
 """Rows; None is an empty place."""
@@ -33,9 +35,10 @@ def shown(channels: Sequence[Channel]) -> list[Channel]:
 
 
 def make_grid(channels: Sequence[Channel], trajectory: Trajectory, scene: Scene) -> Grid:
-    """A column for each limb where there are several, not too long; else the file's order, row by row."""
+    """A column for each limb where there are several of like size; else the file's order, row by row."""
     columns = by_limb(channels, trajectory, scene)
-    if len(columns) < 2 or max(map(len, columns)) > TALL:
+    sizes = [len(column) for column in columns]
+    if len(columns) < 2 or max(sizes) > min(TALL, UNEVEN * min(sizes)):
         rows = [list(channels[start : start + WIDE]) for start in range(0, len(channels), WIDE)]
         return [[*row, *[None] * (WIDE - len(row))] for row in rows]
     bands = [columns[start : start + WIDE] for start in range(0, len(columns), WIDE)]

@@ -11,7 +11,9 @@ function carried(side, vector, poses, point) { // what a side carries, in the wo
 function drawBones(painter, data, poses) { // where bodies have no surface, these show how they hang together
   for (const joint of data.joints) {
     for (const side of joint.sides.filter((s) => s.body >= 0)) {
-      painter.line([poses[side.body].p, carried(side, side.point, poses, true)], data.bodies[side.body].colour, 3, 0.8);
+      const pose = poses[side.body], { colour, solids } = data.bodies[side.body];
+      const beside = solids.filter((s) => Math.hypot(...s.centre) > s.radius).map((s) => s.centre);
+      for (const end of [side.point, ...beside]) painter.line([pose.p, carried(side, end, poses, true)], colour, 3);
     }
   }
 }

@@ -9,10 +9,11 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from symphys.report import style
+from symphys.report.limbs import linked
 from symphys.report.records import Array, Trajectory
 from symphys.report.scene_joints import SceneJoint
 from symphys.report.scenery import Scene
-from symphys.report.views import View, turn
+from symphys.report.views import View, centres, turn
 
 AXES = {"hinge": ((0, 0),), "slider": ((1, 0),), "universal": ((1, 1), (0, 0))}
 """Which axes of a joint are drawn: (side, axis of that side's socket)."""
@@ -48,12 +49,16 @@ def axes_of(joint: SceneJoint) -> list[tuple[int, Array]]:
 
 
 def bones(trajectory: Trajectory, scene: Scene, shot: int) -> Iterator[tuple[int, Array]]:
-    """Lines (2, 3) [m] from the centres of bodies to their joints, each with its body."""
+    """Lines (2, 3) [m] from the centres of bodies to their joints, and to solids beside them, each with its body."""
     for joint in drawable(trajectory, scene):
         for side, name in enumerate(joint.bodies):
             body = trajectory.body_names.index(name)
             end = on_side(trajectory, joint, side, joint.sockets[side].point, shot, True)
             yield body, np.array([trajectory.position[shot, body], end])
+    for body in linked(trajectory, scene):
+        for solid in scene.solids(trajectory.body_names[body]):
+            if np.linalg.norm(solid.centre) > solid.girth:
+                yield body, np.array([trajectory.position[shot, body], centres(trajectory, body, solid)[shot]])
 
 
 def draw_pivots(axes: Axes, view: View, trajectory: Trajectory, scene: Scene, shot: int, scale: float) -> None:

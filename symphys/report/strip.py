@@ -1,6 +1,6 @@
 """A motion of bodies that hang together as a strip of pictures at even times: side view above, top view below.
 
-The window goes with the bodies in a direction in which they travel far, and stands still in the others.
+The window goes with bodies that travel far to the right or the left; up and down it stands still.
 """
 
 from __future__ import annotations
@@ -93,7 +93,8 @@ def make_strip(view: View, trajectory: Trajectory, scene: Scene, shots: Sequence
     low, high = (part[list(shots)] for part in extents(trajectory, scene, view, linked(trajectory, scene)))
     size, union = (high - low).max(axis=0), high.max(axis=0) - low.min(axis=0)
     middle = (low + high) / 2
-    still = union <= (FAR if all(joint.second for joint in scene.joints) else FAR_ON_RAILS) * size
+    far = FAR if all(joint.second for joint in scene.joints) else FAR_ON_RAILS
+    still = np.array([union[0] <= far * size[0], True])
     size = np.where(still, union, size)
     corner = np.where(still, low.min(axis=0), middle - size / 2)
     room = float(size.max())

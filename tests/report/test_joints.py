@@ -76,7 +76,7 @@ def test_saturation_is_marked_where_it_is(load: Load) -> None:
     marks = [(line.get_xdata(), line.get_ydata()) for line in axes.lines if line.get_color() == FULL]
     stretches = sorted((*np.round(x, 9).tolist(), float(y[0])) for x, y in marks)
     assert stretches == [(5 * DT, 11 * DT, 30.0), (20 * DT, 26 * DT, -30.0)]
-    assert axes.get_title(loc="right") == "30 % saturated"
+    assert axes.get_title(loc="right") == "30 %"
     other = panel(figure.axes, "fl_knee [N m]")
     assert not [line for line in other.lines if line.get_color() == FULL]
     assert other.get_title(loc="right") == ""

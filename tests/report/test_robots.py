@@ -136,6 +136,8 @@ def test_pivots_and_axes_go_with_the_bodies(load: Load) -> None:
     assert np.allclose(on_side(trajectory, hip, side, axis, 0, False), [0, 1, 0])
     lines = [line for body, line in bones(trajectory, scene, 0) if body == 1]
     assert np.allclose(lines, [[[0.15, 0.2, 0.65], [0.3, 0.2, 0.65]], [[0.15, 0.2, 0.65], [0, 0.2, 0.65]]])
+    _, (start, foot) = [line for body, line in bones(trajectory, scene, 0) if body == 2]
+    assert np.allclose([start, foot], [[0.3, 0.2, 0.2], [0.3, 0.2, 0.05]])
 
 
 def test_a_universal_joint_has_two_axes_and_the_world_stands_still(load: Load) -> None:
@@ -177,6 +179,14 @@ def test_a_strip_goes_with_the_robot_and_shows_all_of_it(load: Load, speed: floa
         assert np.ptp(strip.low[:, 1]) == 0
         assert np.ptp(strip.low[:, 0]) == pytest.approx(10 if speed else 0)
         assert strip.size[0] < 1
+
+
+def test_a_strip_does_not_go_up_or_down_since_only_its_first_picture_has_numbers_there(load: Load) -> None:
+    arrays = motion()
+    arrays["position"][..., 2] -= 5 * arrays["time"][:, None] ** 2
+    strip = make_strip(SIDE_XZ, *load(arrays), [0, 20, 40])
+    assert np.ptp(strip.low[:, 1]) == 0
+    assert strip.size[1] > 20
 
 
 def test_numbers_below_a_strip_do_not_meet(load: Load) -> None:
