@@ -39,10 +39,11 @@ bench-contact: $(VENV)/.benching  ## errors of contact against the step, gradien
 	$(BIN)/python benchmarks/consistency.py build
 
 gallery: $(VENV)/.installed  ## make the figures of the README again
-	$(BIN)/symphys solve ball_throw bank_shot sled basket knock putt --out build/gallery
+	$(BIN)/symphys solve ball_throw bank_shot sled basket knock putt cart_pole --out build/gallery
 	cp build/gallery/figures/ball_throw-motion.svg build/gallery/figures/ball_throw-convergence.svg \
 	    build/gallery/figures/bank_shot-motion.svg build/gallery/figures/basket-motion.svg \
-	    build/gallery/figures/knock-motion.svg build/gallery/figures/putt-motion.svg reports/gallery/
+	    build/gallery/figures/knock-motion.svg build/gallery/figures/putt-motion.svg \
+	    build/gallery/figures/cart_pole-strip.svg reports/gallery/
 	cp build/gallery/sled/least_squares-seed0/figures/convergence.svg reports/gallery/sled-stages.svg
 
 clean:  ## remove what the other targets made, reports aside

@@ -39,6 +39,7 @@ class Trajectory:
         joint_value, joint_rate: (N + 1, J, K) coordinates [rad] or [m] and their rates; K is that of the joint that has
             most, NaN where another has fewer.
         joint_torque: (N, J, K) of motors [N m] or [N]; 0 without one.
+        joint_command: (N, J, K) what motors were told, in the unit of their kind; 0 where nothing tells them.
         joint_separation: (N + 1, J) how far apart the sockets are, as far as a joint holds them together [m].
     """
 
@@ -59,6 +60,7 @@ class Trajectory:
     joint_value: Array
     joint_rate: Array
     joint_torque: Array
+    joint_command: Array
     joint_separation: Array
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:

@@ -1,4 +1,4 @@
-// Plays a recorded motion on a canvas: parallel projection, drag to turn. Comes after painter.js.
+// Plays a recorded motion on a canvas: parallel projection, drag to turn. Comes after painter.js and joints.js.
 
 const STILL = { p: [0, 0, 0], q: [1, 0, 0, 0] };
 const LOW = 0.12; // below this elevation hills would hide what moves between them, so they stay behind it
@@ -13,6 +13,8 @@ class Player {
     this.output = root.querySelector("output");
     this.speed = root.querySelector("select");
     this.views = [...root.querySelectorAll("[data-view]")];
+    this.follow = root.querySelector("[data-follow]");
+    this.following = Boolean(this.data.follow);
     this.fixtures = this.data.fixtures.map((solid) => place(solid, STILL, FIXED, true));
     this.cells = this.data.terrain.flatMap((terrain) => mesh(terrain, this.data.planes));
     const corners = this.fixtures.flatMap((solid) => extremes(solid)), edges = this.data.terrain.flatMap(rim);
@@ -43,6 +45,11 @@ class Player {
       this.draw();
     });
     this.views.forEach((b) => b.addEventListener("click", () => this.look(b.dataset.view)));
+    this.follow?.addEventListener("click", () => {
+      this.following = !this.following;
+      this.follow.setAttribute("aria-pressed", String(this.following));
+      this.draw();
+    });
     this.canvas.addEventListener("keydown", (e) => {
       if (e.key === " ") { e.preventDefault(); this.toggle(); }
     });
@@ -118,16 +125,19 @@ class Player {
   }
 
   draw() {
-    const painter = this.painter, [index, share] = this.frame(), solids = this.solids(index, share);
-    painter.fit(this.seen, this.azimuth, this.elevation);
+    const painter = this.painter, [index, share] = this.frame(), data = this.data;
+    const poses = data.bodies.map((_, b) => this.pose(b, index, share)), solids = this.solids(poses);
+    painter.fit(this.following ? alongside(data.follow, poses) : this.seen, this.azimuth, this.elevation);
     this.patches.forEach((p) => painter.drawPlane(p));
     const cells = this.inDepth();
     cells.forEach(({ cell }) => painter.drawCell(cell));
     solids.forEach((solid) => painter.drawShadows(solid, this.patches, this.data.terrain));
     this.drawFixtures(cells);
     this.guesses.forEach((path) => painter.drawGuess(path));
-    this.paths.forEach((path, b) => painter.drawPath(path, index, this.data.bodies[b].colour));
+    this.paths.forEach((path, b) => { if (data.bodies[b].path) painter.drawPath(path, index, data.bodies[b].colour); });
+    drawBones(painter, data, poses);
     this.drawSolids(inOrder([...this.fixtures, ...solids], painter.eye), cells);
+    drawPivots(painter, data, poses);
     painter.drawTriad();
     this.output.textContent = `${this.time.toFixed(2)} / ${this.last.toFixed(2)} s`;
     this.slider.value = String(Math.round(1000 * (this.time - this.first) / (this.last - this.first || 1)));
@@ -138,11 +148,8 @@ class Player {
     return triples(this.data.position).filter((_, i) => i % count === body);
   }
 
-  solids(index, share) {
-    return this.data.bodies.flatMap((body, b) => {
-      const pose = this.pose(b, index, share);
-      return body.solids.map((solid) => place(solid, pose, body.colour, false));
-    });
+  solids(poses) {
+    return this.data.bodies.flatMap((body, b) => body.solids.map((solid) => place(solid, poses[b], body.colour, false)));
   }
 
   drawFixtures(cells) {

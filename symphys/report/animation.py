@@ -7,7 +7,9 @@ import json
 import numpy as np
 
 from symphys.report import style
+from symphys.report.limbs import colours, keys, traced
 from symphys.report.markup import Html, dot, join, tag
+from symphys.report.played_joints import follow_data, joint_data
 from symphys.report.records import Array, Trajectory
 from symphys.report.scenery import Scene, SceneTerrain, Solid
 from symphys.report.views import SIDE_YZ, TOP, choose_views, solids_of
@@ -16,7 +18,6 @@ NUMBERS = 60_000
 """How many numbers a page carries at most for one motion, about 400 kB."""
 MOST_FRAMES = 600
 GUESS_POINTS = 120
-MOST_NAMED = 7
 SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
 LEAST_PLAY = 3.0
 """[s] a motion plays at least, slowed down if need be."""
@@ -26,21 +27,20 @@ def animation(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = N
     """A canvas with play, time and view controls, and its data; works without any network."""
     data = json.dumps(motion_data(trajectory, scene, guess, numbers), separators=(",", ":"), allow_nan=False)
     inert = data.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
-    names = trajectory.body_names
-    legend = [join([dot(style.BODIES[i % len(style.BODIES)]), style.short(name, 24)]) for i, name in enumerate(names)]
+    legend = [join([dot(colour), style.short(name, 24)]) for name, colour in keys(trajectory, scene)]
     return tag(
         "div",
         tag("canvas", tabindex="0", role="img", aria_label="The motion, played; drag to turn"),
-        tag("div", *(tag("span", part) for part in legend), class_="legend") if 1 < len(names) <= MOST_NAMED else "",
-        controls(float(trajectory.time[-1] - trajectory.time[0])),
+        tag("div", *(tag("span", part) for part in legend), class_="legend") if legend else "",
+        controls(float(trajectory.time[-1] - trajectory.time[0]), follow_data(trajectory, scene) is not None),
         tag("noscript", "The motion plays only with JavaScript; the figure below shows it without."),
         tag("script", Html(inert), type="application/json"),
         class_="animation",
     )
 
 
-def controls(duration: float) -> Html:
-    """Play button, slider, time, speed and views."""
+def controls(duration: float, follows: bool) -> Html:
+    """Play button, slider, time, speed and views, and whether the camera goes along where it can."""
     fitting = [speed for speed in SPEEDS if speed <= 1 and duration / speed >= LEAST_PLAY]
     chosen = max(fitting, default=SPEEDS[0])
     speeds = [tag("option", f"{s:g}×", value=f"{s:g}", selected="" if s == chosen else None) for s in SPEEDS]  # noqa: RUF001
@@ -52,38 +52,49 @@ def controls(duration: float) -> Html:
         tag("output", ""),
         tag("select", *speeds, aria_label="Speed"),
         tag("span", *views, class_="views"),
+        tag("span", tag("button", "Follow", **FOLLOW), class_="views") if follows else "",
         class_="controls",
     )
 
 
+FOLLOW = {"type": "button", "data_follow": "", "aria_pressed": "true"}
 VIEW_TITLES = (("space", "3D"), ("side", "Side"), ("top", "Top"))
 
 
 def motion_data(trajectory: Trajectory, scene: Scene, guess: Trajectory | None, numbers: int) -> dict[str, object]:
-    """What animation.js reads; lists are flat, frame after frame, body after body."""
+    """What animation.js and joints.js read; lists are flat, frame after frame, body after body."""
     bodies = len(trajectory.body_names)
     frames = int(np.clip(numbers // (7 * bodies), 40, MOST_FRAMES))
     chosen = even(len(trajectory.time), frames)
     views = choose_views(trajectory, scene)
     return {
         "time": rounded(trajectory.time[chosen], 1e-6),
-        "bodies": [body_data(trajectory, scene, body) for body in range(bodies)],
+        "bodies": body_data(trajectory, scene),
         "position": rounded(trajectory.position[chosen], 1e-5),
         "orientation": rounded(trajectory.orientation[chosen], 1e-4),
-        "guess": [] if guess is None else [guess_data(guess, body) for body in range(len(guess.body_names))],
+        "guess": [] if guess is None else guess_data(guess, scene),
         "planes": [{"normal": rounded(p.normal, 1e-9), "offset": float(p.offset)} for p in scene.planes],
         "fixtures": [solid_data(fixture.solid) for fixture in scene.fixtures],
         "terrain": [terrain_data(ground) for ground in scene.terrain],
         "flat": views[0] == TOP,
         "along": "y" if views[0] == SIDE_YZ else "x",
         "axes": list(style.AXES),
+        "joints": joint_data(trajectory, scene),
+        "follow": follow_data(trajectory, scene),
     }
 
 
-def body_data(trajectory: Trajectory, scene: Scene, body: int) -> dict[str, object]:
-    """Colour and solids of a body."""
-    solids = [solid_data(solid) for solid in solids_of(trajectory, scene, body)]
-    return {"colour": style.BODIES[body % len(style.BODIES)], "solids": solids}
+def body_data(trajectory: Trajectory, scene: Scene) -> list[dict[str, object]]:
+    """Colour and solids of each body, and whether its path is drawn."""
+    names, kept = trajectory.body_names, traced(trajectory, scene)
+    return [
+        {
+            "colour": colour,
+            "solids": list(map(solid_data, solids_of(trajectory, scene, body))),
+            "path": names[body] in kept,
+        }
+        for body, colour in enumerate(colours(trajectory, scene))
+    ]
 
 
 def solid_data(solid: Solid) -> dict[str, object]:
@@ -102,9 +113,10 @@ def terrain_data(ground: SceneTerrain) -> dict[str, object]:
     return {"x": rounded(ground.x, 1e-6), "y": rounded(ground.y, 1e-6), "z": heights}
 
 
-def guess_data(guess: Trajectory, body: int) -> list[float]:
-    """The guess's path, flat."""
-    return rounded(guess.position[even(len(guess.time), GUESS_POINTS), body], 1e-4)
+def guess_data(guess: Trajectory, scene: Scene) -> list[list[float]]:
+    """The guess's paths, flat, of the bodies whose path is drawn."""
+    kept, shots = traced(guess, scene), even(len(guess.time), GUESS_POINTS)
+    return [rounded(guess.position[shots, body], 1e-4) for body, name in enumerate(guess.body_names) if name in kept]
 
 
 def even(count: int, most: int) -> Array:

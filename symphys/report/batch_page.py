@@ -18,6 +18,7 @@ from symphys.report.recordings import GUESS, TRAJECTORY, read_trajectory
 from symphys.report.records import ReportError, Run, Trajectory
 from symphys.report.scene_file import SCENE, read_scene
 from symphys.report.scenery import Scene
+from symphys.report.strip import draw_strip
 from symphys.report.style import Picture
 
 PAGE = "index.html"
@@ -86,8 +87,10 @@ def build_study(study: Study, root: Path, numbers: int, anchor: str, titled: boo
     with style.paper():
         converged = style.picture(f"{anchor}-convergence", "Objective and errors", draw_convergence(study))
         checked = style.picture(f"{anchor}-checks", "Errors against tolerances", draw_checks(study))
+        strip = draw_strip(motion, scene) if motion else None
         drawn = draw_motion(motion, scene, guess) if motion else None
-        moved = style.picture(f"{anchor}-motion", "Path and snapshots", drawn)
+        moved = style.picture(f"{anchor}-strip", "The motion at even times", strip)
+        moved += style.picture(f"{anchor}-motion", "Path and snapshots", drawn)
     write_figures(root, converged + checked + moved)
     played = animation(motion, scene, guess, numbers) if motion else tag("p", f"There is no motion to draw: {why}.")
     best = study.best

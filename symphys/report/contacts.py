@@ -23,12 +23,17 @@ POINT = re.compile(r"(.*):\d+", re.DOTALL)
 """Surfaces that may touch in several points have a contact for each: ``box-ground:3``."""
 
 
+def pair_of(name: str) -> str:
+    """The two surfaces of a contact, without the number of its point."""
+    match = POINT.fullmatch(name)
+    return match[1] if match else name
+
+
 def by_surfaces(trajectory: Trajectory) -> Trajectory:
     """The motion with one contact for each two surfaces: the forces of all its points, and the smallest gap."""
     points: dict[str, list[int]] = {}
     for index, name in enumerate(trajectory.contact_names):
-        match = POINT.fullmatch(name)
-        points.setdefault(match[1] if match else name, []).append(index)
+        points.setdefault(pair_of(name), []).append(index)
     force = [trajectory.contact_force[:, indices].sum(axis=1) for indices in points.values()]
     gap = [np.fmin.reduce(trajectory.contact_gap[:, indices], axis=1) for indices in points.values()]
     if len(points) == len(trajectory.contact_names):

@@ -12,7 +12,7 @@ from symphys.report.style import Picture
 
 VOID = frozenset({"br", "img", "input", "link", "meta"})
 HERE = Path(__file__).parent
-SCRIPTS = ("geometry.js", "solids.js", "terrain.js", "painter.js", "animation.js")
+SCRIPTS = ("geometry.js", "solids.js", "terrain.js", "painter.js", "joints.js", "animation.js")
 ICONS = {"good": "✓", "fair": "!", "bad": "✕", "unknown": "?"}
 
 

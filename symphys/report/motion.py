@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+from collections.abc import Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -10,8 +10,11 @@ from matplotlib.lines import Line2D
 
 from symphys.report import style
 from symphys.report.ground import draw_ground
+from symphys.report.limbs import is_large, keys, traced
 from symphys.report.panel import RIGHT, Panel, arrange, dress, lay_out, make_panel, widen
+from symphys.report.pivots import draw_pivots
 from symphys.report.records import Trajectory
+from symphys.report.robots import draw_robots
 from symphys.report.scenery import Scene
 from symphys.report.snapshots import draw_bodies
 from symphys.report.views import choose_views
@@ -28,27 +31,27 @@ def draw_motion(trajectory: Trajectory, scene: Scene, guess: Trajectory | None =
         dress(axes, panel, scale)
         draw_ground(axes, panel, trajectory, scene)
         if guess is not None:
-            draw_guess(axes, panel, guess)
-        draw_bodies(axes, panel, trajectory, scene, scale)
-    add_legend(figure, trajectory, guess is not None)
+            draw_guess(axes, panel, guess, traced(guess, scene))
+        if is_large(trajectory, scene):
+            draw_robots(axes, panel, trajectory, scene, scale)
+        else:
+            draw_bodies(axes, panel, trajectory, scene, scale)
+            draw_pivots(axes, panel.view, trajectory, scene, len(trajectory.time) - 1, scale)
+    add_legend(figure, trajectory, scene, guess is not None)
     return figure
 
 
-def draw_guess(axes: Axes, panel: Panel, guess: Trajectory) -> None:
-    """The guess's path, thin and grey."""
-    for body in range(len(guess.body_names)):
+def draw_guess(axes: Axes, panel: Panel, guess: Trajectory, names: Sequence[str]) -> None:
+    """The guess's paths of these bodies, thin and grey."""
+    for body in (index for index, name in enumerate(guess.body_names) if name in names):
         path = panel.view.flat(guess.position[:, body])
         _, path = style.thin(guess.time, path, 300)
         axes.plot(*path.T, color="#98a4af", linewidth=0.9, linestyle=(0, (4, 2.5)), zorder=2)
 
 
-def add_legend(figure: Figure, trajectory: Trajectory, guessed: bool) -> None:
-    """Bodies by colour, and the guess; nothing where the picture explains itself."""
-    names = trajectory.body_names
-    handles = []
-    if 1 < len(names) <= len(style.BODIES):
-        colours = itertools.cycle(style.BODIES)
-        handles = [Line2D([], [], color=next(colours), label=style.short(name, 20)) for name in names]
+def add_legend(figure: Figure, trajectory: Trajectory, scene: Scene, guessed: bool) -> None:
+    """Bodies or limbs by colour, and the guess; nothing where the picture explains itself."""
+    handles = [Line2D([], [], color=colour, label=style.short(name, 20)) for name, colour in keys(trajectory, scene)]
     if guessed:
         handles.append(Line2D([], [], color="#98a4af", linewidth=0.9, linestyle=(0, (4, 2.5)), label="guess"))
     if handles:

@@ -7,6 +7,7 @@ from pathlib import Path
 from symphys import files
 from symphys.report import sections, style
 from symphys.report.contacts import draw_contacts
+from symphys.report.joint_section import gait_card, joint_card, joint_pictures
 from symphys.report.markup import card, figures, join, page, tag
 from symphys.report.motion import draw_motion
 from symphys.report.recordings import read_trajectory
@@ -41,6 +42,8 @@ def write_motion(trajectory_npz: Path, scene_json: Path, out: Path, title: str =
             tag("h1", title),
             tag("p", summary(trajectory), class_="lead"),
             sections.motion(trajectory, scene, None, pictures, ()),
+            joint_card(trajectory, scene, pictures),
+            gait_card(trajectory, scene, pictures),
             *(card(name, figures([pictures[key]])) for key, name in CARDS if key in pictures),
         ]
     )
@@ -54,6 +57,7 @@ CARDS = (("states", "States over time"), ("controls", "Controls"), ("contacts", 
 def draw(trajectory: Trajectory, scene: Scene) -> dict[str, style.Picture]:
     """Every figure by name."""
     made = style.picture("motion", "Path and snapshots", draw_motion(trajectory, scene))
+    made += joint_pictures(trajectory, scene)
     made += style.picture("states", "Position, velocity and angular velocity over time", draw_states(trajectory))
     made += style.picture("controls", "Forces and torques over time", draw_controls(trajectory))
     made += style.picture("contacts", "Contact forces and gaps over time", draw_contacts(trajectory, scene))

@@ -1,6 +1,6 @@
 // Draws one picture of the scene on a canvas. Comes after solids.js and terrain.js.
 
-const INK = "#5c6b78", GRID = "#dfe5ea", PLANE = "#f1f4f6", EDGE = "#aab5bf", GUESS = "#98a4af", FIXED = "#b7c2cc";
+const INK = "#5c6b78", GRID = "#dfe5ea", PLANE = "#f1f4f6", EDGE = "#aab5bf", GUESS = "#98a4af", FIXED = "#b7c2cc", DARK = "#1f2d3a";
 
 class Painter {
   constructor(canvas, axes) {
@@ -106,7 +106,7 @@ class Painter {
 
   drawShadow(points, height, below) { // paler the higher the solid is, that reaches so far below its centre
     this.trace(points);
-    this.pen.fillStyle = "#1f2d3a";
+    this.pen.fillStyle = DARK;
     this.pen.globalAlpha = 0.04 + 0.16 * Math.exp(-Math.max(0, height - below) / (2 * below));
     this.pen.fill();
     this.pen.globalAlpha = 1;

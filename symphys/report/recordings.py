@@ -79,6 +79,7 @@ def make_trajectory(arrays: Mapping[str, Array]) -> Trajectory:
         joint_value=quantity("joint_value", (count, *along)),
         joint_rate=quantity("joint_rate", (count, *along)),
         joint_torque=quantity("joint_torque", (count - 1, *along)),
+        joint_command=quantity("joint_command", (count - 1, *along)),
         joint_separation=quantity("joint_separation", (count, len(joints))),
     )
 
@@ -110,6 +111,6 @@ def trim(trajectory: Trajectory) -> Trajectory:
     cut: dict[str, Any] = {
         name: array[:keep] for name, array in vars(trajectory).items() if isinstance(array, np.ndarray)
     }
-    for name in ("force", "torque", "contact_force", "joint_torque"):
+    for name in ("force", "torque", "contact_force", "joint_torque", "joint_command"):
         cut[name] = cut[name][: keep - 1]
     return replace(trajectory, **cut)

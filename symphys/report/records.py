@@ -14,6 +14,7 @@ from symphys.report.examination import Trust
 from symphys.report.stage import Stage
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 class ReportError(SymphysError):
@@ -169,4 +170,5 @@ class Trajectory:
     joint_value: Array
     joint_rate: Array
     joint_torque: Array
+    joint_command: Array
     joint_separation: Array

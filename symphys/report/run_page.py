@@ -11,6 +11,7 @@ from symphys.report import sections, style, values, words
 from symphys.report.contacts import by_surfaces, draw_contacts, shown_pairs
 from symphys.report.finding import is_run
 from symphys.report.history import draw_run
+from symphys.report.joint_section import gait_card, joint_card, joint_pictures
 from symphys.report.markup import Html, card, figures, join, page, tag
 from symphys.report.motion import draw_motion
 from symphys.report.output import write_figures
@@ -97,6 +98,7 @@ def draw(run: Run, recording: Recording) -> dict[str, Picture]:
     motion = recording.trajectory
     if motion is not None:
         made += style.picture("motion", "Path and snapshots", draw_motion(motion, recording.scene, recording.guess))
+        made += joint_pictures(motion, recording.scene)
         made += style.picture("states", "Position, velocity and angular velocity over time", draw_states(motion))
         made += style.picture("controls", "Forces and torques over time", draw_controls(motion))
         made += style.picture("contacts", "Contact forces and gaps over time", draw_contacts(motion, recording.scene))
@@ -118,7 +120,7 @@ def build(run: Run, recording: Recording, pictures: dict[str, Picture]) -> Html:
             figures(only(pictures, "convergence"), how_drawn(run)),
             anchor="convergence",
         ),
-        *motion_cards(recording.trajectory, pictures),
+        *motion_cards(recording, pictures),
         sections.time_split(run),
         sources(run),
     ]
@@ -143,8 +145,9 @@ def only(pictures: dict[str, Picture], name: str) -> list[Picture]:
     return [pictures[name]] if name in pictures else []
 
 
-def motion_cards(motion: Trajectory | None, pictures: dict[str, Picture]) -> list[Html]:
-    """States, controls and contacts over time."""
+def motion_cards(recording: Recording, pictures: dict[str, Picture]) -> list[Html]:
+    """Joints, gait, states, controls and contacts over time."""
+    motion = recording.trajectory
     if motion is None:
         return []
     bodies, touching = len(motion.body_names), by_surfaces(motion)
@@ -154,6 +157,8 @@ def motion_cards(motion: Trajectory | None, pictures: dict[str, Picture]) -> lis
     contacts = shortened(len(shown_pairs(touching)), len(touching.contact_names), "pairs", "with the largest impulses")
     force = "A force is the step's impulse over its duration, so an impact is a spike whose height grows as dt shrinks."
     return [
+        joint_card(motion, recording.scene, pictures),
+        gait_card(motion, recording.scene, pictures),
         card("States over time", figures(only(pictures, "states"), states), anchor="states"),
         card("Controls", figures(only(pictures, "controls"), acting), anchor="controls"),
         card("Contacts", figures(only(pictures, "contacts"), f"{force} {contacts}"), anchor="contacts"),

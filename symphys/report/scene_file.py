@@ -8,16 +8,17 @@ import numpy as np
 
 from symphys.report import values
 from symphys.report.records import Array
+from symphys.report.scene_joints import make_joints
 from symphys.report.scenery import UPRIGHT, Scene, SceneBody, SceneFixture, ScenePlane, SceneTerrain, Solid
 
 SCENE = "scene.json"
 
 
 def read_scene(path: Path) -> Scene:
-    """Read the shapes of the bodies, the planes, the fixtures and the terrain. Raises ReportError."""
+    """Read the bodies, what stands still, the joints and gravity. Raises ReportError."""
     content = values.read_table(path)
     bodies = tuple(
-        SceneBody(values.name(entry.get("name")), make_solids(entry.get("shapes")))
+        SceneBody(values.name(entry.get("name")), make_solids(entry.get("shapes")), values.number(entry.get("mass")))
         for entry in values.tables(content.get("bodies"))
     )
     planes = (make_plane(entry) for entry in values.tables(content.get("planes")))
@@ -28,6 +29,8 @@ def read_scene(path: Path) -> Scene:
         tuple(plane for plane in planes if plane is not None),
         tuple(fixture for fixture in fixtures if fixture is not None),
         tuple(ground for ground in terrain if ground is not None),
+        tuple(make_joints(content.get("joints"))),
+        float(np.linalg.norm(values.numbers(content["gravity"]))) if "gravity" in content else np.nan,
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from symphys.report.records import Array
+from symphys.report.scene_joints import SceneJoint
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 THREE = (0.0, 0.0, 0.0)
@@ -46,10 +47,11 @@ class Solid:
 
 @dataclass(frozen=True)
 class SceneBody:
-    """A body's name and the solids of its surface."""
+    """A body's name, the solids of its surface, and its mass [kg]; nan where it is not known."""
 
     name: str
     solids: tuple[Solid, ...]
+    mass: float = np.nan
 
 
 @dataclass(frozen=True)
@@ -81,12 +83,14 @@ class SceneTerrain:
 
 @dataclass(frozen=True)
 class Scene:
-    """What is drawn around and for the states of a trajectory."""
+    """What is drawn around and for the states of a trajectory; ``gravity`` is its size [m/s^2], nan if not known."""
 
     bodies: tuple[SceneBody, ...] = ()
     planes: tuple[ScenePlane, ...] = ()
     fixtures: tuple[SceneFixture, ...] = ()
     terrain: tuple[SceneTerrain, ...] = ()
+    joints: tuple[SceneJoint, ...] = ()
+    gravity: float = np.nan
 
     def solids(self, name: str) -> tuple[Solid, ...]:
         """The surface of the body called ``name``; none if the scene does not know it."""

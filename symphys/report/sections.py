@@ -10,6 +10,7 @@ import numpy as np
 
 from symphys.report import style, words
 from symphys.report.animation import animation
+from symphys.report.limbs import is_large
 from symphys.report.markup import Html, banner, card, facts, figures, fold, join, pill, stats, table, tag
 from symphys.report.records import Check, Run, Trajectory, Variable
 from symphys.report.scenery import Scene
@@ -26,6 +27,11 @@ HOW_JUDGED = (
 HOW_DRAWN = (
     "Snapshots at even times, the later the darker, fewer where a body hardly moves; spokes and edges turn with it."
 )
+HOW_ROBOTS_DRAWN = (
+    "The whole where it has moved on by most of its length, the later the stronger; lines are paths of trunks and feet."
+)
+HOW_JOINTS_DRAWN = "Dots are joints, squares those that slide or hold fast; bars are the axes."
+HOW_STRIP_DRAWN = "At even times; the window goes with what travels far."
 CHAPTERS = (
     ("checks", "Checks"),
     ("motion", "Motion"),
@@ -33,6 +39,8 @@ CHAPTERS = (
     ("trust", "Trust"),
     ("stages", "Stages"),
     ("convergence", "Convergence"),
+    ("joints", "Joints"),
+    ("gait", "Gait"),
     ("states", "States"),
     ("contacts", "Contacts"),
     ("provenance", "Provenance"),
@@ -115,8 +123,10 @@ def motion(
     notes = tag("p", "Not read: " + "; ".join(faults) + ".", class_="note") if faults else Html("")
     if trajectory is None:
         return card("The motion", tag("p", "This run recorded no motion."), notes, anchor="motion")
-    drawn = figures([pictures["motion"]], HOW_DRAWN)
-    return card("The motion", animation(trajectory, scene, guess), drawn, notes, anchor="motion")
+    how = HOW_ROBOTS_DRAWN if is_large(trajectory, scene) else HOW_DRAWN
+    drawn = figures([pictures["motion"]], f"{how} {HOW_JOINTS_DRAWN}" if scene.joints else how)
+    strip = figures([pictures["strip"]], HOW_STRIP_DRAWN) if "strip" in pictures else Html("")
+    return card("The motion", animation(trajectory, scene, guess), strip, drawn, notes, anchor="motion")
 
 
 def found(run: Run, pictures: dict[str, Picture]) -> Html:

@@ -23,7 +23,7 @@ SHAPES = 220
 
 
 def draw_bodies(axes: Axes, panel: Panel, trajectory: Trajectory, scene: Scene, scale: float) -> None:
-    """Path and snapshots of every body; the first and last one named where there is room."""
+    """Path and snapshots of every body; the first and last one of few, which no joint holds, are named."""
     bodies = range(len(trajectory.body_names))
     total = sum(len(solids_of(trajectory, scene, body)) for body in bodies)
     shots = np.linspace(0, len(trajectory.time) - 1, int(np.clip(SHAPES // total, 3, 10))).round().astype(int)
@@ -36,7 +36,7 @@ def draw_bodies(axes: Axes, panel: Panel, trajectory: Trajectory, scene: Scene, 
             strength = 0.08 + 0.3 * shot / max(int(shots[-1]), 1)
             for solid in solids:
                 Snapshot(axes, panel.view, colour, strength, shot == shots[-1]).draw(trajectory, body, solid, shot)
-        if len(bodies) <= MOST_LABELLED:
+        if len(bodies) <= MOST_LABELLED and not scene.joints:
             name_ends(axes, panel, trajectory, reach(trajectory, scene, body), body, scale)
 
 

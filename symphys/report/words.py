@@ -87,9 +87,9 @@ def seconds(value: float) -> str:
     return f"{show(value, 3)} s" if value < 600 else f"{show(value / 60, 3)} min"
 
 
-def several(number: int, noun: str) -> str:
+def several(number: int, noun: str, plural: str = "") -> str:
     """``1 run``, ``3 runs``."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
+    return f"{number} {noun if number == 1 else plural or noun + 's'}"
 
 
 def listed(parts: Sequence[str]) -> str:

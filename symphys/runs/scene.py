@@ -8,14 +8,16 @@ from typing import Any
 import numpy as np
 
 from symphys.problem import Problem
+from symphys.runs.scene_joints import joint_entry
 from symphys.runs.window import Window, sample, window
 from symphys.shapes import Box, Fixture, Plane, Shape, Sphere, Static, Terrain
 from symphys.shooting import Array
 from symphys.trajectory import Trajectory
+from symphys.world import Body
 
 
 def scene(problem: Problem, z: Mapping[str, Array], motion: Trajectory | None = None) -> dict[str, Any]:
-    """Shapes of the bodies and what stands still, lengths [m], with the parameters that ``z`` (by variable) sets.
+    """Gravity, bodies, what stands still, and joints, in SI units, with the parameters that ``z`` (by variable) sets.
 
     Terrain is sampled where ``motion`` goes; without one, around the bodies at the start.
     """
@@ -26,11 +28,18 @@ def scene(problem: Problem, z: Mapping[str, Array], motion: Trajectory | None = 
         places = motion.position.reshape(-1, 3)
     near = window(world, places)
     return {
-        "bodies": [{"name": body.name, "shapes": [solid(shape) for shape in body.shapes]} for body in world.bodies],
+        "gravity": plain(world.gravity),
+        "bodies": [body_entry(body) for body in world.bodies],
         "planes": statics(world.statics, Plane, near),
         "fixtures": statics(world.statics, Fixture, near),
         "terrain": statics(world.statics, Terrain, near),
+        "joints": [joint_entry(joint, [body.name for body in world.bodies]) for joint in world.joints],
     }
+
+
+def body_entry(body: Body) -> dict[str, Any]:
+    """A body as JSON: mass [kg] and shapes."""
+    return {"name": body.name, "mass": float(body.mass), "shapes": [solid(shape) for shape in body.shapes]}
 
 
 def statics(found: tuple[Static, ...], kind: type[Static], near: Window) -> list[dict[str, Any]]:

@@ -65,7 +65,7 @@ def _trajectory(
         contact_gap=np.concatenate([gaps, gaps[-1:]]),
         residual=residual.ravel(),
         crowded=crowded.ravel(),
-        **_joints(rollout, x, p),
+        **_joints(rollout, x, u, p),
     )
 
 
@@ -78,7 +78,7 @@ def _stack(parts: list[Any]) -> Array:
     return np.stack(parts, axis=1)
 
 
-def _joints(rollout: Rollout, x: Array, p: Array) -> dict[str, Any]:
+def _joints(rollout: Rollout, x: Array, u: Array, p: Array) -> dict[str, Any]:
     """The fields of joints."""
     joints = rollout.world.joints
     counts = [len(joint.kind.coordinates) for joint in joints]
@@ -92,8 +92,19 @@ def _joints(rollout: Rollout, x: Array, p: Array) -> dict[str, Any]:
         "joint_value": value,
         "joint_rate": rate,
         "joint_torque": torque[1:],
+        "joint_command": _split(_commands(rollout, u, counts), counts),
         "joint_separation": separation,
     }
+
+
+def _commands(rollout: Rollout, u: Array, counts: list[int]) -> Array:
+    """(N, coordinates of all joints): what their motors were told."""
+    columns = input_columns(rollout.world, rollout.inputs)
+    told = [
+        u[:, columns[name]] if (name := f"{joint.name}.command") in columns else np.zeros((rollout.steps, count))
+        for joint, count in zip(rollout.world.joints, counts, strict=True)
+    ]
+    return np.concatenate([np.zeros((rollout.steps, 0)), *told], axis=1)
 
 
 def _split(columns: Array, counts: list[int]) -> Array:

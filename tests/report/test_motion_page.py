@@ -4,40 +4,18 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
-import subprocess
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from page_scripts import NODE, plays_to_the_end
 
 from symphys.report import write_motion
 from symphys.report.animation import NUMBERS, motion_data
-from symphys.report.markup import HERE, SCRIPTS
 from symphys.report.recordings import read_trajectory
 from symphys.report.records import ReportError
 from symphys.report.scene_file import read_scene
-
-STAGE = """
-const gradient = () => ({ addColorStop() {} });
-const pen = new Proxy({}, { get: (_, key) => (key.startsWith("create") ? gradient : () => {}), set: () => true });
-const listeners = {};
-const element = (name) => ({
-  textContent: DATA, clientWidth: 800, clientHeight: 400, dataset: { view: name }, getContext: () => pen,
-  setAttribute() {}, addEventListener: (kind, f) => { listeners[`${name} ${kind}`] = f; },
-});
-const names = ["canvas", ".play", "input", "output", "select", "script"];
-const parts = Object.fromEntries(names.map((name) => [name, element(name)]));
-const views = ["space", "side", "top"].map(element);
-let frames = 0;
-global.window = { devicePixelRatio: 2 };
-global.document = {
-  querySelectorAll: () => [{ querySelector: (name) => parts[name], querySelectorAll: () => views }],
-};
-global.ResizeObserver = class { observe() {} };
-global.requestAnimationFrame = (f) => { if (frames++ < 400) setImmediate(() => f(performance.now() + 100 * frames)); };
-"""
 
 
 def test_page_plays_and_draws(made: Path, tmp_path: Path) -> None:
@@ -78,7 +56,7 @@ def test_views_follow_the_motion(made: Path) -> None:
     assert (thrown["flat"], thrown["along"]) == (False, "x")
 
 
-@pytest.mark.skipif(shutil.which("node") is None, reason="needs node to run the page's script")
+@NODE
 @pytest.mark.parametrize("run", ["two_balls/gradient-seed0", "ball_throw/gradient-seed0"])
 def test_script_plays_to_the_end(made: Path, run: str) -> None:
     plays_to_the_end(data_of(made / run))
@@ -108,30 +86,7 @@ SHAPES = {
 }
 
 
-@pytest.mark.skipif(shutil.which("node") is None, reason="needs node to run the page's script")
+@NODE
 def test_script_plays_every_shape_to_the_end(run_dir: Path) -> None:
     (run_dir / "scene.json").write_text(json.dumps(SHAPES))
     plays_to_the_end(data_of(run_dir))
-
-
-def plays_to_the_end(motion: dict[str, Any]) -> None:
-    """Look from all sides, go to the middle, then play: time, button and the terminal show that it went well."""
-    data = json.dumps(json.dumps(motion))
-    script = "".join((HERE / name).read_text(encoding="utf-8") for name in SCRIPTS)
-    acts = """
-    for (const key of ["space click", "side click", "top click"]) listeners[key]();
-    parts.input.value = "500";
-    listeners["input input"]();
-    const half = parts.output.textContent;
-    parts.select.value = "1";
-    listeners[".play click"]();
-    setTimeout(() => console.log(half, "|", parts.output.textContent, "|", parts[".play"].textContent), 800);
-    """
-    code = f"const DATA = {data};{STAGE}{script}{acts}"
-    played = subprocess.run(["node", "-"], input=code, capture_output=True, text=True, timeout=30, check=False)
-    assert played.stderr == ""
-    half, end, button = played.stdout.strip().split(" | ")
-    last = half.split(" / ")[1]
-    assert float(half.split(" / ")[0]) == pytest.approx(float(last.rstrip(" s")) / 2, abs=0.01)
-    assert end == f"{float(last.rstrip(' s')):.2f} / {last}"
-    assert button == "▶"

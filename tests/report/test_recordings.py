@@ -17,6 +17,7 @@ JOINTS = {
     "joint_value": VALUE,
     "joint_rate": -VALUE,
     "joint_torque": VALUE[1:],
+    "joint_command": 2 * VALUE[1:],
     "joint_separation": np.full((4, 2), 1e-6),
 }
 
@@ -28,7 +29,15 @@ def test_joints_are_read(tmp_path: Path) -> None:
     assert np.array_equal(motion.joint_value, VALUE)
     assert np.array_equal(motion.joint_rate, -VALUE)
     assert np.array_equal(motion.joint_torque, VALUE[1:])
+    assert np.array_equal(motion.joint_command, 2 * VALUE[1:])
     assert motion.joint_separation.shape == (4, 2)
+
+
+def test_commands_that_are_not_recorded_are_not_known(tmp_path: Path) -> None:
+    np.savez(
+        tmp_path / "trajectory.npz", **BODIES, **{key: part for key, part in JOINTS.items() if key != "joint_command"}
+    )
+    assert np.isnan(read_trajectory(tmp_path / "trajectory.npz").joint_command).all()
 
 
 def test_records_without_joints_are_read(tmp_path: Path) -> None:
@@ -45,6 +54,7 @@ def test_what_is_not_finite_is_cut_off(tmp_path: Path) -> None:
     motion = read_trajectory(tmp_path / "trajectory.npz")
     assert np.array_equal(motion.joint_value, VALUE[:2])
     assert np.array_equal(motion.joint_torque, VALUE[1:2])
+    assert np.array_equal(motion.joint_command, 2 * VALUE[1:2])
 
 
 def test_joints_that_do_not_fit_are_named(tmp_path: Path) -> None:

@@ -3,34 +3,17 @@
 from __future__ import annotations
 
 import json
-import shutil
-import subprocess
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
+from page_scripts import NODE, run_script
 from yard import area
 
-from symphys.report.markup import HERE
 from symphys.report.outlines import outline
 from symphys.report.scenery import Solid
 
-pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="needs node to run the page's script")
-
-
-def run_script(code: str) -> Any:
-    """What an expression of the page's geometry gives."""
-    script = "".join((HERE / name).read_text(encoding="utf-8") for name in ("geometry.js", "solids.js", "terrain.js"))
-    done = subprocess.run(
-        ["node", "-"],
-        input=f"{script}\nconsole.log(JSON.stringify({code}));",
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.stderr == ""
-    return json.loads(done.stdout)
+pytestmark = NODE
 
 
 EYE = "camera(-2, 0.4)"

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from symphys.problem import Problem, load_problem
 from symphys.runs.scene import scene
@@ -63,6 +64,46 @@ height = "sqrt(8 - x)"
 name = "throw"
 sets = "ball.velocity"
 """
+ARM = """
+[simulation]
+duration = 0.1
+dt = 0.01
+[world]
+gravity = [0, 0, -5]
+[[body]]
+name = "upper"
+mass = 2.0
+inertia = 0.1
+position = [0, 0, -0.5]
+[[body]]
+name = "lower"
+mass = 1.0
+inertia = 0.1
+position = [0, 0, -1.5]
+[[joint]]
+name = "shoulder"
+between = ["world", "upper"]
+universal = { axes = [[0, 1, 0], [1, 0, 0]] }
+point = [0, 0, 0]
+motor = { velocity = { torque = 3, velocity = 4 } }
+[[joint]]
+name = "elbow"
+between = ["upper", "lower"]
+hinge = { axis = [0, 1, 0] }
+point = [0, 0, -1]
+limits = [-inf, 2]
+motor = { servo = { gain = 20, torque = 30, velocity = 8 } }
+[[joint]]
+name = "strut"
+between = ["world", "lower"]
+ball = {}
+point = [0, 0, -2]
+frequency = 2
+[[variable]]
+name = "made"
+sets = "elbow.torque"
+guess = 30.0
+"""
 Z = {"build": np.array([[3.0]]), "where": np.array([[7.0], [8.0]])}
 
 
@@ -114,3 +155,23 @@ def test_terrain_is_sampled_along_the_motion(tmp_path: Path) -> None:
     assert x[-1] > 20.5
     assert np.isnan(z[:, x > 8]).all()
     assert np.isfinite(z[:, x < 8]).all()
+
+
+def test_joints_are_told_with_all_that_a_report_needs(tmp_path: Path) -> None:
+    """Sockets in the frames of the bodies; the motor's bound is that which a variable sets."""
+    found = scene(problem_of(tmp_path, ARM), {"made": np.array([[12.0]])})
+    assert found["gravity"] == [0, 0, -5]
+    assert [(body["name"], body["mass"]) for body in found["bodies"]] == [("upper", 2.0), ("lower", 1.0)]
+    shoulder, elbow, strut = found["joints"]
+    assert (elbow["name"], elbow["kind"], elbow["first"], elbow["second"]) == ("elbow", "hinge", "lower", "upper")
+    assert elbow["motor"] == {"kind": "servo", "gain": 20, "torque": 12, "velocity": 8}
+    assert elbow["limits"] == [None, 2]
+    assert elbow["coordinates"] == [{"name": "angle", "turns": True}]
+    assert [socket["point"] for socket in elbow["sockets"]] == [[0, 0, 0.5], [0, 0, -0.5]]
+    turned = Rotation.from_quat(np.roll(elbow["sockets"][0]["orientation"], -1))
+    np.testing.assert_allclose(turned.apply([1, 0, 0]), [0, 1, 0], atol=1e-12)
+    assert (shoulder["second"], shoulder["sockets"][1]["point"]) == (None, [0, 0, 0])
+    assert shoulder["motor"] == {"kind": "velocity", "torque": 3, "velocity": 4}
+    assert [each["name"] for each in shoulder["coordinates"]] == ["angle1", "angle2"]
+    assert (strut["motor"], strut["coordinates"], strut["limits"]) == (None, [], [None, None])
+    json.dumps(found, allow_nan=False)

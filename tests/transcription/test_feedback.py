@@ -268,3 +268,12 @@ def test_function_that_nobody_gives(tmp_path: Path) -> None:
     """The command line cannot give one; the message says how Python does."""
     with pytest.raises(ProblemError, match="load_problem"):
         problem_of(tmp_path, GIVEN)
+
+
+def test_records_hold_what_controllers_tell_motors(tmp_path: Path) -> None:
+    """A torque motor gives what it is told, by all controllers and the variable together."""
+    made = transcribe(problem_of(tmp_path), backend="casadi")
+    motion = made.simulate(points(made)[0])
+    told = motion.joint_command[:, 0, 0]
+    assert np.ptp(told) > 1
+    assert motion.joint_torque[:, 0, 0] == pytest.approx(np.clip(told, -30, 30))

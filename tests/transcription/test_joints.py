@@ -137,6 +137,7 @@ def test_angle_and_rate_of_a_pendulum(make: Make) -> None:
     assert verdict.checks[0].error == pytest.approx(np.hypot(angle[-1], rate[-1]), abs=1e-9)
     torque = np.concatenate([[0.0], motion.joint_torque[:, 0, 0]])
     assert 0 < np.abs(torque).max() <= 2 + 1e-9
+    assert motion.joint_command[:, 0, 0] == pytest.approx(np.repeat([0.3, 0.5, -0.2, 0.1], 20))
     assert verdict.costs["torque"] == pytest.approx(0.01 * np.trapezoid(torque**2, motion.time))
     assert verdict.costs["command"] == pytest.approx(0.1 * 0.2 * (0.09 + 0.25 + 0.04 + 0.01))
 
@@ -168,13 +169,19 @@ def test_gradient_agrees_with_differences(make: Make, text: str) -> None:
     assert np.abs(slope).min() > 1e-9
 
 
+def test_a_motor_that_no_variable_commands_is_told_0(make: Make) -> None:
+    start, end = PENDULUM.index('[[variable]]\nname = "aim"'), PENDULUM.index('[[variable]]\nname = "made"')
+    motion = make(PENDULUM[:start] + PENDULUM[end:].replace('squares = "pivot.command"', 'squares = "pivot.rate"'))
+    assert motion.simulate(motion.shooting.start(0)).joint_command[:, 0, 0] == pytest.approx(np.zeros(80))
+
+
 def test_a_record_without_joints_says_so(make: Make) -> None:
     start = PENDULUM.index("[[joint]]")
     text = PENDULUM[:start] + '[[variable]]\nname = "throw"\nsets = "rod.velocity"\n'
     motion = make(text).simulate(np.zeros(3))
     assert motion.joint_names == ()
     assert motion.joint_value.shape == motion.joint_rate.shape == (81, 0, 0)
-    assert motion.joint_torque.shape == (80, 0, 0)
+    assert motion.joint_torque.shape == motion.joint_command.shape == (80, 0, 0)
     assert motion.joint_separation.shape == (81, 0)
 
 

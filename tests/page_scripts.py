@@ -1,0 +1,72 @@
+"""The scripts of a page, run by node without a browser."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from typing import Any
+
+import pytest
+
+from symphys.report.markup import HERE, SCRIPTS
+
+NODE = pytest.mark.skipif(shutil.which("node") is None, reason="needs node to run the page's script")
+
+STAGE = """
+const gradient = () => ({ addColorStop() {} });
+const pen = new Proxy({}, { get: (_, key) => (key.startsWith("create") ? gradient : () => {}), set: () => true });
+const listeners = {};
+const element = (name) => ({
+  textContent: DATA, clientWidth: 800, clientHeight: 400, dataset: { view: name }, getContext: () => pen,
+  setAttribute() {}, addEventListener: (kind, f) => { listeners[`${name} ${kind}`] = f; },
+});
+const names = ["canvas", ".play", "input", "output", "select", "script"];
+const parts = Object.fromEntries(names.map((name) => [name, element(name)]));
+const views = ["space", "side", "top"].map(element);
+let frames = 0;
+global.window = { devicePixelRatio: 2 };
+global.document = {
+  querySelectorAll: () => [{ querySelector: (name) => parts[name], querySelectorAll: () => views }],
+};
+global.ResizeObserver = class { observe() {} };
+global.requestAnimationFrame = (f) => { if (frames++ < 400) setImmediate(() => f(performance.now() + 100 * frames)); };
+"""
+
+
+def run_script(code: str, *more: str) -> Any:
+    """What an expression of the page's geometry, and of ``more`` scripts, gives."""
+    names = ("geometry.js", "solids.js", "terrain.js", *more)
+    script = "".join((HERE / name).read_text(encoding="utf-8") for name in names)
+    done = subprocess.run(
+        ["node", "-"],
+        input=f"{script}\nconsole.log(JSON.stringify({code}));",
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stderr == ""
+    return json.loads(done.stdout)
+
+
+def plays_to_the_end(motion: dict[str, Any]) -> None:
+    """Look from all sides, go to the middle, then play: time, button and the terminal show that it went well."""
+    data = json.dumps(json.dumps(motion))
+    script = "".join((HERE / name).read_text(encoding="utf-8") for name in SCRIPTS)
+    acts = """
+    for (const key of ["space click", "side click", "top click"]) listeners[key]();
+    parts.input.value = "500";
+    listeners["input input"]();
+    const half = parts.output.textContent;
+    parts.select.value = "1";
+    listeners[".play click"]();
+    setTimeout(() => console.log(half, "|", parts.output.textContent, "|", parts[".play"].textContent), 800);
+    """
+    code = f"const DATA = {data};{STAGE}{script}{acts}"
+    played = subprocess.run(["node", "-"], input=code, capture_output=True, text=True, timeout=30, check=False)
+    assert played.stderr == ""
+    half, end, button = played.stdout.strip().split(" | ")
+    last = half.split(" / ")[1]
+    assert float(half.split(" / ")[0]) == pytest.approx(float(last.rstrip(" s")) / 2, abs=0.01)
+    assert end == f"{float(last.rstrip(' s')):.2f} / {last}"
+    assert button == "▶"
