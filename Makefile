@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help demo test thorough lint typecheck bench bench-contact gallery clean
+.PHONY: help demo test thorough lint typecheck bench bench-contact bench-table1 gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
@@ -37,6 +37,10 @@ bench-contact: $(VENV)/.benching  ## errors of contact against the step, gradien
 	$(BIN)/python benchmarks/gradients.py build
 	$(BIN)/python benchmarks/ablation.py
 	$(BIN)/python benchmarks/consistency.py build
+
+bench-table1: $(VENV)/.benching  ## the timing table of Degrave et al. (1 and 128 robots, small and large net), cost against weights
+	$(BIN)/python benchmarks/table1.py
+	$(BIN)/python benchmarks/weights.py build
 
 gallery: $(VENV)/.installed  ## make the figures of the README again
 	$(BIN)/symphys solve ball_throw bank_shot sled basket knock putt cart_pole --out build/gallery
