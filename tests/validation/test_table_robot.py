@@ -1,0 +1,88 @@
+"""The paper's quadruped with its net of 1,296 weights on the ground: sensors, gradient, joints, feet."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from table_robot import starts, table_problem
+
+from symphys.kernel import Kernel, compile_program
+from symphys.problem import Problem
+from symphys.transcription import Rollout, symbolic_rollout
+from symphys.transcription.program import rollout_program
+from symphys.transcription.simulate import recorder, simulate
+
+Array = NDArray[np.float64]
+STEPS = 50
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    """Half a second of it."""
+    return table_problem([], STEPS)
+
+
+@pytest.fixture(scope="module")
+def rollout(problem: Problem) -> Rollout:
+    """Of the problem."""
+    return symbolic_rollout(problem)
+
+
+@pytest.fixture(scope="module")
+def kernel(rollout: Rollout) -> Kernel:
+    """Compiled."""
+    return compile_program(rollout_program(rollout, exact=True), seeded=["merit"], threads=1)
+
+
+def point(problem: Problem) -> Array:
+    """(n,) off every symmetry: weights, and a push."""
+    rng = np.random.default_rng(2)
+    weights = problem.variables[0].guess
+    return np.concatenate([weights + 0.05 * rng.standard_normal(weights.size), [0.03, -0.02, 0.01]])
+
+
+def test_sensors(problem: Problem, rollout: Rollout) -> None:
+    """There are 81, and none is constant while the robot moves."""
+    assert sum(sensor.size for sensor in problem.sensors) == 81
+    course = simulate(rollout, recorder(rollout), point(problem), 0.0).course
+    for sensor in problem.sensors:
+        read = rollout.control.sensor(sensor)
+        columns = np.array([np.array(read(x, course.p, 0.01 * k)).ravel() for k, x in enumerate(course.x)])
+        assert (np.ptp(columns, axis=0) > 1e-4).all(), sensor.name
+
+
+def test_gradient_by_differences(problem: Problem, kernel: Kernel) -> None:
+    """Of the distance with respect to weights and start, along random directions and single weights: 1e-5.
+
+    Steps of the differences go down to 1e-8: fifty steps on four feet have kinks within 1e-6.
+    """
+    z = point(problem)
+    gradient = kernel.gradient(z, [1.0], [0.0])[1][0]
+    rng = np.random.default_rng(3)
+    single = np.eye(z.size)[rng.choice(z.size, 16, replace=False)]
+    directions = np.vstack([rng.standard_normal((16, z.size)) / np.sqrt(z.size), single])
+    slopes = directions @ gradient
+    found = []
+    for h in (1e-5, 1e-6, 1e-7, 1e-8):
+        ahead, behind = (kernel.forward(z + sign * h * directions, [0.0])["objective"][:, 0] for sign in (1, -1))
+        found.append(np.abs((ahead - behind) / (2 * h) - slopes))
+    assert np.min(found, axis=0).max() < 1e-5 * np.abs(slopes[:16]).max()
+
+
+def test_joints_and_feet(problem: Problem, rollout: Rollout) -> None:
+    """At 20 sweeps joints part by less than a millimetre (rms), and feet sink in by less than one."""
+    motion = simulate(rollout, recorder(rollout), point(problem), 0.0).motion
+    assert np.sqrt(np.mean(motion.joint_separation**2)) < 1e-3
+    assert motion.contact_gap.min() > -1e-3
+    assert (motion.contact_force[:, :, 2] > 0).any(axis=0).all(), "every foot bears load at some time"
+
+
+def test_robots_of_a_batch_are_those_alone(problem: Problem, kernel: Kernel) -> None:
+    """Bit by bit, in any lane, with or without the gradient."""
+    weights = problem.variables[0].guess
+    Z = np.hstack([np.tile(weights, (11, 1)), starts(11)])
+    together, slopes = kernel.gradient(Z, [1.0], [0.0])
+    for k in (0, 3, 10):
+        assert np.array_equal(kernel.forward(Z[k], [0.0])["objective"][0], together["objective"][k])
+        assert np.array_equal(kernel.gradient(Z[k], [1.0], [0.0])[1][0], slopes[k])
