@@ -24,6 +24,8 @@ SOCKETS = {"x": (1.0, 0.0, 0.0, 0.0), "y": (HALF, 0.0, 0.0, HALF), "z": (HALF, 0
 HIPS = {"left front": (1, 1), "right front": (1, -1), "left hind": (-1, 1), "right hind": (-1, -1)}
 STANDING = 0.65
 """Height of the trunk's centre above the ground with straight legs [m]."""
+KNEES = {f"{name} {k}": angle for name in HIPS for k, angle in ((3, -0.4), (4, 0.8))}
+"""Legs that are a little bent."""
 HOLD = Spring(stiffness=60.0, damping=2.0)
 """What holds a leg in place, where motors do not."""
 
@@ -60,14 +62,14 @@ def leg(name: str) -> list[Body]:
     return [*rings, thigh, Body(f"{name} shank", 0.6, block(0.6, 0.05, 0.05, 0.3), (Sphere(0.05, (0, 0, -0.15)),))]
 
 
-def chain(count: int = 8, length: float = 0.15, spring: Spring | None = None) -> World:
+def chain(count: int = 8, length: float = 0.15, spring: Spring | None = None, motor: Motor | None = None) -> World:
     """Rods of 0.5 kg that hang on the world by hinges about y, x, y, ... in turn; straight down at coordinates 0."""
     bodies = [Body(f"rod{k}", 0.5, block(0.5, 0.03, 0.03, length)) for k in range(count)]
     joints = []
     for k in range(count):
         turned = SOCKETS["yx"[k % 2]]
         sockets = Socket((0, 0, length / 2), turned), Socket((0, 0, -length / 2 if k else 0), turned)
-        joints.append(Joint(f"j{k}", HINGE, k, k - 1 if k else None, sockets, spring=spring))
+        joints.append(Joint(f"j{k}", HINGE, k, k - 1 if k else None, sockets, motor, spring=spring))
     return World(tuple(bodies), joints=tuple(joints))
 
 
@@ -183,3 +185,34 @@ class JointedScene:
         """(..., bodies, 3) the centres."""
         layout = Layout(world)
         return np.stack([X[..., layout[f"{body.name}.position"]] for body in world.bodies], axis=-2)
+
+
+def dropped(motor: Motor | None = None, batch: int = 8, height: float = 0.05) -> JointedScene:
+    """The quadruped falls on its feet, leaning and turning a little; without a motor springs hold its legs."""
+    rng, robot = np.random.default_rng(5), quadruped(motor, None if motor else HOLD)
+    roots = [
+        Pose(
+            Rotation.from_rotvec(rng.normal(0, 0.05, 3)),
+            np.array([0, 0, STANDING + height]),
+            rng.normal(0, 0.3, 3),
+            rng.normal(0, 0.3, 3),
+        )
+        for _ in range(batch)
+    ]
+    return JointedScene("quadruped", robot, tuple(state_of(robot, KNEES, {}, root) for root in roots))
+
+
+def standing(motor: Motor | None = None, batch: int = 128) -> JointedScene:
+    """The quadruped on its four feet, pushed: its trunk and all that hangs on it moves at about 0.3 m/s."""
+    rng, robot = np.random.default_rng(0), quadruped(motor, None if motor else HOLD)
+    place = np.array([0, 0, STANDING])
+    roots = [Pose(Rotation.identity(), place, rng.normal(0, 0.3, 3), np.zeros(3)) for _ in range(batch)]
+    return JointedScene("quadruped", robot, tuple(state_of(robot, {}, {}, root) for root in roots))
+
+
+def swinging(count: int = 8, batch: int = 8) -> JointedScene:
+    """The chain, let go from a bend; its hinges are damped a little."""
+    rng, robot = np.random.default_rng(7), chain(count, spring=Spring(damping=0.002))
+    names = [joint.name for joint in robot.joints]
+    starts = (dict(zip(names, rng.normal(0, 0.4, count), strict=True)) for _ in range(batch))
+    return JointedScene("chain", robot, tuple(state_of(robot, start, {}) for start in starts))
