@@ -43,8 +43,8 @@ class Engine(Protocol):
     name: str
     scene: Any
 
-    def runner(self, dt: float) -> Callable[[int, int], Array]:
-        """(batch, count) -> (count, batch, n) states at the samples."""
+    def runner(self, dt: float, every: float = SAMPLE) -> Callable[[int, int], Array]:
+        """(batch, count) -> (count, batch, n) states after each ``every`` seconds."""
 
     def places(self, states: Array) -> Array:
         """(..., bodies, 3) the centres in states (..., n)."""
@@ -66,9 +66,9 @@ class Here:
         world: World = self.scene.world(self.restitution)
         return world
 
-    def runner(self, dt: float) -> Callable[[int, int], Array]:
+    def runner(self, dt: float, every: float = SAMPLE) -> Callable[[int, int], Array]:
         """See ``Engine``."""
-        walk = Walk(self.world, Scheme(dt=dt, sweeps=self.sweeps, cuts=self.cuts), round(SAMPLE / dt))
+        walk = Walk(self.world, Scheme(dt=dt, sweeps=self.sweeps, cuts=self.cuts), round(every / dt))
         states = self.scene.states(self.world)
         return lambda batch, count: walk.along(states[:batch], count)
 
@@ -85,10 +85,10 @@ class There:
     scene: Scene
     contact: Contact
 
-    def runner(self, dt: float) -> Callable[[int, int], Array]:
+    def runner(self, dt: float, every: float = SAMPLE) -> Callable[[int, int], Array]:
         """See ``Engine``."""
         runs, states = Runs(model_of(self.scene, self.contact, dt)), states_of(self.scene)
-        return lambda batch, count: runs.along(states[:batch], round(SAMPLE / dt), count)
+        return lambda batch, count: runs.along(states[:batch], round(every / dt), count)
 
     def places(self, states: Array) -> Array:
         """See ``Engine``."""
@@ -96,15 +96,15 @@ class There:
         return poses.reshape(*states.shape[:-1], -1, 7)[..., :3]
 
 
-def errors_of(engine: Engine, window: float, steps: Sequence[float], fine: float) -> Array:
+def errors_of(engine: Engine, window: float, steps: Sequence[float], fine: float, every: float = SAMPLE) -> Array:
     """(steps, batch) [m]: rms distance from the run at the fine step, over bodies and samples of the window."""
-    exact, runs = samples(engine, fine, window), (samples(engine, dt, window) for dt in steps)
+    exact, runs = samples(engine, fine, window, every), (samples(engine, dt, window, every) for dt in steps)
     return np.array([distance(run, exact) for run in runs])
 
 
-def samples(engine: Engine, dt: float, window: float) -> Array:
+def samples(engine: Engine, dt: float, window: float, every: float = SAMPLE) -> Array:
     """(count, batch, bodies, 3) places at the samples of the window."""
-    return engine.places(engine.runner(dt)(len(engine.scene.start), round(window / SAMPLE)))
+    return engine.places(engine.runner(dt, every)(len(engine.scene.start), round(window / every)))
 
 
 def distance(places: Array, exact: Array) -> Array:
@@ -112,12 +112,12 @@ def distance(places: Array, exact: Array) -> Array:
     return np.asarray(np.sqrt((np.linalg.norm(places - exact, axis=-1) ** 2).mean(axis=(0, 2))))
 
 
-def study(engine: Engine, window: float, steps: Sequence[float] = STEPS) -> Curve:
+def study(engine: Engine, window: float, steps: Sequence[float] = STEPS, every: float = SAMPLE) -> Curve:
     """Errors, and CPU seconds for a simulated one: alone, and a share of eight side by side."""
-    count, batch = round(window / SAMPLE), len(engine.scene.start)
-    exact, errors, costs = samples(engine, FINE, window), [], []
+    count, batch = round(window / every), len(engine.scene.start)
+    exact, errors, costs = samples(engine, FINE, window, every), [], []
     for dt in steps:
-        run = engine.runner(dt)
+        run = engine.runner(dt, every)
         errors.append(distance(engine.places(run(batch, count)), exact))
         costs.append([cheapest(partial(run, side, count)) / window / side for side in (1, 8)])
     return Curve(engine.name, tuple(steps), np.array(errors), *np.array(costs).T)

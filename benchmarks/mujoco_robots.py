@@ -36,10 +36,10 @@ class ThereJointed:
     scene: JointedScene
     integrator: str
 
-    def runner(self, dt: float) -> Callable[[int, int], Array]:
+    def runner(self, dt: float, every: float = SAMPLE) -> Callable[[int, int], Array]:
         """(batch, count) -> (count, batch, nstate) states at the samples."""
         runs, states = Runs(model_of(self.scene, dt, self.integrator)), states_of(self.scene)
-        return lambda batch, count: runs.along(states[:batch], round(SAMPLE / dt), count)
+        return lambda batch, count: runs.along(states[:batch], round(every / dt), count)
 
     def places(self, states: Array) -> Array:
         """(..., bodies, 3) the centres, in the order of the scene's bodies."""

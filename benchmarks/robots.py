@@ -24,8 +24,6 @@ SOCKETS = {"x": (1.0, 0.0, 0.0, 0.0), "y": (HALF, 0.0, 0.0, HALF), "z": (HALF, 0
 HIPS = {"left front": (1, 1), "right front": (1, -1), "left hind": (-1, 1), "right hind": (-1, -1)}
 STANDING = 0.65
 """Height of the trunk's centre above the ground with straight legs [m]."""
-KNEES = {f"{name} {k}": angle for name in HIPS for k, angle in ((3, -0.4), (4, 0.8))}
-"""Legs that are a little bent."""
 HOLD = Spring(stiffness=60.0, damping=2.0)
 """What holds a leg in place, where motors do not."""
 
@@ -185,21 +183,6 @@ class JointedScene:
         """(..., bodies, 3) the centres."""
         layout = Layout(world)
         return np.stack([X[..., layout[f"{body.name}.position"]] for body in world.bodies], axis=-2)
-
-
-def dropped(motor: Motor | None = None, batch: int = 8, height: float = 0.05) -> JointedScene:
-    """The quadruped falls on its feet, leaning and turning a little; without a motor springs hold its legs."""
-    rng, robot = np.random.default_rng(5), quadruped(motor, None if motor else HOLD)
-    roots = [
-        Pose(
-            Rotation.from_rotvec(rng.normal(0, 0.05, 3)),
-            np.array([0, 0, STANDING + height]),
-            rng.normal(0, 0.3, 3),
-            rng.normal(0, 0.3, 3),
-        )
-        for _ in range(batch)
-    ]
-    return JointedScene("quadruped", robot, tuple(state_of(robot, KNEES, {}, root) for root in roots))
 
 
 def standing(motor: Motor | None = None, batch: int = 128) -> JointedScene:
