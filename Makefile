@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help demo test thorough lint typecheck bench bench-contact gallery clean
+.PHONY: help demo test thorough lint typecheck bench bench-contact bench-robots gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
@@ -37,6 +37,11 @@ bench-contact: $(VENV)/.benching  ## errors of contact against the step, gradien
 	$(BIN)/python benchmarks/gradients.py build
 	$(BIN)/python benchmarks/ablation.py
 	$(BIN)/python benchmarks/consistency.py build
+
+bench-robots: $(VENV)/.benching  ## jointed robots against MuJoCo: agreement, errors against the step, steps and derivatives a second
+	$(BIN)/python benchmarks/robot_agreement.py
+	$(BIN)/python benchmarks/robot_consistency.py build
+	$(BIN)/python benchmarks/robot_against_mujoco.py
 
 gallery: $(VENV)/.installed  ## make the figures of the README again
 	$(BIN)/symphys solve ball_throw bank_shot sled basket knock putt cart_pole --out build/gallery

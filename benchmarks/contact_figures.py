@@ -25,6 +25,9 @@ LOOKS = {
     "MuJoCo, default contact": (style.VERMILION, "o", "-"),
     "MuJoCo, stiff contact": (style.ORANGE, "s", "-"),
     "MuJoCo, default, RK4": (style.PURPLE, "^", "-"),
+    "MuJoCo, Euler": (style.VERMILION, "o", "-"),
+    "MuJoCo, implicitfast": (style.ORANGE, "s", "--"),
+    "MuJoCo, RK4": (style.PURPLE, "^", "-"),
     "MuJoCo, linear spring": (style.PURPLE, "v", "-"),
     "MuJoCo, gradual spring": (style.GREY, "D", "-"),
 }

@@ -16,15 +16,15 @@ from symphys.export import mjcf
 Array = NDArray[np.float64]
 
 
-def model_of(scene: JointedScene, dt: float, integrator: str, index: int = 0) -> mujoco.MjModel:
-    """The robot as exported, with an integrator of one's choice; the keyframe is one of the initial states."""
+def model_of(scene: JointedScene, dt: float, integrator: str, cone: str = "elliptic", index: int = 0) -> mujoco.MjModel:
+    """The robot as exported, with an integrator and a cone of one's choice; the keyframe is one initial state."""
     text = mjcf(scene.robot, scene.start[index], dt, scene.name)
-    return mujoco.MjModel.from_xml_string(text.replace("implicitfast", integrator))
+    return mujoco.MjModel.from_xml_string(text.replace("implicitfast", integrator).replace("elliptic", cone))
 
 
 def states_of(scene: JointedScene) -> Array:
     """(batch, nstate) time, coordinates, rates: those of the keyframes; nothing else has a state."""
-    models = [model_of(scene, 0.01, "Euler", k) for k in range(len(scene.start))]
+    models = [model_of(scene, 0.01, "Euler", index=k) for k in range(len(scene.start))]
     return np.array([np.concatenate([[0.0], model.key_qpos[0], model.key_qvel[0]]) for model in models])
 
 

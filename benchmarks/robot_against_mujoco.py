@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 DT = 0.01
 STEPS = 50
 TURNS = 7
-DERIVED = 4
+DERIVED = 16
 """Robots whose steps are differentiated in MuJoCo, each STEPS times."""
 SERVO = Servo(20.0, 30.0, 8.0)
 SWEEPS = (20, 10, 5)
@@ -68,11 +68,11 @@ def here(scene: JointedScene, sweeps: int, batch: int) -> Candidate:
     )
 
 
-def there(scene: JointedScene, integrator: str) -> Candidate:
+def there(scene: JointedScene, integrator: str, cone: str) -> Candidate:
     """MuJoCo, one thread."""
-    runs, states = Runs(model_of(scene, DT, integrator)), states_of(scene)
+    runs, states = Runs(model_of(scene, DT, integrator, cone)), states_of(scene)
     return Candidate(
-        f"MuJoCo, {integrator}",
+        f"MuJoCo, {integrator}, {cone}",
         partial(runs.after, states, STEPS),
         partial(differentiate, runs, states[:DERIVED]),
         (len(states) * STEPS, DERIVED * STEPS),
@@ -109,7 +109,7 @@ def measure(candidates: Sequence[Candidate]) -> Array:
 
 
 def report(title: str, candidates: Sequence[Candidate], times: Array) -> None:
-    """Print a table: best and median of the turns; ratios to the last candidate, which is MuJoCo."""
+    """Print a table: best and median of the turns; ratios to the last candidate, MuJoCo with our law of friction."""
     print(f"\n{title}: 1000 steps/s best (median), times MuJoCo's; 1000 derivatives/s, times MuJoCo's")
     ratios = times[:, -1:] / times
     for k, candidate in enumerate(candidates):
@@ -128,7 +128,8 @@ def main() -> None:
     for name, (motor, integrator) in ROBOTS.items():
         scene = standing(motor)
         ours = [here(scene, sweeps, 128) for sweeps in SWEEPS]
-        candidates = [*ours, here(scene, SWEEPS[0], 1), there(scene, integrator)]
+        theirs = [there(scene, integrator, cone) for cone in ("pyramidal", "elliptic")]
+        candidates = [*ours, here(scene, SWEEPS[0], 1), *theirs]
         report(f"quadruped, {name}, dt = {DT}", candidates, measure(candidates))
 
 
