@@ -35,10 +35,11 @@ class ThereJointed:
     name: str
     scene: JointedScene
     integrator: str
+    cone: str = "elliptic"
 
     def runner(self, dt: float, every: float = SAMPLE) -> Callable[[int, int], Array]:
         """(batch, count) -> (count, batch, nstate) states at the samples."""
-        runs, states = Runs(model_of(self.scene, dt, self.integrator)), states_of(self.scene)
+        runs, states = Runs(model_of(self.scene, dt, self.integrator, self.cone)), states_of(self.scene)
         return lambda batch, count: runs.along(states[:batch], round(every / dt), count)
 
     def places(self, states: Array) -> Array:

@@ -9,18 +9,19 @@ the adjoint of the whole rollout, gives the gradient of one number. Run with ``m
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from time import process_time
 
 import numpy as np
-from mujoco_robots import model_of, states_of
+from consistency import FINE, Engine, Here, distance, samples
+from mujoco_robots import ThereJointed, model_of, states_of
 from mujoco_runs import Runs, mujoco
 from numpy.typing import NDArray
-from robots import JointedScene, standing
+from robot_consistency import BATCH, EVERY, WINDOW
+from robots import HELD, JointedScene, standing
 from rolling import Rolling
 
-from symphys.joints import Motor, Servo
 from symphys.world import Scheme
 
 Array = NDArray[np.float64]
@@ -29,10 +30,7 @@ STEPS = 50
 TURNS = 7
 DERIVED = 16
 """Robots whose steps are differentiated in MuJoCo, each STEPS times."""
-SERVO = Servo(20.0, 30.0, 8.0)
 SWEEPS = (20, 10, 5)
-ROBOTS: dict[str, tuple[Motor | None, str]] = {"springs": (None, "Euler"), "servos": (SERVO, "implicitfast")}
-"""What holds the legs, and MuJoCo's fastest integrator that is stable with it."""
 Call = Callable[[], object]
 
 
@@ -44,12 +42,14 @@ class Candidate:
         name: in the table.
         rollout, derivative: of ``steps`` steps each.
         steps: robots times steps, of the two.
+        engine: the same, for its error.
     """
 
     name: str
     rollout: Call
     derivative: Call
     steps: tuple[int, int]
+    engine: Engine
 
 
 def here(scene: JointedScene, sweeps: int, batch: int) -> Candidate:
@@ -65,17 +65,20 @@ def here(scene: JointedScene, sweeps: int, batch: int) -> Candidate:
         partial(kernel.forward, states, [0.0]),
         partial(kernel.gradient, states, seed, [0.0]),
         (batch * STEPS, batch * STEPS),
+        Here(name, scene, sweeps=sweeps, cuts=0),
     )
 
 
 def there(scene: JointedScene, integrator: str, cone: str) -> Candidate:
     """MuJoCo, one thread."""
     runs, states = Runs(model_of(scene, DT, integrator, cone)), states_of(scene)
+    name = f"MuJoCo, {integrator}, {cone}"
     return Candidate(
-        f"MuJoCo, {integrator}, {cone}",
+        name,
         partial(runs.after, states, STEPS),
         partial(differentiate, runs, states[:DERIVED]),
         (len(states) * STEPS, DERIVED * STEPS),
+        ThereJointed(name, scene, integrator, cone),
     )
 
 
@@ -108,9 +111,26 @@ def measure(candidates: Sequence[Candidate]) -> Array:
     return np.array(turns[1:])
 
 
-def report(title: str, candidates: Sequence[Candidate], times: Array) -> None:
+def errors_of(candidates: Sequence[Candidate]) -> list[float]:
+    """[m]: as ``robot_consistency``, at DT; of ours against most sweeps at the fine step, of MuJoCo against itself."""
+    exact: dict[str, Array] = {}
+    errors = []
+    for candidate in candidates:
+        engine, kind = few(candidate.engine), candidate.name if "MuJoCo" in candidate.name else "symphys"
+        if kind not in exact:  # ours begin with most sweeps
+            exact[kind] = samples(engine, FINE, WINDOW, EVERY)
+        errors.append(float(np.median(distance(samples(engine, DT, WINDOW, EVERY), exact[kind]))))
+    return errors
+
+
+def few(engine: Engine) -> Engine:
+    """The engine with the first few initial states."""
+    return replace(engine, scene=replace(engine.scene, start=engine.scene.start[:BATCH]))  # type: ignore[type-var]
+
+
+def report(title: str, candidates: Sequence[Candidate], times: Array, errors: Sequence[float]) -> None:
     """Print a table: best and median of the turns; ratios to the last candidate, MuJoCo with our law of friction."""
-    print(f"\n{title}: 1000 steps/s best (median), times MuJoCo's; 1000 derivatives/s, times MuJoCo's")
+    print(f"\n{title}: 1000 steps/s best (median) | times MuJoCo's | 1000 derivatives/s | times MuJoCo's | error [m]")
     ratios = times[:, -1:] / times
     for k, candidate in enumerate(candidates):
         cells = []
@@ -118,19 +138,20 @@ def report(title: str, candidates: Sequence[Candidate], times: Array) -> None:
             best, middle = times[:, k, what].min(), np.median(times[:, k, what])
             fastest = times[:, -1, what].min() / best
             cells.append(
-                f"{1e-3 / best:8.4g} ({1e-3 / middle:.4g}) | {fastest:.3g} ({np.median(ratios[:, k, what]):.3g})"
+                f"{1e-3 / best:.3g} ({1e-3 / middle:.3g}) | {fastest:.3g} ({np.median(ratios[:, k, what]):.3g})"
             )
-        print(f"| {candidate.name} | {' | '.join(cells)} |", flush=True)
+        print(f"| {candidate.name} | {' | '.join(cells)} | {errors[k]:.1e} |", flush=True)
 
 
 def main() -> None:
     """Print a table for each robot."""
-    for name, (motor, integrator) in ROBOTS.items():
+    for name, (motor, integrator) in HELD.items():
         scene = standing(motor)
         ours = [here(scene, sweeps, 128) for sweeps in SWEEPS]
         theirs = [there(scene, integrator, cone) for cone in ("pyramidal", "elliptic")]
         candidates = [*ours, here(scene, SWEEPS[0], 1), *theirs]
-        report(f"quadruped, {name}, dt = {DT}", candidates, measure(candidates))
+        times, errors = measure(candidates), errors_of(candidates)
+        report(f"quadruped, {name}, dt = {DT}", candidates, times, errors)
 
 
 if __name__ == "__main__":

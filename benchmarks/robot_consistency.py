@@ -13,8 +13,7 @@ from pathlib import Path
 from consistency import Engine, Here, report, study
 from contact_figures import Curve, consistency_figure
 from mujoco_robots import ThereJointed
-from robot_against_mujoco import ROBOTS
-from robots import JointedScene, standing, swinging
+from robots import HELD, JointedScene, standing, swinging
 
 STEPS = (0.02, 0.01, 0.005, 0.0025, 0.00125)
 EVERY = 0.08
@@ -32,7 +31,7 @@ def engines(scene: JointedScene, *integrators: str) -> list[Engine]:
 def panels() -> dict[str, list[Engine]]:
     """By title. Runge-Kutta is explicit: with the quadruped's dampers and servos it diverges at 10 ms."""
     found = {"A chain of 8 swings": engines(swinging(batch=BATCH), "Euler", "implicitfast", "RK4")}
-    for name, (motor, integrator) in ROBOTS.items():
+    for name, (motor, integrator) in HELD.items():
         title = f"A quadruped is pushed, held by {name}"
         implicit = dict.fromkeys((integrator, "implicitfast"))
         found[title] = engines(standing(motor, BATCH), *implicit)

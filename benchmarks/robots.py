@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from symphys.joints import HINGE, Joint, Link, Motor, Socket, Spring, linkages
+from symphys.joints import HINGE, Joint, Link, Motor, Servo, Socket, Spring, linkages
 from symphys.shapes import Plane, Sphere
 from symphys.state import Layout, initial_state
 from symphys.world import Body, Law, World, make_world
@@ -26,6 +26,9 @@ STANDING = 0.65
 """Height of the trunk's centre above the ground with straight legs [m]."""
 HOLD = Spring(stiffness=60.0, damping=2.0)
 """What holds a leg in place, where motors do not."""
+SERVO = Servo(20.0, 30.0, 8.0)
+HELD: dict[str, tuple[Motor | None, str]] = {"springs": (None, "Euler"), "servos": (SERVO, "implicitfast")}
+"""What may hold the legs, and MuJoCo's fastest integrator that is stable with it."""
 
 
 def block(mass: float, *sizes: float) -> tuple[float, ...]:

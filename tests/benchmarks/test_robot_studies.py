@@ -69,7 +69,8 @@ def test_steps_and_derivatives_are_timed(capsys: pytest.CaptureFixture[str]) -> 
     candidates = [here(scene, 5, 8), there(scene, "Euler", "elliptic")]
     times = measure(candidates)
     assert (times > 0).all() and times.shape[1:] == (2, 2)
-    report("chain", candidates, times)
+    report("chain", candidates, times, [1e-3, 2e-3])
     lines = capsys.readouterr().out.splitlines()
     assert lines[-1].startswith("| MuJoCo, Euler, elliptic |")
     assert lines[-1].count("| 1 (1) |") == 2
+    assert lines[-1].endswith("| 2.0e-03 |")
