@@ -160,6 +160,20 @@ def test_mujoco_reads_a_quadruped() -> None:
         assert value == pytest.approx(start[name], abs=1e-9), name
 
 
+@pytest.mark.parametrize("name", ["table_robot", "gait_robot", "arm", "hopper", "cart_pendulum"])
+def test_mujoco_reads_shipped_robots(tmp_path: Path, name: str) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    path = tmp_path / "robot.toml"
+    text = f'[simulation]\nduration = 0.1\ndt = 0.01\n[ground]\n[[include]]\nfile = "robots/{name}.toml"\n'
+    path.write_text(text, encoding="utf-8")
+    problem = load_problem(path)
+    model, found = poses(mujoco, problem.world(), problem.initial)
+    joints = problem.world().joints
+    assert model.nu == sum(len(joint.kind.coordinates) for joint in joints if joint.motor is not None) > 0
+    for body in problem.world().bodies:
+        assert found[f"{body.name}.position"] == pytest.approx(problem.initial[f"{body.name}.position"], abs=1e-9)
+
+
 def test_mujoco_reads_every_kind_of_joint() -> None:
     mujoco = pytest.importorskip("mujoco")
     world, start = mixed()
