@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help demo test thorough lint typecheck bench bench-contact bench-table1 gallery clean
+.PHONY: help demo test thorough lint typecheck bench bench-contact bench-robots bench-table1 gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
@@ -37,6 +37,11 @@ bench-contact: $(VENV)/.benching  ## errors of contact against the step, gradien
 	$(BIN)/python benchmarks/gradients.py build
 	$(BIN)/python benchmarks/ablation.py
 	$(BIN)/python benchmarks/consistency.py build
+
+bench-robots: $(VENV)/.benching  ## jointed robots against MuJoCo: agreement, errors against the step, steps and derivatives a second
+	$(BIN)/python benchmarks/robot_agreement.py
+	$(BIN)/python benchmarks/robot_consistency.py build
+	$(BIN)/python benchmarks/robot_against_mujoco.py
 
 bench-table1: $(VENV)/.benching  ## the timing table of Degrave et al. (1 and 128 robots, small and large net), cost against weights
 	$(BIN)/python benchmarks/table1.py

@@ -12,9 +12,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from time import perf_counter, process_time
+from typing import Any, Protocol
 
 import numpy as np
 from contact_figures import Curve, consistency_figure
@@ -23,7 +24,7 @@ from numpy.typing import NDArray
 from rolling import Walk
 from scenes import Scene, heap_of_capsules, tumbling_box
 
-from symphys.world import Scheme
+from symphys.world import Scheme, World
 
 Array = NDArray[np.float64]
 STEPS = (0.016, 0.008, 0.004, 0.002, 0.001, 0.0005, 0.00025)
@@ -36,21 +37,44 @@ STIFF = Contact("MuJoCo, stiff contact", (0.004, 1.0))
 SOFT_RK4 = Contact("MuJoCo, default, RK4", integrator="RK4")
 
 
+class Engine(Protocol):
+    """An engine on a scene, with a name for figures."""
+
+    name: str
+    scene: Any
+
+    def runner(self, dt: float, every: float = SAMPLE) -> Callable[[int, int], Array]:
+        """(batch, count) -> (count, batch, n) states after each ``every`` seconds."""
+
+    def places(self, states: Array) -> Array:
+        """(..., bodies, 3) the centres in states (..., n)."""
+
+
 @dataclass(frozen=True)
 class Here:
     """This engine on a scene."""
 
     name: str
-    scene: Scene
+    scene: Any
     restitution: float = 0.0
     sweeps: int = 10
+    cuts: int | None = None
 
-    def runner(self, dt: float) -> Callable[[int, int], Array]:
-        """(batch, count) -> (count, batch, bodies, 3) places at the samples."""
-        world, scene = self.scene.world(self.restitution), self.scene
-        walk = Walk(world, Scheme(dt=dt, sweeps=self.sweeps), round(SAMPLE / dt))
-        states = scene.states(world)
-        return lambda batch, count: scene.places(world, walk.along(states[:batch], count))
+    @cached_property
+    def world(self) -> World:
+        """The scene's."""
+        world: World = self.scene.world(self.restitution)
+        return world
+
+    def runner(self, dt: float, every: float = SAMPLE) -> Callable[[int, int], Array]:
+        """See ``Engine``."""
+        walk = Walk(self.world, Scheme(dt=dt, sweeps=self.sweeps, cuts=self.cuts), round(every / dt))
+        states = self.scene.states(self.world)
+        return lambda batch, count: walk.along(states[:batch], count)
+
+    def places(self, states: Array) -> Array:
+        """See ``Engine``."""
+        return np.asarray(self.scene.places(self.world, states))
 
 
 @dataclass(frozen=True)
@@ -61,17 +85,26 @@ class There:
     scene: Scene
     contact: Contact
 
-    def runner(self, dt: float) -> Callable[[int, int], Array]:
-        """Likewise."""
+    def runner(self, dt: float, every: float = SAMPLE) -> Callable[[int, int], Array]:
+        """See ``Engine``."""
         runs, states = Runs(model_of(self.scene, self.contact, dt)), states_of(self.scene)
-        return lambda batch, count: runs.places(runs.along(states[:batch], round(SAMPLE / dt), count))
+        return lambda batch, count: runs.along(states[:batch], round(every / dt), count)
+
+    def places(self, states: Array) -> Array:
+        """See ``Engine``."""
+        poses = states[..., 1 : 1 + 7 * len(self.scene.solids)]
+        return poses.reshape(*states.shape[:-1], -1, 7)[..., :3]
 
 
-def errors_of(engine: Here | There, window: float, steps: Sequence[float], fine: float) -> Array:
+def errors_of(engine: Engine, window: float, steps: Sequence[float], fine: float, every: float = SAMPLE) -> Array:
     """(steps, batch) [m]: rms distance from the run at the fine step, over bodies and samples of the window."""
-    count, batch = round(window / SAMPLE), len(engine.scene.start)
-    exact = engine.runner(fine)(batch, count)
-    return np.array([distance(engine.runner(dt)(batch, count), exact) for dt in steps])
+    exact, runs = samples(engine, fine, window, every), (samples(engine, dt, window, every) for dt in steps)
+    return np.array([distance(run, exact) for run in runs])
+
+
+def samples(engine: Engine, dt: float, window: float, every: float = SAMPLE) -> Array:
+    """(count, batch, bodies, 3) places at the samples of the window."""
+    return engine.places(engine.runner(dt, every)(len(engine.scene.start), round(window / every)))
 
 
 def distance(places: Array, exact: Array) -> Array:
@@ -79,13 +112,13 @@ def distance(places: Array, exact: Array) -> Array:
     return np.asarray(np.sqrt((np.linalg.norm(places - exact, axis=-1) ** 2).mean(axis=(0, 2))))
 
 
-def study(engine: Here | There, window: float, steps: Sequence[float] = STEPS) -> Curve:
+def study(engine: Engine, window: float, steps: Sequence[float] = STEPS, every: float = SAMPLE) -> Curve:
     """Errors, and CPU seconds for a simulated one: alone, and a share of eight side by side."""
-    count, batch = round(window / SAMPLE), len(engine.scene.start)
-    exact, errors, costs = engine.runner(FINE)(batch, count), [], []
+    count, batch = round(window / every), len(engine.scene.start)
+    exact, errors, costs = samples(engine, FINE, window, every), [], []
     for dt in steps:
-        run = engine.runner(dt)
-        errors.append(distance(run(batch, count), exact))
+        run = engine.runner(dt, every)
+        errors.append(distance(engine.places(run(batch, count)), exact))
         costs.append([cheapest(partial(run, side, count)) / window / side for side in (1, 8)])
     return Curve(engine.name, tuple(steps), np.array(errors), *np.array(costs).T)
 
@@ -100,15 +133,15 @@ def cheapest(call: Callable[[], object]) -> float:
     return min(times)
 
 
-def box(batch: int = 32) -> list[Here | There]:
+def box(batch: int = 32) -> list[Engine]:
     """The engines on the tumbling box."""
     scene = tumbling_box(batch)
-    here = [Here("symphys, e = 0", scene), Here("symphys, e = 0, 50 sweeps", scene, sweeps=50)]
+    here: list[Engine] = [Here("symphys, e = 0", scene), Here("symphys, e = 0, 50 sweeps", scene, sweeps=50)]
     here.append(Here("symphys, e = 0.5", scene, 0.5))
     return [*here, *(There(contact.name, scene, contact) for contact in (SOFT, STIFF, SOFT_RK4))]
 
 
-def heap(side: int = 2, batch: int = 8) -> list[Here | There]:
+def heap(side: int = 2, batch: int = 8) -> list[Engine]:
     """The engines on the heap of capsules."""
     scene = heap_of_capsules(side, batch)
     here = [Here("symphys, e = 0", scene), Here("symphys, e = 0.5", scene, 0.5)]

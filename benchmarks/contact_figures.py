@@ -25,12 +25,15 @@ LOOKS = {
     "MuJoCo, default contact": (style.VERMILION, "o", "-"),
     "MuJoCo, stiff contact": (style.ORANGE, "s", "-"),
     "MuJoCo, default, RK4": (style.PURPLE, "^", "-"),
+    "MuJoCo, Euler": (style.VERMILION, "o", "-"),
+    "MuJoCo, implicitfast": (style.ORANGE, "s", "--"),
+    "MuJoCo, RK4": (style.PURPLE, "^", "-"),
     "MuJoCo, linear spring": (style.PURPLE, "v", "-"),
     "MuJoCo, gradual spring": (style.GREY, "D", "-"),
 }
 """Colour, marker and line of each curve that is drawn: MuJoCo's are warm."""
 BELOW = 0.04
-"""Of the least error at the largest step: where lines of an order begin."""
+"""Of the first curve's error at the largest step: where lines of an order begin."""
 
 NOTE: dict[str, Any] = {"fontsize": 7.5, "color": style.SOFT}
 ROUNDING, WORST = 1e-12, 30.0
@@ -100,9 +103,9 @@ def consistency_figure(panels: dict[str, list[Curve]], path: Path) -> None:
                 draw(left, 1e3 * np.array(curve.steps), curve.errors, curve.label)
                 draw(right, 1e3 * curve.alone, curve.errors, curve.label, band=False)
             shares(right, curves[0])
-            least = min(float(np.median(curve.errors[0])) for curve in curves)
             for order in (1, 2):
-                slope(left, order, 1e3 * np.array(curves[0].steps), BELOW * least, reach=4)
+                top = BELOW * float(np.median(curves[0].errors[0]))
+                slope(left, order, 1e3 * np.array(curves[0].steps), top, reach=4)
             named_steps(left, curves[0].steps)
         handles, labels = rows[0][1].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper left", ncols=3)

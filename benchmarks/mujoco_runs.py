@@ -81,8 +81,3 @@ class Runs:
     def along(self, states: Array, interval: int, count: int) -> Array:
         """(count, batch, nstate) after every ``interval`` steps; one rollout, so that warm starts go on."""
         return np.moveaxis(self.after(states, interval * count)[:, interval - 1 :: interval], 0, 1)
-
-    def places(self, states: Array) -> Array:
-        """(..., bodies, 3) the centres."""
-        positions = states[..., 1 : 1 + self.model.nq]
-        return positions.reshape(*states.shape[:-1], -1, 7)[..., :3]

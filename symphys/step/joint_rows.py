@@ -50,7 +50,7 @@ class AlongCoordinate:
         sides, seen, given: as of any row.
         value: [rad] or [m].
         rate: at the middle of the stretch, before any impulse of it.
-        rate_now: at its start.
+        rate_now, rate_due: at its start, and at its middle if forces stay what they were.
         mobility: inverse of the effective mass.
         same, of_tree: see ``AxisRow``.
     """
@@ -61,6 +61,7 @@ class AlongCoordinate:
     value: Expr
     rate: Expr
     rate_now: Expr
+    rate_due: Expr
     mobility: Expr
     same: bool
     of_tree: OfTree | None
@@ -132,15 +133,19 @@ def along_coordinate(
     now, sides = sockets.placed(start), sockets.sides(motions, middle, start)
     seen, given = free(coordinate, sockets.placed(middle)), free(coordinate, now)
     before = tuple(Momentum(m.velocity, m.momentum_k) for m in motions)
+    due = tuple(Momentum(m.mid_velocity, m.mid_momentum) for m in motions)
     rate_now = speeds(tuple(replace(s, reach=None) for s in sockets.sides(motions, start, start)), given, before)
+    rate_due = speeds(tuple(replace(s, reach=None) for s in sides), seen, due)
     value = coordinate.value(now)
     if isinstance(place, bool):
         rate, k_of = speeds(sides, seen, momenta), mobility(sides, seen, place)
-        return AlongCoordinate(sides, seen, given, value, rate, rate_now, k_of, place, None)
+        return AlongCoordinate(sides, seen, given, value, rate, rate_now, rate_due, k_of, place, None)
     index, gains = place[0] + k, place[1]
     row, gain = gains[index]
     rate = ca.mtimes(row, momenta[0].numbers)
-    return AlongCoordinate(sides, seen, given, value, rate, rate_now, ca.mtimes(row, gain), True, OfTree(row, gain))
+    return AlongCoordinate(
+        sides, seen, given, value, rate, rate_now, rate_due, ca.mtimes(row, gain), True, OfTree(row, gain)
+    )
 
 
 def motor_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr, stretch: Stretch) -> AxisRow:
@@ -182,13 +187,15 @@ def spring_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Exp
     """A spring and damper.
 
     The spring acts with k / (1 + (w dt)^2 / 3), w^2 = k / m: of second order, keeps energy and is stable at any k. The
-    damper acts on the mean of the rates before and after.
+    damper acts on the mean of the rates before and after: with all that acted in the step before, else what falls on it
+    from then to now would count twice, an error of first order.
     """
     spring, dt = joint.spring, setting.scheme.dt
     assert spring is not None
     stiffness = spring.stiffness / (1 + spring.stiffness * at.mobility * dt * dt / 3)
     half = stretch.kick * spring.damping / 2
-    pull = stretch.kick * stiffness * (at.value - spring.rest) + half * at.rate
+    before = at.rate_now + (at.rate_due - at.rate_now) * (1 - 2 * stretch.kick / stretch.duration)
+    pull = stretch.kick * stiffness * (at.value - spring.rest) + half * before
     return _row(at, by_law(pull, half, at.mobility), None, None, ca.SX(0))
 
 

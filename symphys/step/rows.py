@@ -40,12 +40,6 @@ LOADED = 1e-3
 """Of the weight of the effective mass: what counts as load. A smooth contact always carries a little."""
 
 
-# What changes in the impulse of a contact that lasts acts on positions from t* on, which is 0 for a body at rest. On a
-# tree of joints, where sweeps seldom converge, a foot that stands has gaps of rounding: there t* goes as the root of a
-# gap, and a gradient through a second of standing grew to 1e18. If changes acted at once, feet would quiver by 1e-2 m/s;
-# from the middle of the stretch on, a robot of 16 servos comes to rest to 1e-15 m/s with 20 sweeps.
-
-
 def prepare(
     setting: Setting, law: Law, contact: Contact, motions: Moving, duration: Expr, spared: Expr, force: Expr, same: bool
 ) -> ContactRow:
@@ -83,7 +77,7 @@ def prepare(
     parting = width**2 / (4 * k_normal * ca.fmax(load, weight) * duration)
     target = ca.if_else(lasts, -parting, target)
     delay = hit * (time + (1 - leaving) * (landing - time))
-    if any(side.reach is not None for side in sides):
+    if any(side.reach is not None for side in sides):  # of a tree: see ARCHITECTURE, "Feet that stand"
         delay = ca.if_else(lasts, half, delay)
     slip = hit * leaving * (half - time) * (acceleration - normal * pull)
     return ContactRow(

@@ -132,7 +132,7 @@ def test_export_writes_both(run: Run, throw: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["ball_throw"], "--c DIR or --casadi DIR"),
+        (["ball_throw"], "--c DIR, --casadi DIR or --mjcf DIR"),
         (["ball_thorw", "--c", "there"], "ball_throw"),
         (["ball_throw", "--c", "there", "--set", "simulation.td=1"], "dt"),
         (["ball_throw", "--c", "/dev/null/there"], "/dev/null"),
@@ -148,6 +148,18 @@ def test_what_cannot_be_exported(run: Run, arguments: list[str], words: str) -> 
     assert words in err
     assert not Path("there").exists()
     assert [path.name for path in Path("here").iterdir()] == ["ball_throw.c"]
+
+
+def test_export_writes_a_model_of_a_problem_without_variables(run: Run, throw: Path) -> None:
+    text = throw.read_text("utf-8")
+    throw.write_text(text[: text.index("[[variable]]")], "utf-8")
+    code, out, _ = run("export", throw, "--mjcf", "models")
+    assert (code, out) == (0, "models/throw.xml\n")
+    assert '<mujoco model="throw">' in Path("models/throw.xml").read_text("utf-8")
+    code, out, err = run("export", throw, "--mjcf", "there", "--set", "ground.restitution=0.5")
+    assert (code, out) == (2, "")
+    assert "throw: MJCF cannot say this: ball-ground: restitution" in err
+    assert not Path("there").exists()
 
 
 def test_a_problem_without_variables_cannot_be_exported(run: Run, throw: Path) -> None:

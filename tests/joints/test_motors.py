@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from laboratory import Lab, central_difference, value_and_gradient
-from linkage import ABOUT_Y, Array, chain, hanging, separations
+from linkage import ABOUT_Y, ABOUT_Z, Array, chain, hanging, separations
 
 from symphys.joints import (
     FIXED,
@@ -97,6 +97,19 @@ def test_a_damper_takes_what_it_should() -> None:
     """Rate exp(-c t / I)."""
     _, rates = swung(rod(spring=Spring(0.0, 0.1)), 1.0, rate=2.0)
     assert rates[-1] == pytest.approx(2 * np.exp(-0.1 / INERTIA), rel=1e-3)
+
+
+def test_a_damper_under_a_load_is_of_second_order() -> None:
+    """A cart falls along a rail: v = g m/c (1 - exp(-c t/m))."""
+    cart, exact = Body("cart", 2.0, 0.1), 9.81 / 3 * (1 - np.exp(-3 * 0.5))
+    sockets = Socket((0, 0, 0), ABOUT_Z), Socket((0, 0, 0), ABOUT_Z)
+    rail = Joint("rail", SLIDER, 0, None, sockets, spring=Spring(damping=6.0))
+    errors = []
+    for dt in (0.02, 0.01):
+        states = Lab(World((cart,), joints=(rail,)), Scheme(dt=dt)).states({}, 0.5)
+        errors.append(abs(states["cart.velocity"][-1, 2] + exact))
+    assert errors[1] < 5e-4
+    assert errors[0] == pytest.approx(4 * errors[1], rel=0.05)
 
 
 def test_a_spring_of_any_stiffness_is_stable() -> None:
