@@ -12,6 +12,11 @@ from symphys.kernel.operations import MASKS
 COMMUTE = frozenset({"add", "mul", "eq", "ne", "and", "or", "hypot"})
 
 
+def ordered(op: str, operands: tuple[int, ...]) -> tuple[int, ...]:
+    """The operands as equal values have them, whichever way round they were written."""
+    return tuple(sorted(operands)) if op in COMMUTE else operands
+
+
 @dataclass(frozen=True)
 class Node:
     """One value.
@@ -59,8 +64,7 @@ class Graph:
             operands = (operands[0], self.number(operands[1]), self.number(operands[2]))
         else:
             operands = tuple(self.number(x) for x in operands)
-        if op in COMMUTE:
-            operands = tuple(sorted(operands))
+        operands = ordered(op, operands)
         simpler = self._simpler(op, operands)
         return self.put(Node(op, operands)) if simpler is None else simpler
 
