@@ -37,11 +37,11 @@ class Slot:
 
 @dataclass(frozen=True)
 class Piece:
-    """An SX function from slots to one slot."""
+    """An SX function from slots to slots."""
 
     function: ca.Function
     inputs: tuple[Slot, ...]
-    output: Slot
+    outputs: tuple[Slot, ...]
 
 
 class Recorder(Pieces):
@@ -66,7 +66,8 @@ class Recorder(Pieces):
         symbols = [ca.SX.sym("a", self._slots[k].size) for k in slots]
         entries = [ca.SX(c) if isinstance(c, float) else symbols[c[0]][c[1]] for c in codes]
         function = self.shared(ca.Function("piece", symbols, [ca.vertcat(*entries)]))
-        return self._slots[self._add(name, function, list(slots))]
+        (given,) = self._add(name, function, list(slots))
+        return self._slots[given]
 
     def repeat(self, count: int, once: Once[T], context: Any, state: T) -> T:
         """See ``Pieces``; as soon as it repeats itself its pieces are copied."""
@@ -86,11 +87,11 @@ class Recorder(Pieces):
         homes = {symbol.element_hash(): self._homes[symbol.element_hash()][0] for symbol in ca.symvar(column)}
         slots = list(dict.fromkeys(homes.values()))
         symbols = [self._columns[slot] for slot in slots]
-        given = self._add("", self.shared(ca.Function("piece", symbols, [column])), slots)
+        (given,) = self._add("", self.shared(ca.Function("piece", symbols, [column])), slots)
         self._adopted.append(column)
         self._homes |= {entry.element_hash(): (given, k) for k, entry in enumerate(column.nonzeros())}
 
-    def _apply(self, function: ca.Function, slots: Sequence[int]) -> int:
+    def _apply(self, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
         return self._add("", function, slots)
 
     def _alike(self, before: Any, after: Any) -> dict[int, int] | None:
@@ -109,7 +110,8 @@ class Recorder(Pieces):
         """The state one time later: as ``template`` led to ``after``, its copy leads on from there."""
         for piece in template:
             inputs = [slots.get(slot.number, slot.number) for slot in piece.inputs]
-            slots[piece.output.number] = self._add("", piece.function, inputs)
+            given = self._add("", piece.function, inputs)
+            slots |= dict(zip((slot.number for slot in piece.outputs), given, strict=True))
         leaves: list[Expr] = []
         shape = dismantle(after, leaves)
         renamed: T = rebuild(shape, (self._renamed(leaf, slots) for leaf in leaves))
@@ -129,12 +131,13 @@ class Recorder(Pieces):
     def _size(self, code: tuple[int, int]) -> int:
         return self._slots[code[0]].size
 
-    def _add(self, name: str, function: ca.Function, slots: Sequence[int]) -> int:
-        symbols = ca.SX.sym("kept", function.numel_out(0))
-        slot = Slot(name, symbols.numel(), self.take(symbols))
-        self._slots.append(slot)
-        self.pieces.append(Piece(function, tuple(self._slots[k] for k in slots), slot))
-        return slot.number
+    def _add(self, name: str, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
+        first = len(self._slots)
+        for k in range(function.n_out()):
+            symbols = ca.SX.sym("kept", function.numel_out(k))
+            self._slots.append(Slot(name, symbols.numel(), self.take(symbols)))
+        self.pieces.append(Piece(function, tuple(self._slots[k] for k in slots), tuple(self._slots[first:])))
+        return range(first, len(self._slots))
 
 
 def _side_by_side(values: tuple[Expr, ...]) -> Expr:
