@@ -13,6 +13,7 @@ from symphys.state import Layout, initial_state
 from symphys.step import Piece, Recording, Slot, record_step, step_function
 from symphys.step.pieces import Pieces
 from symphys.step.record import Recorder
+from symphys.step.trim import trimmed
 from symphys.world import Body, Law, Scheme, World, make_world
 
 INPUTS = ("a.force",)
@@ -132,6 +133,22 @@ def test_members_of_a_tuple_look_alike_to_what_comes_next() -> None:
 
 def added(a: ca.SX, b: ca.SX) -> ca.SX:
     return a + b
+
+
+def test_what_nobody_reads_is_left_out() -> None:
+    """Of a record of four words one is read, by way of a part of which one result is read; another part not at all."""
+    recorder, x = Recorder(), ca.SX.sym("x", 4)
+    recorder.argument("x", x)
+    squares = recorder.do(lambda x: x * x, x)
+    recorder.do(lambda squares: ca.sin(squares), squares)
+    root, _ = recorder.do(lambda squares: (ca.sqrt(squares[2]), ca.exp(squares[1])), squares)
+    recorder.give("next", [root])
+    left = trimmed(recorder.pieces)
+    assert [(piece.function.nnz_in(), piece.function.nnz_out()) for piece in left] == [(4, 1), (1, 1), (1, 1)]
+    values = {left[0].inputs[0]: np.array([1.0, 2.0, 3.0, 4.0])}
+    for piece in left:
+        values |= evaluate(piece, values)
+    assert values[left[-1].outputs[0]] == pytest.approx([3.0])
 
 
 def turn(pieces: Pieces, factor: float, state: ca.SX) -> ca.SX:
