@@ -58,6 +58,7 @@ class Motion(Course):
         mid_velocity, mid_momentum: (3,) velocity and angular momentum at t_k + dt/2.
         inverse_mid: inverse inertia at t_k + dt/2, world frame: scalar if isotropic, else (3, 3) [1/(kg m^2)].
         inverse_rate: its time derivative; None if isotropic.
+        inertia_mid: (3, 3) inertia at t_k + dt/2, world frame [kg m^2].
         held: if the body is part of a tree of joints.
     """
 
@@ -70,6 +71,7 @@ class Motion(Course):
     mid_momentum: Expr
     inverse_mid: Expr
     inverse_rate: Expr | None
+    inertia_mid: Expr
     held: Held | None = None
 
     def course(self) -> Course:
@@ -81,6 +83,12 @@ class Motion(Course):
         if self.inverse_rate is None:
             return self.inverse_mid
         return self.inverse_mid + (t - self.dt / 2) * self.inverse_rate
+
+    def inertia_at(self, t: Expr) -> Expr:
+        """(3, 3), world frame: the inverse of what ``inverse_inertia`` gives."""
+        if self.inverse_rate is None or ca.SX(t - self.dt / 2).is_zero():
+            return self.inertia_mid
+        return ca.inv_minor(self.inverse_inertia(t))
 
 
 def isotropic(inertia: Expr) -> bool:
@@ -128,10 +136,11 @@ def free_motion(mass: Expr, inertia: Expr, state: BodyState, gravity: Expr, dt: 
     turned = rotation.matrix(state.orientation)
     w = apply(inverse_inertia(inertia, turned), state.angular_momentum)
     inverse_rate = None
-    inverse_mid = inverse_inertia(inertia, turned)
+    inverse_mid, inertia_mid = inverse_inertia(inertia, turned), inertia_matrix(inertia)
     if not isotropic(inertia):
-        middle = rotation.turn(state.orientation, dt / 2 * w)
-        inverse_mid = inverse_inertia(inertia, rotation.matrix(middle))
+        turned_mid = rotation.matrix(rotation.turn(state.orientation, dt / 2 * w))
+        inverse_mid = inverse_inertia(inertia, turned_mid)
+        inertia_mid = ca.mtimes(turned_mid, ca.mtimes(inertia_matrix(inertia), turned_mid.T))
         spin: Expr = rotation.cross_matrix(apply(inverse_mid, mid_momentum))
         turning: Expr = ca.mtimes(spin, inverse_mid)
         inverse_rate = turning + turning.T
@@ -152,4 +161,5 @@ def free_motion(mass: Expr, inertia: Expr, state: BodyState, gravity: Expr, dt: 
         mid_momentum=mid_momentum,
         inverse_mid=inverse_mid,
         inverse_rate=inverse_rate,
+        inertia_mid=inertia_mid,
     )

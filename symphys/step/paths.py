@@ -50,7 +50,7 @@ def expected_motions(scene: Scene, x: State, duration: Expr) -> list[Motion]:
         own = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
         motions = tuple(found[i] for i in tree.bodies)
         wrenches = tuple(scene.pieces.do(_wrench, motion) for motion in motions)
-        for i, change in zip(tree.bodies, scene.pieces.do(accelerations, tree, own, motions, wrenches), strict=True):
+        for i, change in zip(tree.bodies, accelerations(scene.pieces, tree, own, motions, wrenches), strict=True):
             found[i] = scene.pieces.do(_as_held, found[i], change, gravity)
     return found
 

@@ -44,9 +44,8 @@ class _Trimming:
         """The words of its inputs that a piece needs for what is read of it."""
         key = piece.function.__hash__(), tuple(map(self._kept, piece.outputs))
         if key not in self._needs:
-            symbols = [ca.SX.sym("a", slot.size) for slot in piece.inputs]
-            results = ca.vertcat(ca.SX(0, 1), *_results(piece.function, symbols, key[1]))
-            found = {entry.element_hash() for entry in ca.symvar(results)}
+            symbols: list[Expr] = [ca.SX.sym("a", slot.size) for slot in piece.inputs]
+            found = _symbols_of(_results(piece.function, symbols, key[1]))
             self._needs[key] = [
                 {k for k, entry in enumerate(column.nonzeros()) if entry.element_hash() in found} for column in symbols
             ]
@@ -75,6 +74,11 @@ class _Trimming:
             results = [result for result in _results(piece.function, columns, given) if result.numel()]
             self._functions[key] = ca.Function("piece", symbols, results)
         return self._functions[key]
+
+
+def _symbols_of(columns: list[Expr]) -> set[int]:
+    symbols: list[Expr] = ca.symvar(ca.vertcat(ca.SX(0, 1), *columns))
+    return {symbol.element_hash() for symbol in symbols}
 
 
 def _results(function: ca.Function, arguments: Sequence[Expr], kept: Sequence[Words]) -> list[Expr]:
