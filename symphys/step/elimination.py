@@ -46,12 +46,17 @@ class Eliminated:
         return found
 
 
+def reciprocal(x: Expr) -> Expr:
+    """1 / x, so written that products with it stay products: casadi makes x / y of x times 1 / y."""
+    return 2 / (2 * x)
+
+
 def eliminated(rows: Sequence[Mapping[int, Expr]], symmetric: bool = False) -> Eliminated:
     """The factors of a matrix by its rows; of a symmetric one those of one half serve both."""
     left, n = [dict(row) for row in rows], len(rows)
     lower, upper, pivots = ca.SX(n, n), ca.SX(n, n), ca.SX(n, 1)
     for k in reversed(range(n)):
-        pivots[k] = 1 / left[k][k]
+        pivots[k] = reciprocal(left[k][k])
         above = [j for j in left[k] if j < k]
         for j in above:
             upper[j, k] = left[k][j] * pivots[k]
