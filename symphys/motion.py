@@ -126,24 +126,38 @@ def inverse_inertia(inertia: Expr, r_wb: Expr) -> Expr:
     """World-frame inverse inertia: a scalar if isotropic, else (3, 3)."""
     if isotropic(inertia):
         return 1 / inertia
-    return ca.mtimes(r_wb, ca.mtimes(ca.inv_minor(inertia_matrix(inertia)), r_wb.T))
+    return in_world(ca.inv_minor(inertia_matrix(inertia)), r_wb)
+
+
+def in_world(tensor: Expr, r_wb: Expr) -> Expr:
+    """(3, 3): a symmetric tensor of the body's frame in the world's; both halves are the same expressions."""
+    return ca.triu2symm(ca.triu(ca.densify(ca.mtimes(r_wb, ca.mtimes(tensor, r_wb.T)))))
 
 
 def free_motion(mass: Expr, inertia: Expr, state: BodyState, gravity: Expr, dt: Expr) -> Motion:
     """The motion from ``state`` under gravity, force and torque, all constant over the step."""
-    acceleration = gravity + state.force / mass
-    mid_momentum = state.angular_momentum + dt / 2 * state.torque
     turned = rotation.matrix(state.orientation)
     w = apply(inverse_inertia(inertia, turned), state.angular_momentum)
+    return motion_from(mass, inertia, state, (turned, w), gravity, dt)
+
+
+def motion_from(
+    mass: Expr, inertia: Expr, state: BodyState, turning: tuple[Expr, Expr], gravity: Expr, dt: Expr
+) -> Motion:
+    """The same from what ``state`` stands for, ``turning``: its rotation (3, 3) and angular velocity."""
+    turned, w = turning
+    acceleration = gravity + state.force / mass
+    mid_momentum = state.angular_momentum + dt / 2 * state.torque
     inverse_rate = None
-    inverse_mid, inertia_mid = inverse_inertia(inertia, turned), inertia_matrix(inertia)
-    if not isotropic(inertia):
+    if isotropic(inertia):
+        inverse_mid, inertia_mid = 1 / inertia, inertia_matrix(inertia)
+    else:
         turned_mid = rotation.matrix(rotation.turn(state.orientation, dt / 2 * w))
         inverse_mid = inverse_inertia(inertia, turned_mid)
-        inertia_mid = ca.mtimes(turned_mid, ca.mtimes(inertia_matrix(inertia), turned_mid.T))
+        inertia_mid = in_world(inertia_matrix(inertia), turned_mid)
         spin: Expr = rotation.cross_matrix(apply(inverse_mid, mid_momentum))
-        turning: Expr = ca.mtimes(spin, inverse_mid)
-        inverse_rate = turning + turning.T
+        changing: Expr = ca.mtimes(spin, inverse_mid)
+        inverse_rate = changing + changing.T
     return Motion(
         position=state.position,
         rotation=turned,

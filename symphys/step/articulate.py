@@ -14,7 +14,7 @@ import casadi as ca
 from symphys import rotation
 from symphys.course import Course
 from symphys.joints import Joint, Link, Linkage
-from symphys.motion import Motion, inertia_matrix
+from symphys.motion import Motion, in_world, inertia_matrix
 from symphys.step import screws
 from symphys.step.branches import Moving, Tree, axes_at, moving, solve, tree_matrix
 from symphys.step.limbs import Inertia, Screw, mirrored
@@ -152,4 +152,4 @@ def _at(change: Expr, screw: Expr, place: Expr) -> Wrench:
 
 def world_inertia(inertia: Expr, turned: Expr) -> Expr:
     """(3, 3), world frame."""
-    return mirrored(ca.mtimes(turned, ca.mtimes(inertia_matrix(inertia), turned.T)))
+    return in_world(inertia_matrix(inertia), turned)

@@ -1,7 +1,8 @@
 """A step as a list of small functions instead of one expression: each part that the step does is a piece.
 
 What a piece gives becomes fresh symbols, so that what follows depends on these and not on how they came about. Pieces
-of equal bodies, pairs and sweeps are equal functions, which a compiler then sees once.
+of equal bodies, pairs and sweeps are equal functions, which a compiler then sees once. What is asked for twice, of the
+same numbers, is computed once.
 """
 
 from __future__ import annotations
@@ -53,6 +54,7 @@ class Recorder(Pieces):
         self.pieces: list[Piece] = []
         self._slots: list[Slot] = []
         self._adopted: list[Expr] = []
+        self._given: dict[tuple[int, tuple[int, ...]], Sequence[int]] = {}
 
     def argument(self, name: str, symbols: Expr) -> None:
         """A slot for an argument of the step."""
@@ -92,7 +94,10 @@ class Recorder(Pieces):
         self._homes |= {entry.element_hash(): (given, k) for k, entry in enumerate(column.nonzeros())}
 
     def _apply(self, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
-        return self._add("", function, slots)
+        key = function.__hash__(), tuple(slots)
+        if key not in self._given:
+            self._given[key] = self._add("", function, slots)
+        return self._given[key]
 
     def _alike(self, before: Any, after: Any) -> dict[int, int] | None:
         """Which slot of ``after`` stands where one of ``before`` stood; None if they do not lie alike."""

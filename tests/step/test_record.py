@@ -135,6 +135,14 @@ def added(a: ca.SX, b: ca.SX) -> ca.SX:
     return a + b
 
 
+def test_what_is_asked_for_twice_is_computed_once() -> None:
+    recorder, x = Recorder(), ca.SX.sym("x", 2)
+    recorder.argument("x", x)
+    first, second, other = (recorder.do(added, *pair) for pair in ((x[0], x[1]), (x[0], x[1]), (x[0], 2.0)))
+    assert first == second != other
+    assert len(recorder.pieces) == 2
+
+
 def test_what_nobody_reads_is_left_out() -> None:
     """Of a record of four words one is read, by way of a part of which one result is read; another part not at all."""
     recorder, x = Recorder(), ca.SX.sym("x", 4)
