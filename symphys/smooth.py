@@ -28,12 +28,12 @@ def positive(x: Expr, width: Expr) -> Expr:
 
 def at_least(x: Expr, low: Expr, width: Expr) -> Expr:
     """max(x, low), and low + positive(x - low, w) for width w > 0."""
-    return ca.if_else(width > 0, low + _soft(x - low, width), ca.if_else(x < low, low, x))
+    return ca.if_else(width > 0, low + _soft(x - low, width), ca.fmax(x, low))
 
 
 def at_most(x: Expr, high: Expr, width: Expr) -> Expr:
     """min(x, high), likewise."""
-    return ca.if_else(width > 0, high - _soft(high - x, width), ca.if_else(x > high, high, x))
+    return ca.if_else(width > 0, high - _soft(high - x, width), ca.fmin(x, high))
 
 
 def _soft(x: Expr, width: Expr) -> Expr:
