@@ -95,8 +95,10 @@ def step_calls(world: World, scheme: Scheme, layout: Layout, x: Place, knob: Pla
                 places[slot] = Place(x.offset + part.start, part.stop - part.start, x.stride)
             elif slot.name:
                 places[slot] = knob if slot.name == "smoothing" else empty
-        places.setdefault(piece.output, layout.take(piece.output.size))
-        calls.append(Call(piece.function, tuple(places[slot] for slot in piece.inputs), (places[piece.output],)))
+        for slot in piece.outputs:
+            places.setdefault(slot, layout.take(slot.size))
+        inputs, outputs = (tuple(places[slot] for slot in slots) for slots in (piece.inputs, piece.outputs))
+        calls.append(Call(piece.function, inputs, outputs))
     return calls
 
 

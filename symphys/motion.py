@@ -58,6 +58,7 @@ class Motion(Course):
         mid_velocity, mid_momentum: (3,) velocity and angular momentum at t_k + dt/2.
         inverse_mid: inverse inertia at t_k + dt/2, world frame: scalar if isotropic, else (3, 3) [1/(kg m^2)].
         inverse_rate: its time derivative; None if isotropic.
+        inertia_mid: (3, 3) inertia at t_k + dt/2, world frame [kg m^2].
         held: if the body is part of a tree of joints.
     """
 
@@ -70,6 +71,7 @@ class Motion(Course):
     mid_momentum: Expr
     inverse_mid: Expr
     inverse_rate: Expr | None
+    inertia_mid: Expr
     held: Held | None = None
 
     def course(self) -> Course:
@@ -81,6 +83,12 @@ class Motion(Course):
         if self.inverse_rate is None:
             return self.inverse_mid
         return self.inverse_mid + (t - self.dt / 2) * self.inverse_rate
+
+    def inertia_at(self, t: Expr) -> Expr:
+        """(3, 3), world frame: the inverse of what ``inverse_inertia`` gives."""
+        if self.inverse_rate is None or ca.SX(t - self.dt / 2).is_zero():
+            return self.inertia_mid
+        return ca.inv_minor(self.inverse_inertia(t))
 
 
 def isotropic(inertia: Expr) -> bool:
@@ -118,23 +126,38 @@ def inverse_inertia(inertia: Expr, r_wb: Expr) -> Expr:
     """World-frame inverse inertia: a scalar if isotropic, else (3, 3)."""
     if isotropic(inertia):
         return 1 / inertia
-    return ca.mtimes(r_wb, ca.mtimes(ca.inv_minor(inertia_matrix(inertia)), r_wb.T))
+    return in_world(ca.inv_minor(inertia_matrix(inertia)), r_wb)
+
+
+def in_world(tensor: Expr, r_wb: Expr) -> Expr:
+    """(3, 3): a symmetric tensor of the body's frame in the world's; both halves are the same expressions."""
+    return ca.triu2symm(ca.triu(ca.densify(ca.mtimes(r_wb, ca.mtimes(tensor, r_wb.T)))))
 
 
 def free_motion(mass: Expr, inertia: Expr, state: BodyState, gravity: Expr, dt: Expr) -> Motion:
     """The motion from ``state`` under gravity, force and torque, all constant over the step."""
-    acceleration = gravity + state.force / mass
-    mid_momentum = state.angular_momentum + dt / 2 * state.torque
     turned = rotation.matrix(state.orientation)
     w = apply(inverse_inertia(inertia, turned), state.angular_momentum)
+    return motion_from(mass, inertia, state, (turned, w), gravity, dt)
+
+
+def motion_from(
+    mass: Expr, inertia: Expr, state: BodyState, turning: tuple[Expr, Expr], gravity: Expr, dt: Expr
+) -> Motion:
+    """The same from what ``state`` stands for, ``turning``: its rotation (3, 3) and angular velocity."""
+    turned, w = turning
+    acceleration = gravity + state.force / mass
+    mid_momentum = state.angular_momentum + dt / 2 * state.torque
     inverse_rate = None
-    inverse_mid = inverse_inertia(inertia, turned)
-    if not isotropic(inertia):
-        middle = rotation.turn(state.orientation, dt / 2 * w)
-        inverse_mid = inverse_inertia(inertia, rotation.matrix(middle))
+    if isotropic(inertia):
+        inverse_mid, inertia_mid = 1 / inertia, inertia_matrix(inertia)
+    else:
+        turned_mid = rotation.matrix(rotation.turn(state.orientation, dt / 2 * w))
+        inverse_mid = inverse_inertia(inertia, turned_mid)
+        inertia_mid = in_world(inertia_matrix(inertia), turned_mid)
         spin: Expr = rotation.cross_matrix(apply(inverse_mid, mid_momentum))
-        turning: Expr = ca.mtimes(spin, inverse_mid)
-        inverse_rate = turning + turning.T
+        changing: Expr = ca.mtimes(spin, inverse_mid)
+        inverse_rate = changing + changing.T
     return Motion(
         position=state.position,
         rotation=turned,
@@ -152,4 +175,5 @@ def free_motion(mass: Expr, inertia: Expr, state: BodyState, gravity: Expr, dt: 
         mid_momentum=mid_momentum,
         inverse_mid=inverse_mid,
         inverse_rate=inverse_rate,
+        inertia_mid=inertia_mid,
     )

@@ -23,8 +23,21 @@ def positive(x: Expr, width: Expr) -> Expr:
 
     The fixed point of y = positive(y - c, w) is y c = w^2 / 4: the central path of y >= 0, c >= 0, y c = 0.
     """
-    soft = (x + ca.sqrt(x * x + width * width + TINY_WIDTH_SQUARE)) / 2
-    return ca.if_else(width > 0, soft, ca.fmax(x, 0))
+    return ca.if_else(width > 0, _soft(x, width), ca.fmax(x, 0))
+
+
+def at_least(x: Expr, low: Expr, width: Expr) -> Expr:
+    """max(x, low), and low + positive(x - low, w) for width w > 0."""
+    return ca.if_else(width > 0, low + _soft(x - low, width), ca.fmax(x, low))
+
+
+def at_most(x: Expr, high: Expr, width: Expr) -> Expr:
+    """min(x, high), likewise."""
+    return ca.if_else(width > 0, high - _soft(high - x, width), ca.fmin(x, high))
+
+
+def _soft(x: Expr, width: Expr) -> Expr:
+    return (x + ca.sqrt(x * x + width * width + TINY_WIDTH_SQUARE)) / 2
 
 
 def clip(x: Expr, low: Expr, high: Expr, width: Expr) -> Expr:

@@ -33,6 +33,11 @@ class Link:
     start: int
     count: int
 
+    @property
+    def coordinates(self) -> range:
+        """Its coordinates among those of the tree."""
+        return range(self.start, self.start + self.count)
+
 
 @dataclass(frozen=True)
 class Linkage:

@@ -12,8 +12,11 @@ from symphys.kernel.rewrite import with_reciprocals
 Mask = tuple[bool, ...]
 
 
-def adjoint_graph(function: Function, inputs: Mask, outputs: Mask) -> Graph:
-    """Graph with the arguments, then the adjoints of the marked results; it gives one result a marked argument."""
+def adjoint_graph(function: Function, forward: Graph, inputs: Mask, outputs: Mask) -> Graph:
+    """Graph with the arguments, then the adjoints of the marked results; it gives one result a marked argument.
+
+    ``forward`` is the function's own graph.
+    """
     arguments = [ca.SX.sym("x", function.numel_in(i)) for i in range(function.n_in())]
     results = function.call(arguments, True, False)
     seeds = [ca.SX.sym("s", r.numel()) for r, on in zip(results, outputs, strict=True) if on]
@@ -24,5 +27,4 @@ def adjoint_graph(function: Function, inputs: Mask, outputs: Mask) -> Graph:
     for x in wanted:
         ends.append(ends[-1] + x.numel())
     pieces = [ca.densify(piece) for piece in ca.vertsplit(ca.densify(adjoint), ends)]
-    graph = graph_of(ca.Function("adjoint", [*arguments, *seeds], pieces))
-    return with_reciprocals(graph, len(arguments))
+    return with_reciprocals(graph_of(ca.Function("adjoint", [*arguments, *seeds], pieces)), forward)

@@ -50,9 +50,10 @@ class Functions:
 
     def adjoint(self, function: Function, inputs: Mask, outputs: Mask) -> Graph:
         """The adjoint graph for these arguments and results."""
-        key = (self._identity(self.forward(function)), inputs, outputs)
+        forward = self.forward(function)
+        key = (self._identity(forward), inputs, outputs)
         if key not in self._adjoints:
-            self._adjoints[key] = adjoint_graph(function, inputs, outputs)
+            self._adjoints[key] = adjoint_graph(function, forward, inputs, outputs)
         return self._adjoints[key]
 
     def taped(self, forward: Graph, adjoint: Graph) -> Taped | None:

@@ -6,10 +6,23 @@ Comparisons and logic give masks, integers of all ones or all zeros in each lane
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import frexp
 
 from symphys.kernel.operations import MASKS
 
+SMALL = 100
+"""Exponents for which powers of two have reciprocals, in single precision too."""
 COMMUTE = frozenset({"add", "mul", "eq", "ne", "and", "or", "hypot"})
+
+
+def _reciprocal(x: float) -> float | None:
+    """1 / x of a power of two, with which a product is the division to the last bit; None for other numbers."""
+    return 1 / x if abs(frexp(x)[0]) == 0.5 and abs(frexp(x)[1]) < SMALL else None
+
+
+def ordered(op: str, operands: tuple[int, ...]) -> tuple[int, ...]:
+    """The operands as equal values have them, whichever way round they were written."""
+    return tuple(sorted(operands)) if op in COMMUTE else operands
 
 
 @dataclass(frozen=True)
@@ -59,8 +72,7 @@ class Graph:
             operands = (operands[0], self.number(operands[1]), self.number(operands[2]))
         else:
             operands = tuple(self.number(x) for x in operands)
-        if op in COMMUTE:
-            operands = tuple(sorted(operands))
+        operands = ordered(op, operands)
         simpler = self._simpler(op, operands)
         return self.put(Node(op, operands)) if simpler is None else simpler
 
@@ -81,6 +93,8 @@ class Graph:
             return nodes[0].operands[0]
         if op == "add" and nodes[0].op == nodes[1].op == "iez":
             return self._select(*nodes)
+        if op == "div" and nodes[1].op == "const" and (power := _reciprocal(float.fromhex(nodes[1].value))) is not None:
+            return self.add("mul", operands[0], self.constant(power))
         if op == "div" and nodes[0].op == "one" and nodes[1].op == "add" and operands[0] in nodes[1].operands:
             return self._share(operands[0], nodes[1])
         return None

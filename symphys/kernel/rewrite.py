@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from symphys.kernel.graph import Graph, Node
+from symphys.kernel.graph import Graph, Node, ordered
 from symphys.kernel.operations import MASKS
 
 Change = Callable[[Graph, int, Node], int]
@@ -18,18 +18,19 @@ def rewritten(graph: Graph, into: Graph, change: Change) -> dict[int, int]:
     numbers: dict[int, int] = {}
     for x in graph.needed():
         node = graph.nodes[x]
-        moved = Node(node.op, tuple(numbers[y] for y in node.operands), node.at, node.value)
+        operands = ordered(node.op, tuple(numbers[y] for y in node.operands))
+        moved = Node(node.op, operands, node.at, node.value)
         numbers[x] = change(into, x, moved)
     return numbers
 
 
-def with_reciprocals(graph: Graph, primal: int) -> Graph:
+def with_reciprocals(graph: Graph, forward: Graph) -> Graph:
     """Several divisions of adjoints by one value become one, and products with its reciprocal.
 
-    What depends on the first ``primal`` arguments only stays as it is, so that it is also what the call computes.
+    What the call itself computes, ``forward``, stays as it is, so that it need not be computed twice.
     """
-    origins = graph.origins()
-    divisions = {x for x in graph.needed() if graph.nodes[x].op == "div" and origins[x] >> primal}
+    known = _found_in(graph, forward)
+    divisions = {x for x in graph.needed() if graph.nodes[x].op == "div" and x not in known}
     divisors = Counter(graph.nodes[x].operands[1] for x in divisions)
 
     def change(new: Graph, x: int, node: Node) -> int:
@@ -41,6 +42,18 @@ def with_reciprocals(graph: Graph, primal: int) -> Graph:
     numbers = rewritten(graph, new, change)
     new.results = [[numbers[x] for x in result] for result in graph.results]
     return new
+
+
+def _found_in(graph: Graph, other: Graph) -> dict[int, int]:
+    """The nodes that another graph has too, and their numbers there."""
+    found: dict[int, int] = {}
+    for x, node in enumerate(graph.nodes):
+        if all(y in found for y in node.operands):
+            operands = ordered(node.op, tuple(found[y] for y in node.operands))
+            number = other.numbers.get(Node(node.op, operands, node.at, node.value))
+            if number is not None:
+                found[x] = number
+    return found
 
 
 @dataclass(frozen=True)

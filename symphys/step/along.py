@@ -8,7 +8,6 @@ from typing import Any
 import casadi as ca
 
 from symphys.step import row
-from symphys.step.momentum import Momentum, Rates
 from symphys.step.row import Side
 
 Expr = Any
@@ -84,12 +83,5 @@ def mobility(sides: tuple[Side, ...], directions: Directions, same: bool) -> Exp
     for k in range(n):
         unit = ca.SX(n, 1)
         unit[k] = 1
-        columns.append(speeds(sides, directions, kicked(sides, directions, _still(sides), unit, same)))
+        columns.append(speeds(sides, directions, kicked(sides, directions, row.still(sides), unit, same)))
     return ca.horzcat(*columns)
-
-
-def _still(sides: tuple[Side, ...]) -> tuple[Any, ...]:
-    zero = ca.SX.zeros(3)
-    return tuple(
-        Momentum(zero, zero) if side.reach is None else Rates(ca.SX(side.reach.push.size1(), 1)) for side in sides
-    )

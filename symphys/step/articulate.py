@@ -14,50 +14,43 @@ import casadi as ca
 from symphys import rotation
 from symphys.course import Course
 from symphys.joints import Joint, Link, Linkage
-from symphys.motion import Motion, inertia_matrix
+from symphys.motion import Motion, in_world, inertia_matrix
 from symphys.step import screws
-from symphys.step.elimination import Eliminated
+from symphys.step.branches import Moving, Tree, axes_at, moving, solve, tree_matrix
+from symphys.step.limbs import Inertia, Screw, mirrored
 from symphys.step.momentum import Momentum
+from symphys.step.pieces import Pieces
 
 Expr = Any
 """casadi SX"""
 Wrench = tuple[Expr, Expr]
 """Force [N] and torque [N m] about the centre of mass; also linear and angular acceleration."""
+NOW = ca.SX(0)
 
 
 def accelerations(
-    linkage: Linkage, joints: screws.Joints, motions: Sequence[Motion], wrenches: Sequence[Wrench]
+    pieces: Pieces, linkage: Linkage, joints: screws.Joints, motions: Sequence[Motion], wrenches: Sequence[Wrench]
 ) -> tuple[Wrench, ...]:
     """Of the bodies of a tree, from their poses and velocities and all forces but the joints'."""
-    origin, now = motions[0].position, ca.SX(0)
-    along = screws.screws(linkage, joints, motions, now, origin)
-    places = [m.position - origin for m in motions]
-    tensors = [world_inertia(m.inertia, m.rotation) for m in motions]
-    matrix = _matrix(linkage, [m.mass for m in motions], tensors, places, along)
-    momenta = [
-        screws.about_origin(place, m.mass * m.velocity, ca.mtimes(tensor, m.angular_velocity))
-        for place, m, tensor in zip(places, motions, tensors, strict=True)
-    ]
-    rates = matrix.solve(screws.along_screws(linkage, along, momenta))
-    biases = _biases(linkage, joints, along, rates)
-    moving = screws.summed_down(linkage, along, rates)
-    lacking = []
-    for m, place, tensor, screw, bias, (force, torque) in zip(
-        motions, places, tensors, moving, biases, wrenches, strict=True
-    ):
-        linear, angular = _at(bias, screw, place)
-        w = screw[:3]
-        turning = ca.mtimes(tensor, angular) + ca.cross(w, ca.mtimes(tensor, w))
-        lacking.append(screws.about_origin(place, force - m.mass * linear, torque - turning))
-    speeding = matrix.solve(screws.along_screws(linkage, along, lacking))
-    changes = screws.summed_down(linkage, along, speeding)
+    do, origin = pieces.do, motions[0].position
+    tree = Tree(linkage, axes_at(pieces, linkage, joints, [m.course() for m in motions], NOW, origin))
+    tensors = [do(world_inertia, m.inertia, m.rotation) for m in motions]
+    bodies = [(m.mass, tensor, m.position, origin) for m, tensor in zip(motions, tensors, strict=True)]
+    matrix = tree_matrix(pieces, tree, [do(_inertia, *body) for body in bodies])
+    momenta = [do(_momentum, *body, m.velocity, m.angular_velocity) for body, m in zip(bodies, motions, strict=True)]
+    now = moving(pieces, tree, matrix, solve(pieces, tree, matrix, momenta))
+    biases = _biases(pieces, tree, joints, now)
+    states = list(zip(bodies, now.screws, biases, strict=True))
+    lacking = [do(_lacking, *body, *state, wrench) for (body, *state), wrench in zip(states, wrenches, strict=True)]
+    changes = moving(pieces, tree, matrix, solve(pieces, tree, matrix, lacking)).screws
     return tuple(
-        _at(change + bias, screw, place)
-        for change, bias, screw, place in zip(changes, biases, moving, places, strict=True)
+        do(_accelerated, place, origin, *state, change)
+        for ((*_, place, origin), *state), change in zip(states, changes, strict=True)
     )
 
 
 def consistent(
+    pieces: Pieces,
     linkage: Linkage,
     joints: screws.Joints,
     inertials: Sequence[tuple[Expr, Expr]],
@@ -65,53 +58,84 @@ def consistent(
     momenta: Sequence[Momentum],
 ) -> tuple[Wrench, ...]:
     """Velocity and angular velocity of each body: those that fit the joints and have the momenta along free motions."""
-    zero, origin = ca.SX.zeros(3), poses[0][0]
-    turned = [rotation.matrix(q) for _, q in poses]
-    courses = [Course(p, r, zero, zero, zero, zero, ca.SX(0)) for (p, _), r in zip(poses, turned, strict=True)]
-    along = screws.screws(linkage, joints, courses, ca.SX(0), origin)
-    places = [p - origin for p, _ in poses]
-    masses = [mass for mass, _ in inertials]
-    tensors = [world_inertia(inertia, r) for (_, inertia), r in zip(inertials, turned, strict=True)]
-    matrix = _matrix(linkage, masses, tensors, places, along)
-    counted = [
-        screws.about_origin(place, mass * momentum.velocity, momentum.angular)
-        for place, mass, momentum in zip(places, masses, momenta, strict=True)
-    ]
-    rates = matrix.solve(screws.along_screws(linkage, along, counted))
-    moving = screws.summed_down(linkage, along, rates)
-    return tuple(screws.at_place(screw, place) for screw, place in zip(moving, places, strict=True))
+    do, zero, origin = pieces.do, ca.SX.zeros(3), poses[0][0]
+    turned = [do(rotation.matrix, q) for _, q in poses]
+    courses = [Course(p, r, zero, zero, zero, zero, NOW) for (p, _), r in zip(poses, turned, strict=True)]
+    tree = Tree(linkage, axes_at(pieces, linkage, joints, courses, NOW, origin))
+    parts = list(zip(inertials, poses, turned, momenta, strict=True))
+    tensors = (do(world_inertia, inertia, r) for (_, inertia), _, r, _ in parts)
+    inertias = [do(_inertia, mass, t, p, origin) for ((mass, _), (p, _), *_), t in zip(parts, tensors, strict=True)]
+    counted = [do(_counted, mass, p, origin, momentum) for (mass, _), (p, _), _, momentum in parts]
+    matrix = tree_matrix(pieces, tree, inertias)
+    moved = moving(pieces, tree, matrix, solve(pieces, tree, matrix, counted)).screws
+    return tuple(do(_at_place, screw, p, origin) for screw, (p, _) in zip(moved, poses, strict=True))
 
 
-def _matrix(
-    linkage: Linkage, masses: Sequence[Expr], tensors: Sequence[Expr], places: Sequence[Expr], along: list[Expr]
-) -> Eliminated:
-    parts = zip(masses, tensors, places, strict=True)
-    inertias = [screws.inertia_of(mass, tensor, place, place) for mass, tensor, place in parts]
-    return Eliminated(screws.mass_matrix(linkage, inertias, along, along))
+def _inertia(mass: Expr, tensor: Expr, position: Expr, origin: Expr) -> Inertia:
+    place = position - origin
+    return Inertia(mirrored(screws.inertia_of(mass, tensor, place, place)))
 
 
-def _biases(linkage: Linkage, joints: screws.Joints, along: Sequence[Expr], rates: dict[int, Expr]) -> list[Expr]:
+def _momentum(mass: Expr, tensor: Expr, position: Expr, origin: Expr, velocity: Expr, spin: Expr) -> Screw:
+    return Screw(screws.about_origin(position - origin, mass * velocity, ca.mtimes(tensor, spin)))
+
+
+def _counted(mass: Expr, position: Expr, origin: Expr, momentum: Momentum) -> Screw:
+    return Screw(screws.about_origin(position - origin, mass * momentum.velocity, momentum.angular))
+
+
+def _lacking(
+    mass: Expr, tensor: Expr, position: Expr, origin: Expr, screw: Screw, bias: Screw, wrench: Wrench
+) -> Screw:
+    """What forces do beside what the motion needs as it is."""
+    place, w = position - origin, screw.parts[:3]
+    linear, angular = _at(bias.parts, screw.parts, place)
+    turning = ca.mtimes(tensor, angular) + ca.cross(w, ca.mtimes(tensor, w))
+    return Screw(screws.about_origin(place, wrench[0] - mass * linear, wrench[1] - turning))
+
+
+def _accelerated(position: Expr, origin: Expr, screw: Screw, bias: Screw, change: Screw) -> Wrench:
+    return _at(change.parts + bias.parts, screw.parts, position - origin)
+
+
+def _at_place(screw: Screw, position: Expr, origin: Expr) -> Wrench:
+    return screws.at_place(screw.parts, position - origin)
+
+
+def _biases(pieces: Pieces, tree: Tree, joints: screws.Joints, now: Moving) -> list[Screw]:
     """(6,) rates of change of the bodies' screws while the coordinates' rates do not change."""
-    moving = screws.summed_down(linkage, along, rates)
-    found: list[Expr] = []
-    for k, (link, parent, joint) in enumerate(zip(linkage.links, screws.parents(linkage), joints, strict=True)):
-        total = ca.SX.zeros(6) if parent is None else found[parent]
+    place = {link.body: k for k, link in enumerate(tree.linkage.links)}
+    found: list[Screw] = []
+    for k, (link, joint) in enumerate(zip(tree.linkage.links, joints, strict=True)):
         if joint is None:
-            velocity, spin = moving[k][3:], moving[k][:3]  # the root's centre of mass is at the origin
-            found.append(total + ca.vertcat(ca.SX.zeros(3), ca.cross(velocity, spin)))
+            found.append(pieces.do(_floating_bias, now.screws[k]))
             continue
-        for place, j in enumerate(screws.own(link)):
-            carrier = _carrier(link, joint, place, k, parent)
-            if carrier is not None:
-                total = total + rates.get(j, 0) * _carried(moving[carrier], along[j])
-        found.append(total)
+        parent = None if link.parent is None else place[link.parent]
+        above, moved = (None, None) if parent is None else (found[parent], now.screws[parent])
+        carriers = tuple(_carried_by_child(link, joint, j) for j in range(link.count))
+        found.append(pieces.do(_bias, carriers, tree.seen[k], now.rates[k], now.screws[k], moved, above))
     return found
 
 
-def _carrier(link: Link, joint: Joint, place: int, child: int, parent: int | None) -> int | None:
-    """The link on whose body the axis of a coordinate is fixed; None: the world."""
-    first = bool(joint.kind.coordinates) and joint.kind.coordinates[place].fixed_in_first
-    return child if first == (link.sign > 0) else parent
+def _floating_bias(screw: Screw) -> Screw:
+    return Screw(ca.vertcat(ca.SX.zeros(3), ca.cross(screw.parts[3:], screw.parts[:3])))  # its centre is at the origin
+
+
+def _bias(
+    carriers: tuple[bool, ...], axes: Expr, rates: Expr, own: Screw, parent: Screw | None, above: Screw | None
+) -> Screw:
+    total = ca.SX.zeros(6) if above is None else above.parts
+    for j, by_child in enumerate(carriers):
+        carrier = own if by_child else parent
+        if carrier is not None:
+            total = total + rates[j] * _carried(carrier.parts, axes[:, j])
+    return Screw(total)
+
+
+def _carried_by_child(link: Link, joint: Joint, coordinate: int) -> bool:
+    """Whether the axis of a coordinate is fixed in the link's body; else it is in the parent, or the world."""
+    first = bool(joint.kind.coordinates) and joint.kind.coordinates[coordinate].fixed_in_first
+    return first == (link.sign > 0)
 
 
 def _carried(moving: Expr, screw: Expr) -> Expr:
@@ -128,4 +152,4 @@ def _at(change: Expr, screw: Expr, place: Expr) -> Wrench:
 
 def world_inertia(inertia: Expr, turned: Expr) -> Expr:
     """(3, 3), world frame."""
-    return ca.mtimes(turned, ca.mtimes(inertia_matrix(inertia), turned.T))
+    return in_world(inertia_matrix(inertia), turned)

@@ -12,7 +12,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.smooth import positive
+from symphys.smooth import at_least, at_most
 from symphys.step.along import Along, Directions, kicked, speeds
 from symphys.step.momentum import Rates
 from symphys.step.row import Side
@@ -71,7 +71,7 @@ class AxisRow:
         """Of the coordinate."""
         if self.of_tree is None:
             return speeds(self.sides, self.seen, momenta)
-        return ca.mtimes(self.of_tree.see, momenta[0].numbers)
+        return momenta[0].along(self.of_tree.see)
 
     def carried(self, impulse: Along) -> Expr:
         """(1,): what is stored of an impulse; also of a force."""
@@ -86,9 +86,9 @@ class AxisRow:
         rate = self.rate(momenta)
         new = self.keep * old.numbers - self.slope * rate - self.offset
         if self.low is not None:
-            new = self.low + positive(new - self.low, self.width)
+            new = at_least(new, self.low, self.width)
         if self.high is not None:
-            new = self.high - positive(self.high - new, self.width)
+            new = at_most(new, self.high, self.width)
         return self.given(momenta, Along(new - old.numbers)), Along(new)
 
     def given(self, momenta: tuple[Any, ...], impulse: Along) -> tuple[Any, ...]:

@@ -18,9 +18,11 @@ import casadi as ca
 from symphys.joints import Linkage
 from symphys.motion import Held, Motion, apply
 from symphys.step import screws
-from symphys.step.elimination import Sparse
-from symphys.step.limbs import Limbs, matrix_of
+from symphys.step.branches import Solved, Tree, TreeMatrix, axes_at, moving, solve, tree_matrix
+from symphys.step.gains import Gain, Numbering, Placed, gains_of, held_of, numbering, spread
+from symphys.step.limbs import Inertia, Screw
 from symphys.step.momentum import Momentum, Rates
+from symphys.step.pieces import Pieces
 
 Expr = Any
 """casadi SX"""
@@ -37,24 +39,21 @@ class Chart:
         free: them without any impulse of the stretch.
         held: of each link: how its body moves with the rates, and what impulses on it do to them; None for bodies on
             which nothing acts but the tree's own joints.
-        gains: for each coordinate its rate by the numbers (1, n), and what a unit impulse along it does to them (n,);
-            None where nothing acts along it.
-        rates: (n, n) the numbers to the rates of the coordinates.
-        seen: (6,) screw of each coordinate at mid-step.
-        places: (3,) of each body at mid-step, from the origin of the screws.
-        inertias: (3, 3) of each body, world frame, at mid-step.
+        gains: of each coordinate; None where nothing acts along it.
+        tree, matrix: its screws and its mass matrix.
+        bodies: when velocities are seen.
     """
 
     free: Rates
     held: tuple[Held | None, ...]
-    gains: tuple[tuple[Expr, Expr] | None, ...]
-    rates: Expr
-    seen: tuple[Expr, ...]
-    places: tuple[Expr, ...]
-    inertias: tuple[Expr, ...]
+    gains: tuple[Gain | None, ...]
+    tree: Tree
+    matrix: TreeMatrix
+    bodies: tuple[Placed, ...]
 
 
 def make_chart(
+    pieces: Pieces,
     linkage: Linkage,
     joints: screws.Joints,
     reached: Sequence[bool],
@@ -65,6 +64,7 @@ def make_chart(
     """The chart of a tree.
 
     Args:
+        pieces: how its parts are put together.
         linkage: the tree.
         joints: of its links, as are the other sequences.
         reached: whether anything but the tree's own joints acts on the body.
@@ -72,35 +72,21 @@ def make_chart(
         free: their momenta without any impulse of the stretch.
         middle: when velocities are seen [s].
     """
-    start, origin, n = ca.SX(0), motions[0].position, linkage.size
-    seen, given = (screws.screws(linkage, joints, motions, t, origin) for t in (middle, start))
-    places, counted = ([m.centre().at(t) - origin for m in motions] for t in (middle, start))
-    inertias = [_inertia(motion, middle) for motion in motions]
-    parts = zip(motions, inertias, counted, places, strict=True)
-    masses = [screws.inertia_of(m.mass, *rest) for m, *rest in parts]
-    matrix = Limbs(screws.mass_matrix(linkage, masses, seen, given), screws.limbs(linkage))
-    momenta = [
-        screws.about_origin(place, motion.mass * momentum.velocity, momentum.angular)
-        for place, motion, momentum in zip(counted, motions, free, strict=True)
+    do, origin = pieces.do, motions[0].position
+    courses = [motion.course() for motion in motions]
+    seen, given = (axes_at(pieces, linkage, joints, courses, t, origin) for t in (middle, ca.SX(0)))
+    tree = Tree(linkage, seen, given)
+    parts = [do(_counted, motion, momentum, origin, middle) for motion, momentum in zip(motions, free, strict=True)]
+    bodies, inertias, momenta = zip(*parts, strict=True)
+    matrix = tree_matrix(pieces, tree, inertias)
+    rates = do(_joined, numbering(tree), solve(pieces, tree, matrix, momenta))
+    places = [
+        (do(_place, motion, origin), body) if on else None
+        for motion, body, on in zip(motions, bodies, reached, strict=True)
     ]
-    held = []
-    for k, path in enumerate(screws.paths(linkage)):
-        see = _see(matrix.seen({j: seen[j] for j in path}), places[k], n)
-        response = _response(matrix, {j: given[j] for j in path}, counted[k], n) if reached[k] else None
-        held.append(None if response is None else Held(see, inertias[k], *response))
-    acting = {k for link, joint in zip(linkage.links, joints, strict=True) for k in screws.own(link) if acts(joint)}
-    gains = tuple(_gain(matrix, k, n) if k in acting else None for k in range(n))
-    free_rates = Rates(dense(matrix.solve(screws.along_screws(linkage, given, momenta)), n))
-    rates = matrix_of(matrix.follows, n)
-    return Chart(free_rates, tuple(held), gains, rates, tuple(seen), tuple(places), tuple(inertias))
-
-
-def _gain(matrix: Limbs, k: int, n: int) -> tuple[Expr, Expr]:
-    rate = matrix.seen({k: ca.SX(1)})
-    row = ca.SX(1, n)
-    for j, value in rate.items():
-        row[0, j] = value
-    return row, dense(matrix.solve({k: ca.SX(1)}), n)
+    held = held_of(pieces, tree, matrix, places)
+    gains = gains_of(pieces, tree, matrix, [acts(joint) for joint in joints])
+    return Chart(Rates(rates), held, gains, tree, matrix, bodies)
 
 
 def acts(joint: Any) -> bool:
@@ -108,44 +94,33 @@ def acts(joint: Any) -> bool:
     return joint is not None and bool(joint.acting)
 
 
-def _inertia(motion: Motion, t: Expr) -> Expr:
-    """(3, 3), world frame: the inverse of what rows take for the inverse."""
-    inverse = motion.inverse_inertia(t)
-    return ca.SX.eye(3) / inverse if ca.SX(inverse).is_scalar() else ca.inv_minor(inverse)
+def body_momenta(pieces: Pieces, chart: Chart, rates: Any) -> tuple[Momentum, ...]:
+    """Of the bodies of a tree, from the rates that sweeps know of it."""
+    apart = pieces.do(_apart, numbering(chart.tree), rates.numbers)
+    screws_of = moving(pieces, chart.tree, chart.matrix, apart).screws
+    return tuple(pieces.do(_momentum, *each) for each in zip(screws_of, chart.bodies, strict=True))
 
 
-def _see(seen: dict[int, Expr], place: Expr, n: int) -> Expr:
-    """(6, n): velocity above angular velocity."""
-    columns = [ca.vertcat(*screws.at_place(seen[k], place)) if k in seen else ca.SX(6, 1) for k in range(n)]
-    return ca.sparsify(ca.horzcat(*columns))
+def _momentum(screw: Screw, body: Placed) -> Momentum:
+    velocity, spin = screws.at_place(screw.parts, body.place)
+    return Momentum(velocity, apply(body.inertia, spin))
 
 
-def _response(matrix: Limbs, given: dict[int, Expr], place: Expr, n: int) -> tuple[Expr, Expr]:
-    """(n, 3) each: what unit impulses at the centre of mass, and unit torque impulses, do to the rates."""
-    unit, zero = ca.SX.eye(3), ca.SX.zeros(3)
-    found = []
-    for pairs in ([(unit[:, i], zero) for i in range(3)], [(zero, unit[:, i]) for i in range(3)]):
-        rights = [{k: ca.dot(s, screws.about_origin(place, *pair)) for k, s in given.items()} for pair in pairs]
-        solved = [matrix.solve({k: v for k, v in right.items() if not v.is_zero()}) for right in rights]
-        found.append(ca.horzcat(*(dense(each, n) for each in solved)))
-    return found[0], found[1]
+def _place(motion: Motion, origin: Expr) -> Expr:
+    return motion.position - origin
 
 
-def dense(entries: Sparse, n: int) -> Expr:
-    """(n,) of a sparse vector, zeros left out."""
-    found = ca.SX(n, 1)
-    for k, value in entries.items():
-        found[k] = value
-    return found
+def _counted(motion: Motion, free: Momentum, origin: Expr, middle: Expr) -> tuple[Placed, Inertia, Screw]:
+    """A body at mid-step, its momentum at the start for what is seen at mid-step, and its free momentum."""
+    counted, place, inertia = motion.position - origin, motion.centre().at(middle) - origin, motion.inertia_at(middle)
+    momentum = screws.about_origin(counted, motion.mass * free.velocity, free.angular)
+    return Placed(place, inertia), Inertia(screws.inertia_of(motion.mass, inertia, counted, place)), Screw(momentum)
 
 
-def body_momenta(linkage: Linkage, chart: Chart, rates: Rates) -> tuple[Momentum, ...]:
-    """Of the bodies of a tree."""
-    numbers = apply(chart.rates, rates.numbers)
-    amounts = {k: numbers[k] for k in range(linkage.size)}
-    moving = screws.summed_down(linkage, chart.seen, amounts)
-    found = []
-    for screw, place, inertia in zip(moving, chart.places, chart.inertias, strict=True):
-        velocity, spin = screws.at_place(screw, place)
-        found.append(Momentum(velocity, apply(inertia, spin)))
-    return tuple(found)
+def _joined(numbering: Numbering, rates: Solved) -> Expr:
+    return spread(numbering, (rates.r, *rates.z))
+
+
+def _apart(numbering: Numbering, numbers: Expr) -> Solved:
+    r, *z = (numbers[list(each)] for each in numbering)
+    return Solved(r, tuple(z))

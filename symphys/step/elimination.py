@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
+
+import casadi as ca
 
 Expr = Any
 """casadi SX"""
@@ -11,36 +14,56 @@ Sparse = dict[int, Expr]
 """Entries of a vector by index; what is not there is zero."""
 
 
+@dataclass(frozen=True)
 class Eliminated:
     """A square matrix whose entry (i, j) is zero unless i and j are on one path from the root, factored without pivots.
 
     Indices grow from the root to the leaves.
+
+    Attributes:
+        lower: (n, n) in (i, k), i < k, the share of row k that was taken off row i.
+        upper: (n, n) in (j, k), j < k, entry j of row k when it was taken off, by its pivot.
+        pivots: (n,) reciprocals.
     """
 
-    def __init__(self, rows: list[Sparse]) -> None:
-        """Factor it; ``rows`` by index."""
-        self._rows = [dict(row) for row in rows]
-        self._shares: list[Sparse] = [{} for _ in rows]
-        for k in reversed(range(len(rows))):
-            pivot = self._rows[k]
-            for i in range(k):
-                if k in self._rows[i]:
-                    share = self._rows[i].pop(k) / pivot[k]
-                    self._shares[k][i] = share
-                    for j, entry in pivot.items():
-                        if j < k:
-                            self._rows[i][j] = self._rows[i].get(j, 0) - share * entry
+    lower: Expr
+    upper: Expr
+    pivots: Expr
 
     def solve(self, right: Mapping[int, Expr]) -> Sparse:
         """The solution for a right hand side."""
         reduced = dict(right)
-        for k in reversed(range(len(self._rows))):
-            if k in reduced:
-                for i, share in self._shares[k].items():
-                    reduced[i] = reduced.get(i, 0) - share * reduced[k]
+        n = self.pivots.size1()
+        for k in reversed(range(n)):
+            for i in range(k) if k in reduced else ():
+                if self.lower.has_nz(i, k):
+                    reduced[i] = reduced.get(i, 0) - self.lower[i, k] * reduced[k]
         found: Sparse = {}
-        for k, row in enumerate(self._rows):
-            known = [entry * found[j] for j, entry in row.items() if j < k and j in found]
+        for k in range(n):
+            known = [self.upper[j, k] * found[j] for j in range(k) if j in found and self.upper.has_nz(j, k)]
             if known or k in reduced:
-                found[k] = (reduced.get(k, 0) - sum(known)) / row[k]
+                found[k] = reduced.get(k, 0) * self.pivots[k] - sum(known)
         return found
+
+
+def reciprocal(x: Expr) -> Expr:
+    """1 / x, so written that products with it stay products: casadi makes x / y of x times 1 / y."""
+    return 2 / (2 * x)
+
+
+def eliminated(rows: Sequence[Mapping[int, Expr]], symmetric: bool = False) -> Eliminated:
+    """The factors of a matrix by its rows; of a symmetric one those of one half serve both."""
+    left, n = [dict(row) for row in rows], len(rows)
+    lower, upper, pivots = ca.SX(n, n), ca.SX(n, n), ca.SX(n, 1)
+    for k in reversed(range(n)):
+        pivots[k] = reciprocal(left[k][k])
+        above = [j for j in left[k] if j < k]
+        for j in above:
+            upper[j, k] = left[k][j] * pivots[k]
+        for i in [i for i in range(k) if k in left[i]]:
+            lower[i, k] = upper[i, k] if symmetric else left[i][k] * pivots[k]
+            for j in above if not symmetric else [j for j in above if j <= i]:
+                left[i][j] = left[i].get(j, 0) - lower[i, k] * left[k][j]
+                if symmetric:
+                    left[j][i] = left[i][j]
+    return Eliminated(lower, upper, pivots)

@@ -12,6 +12,7 @@ from symphys.state import Layout, inputs_size
 from symphys.step.pieces import Inline
 from symphys.step.record import Piece, Recorder, Slot
 from symphys.step.scene import Scene, State, make_scene
+from symphys.step.trim import trimmed
 from symphys.step.whole import report, take_step
 from symphys.world import Scheme, World
 
@@ -93,7 +94,7 @@ def record_step(
     for names in owners.values():
         slot = recorder.give("next", [after[name] for name in names])
         results[slot] = slice(layout[names[0]].start, layout[names[-1]].stop)
-    return Recording(tuple(recorder.pieces), results)
+    return Recording(trimmed(recorder.pieces), results)
 
 
 def _flat(

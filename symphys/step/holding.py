@@ -166,6 +166,6 @@ def fitting(
         bodies = [scene.world.bodies[i] for i in tree.bodies]
         inertials = tuple((body.mass, body.inertia) for body in bodies)
         parts = tuple(poses[i] for i in tree.bodies), tuple(momenta[i] for i in tree.bodies)
-        for i, fits in zip(tree.bodies, scene.pieces.do(consistent, tree, along, inertials, *parts), strict=True):
+        for i, fits in zip(tree.bodies, consistent(scene.pieces, tree, along, inertials, *parts), strict=True):
             found[i] = fits
     return found

@@ -13,12 +13,13 @@ from symphys.motion import Motion, angular_velocity
 from symphys.smooth import positive
 from symphys.step.impulse import ZERO
 from symphys.step.jointed import locks_at, make_trees, momenta_of
+from symphys.step.masses import answer_of, effective_masses, inverse_masses
 from symphys.step.momentum import Momentum
 from symphys.step.paths import bodies_of, expected_motions, look
 from symphys.step.pgs import Solution
 from symphys.step.phase import Phase
 from symphys.step.restitution import rebound
-from symphys.step.row import UNREACHED, ContactRow, Moving, at_touch, effective_masses, inverse_masses, make_sides
+from symphys.step.row import UNREACHED, ContactRow, Moving, at_touch, make_sides
 from symphys.step.rows import width_of
 from symphys.step.scene import Scene, Setting, State
 from symphys.world import Law
@@ -140,6 +141,7 @@ def _row(
         sides,
         frame.normal,
         frame.normal,
+        answer_of(sides, frame.normal, same),
         **effective_masses(*inverse_masses(sides, frame.normal, same)),
         softness=ca.SX(0),
         target=ca.SX(UNREACHED) if law.soft else ca.if_else(struck, speed, resting),

@@ -69,11 +69,10 @@ def give(row: ContactRow, momenta: States, impulse: Impulse) -> States:
 
 def visit(row: ContactRow, momenta: States, old: Impulse) -> tuple[States, Impulse]:
     """One projection of each of the row's impulses, one after the other."""
-    zero = ca.SX.zeros(3)
-    normal = _normal(row, momenta, old)
-    momenta = give(row, momenta, Impulse(normal - old.normal, zero, ca.SX(0), zero))
-    tangent = _tangent(row, momenta, old, normal)
-    momenta = give(row, momenta, Impulse(ca.SX(0), tangent - old.tangent, ca.SX(0), zero))
+    zero, slip = ca.SX.zeros(3), row.slip(momenta)
+    normal = _normal(row, slip, old)
+    tangent = _tangent(row, slip + row.answer * (normal - old.normal), old, normal)
+    momenta = give(row, momenta, Impulse(normal - old.normal, tangent - old.tangent, ca.SX(0), zero))
     if not row.law.spins:
         return momenta, Impulse(normal, tangent, old.spin, old.roll)
     spin, roll = _torques(row, momenta, old, normal)
@@ -81,16 +80,15 @@ def visit(row: ContactRow, momenta: States, old: Impulse) -> tuple[States, Impul
     return momenta, Impulse(normal, tangent, spin, roll)
 
 
-def _normal(row: ContactRow, momenta: States, old: Impulse) -> Expr:
+def _normal(row: ContactRow, slip: Expr, old: Impulse) -> Expr:
     """ln <- max(ln - m (n.u - b + gamma ln), 0), m = 1 / (k + gamma)."""
-    wanted = ca.dot(row.normal, _slip(row, momenta)) - row.target + row.softness * old.normal
+    wanted = ca.dot(row.normal, slip) - row.target + row.softness * old.normal
     return positive(old.normal - row.normal_mass * wanted, row.normal_mass * row.width)
 
 
-def _tangent(row: ContactRow, momenta: States, old: Impulse, normal: Expr) -> Expr:
+def _tangent(row: ContactRow, slip: Expr, old: Impulse, normal: Expr) -> Expr:
     """The friction impulse, onto the disc of radius mu ln."""
-    slip = _slip(row, momenta) - row.slip_target
-    wanted = old.tangent - row.tangent_mass * _across(slip, row.normal)
+    wanted = old.tangent - row.tangent_mass * _across(slip - row.slip_target, row.normal)
     return onto_disc(wanted, row.law.friction * normal, row.tangent_mass * row.knob, row.knob)
 
 
@@ -108,11 +106,3 @@ def _torques(row: ContactRow, momenta: States, old: Impulse, normal: Expr) -> tu
 
 def _across(a: Expr, n: Expr) -> Expr:
     return a - n * ca.dot(n, a)
-
-
-def _slip(row: ContactRow, momenta: States) -> Expr:
-    """(3,) [m/s]: relative velocity of the touching points."""
-    total = ca.SX.zeros(3)
-    for side, m in zip(row.sides, momenta, strict=True):
-        total += side.sign * side.speed(m)
-    return total

@@ -60,7 +60,7 @@ def make_trees(scene: Scene, motions: Sequence[Motion], free: Momenta, middle: E
         own = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
         reached = tuple(body in touched for body in tree.bodies)
         parts = tuple(motions[i] for i in tree.bodies), tuple(free[i] for i in tree.bodies)
-        chart = scene.pieces.do(make_chart, tree, own, reached, *parts, middle)
+        chart = make_chart(scene.pieces, tree, own, reached, *parts, middle)
         charts.append(chart)
         for body, holds in zip(tree.bodies, chart.held, strict=True):
             held[body], states[body] = replace(motions[body], held=holds), None
@@ -80,7 +80,7 @@ def momenta_of(scene: Scene, trees: Trees, solved: States) -> Momenta:
     """Of all bodies."""
     found = list(solved)
     for tree, chart in zip(linkages(scene.world.joints), trees.charts, strict=True):
-        momenta = scene.pieces.do(body_momenta, tree, chart, solved[tree.root])
+        momenta = body_momenta(scene.pieces, chart, solved[tree.root])
         for body, momentum in zip(tree.bodies, momenta, strict=True):
             found[body] = momentum
     return tuple(found)  # type: ignore[arg-type]

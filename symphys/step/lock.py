@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.step.along import Along, Directions, kicked, speeds
-from symphys.step.elimination import Eliminated
+from symphys.step.elimination import eliminated
 from symphys.step.row import Side
 
 Expr = Any
@@ -74,6 +74,6 @@ def in_world(axes: Expr, stored: Expr) -> Expr:
 def inverse(k: Expr) -> Expr:
     """(n, n): of a mobility, which is not symmetric where impulses are given with other arms than seen."""
     n = k.size1()
-    matrix = Eliminated([{j: k[i, j] for j in range(n)} for i in range(n)])
+    matrix = eliminated([{j: k[i, j] for j in range(n)} for i in range(n)])
     columns = (matrix.solve({j: ca.SX(1)}) for j in range(n))
     return ca.horzcat(*(ca.vertcat(*(column[i] for i in range(n))) for column in columns))

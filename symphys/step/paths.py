@@ -11,7 +11,7 @@ import casadi as ca
 from symphys.collide import Contact, collide
 from symphys.course import at_rest
 from symphys.joints import linkages
-from symphys.motion import BodyState, Motion, free_motion, momentum
+from symphys.motion import BodyState, Motion, free_motion, momentum, motion_from
 from symphys.state import BODY_FIELDS
 from symphys.step.articulate import accelerations, world_inertia
 from symphys.step.scene import Scene, State
@@ -50,8 +50,9 @@ def expected_motions(scene: Scene, x: State, duration: Expr) -> list[Motion]:
         own = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
         motions = tuple(found[i] for i in tree.bodies)
         wrenches = tuple(scene.pieces.do(_wrench, motion) for motion in motions)
-        for i, change in zip(tree.bodies, scene.pieces.do(accelerations, tree, own, motions, wrenches), strict=True):
-            found[i] = scene.pieces.do(_as_held, found[i], change, gravity)
+        for i, change in zip(tree.bodies, accelerations(scene.pieces, tree, own, motions, wrenches), strict=True):
+            tensor = scene.pieces.do(world_inertia, found[i].inertia, found[i].rotation)
+            found[i] = scene.pieces.do(_as_held, found[i], tensor, change, gravity)
     return found
 
 
@@ -59,14 +60,13 @@ def _wrench(motion: Motion) -> tuple[Expr, Expr]:
     return motion.mass * motion.acceleration, motion.torque
 
 
-def _as_held(motion: Motion, change: tuple[Expr, Expr], gravity: Expr) -> Motion:
+def _as_held(motion: Motion, tensor: Expr, change: tuple[Expr, Expr], gravity: Expr) -> Motion:
     """The motion with the accelerations that joints leave."""
-    turned, w = motion.rotation, motion.angular_velocity
-    tensor = world_inertia(motion.inertia, turned)
+    w = motion.angular_velocity
     torque = ca.mtimes(tensor, change[1]) + ca.cross(w, ca.mtimes(tensor, w))
     force = motion.mass * (change[0] - gravity)
     state = BodyState(motion.position, motion.orientation, motion.velocity, motion.momentum_k, force, torque)
-    return free_motion(motion.mass, motion.inertia, state, gravity, motion.dt)
+    return motion_from(motion.mass, motion.inertia, state, (motion.rotation, w), gravity, motion.dt)
 
 
 def _motions(scene: Scene, x: State, duration: Expr, freed: int, share: int) -> list[Motion]:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from symphys.step.momentum import Moved, States
+from symphys.step.momentum import Moved, Rates, States
 from symphys.step.pieces import Pieces
 
 Given = Any
@@ -60,9 +60,14 @@ def relax(pieces: Pieces, sweeps: int, rows: tuple[Row, ...], start: Solution) -
 def sweep(pieces: Pieces, rows: tuple[Row, ...], before: Solution) -> Solution:
     """One pass over all rows."""
     momenta, new = list(before.momenta), list(before.impulses)
-    for k in visiting_order(rows):
-        visited, new[k] = pieces.do(_visit, rows[k].row, of_bodies(momenta, rows[k]), new[k])
-        spread(momenta, rows[k], visited)
+    for run in runs(rows, momenta):
+        carriers = tuple(dict.fromkeys(i for k in run for i in rows[k].carriers))
+        visits = tuple((rows[k].row, tuple(carriers.index(i) for i in rows[k].carriers)) for k in run)
+        visited, given = pieces.do(_visit, visits, tuple(momenta[i] for i in carriers), [new[k] for k in run])
+        for i, moved in zip(carriers, visited, strict=True):
+            momenta[i] = moved
+        for k, impulse in zip(run, given, strict=True):
+            new[k] = impulse
     return Solution(tuple(momenta), tuple(new), before.impulses)
 
 
@@ -78,6 +83,25 @@ def visiting_order(rows: Sequence[Row]) -> list[int]:
         left.remove(k)
         order.append(k)
     return order
+
+
+def runs(rows: Sequence[Row], momenta: Sequence[Moved]) -> list[list[int]]:
+    """The rows in visiting order, those of one tree of joints together: what is known of it is handed on within a run.
+
+    A row joins the last run that shares a body with it, so that nothing is visited in another order than before.
+    """
+    found: list[list[int]] = []
+    last: dict[int, int] = {}
+    for k in visiting_order(rows):
+        carriers = set(rows[k].carriers)
+        latest = max((last[i] for i in carriers if i in last), default=-1)
+        within = len(carriers) == 1 and isinstance(momenta[min(carriers)], Rates)
+        if not (within and latest >= 0 and carriers == set(rows[found[latest][0]].carriers)):
+            latest = len(found)
+            found.append([])
+        found[latest].append(k)
+        last |= dict.fromkeys(carriers, latest)
+    return found
 
 
 def begin(pieces: Pieces, rows: Sequence[Row], momenta: States, impulses: Sequence[Given]) -> Solution:
@@ -99,8 +123,17 @@ def spread(momenta: list[Moved], row: Row, changed: States) -> None:
         momenta[i] = momentum
 
 
-def _visit(row: Solvable, momenta: States, old: Given) -> tuple[States, Given]:
-    return row.visit(momenta, old)
+def _visit(
+    visits: tuple[tuple[Solvable, tuple[int, ...]], ...], states: States, old: list[Given]
+) -> tuple[States, list[Given]]:
+    """Visits one after the other: rows, and which of the states are those of their sides."""
+    momenta, given = list(states), []
+    for (row, places), impulse in zip(visits, old, strict=True):
+        visited, new = row.visit(tuple(momenta[i] for i in places), impulse)
+        given.append(new)
+        for i, moved in zip(places, visited, strict=True):
+            momenta[i] = moved
+    return tuple(momenta), given
 
 
 def _give(row: Solvable, momenta: States, impulse: Given) -> States:

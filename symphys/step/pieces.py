@@ -5,7 +5,8 @@ time it is called with symbols in place of all that varies, and what it gives be
 that function is called: by ``Inline`` within one expression, by a ``Recorder`` as a piece of its own. Numbers that are
 constants stay constants, so that what is zero costs nothing. A part must depend on its arguments alone.
 
-What parts give lies in slots, columns of numbers. Between parts a tree's matrices are ``Numbers``, which say where
+What parts give lies in slots, columns of numbers; members of a tuple that are trees themselves have slots of their own,
+so that what comes next sees each of them alike. Between parts a tree's matrices are ``Numbers``, which say where
 their entries lie; only inside a part they are expressions. Arithmetic therefore belongs into parts.
 """
 
@@ -18,7 +19,7 @@ from typing import Any, TypeVar
 
 import casadi as ca
 
-from symphys.step.tree import Code, Leaf, Numbers, dismantle, leaves_of, matrix, outline, rebuild
+from symphys.step.tree import Code, Leaf, Numbers, dismantle, leaves_of, matrix, outline, rebuild, slots_of
 
 T = TypeVar("T")
 Expr = Any
@@ -31,11 +32,11 @@ class Template:
     """A part as a casadi function.
 
     Attributes:
-        function: of the slots in ``used``, gives the numbers that have to be computed; None if there are none.
+        function: of the slots in ``used``, gives columns of what has to be computed; None if that is nothing.
         used: which of the slots that the arguments lie in.
         shape: of the tree that the part gives.
-        matrices: of that tree, in order. A code's slot is one of those that the arguments lie in, -1 what the
-            function gives.
+        matrices: of that tree, in order. A code's slot is one of those that the arguments lie in, or -1, -2 .. for the
+            first, the second .. that the function gives.
     """
 
     function: ca.Function | None
@@ -60,8 +61,8 @@ class Pieces(ABC):
         """The state after ``count`` times ``state = once(pieces, context, state)``."""
 
     @abstractmethod
-    def _apply(self, function: ca.Function, slots: Sequence[int]) -> int:
-        """The slot that takes what the function gives."""
+    def _apply(self, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
+        """The slots that take what the function gives."""
 
     @abstractmethod
     def _adopt(self, column: Expr) -> None:
@@ -120,19 +121,16 @@ class Pieces(ABC):
         )
         results: list[Expr] = []
         result_shape = dismantle(part(*rebuild(shape, arguments)), results)
-        homes = {e.element_hash(): (k, j) for k, column in enumerate(entries) for j, e in enumerate(column)}
-        values: list[Expr] = []
-        matrices = []
-        for leaf in map(self.value, results):
-            codes = tuple([_code(number, homes, values) for number in leaf.nonzeros()])
-            matrices.append(Numbers(outline(leaf), codes))
-        if not values:
-            return Template(None, (), result_shape, tuple(matrices))
-        result = ca.cse(ca.vertcat(*values))
-        needed = {symbol.element_hash() for symbol in ca.symvar(result)}
+        given = _Given(entries)
+        leaves = zip(map(self.value, results), slots_of(result_shape), strict=True)
+        matrices = tuple(given.placed(leaf, slot) for leaf, slot in leaves)
+        if not given.columns:
+            return Template(None, (), result_shape, matrices)
+        columns = ca.cse([ca.vertcat(*column) for column in given.columns.values()])
+        needed = {symbol.element_hash() for symbol in ca.symvar(ca.vertcat(*columns))}
         used = [k for k, column in enumerate(entries) if any(e.element_hash() in needed for e in column)]
-        function = self.shared(ca.Function("piece", [symbols[k] for k in used], [result]))
-        return Template(function, tuple(used), result_shape, tuple(matrices))
+        function = self.shared(ca.Function("piece", [symbols[k] for k in used], columns))
+        return Template(function, tuple(used), result_shape, matrices)
 
     def shared(self, function: ca.Function) -> ca.Function:
         """A function, or an equal one that was there before."""
@@ -141,7 +139,7 @@ class Pieces(ABC):
     def _fill(self, template: Template, slots: list[int]) -> Any:
         """The tree that a template stands for, given the slots that its arguments lie in."""
         if template.function is not None:
-            slots = [*slots, self._apply(template.function, [slots[k] for k in template.used])]
+            slots = [*slots, *reversed(self._apply(template.function, [slots[k] for k in template.used]))]
         filled = (
             Numbers(m.leaf, tuple([c if isinstance(c, float) else (slots[c[0]], c[1]) for c in m.codes]))
             for m in template.matrices
@@ -161,19 +159,31 @@ class Inline(Pieces):
     def _adopt(self, column: Expr) -> None:
         self.take(column)
 
-    def _apply(self, function: ca.Function, slots: Sequence[int]) -> int:
-        (column,) = function.call([self._columns[slot] for slot in slots])
-        self._columns.append(column)
-        self._entries.append(column.nonzeros())
-        return len(self._columns) - 1
+    def _apply(self, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
+        first, columns = len(self._columns), function.call([self._columns[slot] for slot in slots])
+        self._columns += columns
+        self._entries += [column.nonzeros() for column in columns]
+        return range(first, len(self._columns))
 
 
-def _code(number: Expr, homes: dict[int, tuple[int, int]], values: list[Expr]) -> Code:
-    """What stands for a number of the result; what has to be computed joins ``values``."""
-    if number.is_constant():
-        return float(number)
-    code = number.element_hash()
-    if code not in homes:
-        homes[code] = (-1, len(values))
-        values.append(number)
-    return homes[code]
+class _Given:
+    """What a part gives, column by column, and where each of its numbers lies."""
+
+    def __init__(self, entries: Sequence[Sequence[Expr]]) -> None:
+        """``entries`` of the slots that the arguments lie in: what is one of them need not be given."""
+        self.columns: dict[int, list[Expr]] = {}
+        self._homes = {e.element_hash(): (k, j) for k, column in enumerate(entries) for j, e in enumerate(column)}
+
+    def placed(self, matrix: Expr, slot: int) -> Numbers:
+        """The codes of a matrix, whose numbers go to a slot if they lie nowhere yet."""
+        return Numbers(outline(matrix), tuple([self._code(number, slot) for number in matrix.nonzeros()]))
+
+    def _code(self, number: Expr, slot: int) -> Code:
+        if number.is_constant():
+            return float(number)
+        code = number.element_hash()
+        if code not in self._homes:
+            column = self.columns.setdefault(slot, [])
+            self._homes[code] = (-1 - list(self.columns).index(slot), len(column))
+            column.append(number)
+        return self._homes[code]

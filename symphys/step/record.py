@@ -1,7 +1,8 @@
 """A step as a list of small functions instead of one expression: each part that the step does is a piece.
 
 What a piece gives becomes fresh symbols, so that what follows depends on these and not on how they came about. Pieces
-of equal bodies, pairs and sweeps are equal functions, which a compiler then sees once.
+of equal bodies, pairs and sweeps are equal functions, which a compiler then sees once. What is asked for twice, of the
+same numbers, is computed once.
 """
 
 from __future__ import annotations
@@ -37,11 +38,11 @@ class Slot:
 
 @dataclass(frozen=True)
 class Piece:
-    """An SX function from slots to one slot."""
+    """An SX function from slots to slots."""
 
     function: ca.Function
     inputs: tuple[Slot, ...]
-    output: Slot
+    outputs: tuple[Slot, ...]
 
 
 class Recorder(Pieces):
@@ -53,6 +54,7 @@ class Recorder(Pieces):
         self.pieces: list[Piece] = []
         self._slots: list[Slot] = []
         self._adopted: list[Expr] = []
+        self._given: dict[tuple[int, tuple[int, ...]], Sequence[int]] = {}
 
     def argument(self, name: str, symbols: Expr) -> None:
         """A slot for an argument of the step."""
@@ -66,7 +68,8 @@ class Recorder(Pieces):
         symbols = [ca.SX.sym("a", self._slots[k].size) for k in slots]
         entries = [ca.SX(c) if isinstance(c, float) else symbols[c[0]][c[1]] for c in codes]
         function = self.shared(ca.Function("piece", symbols, [ca.vertcat(*entries)]))
-        return self._slots[self._add(name, function, list(slots))]
+        (given,) = self._add(name, function, list(slots))
+        return self._slots[given]
 
     def repeat(self, count: int, once: Once[T], context: Any, state: T) -> T:
         """See ``Pieces``; as soon as it repeats itself its pieces are copied."""
@@ -86,12 +89,15 @@ class Recorder(Pieces):
         homes = {symbol.element_hash(): self._homes[symbol.element_hash()][0] for symbol in ca.symvar(column)}
         slots = list(dict.fromkeys(homes.values()))
         symbols = [self._columns[slot] for slot in slots]
-        given = self._add("", self.shared(ca.Function("piece", symbols, [column])), slots)
+        (given,) = self._add("", self.shared(ca.Function("piece", symbols, [column])), slots)
         self._adopted.append(column)
         self._homes |= {entry.element_hash(): (given, k) for k, entry in enumerate(column.nonzeros())}
 
-    def _apply(self, function: ca.Function, slots: Sequence[int]) -> int:
-        return self._add("", function, slots)
+    def _apply(self, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
+        key = function.__hash__(), tuple(slots)
+        if key not in self._given:
+            self._given[key] = self._add("", function, slots)
+        return self._given[key]
 
     def _alike(self, before: Any, after: Any) -> dict[int, int] | None:
         """Which slot of ``after`` stands where one of ``before`` stood; None if they do not lie alike."""
@@ -109,7 +115,8 @@ class Recorder(Pieces):
         """The state one time later: as ``template`` led to ``after``, its copy leads on from there."""
         for piece in template:
             inputs = [slots.get(slot.number, slot.number) for slot in piece.inputs]
-            slots[piece.output.number] = self._add("", piece.function, inputs)
+            given = self._add("", piece.function, inputs)
+            slots |= dict(zip((slot.number for slot in piece.outputs), given, strict=True))
         leaves: list[Expr] = []
         shape = dismantle(after, leaves)
         renamed: T = rebuild(shape, (self._renamed(leaf, slots) for leaf in leaves))
@@ -129,12 +136,13 @@ class Recorder(Pieces):
     def _size(self, code: tuple[int, int]) -> int:
         return self._slots[code[0]].size
 
-    def _add(self, name: str, function: ca.Function, slots: Sequence[int]) -> int:
-        symbols = ca.SX.sym("kept", function.numel_out(0))
-        slot = Slot(name, symbols.numel(), self.take(symbols))
-        self._slots.append(slot)
-        self.pieces.append(Piece(function, tuple(self._slots[k] for k in slots), slot))
-        return slot.number
+    def _add(self, name: str, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
+        first = len(self._slots)
+        for k in range(function.n_out()):
+            symbols = ca.SX.sym("kept", function.numel_out(k))
+            self._slots.append(Slot(name, symbols.numel(), self.take(symbols)))
+        self.pieces.append(Piece(function, tuple(self._slots[k] for k in slots), tuple(self._slots[first:])))
+        return range(first, len(self._slots))
 
 
 def _side_by_side(values: tuple[Expr, ...]) -> Expr:

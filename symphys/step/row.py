@@ -11,7 +11,6 @@ import casadi as ca
 from symphys.collide.contact import Contact, Frame
 from symphys.motion import Motion, apply
 from symphys.rotation import cross_matrix
-from symphys.smooth import TINY_SQUARE
 from symphys.step import impulse
 from symphys.step.momentum import Momentum, Rates
 from symphys.world import Law
@@ -22,8 +21,6 @@ Expr = Any
 Moving = tuple[Motion, ...]
 """The motions of the sides that can move: of the first, or of both."""
 
-HELD = 1e-9
-"""Of a body's own mobility: what it keeps in directions in which joints do not let it move."""
 UNREACHED = -1e6
 """[m/s] a normal velocity that no row reaches: it gives no impulse."""
 
@@ -66,13 +63,13 @@ class Side:
     def spin(self, m: Any) -> Expr:
         """(3,) [rad/s], from what the sweeps know of the body."""
         if self.reach is not None:
-            return ca.mtimes(self.reach.spin, m.numbers)
+            return m.along(self.reach.spin)
         return apply(self.inverse_inertia, m.angular)
 
     def speed(self, m: Any) -> Expr:
         """(3,) [m/s] of the touching point."""
         if self.reach is not None:
-            return ca.mtimes(self.reach.see, m.numbers)
+            return m.along(self.reach.see)
         return m.velocity + ca.cross(self.spin(m), self.arm)
 
     def kicked(self, m: Any, linear: Expr, angular: Expr) -> Any:
@@ -95,6 +92,22 @@ def kicked(sides: Sequence[Side], momenta: Sequence[Any], linear: Expr, angular:
     return tuple(after for _ in sides)
 
 
+def slip(sides: Sequence[Side], momenta: Sequence[Any]) -> Expr:
+    """(3,) [m/s]: relative velocity of the touching points."""
+    total = ca.SX.zeros(3)
+    for side, m in zip(sides, momenta, strict=True):
+        total += side.sign * side.speed(m)
+    return total
+
+
+def still(sides: Sequence[Side]) -> tuple[Any, ...]:
+    """What sweeps know of sides that do not move."""
+    zero = ca.SX.zeros(3)
+    return tuple(
+        Momentum(zero, zero) if side.reach is None else Rates(ca.SX(side.reach.push.size1(), 1)) for side in sides
+    )
+
+
 def reach_of(motion: Motion, t: Expr, arm: Expr, impulse_arm: Expr) -> Reach | None:
     """The reach of a side at a row's instant."""
     held = motion.held
@@ -106,26 +119,6 @@ def reach_of(motion: Motion, t: Expr, arm: Expr, impulse_arm: Expr) -> Reach | N
     return Reach(see, spin, held.push + ca.mtimes(held.twist, cross_matrix(impulse_arm)), held.twist)
 
 
-def mobilities(sides: Sequence[Side], same: bool) -> tuple[Expr, Expr]:
-    """(3, 3) each: relative velocity for unit impulses at the point, relative spin for unit torque impulses."""
-    push, twist = ca.SX.zeros(3, 3), ca.SX.zeros(3, 3)
-    for i, side in enumerate(sides):
-        inverse = apply(side.inverse_inertia, ca.SX.eye(3))
-        if side.reach is None:
-            arm = cross_matrix(side.arm)
-            push += side.inverse_mass * ca.SX.eye(3) - ca.mtimes(arm, ca.mtimes(inverse, arm))
-            twist += inverse
-            continue
-        push += HELD * side.inverse_mass * ca.SX.eye(3)
-        twist += HELD * inverse
-        for j, other in enumerate(sides):
-            if other.reach is not None and (same or i == j):
-                sign = side.sign * other.sign
-                push += sign * apply(side.reach.see, other.reach.push)
-                twist += sign * apply(side.reach.spin, other.reach.twist)
-    return push, twist
-
-
 @dataclass(frozen=True)
 class ContactRow:
     """A contact as the sweeps see it.
@@ -135,6 +128,7 @@ class ContactRow:
         sides: one or two moving sides.
         normal: (3,) at the row's instant; the impulse's normal is ``impulse_normal``.
         impulse_normal: (3,).
+        answer: (3,) velocity of the touching points against each other for a unit normal impulse [1/kg].
         normal_mass, tangent_mass: effective masses [kg], 1 / (k + gamma) and 1 / k; across the normal k is the
             largest eigenvalue, one number, so that sliding friction stays opposite to the slip.
         spin_mass, roll_mass: the same for torques [kg m^2].
@@ -155,6 +149,7 @@ class ContactRow:
     sides: tuple[Side, ...]
     normal: Expr
     impulse_normal: Expr
+    answer: Expr
     normal_mass: Expr
     tangent_mass: Expr
     spin_mass: Expr
@@ -170,6 +165,10 @@ class ContactRow:
     width: Expr
     knob: Expr
     same: bool
+
+    def slip(self, momenta: tuple[Any, ...]) -> Expr:
+        """(3,) [m/s]: relative velocity of the touching points."""
+        return slip(self.sides, momenta)
 
     def kicked(self, momenta: tuple[Any, ...], linear: Expr, angular: Expr) -> tuple[Any, ...]:
         """The momenta of the row's bodies after impulses on the first side."""
@@ -218,28 +217,3 @@ def free_slip(sides: Sequence[Side], motions: Moving) -> Expr:
         spin = apply(side.inverse_inertia, motion.mid_momentum)
         total += side.sign * (motion.mid_velocity + ca.cross(spin, side.arm))
     return total
-
-
-def inverse_masses(sides: Sequence[Side], n: Expr, same: bool) -> tuple[Expr, Expr, Expr, Expr]:
-    """k along the normal, across it, and for torques about it and across it."""
-    push, twist = mobilities(sides, same)
-    if any(side.reach is not None for side in sides):
-        push, twist = (push + push.T) / 2, (twist + twist.T) / 2
-    return along(push, n), across(push, n), along(twist, n), across(twist, n)
-
-
-def effective_masses(normal: Expr, tangent: Expr, spin: Expr, roll: Expr) -> dict[str, Expr]:
-    """The fields of a row from the inverse effective masses k; here they are inverted once, not in each sweep."""
-    return {"normal_mass": 1 / normal, "tangent_mass": 1 / tangent, "spin_mass": 1 / spin, "roll_mass": 1 / roll}
-
-
-def along(k: Expr, n: Expr) -> Expr:
-    """n . k n."""
-    return ca.dot(n, ca.mtimes(k, n))
-
-
-def across(k: Expr, n: Expr) -> Expr:
-    """The largest eigenvalue of the symmetric (3, 3) ``k`` restricted to the plane across the unit vector n."""
-    half_trace = (ca.trace(k) - along(k, n)) / 2
-    determinant = ca.dot(n, ca.mtimes(ca.adj(k), n))
-    return half_trace + ca.sqrt(ca.fmax(half_trace**2 - determinant, 0) + TINY_SQUARE)

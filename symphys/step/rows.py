@@ -14,16 +14,8 @@ import casadi as ca
 from symphys.collide.contact import Contact
 from symphys.collide.touch import TINY_RATE
 from symphys.smooth import clip, positive
-from symphys.step.row import (
-    UNREACHED,
-    ContactRow,
-    Moving,
-    at_touch,
-    effective_masses,
-    free_slip,
-    inverse_masses,
-    make_sides,
-)
+from symphys.step.masses import answer_of, effective_masses, inverse_masses
+from symphys.step.row import UNREACHED, ContactRow, Moving, at_touch, free_slip, make_sides
 from symphys.step.scene import Setting
 from symphys.world import Law
 
@@ -85,6 +77,7 @@ def prepare(
         sides=sides,
         normal=frame.normal,
         impulse_normal=applied.normal,
+        answer=answer_of(sides, applied.normal, same),
         **effective_masses(k_normal + softness, *k_others),
         softness=softness,
         target=ca.if_else(spared, UNREACHED, target),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
+from itertools import count
 from typing import Any
 
 import casadi as ca
@@ -96,6 +97,26 @@ def leaves_of(shape: Any, found: list[Leaf]) -> None:
     else:
         for part in shape.below:
             leaves_of(part, found)
+
+
+def slots_of(shape: Any) -> list[int]:
+    """For each matrix of a tree, from its shape, in order: in which slot it lies.
+
+    Members of a tuple that are trees themselves have slots of their own, all else lies together.
+    """
+    found: list[int] = []
+    numbers = count()
+
+    def visit(part: Any, slot: int) -> None:
+        if type(part) is Leaf:
+            found.append(slot)
+            return
+        apart = part.kind is tuple and any(type(member) is Knot for member in part.below)
+        for member in part.below:
+            visit(member, next(numbers) if apart else slot)
+
+    visit(shape, next(numbers))
+    return found
 
 
 def matrix(leaf: Leaf, entries: list[Expr]) -> Expr:

@@ -118,8 +118,10 @@ def step_calls(samples: Places, exact: bool) -> list[Call]:
                 places[slot] = _part(samples.x, columns[slot.name])
             elif slot.name:
                 places[slot] = arguments[slot.name]
-        places.setdefault(piece.output, samples.layout.take(piece.output.size))
-        calls.append(Call(piece.function, tuple(places[slot] for slot in piece.inputs), (places[piece.output],)))
+        for slot in piece.outputs:
+            places.setdefault(slot, samples.layout.take(slot.size))
+        inputs, outputs = (tuple(places[slot] for slot in slots) for slots in (piece.inputs, piece.outputs))
+        calls.append(Call(piece.function, inputs, outputs))
     if rollout.memory.columns:
         calls.append(_remember(samples))
     return calls

@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 from operations import ARGUMENTS, PAIRS, SMOOTH, alone, build, every_operation, long_function
 
 from symphys.kernel import Cache, compile_program
+from symphys.kernel.adjoint import adjoint_graph
 from symphys.kernel.instructions import graph_of
+from symphys.kernel.rewrite import taped
 
 step = st.tuples(st.integers(0, len(SMOOTH) + len(PAIRS) - 1), st.integers(0, 10**6), st.integers(0, 10**6))
 
@@ -75,6 +77,25 @@ def test_equal_values_are_computed_once() -> None:
     x = ca.SX.sym("x")
     doubled = graph_of(ca.Function("f", [x], [ca.sin(x) * ca.cos(x) + ca.cos(x) * ca.sin(x)]))
     assert [node.op for node in doubled.nodes] == ["input", "sin", "cos", "mul", "add"]
+
+
+def test_divisions_by_powers_of_two_are_products_to_the_last_bit() -> None:
+    """Others are not: 1/3 is rounded, and 2^-1074 has no reciprocal."""
+    x = ca.SX.sym("x")
+    for divisor, op in ((4.0, "mul"), (-0.5, "mul"), (3.0, "div"), (2.0**-1074, "div")):
+        quotient = graph_of(ca.Function("f", [x], [x / divisor]))
+        assert quotient.nodes[quotient.results[0][0]].op == op, divisor
+
+
+def test_adjoints_find_what_the_call_has_computed() -> None:
+    """Of x y / (y + x) the sum and the quotient, though written the other way round; what is new is one reciprocal."""
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    function = ca.Function("f", [x, y], [x * y / (y + x)])
+    forward = graph_of(function)
+    pair = taped(forward, adjoint_graph(function, forward, (True, True), (True,)))
+    assert pair is not None
+    operations = [pair.forward.nodes[k].op for k in pair.forward.needed()]
+    assert (operations.count("add"), operations.count("div")) == (1, 2)
 
 
 def test_a_branch_becomes_one_select() -> None:

@@ -13,6 +13,7 @@ from symphys.state import Layout, initial_state
 from symphys.step import Piece, Recording, Slot, record_step, step_function
 from symphys.step.pieces import Pieces
 from symphys.step.record import Recorder
+from symphys.step.trim import trimmed
 from symphys.world import Body, Law, Scheme, World, make_world
 
 INPUTS = ("a.force",)
@@ -40,10 +41,10 @@ def shapes() -> World:
     return World(world.bodies, world.statics, tuple(p for p in world.pairs if p.name.split(":")[0] in kept))
 
 
-def evaluate(piece: Piece, values: dict[Slot, np.ndarray]) -> np.ndarray:
+def evaluate(piece: Piece, values: dict[Slot, np.ndarray]) -> dict[Slot, np.ndarray]:
     """What a piece gives."""
-    (result,) = piece.function.call([ca.DM(values[slot]) for slot in piece.inputs])
-    return np.array(ca.DM(result)).ravel()
+    results = piece.function.call([ca.DM(values[slot]) for slot in piece.inputs])
+    return {slot: np.array(ca.DM(result)).ravel() for slot, result in zip(piece.outputs, results, strict=True)}
 
 
 def run(recording: Recording, layout: Layout, x: np.ndarray, u: np.ndarray, knob: float, p: Any = ()) -> np.ndarray:
@@ -56,9 +57,9 @@ def run(recording: Recording, layout: Layout, x: np.ndarray, u: np.ndarray, knob
                 values[slot] = x[layout[slot.name]]
             elif slot.name:
                 values[slot] = {"u": u, "p": np.array(p), "smoothing": np.array([knob])}[slot.name]
-        values[piece.output] = evaluate(piece, values)
-        if piece.output in recording.results:
-            after[recording.results[piece.output]] = values[piece.output]
+        values |= evaluate(piece, values)
+        for slot in recording.results.keys() & set(piece.outputs):
+            after[recording.results[slot]] = values[slot]
     return after
 
 
@@ -113,10 +114,49 @@ def test_equal_parts_share_a_function_and_numbers_in_passing_are_no_part_of_it()
     again, *_ = recorder.do(part, {"a": y[0], "b": y[1]})
     first, second = recorder.pieces
     assert first.function is second.function
-    assert (first.output.size, first.inputs[0].name, second.inputs[0].name) == (1, "x", "y")
+    assert (first.outputs[0].size, first.inputs[0].name, second.inputs[0].name) == (1, "x", "y")
     assert recorder.value(passed).element_hash() == x[1].element_hash()
     assert float(recorder.value(constant)) == 3
     assert recorder.value(square).element_hash() != recorder.value(again).element_hash()
+
+
+def test_members_of_a_tuple_look_alike_to_what_comes_next() -> None:
+    recorder, x = Recorder(), ca.SX.sym("x", 4)
+    recorder.argument("x", x)
+    pairs = recorder.do(lambda x: ((2 * x[0], 3 * x[1]), (4 * x[2], 5 * x[3])), x)
+    for pair in pairs:
+        recorder.do(added, *pair)
+    _, first, second = recorder.pieces
+    assert first.function is second.function
+    assert first.inputs[0] != second.inputs[0]
+
+
+def added(a: ca.SX, b: ca.SX) -> ca.SX:
+    return a + b
+
+
+def test_what_is_asked_for_twice_is_computed_once() -> None:
+    recorder, x = Recorder(), ca.SX.sym("x", 2)
+    recorder.argument("x", x)
+    first, second, other = (recorder.do(added, *pair) for pair in ((x[0], x[1]), (x[0], x[1]), (x[0], 2.0)))
+    assert first == second != other
+    assert len(recorder.pieces) == 2
+
+
+def test_what_nobody_reads_is_left_out() -> None:
+    """Of a record of four words one is read, by way of a part of which one result is read; another part not at all."""
+    recorder, x = Recorder(), ca.SX.sym("x", 4)
+    recorder.argument("x", x)
+    squares = recorder.do(lambda x: x * x, x)
+    recorder.do(lambda squares: ca.sin(squares), squares)
+    root, _ = recorder.do(lambda squares: (ca.sqrt(squares[2]), ca.exp(squares[1])), squares)
+    recorder.give("next", [root])
+    left = trimmed(recorder.pieces)
+    assert [(piece.function.nnz_in(), piece.function.nnz_out()) for piece in left] == [(4, 1), (1, 1), (1, 1)]
+    values = {left[0].inputs[0]: np.array([1.0, 2.0, 3.0, 4.0])}
+    for piece in left:
+        values |= evaluate(piece, values)
+    assert values[left[-1].outputs[0]] == pytest.approx([3.0])
 
 
 def turn(pieces: Pieces, factor: float, state: ca.SX) -> ca.SX:
@@ -135,11 +175,11 @@ def test_sweeps_that_change_places_are_right() -> None:
     values = np.array([1.0, 2.0])
     memory = {slot: values for piece in recorder.pieces for slot in piece.inputs if slot.name == "x"}
     for piece in recorder.pieces:
-        memory[piece.output] = evaluate(piece, memory)
+        memory |= evaluate(piece, memory)
     expected = values
     for _ in range(6):
         expected = np.array([expected[1] + 1, 2 * expected[0]])
-    assert memory[recorder.pieces[-1].output] == pytest.approx(expected)
+    assert memory[recorder.pieces[-1].outputs[0]] == pytest.approx(expected)
 
 
 def test_parameters_in_expressions_have_a_piece() -> None:
