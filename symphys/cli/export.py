@@ -49,9 +49,11 @@ def written(
     from symphys.export import c_files, casadi_files, mjcf_files
     from symphys.problem import require_solvable
     from symphys.transcription import transcribe
+    from symphys.transcription.large import require_small_nets
 
     if c is not None or casadi is not None:
         require_solvable(problem)
+        require_small_nets(problem, "export")
         transcription = transcribe(problem, backend="casadi")
     if c is not None:
         yield c, c_files(transcription, __version__)

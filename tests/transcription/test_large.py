@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from symphys.errors import ProblemError
 from symphys.problem import load_problem
 from symphys.transcription import Transcription, transcribe
-from symphys.transcription.large import LargeEvaluator, LargeTranscription, passes, split
+from symphys.transcription.large import LargeEvaluator, LargeTranscription, passes, require_small_nets, split
 
 Array = NDArray[np.float64]
 
@@ -183,3 +184,17 @@ def test_single_precision_of_nets(both: tuple[Transcription, LargeTranscription]
     assert a.gradient is not None and b.gradient is not None
     assert np.allclose(a.gradient, b.gradient, atol=1e-4 * np.abs(a.gradient).max())
     assert not np.array_equal(a.gradient, b.gradient)
+
+
+def test_what_large_nets_cannot_have(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Formulas that look at their weights, ``check`` and ``export``: refused by name, before anything is built."""
+    path = tmp_path / "hopping.toml"
+    path.write_text(
+        HOPPING.replace("ACTIVATION", "skip = true").replace('"[leg.torque, start]"', '"[leg.torque, weights]"')
+    )
+    problem = load_problem(path)
+    monkeypatch.setattr(split, "MOST_WEIGHTS", 10)
+    with pytest.raises(ProblemError, match='cost "effort": looks at weights'):
+        transcribe(problem)
+    with pytest.raises(ProblemError, match=r'controller "brain"\.net: has \d+ weights; check takes up to 10'):
+        require_small_nets(problem, "check")

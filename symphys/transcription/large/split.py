@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from symphys.controllers import Net
 from symphys.problem import Controller, Problem
 from symphys.transcription.along import Rollout, symbolic_rollout
+from symphys.transcription.large.refusals import refuse_formulas, refuse_large
 from symphys.transcription.names import input_names, spans
 
 Array = NDArray[np.float64]
@@ -26,7 +27,17 @@ def is_large(controller: Controller) -> bool:
 
 def has_large_nets(problem: Problem) -> bool:
     """Whether any is."""
-    return any(is_large(controller) for controller in problem.controllers)
+    return bool(large_nets(problem))
+
+
+def large_nets(problem: Problem) -> tuple[Controller, ...]:
+    """Those that are."""
+    return tuple(controller for controller in problem.controllers if is_large(controller))
+
+
+def require_small_nets(problem: Problem, what: str) -> None:
+    """ProblemError if there are large nets, from what cannot deal with them."""
+    refuse_large(problem, large_nets(problem), MOST_WEIGHTS, what)
 
 
 @dataclass(frozen=True)
@@ -75,11 +86,12 @@ class Split:
 
 
 def split(problem: Problem) -> Split:
-    """Take a problem apart."""
-    nets = tuple(controller for controller in problem.controllers if is_large(controller))
+    """Take a problem apart; ProblemError if its formulas look at the weights of large nets."""
+    nets = large_nets(problem)
     names = {name for controller in nets for name in controller.weights}
     parts = list(zip(problem.variables, spans(problem.variables), strict=True))
     kept = [(v, span) for v, span in parts if not any(slot.name in names for slot in v.slots)]
+    refuse_formulas(problem, [*names, *(v.name for v, span in parts if (v, span) not in kept)])
     others = tuple(controller for controller in problem.controllers if controller not in nets)
     rest = replace(problem, variables=tuple(v for v, _ in kept), controllers=others)
     rollout = symbolic_rollout(rest, input_names(problem))
