@@ -16,7 +16,11 @@ Expr = Any
 """casadi SX, MX or DM"""
 
 HELD = 1e-9
-"""Of a body's own mobility: what it keeps in directions in which joints do not let it move."""
+"""Of a body's own mobility: what it keeps in directions in which joints do not let it move.
+
+Impulses act at another instant than that at which velocities are asked for: a rod on a hinge that passes the upright
+between the two has a mobility below 0 along it.
+"""
 
 
 def mobilities(sides: Sequence[Side], same: bool) -> tuple[Expr, Expr]:
@@ -47,9 +51,11 @@ def answer_of(sides: Sequence[Side], n: Expr, same: bool) -> Expr:
 def inverse_masses(sides: Sequence[Side], n: Expr, same: bool) -> tuple[Expr, Expr, Expr, Expr]:
     """k along the normal, across it, and for torques about it and across it."""
     push, twist = mobilities(sides, same)
-    if any(side.reach is not None for side in sides):
-        push, twist = (push + push.T) / 2, (twist + twist.T) / 2
-    return along(push, n), across(push, n), along(twist, n), across(twist, n)
+    if all(side.reach is None for side in sides):
+        return along(push, n), across(push, n), along(twist, n), across(twist, n)
+    push, twist = (push + push.T) / 2, (twist + twist.T) / 2
+    normal, least = along(push, n), HELD * sum(side.inverse_mass for side in sides)
+    return ca.if_else(normal < least, least, normal), across(push, n), along(twist, n), across(twist, n)
 
 
 def effective_masses(normal: Expr, tangent: Expr, spin: Expr, roll: Expr) -> dict[str, Expr]:
