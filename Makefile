@@ -38,7 +38,8 @@ bench-contact: $(VENV)/.benching  ## errors of contact against the step, gradien
 	$(BIN)/python benchmarks/ablation.py
 	$(BIN)/python benchmarks/consistency.py build
 
-bench-robots: $(VENV)/.benching  ## jointed robots against MuJoCo: agreement, errors against the step, steps and derivatives a second
+bench-robots: $(VENV)/.benching  ## jointed robots: what each device of joints buys; agreement, errors, speed against MuJoCo
+	$(BIN)/python benchmarks/joint_study.py build
 	$(BIN)/python benchmarks/robot_agreement.py
 	$(BIN)/python benchmarks/robot_consistency.py build
 	$(BIN)/python benchmarks/robot_against_mujoco.py

@@ -43,16 +43,18 @@ def bouncing_box(batch: int = 16) -> Scene:
 
 
 def mechanical_energy(world: World, states: Array) -> Array:
-    """Kinetic and potential energy [J] of the one body of a world, from (..., nx) states."""
-    layout, (body,) = Layout(world), world.bodies
-    q = states[..., layout[f"{body.name}.orientation"]]
-    spin = states[..., layout[f"{body.name}.angular_velocity"]]
-    w, axis = q[..., :1], q[..., 1:]
-    twice = 2 * np.cross(axis, spin)
-    own = spin - w * twice + np.cross(axis, twice)
-    kinetic = body.mass * (states[..., layout[f"{body.name}.velocity"]] ** 2).sum(-1)
-    height = states[..., layout[f"{body.name}.position"]] @ np.array(world.gravity)
-    return np.asarray((kinetic + (own**2 * body.inertia).sum(-1)) / 2 - body.mass * height)
+    """Kinetic and potential energy [J] of all bodies of a world, from (..., nx) states."""
+    layout, total = Layout(world), np.zeros(states.shape[:-1])
+    for body in world.bodies:
+        q = states[..., layout[f"{body.name}.orientation"]]
+        spin = states[..., layout[f"{body.name}.angular_velocity"]]
+        w, axis = q[..., :1], q[..., 1:]
+        twice = 2 * np.cross(axis, spin)
+        own = spin - w * twice + np.cross(axis, twice)
+        kinetic = body.mass * (states[..., layout[f"{body.name}.velocity"]] ** 2).sum(-1)
+        height = states[..., layout[f"{body.name}.position"]] @ np.array(world.gravity)
+        total += (kinetic + (own**2 * body.inertia).sum(-1)) / 2 - body.mass * height
+    return total
 
 
 def spinning_ball(batch: int = 16) -> Scene:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -32,6 +32,7 @@ class Rolling:
         steps: int,
         start: tuple[int, Callable[[Expr], Expr]] | None = None,
         end: Callable[[Expr], Expr] | None = None,
+        seeded: Sequence[str] | None = None,
     ) -> None:
         """Say what is rolled out; it is compiled when first needed.
 
@@ -41,16 +42,17 @@ class Rolling:
             steps: of one call.
             start: the size of z, and the state at the start as an expression of z; None: z is that state.
             end: what is asked of the state at the end; None: all of it.
+            seeded: ("end",) or None: it can be differentiated; (): it cannot, which compiles faster.
         """
         self.columns = Columns(world)
         self.world, self.scheme, self.steps = world, scheme, steps
         self.size, self.start = start or (self.columns.size, lambda z: z)
-        self.end = end or (lambda x: x)
+        self.end, self.seeded = end or (lambda x: x), seeded
 
     @cached_property
     def kernel(self) -> Kernel:
         """The compiled rollout."""
-        return compile_program(self._program(), threads=1)
+        return compile_program(self._program(), seeded=self.seeded, threads=1)
 
     def ends(self, Z: Array) -> Array:
         """(batch, m) what is asked of the ends of rollouts from (batch, n)."""
@@ -109,7 +111,7 @@ class Walk:
         """States are asked for after every ``interval`` steps."""
         most = max(1, WORDS // Columns(world).size)
         lengths = (interval // k for k in range(1, interval + 1) if interval % k == 0)
-        self.rolling = Rolling(world, scheme, next(length for length in lengths if length <= most))
+        self.rolling = Rolling(world, scheme, next(length for length in lengths if length <= most), seeded=())
         self.calls = interval // self.rolling.steps
 
     def along(self, X: Array, count: int) -> Array:
