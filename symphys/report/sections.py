@@ -148,7 +148,9 @@ def found(run: Run, pictures: dict[str, Picture]) -> Html:
 
 
 def variable_rows(variable: Variable) -> list[list[str]]:
-    """One row for each component."""
+    """One row for each component; one for all of a variable with very many, such as the weights of a net."""
+    if len(variable.value) > MOST_ROWS:
+        return [many_row(variable)]
     rows: list[list[str]] = []
     for index, name in enumerate(component_names(variable)):
         value, guess = variable.value[index, 0], variable.guess[index, 0]
@@ -158,6 +160,16 @@ def variable_rows(variable: Variable) -> list[list[str]]:
         numbers = [show(guess), tag("b", show(value, 4)), show(low), show(high)]
         rows.append([label, *numbers, between(value, guess, low, high)])
     return rows
+
+
+def many_row(variable: Variable) -> list[str]:
+    """The range of very many components, and how far they are from the guess."""
+    guess, value = variable.guess[:, 0], variable.value[:, 0]
+    label = join([tag("b", variable.name), f" {len(value)} numbers ", tag("small", ", ".join(variable.sets))])
+    ranges = [f"{show(float(of.min()))} to {show(float(of.max()))}" for of in (guess, value)]
+    bounds = [show(float(variable.lower[:, 0].min())), show(float(variable.upper[:, 0].max()))]
+    change = math.sqrt(float(((value - guess) ** 2).mean()))
+    return [label, ranges[0], tag("b", ranges[1]), *bounds, f"changed by {show(change)} (rms)"]
 
 
 def between(value: float, guess: float, low: float, high: float) -> Html:

@@ -16,6 +16,8 @@ from symphys.report.examination import Energy, Gain, GradientCheck, Growth, Refi
 from symphys.report.levels import BAD, FAIR, GOOD, UNKNOWN, Judged, graded
 from symphys.report.markup import Html, tag
 from symphys.report.output import slug
+from symphys.report.records import Variable
+from symphys.report.sections import variable_rows
 from symphys.report.trust import advice, answers, findings, slopes
 from symphys.report.trust_numerics import slope_finding, smoothed_findings
 from symphys.report.trust_physics import depth_finding, residual_finding
@@ -156,3 +158,12 @@ def test_tables_of_refinement() -> None:
     header, rows = slopes(SOUND)
     assert header[-2:] == ["dt / 2", "sweeps x 2"]
     assert rows == [["throw", "1", "1 × 10⁻⁹", "agrees", "1 %", "0 %"]]  # noqa: RUF001
+
+
+def test_weights_of_a_net_take_one_row() -> None:
+    """The range of the guess and of what was found, and how far they are apart."""
+    guess, free = np.linspace(-1, 2, 500)[:, None], np.full((500, 1), np.inf)
+    (row,) = variable_rows(Variable("w", ("brain.weights",), guess + 0.5, guess, -free, free))
+    text = " ".join(row)
+    assert "500 numbers" in text and "brain.weights" in text
+    assert "1 to 2" in text and "0.5 to 2.5" in text and "changed by 0.5 (rms)" in text

@@ -1,0 +1,26 @@
+"""An arm whose net learns to bring its hand to a point, within the evaluations of the paper."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from shipped import shipped, solve, work
+
+POINT, TIP = np.array([0.2, 0.35, 0.3]), np.array([0, 0, 0.075])
+
+
+@pytest.mark.parametrize("seed", [0, 2])
+def test_reaches_the_point(seed: int) -> None:
+    """Within 1 cm after 7 s and at the end, in at most 150 gradients; servos stay within their limits."""
+    made = shipped("arm_reach")
+    assert made.shooting.n == 17284
+    found = solve("gradient", made, seed)
+    assert work(found) <= 150
+    motion = made.simulate(found.z)
+    for k in (700, 800):
+        w, *axis = motion.orientation[k, 3]
+        tip = motion.position[k, 3] + Rotation.from_quat([*axis, w]).apply(TIP)
+        assert np.linalg.norm(tip - POINT) < 0.01
+    assert np.abs(motion.joint_value).max() < np.pi / 2 + 1e-3
+    assert np.abs(motion.joint_torque).max() < 30 + 1e-9
