@@ -78,7 +78,7 @@ def test_motions_are_recorded(make_job: MakeJob) -> None:
         assert motion["position"][-1, 0, 0] == pytest.approx(0.2)
     scene = files.read_json(job.folder.path / "scene.json")
     assert scene["bodies"] == [
-        {"name": "ball", "shapes": [{"kind": "sphere", "radius": 0.1, "centre": [0.0, 0.0, 0.0]}]}
+        {"name": "ball", "mass": 1.0, "shapes": [{"kind": "sphere", "radius": 0.1, "centre": [0.0, 0.0, 0.0]}]}
     ]
     assert scene["planes"] == [{"name": "ground", "normal": [0.0, 0.0, 1.0], "offset": 0.0}]
 
