@@ -148,16 +148,7 @@ def motion_from(
     turned, w = turning
     acceleration = gravity + state.force / mass
     mid_momentum = state.angular_momentum + dt / 2 * state.torque
-    inverse_rate = None
-    if isotropic(inertia):
-        inverse_mid, inertia_mid = 1 / inertia, inertia_matrix(inertia)
-    else:
-        turned_mid = rotation.matrix(rotation.turn(state.orientation, dt / 2 * w))
-        inverse_mid = inverse_inertia(inertia, turned_mid)
-        inertia_mid = in_world(inertia_matrix(inertia), turned_mid)
-        spin: Expr = rotation.cross_matrix(apply(inverse_mid, mid_momentum))
-        changing: Expr = ca.mtimes(spin, inverse_mid)
-        inverse_rate = changing + changing.T
+    inverse_mid, inertia_mid, inverse_rate = _inertias(inertia, state, dt / 2 * w, mid_momentum)
     return Motion(
         position=state.position,
         rotation=turned,
@@ -177,3 +168,13 @@ def motion_from(
         inverse_rate=inverse_rate,
         inertia_mid=inertia_mid,
     )
+
+
+def _inertias(inertia: Expr, state: BodyState, turn: Expr, momentum: Expr) -> tuple[Expr, Expr, Expr | None]:
+    """Mid-step, turned by ``turn`` (3,): inverse inertia, inertia, and the rate of the inverse, None if isotropic."""
+    if isotropic(inertia):
+        return 1 / inertia, inertia_matrix(inertia), None
+    turned = rotation.matrix(rotation.turn(state.orientation, turn))
+    inverse = inverse_inertia(inertia, turned)
+    changing: Expr = ca.mtimes(rotation.cross_matrix(apply(inverse, momentum)), inverse)
+    return inverse, in_world(inertia_matrix(inertia), turned), changing + changing.T

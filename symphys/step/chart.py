@@ -15,6 +15,7 @@ from typing import Any
 
 import casadi as ca
 
+from symphys.collide.contact import Shift
 from symphys.joints import Linkage
 from symphys.motion import Held, Motion, apply
 from symphys.step import screws
@@ -96,9 +97,21 @@ def acts(joint: Any) -> bool:
 
 def body_momenta(pieces: Pieces, chart: Chart, rates: Any) -> tuple[Momentum, ...]:
     """Of the bodies of a tree, from the rates that sweeps know of it."""
+    return tuple(pieces.do(_momentum, *each) for each in zip(_moving(pieces, chart, rates), chart.bodies, strict=True))
+
+
+def body_shifts(pieces: Pieces, chart: Chart, along: Any) -> tuple[Shift, ...]:
+    """Of the bodies of a tree, from displacements along its coordinates."""
+    return tuple(pieces.do(_shift, *each) for each in zip(_moving(pieces, chart, along), chart.bodies, strict=True))
+
+
+def _moving(pieces: Pieces, chart: Chart, rates: Any) -> tuple[Screw, ...]:
     apart = pieces.do(_apart, numbering(chart.tree), rates.numbers)
-    screws_of = moving(pieces, chart.tree, chart.matrix, apart).screws
-    return tuple(pieces.do(_momentum, *each) for each in zip(screws_of, chart.bodies, strict=True))
+    return moving(pieces, chart.tree, chart.matrix, apart).screws
+
+
+def _shift(screw: Screw, body: Placed) -> Shift:
+    return Shift(*screws.at_place(screw.parts, body.place))
 
 
 def _momentum(screw: Screw, body: Placed) -> Momentum:

@@ -15,8 +15,8 @@ from symphys.motion import Motion, angular_velocity
 from symphys.state import BODY_FIELDS
 from symphys.step.holding import fitting, hold, keep_up, kept_forces, struck_by_component
 from symphys.step.impulse import ZERO, Impulse
-from symphys.step.jointed import joint_rows, make_trees, momenta_of, resumed
-from symphys.step.momentum import Momentum
+from symphys.step.jointed import Trees, joint_rows, make_trees, momenta_of, resumed
+from symphys.step.momentum import Momenta, Momentum
 from symphys.step.paths import bodies_of, expected_motions, free_motions, look
 from symphys.step.pgs import Row, begin, relax
 from symphys.step.position import close_gaps, displacements
@@ -65,11 +65,7 @@ def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = ())
     trees = make_trees(scene, paths, free, half)
 
     # rows: where, when and how the surfaces meet, what acts along the coordinates of joints
-    rows = []
-    for pair, contact, off in zip(pairs, contacts, spared or [ca.SX(0)] * len(pairs), strict=True):
-        bodies, force = bodies_of(pair), x[f"{pair.name}.force"]
-        arguments = tuple(trees.motions[i] for i in bodies), duration, off, force, trees.same(bodies)
-        rows.append(trees.row(bodies, pieces.do(prepare, scene.setting, pair.law, contact, *arguments)))
+    rows = _contact_rows(scene, x, trees, contacts, duration, spared or [ca.SX(0)] * len(pairs))
     joints, fitted = joint_rows(scene, trees, paths, duration, kick)
 
     # velocities: warm start, then sweeps
@@ -79,9 +75,9 @@ def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = ())
     impulses, momenta = solved.impulses[n:], momenta_of(scene, trees, solved.momenta)
 
     # positions
-    moved, late = displacements(scene, trees, rows, start[n:], momenta, impulses, duration)
+    moved = displacements(scene, trees, rows, start[n:], solved.momenta, impulses, duration)
     meetings = list(zip(rows, contacts, impulses, strict=True))
-    shifts, made = close_gaps(scene, trees, meetings, fitted, moved, late)
+    shifts, made = close_gaps(scene, trees, meetings, fitted, moved)
 
     # the next state
     values: State = {"lag": half}
@@ -94,13 +90,37 @@ def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = ())
         momenta = keep_up(scene, momenta, made, struck, duration)
         warm = scene.setting.scheme.warm_start
         values |= forces if warm else {name: ca.SX.zeros(x[name].size1()) for name in forces}
-    ended = [pieces.do(_end_momentum, *parts) for parts in zip(motions, momenta, resting, strict=True)]
-    apart = [pieces.do(_velocities, *parts) for parts in zip(motions, ended, poses, strict=True)]
+    values |= _moving_bodies(scene, motions, momenta, resting, poses)
+    return Phase(values, tuple(rows), tuple(contacts), impulses, tuple(zip(solved.impulses, solved.last, strict=True)))
+
+
+def _contact_rows(
+    scene: Scene, x: State, trees: Trees, contacts: Sequence[Contact], duration: Expr, spared: Sequence[Expr]
+) -> list[Row]:
+    rows = []
+    for pair, contact, off in zip(scene.world.pairs, contacts, spared, strict=True):
+        bodies, force = bodies_of(pair), x[f"{pair.name}.force"]
+        arguments = tuple(trees.motions[i] for i in bodies), duration, off, force, trees.same(bodies)
+        rows.append(trees.row(bodies, scene.pieces.do(prepare, scene.setting, pair.law, contact, *arguments)))
+    return rows
+
+
+def _moving_bodies(
+    scene: Scene,
+    motions: Sequence[Motion],
+    momenta: Momenta,
+    resting: Sequence[tuple[Expr, Expr]],
+    poses: Sequence[tuple[Expr, Expr]],
+) -> State:
+    """The fields of all bodies at the end of the stretch."""
+    do, values = scene.pieces.do, State()
+    ended = [do(_end_momentum, *parts) for parts in zip(motions, momenta, resting, strict=True)]
+    apart = [do(_velocities, *parts) for parts in zip(motions, ended, poses, strict=True)]
     moving = fitting(scene, ended, poses, apart)
     for body, pose, velocities, reaction in zip(scene.world.bodies, poses, moving, resting, strict=True):
         stored = (*pose, *velocities, *reaction)
         values |= {f"{body.name}.{field}": value for (field, _), value in zip(BODY_FIELDS, stored, strict=True)}
-    return Phase(values, tuple(rows), tuple(contacts), impulses, tuple(zip(solved.impulses, solved.last, strict=True)))
+    return values
 
 
 def _mid_momentum(motion: Motion) -> Momentum:

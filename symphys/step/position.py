@@ -9,12 +9,14 @@ from typing import Any
 import casadi as ca
 
 from symphys.collide.contact import UNMOVED, Contact, Shift
+from symphys.joints import linkages
 from symphys.motion import Held, Motion, apply
 from symphys.step.axis import AxisRow
+from symphys.step.chart import body_shifts
 from symphys.step.impulse import Impulse
 from symphys.step.jointed import Trees
 from symphys.step.lock import LockRow
-from symphys.step.momentum import Momenta, Momentum, Moved, Rates
+from symphys.step.momentum import Momenta, Momentum, Moved, Rates, States
 from symphys.step.pgs import Row
 from symphys.step.pieces import Pieces
 from symphys.step.row import ContactRow, Side
@@ -35,24 +37,27 @@ def displacements(
     trees: Trees,
     rows: Sequence[Row],
     started: Sequence[Impulse],
-    momenta: Momenta,
+    solved: States,
     given: Sequence[Impulse],
     duration: Expr,
-) -> tuple[list[Shift], list[Displaced]]:
-    """Duration times the new velocities, and less what impulses would have done before they act, at the carriers."""
+) -> list[Displaced]:
+    """Duration times the new velocities, less what impulses would have done before they act, at the carriers."""
     do = scene.pieces.do
-    shifts = [do(_drift, motion, momentum, duration) for motion, momentum in zip(trees.motions, momenta, strict=True)]
-    late = [_still(state) for state in trees.states]
+    late = [do(_drift, motion, state, duration) for motion, state in zip(trees.motions, solved, strict=True)]
     if not scene.setting.scheme.time_of_impact:
-        return shifts, late
+        return late
     for each, *impulses in zip(rows, started, given, strict=True):
         for side, (body, carrier) in enumerate(zip(each.bodies, each.carriers, strict=True)):
             late[carrier] = do(_delayed, late[carrier], each.row, side, impulses, trees.motions[body].inverse_mid)
-    return shifts, late
+    return late
 
 
-def _drift(motion: Motion, momentum: Momentum, duration: Expr) -> Shift:
-    return Shift(duration * momentum.velocity, duration * apply(motion.inverse_mid, momentum.angular))
+def _drift(motion: Motion, state: Moved, duration: Expr) -> Displaced:
+    if state is None:
+        return None
+    if isinstance(state, Rates):
+        return Rates(duration * state.numbers)
+    return Shift(duration * state.velocity, duration * apply(motion.inverse_mid, state.angular))
 
 
 def _delayed(late: Displaced, row: ContactRow, k: int, impulses: list[Impulse], turning: Expr) -> Displaced:
@@ -75,8 +80,7 @@ def close_gaps(
     trees: Trees,
     rows: Sequence[tuple[Row, Contact, Impulse]],
     joints: Sequence[Row],
-    shifts: list[Shift],
-    late: list[Displaced],
+    moved: Sequence[Displaced],
 ) -> tuple[Shifts, Momenta]:
     """Gauss-Seidel on the displacements until no rigid contact overlaps, and those that last do not gape; then joints.
 
@@ -91,15 +95,22 @@ def close_gaps(
         (each, contact, do(_lasts, each.row, impulse)) for each, contact, impulse in rows if not each.row.law.soft
     )
     limits = tuple(each for each in joints if _of_tree(each))
-    context = Passing(tuple(shifts), trees.motions, rigid, limits, scheme.push_out)
-    before: Pushed = tuple(late), tuple(ca.SX(0) for _ in rigid)
+    context = Passing(trees.motions, rigid, limits, scheme.push_out)
+    before: Pushed = tuple(moved), tuple(ca.SX(0) for _ in rigid)
     along, _ = scene.pieces.repeat(scheme.position_sweeps, _push_all, context, before)
-    pushed = tuple(
-        do(_displaced, shift, trees.motions[i].held, along[trees.carriers[i]]) for i, shift in enumerate(shifts)
-    )
+    shifts = _shifts(scene, trees, along)
     none = Momentum(ca.SX.zeros(3), ca.SX.zeros(3))
     locks = tuple(each for each in joints if not _of_tree(each))
-    return scene.pieces.repeat(scheme.position_sweeps, _fit_all, locks, (pushed, tuple(none for _ in shifts)))
+    return scene.pieces.repeat(scheme.position_sweeps, _fit_all, locks, (shifts, tuple(none for _ in shifts)))
+
+
+def _shifts(scene: Scene, trees: Trees, along: Sequence[Displaced]) -> Shifts:
+    """Of all bodies, those of trees from displacements along the tree's coordinates."""
+    found = list(along)
+    for tree, chart in zip(linkages(scene.world.joints), trees.charts, strict=True):
+        for body, shift in zip(tree.bodies, body_shifts(scene.pieces, chart, along[tree.root]), strict=True):
+            found[body] = shift
+    return tuple(found)  # type: ignore[arg-type]
 
 
 Pushed = tuple[tuple[Displaced, ...], tuple[Expr, ...]]
@@ -111,24 +122,16 @@ class Passing:
     """What stays the same over the sweeps of the pass over contacts.
 
     Attributes:
-        shifts: of the bodies before it.
         motions: of the bodies.
         rigid: contacts, and whether they last.
         limits: of coordinates of trees.
         share: of an overlap that a step takes back.
     """
 
-    shifts: Shifts
     motions: tuple[Motion, ...]
     rigid: tuple[tuple[Row, Contact, Expr], ...]
     limits: tuple[Row, ...]
     share: float
-
-
-def _still(state: Moved) -> Displaced:
-    if state is None:
-        return None
-    return Rates(ca.SX(state.numbers.leaf.rows, 1)) if isinstance(state, Rates) else UNMOVED
 
 
 def _of_tree(each: Row) -> bool:
@@ -140,14 +143,13 @@ def _lasts(row: ContactRow, impulse: Impulse) -> Expr:
     return ca.logic_and(row.lasts, impulse.normal > row.load)
 
 
-def _displaced(shift: Shift, held: Held | None, along: Displaced) -> Shift:
-    """A body's displacement with what pushes have added."""
+def _displaced(held: Held | None, along: Displaced) -> Shift:
+    """A body's displacement."""
     if held is not None and isinstance(along, Rates):
         more = apply(held.see, along.numbers)
-        return Shift(shift.linear + more[:3], shift.angular + more[3:])
-    if isinstance(along, Shift):
-        return Shift(shift.linear + along.linear, shift.angular + along.angular)
-    return shift
+        return Shift(more[:3], more[3:])
+    assert isinstance(along, Shift)
+    return along
 
 
 def _push_all(pieces: Pieces, context: Passing, state: Pushed) -> Pushed:
@@ -155,16 +157,12 @@ def _push_all(pieces: Pieces, context: Passing, state: Pushed) -> Pushed:
     along, pushes = list(state[0]), list(state[1])
     for k, (each, contact, lasts) in enumerate(context.rigid):
         own = tuple(along[i] for i in each.carriers)
-        moved = tuple(
-            pieces.do(_displaced, context.shifts[i], context.motions[i].held, a)
-            for i, a in zip(each.bodies, own, strict=True)
-        )
+        moved = tuple(pieces.do(_displaced, context.motions[i].held, a) for i, a in zip(each.bodies, own, strict=True))
         after, pushes[k] = pieces.do(_push, each.row, contact, lasts, moved, own, pushes[k], context.share)
         for i, displaced in zip(each.carriers, after, strict=True):
             along[i] = displaced
     for each in context.limits:
-        before = tuple(context.shifts[i] for i in each.bodies)
-        along[each.carriers[0]] = pieces.do(_back, each.row, before, along[each.carriers[0]])
+        along[each.carriers[0]] = pieces.do(_back, each.row, along[each.carriers[0]])
     return tuple(along), tuple(pushes)
 
 
@@ -198,10 +196,10 @@ def _pushed(side: Side, along: Displaced, step: Expr) -> Displaced:
     return Shift(along.linear + side.sign * side.inverse_mass * step, along.angular + side.sign * turn)
 
 
-def _back(row: AxisRow, before: Shifts, along: Rates) -> Rates:
+def _back(row: AxisRow, along: Rates) -> Rates:
     """The displacement along a tree's coordinates that takes a limit of one back to where it is kept."""
     assert row.of_tree is not None
-    moved = _relative(row, before) + ca.mtimes(row.of_tree.see, along.numbers)
+    moved = ca.mtimes(row.of_tree.see, along.numbers)
     return Rates(along.numbers + ca.mtimes(row.of_tree.gain, row.fitting(moved)))
 
 

@@ -7,6 +7,7 @@ u rebound speed, chi in [0, 1]: 1 where the rebound leaves the step, 0 where it 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -15,7 +16,7 @@ from symphys.collide.contact import Contact
 from symphys.collide.touch import TINY_RATE
 from symphys.smooth import clip, positive
 from symphys.step.masses import answer_of, effective_masses, inverse_masses
-from symphys.step.row import UNREACHED, ContactRow, Moving, at_touch, free_slip, make_sides
+from symphys.step.row import UNREACHED, ContactRow, Moving, Side, at_touch, free_slip, make_sides
 from symphys.step.scene import Setting
 from symphys.world import Law
 
@@ -47,31 +48,17 @@ def prepare(
         force: (3,) with which the contact acted at the end of the last step [N].
         same: whether both sides are of one tree of joints.
     """
-    scheme, knob = setting.scheme, setting.knob
-    time = contact.time if scheme.time_of_impact else ca.SX(0)
-    velocity, acceleration, normal = at_touch(contact, motions, time)
-    pull = ca.dot(normal, acceleration)
-    rebound = law.restitution * positive(-ca.dot(normal, velocity), knob)
-    hit = ca.if_else(spared, 0, contact.hit)  # at the end of a stretch rounding decides whether a spared one meets
-    leaving = hit * _leaves(rebound, pull, duration - time, setting.reference, scheme.dt, knob)
-    half = duration / 2
-    row_time = half + leaving * (time - half)
-    frame, applied = contact.meeting.frame(row_time), contact.meeting.frame(leaving * time)
+    scheme, knob, half = setting.scheme, setting.knob, duration / 2
+    touch = _touch(setting, law, contact, motions, duration, spared)
+    row_time = half + touch.leaving * (touch.time - half)
+    frame, applied = contact.meeting.frame(row_time), contact.meeting.frame(touch.leaving * touch.time)
     sides = make_sides(motions, row_time, frame, applied)
     k_normal, *k_others = inverse_masses(sides, frame.normal, same)
-    softness, target = _normal_target(law, contact, duration, time, rebound, pull, k_normal, knob)
-    landing = _landing(contact, duration, time, target, ca.dot(frame.normal, free_slip(sides, motions)))
-    quick = contact.rate < -setting.fast
-    weight = LOADED * setting.reference / k_normal
-    load, width = ca.dot(applied.normal, force), width_of(setting, contact)
-    lasts = _lasts(setting, law, contact, leaving, load > weight)
-    # on the central path a load keeps surfaces parting at w^2 / (4 k load): less that, what lasts is at rest
-    parting = width**2 / (4 * k_normal * ca.fmax(load, weight) * duration)
-    target = ca.if_else(lasts, -parting, target)
-    delay = hit * (time + (1 - leaving) * (landing - time))
-    if any(side.reach is not None for side in sides):  # of a tree: see ARCHITECTURE, "Feet that stand"
-        delay = ca.if_else(lasts, half, delay)
-    slip = hit * leaving * (half - time) * (acceleration - normal * pull)
+    softness, target = _normal_target(law, contact, duration, touch, k_normal, knob)
+    landing = _landing(contact, duration, touch.time, target, ca.dot(frame.normal, free_slip(sides, motions)))
+    weight, load = LOADED * setting.reference / k_normal, ca.dot(applied.normal, force)
+    lasts = _lasts(setting, law, contact, touch.leaving, load > weight)
+    target = ca.if_else(lasts, -_parting(setting, contact, k_normal, ca.fmax(load, weight), duration), target)
     return ContactRow(
         law=law,
         sides=sides,
@@ -81,16 +68,64 @@ def prepare(
         **effective_masses(k_normal + softness, *k_others),
         softness=softness,
         target=ca.if_else(spared, UNREACHED, target),
-        slip_target=slip if scheme.impact_friction else ca.SX.zeros(3),
-        delay=delay if scheme.time_of_impact else ca.SX(0),
-        leaving=leaving,
+        slip_target=touch.slip(half) if scheme.impact_friction else ca.SX.zeros(3),
+        delay=_delay(touch, landing, lasts, half, sides) if scheme.time_of_impact else ca.SX(0),
+        leaving=touch.leaving,
         lasts=lasts,
         load=weight * duration,
-        struck=ca.SX(0) if law.soft else ca.logic_and(hit, quick),
-        width=width,
+        struck=ca.SX(0) if law.soft else ca.logic_and(touch.hit, contact.rate < -setting.fast),
+        width=width_of(setting, contact),
         knob=knob,
         same=same,
     )
+
+
+@dataclass(frozen=True)
+class _Touch:
+    """What free motion and restitution make of a contact within a stretch.
+
+    Attributes:
+        time: at which the surfaces meet [s]; 0 without time of impact.
+        acceleration: (3,) of the free motion there, between the surfaces [m/s^2].
+        normal: (3,) there.
+        pull: the acceleration along it [m/s^2].
+        rebound: at which they would part [m/s].
+        hit: 1 if they meet within the stretch.
+        leaving: chi: 1 if they are still apart when it ends, 0 if they have fallen back by then.
+    """
+
+    time: Expr
+    acceleration: Expr
+    normal: Expr
+    pull: Expr
+    rebound: Expr
+    hit: Expr
+    leaving: Expr
+
+    def slip(self, half: Expr) -> Expr:
+        """(3,): what of the slip at mid-stretch comes after the impact, at whose instant friction acts [m/s]."""
+        return self.hit * self.leaving * (half - self.time) * (self.acceleration - self.normal * self.pull)
+
+
+def _touch(setting: Setting, law: Law, contact: Contact, motions: Moving, duration: Expr, spared: Expr) -> _Touch:
+    time = contact.time if setting.scheme.time_of_impact else ca.SX(0)
+    velocity, acceleration, normal = at_touch(contact, motions, time)
+    pull = ca.dot(normal, acceleration)
+    rebound = law.restitution * positive(-ca.dot(normal, velocity), setting.knob)
+    hit = ca.if_else(spared, 0, contact.hit)  # at the end of a stretch rounding decides whether a spared one meets
+    chi = _leaves(rebound, pull, duration - time, setting.reference, setting.scheme.dt, setting.knob)
+    return _Touch(time, acceleration, normal, pull, rebound, hit, hit * chi)
+
+
+def _delay(touch: _Touch, landing: Expr, lasts: Expr, half: Expr, sides: tuple[Side, ...]) -> Expr:
+    """How late the contact acts [s]. Lasting ones on trees: see ARCHITECTURE, "Feet that stand"."""
+    delay = touch.hit * (touch.time + (1 - touch.leaving) * (landing - touch.time))
+    return ca.if_else(lasts, half, delay) if any(side.reach is not None for side in sides) else delay
+
+
+def _parting(setting: Setting, contact: Contact, k_normal: Expr, load: Expr, duration: Expr) -> Expr:
+    """On the central path a load keeps surfaces parting at w^2 / (4 k load) [m/s]: less that, what lasts is at rest."""
+    return width_of(setting, contact) ** 2 / (4 * k_normal * load * duration)
 
 
 def width_of(setting: Setting, contact: Contact) -> Expr:
@@ -125,7 +160,7 @@ def _landing(contact: Contact, duration: Expr, time: Expr, target: Expr, free: E
 
 
 def _normal_target(
-    law: Law, contact: Contact, duration: Expr, time: Expr, rebound: Expr, pull: Expr, inverse_mass: Expr, knob: Expr
+    law: Law, contact: Contact, duration: Expr, touch: _Touch, inverse_mass: Expr, knob: Expr
 ) -> tuple[Expr, Expr]:
     """(softness, target): the velocity that the normal row asks for at the middle of the step.
 
@@ -135,10 +170,11 @@ def _normal_target(
     """
     away = -ca.fmax(contact.gap, 0) / duration
     if not law.soft:
-        return ca.SX(0), ca.if_else(contact.hit, positive(rebound + pull * (duration / 2 - time), knob), away)
+        carried = positive(touch.rebound + touch.pull * (duration / 2 - touch.time), knob)
+        return ca.SX(0), ca.if_else(contact.hit, carried, away)
     omega = 2 * ca.pi * law.frequency
     stiffness, damper = omega**2 / inverse_mass, 2 * law.damping * omega / inverse_mass
-    left = duration - time
+    left = duration - touch.time
     beta = stiffness / (damper + left * stiffness)
     gamma = 1 / (left * (damper + left * stiffness) + 1e-30)
     return gamma, ca.if_else(contact.hit, -beta * ca.fmin(contact.gap, 0), away)

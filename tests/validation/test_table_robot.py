@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from robot_growth import grown, rollout_of, visited
 from table_robot import starts, table_problem
 
 from symphys.kernel import Kernel, compile_program
 from symphys.problem import Problem
+from symphys.state import Layout
 from symphys.transcription import Rollout, symbolic_rollout
 from symphys.transcription.program import rollout_program
 from symphys.transcription.simulate import recorder, simulate
@@ -86,3 +88,19 @@ def test_robots_of_a_batch_are_those_alone(problem: Problem, kernel: Kernel) -> 
     for k in (0, 3, 10):
         assert np.array_equal(kernel.forward(Z[k], [0.0])["objective"][0], together["objective"][k])
         assert np.array_equal(kernel.gradient(Z[k], [1.0], [0.0])[1][0], slopes[k])
+
+
+def test_it_stands_and_so_does_its_gradient() -> None:
+    """Put down and pushed, at 20 sweeps, with exact instants of touch: it comes to rest, its adjoint does not grow."""
+    standing, kernel = rollout_of(toi=True, cuts=0, stride=0.0)
+    layout, last = Layout(standing.world), visited(standing, kernel)[-1]
+    for name in (name for name in layout.names() if name.endswith("velocity")):
+        assert np.abs(last[layout[name]]).max() < 1e-12, name
+    assert np.log10(grown(standing, kernel)).sum() < 1
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(("toi", "cuts", "decades"), [(False, 0, 6.5), (True, 1, 6.5), (True, 0, 10)])
+def test_trotting_lets_the_adjoint_grow_slowly(toi: bool, cuts: int, decades: float) -> None:
+    """Over 3 s; by 13 and 7 decades with instants of touch where pushes leave bodies behind that nothing touches."""
+    assert np.log10(grown(*rollout_of(toi, cuts, stride=0.1))).sum() < decades
