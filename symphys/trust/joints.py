@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.joints import Joint
+from symphys.joints import Joint, TorqueMotor
 from symphys.state import Layout
 from symphys.step import components
 from symphys.transcription import Record, Rollout
@@ -26,14 +26,17 @@ AT_LIMIT = 1e-6
 def joint_work(rollout: Rollout, record: Record) -> Array:
     """(N,) [J]: the work of motors and springs in each step.
 
-    Leapfrog: velocities at the ends of a step hold the persistent forces half a step ahead.
+    Leapfrog: velocities at the ends of a step hold the persistent forces half a stretch ahead. Of a step that is cut only
+    the last force is known: torque motors act with the same all along, others are taken to get there in even steps.
     """
     layout, x = Layout(rollout.world), record.course.x
     total, lag = np.zeros(rollout.steps), x[:, layout["lag"]]
     for joint, _, rate in coordinates(rollout, record):
         for part in (part for part in WORKING if part in joint.acting):
             force = x[:, layout[f"{joint.name}.{part}"]]
-            impulse = (rollout.dt / 2 + lag[:-1] + lag[1:]) * force[1:] - lag[:-1] * force[:-1]
+            told = part == "motor" and isinstance(joint.motor, TorqueMotor)
+            ahead = lag[:-1] + (rollout.dt if told else rollout.dt / 2 + lag[1:])
+            impulse = rollout.dt * force[:-1] + ahead * (force[1:] - force[:-1])
             total += (impulse * (rate[:-1] + rate[1:]) / 2).sum(axis=1)
     return total
 
