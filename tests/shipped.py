@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from symphys import problems
 from symphys.problem import load_problem, validate_options
-from symphys.solvers import Outcome, solver
+from symphys.solvers import Outcome, Status, solver
 from symphys.transcription import Transcription, transcribe
 
 Array = NDArray[np.float64]
@@ -29,6 +29,17 @@ def solve(name: str, made: Transcription, seed: int = 0, polish: bool = False) -
         shooting = replace(shooting, stop_when_met=False)
     options = validate_options(chosen.Options, problem.solver_tables.get(name, {}), problem.file, name)
     return chosen.solve(shooting, shooting.start(seed), options, seed)
+
+
+def met(name: str, made: Transcription, of: int, wanted: int) -> list[Outcome]:
+    """The first ``wanted`` of seeds that meet all; rounding decides which ones do where descents are rough."""
+    found: list[Outcome] = []
+    for seed in range(of):
+        outcome = solve(name, made, seed)
+        found += [outcome] if outcome.status == Status.MET else []
+        if len(found) == wanted:
+            return found
+    raise AssertionError(f"only {len(found)} of {of} seeds met all")
 
 
 def work(found: Outcome) -> int:

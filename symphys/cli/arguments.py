@@ -112,11 +112,13 @@ def problem_path(source: str) -> Path:
     return problems.find(source)
 
 
-def read_solvers(text: str | None) -> tuple[str, ...]:
-    """Names, separated by commas, each once; all solvers for None."""
+def read_solvers(text: str | None) -> tuple[str, ...] | None:
+    """Names, separated by commas, each once; None, for those that each problem is for, if nothing is asked for."""
     from symphys.solvers import SOLVERS
 
-    names = tuple(dict.fromkeys(SOLVERS if text is None else (name.strip() for name in text.split(","))))
+    if text is None:
+        return None
+    names = tuple(dict.fromkeys(name.strip() for name in text.split(",")))
     for name in names:
         if name not in SOLVERS:
             raise UsageFault(f"--solver: there is no solver {name!r}; {hint(name, SOLVERS)}")

@@ -112,7 +112,9 @@ def describe(problem: Problem) -> list[str]:
         sets = listed(slot.name for slot in variable.slots)
         lines.append(f"  variable     {variable.name}: {variable.guess.size} numbers, sets {sets}")
     for kind, things in (("cost", problem.costs), ("target", problem.targets), ("constraint", problem.constraints)):
-        lines += [f"  {kind:<12} {thing.name}: {thing.formula.text} ({moment(thing.at)})" for thing in things]
+        for thing in things:
+            formula = " ".join(thing.formula.text.split())
+            lines.append(f"  {kind:<12} {thing.name}: {formula} ({moment(thing.at)})")
     return lines
 
 

@@ -31,7 +31,9 @@ MOST_JOBS = 256
 
 @click.command()
 @click.argument("sources", metavar="FILE...", nargs=-1, required=True)
-@click.option("--solver", "names", metavar="A,B", help="Solvers, separated by commas.  [default: all]")
+@click.option(
+    "--solver", "names", metavar="A,B", help="Solvers, separated by commas.  [default: the file's `solvers`, else all]"
+)
 @click.option(
     "--seeds",
     type=click.IntRange(1, MOST_SEEDS),

@@ -150,6 +150,7 @@ def build(
         solver_tables=document.solver,
         sensors=sensors,
         controllers=controllers,
+        solvers=None if document.solvers is None else tuple(dict.fromkeys(document.solvers)),
     )
 
 

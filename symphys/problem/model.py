@@ -190,6 +190,7 @@ class Problem:
         variables, costs, targets, constraints: in the file's order.
         goal: the objective should come down to this; None for no goal.
         stop_when_met: stop at the first point that meets everything, instead of at an optimum.
+        solvers: the names of those that the problem is for, as the file has them; None for all.
         solver_tables: the raw [solver.NAME] tables by NAME.
         sensors, controllers: in the file's order.
     """
@@ -212,6 +213,7 @@ class Problem:
     solver_tables: dict[str, dict[str, object]]
     sensors: tuple[Sensor, ...] = ()
     controllers: tuple[Controller, ...] = ()
+    solvers: tuple[str, ...] | None = None
 
     @property
     def weights(self) -> dict[str, Array]:

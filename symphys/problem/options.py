@@ -56,12 +56,14 @@ def read_options(model: type[BaseModel], table: Mapping[str, object], where: str
     return {}
 
 
-def require_solvers(tables: Iterable[str], known: Iterable[str], file: str) -> None:
-    """ProblemError if a [solver.NAME] table has the name of no solver."""
+def require_solvers(tables: Iterable[str], asked: Iterable[str], known: Iterable[str], file: str) -> None:
+    """ProblemError if a [solver.NAME] table, or a name that the file's ``solvers`` asks for, is that of no solver."""
     names = list(known)
+    told = [(f"solver.{name}", name) for name in tables]
+    told += [(f"solvers[{k}]", name) for k, name in enumerate(asked)]
     issues = [
-        Issue(f"solver.{name}", f"there is no solver {quote(name)}; {hint(name, names)}")
-        for name in tables
+        Issue(where, f"there is no solver {quote(name)}; {hint(name, names)}")
+        for where, name in told
         if name not in names
     ]
     if issues:

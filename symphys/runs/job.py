@@ -46,14 +46,14 @@ class Job:
 
 def make_jobs(
     problems: Iterable[Problem],
-    solvers: Sequence[str],
+    solvers: Sequence[str] | None,
     seeds: Iterable[int],
     settings: dict[str, object],
     out: Path,
     command: str = "",
     backend: str = BEST,
 ) -> list[Job]:
-    """Every problem with every solver and seed, below the folder ``out``.
+    """Every problem with every solver and seed, below the folder ``out``; None: the solvers that each problem is for.
 
     ProblemError for a problem without variables or aims, and for bad solver options.
     """
@@ -62,7 +62,7 @@ def make_jobs(
     for problem in problems:
         require_solvable(problem)
         check_tables(problem)
-        for name in solvers:
+        for name in solvers or problem.solvers or SOLVERS:
             options = solver_options(problem, name)
             plain = dataclasses.asdict(options)
             for seed in seeds:
@@ -79,6 +79,6 @@ def solver_options(problem: Problem, name: str) -> Any:
 
 def check_tables(problem: Problem) -> None:
     """ProblemError if a [solver.NAME] table is of no solver, or sets what that solver does not take."""
-    require_solvers(problem.solver_tables, SOLVERS, problem.file)
+    require_solvers(problem.solver_tables, problem.solvers or (), SOLVERS, problem.file)
     for name in problem.solver_tables:
         solver_options(problem, name)

@@ -26,8 +26,8 @@ AT_LIMIT = 1e-6
 def joint_work(rollout: Rollout, record: Record) -> Array:
     """(N,) [J]: the work of motors and springs in each step.
 
-    Leapfrog: velocities at the ends of a step hold the persistent forces half a stretch ahead. Of a step that is cut only
-    the last force is known: torque motors act with the same all along, others are taken to get there in even steps.
+    Leapfrog: velocities at the ends of a step hold the persistent forces half a stretch ahead. Of a step that is cut
+    only the last force is known: torque motors act with it all along, others are taken to get there in even steps.
     """
     layout, x = Layout(rollout.world), record.course.x
     total, lag = np.zeros(rollout.steps), x[:, layout["lag"]]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import casadi as ca
@@ -126,6 +125,6 @@ def test_function_without_a_controller(tmp_path: Path) -> None:
     path = tmp_path / "arm.toml"
     path.write_text(SOURCE)
     o, t, w = ca.SX.sym("o", 2), ca.SX.sym("t"), ca.SX.sym("w")
-    make: Callable[[], object] = lambda: load_problem(path, functions={"brian": ca.Function("f", [o, t, w], [w])})  # noqa: E731
+    function = ca.Function("f", [o, t, w], [w])
     with pytest.raises(ProblemError, match="brian"):
-        make()
+        load_problem(path, functions={"brian": function})

@@ -98,6 +98,8 @@ def test_a_required_option() -> None:
 
 
 def test_names_of_solvers() -> None:
-    require_solvers(["cma"], ["cma", "gradient"], "file.toml")
+    require_solvers(["cma"], ["gradient"], ["cma", "gradient"], "file.toml")
     with pytest.raises(ProblemError, match=r'solver\.gradeint: there is no solver "gradeint"; did you mean "gradient"'):
-        require_solvers(["cma", "gradeint"], ["cma", "gradient"], "file.toml")
+        require_solvers(["cma", "gradeint"], [], ["cma", "gradient"], "file.toml")
+    with pytest.raises(ProblemError, match=r'solvers\[1\]: there is no solver "cmaes"; did you mean "cma"'):
+        require_solvers([], ["gradient", "cmaes"], ["cma", "gradient"], "file.toml")

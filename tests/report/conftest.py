@@ -11,6 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from walker import SCENE, write_walker
+
+from symphys.report.recordings import read_trajectory
+from symphys.report.records import Trajectory
+from symphys.report.scene_file import read_scene
+from symphys.report.scenery import Scene
 
 Arrays = dict[str, Any]
 GRAVITY, BOUNCE, RADIUS = 9.81, 0.5, 0.5
@@ -248,3 +254,17 @@ def edit() -> Callable[..., None]:
         path.write_text(json.dumps({**json.loads(path.read_text()), **fields}))
 
     return change
+
+
+Load = Callable[..., tuple[Trajectory, Scene]]
+
+
+@pytest.fixture
+def load(tmp_path: Path) -> Load:
+    """Write arrays and scene, and read them."""
+
+    def do(arrays: dict[str, Any], scene: dict[str, Any] = SCENE) -> tuple[Trajectory, Scene]:
+        folder = write_walker(tmp_path, arrays, scene)
+        return read_trajectory(folder / "trajectory.npz"), read_scene(folder / "scene.json")
+
+    return do

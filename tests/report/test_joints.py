@@ -19,9 +19,7 @@ from symphys.report.joint_figures import BEYOND, FULL, TARGET, draw_joints, unwo
 from symphys.report.joint_grid import make_grid, shown
 from symphys.report.joint_section import limits_told, motors_told, separation_told
 from symphys.report.joint_use import channels, separation
-from symphys.report.recordings import read_trajectory
 from symphys.report.records import Trajectory
-from symphys.report.scene_file import read_scene
 from symphys.report.scenery import Scene
 
 Load = Callable[..., tuple[Trajectory, Scene]]
@@ -33,17 +31,6 @@ KNEE = 3
 def _on_paper() -> Iterator[None]:
     with style.paper():
         yield
-
-
-@pytest.fixture
-def load(tmp_path: Path) -> Load:
-    """Write arrays and scene, and read them."""
-
-    def do(arrays: dict[str, Any], scene: dict[str, Any] = SCENE) -> tuple[Trajectory, Scene]:
-        folder = write_walker(tmp_path, arrays, scene)
-        return read_trajectory(folder / "trajectory.npz"), read_scene(folder / "scene.json")
-
-    return do
 
 
 def worked() -> dict[str, Any]:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from page_scripts import NODE, plays_to_the_end, run_script
-from walker import DT, LEGS, NAMES, SCENE, STEPS, TURNED, hinge, motion, write_walker
+from walker import DT, LEGS, NAMES, SCENE, STEPS, TURNED, hinge, motion
 
 from symphys.report import style
 from symphys.report.animation import NUMBERS, motion_data
@@ -20,27 +19,14 @@ from symphys.report.joint_section import steps_told
 from symphys.report.limbs import colours, keys, limbs, traced
 from symphys.report.motion import draw_motion
 from symphys.report.pivots import axes_of, bones, on_side, pivot
-from symphys.report.recordings import read_trajectory
 from symphys.report.records import Trajectory
 from symphys.report.robots import extents, spaced
-from symphys.report.scene_file import read_scene
 from symphys.report.scenery import Scene
 from symphys.report.spans import spans
 from symphys.report.strip import draw_strip, make_strip
 from symphys.report.views import SIDE_XZ, TOP
 
 Load = Callable[..., tuple[Trajectory, Scene]]
-
-
-@pytest.fixture
-def load(tmp_path: Path) -> Load:
-    """Write arrays and scene, and read them."""
-
-    def do(arrays: dict[str, Any], scene: dict[str, Any] = SCENE) -> tuple[Trajectory, Scene]:
-        folder = write_walker(tmp_path, arrays, scene)
-        return read_trajectory(folder / "trajectory.npz"), read_scene(folder / "scene.json")
-
-    return do
 
 
 def trotting() -> dict[str, Any]:

@@ -31,6 +31,9 @@ class Document(Table):
 
     title: Label | None = Field(default=None, description="one line; default: the file's name")
     description: str = Field(default="", description="what the problem is about")
+    solvers: list[Label] | None = Field(
+        default=None, min_length=1, description="which solvers `symphys solve` runs without --solver; default: all"
+    )
     simulation: SimulationTable
     world: WorldTable = WorldTable()
     include: list[IncludeTable] = Field(default=[], max_length=MOST_INCLUDES)

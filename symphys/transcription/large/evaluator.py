@@ -78,10 +78,7 @@ class LargeEvaluator:
         return forward(self.made, self.stage, nets, z[None, parts.small], smoothing)
 
     def _nets(self, weights: Sequence[Array]) -> list[Layers]:
-        return [
-            Layers(controller.law, own, self.real)  # type: ignore[arg-type]
-            for controller, own in zip(self.made.split.nets, weights, strict=True)
-        ]
+        return [Layers(law, own, self.real) for law, own in zip(self.made.split.laws, weights, strict=True)]
 
     def _part(self, nets: Sequence[Layers], Z: Array, smoothing: float, gradient: bool) -> Shared:
         way = forward(self.made, self.stage, nets, Z, smoothing)

@@ -72,7 +72,7 @@ class Split:
         rollout: of the problem without its large nets, whose inputs they add to.
         small: (s,) the entries of z that it depends on.
         n: the length of z.
-        nets: the controllers that are large nets.
+        nets, laws: the controllers that are large nets, and the nets.
         places: for each (nu, m) which input an output is added to, scaled.
         weights: for each.
     """
@@ -81,6 +81,7 @@ class Split:
     small: Indices
     n: int
     nets: tuple[Controller, ...]
+    laws: tuple[Net, ...]
     places: tuple[Array, ...]
     weights: tuple[Weights, ...]
 
@@ -100,6 +101,7 @@ def split(problem: Problem) -> Split:
         small=np.concatenate([np.zeros(0, int), *(np.arange(*span) for _, span in kept)]),
         n=sum(v.guess.size for v in problem.variables),
         nets=nets,
+        laws=tuple(controller.law for controller in nets if isinstance(controller.law, Net)),
         places=tuple(np.array(ca.DM(rollout.control.place(controller)).full()) for controller in nets),
         weights=tuple(_weights(problem, controller) for controller in nets),
     )

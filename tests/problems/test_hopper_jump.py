@@ -1,0 +1,24 @@
+"""A hopper learns commands that make it jump."""
+
+from __future__ import annotations
+
+import numpy as np
+from shipped import met, shipped
+
+
+def test_it_jumps_half_a_metre() -> None:
+    """From two seeds of three: aloft for 0.1 s at least, landing on its foot, the leg within its limits."""
+    made = shipped("hopper_jump")
+    for found in met("gradient", made, of=3, wanted=2):
+        motion = made.simulate(found.z)
+        foot, torso = (motion.body_names.index(name) for name in ("foot", "torso"))
+        assert np.linalg.norm(motion.position[-1, foot] - [0.5, 0, 0.05]) < 0.05
+        assert np.linalg.norm(motion.position[0, foot] - [0, 0, 0.05]) < 1e-6
+        force = np.linalg.norm(motion.contact_force, axis=2).sum(axis=1)
+        aloft = np.flatnonzero(force == 0)
+        assert np.max(np.diff(np.flatnonzero(force > 0))) >= 10
+        assert motion.position[aloft, foot, 2].max() > 0.1
+        assert motion.position[:, torso, 2].min() > 0.3
+        leg = motion.joint_value[:, motion.joint_names.index("thruster"), 0]
+        assert leg.min() > -0.15 - 1e-3
+        assert leg.max() < 1e-3
