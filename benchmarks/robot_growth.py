@@ -23,7 +23,7 @@ from symphys.transcription.large.stage import Aims, stage_program, start_functio
 Array = NDArray[np.float64]
 STEPS = 300
 DIRECTIONS = 16
-SLOW = 10.0
+STEEP = 10.0
 """Steps in which the adjoint grows more than tenfold are counted."""
 
 
@@ -32,8 +32,8 @@ def main() -> None:
     for toi, cuts, stride in ((False, 0, 0.1), (True, 0, 0.1), (True, 1, 0.1), (False, 0, 0.0), (True, 0, 0.0)):
         growth = np.log10(grown(*rollout_of(toi, cuts, stride)))
         way = f"instants of touch {'exact' if toi else 'ignored'}, {cuts} cuts, {'trotting' if stride else 'standing'}"
-        fast = f"{np.sum(growth > np.log10(SLOW))} steps of {STEPS} more than tenfold"
-        print(f"{way:<50} 10^{growth.sum():5.1f}; {fast}, at most {10 ** growth.max():.0f}", flush=True)
+        steep = f"{np.sum(growth > np.log10(STEEP))} steps of {STEPS} more than tenfold"
+        print(f"{way:<50} 10^{growth.sum():5.1f}; {steep}, at most {10 ** growth.max():.0f}", flush=True)
 
 
 def rollout_of(toi: bool, cuts: int, stride: float) -> tuple[Rollout, Kernel]:

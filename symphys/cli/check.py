@@ -41,13 +41,11 @@ def check(source: str, assignments: tuple[str, ...], folder: Path | None) -> int
     from symphys.runs import check_tables
     from symphys.trajectory import NotFinite
     from symphys.transcription import transcribe
-    from symphys.transcription.large import require_small_nets
 
     (problem,) = read_problems([source], read_settings(assignments))
     check_tables(problem)
     click.echo("\n".join(describe(problem)))
     require_solvable(problem)
-    require_small_nets(problem, "check")
     transcription = transcribe(problem, backend="casadi")
     z = transcription.shooting.start(0) if folder is None else found(folder, transcription)
     try:

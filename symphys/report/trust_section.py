@@ -14,7 +14,7 @@ from symphys.report.trust import advice, answers, findings, slopes
 from symphys.report.trust_physics import sliding
 from symphys.report.words import show
 
-NOT_EXAMINED = "This run was not examined; nets of more than 4,096 weights are not."
+NOT_EXAMINED = "This run was not examined."
 TITLE = "How far to trust this"
 HOW_GROWN = (
     "By how much a small change of the state at time t is magnified until the end: distances in m, velocities in m/s, "
@@ -31,9 +31,7 @@ def trusted(run: Run, pictures: Mapping[str, Picture]) -> Html:
     judged = Judged(run.objective, run.worst, run.solved, bool(run.checks))
     lines = findings(run.trust, judged)
     if not lines:
-        unknown = (
-            tag("p", "This run was not examined; nets of more than 4,096 weights are not.") if run.readable else ""
-        )
+        unknown = tag("p", NOT_EXAMINED) if run.readable else ""
         return card(TITLE, unknown, anchor="trust")
     rows = [[pill(line.level, MARKS[line.level]), line.what, line.number, line.meaning] for line in lines]
     return card(

@@ -100,7 +100,7 @@ def judge(transcription: Transcription, outcome: Outcome) -> Judgement:
         verdict = transcription.judge(outcome.z)
         trajectory = transcription.simulate(outcome.z)
         over = outcome.status is not Status.INTERRUPTED
-        examined = trust.examine(transcription, outcome.z) if over and transcription.examinable else None
+        examined = trust.examine(transcription, outcome.z) if over else None
     except SymphysError as error:
         return Judgement(None, None, None, f"{outcome.advice} {error}".strip())
     smoothed = outcome.status is Status.MET and not verdict.solved and outcome.trace[-1].smoothing > 0

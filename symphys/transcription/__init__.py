@@ -3,15 +3,16 @@
 from symphys.transcription.along import Rollout, symbolic_rollout
 from symphys.transcription.faults import first_derivative_fault, first_fault
 from symphys.transcription.judge import Check, Verdict
+from symphys.transcription.probe import Probe
 from symphys.transcription.program import rollout_program
 from symphys.transcription.simulate import Record, plain
 from symphys.transcription.terms import Terms, terms
 from symphys.transcription.transcribe import transcribe
-from symphys.transcription.transcription import Judge, Transcription, judge_for, judge_of
+from symphys.transcription.transcription import Transcription
 
 __all__ = [
     "Check",
-    "Judge",
+    "Probe",
     "Record",
     "Rollout",
     "Terms",
@@ -19,8 +20,6 @@ __all__ = [
     "Verdict",
     "first_derivative_fault",
     "first_fault",
-    "judge_for",
-    "judge_of",
     "plain",
     "rollout_program",
     "symbolic_rollout",

@@ -21,8 +21,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Record:
-    """A rollout: all of its states and arguments, and the motion in them."""
+    """A rollout of ``z`` (n,): all of its states and arguments, and the motion in them."""
 
+    z: Array
     course: Course
     motion: Trajectory
 
@@ -38,10 +39,11 @@ def recorder(rollout: Rollout) -> ca.Function:
 def simulate(rollout: Rollout, record: Callable[..., Any], z: Array, smoothing: float) -> Record:
     """The rollout of z; NotFinite, which says where and why, if it has none."""
     x, u, given, p, *happened = (np.array(part).T for part in record(z, smoothing))
-    course = Course(np.asarray(z, float), smoothing, x, u, given, p.ravel())
+    z = np.asarray(z, float)
+    course = Course(z, smoothing, x, u, given, p.ravel())
     motion = _trajectory(rollout, x, u, p.ravel(), *happened)
     try:
-        return Record(course, motion.require_finite())
+        return Record(z, course, motion.require_finite())
     except NotFinite as error:
         raise NotFinite(f"{error}; {first_fault(rollout, course)}") from None
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from time import perf_counter
@@ -15,11 +15,12 @@ from symphys.backends import Description
 from symphys.problem import Problem
 from symphys.shooting import ShootingProblem
 from symphys.trajectory import Trajectory
-from symphys.transcription.along import Rollout, symbolic_rollout
+from symphys.transcription.along import Rollout
 from symphys.transcription.functions import ExpressionFunctions, function_of
 from symphys.transcription.judge import Verdict, verdict
+from symphys.transcription.probe import ExpressionProbe, Probe
 from symphys.transcription.simulate import Record, recorder, simulate
-from symphys.transcription.terms import Terms, terms
+from symphys.transcription.terms import Terms
 
 Array = NDArray[np.float64]
 Judge = Callable[..., Verdict]
@@ -44,11 +45,6 @@ class Transcription:
     shooting: ShootingProblem
     backend: Description
     build_seconds: float
-
-    @property
-    def examinable(self) -> bool:
-        """Whether ``trust.examine`` can look at its points."""
-        return True
 
     def judge(self, z: Array, smoothing: float = 0.0) -> Verdict:
         """How ``z`` does in the exact rollout, or in a smoothed one."""
@@ -80,6 +76,21 @@ class Transcription:
         return {kind: fastest(calls[kind]) / one for kind in kinds if kind in calls}
 
     @cached_property
+    def probe(self) -> Probe:
+        """What is differentiated to examine the gradient."""
+        return ExpressionProbe(self.rollout, self.terms)
+
+    def back(self, record: Record, ends: Array) -> Iterator[Array]:
+        """Derivatives of ends . x_N, with ``ends`` (nx, m), with respect to x_N-1, x_N-2 ... x_0: (nx, m) each."""
+        course, step = record.course, self.rollout.closed
+        backward, adjoint = step.reverse(ends.shape[1]), ends
+        results = [np.zeros(step.numel_out(i)) for i in range(step.n_out())]
+        inert = [np.zeros((len(result), ends.shape[1])) for result in results[1:]]
+        for k in reversed(range(self.rollout.steps)):
+            adjoint = np.array(backward(*course.closed_arguments(k, self.rollout), *results, adjoint, *inert)[0])
+            yield adjoint
+
+    @cached_property
     def _judge(self) -> Judge:
         return judge_of(self.rollout, self.terms)
 
@@ -97,12 +108,6 @@ def judge_of(rollout: Rollout, asked: Terms) -> Judge:
         return verdict(rollout.problem, float(objective), np.array(costs).ravel(), np.array(errors).ravel())
 
     return judge
-
-
-def judge_for(problem: Problem) -> Judge:
-    """The judge of a problem."""
-    rollout = symbolic_rollout(problem)
-    return judge_of(rollout, terms(rollout))
 
 
 def fastest(call: Callable[[], object]) -> float:

@@ -32,7 +32,7 @@ def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: No
     tell("refining the time step and the sweeps")
     finer = refinement.refine(transcription, z)
     tell("sweeping the sensitivity back through time")
-    grown = growth.growth(transcription.rollout, record)
+    grown = growth.growth(transcription, record)
     tell("smoothing, and adding up energy and momentum")
     return {
         "gradient": compared,
@@ -46,7 +46,7 @@ def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: No
 
 
 def _fault(transcription: Transcription, record: Record, compared: list[dict[str, Any]]) -> str:
-    verdict = transcription.judge(record.course.z)
+    verdict = transcription.judge(record.z)
     told = [verdict.objective, *verdict.costs.values(), *(check.error for check in verdict.checks)]
     if not np.isfinite([*told, *record.course.x.ravel()]).all():
         return first_fault(transcription.rollout, record.course)

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 from typing import Any
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from symphys.shooting import Block
-from symphys.transcription import Rollout, Terms, Transcription
+from symphys.transcription import Transcription
 
 Array = NDArray[np.float64]
+Value = Callable[[Array], float]
 
 DIFFERENCE_STEPS = (1e-4, 1e-5, 1e-6)
 """Steps of the central differences, as shares of the scale; the best counts, and a wrong slope passes none."""
@@ -26,8 +25,7 @@ NOTICED = 1e-4
 def compare_gradient(transcription: Transcription, z: Array) -> list[dict[str, Any]]:
     """Adjoint against central differences, per variable.
 
-    What is differentiated is a fixed random combination of every formula that the problem asks for (``Terms.means``),
-    because at a solution the gradient of the objective itself is zero.
+    What is differentiated is the transcription's ``Probe``, whose gradient does not vanish at a solution.
 
     Returns:
         For each variable "error", |adjoint - difference| / scale; "scale", the norm of its slope; "step", the step of
@@ -36,31 +34,12 @@ def compare_gradient(transcription: Transcription, z: Array) -> list[dict[str, A
         as much as a change of the variable by "jump" of its scale brings about. An impact at the very end of a step
         does that: the time grid changes sides.
     """
-    value, gradient = probe(transcription)
-    slope = np.array(gradient(z)).ravel()
-    return [_compare_block(value, block, z, slope) for block in transcription.shooting.blocks]
+    probe = transcription.probe
+    slope = probe.gradient(z)
+    return [_compare_block(probe.value, block, z, slope) for block in transcription.shooting.blocks]
 
 
-@lru_cache(maxsize=1)
-def probe(transcription: Transcription) -> tuple[ca.Function, ca.Function]:
-    """(z -> weights . every formula, z -> its gradient), exact contact."""
-    return probe_of(transcription.rollout, transcription.terms)
-
-
-def probe_of(rollout: Rollout, asked: Terms) -> tuple[ca.Function, ca.Function]:
-    """The probe of a rollout; its weights depend on the formulas alone, not on the time grid."""
-    weights = np.random.default_rng(0).uniform(0.5, 1.5, asked.means.shape[0])
-    combined = ca.dot(ca.DM(weights), ca.densify(asked.means))
-    z = ca.MX.sym("z", rollout.z.shape[0])
-
-    def exact(name: str, output: Any) -> ca.Function:
-        smooth = ca.Function(name, [rollout.z, rollout.smoothing], [ca.densify(output)])
-        return ca.Function(name, [z], [smooth(z, 0)])
-
-    return exact("probe", combined), exact("probe_gradient", ca.gradient(combined, rollout.z))
-
-
-def _compare_block(value: ca.Function, block: Block, z: Array, slope: Array) -> dict[str, Any]:
+def _compare_block(value: Value, block: Block, z: Array, slope: Array) -> dict[str, Any]:
     norm = float(np.linalg.norm(slope[block.start : block.stop])) or 1.0
     directions = _directions(block, block.stop - block.start, z.size)
     middle, at = _best(lambda d, step: _mismatch(value, z, slope, d, step), directions)
@@ -97,15 +76,15 @@ def _directions(block: Block, size: int, n: int) -> Array:
     return whole
 
 
-def _mismatch(value: ca.Function, z: Array, slope: Array, direction: Array, step: float) -> float:
-    high, low = (float(value(z + sign * step * direction)) for sign in (1, -1))
+def _mismatch(value: Value, z: Array, slope: Array, direction: Array, step: float) -> float:
+    high, low = (value(z + sign * step * direction) for sign in (1, -1))
     return abs((high - low) / (2 * step) - float(slope @ direction)) / float(np.linalg.norm(direction))
 
 
-def _mismatch_beside(value: ca.Function, z: Array, slope: Array, direction: Array, step: float) -> float:
+def _mismatch_beside(value: Value, z: Array, slope: Array, direction: Array, step: float) -> float:
     """The larger error of either side's derivative at z, from three points beside it: of second order."""
     errors = []
     for side in (step, -step):
-        one, two, three = (float(value(z + k * side * direction)) for k in (1, 2, 3))
+        one, two, three = (value(z + k * side * direction) for k in (1, 2, 3))
         errors.append(abs((8 * two - 5 * one - 3 * three) / (2 * side) - float(slope @ direction)))
     return max(errors) / float(np.linalg.norm(direction))

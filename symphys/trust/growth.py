@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.state import GIVEN, Layout
-from symphys.transcription import Record, Rollout
+from symphys.transcription import Record, Rollout, Transcription
 from symphys.trust.bodies import bodies
 
 Array = NDArray[np.float64]
@@ -22,7 +22,7 @@ DIRECTIONS = 4
 MOST_SAMPLES = 200
 
 
-def growth(rollout: Rollout, record: Record) -> dict[str, list[float]]:
+def growth(transcription: Transcription, record: Record) -> dict[str, list[float]]:
     """The sensitivity of the end along the horizon.
 
     Returns:
@@ -30,10 +30,11 @@ def growth(rollout: Rollout, record: Record) -> dict[str, list[float]]:
         adjoint is not finite. Distances count in m, velocities in m/s; angles and angular velocities count as those of
         points at the body's radius of gyration. What a state remembers of forces is left out.
     """
+    rollout = transcription.rollout
     count = len(state_columns(rollout))
     ends = np.linalg.qr(np.random.default_rng(2).standard_normal((count, min(DIRECTIONS, count))))[0]
     factors = np.full(rollout.steps + 1, np.nan)
-    for k, swept in backwards(rollout, record, ends):
+    for k, swept in backwards(transcription, record, ends):
         if not np.isfinite(swept).all():
             break
         factors[k] = np.linalg.norm(swept, 2)
@@ -46,27 +47,24 @@ def samples(count: int, most: int) -> NDArray[np.intp]:
     return np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(np.intp))
 
 
-def backwards(rollout: Rollout, record: Record, ends: Array) -> Iterator[tuple[int, Array]]:
+def backwards(transcription: Transcription, record: Record, ends: Array) -> Iterator[tuple[int, Array]]:
     """From the last state to the first: its number k, and d (ends . x_T) / dx_k (n, m).
 
     Args:
-        rollout: of the problem.
-        record: the exact rollout.
+        transcription: of the problem.
+        record: an exact rollout.
         ends: (n, m) directions of the final state, ordered like ``state_columns``, in the units of ``growth``.
 
     Yields:
         Derivatives in the same order and units; of an orientation only its rotation is changed, not its length.
     """
-    course, columns, units = record.course, state_columns(rollout), state_units(rollout, record)
-    backward = rollout.closed.reverse(ends.shape[1])
-    results = [np.zeros(rollout.closed.numel_out(i)) for i in range(rollout.closed.n_out())]
-    inert = [np.zeros((len(result), ends.shape[1])) for result in results[1:]]
-    adjoint = np.zeros((course.x.shape[1], ends.shape[1]))
-    adjoint[columns] = ends * units[:, None]
+    rollout, x = transcription.rollout, record.course.x
+    columns, units = state_columns(rollout), state_units(rollout, record)
+    whole = np.zeros((x.shape[1], ends.shape[1]))
+    whole[columns] = ends * units[:, None]
     yield rollout.steps, ends
-    for k in reversed(range(rollout.steps)):
-        adjoint = np.array(backward(*course.closed_arguments(k, rollout), *results, adjoint, *inert)[0])
-        yield k, _turned(rollout, course.x[k], adjoint)[columns] / units[:, None]
+    for k, adjoint in zip(reversed(range(rollout.steps)), transcription.back(record, whole), strict=True):
+        yield k, _turned(rollout, x[k], adjoint)[columns] / units[:, None]
 
 
 def state_columns(rollout: Rollout) -> NDArray[np.intp]:

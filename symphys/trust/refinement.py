@@ -3,32 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
-import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symphys.problem import Problem
 from symphys.shooting import Block
-from symphys.transcription import Judge, Transcription, judge_of, symbolic_rollout, terms
-from symphys.trust.gradient import probe, probe_of
+from symphys.transcription import Transcription, transcribe
 
 Array = NDArray[np.float64]
 
 ROUNDING = 1e-9
 """Relative changes below this say nothing about the order of convergence."""
-
-
-@dataclass(frozen=True)
-class Finer:
-    """A finer discretisation of a problem: how it judges, and the gradient of its probe."""
-
-    what: str
-    judge: Judge
-    gradient: ca.Function
 
 
 def refine(transcription: Transcription, z: Array) -> dict[str, Any]:
@@ -40,13 +29,13 @@ def refine(transcription: Transcription, z: Array) -> dict[str, Any]:
         None where it is flat.
         "order": of convergence in dt, of the "objective" and of the "gradient"; None where it cannot be seen.
     """
-    slopes = [_slope(probe(transcription)[1], z)]
+    slopes = [transcription.probe.gradient(z)]
     objectives = [transcription.judge(z).objective]
     rows = []
-    for finer in finer_problems(transcription):
-        verdict, slope = finer.judge(z), _slope(finer.gradient, z)
+    for what, finer in finer_problems(transcription):
+        verdict, slope = finer.judge(z), finer.probe.gradient(z)
         changes = {block.name: change(block, slopes[0], slope) for block in transcription.shooting.blocks}
-        rows.append({"what": finer.what, "objective": verdict.objective, "worst": verdict.worst, "gradient": changes})
+        rows.append({"what": what, "objective": verdict.objective, "worst": verdict.worst, "gradient": changes})
         objectives.append(verdict.objective)
         slopes.append(slope)
     return {"refined": rows, "order": {"objective": order(objectives[:3]), "gradient": order(slopes[:3])}}
@@ -70,15 +59,9 @@ def order(values: Sequence[ArrayLike]) -> float | None:
 
 
 @lru_cache(maxsize=1)
-def finer_problems(transcription: Transcription) -> list[Finer]:
+def finer_problems(transcription: Transcription) -> list[tuple[str, Transcription]]:
     """Made once for all runs of a problem."""
-    return [_finer(what, problem) for what, problem in _variants(transcription.problem)]
-
-
-def _finer(what: str, problem: Problem) -> Finer:
-    rollout = symbolic_rollout(problem)
-    asked = terms(rollout)
-    return Finer(what, judge_of(rollout, asked), probe_of(rollout, asked)[1])
+    return [(what, transcribe(problem, backend="casadi")) for what, problem in _variants(transcription.problem)]
 
 
 def _variants(problem: Problem) -> list[tuple[str, Problem]]:
@@ -88,7 +71,3 @@ def _variants(problem: Problem) -> list[tuple[str, Problem]]:
         ("dt / 4", replace(problem, simulation=replace(simulation, dt=simulation.dt / 4))),
         ("sweeps x 2", replace(problem, simulation=replace(simulation, sweeps=2 * simulation.sweeps))),
     ]
-
-
-def _slope(gradient: ca.Function, z: Array) -> Array:
-    return np.array(gradient(z)).ravel()

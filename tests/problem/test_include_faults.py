@@ -50,6 +50,7 @@ FAULTS = [
     ),
     (("[contact]", "[solver.cma]\n[contact]"), ("", ""), "parts/robot.toml: solver: belongs to a whole problem"),
     (("[contact]", "[objective]\n[contact]"), ("", ""), "parts/robot.toml: objective: belongs to a whole problem"),
+    (("title =", 'solvers = ["cma"]\ntitle ='), ("", ""), "parts/robot.toml: solvers: belongs to a whole problem"),
     (
         ("[contact]", SECOND + "[contact]"),
         ("", ""),

@@ -14,6 +14,7 @@ import pytest
 
 from symphys.report import write_run_report
 from symphys.report.records import ReportError
+from symphys.report.trust_section import NOT_EXAMINED
 
 LARGEST = 3_000_000
 SLOWEST = 10.0
@@ -174,7 +175,7 @@ def test_run_without_motion_says_so(batch: Path) -> None:
     assert "start from a slower throw" in text
     assert "This run recorded no motion." in text
     assert "trajectory.npz: there is no such file" in text
-    assert "This run was not examined" in text
+    assert NOT_EXAMINED in text
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ import pytest
 
 from symphys.problem import Problem, load_problem
 from symphys.runs import Job, make_jobs, run_batch
-from symphys.solvers import TraceRow
+from symphys.solvers import SOLVERS, TraceRow
 from symphys.transcription import transcribe
 
 MakeJob = Callable[..., Job]
@@ -89,6 +89,17 @@ def test_a_transcription_is_made_once_per_problem(make_job: MakeJob, recorder: A
 
     run_batch([make_job(seed) for seed in range(3)], 1, recorder, counting)
     assert made == ["short_throw"]
+
+
+def test_a_file_says_which_solvers_it_is_for(problem_file: Path, tmp_path: Path) -> None:
+    """Where none is asked for; twice is once, in the file's order."""
+    everything = make_jobs([load_problem(problem_file)], None, [0], {}, tmp_path)
+    assert [job.config.solver for job in everything] == list(SOLVERS)
+    text = problem_file.read_text(encoding="utf-8")
+    problem_file.write_text('solvers = ["gradient", "cma", "gradient"]\n' + text, encoding="utf-8")
+    problem = load_problem(problem_file)
+    assert [job.config.solver for job in make_jobs([problem], None, [0], {}, tmp_path)] == ["gradient", "cma"]
+    assert [job.config.solver for job in make_jobs([problem], ["ipopt"], [0], {}, tmp_path)] == ["ipopt"]
 
 
 def test_workers_do_what_one_process_does(problem_file: Path, tmp_path: Path, recorder: Any) -> None:

@@ -12,6 +12,7 @@ from symphys.errors import ProblemError
 from symphys.problem import load_problem
 from symphys.transcription import Transcription, transcribe
 from symphys.transcription.large import LargeEvaluator, LargeTranscription, passes, require_small_nets, split
+from symphys.trust import examine
 
 Array = NDArray[np.float64]
 
@@ -175,6 +176,20 @@ def test_judge_and_motion(both: tuple[Transcription, LargeTranscription]) -> Non
             assert np.allclose(values, motions[1][name], rtol=1e-9, atol=1e-9, equal_nan=True), name
 
 
+def test_examination(both: tuple[Transcription, LargeTranscription]) -> None:
+    """``check`` says the same of both: gradient, refinements, growth through the nets, energy."""
+    z = points(both[0])[0]
+    a, b = (examine(made, z) for made in both)
+    assert max(row["error"] for row in b["gradient"]) < 1e-6
+    assert [row["scale"] for row in b["gradient"]] == pytest.approx([row["scale"] for row in a["gradient"]], rel=1e-7)
+    for one, other in zip(a["refined"], b["refined"], strict=True):
+        assert one["objective"] == pytest.approx(other["objective"], rel=1e-9)
+        assert one["gradient"] == pytest.approx(other["gradient"], rel=1e-6)
+    assert b["growth"]["factor"] == pytest.approx(a["growth"]["factor"], rel=1e-7)
+    assert b["energy"]["contact"] == pytest.approx(a["energy"]["contact"], abs=1e-9)
+    assert (b["fault"], b["smoothed"]) == ("", [pytest.approx(row) for row in a["smoothed"]])
+
+
 def test_single_precision_of_nets(both: tuple[Transcription, LargeTranscription]) -> None:
     """Nets in single precision cost six digits, not more."""
     beside = both[1]
@@ -187,7 +202,7 @@ def test_single_precision_of_nets(both: tuple[Transcription, LargeTranscription]
 
 
 def test_what_large_nets_cannot_have(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Formulas that look at their weights, ``check`` and ``export``: refused by name, before anything is built."""
+    """Formulas that look at their weights, and ``export``: refused by name, before anything is built."""
     path = tmp_path / "hopping.toml"
     path.write_text(
         HOPPING.replace("ACTIVATION", "skip = true").replace('"[leg.torque, start]"', '"[leg.torque, weights]"')
@@ -196,5 +211,5 @@ def test_what_large_nets_cannot_have(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(split, "MOST_WEIGHTS", 10)
     with pytest.raises(ProblemError, match='cost "effort": looks at weights'):
         transcribe(problem)
-    with pytest.raises(ProblemError, match=r'controller "brain"\.net: has \d+ weights; check takes up to 10'):
-        require_small_nets(problem, "check")
+    with pytest.raises(ProblemError, match=r'controller "brain"\.net: has \d+ weights; export takes up to 10'):
+        require_small_nets(problem, "export")

@@ -9,9 +9,9 @@ import pytest
 from symphys.problem import load_problem
 from symphys.problems import find
 from symphys.shooting import Block
-from symphys.transcription import judge_for, transcribe
+from symphys.transcription import transcribe
 from symphys.trust import examine
-from symphys.trust.gradient import _compare_block, compare_gradient, probe
+from symphys.trust.gradient import _compare_block, compare_gradient
 from symphys.trust.refinement import order
 
 THROW = np.array([3.0, 0.1, 3.0, 0.0, -9.0, 0.5])
@@ -31,10 +31,8 @@ def test_right_gradients_pass(throw):
 def test_wrong_gradients_are_rejected(throw):
     """The derivative of another problem (weaker gravity) does not pass as this one's."""
     other = transcribe(load_problem(find("ball_throw"), {"world.gravity": [0, 0, -8]}))
-    value, _ = probe(throw)
-    _, gradient = probe(other)
-    wrong = np.array(gradient(THROW)).ravel()
-    errors = [_compare_block(value, block, THROW, wrong)["error"] for block in throw.shooting.blocks]
+    wrong = other.probe.gradient(THROW)
+    errors = [_compare_block(throw.probe.value, block, THROW, wrong)["error"] for block in throw.shooting.blocks]
     assert max(errors) > 1e-2
 
 
@@ -52,9 +50,9 @@ def test_a_kink_is_no_jump(slope, passes):
     """The slope of one side of a kink is not that of both; a jump leaves both as they are."""
     z = ca.SX.sym("z")
     values = {True: 2 * z + 1e-6 * (z > 0), False: ca.fabs(z)}
-    one = np.ones(1)
+    value, one = ca.Function("f", [z], [values[passes]]), np.ones(1)
     block = Block("v", 0, (1, 1), 0 * one, -one, one, one, one)
-    row = _compare_block(ca.Function("f", [z], [values[passes]]), block, np.zeros(1), np.array([slope]))
+    row = _compare_block(lambda at: float(value(at)), block, np.zeros(1), np.array([slope]))
     assert (row["error"] < 1e-6) == passes
     assert (row["jump"] == pytest.approx(1e-6 / 2, rel=1e-3)) == passes
 
@@ -74,10 +72,8 @@ def test_refined_answers_are_those_of_the_refined_problem():
     settings = {"simulation.dt": 0.02, "simulation.duration": 3}
     shot = transcribe(load_problem(find("bank_shot"), settings))
     z = shot.shooting.start(1)
-    halved = judge_for(load_problem(find("bank_shot"), settings | {"simulation.dt": 0.01}))(z)
-    doubled = judge_for(
-        load_problem(find("bank_shot"), settings | {"simulation.sweeps": 2 * shot.problem.simulation.sweeps})
-    )(z)
+    finer = {"simulation.dt": 0.01}, {"simulation.sweeps": 2 * shot.problem.simulation.sweeps}
+    halved, doubled = (transcribe(load_problem(find("bank_shot"), settings | more)).judge(z) for more in finer)
     found = examine(shot, z)["refined"]
     assert [row["objective"] for row in found[::2]] == [halved.objective, doubled.objective]
     assert [row["worst"] for row in found[::2]] == [halved.worst, doubled.worst]
@@ -90,7 +86,7 @@ def test_changes_of_the_gradient_are_those_of_the_refined_problem():
     shot, finer = (transcribe(load_problem(find("bank_shot"), settings | more), backend="casadi")
                    for more in ({}, {"simulation.dt": 0.01}))  # fmt: skip
     z = shot.shooting.start(1)
-    before, after = (np.array(probe(each)[1](z)).ravel() for each in (shot, finer))
+    before, after = (np.array(each.probe.gradient(z)).ravel() for each in (shot, finer))
     found = examine(shot, z)["refined"][0]["gradient"]
     spin = slice(2, 4)
     expected = np.linalg.norm((after - before)[spin]) / np.linalg.norm(before[spin])

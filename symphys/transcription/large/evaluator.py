@@ -74,8 +74,11 @@ class LargeEvaluator:
     def way(self, z: Array, smoothing: float) -> Way:
         """The motion of one decision vector."""
         parts = self.made.split
-        nets = self._nets([own.at(z) for own in parts.weights])
-        return forward(self.made, self.stage, nets, z[None, parts.small], smoothing)
+        return forward(self.made, self.stage, self.nets_at(z), z[None, parts.small], smoothing)
+
+    def nets_at(self, z: Array) -> list[Layers]:
+        """The nets of one decision vector."""
+        return self._nets([own.at(z) for own in self.made.split.weights])
 
     def _nets(self, weights: Sequence[Array]) -> list[Layers]:
         return [Layers(law, own, self.real) for law, own in zip(self.made.split.laws, weights, strict=True)]
@@ -85,7 +88,7 @@ class LargeEvaluator:
         values = Shared(*self._values(way))
         if not gradient:
             return values
-        small, weights = Backward(self.made, self.stage, nets, way, smoothing).run()
+        small, weights = Backward(self.made, self.stage, nets, way, smoothing, self.made.aims.slopes).run()
         return Shared(values.merit, values.objective, values.errors, small, tuple(weights))
 
     def _values(self, way: Way) -> tuple[Array, Array, Array]:
@@ -119,10 +122,8 @@ class LargeEvaluator:
         )
         if not gradient:
             return Values(merit, objective, errors)
-        slopes = np.zeros((len(Z), split_.n))
-        for row, each in zip(slopes, found, strict=True):
+        slopes = []
+        for each in found:
             assert each.small is not None and each.weights is not None
-            row[split_.small] = each.small[0]
-            for own, slope in zip(split_.weights, each.weights, strict=True):
-                own.add(row, slope)
-        return Values(merit, objective, errors, gradient=slopes)
+            slopes.append(split_.joined(each.small[0], each.weights))
+        return Values(merit, objective, errors, gradient=np.array(slopes).reshape(len(Z), split_.n))

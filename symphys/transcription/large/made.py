@@ -16,7 +16,7 @@ from symphys.problem import Problem
 from symphys.transcription.along import Rollout
 from symphys.transcription.large.plain import PlainStage
 from symphys.transcription.large.split import Split, split
-from symphys.transcription.large.stage import RESULTS, Aims, stage_program, start_function
+from symphys.transcription.large.stage import RESULTS, Aims, sense_function, stage_program, start_function
 
 Array = NDArray[np.float64]
 
@@ -79,6 +79,11 @@ class Made:
     def pull(self) -> ca.Function:
         """The adjoint of ``start``."""
         return self.start.reverse(1)
+
+    @cached_property
+    def sense(self) -> ca.Function:
+        """See ``sense_function``."""
+        return sense_function(self.rollout, self.sensors)
 
     @cached_property
     def plain(self) -> Stage:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -91,10 +92,12 @@ def aim_arguments(made: Made, way: Way, b: int) -> list[Array]:
 
 
 class Backward:
-    """A pass backwards along a ``Way``: the gradient of the sum of weighted merits."""
+    """A pass backwards along a ``Way``: the gradient of the sum over robots of what ``slopes`` are the slopes of."""
 
-    def __init__(self, made: Made, stage: Stage, nets: Sequence[Layers], way: Way, smoothing: float) -> None:
-        """Begin with what the aims say of the robots' motions."""
+    def __init__(
+        self, made: Made, stage: Stage, nets: Sequence[Layers], way: Way, smoothing: float, slopes: ca.Function
+    ) -> None:
+        """Begin with what ``slopes``, one of those of ``made.aims``, say of the robots' motions."""
         self.made, self.stage, self.nets, self.way, self.knob = made, stage, nets, way, [smoothing]
         self.z, self.p = np.zeros_like(way.z), np.zeros_like(way.p)
         self.at_x: dict[int, Array] = {}
@@ -102,12 +105,12 @@ class Backward:
         self.asked = np.zeros_like(way.asked)
         self.weights = [np.zeros(net.net.sizes["weights"]) for net in nets]
         for b in range(len(way.z)):
-            self.aim(b)
+            self.aim(b, slopes)
 
-    def aim(self, b: int) -> None:
-        """Slopes of one robot's merit."""
+    def aim(self, b: int, slopes: ca.Function) -> None:
+        """Slopes at one robot's motion."""
         way, stages = self.way, self.made.aims.stages
-        found = [np.array(part) for part in self.made.aims.slopes.call(aim_arguments(self.made, way, b))]
+        found = [np.array(part) for part in slopes.call(aim_arguments(self.made, way, b))]
         self.z[b], self.p[b], others = found[0].ravel(), found[1].ravel(), found[2:]
         for k, row in stages.moments:
             x, u, *others = others

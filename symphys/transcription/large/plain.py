@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.transcription.along import Rollout
-from symphys.transcription.large.stage import RESULTS, Aims
+from symphys.transcription.large.stage import RESULTS, Aims, sense_function
 
 Array = NDArray[np.float64]
 
@@ -27,8 +27,7 @@ class PlainStage:
         u = given if rollout.feedback is None else rollout.feedback(x, given, p, now)
         after = rollout.step(x, u, p, knob)
         found = {"after": after, "inputs": u}
-        read = [s for name in sensors for s in rollout.problem.sensors if s.name == name]
-        found["sensed"] = ca.vertcat(*(rollout.control.sensor(sensor)(after, p, later) for sensor in read))
+        found["sensed"] = sense_function(rollout, sensors)(after, p, later)
         asked = [
             rollout.compiled(formula)(after if shift else x, u, p, later if shift else now, z)
             for formula, shift in aims.stages.series

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -84,6 +85,14 @@ class Split:
     laws: tuple[Net, ...]
     places: tuple[Array, ...]
     weights: tuple[Weights, ...]
+
+    def joined(self, small: Array, weights: Sequence[Array]) -> Array:
+        """(n,) a gradient from those of what is small and of the weights of each net."""
+        gradient = np.zeros(self.n)
+        gradient[self.small] = small
+        for own, slope in zip(self.weights, weights, strict=True):
+            own.add(gradient, slope)
+        return gradient
 
 
 def split(problem: Problem) -> Split:

@@ -19,6 +19,7 @@ from symphys.kernel import Call, Layout, Place, Program
 from symphys.transcription.along import Rollout
 from symphys.transcription.control_calls import control_calls
 from symphys.transcription.decision import start_of
+from symphys.transcription.probe import combined
 from symphys.transcription.program import dense, step_calls
 from symphys.transcription.terms import terms
 
@@ -64,7 +65,11 @@ class Stages:
 
 
 class Aims:
-    """What a problem asks of a rollout as functions of (z, p, x and u at moments, series), and their slopes."""
+    """What a problem asks of a rollout as functions of (z, p, x and u at moments, series), and their slopes.
+
+    ``value`` gives merit, objective, errors and costs, ``slopes`` the derivatives of the merit; ``probe`` and
+    ``probe_slopes`` are the same of what is differentiated to examine gradients.
+    """
 
     def __init__(self, rollout: Rollout) -> None:
         """Build them."""
@@ -76,8 +81,12 @@ class Aims:
         self.arguments = [self.stages.z, self.stages.p, *moments, *self.stages.series.values()]
         results = [ca.densify(part) for part in (merit, asked.objective, asked.errors, asked.costs)]
         self.value = ca.Function("aims", self.arguments, results)
-        slopes = [ca.densify(ca.gradient(merit, symbol)) for symbol in self.arguments]
-        self.slopes = ca.Function("slopes", self.arguments, slopes)
+        self.slopes, number = self._slopes(merit), combined(asked.means)
+        self.probe, self.probe_slopes = ca.Function("probe", self.arguments, [number]), self._slopes(number)
+
+    def _slopes(self, number: Expr) -> ca.Function:
+        slopes = [ca.densify(ca.gradient(number, symbol)) for symbol in self.arguments]
+        return ca.Function("slopes", self.arguments, slopes)
 
 
 class StagePlaces:
@@ -161,7 +170,13 @@ def start_function(rollout: Rollout, sensors: Sequence[str]) -> ca.Function:
     """(z) -> x0, the inputs of all steps one after the other, p, what the sensors read at the start."""
     start = start_of(rollout.problem, rollout.world, rollout.inputs, rollout.parameters, rollout.z)
     x0 = rollout.memory.start(start.x0)
-    found = [next(s for s in rollout.problem.sensors if s.name == name) for name in sensors]
-    read = [rollout.control.sensor(sensor)(x0, start.p, 0.0) for sensor in found]
-    results = [x0, ca.vec(start.u), start.p, ca.vertcat(ca.MX(0, 1), *read)]
+    results = [x0, ca.vec(start.u), start.p, sense_function(rollout, sensors)(x0, start.p, 0.0)]
     return ca.Function("start", [rollout.z], [ca.densify(result) for result in results]).expand()
+
+
+def sense_function(rollout: Rollout, sensors: Sequence[str]) -> ca.Function:
+    """(x, p, time) -> what these sensors read, one after the other."""
+    arguments = [ca.MX.sym("x", rollout.x0.shape[0]), ca.MX.sym("p", rollout.p.shape[0]), ca.MX.sym("time")]
+    found = [next(s for s in rollout.problem.sensors if s.name == name) for name in sensors]
+    read = [rollout.control.sensor(sensor)(*arguments) for sensor in found]
+    return ca.Function("sense", arguments, [ca.densify(ca.vertcat(ca.MX(0, 1), *read))])

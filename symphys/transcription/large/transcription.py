@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
 from typing import Any
@@ -22,6 +22,9 @@ from symphys.transcription.judge import Verdict, verdict
 from symphys.transcription.large.evaluator import LargeEvaluator
 from symphys.transcription.large.made import KernelStage, Made, make
 from symphys.transcription.large.passes import Way, aim_arguments
+from symphys.transcription.large.probe import LargeProbe
+from symphys.transcription.large.sensitivity import back
+from symphys.transcription.probe import Probe
 from symphys.transcription.simulate import Record, simulate
 from symphys.transcription.transcription import Transcription, fastest
 
@@ -39,11 +42,6 @@ class LargeTranscription(Transcription):
 
     made: Made
 
-    @property
-    def examinable(self) -> bool:
-        """See ``Transcription``."""
-        return False
-
     def judge(self, z: Array, smoothing: float = 0.0) -> Verdict:
         """See ``Transcription``."""
         way = self._plain.way(z, smoothing)
@@ -55,13 +53,25 @@ class LargeTranscription(Transcription):
     def record(self, z: Array, smoothing: float = 0.0) -> Record:
         """See ``Transcription``."""
         way = self._plain.way(z, smoothing)
-        return simulate(self.rollout, lambda *_: self._happened(way, smoothing), way.z[0], smoothing)
+        found = simulate(self.rollout, lambda *_: self._happened(way, smoothing), way.z[0], smoothing)
+        return replace(found, z=np.asarray(z, float))
 
     def prices(self, kinds: Iterable[str] = ("gradient",)) -> dict[str, float]:
         """See ``Transcription``."""
         z, evaluator = self.shooting.start(0)[None], self.shooting.evaluator
         one = fastest(lambda: evaluator.value(z, 0.0))
         return {kind: fastest(lambda: evaluator.gradient(z, 0.0)) / one for kind in kinds if kind == "gradient"}
+
+    @cached_property
+    def probe(self) -> Probe:
+        """See ``Transcription``."""
+        return LargeProbe(self._plain)
+
+    def back(self, record: Record, ends: Array) -> Iterator[Array]:
+        """See ``Transcription``."""
+        plain, smoothing = self._plain, record.course.smoothing
+        way = plain.way(record.z, smoothing)
+        return back(self.made, plain.stage, plain.nets_at(record.z), way, smoothing, ends)
 
     @cached_property
     def _plain(self) -> LargeEvaluator:

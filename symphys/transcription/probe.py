@@ -1,0 +1,60 @@
+"""What is differentiated to examine a gradient: one number that depends on every formula that a problem asks for."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.transcription.along import Rollout
+from symphys.transcription.terms import Terms
+
+Array = NDArray[np.float64]
+Expr = Any
+"""casadi MX"""
+
+
+class Probe(Protocol):
+    """A fixed random combination of all formulas (``Terms.means``) along the exact rollout, and its gradient.
+
+    The gradient of the objective itself vanishes at a solution. The weights of the combination depend on the number of
+    formulas alone, not on the time grid.
+    """
+
+    def value(self, z: Array) -> float:
+        """At z (n,)."""
+
+    def gradient(self, z: Array) -> Array:
+        """(n,) its derivative."""
+
+
+def combined(means: Expr) -> Expr:
+    """The combination of ``Terms.means``."""
+    weights = np.random.default_rng(0).uniform(0.5, 1.5, means.shape[0])
+    return ca.dot(ca.DM(weights), ca.densify(means))
+
+
+class ExpressionProbe:
+    """See ``Probe``; from expressions, on casadi's virtual machine."""
+
+    def __init__(self, rollout: Rollout, asked: Terms) -> None:
+        """Build both functions."""
+        number = combined(asked.means)
+        self._value = _exact(rollout, "probe", number)
+        self._gradient = _exact(rollout, "probe_gradient", ca.gradient(number, rollout.z))
+
+    def value(self, z: Array) -> float:
+        """See ``Probe``."""
+        return float(self._value(z))
+
+    def gradient(self, z: Array) -> Array:
+        """See ``Probe``."""
+        return np.array(self._gradient(z)).ravel()
+
+
+def _exact(rollout: Rollout, name: str, output: Expr) -> ca.Function:
+    z = ca.MX.sym("z", rollout.z.shape[0])
+    smooth = ca.Function(name, [rollout.z, rollout.smoothing], [ca.densify(output)])
+    return ca.Function(name, [z], [smooth(z, 0)])
