@@ -39,9 +39,15 @@ def components(world: World) -> list[frozenset[int]]:
     return found
 
 
-def struck_by_component(
-    scene: Scene, contacts: Sequence[Row], joints: Sequence[JointRow], given: Sequence[Along]
-) -> Struck:
+def kept(
+    scene: Scene, contacts: Sequence[Row], joints: Sequence[JointRow], given: Sequence[Along], x: State, kick: Expr
+) -> tuple[Struck, State]:
+    """Which components an impact struck; and the forces of ``joints``, which gave ``given``, that last."""
+    struck = _struck(scene, contacts, joints, given)
+    return struck, _lasting_forces(scene, joints, given, struck, x, kick)
+
+
+def _struck(scene: Scene, contacts: Sequence[Row], joints: Sequence[JointRow], given: Sequence[Along]) -> Struck:
     """Of each component: 1 if a contact or a limit of it is an impact, whose share of joint forces does not last."""
     found = {}
     for group in components(scene.world):
@@ -61,7 +67,7 @@ def _any_struck(rows: tuple[ContactRow, ...], limits: tuple[tuple[AxisRow, Along
     return ca.mmax(ca.vertcat(ca.SX(0), *struck))
 
 
-def kept_forces(
+def _lasting_forces(
     scene: Scene, rows: Sequence[JointRow], given: Sequence[Along], struck: Struck, x: State, kick: Expr
 ) -> State:
     """Persistent forces of rows that sweeps visit.

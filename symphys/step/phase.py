@@ -13,12 +13,12 @@ from symphys.collide import Contact
 from symphys.collide.contact import Shift
 from symphys.motion import Motion, angular_velocity
 from symphys.state import BODY_FIELDS
-from symphys.step.holding import fitting, hold, keep_up, kept_forces, struck_by_component
+from symphys.step.holding import fitting, hold, keep_up, kept
 from symphys.step.impulse import ZERO, Impulse
-from symphys.step.jointed import Trees, joint_rows, make_trees, momenta_of, resumed
+from symphys.step.jointed import JointRow, Trees, joint_rows, make_trees, momenta_of, resumed
 from symphys.step.momentum import Momenta, Momentum
 from symphys.step.paths import bodies_of, expected_motions, free_motions, look
-from symphys.step.pgs import Row, begin, relax
+from symphys.step.pgs import Row, Solution, begin, relax
 from symphys.step.position import close_gaps, displacements
 from symphys.step.row import ContactRow
 from symphys.step.rows import prepare
@@ -52,8 +52,7 @@ class Phase:
 
 def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = ()) -> Phase:
     """The state after ``duration`` [s]; pairs whose ``spared`` is 1 give no impulse: the stretch ends as they meet."""
-    pieces, pairs = scene.pieces, scene.world.pairs
-    kick, half = pieces.do(_times, duration, x["lag"])
+    kick, half = scene.pieces.do(_times, duration, x["lag"])
 
     # free motion, in which impacts find their instant; what joints hold moves as the last step's forces say
     motions = free_motions(scene, x, duration)
@@ -61,35 +60,32 @@ def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = ())
     contacts = look(scene, paths, duration)
 
     # trees of joints, whose velocities are solved for in the coordinates that joints leave
-    free = tuple(pieces.do(_mid_momentum, motion) for motion in motions)
+    free = tuple(scene.pieces.do(_mid_momentum, motion) for motion in motions)
     trees = make_trees(scene, paths, free, half)
 
     # rows: where, when and how the surfaces meet, what acts along the coordinates of joints
-    rows = _contact_rows(scene, x, trees, contacts, duration, spared or [ca.SX(0)] * len(pairs))
+    rows = _contact_rows(scene, x, trees, contacts, duration, spared or [ca.SX(0)] * len(contacts))
     joints, fitted = joint_rows(scene, trees, paths, duration, kick)
 
     # velocities: warm start, then sweeps
-    every, n = (*(each.row for each in joints), *rows), len(joints)
-    start: list[Any] = [*resumed(scene, joints, x, kick), *shared(scene, rows, _warm_start(scene, rows, x, kick))]
-    solved = relax(pieces, scene.setting.scheme.sweeps, every, begin(pieces, every, trees.states, start))
-    impulses, momenta = solved.impulses[n:], momenta_of(scene, trees, solved.momenta)
+    given = shared(scene, rows, _warm_start(scene, rows, x, kick))
+    solved, by_joints, impulses = _sweep(scene, trees, joints, rows, (*resumed(scene, joints, x, kick), *given))
+    momenta = momenta_of(scene, trees, solved.momenta)
 
     # positions
-    moved = displacements(scene, trees, rows, start[n:], solved.momenta, impulses, duration)
-    meetings = list(zip(rows, contacts, impulses, strict=True))
-    shifts, made = close_gaps(scene, trees, meetings, fitted, moved)
+    moved = displacements(scene, trees, rows, given, solved.momenta, impulses, duration)
+    shifts, made = close_gaps(scene, trees, list(zip(rows, contacts, impulses, strict=True)), fitted, moved)
 
     # the next state
     values: State = {"lag": half}
     resting = _store_forces(scene, rows, impulses, kick, values)
-    poses = [pieces.do(_pose, motion, shift) for motion, shift in zip(motions, shifts, strict=True)]
+    poses = [scene.pieces.do(_pose, *each) for each in zip(motions, shifts, strict=True)]
     if scene.world.joints:
-        struck = struck_by_component(scene, rows, joints, solved.impulses[:n])
-        forces = kept_forces(scene, joints, solved.impulses[:n], struck, x, kick)
+        struck, forces = kept(scene, rows, joints, by_joints, x, kick)
         hold(scene, forces, poses, resting)
         momenta = keep_up(scene, momenta, made, struck, duration)
         warm = scene.setting.scheme.warm_start
-        values |= forces if warm else {name: ca.SX.zeros(x[name].size1()) for name in forces}
+        values |= forces if warm else {name: ca.SX.zeros(force.shape) for name, force in forces.items()}
     values |= _moving_bodies(scene, motions, momenta, resting, poses)
     return Phase(values, tuple(rows), tuple(contacts), impulses, tuple(zip(solved.impulses, solved.last, strict=True)))
 
@@ -103,6 +99,16 @@ def _contact_rows(
         arguments = tuple(trees.motions[i] for i in bodies), duration, off, force, trees.same(bodies)
         rows.append(trees.row(bodies, scene.pieces.do(prepare, scene.setting, pair.law, contact, *arguments)))
     return rows
+
+
+def _sweep(
+    scene: Scene, trees: Trees, joints: Sequence[JointRow], rows: Sequence[Row], start: Sequence[Any]
+) -> tuple[Solution, tuple[Any, ...], tuple[Impulse, ...]]:
+    """What sweeps come to from these impulses; and of it the impulses of joints, and those of contacts."""
+    every = (*(each.row for each in joints), *rows)
+    state = begin(scene.pieces, every, trees.states, start)
+    solved = relax(scene.pieces, scene.setting.scheme.sweeps, every, state)
+    return solved, solved.impulses[: len(joints)], solved.impulses[len(joints) :]
 
 
 def _moving_bodies(
