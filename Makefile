@@ -38,12 +38,13 @@ bench-contact: $(VENV)/.benching  ## errors of contact against the step, gradien
 	$(BIN)/python benchmarks/ablation.py
 	$(BIN)/python benchmarks/consistency.py build
 
-bench-robots: $(VENV)/.benching  ## jointed robots: what each device of joints buys; agreement, errors, speed against MuJoCo; growth of adjoints
+bench-robots: $(VENV)/.benching  ## jointed robots: what each device of joints buys; agreement, errors, speed against MuJoCo and casadi's C; growth of adjoints
 	$(BIN)/python benchmarks/joint_study.py build
 	$(BIN)/python benchmarks/robot_agreement.py
 	$(BIN)/python benchmarks/robot_consistency.py build
 	$(BIN)/python benchmarks/robot_against_mujoco.py
 	$(BIN)/python benchmarks/robot_growth.py
+	$(BIN)/python benchmarks/robot_kernels.py
 
 bench-table1: $(VENV)/.benching  ## the timing table of Degrave et al. (1 and 128 robots, small and large net), cost against weights
 	$(BIN)/python benchmarks/table1.py

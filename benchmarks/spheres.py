@@ -8,15 +8,14 @@ from __future__ import annotations
 import os
 import platform
 import resource
-import subprocess
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-import casadi as ca
 import numpy as np
+from casadi_code import compiled_by_casadi
 from worlds import spheres_on_ground
 
 from symphys.kernel import Cache, Kernel, Program, compile_program
@@ -91,19 +90,8 @@ def casadi_c(problem: Problem, name: str) -> float:
     """Seconds for BATCH rollouts by casadi's own C code and ``map``, compiled with -O2."""
     function = getattr(transcribe(problem, backend="casadi").functions, name).map(BATCH)
     Z = around(guess_of(problem)).T
-    with tempfile.TemporaryDirectory() as folder:
-        here = Path.cwd()
-        os.chdir(folder)  # casadi generates into the current folder only
-        try:
-            function.generate("code.c")
-            began = perf_counter()
-            command = [*find_compiler().command, "-O2", "-march=native", "-w", "-fPIC", "-shared", "code.c"]
-            subprocess.run([*command, "-o", "code.so"], check=True)
-            compiled = perf_counter() - began
-            loaded = ca.external(function.name(), "./code.so")
-            seconds = fastest(lambda: loaded(Z, np.zeros((1, BATCH))))
-        finally:
-            os.chdir(here)
+    with compiled_by_casadi(function) as (code, compiled):
+        seconds = fastest(lambda: code(Z, np.zeros((1, BATCH))))
     print(f"   casadi C, map({BATCH}), {name}: {per_step(seconds):.2f} us a step and robot, compile {compiled:.1f} s")
     return seconds
 
