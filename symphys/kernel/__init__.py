@@ -9,7 +9,7 @@ from symphys.kernel.fixed import Fixed
 from symphys.kernel.interpret import interpret
 from symphys.kernel.kernel import Kernel
 from symphys.kernel.layout import Layout
-from symphys.kernel.program import Call, Place, Program
+from symphys.kernel.program import Call, Fading, Place, Program
 from symphys.kernel.report import Report
 from symphys.kernel.source import Source
 
@@ -18,6 +18,7 @@ __all__ = [
     "Cache",
     "CacheInfo",
     "Call",
+    "Fading",
     "Fixed",
     "Kernel",
     "KernelUnavailable",

@@ -10,6 +10,7 @@ typedef struct {
   const double *values;                                  /* of the constants */
   table prologue, body, epilogue;                        /* forward */
   table again, back_body, back_prologue, back_epilogue;  /* backward */
+  word fading[3], kept[2];                               /* (offset, size, stride), (offset, stride) */
 } program;
 typedef struct { const double *rows; word stride; } source; /* stride 0: one row for all lanes */
 typedef struct {
@@ -17,6 +18,7 @@ typedef struct {
   source z, knob, seed;
   double *outputs, *gradient, *trajectory;
   word offset, size, stride, count; /* of the trajectory */
+  double loss;                      /* of the adjoint of what fades, in each step back */
 } batch;
 
 static void run(const table *calls, V *m, V *b, word k) {
@@ -63,12 +65,21 @@ static void roll(const program *p, V *m) {
   run(&p->epilogue, m, 0, 0);
 }
 
+/* The adjoint of what fades at step k: a share of it is lost, and all of it where what is kept is 0. */
+static void fade(const program *p, double loss, const V *m, V *b, word k) {
+  const V *kept = m + p->kept[0] + k * p->kept[1];
+  V share, *words = b + p->fading[0] + k * p->fading[2];
+  for (word l = 0; l < LANES; l++) LANE(share, l) = (R)(1 - loss) * (p->kept[1] ? LANE(*kept, l) : (R)1);
+  for (word w = 0; w < p->fading[1]; w++) words[w] = words[w] * share;
+}
+
 /* States are in the memory; the scratch of a step, and the tape for its adjoints, are computed again. */
-static void pull(const program *p, V *m, V *b) {
+static void pull(const program *p, double loss, V *m, V *b) {
   run(&p->back_epilogue, m, b, 0);
   for (word k = p->steps - 1; k >= 0; k--) {
     run(&p->again, m, 0, k);
     run(&p->back_body, m, b, k);
+    if (loss > 0) fade(p, loss, m, b, k);
   }
   run(&p->back_prologue, m, b, 0);
 }
@@ -92,7 +103,7 @@ API void evaluate(const program *p, const batch *x, V *m) {
     if (!x->gradient) continue;
     memset(b, 0, sizeof(V) * p->size);
     gather(b, &p->seeded, &x->seed, row, rows, 1);
-    pull(p, m, b);
+    pull(p, x->loss, m, b);
     scatter(x->gradient, b, &p->z, total(&p->z), row, rows);
   }
 }

@@ -47,15 +47,18 @@ class Kernel:
         self._run(batch)
         return self._named(outputs)
 
-    def gradient(self, Z: ArrayLike, seed: ArrayLike, knob: ArrayLike = ()) -> tuple[Outputs, Array]:
+    def gradient(self, Z: ArrayLike, seed: ArrayLike, knob: ArrayLike = (), loss: float = 0.0) -> tuple[Outputs, Array]:
         """Outputs, and (batch, n): the derivative of seed . outputs with respect to z, row by row.
 
         Args:
             Z: (batch, n), or one (n,) for all seeds.
             seed: (batch, s) or one (s,) for all; s words of the seeded outputs, in their order.
             knob: (batch, p) or one (p,) for all.
+            loss: the share of its adjoint that ``program.fading.state`` loses in each step back; above 0, adjoints also
+                end where ``kept`` is 0. What comes out is no derivative then.
         """
         batch = self._batch(Z, knob, seed)
+        batch.loss = loss
         outputs, gradient = batch.outputs(self._width()), batch.gradient(self.program.z.size)
         self._run(batch)
         return self._named(outputs), gradient

@@ -41,6 +41,8 @@ class ProgramData(ctypes.Structure):
         *((name, List) for name in ("z", "knob", "zeroed", "constants", "outputs", "seeded")),
         ("values", ctypes.c_void_p),
         *((name, List) for name in TABLES),
+        ("fading", WORD * 3),
+        ("kept", WORD * 2),
     )
 
 
@@ -52,6 +54,7 @@ class BatchData(ctypes.Structure):
         *((name, Source) for name in ("z", "knob", "seed")),
         *((name, ctypes.c_void_p) for name in ("outputs", "gradient", "trajectory")),
         *((name, WORD) for name in ("offset", "size", "stride", "count")),
+        ("loss", ctypes.c_double),
     )
 
 
@@ -79,6 +82,10 @@ class Loaded:
             setattr(self.data, name, self._list(len(listed), _ranges(listed)))
         for name in TABLES:
             setattr(self.data, name, self._list(*plan.tables[name]))
+        if program.fading is not None:
+            state, kept = program.fading.state, program.fading.kept
+            self.data.fading = (WORD * 3)(state.offset, state.size, state.stride)
+            self.data.kept = (WORD * 2)(*((kept.offset, kept.stride) if kept else (0, 0)))
 
     def _list(self, count: int, words: Any) -> List:
         self._kept.append(words)

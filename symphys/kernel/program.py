@@ -57,6 +57,19 @@ class Call:
 
 
 @dataclass(frozen=True)
+class Fading:
+    """What adjoints may lose on their way back through time.
+
+    Attributes:
+        state: of a step, with a stride: its adjoint is shortened when the adjoint of the step before begins.
+        kept: a word of each step, 1 or 0: where it is 0, the adjoint ends. None: it is 1 everywhere.
+    """
+
+    state: Place
+    kept: Place | None = None
+
+
+@dataclass(frozen=True)
 class Program:
     """A rollout: ``prologue`` once, ``body`` for steps k = 0 .. steps - 1, ``epilogue`` once.
 
@@ -72,6 +85,7 @@ class Program:
         outputs: named places, read after the epilogue.
         zeroed: places that are 0 at the beginning.
         constants: places and their values. Programs that differ in them only share one compiled kernel.
+        fading: what adjoints may lose on their way back; None: nothing.
     """
 
     size: int
@@ -84,6 +98,7 @@ class Program:
     epilogue: tuple[Call, ...] = ()
     zeroed: tuple[Place, ...] = ()
     constants: tuple[tuple[Place, tuple[float, ...]], ...] = ()
+    fading: Fading | None = None
 
     def __post_init__(self) -> None:
         """Check everything that can be checked; ProgramError names the call and the words."""

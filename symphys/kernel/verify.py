@@ -126,6 +126,11 @@ def verify(program: Program) -> Verification:
         check.inside(f"output {name}", words)
         check._refuse(f"output {name}", words, check.written[words] == NEVER, "which nobody writes")
         check._refuse(f"output {name}", words, check.scratch[words], "which are scratch of the body")
+    for name, faded in () if program.fading is None else vars(program.fading).items():
+        if faded is not None:
+            words = faded.words(program.steps)
+            check.inside(f"fading {name}", words)
+            check._refuse(f"fading {name}", words, check.scratch[words], "which are scratch of the body")
     return check
 
 
