@@ -22,7 +22,7 @@ from symphys.problem.words import shown
 from symphys.problems import robots
 from symphys.suggest import hint, quote
 
-OF_THE_PROBLEM = ("simulation", "objective", "solver", "solvers")
+OF_THE_PROBLEM = ("simulation", "fall", "objective", "solver", "solvers")
 FURTHER = ("include", "included")
 OWN = ("title", "description")
 """What an included file says about itself alone."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +16,13 @@ from symphys.problem.carry import carry
 from symphys.problem.complaints import report
 from symphys.problem.controllers import read_controllers
 from symphys.problem.crowd import check_crowd
+from symphys.problem.fall import ALIVE, costs_of_falling, read_fall
 from symphys.problem.faults import Faults, Place
 from symphys.problem.feedback import Controller, Sensor
 from symphys.problem.include import with_included
 from symphys.problem.joints import read_joints
 from symphys.problem.meetings import Meetings
-from symphys.problem.model import NOTHING, Array, Problem, Simulation, Variable
+from symphys.problem.model import NOTHING, Array, Fall, Problem, Simulation, Variable
 from symphys.problem.placing import placed
 from symphys.problem.plan import WorldPlan
 from symphys.problem.quantities import Quantity, quantities, weight_quantities
@@ -132,7 +134,7 @@ def build(
     variables = read_variables(document.variable, known, simulation, faults)
     check_varied(plan, variables, faults)
     faults.stop_if_any()
-    aims = read_asked(document, simulation, plan, at_guess(known, variables), variables, faults)
+    fall, aims = read_asked(document, simulation, plan, at_guess(known, variables), variables, faults)
     return Problem(
         name=path.stem,
         title=document.title or path.stem,
@@ -151,6 +153,7 @@ def build(
         sensors=sensors,
         controllers=controllers,
         solvers=None if document.solvers is None else tuple(dict.fromkeys(document.solvers)),
+        fall=fall,
     )
 
 
@@ -176,13 +179,17 @@ def read_asked(
     start: Mapping[str, Array],
     variables: Sequence[Variable],
     faults: Faults,
-) -> Aims:
+) -> tuple[Fall | None, Aims]:
     """What is asked for; ``start`` is as the guess has it, and must be one that can be."""
     check_overlap(plan, start, faults)
     check_joints(plan, start, faults)
-    aims = read_aims(document, simulation, formula_names(plan, start, variables), faults)
+    fall = read_fall(document.fall, sensor_names(plan, start), input_sizes(plan.world({})), faults)
+    alive = {} if document.fall is None else {ALIVE: ca.DM(1)}
+    aims = read_aims(document, simulation, formula_names(plan, start, variables) | alive, faults)
+    if document.fall is not None:
+        aims = replace(aims, costs=costs_of_falling(document.fall, aims.costs, faults))
     faults.stop_if_any()
-    return aims
+    return fall, aims
 
 
 def read_plan(document: Document, faults: Faults) -> tuple[WorldPlan, dict[str, Array]]:

@@ -174,6 +174,17 @@ class Constraint:
 
 
 @dataclass(frozen=True)
+class Fall:
+    """Where a motion is over before its time: from then on nothing moves.
+
+    Attributes:
+        margin: of a number of the state; over where it is below 0.
+    """
+
+    margin: Formula
+
+
+@dataclass(frozen=True)
 class Problem:
     """A validated problem.
 
@@ -193,6 +204,7 @@ class Problem:
         solvers: the names of those that the problem is for, as the file has them; None for all.
         solver_tables: the raw [solver.NAME] tables by NAME.
         sensors, controllers: in the file's order.
+        fall: where a motion is over before its time; None: nowhere.
     """
 
     name: str
@@ -214,6 +226,7 @@ class Problem:
     sensors: tuple[Sensor, ...] = ()
     controllers: tuple[Controller, ...] = ()
     solvers: tuple[str, ...] | None = None
+    fall: Fall | None = None
 
     @property
     def weights(self) -> dict[str, Array]:

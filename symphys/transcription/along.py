@@ -15,6 +15,7 @@ from symphys.rollout import roll_out
 from symphys.step import step_function
 from symphys.transcription.control import Control
 from symphys.transcription.decision import start_of
+from symphys.transcription.fall import freeze_function
 from symphys.transcription.memory import Memory, memory_of
 from symphys.transcription.names import Parameters, compile_formula, input_names, moving_names, varied_parameters
 from symphys.world import World
@@ -64,8 +65,18 @@ class Rollout:
         x, u = ca.MX.sym("x", self.memory.size), ca.MX.sym("u", step.size1_in(1))
         p, knob = ca.MX.sym("p", step.size1_in(2)), ca.MX.sym("smoothing")
         after, *others = call(step, x[: step.size1_in(0)], u, p, knob)
-        whole = ca.vertcat(after, self.memory.after(x, u, self.inputs))
+        whole: Expr = ca.vertcat(after, self.memory.after(x, u, self.inputs))
+        if self.freeze is not None:
+            whole = self.freeze(x, whole, p)
         return ca.Function(step.name(), [x, u, p, knob], [whole, *others]).expand()
+
+    @cached_property
+    def freeze(self) -> ca.Function | None:
+        """See ``freeze_function``; None where nothing falls."""
+        problem = self.problem
+        if problem.fall is None:
+            return None
+        return freeze_function(problem, problem.fall, self.world, self.inputs, self.parameters, self.memory)
 
     @cached_property
     def control(self) -> Control:

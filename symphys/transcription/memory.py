@@ -9,7 +9,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.problem import Constraint, Cost, Problem, Target
+from symphys.problem import ALIVE, Constraint, Cost, Problem, Target
 from symphys.state import Layout, input_columns, input_sizes
 from symphys.step import accelerometer_bodies
 from symphys.world import World
@@ -26,17 +26,20 @@ class Memory:
         world: what is simulated.
         inputs: names of the inputs that are remembered.
         bodies: names of the bodies whose velocity is remembered.
+        falls: whether there is ``alive`` at the end: 1 until a fall, 0 from then on; ``after`` leaves it out.
     """
 
     world: World
     inputs: tuple[str, ...] = ()
     bodies: tuple[str, ...] = ()
+    falls: bool = False
 
     @cached_property
     def columns(self) -> dict[str, slice]:
         """Where each lies in the whole state: inputs by their names, velocities as ``torso.velocity``."""
         sizes, start, found = input_sizes(self.world), Layout(self.world).size, dict[str, slice]()
         lengths = [(name, sizes[name]) for name in self.inputs] + [(f"{body}.velocity", 3) for body in self.bodies]
+        lengths += [(ALIVE, 1)] * self.falls
         for name, length in lengths:
             found[name] = slice(start, start + length)
             start += length
@@ -51,7 +54,8 @@ class Memory:
         """The whole state at t = 0, when no command has been given and nothing has been accelerated."""
         layout = Layout(self.world)
         commands = [type(x).zeros(input_sizes(self.world)[name]) for name in self.inputs]
-        return ca.vertcat(x, *commands, *(x[layout[f"{body}.velocity"]] for body in self.bodies))
+        velocities = [x[layout[f"{body}.velocity"]] for body in self.bodies]
+        return ca.vertcat(x, *commands, *velocities, *([type(x)(1)] if self.falls else []))
 
     def after(self, x: Expr, u: Expr, inputs: Sequence[str]) -> Expr:
         """(memory,) what is remembered of a step from state x with the inputs u, which stacks ``inputs``."""
@@ -75,4 +79,6 @@ def memory_of(problem: Problem, world: World) -> Memory:
     aims: list[Cost | Target | Constraint] = [*problem.costs, *problem.targets, *problem.constraints]
     asked = frozenset[str]().union(*(aim.formula.names for aim in aims))
     inputs = tuple(name for name in input_sizes(world) if name in sensed)
-    return Memory(world, inputs, accelerometer_bodies(world, sensed | asked))
+    margin = problem.fall.margin.names if problem.fall else frozenset[str]()
+    bodies = accelerometer_bodies(world, sensed | asked | margin)
+    return Memory(world, inputs, bodies, problem.fall is not None)

@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from symphys.expression import Formula
-from symphys.problem import Problem, Variable
+from symphys.problem import ALIVE, Problem, Variable
 from symphys.state import GIVEN, Layout, input_columns, input_sizes, inputs_size
 from symphys.step import accelerometers, body_quantities, felt_names, joint_quantities, joint_quantity_names
 from symphys.transcription.memory import Memory
@@ -115,6 +115,8 @@ def namespace(
     """What names mean at an instant, variables aside; of what takes work to express only what is wanted."""
     layout = Layout(world)
     names: dict[str, Expr] = {"time": at.time}
+    if memory.falls:
+        names[ALIVE] = at.x[memory.columns[ALIVE]]
     for body in world.bodies:
         names.update({f"{body.name}.{field}": at.x[layout[f"{body.name}.{field}"]] for field in GIVEN})
     names.update({name: ca.SX.zeros(size) for name, size in input_sizes(world).items()})
@@ -132,7 +134,7 @@ def namespace(
 def moving_names(world: World) -> frozenset[str]:
     """The names that change within a step."""
     states = {f"{body.name}.{field}" for body in world.bodies for field in (*GIVEN, "accelerometer")}
-    return frozenset({"time", *states, *joint_quantity_names(world), *felt_names(world)})
+    return frozenset({"time", ALIVE, *states, *joint_quantity_names(world), *felt_names(world)})
 
 
 def spans(variables: Sequence[Variable]) -> list[tuple[int, int]]:

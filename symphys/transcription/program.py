@@ -8,7 +8,8 @@ import casadi as ca
 import numpy as np
 
 from symphys.expression import Formula
-from symphys.kernel import Call, Layout, Place, Program
+from symphys.kernel import Call, Fading, Layout, Place, Program
+from symphys.problem import ALIVE
 from symphys.state import Layout as Columns
 from symphys.step import Slot, record_step
 from symphys.transcription.along import Rollout
@@ -98,6 +99,7 @@ def rollout_program(rollout: Rollout, exact: bool = False) -> Program:
         body=(*body, *samples.calls),
         epilogue=(epilogue,),
         constants=((Place(samples.time.offset, len(times)), times),),
+        fading=Fading(samples.x, _alive(samples)),
     )
 
 
@@ -109,7 +111,7 @@ def step_calls(samples: Places, exact: bool) -> list[Call]:
         rollout.world, rollout.problem.simulation.scheme(), rollout.inputs, rollout.parameters.symbols, exact
     )
     arguments = {"u": samples.u, "p": samples.p, "smoothing": samples.knob}
-    after = samples.x.later()
+    after = samples.x.later() if rollout.freeze is None else samples.layout.take(rollout.memory.size - 1)
     places: dict[Slot, Place] = {slot: _part(after, part) for slot, part in recording.results.items()}
     calls = []
     for piece in recording.pieces:
@@ -122,23 +124,31 @@ def step_calls(samples: Places, exact: bool) -> list[Call]:
             places.setdefault(slot, samples.layout.take(slot.size))
         inputs, outputs = (tuple(places[slot] for slot in slots) for slots in (piece.inputs, piece.outputs))
         calls.append(Call(piece.function, inputs, outputs))
-    if rollout.memory.columns:
-        calls.append(_remember(samples))
+    if after.size > columns.size:
+        calls.append(_remember(samples, _part(after, slice(columns.size, None))))
+    if rollout.freeze is not None:
+        calls.append(Call(rollout.freeze, (samples.x, after, samples.p), (samples.x.later(),)))
     return calls
 
 
-def _remember(samples: Places) -> Call:
+def _alive(samples: Samples) -> Place | None:
+    """Whether a motion is not over at each step; None where it never is."""
+    memory = samples.rollout.memory
+    return _part(samples.x, memory.columns[ALIVE]) if memory.falls else None
+
+
+def _remember(samples: Places, result: Place) -> Call:
     """What the next step's sensors need to know of this one."""
     memory, inputs = samples.rollout.memory, samples.rollout.inputs
     x, u = ca.SX.sym("x", samples.x.size), ca.SX.sym("u", samples.u.size)
     function = ca.Function("remember", [x, u], [ca.densify(memory.after(x, u, inputs))])
-    width = Columns(samples.rollout.world).size
-    return Call(function, (samples.x, samples.u), (_part(samples.x.later(), slice(width, memory.size)),))
+    return Call(function, (samples.x, samples.u), (result,))
 
 
 def _part(place: Place, columns: slice) -> Place:
     """Some columns of a state."""
-    return Place(place.offset + columns.start, columns.stop - columns.start, place.stride)
+    start, stop, _ = columns.indices(place.size)
+    return Place(place.offset + start, stop - start, place.stride)
 
 
 def _prologue(samples: Samples) -> Call:

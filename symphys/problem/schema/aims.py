@@ -86,6 +86,16 @@ class ConstraintTable(Table):
     )
 
 
+class FallTable(Table):
+    """When a motion is over before its time: from then on nothing moves, and running costs stop."""
+
+    margin: str = Field(
+        description="formula of a number of the state; the motion ends where it falls below 0. Formulas know `alive`, "
+        "which is 1 until then and 0 from then on"
+    )
+    cost: NonNegative = Field(default=0.0, description="added for every second that is left; more than standing costs")
+
+
 class ObjectiveTable(Table):
     """When to be content."""
 

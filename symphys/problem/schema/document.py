@@ -6,7 +6,14 @@ from typing import Any
 
 from pydantic import ConfigDict, Field
 
-from symphys.problem.schema.aims import ConstraintTable, CostTable, ObjectiveTable, TargetTable, VariableTable
+from symphys.problem.schema.aims import (
+    ConstraintTable,
+    CostTable,
+    FallTable,
+    ObjectiveTable,
+    TargetTable,
+    VariableTable,
+)
 from symphys.problem.schema.control import ControllerTable, SensorTable
 from symphys.problem.schema.include import MOST_INCLUDES, IncludedTable, IncludeTable
 from symphys.problem.schema.joints import JointTable
@@ -52,6 +59,7 @@ class Document(Table):
     cost: list[CostTable] = Field(default=[])
     target: list[TargetTable] = Field(default=[])
     constraint: list[ConstraintTable] = Field(default=[])
+    fall: FallTable | None = None
     objective: ObjectiveTable = ObjectiveTable()
     solver: dict[str, dict[str, Any]] = Field(
         default={}, description="options by solver: [solver.gradient], [solver.cma], ..."

@@ -1,0 +1,124 @@
+"""Motions that are over before their time: nothing moves any more, running costs stop, the time left costs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from symphys.errors import ProblemError
+from symphys.problem import load_problem
+from symphys.transcription import Transcription, rollout_program, transcribe
+
+DT, HALF = 0.01, 31
+"""A ball falls from 1 m; 31 steps end above half a metre, and the next one below."""
+BALL = """
+[simulation]
+duration = 1
+dt = 0.01
+[[body]]
+name = "ball"
+shape = { sphere = { radius = 0.1 } }
+mass = 1
+position = [0, 0, 1]
+[fall]
+margin = "ball.position[2] - 0.5"
+cost = 2
+[[variable]]
+name = "push"
+sets = "ball.velocity"
+guess = [1, 0, 0]
+[[cost]]
+name = "ahead"
+at = "always"
+value = "ball.position[0]"
+[[target]]
+name = "there"
+value = "ball.position[0] - 1"
+tolerance = 0.01
+"""
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    found = tmp_path / "ball.toml"
+    found.write_text(BALL, encoding="utf-8")
+    return found
+
+
+@pytest.fixture
+def ball(path: Path) -> Transcription:
+    return transcribe(load_problem(path))
+
+
+def test_nothing_moves_after_a_fall(ball: Transcription) -> None:
+    height = ball.simulate(np.array([1.0, 0, 0])).position[:, 0, 2]
+    assert height[HALF] > 0.5 > height[HALF + 1]
+    assert np.all(height[HALF + 1 :] == height[HALF + 1])
+
+
+def test_costs_are_those_of_the_time_before(ball: Transcription) -> None:
+    """Trapezoids of what is alive: the step of the fall counts half, the time left twice."""
+    costs = ball.judge(np.array([1.0, 0, 0])).costs
+    assert costs["ahead"] == pytest.approx(DT * DT * (sum(range(HALF + 1)) - HALF / 2 + HALF / 2), rel=1e-9)
+    assert costs["fall"] == pytest.approx(2 * (1 - DT * (HALF + 0.5)), rel=1e-12)
+
+
+def test_gradients_end_at_the_fall(ball: Transcription) -> None:
+    """Casadi and kernel agree; the end's target is as far as the ball came; the instant of the fall has no slope."""
+    z, reached = np.array([[1.0, 0, 0]]), DT * (HALF + 1)
+    values = [transcribe(ball.problem, backend=name).shooting.evaluator.gradient(z, 0.0) for name in ("casadi", "auto")]
+    expected = [ball.judge(z[0]).costs["ahead"] + 2 * (reached - 1) * reached, 0, 0]
+    for found in values:
+        assert found.gradient is not None
+        assert found.gradient[0] == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+def test_adjoints_that_fade_end_at_the_fall(ball: Transcription) -> None:
+    """The target at the end pulls no longer, since the motion was over."""
+    fading = rollout_program(ball.rollout).fading
+    assert fading is not None and fading.kept is not None
+    kernel = getattr(ball.shooting.evaluator, "kernel", None)
+    if kernel is None:
+        pytest.skip("kernels need a compiler")
+    seed = [1.0] + [0.0] * (sum(kernel.program.outputs[name].size for name in kernel.seeded) - 1)
+    _, gradient = kernel.gradient([1.0, 0, 0], seed, [0.0], 1e-12)
+    assert gradient[0] == pytest.approx([ball.judge(np.array([1.0, 0, 0])).costs["ahead"], 0, 0], rel=1e-9)
+
+
+def test_without_a_fall_it_is_as_if_there_were_none(path: Path) -> None:
+    """To the bit."""
+    free = path.with_name("free.toml")
+    free.write_text(BALL.replace("[fall]", "[objective]").replace("margin", "#").replace("cost = 2", ""))
+    path.write_text(BALL.replace("- 0.5", "+ 50"), encoding="utf-8")
+    a, b = (transcribe(load_problem(file)).shooting.evaluator.gradient(np.array([[1.0, 2, 3]]), 0.0)
+            for file in (path, free))  # fmt: skip
+    assert a.merit == b.merit
+    assert np.array_equal(a.gradient, b.gradient)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("- 0.5", "- 1.5", r"fall\.margin: is -0.5 at the start of the guess"),
+        ("ball.position[2] - 0.5", "ball.position", r"fall\.margin: must be a number, but is a vector of 3"),
+        ("ball.position[2] - 0.5", "1 - time", r"fall\.margin: .*time"),
+        ("ball.position[2] - 0.5", "1 - ball.force[0]", r"fall\.margin: .*ball.force"),
+        ('name = "ahead"', 'name = "fall"', r'cost "fall"\.name: "fall" is the name of the cost that .fall. adds'),
+        ("cost = 2", "cost = -2", r"fall\.cost: must be at least 0"),
+    ],
+)
+def test_bad_falls_are_named(path: Path, old: str, new: str, told: str) -> None:
+    path.write_text(BALL.replace(old, new), encoding="utf-8")
+    with pytest.raises(ProblemError, match=told):
+        load_problem(path)
+
+
+def test_alive_is_known_with_a_fall_only(path: Path) -> None:
+    path.write_text(BALL.replace("ball.position[0] - 1", "alive"), encoding="utf-8")
+    assert load_problem(path).targets[0].formula.names == {"alive"}
+    path.write_text(BALL.replace("[fall]", "[objective]").replace("margin", "#").replace("cost = 2", "")
+                    .replace("ball.position[0] - 1", "alive"), encoding="utf-8")  # fmt: skip
+    with pytest.raises(ProblemError, match="alive"):
+        load_problem(path)
