@@ -19,6 +19,7 @@ from symphys.solvers.interface import Solver
 from symphys.solvers.ipopt_ import IPOPT, IpoptOptions
 from symphys.solvers.least_squares import LEAST_SQUARES, LeastSquaresOptions
 from symphys.solvers.outcome import Counts, Monitor, Outcome, StageResult, Status, TraceRow
+from symphys.solvers.stochastic import STOCHASTIC, StochasticOptions
 from symphys.solvers.together import solve_together
 
 __all__ = [
@@ -33,12 +34,13 @@ __all__ = [
     "Solver",
     "StageResult",
     "Status",
+    "StochasticOptions",
     "TraceRow",
     "solve_together",
     "solver",
 ]
 
-SOLVERS: dict[str, Solver[Any]] = {each.name: each for each in (GRADIENT, LEAST_SQUARES, IPOPT, CMA)}
+SOLVERS: dict[str, Solver[Any]] = {each.name: each for each in (GRADIENT, LEAST_SQUARES, IPOPT, CMA, STOCHASTIC)}
 
 
 def solver(name: str) -> Solver[Any]:

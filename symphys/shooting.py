@@ -50,6 +50,8 @@ class Values:
         errors: (batch, k).
         gradient: (batch, n) of the merit; None where it was not asked for.
         residuals, jacobian: (batch, m) and (batch, m, n), merit = r . r; None where they were not asked for.
+        probe: (batch,) the number whose gradient is examined; None where it is not computed.
+        alive: (batch,) 1 where the motion lasted to its end, 0 where it was over before; None where all do.
     """
 
     merit: Array
@@ -58,6 +60,8 @@ class Values:
     gradient: Array | None = None
     residuals: Array | None = None
     jacobian: Array | None = None
+    probe: Array | None = None
+    alive: Array | None = None
 
 
 class Evaluator(Protocol):
@@ -80,6 +84,48 @@ class Evaluator(Protocol):
 
     def jacobian(self, Z: Array, smoothing: float) -> Values:
         """Residuals and their Jacobians with them; only where the problem has ``squares``."""
+        ...
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Situations that were drawn: one a row.
+
+    Attributes:
+        grid: the number of the discretisation.
+        numbers: (batch, s) all that differs.
+    """
+
+    grid: int
+    numbers: Array
+
+
+class Situations(Protocol):
+    """Evaluates points in situations that differ: other friction, other masses, another pose, pushes.
+
+    Attributes:
+        grids: what the discretisations are called; the first is that of the problem.
+    """
+
+    grids: tuple[str, ...]
+
+    def draw(self, rng: np.random.Generator, count: int, width: float = 1.0, grid: int = 0) -> Drawn:
+        """``count`` situations: the first is that of the problem, the others vary ``width`` times as widely as there.
+
+        The same stream gives the same situations on every grid.
+        """
+        ...
+
+    def value(self, Z: Array, drawn: Drawn, smoothing: float) -> Values:
+        """Z (batch, n), or (1, n) for all: merits, objectives, errors, alive."""
+        ...
+
+    def gradient(self, Z: Array, drawn: Drawn, smoothing: float, forget: float = 0.0) -> Values:
+        """These and the gradients of the merits.
+
+        With ``forget`` [1/s] above 0 the adjoint of the state falls like exp(-forget t) on its way back, and ends where
+        a motion was over: no derivative, but what descends where derivatives explode.
+        """
         ...
 
 
@@ -120,6 +166,7 @@ class ShootingProblem:
         constraint_lower, constraint_upper: (m,).
         smoothing: stages of the knob, decreasing, at least one; each starts from the best point of the one before.
         stop_when_met: stop at the first point whose errors are all <= 1, instead of at a stationary point.
+        situations: in which points can be evaluated, beside that of ``evaluator``; None: there are no others.
     """
 
     name: str
@@ -132,6 +179,7 @@ class ShootingProblem:
     constraint_upper: Array = field(default_factory=lambda: np.zeros(0))
     smoothing: tuple[float, ...] = (0.0,)
     stop_when_met: bool = True
+    situations: Situations | None = None
 
     @property
     def n(self) -> int:

@@ -19,6 +19,9 @@ from symphys.kernel.compiler import find_compiler
 from symphys.shooting import Block, Evaluator, ShootingProblem, Values
 from symphys.solvers import SOLVERS, Outcome, TraceRow, solver
 
+PLAIN = [name for name, each in SOLVERS.items() if not each.situations]
+"""The solvers that need no situations."""
+
 Array = NDArray[np.float64]
 Formula = Callable[[Any, Any], Any]
 """(z, smoothing) -> casadi expression."""

@@ -35,7 +35,7 @@ class KernelEvaluator:
     def value(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
         outputs = self.kernel.forward(Z, self.knob(smoothing))
-        return Values(*common(outputs))
+        return Values(*common(outputs), probe=probed(self.kernel, outputs))
 
     def gradient(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
@@ -61,6 +61,11 @@ class KernelEvaluator:
         r = np.ascontiguousarray(first["residuals"])
         jacobian = self.rows.spread(slopes.reshape(len(Z), len(seeds), Z.shape[1]))
         return Values(squared(r), objective, errors, residuals=r, jacobian=jacobian)
+
+
+def probed(kernel: Kernel, outputs: Outputs) -> Array | None:
+    """(batch,) of the number whose gradient is examined; None in single precision, which cannot be differenced."""
+    return outputs["probe"][:, 0] if "probe" in outputs and kernel.report.precision == "double" else None
 
 
 def common(outputs: Outputs) -> tuple[Array, Array, Array]:

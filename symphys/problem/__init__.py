@@ -7,6 +7,7 @@ from symphys.problem.load import load_problem
 from symphys.problem.model import Constraint, Cost, Fall, Problem, Simulation, Slot, Target, Variable
 from symphys.problem.options import require_solvers, validate_options
 from symphys.problem.solvable import require_solvable
+from symphys.problem.variation import Grid, Posed, Scenarios, Varied
 
 __all__ = [
     "ALIVE",
@@ -14,12 +15,16 @@ __all__ = [
     "Controller",
     "Cost",
     "Fall",
+    "Grid",
+    "Posed",
     "Problem",
+    "Scenarios",
     "Sensor",
     "Simulation",
     "Slot",
     "Target",
     "Variable",
+    "Varied",
     "json_schema",
     "load_problem",
     "require_solvable",

@@ -26,6 +26,7 @@ from symphys.problem.model import NOTHING, Array, Fall, Problem, Simulation, Var
 from symphys.problem.placing import placed
 from symphys.problem.plan import WorldPlan
 from symphys.problem.quantities import Quantity, quantities, weight_quantities
+from symphys.problem.scenarios import read_scenarios
 from symphys.problem.schema import Document
 from symphys.problem.sensors import read_sensors
 from symphys.problem.settings import apply_settings
@@ -45,7 +46,7 @@ from symphys.state import input_sizes
 
 MEMBERS = ("body", "plane", "block", "terrain")
 SHARED_NAMES = (*MEMBERS, "joint", "sensor", "controller", "variable")
-OWN_NAMES = ("cost", "target", "constraint")
+OWN_NAMES = ("cost", "target", "constraint", "scenario")
 
 
 def load_problem(
@@ -133,6 +134,7 @@ def build(
     known |= weight_quantities(controllers)
     variables = read_variables(document.variable, known, simulation, faults)
     check_varied(plan, variables, faults)
+    scenarios = read_scenarios(document.scenario, known, plan, simulation, variables, faults)
     faults.stop_if_any()
     fall, aims = read_asked(document, simulation, plan, at_guess(known, variables), variables, faults)
     return Problem(
@@ -154,6 +156,7 @@ def build(
         controllers=controllers,
         solvers=None if document.solvers is None else tuple(dict.fromkeys(document.solvers)),
         fall=fall,
+        scenarios=scenarios or None,
     )
 
 

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ from symphys.expression import Formula
 from symphys.problem.feedback import Controller, Sensor
 from symphys.problem.plan import WorldPlan
 from symphys.world import Scheme, World
+
+if TYPE_CHECKING:
+    from symphys.problem.variation import Scenarios
 
 Array = NDArray[np.float64]
 NOTHING: Mapping[str, Any] = MappingProxyType({})
@@ -205,6 +208,7 @@ class Problem:
         solver_tables: the raw [solver.NAME] tables by NAME.
         sensors, controllers: in the file's order.
         fall: where a motion is over before its time; None: nowhere.
+        scenarios: what differs from situation to situation; None: nothing.
     """
 
     name: str
@@ -227,6 +231,7 @@ class Problem:
     controllers: tuple[Controller, ...] = ()
     solvers: tuple[str, ...] | None = None
     fall: Fall | None = None
+    scenarios: Scenarios | None = None
 
     @property
     def weights(self) -> dict[str, Array]:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-LABELLED = ("cost", "target", "constraint")
+LABELLED = ("cost", "target", "constraint", "scenario")
 """Tables whose names nothing refers to."""
 OTHER_TEXTS = ("at", "interpolation", "height", "activation", "output", "weights")
 """Keys whose texts name nothing of the file."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import ceil, floor
 
-from symphys.problem.faults import Faults
+from symphys.problem.faults import Faults, Place
 from symphys.problem.model import Simulation
 from symphys.problem.schema.physics import SimulationTable
 
@@ -19,9 +19,8 @@ def read_simulation(table: SimulationTable, faults: Faults) -> Simulation:
     return Simulation(**{**table.model_dump(), "smoothing": tuple(table.smoothing)})
 
 
-def check_steps(duration: float, dt: float, faults: Faults) -> None:
+def check_steps(duration: float, dt: float, faults: Faults, place: Place = ("simulation", "dt")) -> None:
     """The duration must be a whole number of steps, and not too many."""
-    place = ("simulation", "dt")
     ratio = duration / dt
     if dt > duration:
         faults.add(place, f"the step {dt:g} s is longer than the duration {duration:g} s")

@@ -53,7 +53,9 @@ def make_jobs(
     command: str = "",
     backend: str = BEST,
 ) -> list[Job]:
-    """Every problem with every solver and seed, below the folder ``out``; None: the solvers that each problem is for.
+    """Every problem with every solver and seed, below the folder ``out``.
+
+    ``solvers`` None: those that each problem names, or those that fit it.
 
     ProblemError for a problem without variables or aims, and for bad solver options.
     """
@@ -62,13 +64,18 @@ def make_jobs(
     for problem in problems:
         require_solvable(problem)
         check_tables(problem)
-        for name in solvers or problem.solvers or SOLVERS:
+        for name in solvers or problem.solvers or fitting(problem):
             options = solver_options(problem, name)
             plain = dataclasses.asdict(options)
             for seed in seeds:
                 config = make_config(problem.name, problem.identity, name, seed, settings, plain, backend)
                 jobs.append(Job(problem, config, options, RunFolder.of(out, problem.name, name, seed), command))
     return jobs
+
+
+def fitting(problem: Problem) -> list[str]:
+    """The solvers that are for such problems: with situations that differ, or without."""
+    return [name for name, each in SOLVERS.items() if each.situations == (problem.scenarios is not None)]
 
 
 def solver_options(problem: Problem, name: str) -> Any:

@@ -15,6 +15,7 @@ from symphys.step import Slot, record_step
 from symphys.transcription.along import Rollout
 from symphys.transcription.control_calls import Places, control_calls
 from symphys.transcription.decision import start_of
+from symphys.transcription.probe import combined
 from symphys.transcription.terms import Terms, terms
 
 Expr = Any
@@ -80,7 +81,7 @@ def dense(function: ca.Function) -> ca.Function:
 
 
 def rollout_program(rollout: Rollout, exact: bool = False) -> Program:
-    """A program of z and smoothing whose outputs are merit, objective, errors, constraints, costs and residuals.
+    """A program of z and smoothing: merit, objective, errors, constraints, costs, probe, residuals, alive.
 
     ``exact`` is for smoothing 0 only, whatever is given: it has less to compute.
     """
@@ -88,6 +89,9 @@ def rollout_program(rollout: Rollout, exact: bool = False) -> Program:
     asked = terms(samples)
     body = [*control_calls(rollout, samples), *step_calls(samples, exact)]
     epilogue, outputs = _epilogue(samples, asked)
+    alive = _alive(samples)
+    if alive is not None:
+        outputs["alive"] = alive.later(rollout.steps).still()
     times = tuple(np.arange(rollout.steps + 1) * rollout.dt)
     return Program(
         size=samples.layout.size,
@@ -99,7 +103,7 @@ def rollout_program(rollout: Rollout, exact: bool = False) -> Program:
         body=(*body, *samples.calls),
         epilogue=(epilogue,),
         constants=((Place(samples.time.offset, len(times)), times),),
-        fading=Fading(samples.x, _alive(samples)),
+        fading=Fading(samples.x, alive),
     )
 
 
@@ -167,6 +171,7 @@ def _epilogue(samples: Samples, asked: Terms) -> tuple[Call, dict[str, Place]]:
         "errors": asked.errors,
         "constraints": asked.constraints,
         "costs": asked.costs,
+        "probe": combined(asked.means),
     }
     if asked.residuals is not None:
         parts["residuals"] = asked.residuals

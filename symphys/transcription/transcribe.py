@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from time import perf_counter
 
 from symphys.backends import BEST, Source, choose
@@ -10,8 +11,9 @@ from symphys.shooting import ShootingProblem
 from symphys.transcription.along import symbolic_rollout
 from symphys.transcription.decision import blocks
 from symphys.transcription.functions import ExpressionFunctions
-from symphys.transcription.large import has_large_nets, transcribe_large
+from symphys.transcription.large import has_large_nets, require_small_nets, transcribe_large
 from symphys.transcription.program import rollout_program
+from symphys.transcription.situations import with_situations
 from symphys.transcription.terms import terms
 from symphys.transcription.transcription import Transcription
 
@@ -25,6 +27,10 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
         backend: what evaluates it, a name of ``symphys.backends.NAMES``.
         threads: that share a batch; None: one for each processor.
     """
+    if problem.scenarios is not None:
+        require_small_nets(problem, "a problem with scenarios")
+        plain = transcribe(replace(problem, scenarios=None), exact, "casadi", threads)
+        return with_situations(plain, problem, exact, backend, threads)
     if has_large_nets(problem):
         return transcribe_large(problem, exact, backend, threads)
     began = perf_counter()

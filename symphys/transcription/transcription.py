@@ -70,15 +70,14 @@ class Transcription:
         if self.shooting.squares:
             calls["jacobian"] = lambda: evaluator.jacobian(z[None], 0.0)
         elif self.terms.names:
-            constraints = self.shooting.nlp.jacobian or self.functions.constraint_jacobian
-            calls["jacobian"] = lambda: constraints(z, 0.0)
+            calls["jacobian"] = lambda: (self.shooting.nlp.jacobian or self.functions.constraint_jacobian)(z, 0.0)
         calls["hessian"] = lambda: self.functions.hessian(z, 0.0)
         return {kind: fastest(calls[kind]) / one for kind in kinds if kind in calls}
 
     @cached_property
     def probe(self) -> Probe:
         """What is differentiated to examine the gradient."""
-        return ExpressionProbe(self.rollout, self.terms)
+        return ExpressionProbe(self.rollout, self.terms, self.shooting.evaluator)
 
     def back(self, record: Record, ends: Array) -> Iterator[Array]:
         """Derivatives of ends . x_N, with ``ends`` (nx, m), with respect to x_N-1, x_N-2 ... x_0: (nx, m) each."""

@@ -12,12 +12,14 @@ from symphys.shooting import Block
 from symphys.transcription import Transcription
 
 Array = NDArray[np.float64]
-Value = Callable[[Array], float]
+Values = Callable[[Array], Array]
 
 DIFFERENCE_STEPS = (1e-4, 1e-5, 1e-6)
 """Steps of the central differences, as shares of the scale; the best counts, and a wrong slope passes none."""
 EVERY_COMPONENT = 12
-"""Variables up to this size are differenced component by component, larger ones along as many random directions."""
+"""Variables up to this size are differenced component by component."""
+DIRECTIONS = 4
+"""Larger ones along as many random directions."""
 NOTICED = 1e-4
 """Relative error of central differences from which each side is looked at by itself."""
 
@@ -36,10 +38,10 @@ def compare_gradient(transcription: Transcription, z: Array) -> list[dict[str, A
     """
     probe = transcription.probe
     slope = probe.gradient(z)
-    return [_compare_block(probe.value, block, z, slope) for block in transcription.shooting.blocks]
+    return [_compare_block(probe.values, block, z, slope) for block in transcription.shooting.blocks]
 
 
-def _compare_block(value: Value, block: Block, z: Array, slope: Array) -> dict[str, Any]:
+def _compare_block(value: Values, block: Block, z: Array, slope: Array) -> dict[str, Any]:
     norm = float(np.linalg.norm(slope[block.start : block.stop])) or 1.0
     directions = _directions(block, block.stop - block.start, z.size)
     middle, at = _best(lambda d, step: _mismatch(value, z, slope, d, step), directions)
@@ -69,22 +71,22 @@ def _directions(block: Block, size: int, n: int) -> Array:
     """(k, n): unit steps in the scale of each component, or random combinations of many."""
     inside = np.eye(size)
     if size > EVERY_COMPONENT:
-        inside = np.random.default_rng(1).standard_normal((EVERY_COMPONENT, size))
+        inside = np.random.default_rng(1).standard_normal((DIRECTIONS, size))
         inside /= np.linalg.norm(inside, axis=1, keepdims=True)
     whole = np.zeros((len(inside), n))
     whole[:, block.start : block.stop] = inside * block.scale
     return whole
 
 
-def _mismatch(value: Value, z: Array, slope: Array, direction: Array, step: float) -> float:
-    high, low = (value(z + sign * step * direction) for sign in (1, -1))
-    return abs((high - low) / (2 * step) - float(slope @ direction)) / float(np.linalg.norm(direction))
+def _mismatch(value: Values, z: Array, slope: Array, direction: Array, step: float) -> float:
+    high, low = value(z + step * np.outer([1, -1], direction))
+    return float(abs((high - low) / (2 * step) - slope @ direction) / np.linalg.norm(direction))
 
 
-def _mismatch_beside(value: Value, z: Array, slope: Array, direction: Array, step: float) -> float:
+def _mismatch_beside(value: Values, z: Array, slope: Array, direction: Array, step: float) -> float:
     """The larger error of either side's derivative at z, from three points beside it: of second order."""
     errors = []
     for side in (step, -step):
-        one, two, three = (value(z + k * side * direction) for k in (1, 2, 3))
+        one, two, three = value(z + side * np.outer([1, 2, 3], direction))
         errors.append(abs((8 * two - 5 * one - 3 * three) / (2 * side) - float(slope @ direction)))
-    return max(errors) / float(np.linalg.norm(direction))
+    return float(max(errors) / np.linalg.norm(direction))

@@ -10,12 +10,12 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from toys import Counted, failing, quadratic, rosenbrock, solve, target, toy
+from toys import PLAIN, Counted, failing, quadratic, rosenbrock, solve, target, toy
 
 from symphys.shooting import Evaluator, ShootingProblem, Values
 from symphys.solvers import SOLVERS, Status
 
-every_solver = pytest.mark.parametrize("name", list(SOLVERS))
+every_solver = pytest.mark.parametrize("name", PLAIN)
 KINDS = ("value", "gradient", "residuals", "jacobian")
 METHODS = ["spectral", "gradient", "momentum", "adam"]
 

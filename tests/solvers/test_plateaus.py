@@ -7,13 +7,13 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from toys import counted, solve, stop_at, through_json, toy
+from toys import PLAIN, counted, solve, stop_at, through_json, toy
 
 from symphys.shooting import ShootingProblem
-from symphys.solvers import SOLVERS, Status
+from symphys.solvers import Status
 from symphys.solvers.plateau import FLAT, REFUSALS
 
-every_solver = pytest.mark.parametrize("name", list(SOLVERS))
+every_solver = pytest.mark.parametrize("name", PLAIN)
 descents = pytest.mark.parametrize("name", ["gradient", "least_squares"])
 EDGE, LEVEL = 0.6, 2.0
 
@@ -116,7 +116,7 @@ def test_a_guess_on_a_plateau_and_at_a_bound(name: str) -> None:
 
 def test_what_bounds_hold_back_is_no_plateau() -> None:
     problem = toy(1, lambda z, s: z + 3, errors=lambda z, s: ca.fabs(z + 3), bounds=(0.0, 1.0))
-    for name in SOLVERS:
+    for name in PLAIN:
         assert solve(name, problem).advice not in ("", FLAT)
 
 

@@ -28,6 +28,7 @@ from symphys.problem.schema.physics import (
     TerrainTable,
     WorldTable,
 )
+from symphys.problem.schema.scenarios import ScenarioTable
 from symphys.problem.schema.types import Label, Table
 
 
@@ -59,6 +60,7 @@ class Document(Table):
     cost: list[CostTable] = Field(default=[])
     target: list[TargetTable] = Field(default=[])
     constraint: list[ConstraintTable] = Field(default=[])
+    scenario: list[ScenarioTable] = Field(default=[])
     fall: FallTable | None = None
     objective: ObjectiveTable = ObjectiveTable()
     solver: dict[str, dict[str, Any]] = Field(

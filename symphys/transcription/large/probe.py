@@ -18,9 +18,10 @@ class LargeProbe:
         """By the nets and steps of an evaluator."""
         self._evaluator, self._made = evaluator, evaluator.made
 
-    def value(self, z: Array) -> float:
+    def values(self, Z: Array) -> Array:
         """See ``Probe``."""
-        return float(self._made.aims.probe.call(aim_arguments(self._made, self._evaluator.way(z, 0.0), 0))[0])
+        ways = (self._evaluator.way(z, 0.0) for z in Z)
+        return np.array([float(self._made.aims.probe.call(aim_arguments(self._made, way, 0))[0]) for way in ways])
 
     def gradient(self, z: Array) -> Array:
         """See ``Probe``."""

@@ -1,0 +1,168 @@
+"""The [[scenario]] tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.problem.carry import spanning
+from symphys.problem.faults import Faults, Place
+from symphys.problem.joint_plan import WORLD, JointPlan
+from symphys.problem.model import Simulation, Slot, Variable
+from symphys.problem.plan import WorldPlan
+from symphys.problem.quantities import Quantity, SlotError, read_slot
+from symphys.problem.schema.scenarios import GridTable, ScenarioTable
+from symphys.problem.simulation import check_steps
+from symphys.problem.variation import Grid, Posed, Scenarios, Varied
+from symphys.state import GIVEN
+from symphys.suggest import hint, quote
+
+Array = NDArray[np.float64]
+Taken = dict[tuple[str, int], str]
+"""What sets each component of each quantity, in words."""
+KINDS = ("sets", "robot", "simulation")
+
+
+def read_scenarios(
+    tables: Sequence[ScenarioTable],
+    known: Mapping[str, Quantity],
+    plan: WorldPlan,
+    simulation: Simulation,
+    variables: Sequence[Variable],
+    faults: Faults,
+) -> Scenarios:
+    """All tables; what a variable sets cannot differ, nor can anything differ twice."""
+    taken: Taken = {}
+    for variable in variables:
+        for slot in variable.slots:
+            taken |= {(slot.name, k): f"variable {variable.name}" for k in slot.components}
+    reader = Reader(known, plan, simulation, taken, faults)
+    for index, table in enumerate(tables):
+        reader.read(index, table)
+    return Scenarios(tuple(reader.varied), tuple(reader.posed), tuple(reader.grids))
+
+
+class Reader:
+    """Reads one table after the other."""
+
+    def __init__(
+        self, known: Mapping[str, Quantity], plan: WorldPlan, simulation: Simulation, taken: Taken, faults: Faults
+    ) -> None:
+        """Nothing is read yet."""
+        self.known, self.plan, self.simulation, self.taken, self.faults = known, plan, simulation, taken, faults
+        self.varied: list[Varied] = []
+        self.posed: list[Posed] = []
+        self.grids: list[Grid] = []
+
+    def read(self, index: int, table: ScenarioTable) -> None:
+        """One table."""
+        place: Place = ("scenario", index)
+        given = [key for key in KINDS if getattr(table, key) is not None]
+        if len(given) != 1:
+            self.faults.add((*place, "sets"), "give one of sets, robot and simulation")
+        elif table.sets is not None:
+            self.numbers(place, table)
+        elif table.robot is not None:
+            self.pose(place, table, table.robot)
+        elif table.simulation is not None:
+            self.grid(place, table.name, table.simulation)
+
+    def numbers(self, place: Place, table: ScenarioTable) -> None:
+        """Numbers that are drawn."""
+        try:
+            slots = tuple(read_slot(text, self.known) for text in table.sets or ())
+        except SlotError as error:
+            self.faults.add((*place, "sets"), str(error))
+            return
+        kinds, sizes = {self.known[slot.name].kind for slot in slots}, {len(slot.components) for slot in slots}
+        if len(kinds) > 1 or len(sizes) > 1:
+            self.faults.add((*place, "sets"), "these are of different kinds or lengths; use one scenario for each")
+            return
+        if (table.factor is None) == (table.shift is None):
+            self.faults.add((*place, "factor"), "give either factor or shift")
+            return
+        self.take((*place, "sets"), slots, table.name)
+        shift = np.array([0.0] if table.shift is None else table.shift)
+        if shift.size not in (1, *sizes):
+            self.faults.add((*place, "shift"), f"must be a number, or {max(sizes)} of them; it has {shift.size}")
+            return
+        kind, lasts = kinds.pop(), 0
+        if table.lasts is not None:
+            lasts = self.lasting((*place, "lasts"), table.lasts, kind)
+        spread = np.broadcast_to(shift, (max(sizes),)).copy()
+        self.varied.append(Varied(table.name, kind, slots, table.factor or 0.0, spread, table.alike, lasts))
+
+    def lasting(self, place: Place, seconds: float, kind: str) -> int:
+        """In steps."""
+        steps = max(1, round(seconds / self.simulation.dt))
+        if kind != "control":
+            self.faults.add(place, "only forces, torques and commands act for a while; leave this out")
+        elif steps > self.simulation.steps:
+            self.faults.add(place, f"is longer than the motion, {self.simulation.duration:g} s")
+        return steps
+
+    def take(self, place: Place, slots: Sequence[Slot], name: str) -> None:
+        """Note who sets what; refuse second ones."""
+        for slot in slots:
+            for k in slot.components:
+                owner = self.taken.setdefault((slot.name, k), f"scenario {name}")
+                if owner != f"scenario {name}":
+                    self.faults.add(place, f"{slot.name}[{k}] is set by {owner} already")
+                    return
+
+    def pose(self, place: Place, table: ScenarioTable, robot: str) -> None:
+        """A robot whose pose is drawn."""
+        bodies = [body.name for body in self.plan.bodies]
+        if robot not in bodies:
+            self.faults.add((*place, "robot"), f"there is no body {quote(robot)}; {hint(robot, bodies)}")
+            return
+        whole = together(robot, self.plan.joints)
+        if WORLD in whole:
+            self.faults.add((*place, "robot"), f"{robot} hangs on the world; only what moves freely has a pose")
+            return
+        slots = [
+            Slot(f"{body}.{field}", tuple(range(4 if field == "orientation" else 3)))
+            for body in whole
+            for field in GIVEN
+        ]
+        self.take((*place, "robot"), slots, table.name)
+        tilt, bend = table.tilt + np.deg2rad(table.tilt_deg), table.joints + np.deg2rad(table.joints_deg)
+        if not (tilt or bend or table.velocity):
+            self.faults.add((*place, "tilt"), "give tilt, joints or velocity, or several of them")
+        joints = bending(self.plan.joints, whole)
+        self.posed.append(Posed(table.name, tuple(whole), joints, float(tilt), float(bend), table.velocity))
+
+    def grid(self, place: Place, name: str, table: GridTable) -> None:
+        """Another discretisation."""
+        given = {key: value for key in ("dt", "sweeps") if (value := getattr(table, key)) is not None}
+        if not given:
+            self.faults.add((*place, "simulation"), "give dt, sweeps or both")
+        if table.dt is not None:
+            check_steps(self.simulation.duration, table.dt, self.faults, (*place, "simulation", "dt"))
+        self.grids.append(Grid(name, replace(self.simulation, **given)))
+
+
+def together(body: str, joints: Sequence[JointPlan]) -> list[str]:
+    """The bodies that joints hold together with one, the world too."""
+    found = {body: None}
+    while True:
+        ends = [{joint.first, joint.second or WORLD} for joint in joints]
+        more = [name for pair in ends if pair & found.keys() for name in sorted(pair) if name not in found]
+        if not more:
+            return list(found)
+        found |= dict.fromkeys(more)
+
+
+def bending(joints: Sequence[JointPlan], bodies: Sequence[str]) -> tuple[JointPlan, ...]:
+    """The rigid hinges of a robot that close no loop."""
+    tree = spanning(joints)
+    return tuple(
+        joint
+        for joint in joints
+        if joint.first in bodies
+        and joint.name in tree[joint.first]
+        and [coordinate.turns for coordinate in joint.kind.coordinates] == [True]
+    )

@@ -1,0 +1,54 @@
+"""Numbers that differ from situation to situation, as variables that no solver chooses."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.problem import Problem, Slot, Variable, Varied
+
+Array = NDArray[np.float64]
+LEAST = 0.05
+"""Of a factor, however wide the draws are made."""
+
+
+class Numbers:
+    """The draws of one table."""
+
+    def __init__(self, problem: Problem, varied: Varied) -> None:
+        """Look up what the numbers are without it."""
+        self.varied, self.steps = varied, problem.simulation.steps
+        values = {**problem.initial, **problem.parameters, **problem.weights}
+        size = len(varied.slots[0].components)
+        blank = np.zeros(1 + max(max(slot.components) for slot in varied.slots))
+        found = [values.get(slot.name, blank)[list(slot.components)] for slot in varied.slots]
+        self.base = np.stack(found)
+        knots = self.steps if varied.kind == "control" else 1
+        self.variables = tuple(
+            hidden(f"{varied.name}:{slot.name}", varied.kind, slot, np.tile(each, knots), knots)
+            for slot, each in zip(varied.slots, self.base, strict=True)
+        )
+        self.shape = (len(varied.slots), size)
+
+    def draw(self, rng: np.random.Generator, count: int, width: float) -> Array:
+        """(count, numbers of the variables)."""
+        varied, (slots, size) = self.varied, self.shape
+        drawn = width * rng.uniform(-1, 1, (count, 1, 1) if varied.alike else (count, slots, size))
+        factor = np.maximum(1 + varied.factor * drawn, LEAST)
+        values = np.broadcast_to(self.base * factor + varied.shift * drawn, (count, slots, size))
+        if varied.kind != "control":
+            return values.reshape(count, -1)
+        return (values[:, :, None] * self.acting(rng, count)[:, None, :, None]).reshape(count, -1)
+
+    def acting(self, rng: np.random.Generator, count: int) -> Array:
+        """(count, steps) 1 in the steps in which an input acts."""
+        lasts = self.varied.lasts or self.steps
+        first = np.floor(rng.uniform(0, 1, count) * (self.steps - lasts + 1))
+        step = np.arange(self.steps)
+        return ((step >= first[:, None]) & (step < first[:, None] + lasts)).astype(float)
+
+
+def hidden(name: str, kind: str, slot: Slot, guess: Array, knots: int = 1) -> Variable:
+    """A variable that no solver sees."""
+    none, one = np.full(guess.size, np.inf), np.ones(guess.size)
+    return Variable(name, kind, (slot,), knots, "constant", guess, -none, none, one, 0 * one)  # type: ignore[arg-type]

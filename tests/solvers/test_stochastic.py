@@ -1,0 +1,145 @@
+"""Descent in situations that are drawn anew: it finds what is best on the average, and goes on where it was stopped."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from toys import toy
+
+from symphys.shooting import Array, Drawn, ShootingProblem, Values
+from symphys.solvers import SOLVERS, Status, StochasticOptions, TraceRow
+from symphys.solvers.averages import average, evolution, together
+
+SOLVE = SOLVERS["stochastic"].solve
+BEST = np.array([0.5, -0.25])
+
+
+class Winds:
+    """(z - BEST - wind)^2, with a wind that differs; those above ``storm`` end the motion, and spoil it ``badly``."""
+
+    def __init__(self, spread: float = 0.3, storm: float = np.inf, badly: float = 0.0) -> None:
+        self.grids, self.spread, self.storm, self.badly = ("", "fine"), spread, storm, badly
+        self.asked: list[int] = []
+
+    def draw(self, rng: np.random.Generator, count: int, width: float = 1.0, grid: int = 0) -> Drawn:
+        rows = width * self.spread * rng.uniform(-1, 1, (count, 2))
+        rows[0] = 0
+        return Drawn(grid, rows)
+
+    def value(self, Z: Array, drawn: Drawn, smoothing: float) -> Values:
+        off = Z - BEST - drawn.numbers
+        merit = (off**2).sum(axis=1)
+        over = np.abs(drawn.numbers).max(axis=1) > self.storm
+        merit = np.where(over, merit + self.badly, merit)
+        return Values(merit, merit, np.zeros((len(merit), 0)), alive=1.0 - over)
+
+    def gradient(self, Z: Array, drawn: Drawn, smoothing: float, forget: float = 0.0) -> Values:
+        self.asked.append(drawn.grid)
+        found = self.value(Z, drawn, smoothing)
+        slopes = 2 * (Z - BEST - drawn.numbers) + 0 * found.merit[:, None]
+        return replace(found, gradient=slopes)
+
+
+def windy(**settings: Any) -> ShootingProblem:
+    return replace(toy(2, objective=lambda z, s: ca.sumsqr(z - BEST)), situations=Winds(**settings))
+
+
+def options(**changes: Any) -> StochasticOptions:
+    return StochasticOptions(**{"iterations": 150, "samples": 8, "rate": 0.05, "validation": 32, **changes})
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_it_finds_the_best_on_the_average(share: float) -> None:
+    """By gradients, by values alone, and by both."""
+    problem = windy()
+    found = SOLVE(problem, np.array([3.0, 3.0]), options(evolution=share, rate=0.1))
+    assert found.status is Status.BUDGET
+    assert found.z == pytest.approx(BEST, abs=0.1)
+    assert found.counts.gradients == 150 * 8
+    assert (found.counts.rollouts > 150 * 16) == (share > 0)
+
+
+def test_discretisations_take_turns() -> None:
+    problem = windy()
+    SOLVE(problem, np.zeros(2), options(iterations=4))
+    assert isinstance(problem.situations, Winds)
+    assert problem.situations.asked == [0, 1, 0, 1]
+
+
+def test_validation_keeps_the_best_point() -> None:
+    """A rate that leaps about ends worse than what is kept."""
+    kept, last = (SOLVE(windy(), BEST, options(rate=1.0, hold=1.0, patience=0, every=1, validation=count))
+                  for count in (32, 0))  # fmt: skip
+    distance = [float(np.linalg.norm(found.z - BEST)) for found in (kept, last)]
+    assert distance[0] < 0.5 * distance[1]
+
+
+@pytest.mark.parametrize("stop", [3, 40])
+def test_it_goes_on_to_the_bit(stop: int) -> None:
+    def press(row: TraceRow) -> None:
+        if row.iteration == stop:
+            raise KeyboardInterrupt
+
+    whole = SOLVE(windy(), np.ones(2), options(iterations=60), seed=3)
+    first = SOLVE(windy(), np.ones(2), options(iterations=60), seed=3, monitor=press)
+    assert first.status is Status.INTERRUPTED
+    second = SOLVE(windy(), np.ones(2), options(iterations=60), seed=3, checkpoint=first.checkpoint)
+    assert np.array_equal(second.z, whole.z)
+    assert [row.objective for row in second.trace] == [row.objective for row in whole.trace]
+    assert second.counts == whole.counts
+
+
+def test_seeds_differ() -> None:
+    a, b = (SOLVE(windy(), np.ones(2), options(iterations=5), seed=seed).z for seed in (0, 1))
+    assert not np.array_equal(a, b)
+
+
+def test_samples_that_are_not_finite_are_left_out_and_told() -> None:
+    """All of them: it ends, and says why."""
+    lines: list[str] = []
+    found = SOLVE(windy(storm=0.2, badly=np.nan), np.ones(2), options(), log=lines.append)
+    assert found.z == pytest.approx(BEST, abs=0.2)
+    assert any("not finite" in line for line in lines)
+    assert SOLVE(windy(spread=np.nan), np.ones(2), options(samples=1)).status is Status.BUDGET
+    spoilt = SOLVE(windy(storm=-1, badly=np.nan), np.ones(2), options())
+    assert spoilt.status is Status.NOT_FINITE and "[fall]" in spoilt.advice
+
+
+def test_without_situations_it_is_not_for_this_problem() -> None:
+    found = SOLVE(toy(2, objective=lambda z, s: ca.sumsqr(z)), np.ones(2), options())
+    assert found.status is Status.NOT_APPLICABLE and "[[scenario]]" in found.advice
+
+
+def test_each_gradient_is_shortened_by_itself() -> None:
+    """However long; fallen ones count more; what explodes keeps its direction."""
+    slopes = np.array([[0.1, 0.0], [0.0, 30.0], [1e200, 1e200]])
+    values = Values(np.zeros(3), np.arange(3.0), np.zeros((3, 0)), gradient=slopes, alive=np.array([1.0, 0.0, 1.0]))
+    found = average(values, np.ones(2), 1.0, 2.0)
+    assert found.gradient == pytest.approx([(0.1 + 0.5**0.5) / 4, (2 + 0.5**0.5) / 4], rel=1e-12)
+    assert (found.objective, found.alive, found.left_out) == (1.0, pytest.approx(2 / 3), 0)
+    assert found.longest == pytest.approx(2**0.5 * 1e200)
+    assert found.typical == pytest.approx(30)
+    along = np.array([1 + 0.5**0.5, 1 + 0.5**0.5]) / 3
+    assert found.agreement == pytest.approx(np.linalg.norm(along), rel=1e-12)
+
+
+def test_evolution_estimates_the_gradient() -> None:
+    """Of a quadratic, on the average of many pairs."""
+    winds, z, step = Winds(), np.array([1.5, 0.75]), np.array([0.1, 0.2])
+    rng = np.random.default_rng(0)
+    found = evolution(winds, z, step, winds.draw(rng, 20_000), 0.0, rng)
+    assert found == pytest.approx(2 * (z - BEST) * step, rel=0.1)
+    mixed = together(np.array([3.0, 0]), np.array([0, 0.1]), 0.25)
+    assert mixed == pytest.approx([0.75, 0.25])
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("rate", 0.0), ("clip", 0.0), ("samples", 0), ("evolution", 1.5), ("betas", (1.0, 0.5))]
+)
+def test_options_that_cannot_be(name: str, value: Any) -> None:
+    with pytest.raises(ValueError, match=name):
+        StochasticOptions(**{name: value})

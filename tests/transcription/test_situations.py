@@ -1,0 +1,219 @@
+"""Situations that differ: draws keep their bounds and joints, and evaluations are those of files with their numbers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from symphys.problem import Problem, load_problem
+from symphys.shooting import Drawn
+from symphys.state import initial_state
+from symphys.step import gap_function
+from symphys.step.coordinates import readings
+from symphys.transcription import Transcription, transcribe
+from symphys.transcription.situations.sampler import Sampler
+
+Array = NDArray[np.float64]
+WALKER = """
+[simulation]
+duration = 0.4
+dt = 0.01
+[[body]]
+name = "torso"
+shape = { box = { size = [0.4, 0.2, 0.1] } }
+mass = 5
+position = [0, 0, 0.6]
+collides_with = []
+[[body]]
+name = "leg"
+shape = { sphere = { radius = 0.05 } }
+mass = 1
+position = [0, 0, 0.3]
+[[joint]]
+name = "hip"
+between = ["torso", "leg"]
+hinge = { axis = [0, 1, 0] }
+point = [0, 0, 0.55]
+start = 0.2
+motor = { servo = { gain = 20, torque = 30, velocity = 8 } }
+[ground]
+height = 0.252
+friction = 0.5
+[fall]
+margin = "torso.position[2] - 0.5"
+[[variable]]
+name = "command"
+sets = "hip.command"
+knots = 2
+[[cost]]
+name = "far"
+value = "-torso.position[0]"
+[[scenario]]
+name = "friction"
+sets = "ground.friction"
+factor = 0.3
+[[scenario]]
+name = "masses"
+sets = ["torso.mass", "leg.mass"]
+factor = 0.1
+[[scenario]]
+name = "push"
+sets = "torso.force[0:2]"
+shift = [30, 20]
+lasts = 0.1
+[[scenario]]
+name = "pose"
+robot = "torso"
+tilt = 0.2
+joints = 0.3
+velocity = 0.1
+[[scenario]]
+name = "finer"
+simulation = { dt = 0.005 }
+"""
+
+
+@pytest.fixture
+def problem(tmp_path: Path) -> Problem:
+    path = tmp_path / "walker.toml"
+    path.write_text(WALKER, encoding="utf-8")
+    return load_problem(path)
+
+
+@pytest.fixture
+def walker(problem: Problem) -> Transcription:
+    made = transcribe(problem)
+    if made.shooting.situations is None:
+        pytest.skip(made.backend.note)
+    return made
+
+
+def columns(sampler: Sampler, rows: Array) -> dict[str, Array]:
+    """By the name of what is drawn, (count, k)."""
+    own = [v for v in sampler.problem.variables if ":" in v.name]
+    ends = np.cumsum([0, *(v.guess.size for v in own)])
+    return {v.slots[0].name: rows[:, a:b] for v, a, b in zip(own, ends[:-1], ends[1:], strict=True)}
+
+
+def test_numbers_keep_their_bounds(problem: Problem) -> None:
+    """The first row is the file's, the others spread over what the tables say, twice as wide where asked."""
+    sampler = Sampler(problem)
+    for width in (1.0, 2.0):
+        drawn = columns(sampler, sampler.draw(np.random.default_rng(0), 400, width))
+        friction, masses = drawn["ground.friction"][:, 0], drawn["torso.mass"][:, 0] / 5
+        assert (friction[0], masses[0]) == (0.5, 1)
+        for numbers, middle, spread in ((friction, 0.5, 0.15), (masses, 1, 0.1)):
+            off = np.abs(numbers - middle).max()
+            assert 0.9 * width * spread < off <= width * spread + 1e-12
+        assert abs(np.corrcoef(masses[1:], drawn["leg.mass"][1:, 0])[0, 1]) < 0.2
+
+
+def test_pushes_act_for_their_time(problem: Problem) -> None:
+    sampler = Sampler(problem)
+    force = columns(sampler, sampler.draw(np.random.default_rng(0), 200, 1.0))["torso.force"].reshape(200, -1, 2)
+    acts = (force != 0).any(axis=2)
+    assert not acts[0].any()
+    assert np.all(acts[1:].sum(axis=1) == 10)
+    assert np.all(np.abs(np.diff(acts[1:].astype(int), axis=1)).sum(axis=1) <= 2)
+    assert len(set(np.argmax(acts[1:], axis=1))) > 20
+    assert np.abs(force[..., 0]).max() > 25 > 20 >= np.abs(force[..., 1]).max()
+
+
+def test_poses_hold_together_and_touch_nothing(problem: Problem) -> None:
+    """Joints at their drawn angles, without a gap; lifted only where the robot would be in the ground."""
+    sampler, world = Sampler(problem), problem.world()
+    drawn = columns(sampler, sampler.draw(np.random.default_rng(1), 60, 1.0))
+    angles, lifted = [], 0
+    for k in range(60):
+        values = {name: value[k] for name, value in drawn.items() if name in problem.initial}
+        x = initial_state(world, values)
+        (reading,) = readings(world, x).values()
+        assert float(reading.separation) < 1e-12
+        angles.append(float(reading.value))
+        gap = float(np.min(np.array(gap_function(world)(x))))
+        assert gap > -1e-12
+        lifted += gap < 1e-12
+        spin = [values[f"{body}.velocity"] for body in ("torso", "leg")]
+        assert np.array_equal(*spin) and np.abs(spin[0]).max() <= 0.1
+    assert angles[0] == pytest.approx(0.2, abs=1e-12)
+    assert np.abs(np.array(angles) - 0.2).max() <= 0.3 and np.ptp(angles) > 0.5
+    assert 5 < lifted < 55
+
+
+def test_evaluations_are_those_of_the_numbers_in_a_file(walker: Transcription, tmp_path: Path) -> None:
+    """Values and gradients of rows against files with the same numbers."""
+    situations = walker.shooting.situations
+    assert situations is not None
+    z, drawn = np.array([[0.3, -0.2]]), situations.draw(np.random.default_rng(2), 3)
+    numbers = columns(Sampler(walker.problem), drawn.numbers)
+    numbers["torso.force"][:] = 0
+    found = situations.gradient(z, Drawn(0, np.concatenate(list(numbers.values()), axis=1)), 0.0)
+    assert found.gradient is not None
+    for k in range(3):
+        settings = {
+            "ground.friction": float(numbers["ground.friction"][k, 0]),
+            **{f"body.{body}.mass": float(numbers[f"{body}.mass"][k, 0]) for body in ("torso", "leg")},
+        }
+        loaded = load_problem(tmp_path / "walker.toml", settings)
+        posed = {name: numbers[name][k] if name in numbers else value for name, value in loaded.initial.items()}
+        alone = transcribe(replace(loaded, initial=posed, scenarios=None)).shooting.evaluator.gradient(z, 0.0)
+        assert alone.gradient is not None
+        assert found.merit[k] == pytest.approx(alone.merit[0], rel=1e-10)
+        assert found.gradient[k] == pytest.approx(alone.gradient[0], rel=1e-7)
+    assert np.ptp(found.merit) > 1e-3
+
+
+def test_pushes_push(walker: Transcription) -> None:
+    """Sideways, with the force that was drawn."""
+    situations = walker.shooting.situations
+    assert situations is not None
+    drawn = situations.draw(np.random.default_rng(2), 30)
+    force = columns(Sampler(walker.problem), drawn.numbers)["torso.force"].reshape(30, -1, 2)
+    quiet = Drawn(0, drawn.numbers.copy())
+    columns(Sampler(walker.problem), quiet.numbers)["torso.force"][:] = 0
+    z = np.zeros((1, 2))
+    far = [-situations.value(z, each, 0.0).merit for each in (drawn, quiet)]
+    ahead = force[..., 0].sum(axis=1)
+    strong = np.abs(ahead) > 100
+    assert strong.sum() > 5
+    assert np.array_equal(np.sign((far[0] - far[1])[strong]), np.sign(ahead[strong]))
+
+
+def test_the_problem_itself_is_the_first(walker: Transcription) -> None:
+    """On every grid; a finer one has nearly the same answer, and the plain evaluator the same to the bit."""
+    situations = walker.shooting.situations
+    assert situations is not None
+    z = np.array([[0.3, -0.2]])
+    first, finer = (
+        situations.gradient(z, situations.draw(np.random.default_rng(0), 2, 1.0, grid), 0.0) for grid in (0, 1)
+    )
+    alone = walker.shooting.evaluator.gradient(z, 0.0)
+    assert first.merit[0] == alone.merit[0] and first.gradient is not None and alone.gradient is not None
+    assert np.array_equal(first.gradient[0], alone.gradient[0])
+    assert first.merit[0] == pytest.approx(walker.judge(z[0]).objective, rel=1e-12)
+    assert finer.merit[0] != first.merit[0]
+    assert finer.merit[0] == pytest.approx(first.merit[0], rel=0.1, abs=0.01)
+
+
+def test_forgetting_and_falling(walker: Transcription) -> None:
+    """Shorter adjoints far from the end; what has fallen says so."""
+    situations = walker.shooting.situations
+    assert situations is not None
+    drawn = situations.draw(np.random.default_rng(3), 8)
+    exact, faded = (situations.gradient(np.zeros((1, 2)), drawn, 0.0, forget) for forget in (0.0, 50.0))
+    assert exact.gradient is not None and faded.gradient is not None
+    assert np.linalg.norm(faded.gradient[:, 0]) < 0.1 * np.linalg.norm(exact.gradient[:, 0])
+    assert exact.alive is not None
+    assert set(exact.alive) == {0.0, 1.0} or set(exact.alive) == {1.0}
+
+
+def test_without_kernels_there_are_none(problem: Problem) -> None:
+    """It is said, and the rest works."""
+    made = transcribe(problem, backend="casadi")
+    assert made.shooting.situations is None
+    assert "no evaluation in other situations" in made.backend.note
+    assert np.isfinite(made.shooting.evaluator.value(np.zeros((1, 2)), 0.0).merit).all()
