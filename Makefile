@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help demo test thorough lint typecheck bench bench-contact bench-robots bench-table1 gallery clean
+.PHONY: help demo test thorough lint typecheck bench bench-contact bench-robots bench-table1 bench-walk gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
@@ -45,6 +45,9 @@ bench-robots: $(VENV)/.benching  ## jointed robots: what each device of joints b
 	$(BIN)/python benchmarks/robot_against_mujoco.py
 	$(BIN)/python benchmarks/robot_growth.py
 	$(BIN)/python benchmarks/robot_kernels.py
+
+bench-walk: $(VENV)/.benching  ## how the quadruped learns to walk, three seeds; its gaits in situations not seen before (10 minutes)
+	$(BIN)/python benchmarks/walking.py
 
 bench-table1: $(VENV)/.benching  ## the timing table of Degrave et al. (1 and 128 robots, small and large net), cost against weights
 	$(BIN)/python benchmarks/table1.py

@@ -26,6 +26,7 @@ SHIPPED = [
     "parcel",
     "putt",
     "quadruped_shift",
+    "quadruped_walk",
     "row_of_balls",
     "sled",
     "stairs",
