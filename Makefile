@@ -47,6 +47,7 @@ bench-robots: $(VENV)/.benching  ## jointed robots: what each device of joints b
 	$(BIN)/python benchmarks/robot_kernels.py
 
 bench-walk: $(VENV)/.benching  ## how the quadruped learns to walk, three seeds; its gaits in situations not seen before (10 minutes)
+	$(BIN)/python benchmarks/trot.py
 	$(BIN)/python benchmarks/walking.py
 
 bench-table1: $(VENV)/.benching  ## the timing table of Degrave et al. (1 and 128 robots, small and large net), cost against weights

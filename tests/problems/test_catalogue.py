@@ -20,6 +20,7 @@ SHIPPED = [
     "basket",
     "bowling",
     "cart_pole",
+    "gait_robot_trot",
     "hopper_jump",
     "juggle",
     "knock",
