@@ -3,18 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
 
-from symphys.expression import FormulaError, parse
+from symphys.expression import Formula, FormulaError, parse
 from symphys.problem.faults import Faults
-from symphys.problem.model import Cost, Fall
+from symphys.problem.model import Cost
 from symphys.problem.schema.aims import FallTable
 
 ALIVE = "alive"
 COST = "fall"
+
+
+@dataclass(frozen=True)
+class Fall:
+    """Where a motion is over before its time: from then on nothing moves.
+
+    Attributes:
+        margin: of a number of the state; over where it is below 0.
+    """
+
+    margin: Formula
 
 
 def read_fall(

@@ -16,13 +16,13 @@ from symphys.problem.carry import carry
 from symphys.problem.complaints import report
 from symphys.problem.controllers import read_controllers
 from symphys.problem.crowd import check_crowd
-from symphys.problem.fall import ALIVE, costs_of_falling, read_fall
+from symphys.problem.fall import ALIVE, Fall, costs_of_falling, read_fall
 from symphys.problem.faults import Faults, Place
 from symphys.problem.feedback import Controller, Sensor
 from symphys.problem.include import with_included
 from symphys.problem.joints import read_joints
 from symphys.problem.meetings import Meetings
-from symphys.problem.model import NOTHING, Array, Fall, Problem, Simulation, Variable
+from symphys.problem.model import NOTHING, Array, Problem, Simulation, Variable
 from symphys.problem.placing import placed
 from symphys.problem.plan import WorldPlan
 from symphys.problem.quantities import Quantity, quantities, weight_quantities

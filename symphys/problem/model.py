@@ -17,6 +17,7 @@ from symphys.problem.plan import WorldPlan
 from symphys.world import Scheme, World
 
 if TYPE_CHECKING:
+    from symphys.problem.fall import Fall
     from symphys.problem.variation import Scenarios
 
 Array = NDArray[np.float64]
@@ -174,17 +175,6 @@ class Constraint:
     upper: Array
     tolerance: float
     penalty: float
-
-
-@dataclass(frozen=True)
-class Fall:
-    """Where a motion is over before its time: from then on nothing moves.
-
-    Attributes:
-        margin: of a number of the state; over where it is below 0.
-    """
-
-    margin: Formula
 
 
 @dataclass(frozen=True)

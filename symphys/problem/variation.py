@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,6 +74,10 @@ class Scenarios:
     posed: tuple[Posed, ...] = ()
     grids: tuple[Grid, ...] = ()
 
+    def __iter__(self) -> Iterator[Varied | Posed | Grid]:
+        """One after the other."""
+        return chain(self.varied, self.posed, self.grids)
+
     def __bool__(self) -> bool:
-        """Whether anything does."""
-        return bool(self.varied or self.posed or self.grids)
+        """Whether there is anything."""
+        return any(True for _ in self)

@@ -17,6 +17,16 @@ def test_check_describes_the_file_and_compares_gradients(run: Run, throw: Path) 
         assert words in out
 
 
+def test_check_tells_of_falls_and_scenarios(run: Run, throw: Path) -> None:
+    text = throw.read_text(encoding="utf-8")
+    more = '[fall]\nmargin = "ball.position[2] + 9"\n[[scenario]]\nname = "masses"\nsets = "ball.mass"\nfactor = 0.1\n'
+    throw.write_text(text + more, encoding="utf-8")
+    code, out, _ = run("check", throw)
+    assert code == 0
+    assert "over         where ball.position[2] + 9 < 0" in out
+    assert "differs      masses" in out
+
+
 def test_check_exits_1_where_the_gradient_is_wrong(run: Run, throw: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     wrong = [{"variable": "throw", "error": 0.5, "scale": 1.0}]
     monkeypatch.setattr("symphys.trust.gradient.compare_gradient", lambda *given: wrong)
