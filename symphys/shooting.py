@@ -87,6 +87,18 @@ class Evaluator(Protocol):
         ...
 
 
+class WithoutResiduals:
+    """The half of ``Evaluator`` that problems without ``squares`` lack."""
+
+    def residuals(self, Z: Array, smoothing: float) -> Values:
+        """There are none: see ``ShootingProblem.squares``."""
+        raise NotImplementedError("this problem has no residuals")
+
+    def jacobian(self, Z: Array, smoothing: float) -> Values:
+        """There is none."""
+        raise NotImplementedError("this problem has no residuals to differentiate")
+
+
 @dataclass(frozen=True)
 class Drawn:
     """Situations that were drawn: one a row.

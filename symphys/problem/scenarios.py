@@ -13,7 +13,7 @@ from symphys.problem.faults import Faults, Place
 from symphys.problem.joint_plan import WORLD, JointPlan
 from symphys.problem.model import Simulation, Slot, Variable
 from symphys.problem.plan import WorldPlan
-from symphys.problem.quantities import Quantity, SlotError, read_slot
+from symphys.problem.quantities import Quantity, SlotError, limits, read_slot
 from symphys.problem.schema.scenarios import GridTable, ScenarioTable
 from symphys.problem.simulation import check_steps
 from symphys.problem.variation import Grid, Posed, Scenarios, Varied
@@ -89,20 +89,29 @@ class Reader:
         if shift.size not in (1, *sizes):
             self.faults.add((*place, "shift"), f"must be a number, or {max(sizes)} of them; it has {shift.size}")
             return
-        kind, lasts = kinds.pop(), 0
-        if table.lasts is not None:
-            lasts = self.lasting((*place, "lasts"), table.lasts, kind)
-        spread = np.broadcast_to(shift, (max(sizes),)).copy()
-        self.varied.append(Varied(table.name, kind, slots, table.factor or 0.0, spread, table.alike, lasts))
+        kind, spread = kinds.pop(), np.broadcast_to(np.abs(shift), (max(sizes),)).copy()
+        self.check_lasting((*place, "lasts"), table.lasts, kind)
+        lower, upper = (np.stack(ends) for ends in zip(*(limits(slot, self.known) for slot in slots), strict=True))
+        self.check_physical((*place, "shift"), slots, spread, lower, upper)
+        factor, lasts = table.factor or 0.0, table.lasts or 0.0
+        self.varied.append(Varied(table.name, kind, slots, factor, spread, table.alike, lasts, lower, upper))
 
-    def lasting(self, place: Place, seconds: float, kind: str) -> int:
-        """In steps."""
-        steps = max(1, round(seconds / self.simulation.dt))
-        if kind != "control":
+    def check_lasting(self, place: Place, seconds: float | None, kind: str) -> None:
+        """Inputs alone last, and not beyond the motion."""
+        if seconds is not None and kind != "control":
             self.faults.add(place, "only forces, torques and commands act for a while; leave this out")
-        elif steps > self.simulation.steps:
+        elif seconds is not None and seconds > self.simulation.duration:
             self.faults.add(place, f"is longer than the motion, {self.simulation.duration:g} s")
-        return steps
+
+    def check_physical(self, place: Place, slots: Sequence[Slot], shift: Array, lower: Array, upper: Array) -> None:
+        """What is added must not lead beyond what is physical."""
+        for slot, low, high in zip(slots, lower, upper, strict=True):
+            nominal = self.known[slot.name].nominal[list(slot.components)]
+            if np.any(shift > 0) and (np.any(nominal - shift < low) or np.any(nominal + shift > high)):
+                ends = f"{np.min(nominal - shift):g} to {np.max(nominal + shift):g}"
+                self.faults.add(
+                    place, f"would take {slot.name} from {ends}; physical is {low.max():g} to {high.min():g}"
+                )
 
     def take(self, place: Place, slots: Sequence[Slot], name: str) -> None:
         """Note who sets what; refuse second ones."""

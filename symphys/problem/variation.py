@@ -26,7 +26,8 @@ class Varied:
         factor: half the width of the factors; 0: none.
         shift: (components,) half the width of what is added.
         alike: whether all numbers share one draw.
-        lasts: of inputs, the steps that they act; 0: always.
+        lasts: [s] of inputs, how long they act; 0: always.
+        lower, upper: (components,) each slot, what is physical.
     """
 
     name: str
@@ -35,7 +36,9 @@ class Varied:
     factor: float
     shift: Array
     alike: bool
-    lasts: int
+    lasts: float
+    lower: Array
+    upper: Array
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,7 @@ Values = Callable[[Array], Array]
 DIFFERENCE_STEPS = (1e-4, 1e-5, 1e-6)
 """Steps of the central differences, as shares of the scale; the best counts, and a wrong slope passes none."""
 EVERY_COMPONENT = 12
-"""Variables up to this size are differenced component by component."""
-DIRECTIONS = 4
-"""Larger ones along as many random directions."""
+"""Variables up to this size are differenced component by component, larger ones along as many random directions."""
 NOTICED = 1e-4
 """Relative error of central differences from which each side is looked at by itself."""
 
@@ -71,7 +69,7 @@ def _directions(block: Block, size: int, n: int) -> Array:
     """(k, n): unit steps in the scale of each component, or random combinations of many."""
     inside = np.eye(size)
     if size > EVERY_COMPONENT:
-        inside = np.random.default_rng(1).standard_normal((DIRECTIONS, size))
+        inside = np.random.default_rng(1).standard_normal((EVERY_COMPONENT, size))
         inside /= np.linalg.norm(inside, axis=1, keepdims=True)
     whole = np.zeros((len(inside), n))
     whole[:, block.start : block.stop] = inside * block.scale

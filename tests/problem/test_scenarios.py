@@ -81,10 +81,10 @@ def test_numbers(load: Load) -> None:
     assert [slot.name for slot in varied.slots] == ["torso.mass", "leg.mass"]
 
 
-def test_pushes_last_whole_steps(load: Load) -> None:
+def test_pushes_last_for_a_while(load: Load) -> None:
     found = load(table('sets = "torso.force[0:2]"', "shift = [30, 20]", "lasts = 0.2")).scenarios
     assert found is not None
-    assert (found.varied[0].lasts, found.varied[0].shift.tolist()) == (20, [30, 20])
+    assert (found.varied[0].lasts, found.varied[0].shift.tolist()) == (0.2, [30, 20])
 
 
 def test_robots_are_all_that_hangs_together(load: Load) -> None:
@@ -115,6 +115,11 @@ def test_grids_differ_where_they_say_so(load: Load) -> None:
         (('sets = "torso.velocity"', "shift = [1, 2]"), r"shift: must be a number, or 3 of them; it has 2"),
         (('sets = "torso.mass"', "factor = 0.1", "lasts = 0.1"), r"lasts: only forces, torques and commands"),
         (('sets = "torso.force"', "shift = 1", "lasts = 3"), r"lasts: is longer than the motion, 1 s"),
+        (
+            ('sets = "ground.friction"', "shift = 0.6"),
+            r"shift: would take ground.friction from -0.1 to 1.1; physical is 0",
+        ),
+        (('sets = "torso.mass"', "shift = 5"), r"shift: would take torso.mass from 0 to 10; physical is 0.005"),
         (('sets = "hip.command"', "shift = 0.1"), r"sets: hip.command\[0\] is set by variable command already"),
         (('robot = "tors"', "tilt = 0.1"), r"robot: there is no body .tors."),
         (('robot = "lamp"', "tilt = 0.1"), r"robot: lamp hangs on the world"),

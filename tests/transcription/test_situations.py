@@ -123,6 +123,27 @@ def test_pushes_act_for_their_time(problem: Problem) -> None:
     assert np.abs(force[..., 0]).max() > 25 > 20 >= np.abs(force[..., 1]).max()
 
 
+def test_pushes_act_as_long_on_a_finer_grid(problem: Problem) -> None:
+    """From the same instants."""
+    assert problem.scenarios is not None
+    (grid,) = problem.scenarios.grids
+    coarse, fine = (
+        columns(sampler, sampler.draw(np.random.default_rng(0), 50, 1.0))["torso.force"].reshape(50, -1, 2)[1:]
+        for sampler in (Sampler(problem), Sampler(replace(problem, simulation=grid.simulation)))
+    )
+    sums = [force.sum(axis=1) * dt for force, dt in ((coarse, 0.01), (fine, 0.005))]
+    assert np.allclose(*sums, rtol=1e-12)
+    begins = [np.argmax((force != 0).any(axis=2), axis=1) * dt for force, dt in ((coarse, 0.01), (fine, 0.005))]
+    assert np.abs(begins[0] - begins[1]).max() <= 0.01 + 1e-12
+
+
+def test_draws_stay_physical(problem: Problem) -> None:
+    """However wide: friction and masses never below what files may say."""
+    drawn = columns(sampler := Sampler(problem), sampler.draw(np.random.default_rng(0), 500, 20.0))
+    assert drawn["ground.friction"].min() >= 0
+    assert drawn["torso.mass"].min() >= 5e-3
+
+
 def test_poses_hold_together_and_touch_nothing(problem: Problem) -> None:
     """Joints at their drawn angles, without a gap; lifted only where the robot would be in the ground."""
     sampler, world = Sampler(problem), problem.world()

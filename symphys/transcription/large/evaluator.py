@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.shooting import Values
+from symphys.shooting import Values, WithoutResiduals
 from symphys.transcription.large.layers import Layers
 from symphys.transcription.large.made import Made, Stage
 from symphys.transcription.large.passes import Backward, Way, aim_arguments, forward
@@ -38,7 +38,7 @@ class Shared:
     weights: tuple[Array, ...] | None = None
 
 
-class LargeEvaluator:
+class LargeEvaluator(WithoutResiduals):
     """See ``Evaluator``; and ``shared`` for robots that share their weights."""
 
     def __init__(self, made: Made, stage: Stage, threads: int, real: Any = np.float64) -> None:
@@ -103,14 +103,6 @@ class LargeEvaluator:
     def gradient(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
         return self._each(Z, smoothing, gradient=True)
-
-    def residuals(self, Z: Array, smoothing: float) -> Values:
-        """There are none: see ``ShootingProblem.squares``."""
-        raise NotImplementedError("a problem with large nets has no residuals")
-
-    def jacobian(self, Z: Array, smoothing: float) -> Values:
-        """There is none."""
-        raise NotImplementedError("a problem with large nets has no Jacobian")
 
     def _each(self, Z: Array, smoothing: float, gradient: bool) -> Values:
         split_, found = self.made.split, []

@@ -9,10 +9,10 @@ from math import exp
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.backends.simd import probed
+from symphys.backends.simd import common, probed
 from symphys.kernel import Kernel
 from symphys.kernel.kernel import Outputs
-from symphys.shooting import Drawn, Values
+from symphys.shooting import Drawn, Values, WithoutResiduals
 from symphys.transcription.situations.sampler import Sampler
 
 Array = NDArray[np.float64]
@@ -46,7 +46,7 @@ class KernelSituations:
         return values(outputs, np.ascontiguousarray(slopes[:, : Z.shape[1]]))
 
 
-class NominalEvaluator:
+class NominalEvaluator(WithoutResiduals):
     """Evaluates points in the problem's own situation; see ``Evaluator``."""
 
     def __init__(self, situations: KernelSituations) -> None:
@@ -61,14 +61,6 @@ class NominalEvaluator:
         """See ``Evaluator``."""
         return self.situations.gradient(Z, self.situations.nominal(len(Z)), smoothing)
 
-    def residuals(self, Z: Array, smoothing: float) -> Values:
-        """There are none: see ``ShootingProblem.squares``."""
-        raise NotImplementedError("a problem with scenarios has no residuals")
-
-    def jacobian(self, Z: Array, smoothing: float) -> Values:
-        """There is none."""
-        raise NotImplementedError("a problem with scenarios has no Jacobian")
-
 
 def joined(Z: Array, drawn: Drawn) -> Array:
     """(batch, n + s)."""
@@ -77,7 +69,5 @@ def joined(Z: Array, drawn: Drawn) -> Array:
 
 def values(outputs: Outputs, gradient: Array | None = None) -> Values:
     """From what a kernel gives."""
-    merit = outputs["merit"]
     alive = outputs["alive"][:, 0] if "alive" in outputs else None
-    errors = outputs.get("errors", merit[:, :0])
-    return Values(merit[:, 0], outputs["objective"][:, 0], errors, gradient=gradient, alive=alive)
+    return Values(*common(outputs), gradient=gradient, alive=alive)

@@ -18,6 +18,7 @@ class Numbers:
     def __init__(self, problem: Problem, varied: Varied) -> None:
         """Look up what the numbers are without it."""
         self.varied, self.steps = varied, problem.simulation.steps
+        self.lasts = max(1, round(varied.lasts / problem.simulation.dt)) if varied.lasts else self.steps
         values = {**problem.initial, **problem.parameters, **problem.weights}
         size = len(varied.slots[0].components)
         blank = np.zeros(1 + max(max(slot.components) for slot in varied.slots))
@@ -35,17 +36,17 @@ class Numbers:
         varied, (slots, size) = self.varied, self.shape
         drawn = width * rng.uniform(-1, 1, (count, 1, 1) if varied.alike else (count, slots, size))
         factor = np.maximum(1 + varied.factor * drawn, LEAST)
-        values = np.broadcast_to(self.base * factor + varied.shift * drawn, (count, slots, size))
+        values = np.clip(self.base * factor + varied.shift * drawn, varied.lower, varied.upper)
+        values = np.broadcast_to(values, (count, slots, size))
         if varied.kind != "control":
             return values.reshape(count, -1)
         return (values[:, :, None] * self.acting(rng, count)[:, None, :, None]).reshape(count, -1)
 
     def acting(self, rng: np.random.Generator, count: int) -> Array:
         """(count, steps) 1 in the steps in which an input acts."""
-        lasts = self.varied.lasts or self.steps
-        first = np.floor(rng.uniform(0, 1, count) * (self.steps - lasts + 1))
+        first = np.floor(rng.uniform(0, 1, count) * (self.steps - self.lasts + 1))
         step = np.arange(self.steps)
-        return ((step >= first[:, None]) & (step < first[:, None] + lasts)).astype(float)
+        return ((step >= first[:, None]) & (step < first[:, None] + self.lasts)).astype(float)
 
 
 def hidden(name: str, kind: str, slot: Slot, guess: Array, knots: int = 1) -> Variable:
