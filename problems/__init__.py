@@ -1,4 +1,4 @@
-"""The shipped problem and robot files, and how a name on the command line finds a problem."""
+"""The shipped problem files and their parts, and how a name on the command line finds a problem."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from symphys.errors import SymphysError
 from symphys.suggest import hint, quote
 
 FOLDER = Path(__file__).parent
+PARTS = ("robots", "tasks")
 
 
 def catalogue() -> dict[str, Path]:
@@ -21,9 +22,9 @@ def catalogue() -> dict[str, Path]:
     return {path.stem: path for path in sorted(FOLDER.glob("*.toml"))}
 
 
-def robots() -> dict[str, Path]:
-    """Every shipped robot file by the path under which a problem includes it: ``robots/arm.toml``."""
-    return {f"robots/{path.name}": path for path in sorted((FOLDER / "robots").glob("*.toml"))}
+def parts() -> dict[str, Path]:
+    """Shipped robots and tasks by the paths under which problems include them: ``robots/arm.toml``."""
+    return {f"{kind}/{path.name}": path for kind in PARTS for path in sorted((FOLDER / kind).glob("*.toml"))}
 
 
 def find(name_or_path: str | Path) -> Path:

@@ -14,6 +14,7 @@ from typing import Any
 
 from symphys.errors import SymphysError
 from symphys.solvers.cma_ import CMA, CmaOptions
+from symphys.solvers.evolution_ import EVOLUTION, EvolutionOptions
 from symphys.solvers.gradient import GRADIENT, GradientOptions
 from symphys.solvers.interface import Solver
 from symphys.solvers.ipopt_ import IPOPT, IpoptOptions
@@ -26,6 +27,7 @@ __all__ = [
     "SOLVERS",
     "CmaOptions",
     "Counts",
+    "EvolutionOptions",
     "GradientOptions",
     "IpoptOptions",
     "LeastSquaresOptions",
@@ -40,7 +42,9 @@ __all__ = [
     "solver",
 ]
 
-SOLVERS: dict[str, Solver[Any]] = {each.name: each for each in (GRADIENT, LEAST_SQUARES, IPOPT, CMA, STOCHASTIC)}
+SOLVERS: dict[str, Solver[Any]] = {
+    each.name: each for each in (GRADIENT, LEAST_SQUARES, IPOPT, CMA, STOCHASTIC, EVOLUTION)
+}
 
 
 def solver(name: str) -> Solver[Any]:

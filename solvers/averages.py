@@ -19,7 +19,6 @@ class Average:
     Attributes:
         gradient: (n,) mean of the gradients, each scaled and shortened first.
         objective, merit: means of those that are finite.
-        errors: (k,) of the problem's own situation, the first.
         alive: share of the motions that lasted.
         agreement: length of the mean of the gradients' directions: 1 where all agree, 0 where they cancel.
         typical, longest: median and largest norm of the scaled gradients.
@@ -29,7 +28,6 @@ class Average:
     gradient: Array
     objective: float
     merit: float
-    errors: Array
     alive: float
     agreement: float
     typical: float
@@ -54,7 +52,6 @@ def average(values: Values, scale: Array, clip: float, fallen: float) -> Average
         gradient=weights @ short / max(weights.sum(), TINY),
         objective=mean(values.objective[finite]),
         merit=mean(values.merit[finite]),
-        errors=values.errors[0],
         alive=float((lasted * finite).mean()),
         agreement=float(np.linalg.norm(directions.mean(axis=0))) if len(directions) else np.nan,
         typical=float(np.median(norms)) if len(norms) else np.nan,
@@ -68,6 +65,26 @@ def mean(numbers: Array) -> float:
     return float(numbers.mean()) if numbers.size else np.nan
 
 
+@dataclass(frozen=True)
+class Evolved:
+    """What pairs of points to either side of one say of it.
+
+    Attributes:
+        gradient: (n,) scaled.
+        pairs: how many were finite.
+        objective, merit: means over these.
+        first: what was found on one side, whose first situation is the problem's own.
+        alive: share of the motions that lasted.
+    """
+
+    gradient: Array
+    pairs: int
+    objective: float
+    merit: float
+    first: Values
+    alive: float
+
+
 def evolution(
     situations: Situations,
     z: Array,
@@ -75,18 +92,36 @@ def evolution(
     drawn: Drawn,
     smoothing: float,
     rng: np.random.Generator,
-) -> Array:
-    """(n,) a descent direction's gradient from values: z moved to either side at random in each situation.
+) -> Evolved:
+    """A gradient from values: z moved to either side at random in each situation.
 
-    Antithetic pairs (Salimans et al. 2017, arXiv 1703.03864, without their ranks): the mean of
-    (J(z + s e) - J(z - s e)) / 2 e over situations, in units of ``step`` = s (n,); a pair that is not finite is left
-    out.
+    Antithetic pairs (Salimans et al. 2017, arXiv 1703.03864): the mean of (r(z + s e) - r(z - s e)) / 2 e over
+    situations, in units of ``step`` = s (n,), where r is the rank of a merit among all that are finite, from -1/2 to
+    1/2: how bad a fall is does not matter then, only that it is worse.
     """
     noise = rng.standard_normal((len(drawn.numbers), z.size))
-    high, low = (situations.value(z + sign * step * noise, drawn, smoothing).merit for sign in (1, -1))
-    difference = (high - low) / 2
-    known = np.isfinite(difference)
-    return np.asarray(difference[known] @ noise[known] / max(int(known.sum()), 1))
+    sides = [situations.value(z + sign * step * noise, drawn, smoothing) for sign in (1, -1)]
+    merits = np.stack([side.merit for side in sides])
+    known = np.isfinite(merits).all(axis=0)
+    high, low = centred(merits[:, known])
+    pairs = int(known.sum())
+    objective = np.stack([side.objective for side in sides])[:, known]
+    lasted = [1.0 if side.alive is None else float(side.alive.mean()) for side in sides]
+    return Evolved(
+        gradient=np.asarray((high - low) / 2 @ noise[known] / max(pairs, 1)),
+        pairs=pairs,
+        objective=mean(objective),
+        merit=mean(merits[:, known]),
+        first=sides[0],
+        alive=sum(lasted) / 2,
+    )
+
+
+def centred(merits: Array) -> Array:
+    """Ranks of all merits, from -1/2 to 1/2, in their shape; equal ones share theirs."""
+    _, places, counts = np.unique(merits, return_inverse=True, return_counts=True)
+    ranks = np.cumsum(counts) - (counts + 1) / 2
+    return np.asarray(ranks[places].reshape(merits.shape) / max(merits.size - 1, 1) - 0.5)
 
 
 def together(pathwise: Array, evolved: Array, share: float) -> Array:

@@ -22,6 +22,7 @@ READERS: dict[str, Callable[[Any], Any]] = {
     "bool": bool,
     "Status": Status,
     "Array": lambda value: np.array(value, float),
+    "dict[str, float]": lambda value: {str(key): float(number) for key, number in value.items()},
     "tuple[float, ...]": lambda value: tuple(float(number) for number in value),
 }
 """By the annotation of a field; float() also reads the strings "nan" and "inf" of strict JSON."""
@@ -34,7 +35,13 @@ def to_checkpoint(solver: str, snapshot: Snapshot, rows: Iterable[TraceRow]) -> 
         "solver": solver,
         "stages": plain(snapshot.stages),
         "state": plain(snapshot.state),
-        "best": {"z": plain(best.z), "merit": best.merit, "objective": best.objective, "errors": plain(best.errors)},
+        "best": {
+            "z": plain(best.z),
+            "merit": best.merit,
+            "objective": best.objective,
+            "errors": plain(best.errors),
+            "outputs": plain(best.outputs),
+        },
         "last": plain(snapshot.last),
         "counts": list(astuple(snapshot.counts)),
         "seconds": snapshot.seconds,
@@ -50,8 +57,8 @@ def from_checkpoint(
         raise SymphysError(f"this checkpoint is of the solver {checkpoint.get('solver')!r}, not of {solver!r}")
     try:
         best = checkpoint["best"]
-        z, errors = np.array(best["z"], float), np.array(best["errors"], float)
-        point = Point(z, float(best["merit"]), float(best["objective"]), errors, problem.met(errors))
+        z, errors, outputs = (np.array(best[name], float) for name in ("z", "errors", "outputs"))
+        point = Point(z, float(best["merit"]), float(best["objective"]), errors, problem.met(errors), outputs)
         counts = Counts(*map(int, checkpoint["counts"]))
         rows = [revive(TraceRow, dict(zip(names(TraceRow), row, strict=True))) for row in checkpoint["rows"]]
         stages = tuple(revive(StageResult, dict(each), Counts) for each in checkpoint["stages"])

@@ -6,6 +6,9 @@ pycma's own options pass through ``options``; it prints nothing, and reads and w
 pycma's: ``tolflatfitness`` is 50. Generations whose merits are all the same are no convergence but a plateau (see
 ``plateau``), which the search leaves as its candidates spread; pycma gives up on the second one.
 
+Where situations differ, each candidate of a generation is rated by its mean over the same few of them, which the next
+generation draws anew, and the means of the search are validated, since what is best in a few situations was lucky.
+
 A solve goes on by replay: the strategy is asked again from the same random stream and told the recorded merits, so
 that mean, step size, covariance and paths are the same to the last bit under any options, at the cost of no rollout.
 """
@@ -13,7 +16,7 @@ that mean, step size, covariance and paths are the same to the last bit under an
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -28,6 +31,8 @@ from symphys.solvers.outcome import Array, Monitor, Outcome, Status
 from symphys.solvers.plateau import FLAT
 from symphys.solvers.session import begin, converged, run
 from symphys.solvers.staged import Request
+from symphys.solvers.trials import Alone, Drawing, Trials
+from symphys.solvers.validation import Batch
 
 BUDGETS = {"maxiter", "timeout"}
 CONVERGED = {"tolfun", "tolfunhist", "tolfunrel", "tolx", "ftarget"}
@@ -46,6 +51,11 @@ class CmaOptions:
         evaluations: rollouts in each stage of smoothing; the generation that reaches it is the last.
         options: pycma's own, such as {tolfun = 1e-8, CMA_diagonal = 50}; cma.CMAOptions() lists them. With more than
             2,000 variables the covariance is diagonal.
+        samples: where situations differ: in how many each candidate is rolled out.
+        width: how widely these vary, relative to their tables.
+        validation: situations that decide which mean of the search is kept; 0: the last is.
+        validation_width: how widely these vary.
+        every: generations between two validations.
     """
 
     __pydantic_config__: ClassVar[dict[str, object]] = {"extra": "forbid"}
@@ -54,12 +64,19 @@ class CmaOptions:
     population: int = 0
     evaluations: int = 10_000
     options: dict[str, Any] = field(default_factory=dict)
+    samples: int = 8
+    width: float = 1.5
+    validation: int = 64
+    validation_width: float = 1.3
+    every: int = 5
 
     def __post_init__(self) -> None:
         """ValueError that names the option and says what would be valid."""
         require(0 < self.sigma < math.inf, "sigma", "above 0")
         require(self.population == 0 or self.population > 2, "population", "0 or at least 3")
-        at_least(0, evaluations=self.evaluations)
+        at_least(0, evaluations=self.evaluations, validation=self.validation)
+        at_least(0, width=self.width, validation_width=self.validation_width)
+        at_least(1, samples=self.samples, every=self.every)
 
 
 def solve(
@@ -82,46 +99,83 @@ def solve(
         strategy = Strategy(
             meter, trail.start if trail else z, options.sigma, options.population, options.options, stream
         )
-        if trail:
-            strategy.follow(trail)
-        else:
-            meter.commit(begin(meter.value(z)), strategy.trail(), step=strategy.sigma)
-        return search(meter, options, strategy)
+        search = Search(meter, options, strategy, trials(meter, options, seed, log))
+        search.follow(trail) if trail else search.begin(z)
+        return search.run()
 
     return run(Request("cma", problem, start, monitor, checkpoint, log), stage)
 
 
-def search(meter: Meter, options: CmaOptions, strategy: Strategy) -> Verdict:
+def trials(meter: Meter, options: CmaOptions, seed: int, log: Log | None) -> Trials:
+    """How candidates are rated."""
+    situations = meter.problem.situations
+    if situations is None:
+        return Alone(meter)
+    batch = Batch(options.validation, options.validation_width, seed)
+    return Drawing(meter, situations, options.samples, options.width, batch, options.every, log)
+
+
+class Search:
     """One generation after the other."""
-    verdict = None
-    while verdict is None:
-        verdict = ended(meter, options, strategy) or generation(meter, strategy)
-    return verdict
 
+    def __init__(self, meter: Meter, options: CmaOptions, strategy: Strategy, trials: Trials) -> None:
+        """Nothing is asked for yet."""
+        self.meter, self.options, self.strategy, self.trials = meter, options, strategy, trials
+        self.spoilt = options.validation
 
-def ended(meter: Meter, options: CmaOptions, strategy: Strategy) -> Verdict | None:
-    """Whether the budget is used up or one of pycma's criteria holds."""
-    if sum(map(len, strategy.merits)) >= options.evaluations:
-        return Verdict(Status.BUDGET, BUDGET)
-    reasons = strategy.stopped()
-    if not reasons:
+    def begin(self, z: Array) -> None:
+        """Evaluate where it begins."""
+        self.commit(self.trials.start(z))
+
+    def follow(self, trail: Trail) -> None:
+        """Go on from there."""
+        self.strategy.follow(trail)
+        self.spoilt = trail.spoilt
+
+    def run(self) -> Verdict:
+        """Until something ends it."""
+        verdict = None
+        while verdict is None:
+            verdict = self.ended() or self.generation()
+        if verdict.status is not Status.NOT_FINITE:
+            self.trials.keep(self.strategy.centre, self.generations, self.spoilt, last=True)
+        return verdict
+
+    @property
+    def generations(self) -> int:
+        """How many are over."""
+        return len(self.strategy.merits)
+
+    def ended(self) -> Verdict | None:
+        """Whether the budget is used up or one of pycma's criteria holds."""
+        if sum(map(len, self.strategy.merits)) * self.trials.rollouts >= self.options.evaluations:
+            return Verdict(Status.BUDGET, BUDGET)
+        reasons = self.strategy.stopped()
+        if not reasons:
+            return None
+        if reasons & BUDGETS:
+            return Verdict(Status.BUDGET, BUDGET)
+        if PLATEAU in reasons:
+            return Verdict(Status.STALLED, FLAT)
+        if reasons & CONVERGED:
+            return self.trials.converged()
+        return Verdict(Status.STALLED, STALLED.format(", ".join(reasons)))
+
+    def generation(self) -> Verdict | None:
+        """Ask, evaluate, tell."""
+        points = self.trials.rate([self.meter.clip(z) for z in self.strategy.ask()], self.generations)
+        best = lowest(points)
+        if best is None:
+            return Verdict(Status.NOT_FINITE, NOT_FINITE)
+        self.strategy.tell(tuple(point.merit if point.finite else math.inf for point in points))
+        self.spoilt = self.trials.keep(self.strategy.centre, self.generations, self.spoilt)
+        self.commit(best)
         return None
-    if reasons & BUDGETS:
-        return Verdict(Status.BUDGET, BUDGET)
-    if PLATEAU in reasons:
-        return Verdict(Status.STALLED, FLAT)
-    return converged(meter) if reasons & CONVERGED else Verdict(Status.STALLED, STALLED.format(", ".join(reasons)))
 
-
-def generation(meter: Meter, strategy: Strategy) -> Verdict | None:
-    """Ask, evaluate, tell."""
-    points = meter.values(meter.clip(z) for z in strategy.ask())
-    best = lowest(points)
-    if best is None:
-        return Verdict(Status.NOT_FINITE, NOT_FINITE)
-    strategy.tell(tuple(point.merit if point.finite else math.inf for point in points))
-    meter.commit(best, strategy.trail(), step=strategy.sigma)
-    return None
+    def commit(self, point: Point) -> None:
+        """End an iteration."""
+        trail = replace(self.strategy.trail(), spoilt=self.spoilt)
+        self.meter.commit(point, trail, step=self.strategy.sigma)
 
 
 def lowest(points: list[Point]) -> Point | None:
@@ -136,7 +190,13 @@ def read_trail(saved: dict[str, Any]) -> Trail:
     """From the plain values of a checkpoint."""
     try:
         merits = tuple(tuple(float(merit) for merit in each) for each in saved["merits"])
-        return Trail(np.array(saved["start"], float), merits, np.array(saved["mean"], float), float(saved["sigma"]))
+        return Trail(
+            np.array(saved["start"], float),
+            merits,
+            np.array(saved["mean"], float),
+            float(saved["sigma"]),
+            int(saved["spoilt"]),
+        )
     except (KeyError, TypeError, ValueError) as error:
         raise damaged(error) from error
 
@@ -146,4 +206,4 @@ def prepare() -> None:
     load()
 
 
-CMA = Solver("cma", "CMA-ES by pycma, without derivatives", CmaOptions, solve, prepare)
+CMA = Solver("cma", "CMA-ES by pycma, without derivatives", CmaOptions, solve, prepare, situations=None)

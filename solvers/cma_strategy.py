@@ -50,12 +50,14 @@ class Trail:
         start: (n,) z where the strategy began.
         merits: (population,) of every generation so far, in the order in which its candidates were asked for.
         mean, sigma: where that led, to compare; mean (free,) as pycma holds it.
+        spoilt: see ``Validation.keep``.
     """
 
     start: Array
     merits: tuple[tuple[float, ...], ...]
     mean: Array
     sigma: float
+    spoilt: int = 0
 
 
 class Strategy:
@@ -127,6 +129,11 @@ class Strategy:
     def sigma(self) -> float:
         """The present step size."""
         return float(self.es.sigma)
+
+    @property
+    def centre(self) -> Array:
+        """(n,) z of the mean."""
+        return self.full(self.es.result.xfavorite)
 
     def full(self, x: Array) -> Array:
         """(n,) z of a candidate (free,)."""

@@ -62,7 +62,7 @@ class Solver(Generic[O_inv]):
         prepare: loads what ``solve`` needs, such as a library, so that who times solves can leave it out; ``solve``
             works without, and a second call costs nothing.
         threaded: whether several solves may run in threads side by side, see ``together``.
-        situations: whether it is for problems whose situations differ, and for no others.
+        situations: whether it is for problems whose situations differ, and for no others; None: for all.
     """
 
     name: str
@@ -71,4 +71,4 @@ class Solver(Generic[O_inv]):
     solve: Solve[O_inv]
     prepare: Callable[[], None] = nothing
     threaded: bool = False
-    situations: bool = False
+    situations: bool | None = False

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, astuple, dataclass, field, replace
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 
 from symphys.shooting import ShootingProblem, Values
 from symphys.solvers.outcome import Array, Counts, Monitor, StageResult, Status, TraceRow
+
+NOTHING: Mapping[str, float] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -23,6 +26,7 @@ class Point:
         merit, objective: see ``ShootingProblem``.
         errors: normalised; met where <= 1.
         met: all errors met.
+        outputs: what the problem tells of it; empty where it tells nothing.
         gradient: (n,) of the merit by z; empty where it was not asked for.
         residuals, jacobian: (m,) and (m, n), merit = r . r; empty where they were not asked for.
     """
@@ -32,6 +36,7 @@ class Point:
     objective: float
     errors: Array
     met: bool = False
+    outputs: Array = field(default_factory=lambda: np.zeros(0))
     gradient: Array = field(default_factory=lambda: np.zeros(0))
     residuals: Array = field(default_factory=lambda: np.zeros(0))
     jacobian: Array = field(default_factory=lambda: np.zeros((0, 0)))
@@ -170,12 +175,20 @@ class Meter:
         self.counts.jacobians += 1
         return self.seen(self.points(z[None], values))[0]
 
-    def commit(self, point: Point, state: object, gradient_norm: float = math.nan, step: float = math.nan) -> None:
+    def commit(
+        self,
+        point: Point,
+        state: object,
+        gradient_norm: float = math.nan,
+        step: float = math.nan,
+        told: Mapping[str, float] = NOTHING,
+    ) -> None:
         """End an iteration: a row of the trace, a snapshot, then the monitor, which may raise KeyboardInterrupt."""
         best, self.last = self.best or point, point.z
+        told = {**dict(zip(self.problem.output_names, best.outputs.tolist(), strict=False)), **told}
         work = (*astuple(self.counts), self.seconds)
         numbers = (point.objective, best.objective, point.miss, gradient_norm, step, self.smoothing)
-        row = TraceRow(*(len(self.rows), *work, *numbers))
+        row = TraceRow(*(len(self.rows), *work, *numbers, told))
         self.rows.append(row)
         self.snapshot = Snapshot(self.stages, state, best, point.z, replace(self.counts), len(self.rows), row.seconds)
         if self.monitor:
@@ -194,7 +207,7 @@ class Meter:
 
     def points(self, Z: Array, values: Values) -> list[Point]:
         """The rows as points with their own copies of everything."""
-        names = [name for name in ("gradient", "residuals", "jacobian") if getattr(values, name) is not None]
+        names = [name for name in ("outputs", "gradient", "residuals", "jacobian") if getattr(values, name) is not None]
         merits, objectives = values.merit.tolist(), values.objective.tolist()
         points = []
         for row, (merit, objective) in enumerate(zip(merits, objectives, strict=True)):

@@ -49,6 +49,7 @@ class TraceRow:
         gradient_norm: nan where the solver has none.
         step: length of the step in z (CMA-ES: sigma); nan for none.
         smoothing: the knob in force.
+        told: by name, what the problem tells of the best point so far, and the solver of the iteration.
     """
 
     iteration: int
@@ -63,6 +64,7 @@ class TraceRow:
     gradient_norm: float
     step: float
     smoothing: float
+    told: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -48,6 +48,7 @@ class Values:
     Attributes:
         merit, objective: (batch,).
         errors: (batch, k).
+        outputs: (batch, o) what is told, see ``ShootingProblem.output_names``; None: nothing.
         gradient: (batch, n) of the merit; None where it was not asked for.
         residuals, jacobian: (batch, m) and (batch, m, n), merit = r . r; None where they were not asked for.
         probe: (batch,) the number whose gradient is examined; None where it is not computed.
@@ -57,6 +58,7 @@ class Values:
     merit: Array
     objective: Array
     errors: Array
+    outputs: Array | None = None
     gradient: Array | None = None
     residuals: Array | None = None
     jacobian: Array | None = None
@@ -71,7 +73,7 @@ class Evaluator(Protocol):
     """
 
     def value(self, Z: Array, smoothing: float) -> Values:
-        """Merits, objectives, errors."""
+        """Merits, objectives, errors, outputs."""
         ...
 
     def gradient(self, Z: Array, smoothing: float) -> Values:
@@ -178,6 +180,7 @@ class ShootingProblem:
         constraint_lower, constraint_upper: (m,).
         smoothing: stages of the knob, decreasing, at least one; each starts from the best point of the one before.
         stop_when_met: stop at the first point whose errors are all <= 1, instead of at a stationary point.
+        output_names: of the numbers that are told.
         situations: in which points can be evaluated, beside that of ``evaluator``; None: there are no others.
     """
 
@@ -191,6 +194,7 @@ class ShootingProblem:
     constraint_upper: Array = field(default_factory=lambda: np.zeros(0))
     smoothing: tuple[float, ...] = (0.0,)
     stop_when_met: bool = True
+    output_names: tuple[str, ...] = ()
     situations: Situations | None = None
 
     @property

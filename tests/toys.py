@@ -50,24 +50,29 @@ def toy(
     guess: float = 0.0,
     scale: float = 1.0,
     backend: str = "casadi",
+    told: bool = False,
     **more: Any,
 ) -> ShootingProblem:
-    """A problem from formulas; ``constraint`` should be zero and is penalised in the merit."""
+    """A problem from formulas; ``constraint`` should be zero and is penalised in the merit.
+
+    ``told``: it tells the sum of z.
+    """
     z, s = ca.MX.sym("z", n), ca.MX.sym("s")
     r = residuals(z, s) if residuals else None
     f = ca.sumsqr(r) if residuals else objective(z, s)  # type: ignore[misc]
     c = constraint(z, s) if constraint else ca.MX(0, 1)
     e = ca.vertcat(errors(z, s) if errors else ca.MX(0, 1), ca.fabs(c) / TOLERANCE)
     rows = ca.vertcat(r, np.sqrt(PENALTY) * c) if residuals else None
+    o = ca.sum1(z) if told else ca.MX(0, 1)
     merit = f + PENALTY * ca.sumsqr(c)
     functions = ToyFunctions(
-        value=ca.Function("value", [z, s], [merit, f, e]),
-        gradient=ca.Function("gradient", [z, s], [merit, f, e, ca.gradient(merit, z)]),
-        residuals=ca.Function("residuals", [z, s], [rows, f, e]) if residuals else None,
-        jacobian=ca.Function("jacobian", [z, s], [rows, f, e, ca.jacobian(rows, z)]) if residuals else None,
+        value=ca.Function("value", [z, s], [merit, f, e, o]),
+        gradient=ca.Function("gradient", [z, s], [merit, f, e, ca.gradient(merit, z), o]),
+        residuals=ca.Function("residuals", [z, s], [rows, f, e, o]) if residuals else None,
+        jacobian=ca.Function("jacobian", [z, s], [rows, f, e, ca.jacobian(rows, z), o]) if residuals else None,
         nlp=ca.Function("nlp", [z, s], [f, c]),
     )
-    named = {"merit": merit, "objective": f, "errors": e, "constraints": c, "residuals": rows}
+    named = {"merit": merit, "objective": f, "errors": e, "constraints": c, "residuals": rows, "outputs": o}
     chosen = choose(backend, Source(functions, lambda: program(z, s, named)))
     zeros = np.zeros(c.numel())
     return ShootingProblem(
@@ -78,6 +83,7 @@ def toy(
         squares=residuals is not None,
         constraint_lower=zeros,
         constraint_upper=zeros,
+        output_names=("sum [m]",) if told else (),
         **more,
     )
 

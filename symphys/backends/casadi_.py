@@ -19,24 +19,24 @@ class FunctionEvaluator:
 
     def value(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
-        merit, objective, errors = self._call("value", Z, smoothing)
-        return Values(merit[:, 0], objective[:, 0], errors)
+        merit, objective, errors, outputs = self._call("value", Z, smoothing)
+        return Values(merit[:, 0], objective[:, 0], errors, outputs)
 
     def gradient(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
-        merit, objective, errors, gradient = self._call("gradient", Z, smoothing)
-        return Values(merit[:, 0], objective[:, 0], errors, gradient=gradient)
+        merit, objective, errors, gradient, outputs = self._call("gradient", Z, smoothing)
+        return Values(merit[:, 0], objective[:, 0], errors, outputs, gradient=gradient)
 
     def residuals(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
-        r, objective, errors = self._call("residuals", Z, smoothing)
-        return Values(squared(r), objective[:, 0], errors, residuals=r)
+        r, objective, errors, outputs = self._call("residuals", Z, smoothing)
+        return Values(squared(r), objective[:, 0], errors, outputs, residuals=r)
 
     def jacobian(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
-        r, objective, errors, jacobian = self._call("jacobian", Z, smoothing)
+        r, objective, errors, jacobian, outputs = self._call("jacobian", Z, smoothing)
         jacobian = jacobian.reshape(*r.shape, Z.shape[1])
-        return Values(squared(r), objective[:, 0], errors, residuals=r, jacobian=jacobian)
+        return Values(squared(r), objective[:, 0], errors, outputs, residuals=r, jacobian=jacobian)
 
     def _call(self, name: str, Z: Array, smoothing: float) -> list[Array]:
         key = (name, len(Z))

@@ -18,19 +18,19 @@ class Functions(Protocol):
 
     @property
     def value(self) -> Function:
-        """-> (merit, objective, errors)."""
+        """-> (merit, objective, errors, outputs)."""
 
     @property
     def gradient(self) -> Function:
-        """-> (merit, objective, errors, d merit / dz (n,))."""
+        """-> (merit, objective, errors, d merit / dz (n,), outputs)."""
 
     @property
     def residuals(self) -> Function | None:
-        """-> (r, objective, errors) with merit = r . r; None where a cost is no sum of squares."""
+        """-> (r, objective, errors, outputs) with merit = r . r; None where a cost is no sum of squares."""
 
     @property
     def jacobian(self) -> Function | None:
-        """-> (r, objective, errors, dr/dz (m, n)); None likewise."""
+        """-> (r, objective, errors, dr/dz (m, n), outputs); None likewise."""
 
     @property
     def nlp(self) -> Function:
@@ -44,7 +44,7 @@ class Source:
     Attributes:
         functions: as casadi functions.
         program: makes the program of its rollout: the outputs merit, objective and, where the problem has any, errors,
-            constraints and residuals, of z and the smoothing as its knob. None: there is none.
+            constraints, outputs and residuals, of z and the smoothing as its knob. None: there is none.
         exact: whether that program is for smoothing 0 only.
     """
 

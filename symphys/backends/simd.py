@@ -45,9 +45,8 @@ class KernelEvaluator:
     def residuals(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
         outputs = self.kernel.forward(Z, self.knob(smoothing))
-        _, objective, errors = common(outputs)
         r = outputs["residuals"]
-        return Values(squared(r), objective, errors, residuals=r)
+        return Values(squared(r), *common(outputs)[1:], residuals=r)
 
     def jacobian(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
@@ -57,10 +56,9 @@ class KernelEvaluator:
             np.repeat(Z, len(seeds), axis=0), np.tile(seeds, (len(Z), 1)), self.knob(smoothing)
         )
         first = {name: rows[:: len(seeds)] for name, rows in outputs.items()}
-        _, objective, errors = common(first)
         r = np.ascontiguousarray(first["residuals"])
         jacobian = self.rows.spread(slopes.reshape(len(Z), len(seeds), Z.shape[1]))
-        return Values(squared(r), objective, errors, residuals=r, jacobian=jacobian)
+        return Values(squared(r), *common(first)[1:], residuals=r, jacobian=jacobian)
 
 
 def probed(kernel: Kernel, outputs: Outputs) -> Array | None:
@@ -68,10 +66,11 @@ def probed(kernel: Kernel, outputs: Outputs) -> Array | None:
     return outputs["probe"][:, 0] if "probe" in outputs and kernel.report.precision == "double" else None
 
 
-def common(outputs: Outputs) -> tuple[Array, Array, Array]:
-    """Merits, objectives, errors."""
+def common(outputs: Outputs) -> tuple[Array, Array, Array, Array]:
+    """Merits, objectives, errors, and what is told."""
     merit = outputs["merit"]
-    return merit[:, 0], outputs["objective"][:, 0], outputs.get("errors", merit[:, :0])
+    none = merit[:, :0]
+    return merit[:, 0], outputs["objective"][:, 0], outputs.get("errors", none), outputs.get("outputs", none)
 
 
 def simd32(source: Source, threads: int) -> Backend:

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
-from symphys.cli.wording import brief, number
+from symphys.cli.wording import brief, labelled, number
 
 if TYPE_CHECKING:
     from symphys.runs import Job, Observer, Result
@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 def at(row: TraceRow) -> str:
     """Where a run is; the smoothing only where there is some, as its numbers are not the exact ones then."""
     smoothed = f" at smoothing {row.smoothing:g}" if row.smoothing > 0 else ""
-    return f"iteration {row.iteration}, objective {number(row.best)}, worst {number(row.miss)}{smoothed}"
+    told = "".join(f", {labelled(name, value)}" for name, value in row.told.items())
+    return f"iteration {row.iteration}, objective {number(row.best)}, worst {number(row.miss)}{told}{smoothed}"
 
 
 @contextmanager

@@ -30,6 +30,12 @@ def number(value: float | None, digits: int = 3) -> str:
     return f"{value:.{digits}g}"
 
 
+def labelled(name: str, value: float | None) -> str:
+    """A number by its name, such as ``speed [m/s]``, with the unit behind it."""
+    what, unit = name[:-1].rsplit(" [", 1) if name.endswith("]") and " [" in name else (name, "")
+    return " ".join(filter(None, [what, number(value), unit]))
+
+
 def whole(value: float | None) -> str:
     """A number of things."""
     return "-" if value is None or not math.isfinite(value) else f"{value:,.0f}"

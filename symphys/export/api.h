@@ -19,6 +19,8 @@ $parameters
 $errors
    costs, with their weights:
 $costs
+   outputs:
+$outputs
    constraints, their values:
 $constraints
 */

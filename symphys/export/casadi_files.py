@@ -14,10 +14,10 @@ from symphys.export.sources import dense_step
 from symphys.transcription import Transcription
 
 RESULTS = {
-    "value": ("merit", "objective", "errors"),
-    "gradient": ("merit", "objective", "errors", "gradient"),
-    "residuals": ("residuals", "objective", "errors"),
-    "jacobian": ("residuals", "objective", "errors", "jacobian"),
+    "value": ("merit", "objective", "errors", "outputs"),
+    "gradient": ("merit", "objective", "errors", "gradient", "outputs"),
+    "residuals": ("residuals", "objective", "errors", "outputs"),
+    "jacobian": ("residuals", "objective", "errors", "jacobian", "outputs"),
     "nlp": ("objective", "constraints"),
 }
 """The functions of (z, smoothing), as in ``ShootingProblem``."""
@@ -27,7 +27,7 @@ Written by symphys {version} from the problem {problem}, with casadi {casadi}. E
 
     import casadi
     gradient = casadi.Function.load("gradient.casadi")
-    merit, objective, errors, slope = gradient(z, 0)
+    merit, objective, errors, slope, outputs = gradient(z, 0)
 
 SI units; z points up; world frame. {steps} steps of {dt:g} s.
 merit is the objective and the penalties of violated constraints; without constraints both are one. It is the sum of the
@@ -78,6 +78,7 @@ def _readme(transcription: Transcription, functions: dict[str, ca.Function], ver
         "u, forces, torques and commands, constant over a step": words.input_lines(rollout),
         "p, parameters": words.parameter_lines(rollout),
         "errors, each error / tolerance, met where <= 1": words.error_lines(problem),
+        "outputs": words.output_lines(problem),
         "constraints, their values": words.constraint_lines(transcription),
     }
     return "\n".join([head, *(f"{title}:\n{words.indented(lines)}\n" for title, lines in sections.items())])

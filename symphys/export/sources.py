@@ -76,6 +76,7 @@ def _documented(transcription: Transcription, program: Program, version: str) ->
         "inputs": words.indented(words.input_lines(rollout)),
         "parameters": words.indented(words.parameter_lines(rollout)),
         "errors": words.indented(words.error_lines(problem)),
+        "outputs": words.indented(words.output_lines(problem)),
         "costs": words.indented(words.cost_lines(problem)),
         "constraints": words.indented(words.constraint_lines(transcription)),
         "members": "\n".join(members),

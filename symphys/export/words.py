@@ -116,6 +116,11 @@ def error_lines(problem: Problem) -> list[str]:
     return _placed("errors", [(1, name) for name in error_names(problem)])
 
 
+def output_lines(problem: Problem) -> list[str]:
+    """One line a number that is told."""
+    return _placed("outputs", [(1, output.label) for output in problem.outputs])
+
+
 def cost_lines(problem: Problem) -> list[str]:
     """One line a cost, with its weight in it."""
     return _placed("costs", [(1, cost.name) for cost in problem.costs])

@@ -4,7 +4,7 @@ from symphys.problem.fall import ALIVE, Fall
 from symphys.problem.feedback import Controller, Sensor
 from symphys.problem.json_schema import json_schema
 from symphys.problem.load import load_problem
-from symphys.problem.model import Constraint, Cost, Problem, Simulation, Slot, Target, Variable
+from symphys.problem.model import Constraint, Cost, Output, Problem, Simulation, Slot, Target, Variable
 from symphys.problem.options import require_solvers, validate_options
 from symphys.problem.solvable import require_solvable
 from symphys.problem.variation import Grid, Posed, Scenarios, Varied
@@ -16,6 +16,7 @@ __all__ = [
     "Cost",
     "Fall",
     "Grid",
+    "Output",
     "Posed",
     "Problem",
     "Scenarios",

@@ -1,4 +1,4 @@
-"""The [[cost]], [[target]] and [[constraint]] tables: formulas, each tried once on the start of the guess."""
+"""The [[cost]], [[target]], [[constraint]] and [[output]] tables: formulas, tried once on the start of the guess."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from symphys.expression import Formula, FormulaError, parse
 from symphys.problem.faults import Faults, Place
-from symphys.problem.model import Constraint, Cost, Simulation, Target
+from symphys.problem.model import Constraint, Cost, Output, Simulation, Target
 from symphys.problem.schema import Document
-from symphys.problem.schema.aims import ConstraintTable, CostTable, TargetTable
+from symphys.problem.schema.aims import ConstraintTable, CostTable, OutputTable, TargetTable
 from symphys.problem.simulation import check_moment
 
 Array = NDArray[np.float64]
@@ -27,6 +27,7 @@ class Aims:
     costs: tuple[Cost, ...]
     targets: tuple[Target, ...]
     constraints: tuple[Constraint, ...]
+    outputs: tuple[Output, ...]
 
 
 def read_aims(document: Document, simulation: Simulation, sample: Mapping[str, Any], faults: Faults) -> Aims:
@@ -35,10 +36,12 @@ def read_aims(document: Document, simulation: Simulation, sample: Mapping[str, A
     costs = [reader.cost(index, table) for index, table in enumerate(document.cost)]
     targets = [reader.target(index, table) for index, table in enumerate(document.target)]
     constraints = [reader.constraint(index, table) for index, table in enumerate(document.constraint)]
+    outputs = [reader.output(index, table) for index, table in enumerate(document.output)]
     return Aims(
         tuple(cost for cost in costs if cost),
         tuple(target for target in targets if target),
         tuple(constraint for constraint in constraints if constraint),
+        tuple(output for output in outputs if output),
     )
 
 
@@ -86,6 +89,15 @@ class Reader:
         check_moment(table.at, self.simulation, (*place, "at"), self.faults)
         found = self.formula((*place, "value"), table.value, table.at)
         return found and Target(table.name, found[0], table.at, table.tolerance, table.weight)
+
+    def output(self, index: int, table: OutputTable) -> Output | None:
+        """One number that is told."""
+        place = ("output", index)
+        check_moment(table.at, self.simulation, (*place, "at"), self.faults)
+        found = self.formula((*place, "value"), table.value, table.at)
+        if found and found[1] != 1:
+            self.faults.add((*place, "value"), f"must be a number, but is a vector of {found[1]}; give one for each")
+        return found and Output(table.name, found[0], table.at, table.unit or "")
 
     def constraint(self, index: int, table: ConstraintTable) -> Constraint | None:
         """One constraint."""

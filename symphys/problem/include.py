@@ -19,7 +19,7 @@ from symphys.problem.schema import Document, Table
 from symphys.problem.schema.include import MOST_INCLUDES, IncludedTable, IncludeTable
 from symphys.problem.source import MAX_BYTES, parse_toml, read_source, refuse
 from symphys.problem.words import shown
-from symphys.problems import robots
+from symphys.problems import parts
 from symphys.suggest import hint, quote
 
 OF_THE_PROBLEM = ("simulation", "fall", "objective", "solver", "solvers")
@@ -86,7 +86,7 @@ def find(path: Path, index: int, table: IncludeTable, kept: Mapping[str, str], f
         return table.file, kept[table.file]
     file = path.parent / table.file
     if not exists(file):
-        shipped = robots()
+        shipped = parts()
         if table.file not in shipped:
             text = f"there is no file {quote(table.file)}, and no shipped robot of that path"
             faults.stop(place, f"{text}; {hint(table.file, shipped)}")

@@ -46,7 +46,7 @@ from symphys.state import input_sizes
 
 MEMBERS = ("body", "plane", "block", "terrain")
 SHARED_NAMES = (*MEMBERS, "joint", "sensor", "controller", "variable")
-OWN_NAMES = ("cost", "target", "constraint", "scenario")
+OWN_NAMES = ("cost", "target", "constraint", "output", "scenario")
 
 
 def load_problem(

@@ -178,6 +178,28 @@ class Constraint:
 
 
 @dataclass(frozen=True)
+class Output:
+    """A number that is told.
+
+    Attributes:
+        name: as in the file.
+        formula: of the number.
+        at: ``end`` or a time [s].
+        unit: of it; may be empty.
+    """
+
+    name: str
+    formula: Formula
+    at: str | float
+    unit: str
+
+    @property
+    def label(self) -> str:
+        """Name and unit: ``speed [m/s]``."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+
+@dataclass(frozen=True)
 class Problem:
     """A validated problem.
 
@@ -199,6 +221,7 @@ class Problem:
         sensors, controllers: in the file's order.
         fall: where a motion is over before its time; None: nowhere.
         scenarios: what differs from situation to situation; None: nothing.
+        outputs: numbers that are told, in the file's order.
     """
 
     name: str
@@ -222,6 +245,7 @@ class Problem:
     solvers: tuple[str, ...] | None = None
     fall: Fall | None = None
     scenarios: Scenarios | None = None
+    outputs: tuple[Output, ...] = ()
 
     @property
     def weights(self) -> dict[str, Array]:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from symphys.report import style
-from symphys.report.curves import QUANTITIES, Curve, Quantity, curve, median_curve, miss_so_far
+from symphys.report.curves import QUANTITIES, Curve, Quantity, curve, median_curve, miss_so_far, told
 from symphys.report.finding import Study
 from symphys.report.records import Array
 
@@ -21,8 +21,10 @@ MISS_FLOOR = 1e-3
 
 
 def draw_convergence(study: Study) -> Figure | None:
-    """All solvers on one axis: objective and errors against rollout equivalents and against time."""
-    rows = [quantity for quantity in QUANTITIES if any(curve(run, WORK, quantity[1]) for run in study.runs)]
+    """All solvers on one axis: objective, errors and what is told against rollout equivalents and against time."""
+    outputs = dict.fromkeys(name for run in study.runs for name in run.outputs)
+    asked = [*QUANTITIES, *((f"{name[:1].upper()}{name[1:]}, of the best so far", told(name)) for name in outputs)]
+    rows = [quantity for quantity in asked if any(curve(run, WORK, quantity[1]) for run in study.runs)]
     columns = [x for x in (WORK, SECONDS) if any(np.isfinite(run.trace[x]).any() for run in study.runs)]
     if not rows or not columns:
         return None

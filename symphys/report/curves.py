@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symphys.report.records import Array, Run
+from symphys.report.records import TOLD, Array, Run
 from symphys.report.stage import Stage, smoothed
 
 GRID = 300
@@ -15,7 +15,7 @@ GRID = 300
 
 @dataclass(frozen=True)
 class Curve:
-    """A quantity that only falls, as a step function: ``y[i]`` holds from ``x[i]`` on."""
+    """A quantity as a step function: ``y[i]`` holds from ``x[i]`` on."""
 
     x: Array
     y: Array
@@ -31,6 +31,11 @@ def best_so_far(run: Run) -> Array:
 def miss_so_far(run: Run) -> Array:
     """(rows,): the smallest largest error / tolerance up to each iteration."""
     return falling(run, run.trace["miss"], "worst", lambda stage: stage.exact_worst)
+
+
+def told(name: str) -> Quantity:
+    """(rows,): what the problem tells of the best point so far."""
+    return lambda run: np.where(run.trace["smoothing"] > 0, np.nan, run.trace[TOLD + name])
 
 
 Quantity = Callable[[Run], Array]

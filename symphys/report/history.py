@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -11,7 +12,7 @@ from matplotlib.figure import Figure
 
 from symphys.report import stages, style
 from symphys.report.convergence import AXIS_TITLES, MISS_FLOOR, WORK, fit_values, mark_tolerance
-from symphys.report.records import Array, Run
+from symphys.report.records import TOLD, Array, Run
 from symphys.report.stage import Stage, smoothed
 
 HEADROOM = 0.16
@@ -38,21 +39,25 @@ class Panel:
 
 
 def draw_run(run: Run) -> Figure | None:
-    """Objective, errors, gradient norm, step; what was not recorded is left out."""
+    """Objective, errors, gradient norm, step, what is told; what was not recorded is left out."""
     x = run.trace[WORK]
     x = x if np.isfinite(x).any() else run.trace["iteration"]
     shown = [panel for panel in panels_of(run) if np.isfinite(panel.values).any()]
     if run.trace.rows < 2 or not shown:
         return None
-    rows, columns = (2, 2) if len(shown) == 4 else (1, len(shown))
+    columns = 2 if len(shown) == 4 else min(len(shown), 3)
+    rows = math.ceil(len(shown) / columns)
     figure = Figure(figsize=(style.WIDTH, 0.6 + 0.25 * smoothed(run.stages) + 2.0 * rows), layout="constrained")
     grid = list(figure.subplots(rows, columns, sharex=True, squeeze=False).flat)
     colour = style.solver_marks([run.solver])[run.solver][0]
     for place, (axes, panel) in enumerate(zip(grid, shown, strict=False)):
         draw_panel(axes, run, x, panel, colour, named=place < columns)
     label = AXIS_TITLES[WORK] if np.isfinite(run.trace[WORK]).any() else "iteration"
-    for axes in grid[-columns:]:
+    for axes in grid[len(shown) :]:
+        axes.remove()
+    for axes in grid[max(len(shown) - columns, 0) : len(shown)]:
         axes.set_xlabel(label)
+        axes.tick_params(labelbottom=True)
     if smoothed(run.stages):
         style.legend_above(figure, *stages.legend(colour))
     return figure
@@ -71,6 +76,7 @@ def panels_of(run: Run) -> list[Panel]:
         ),
         Panel("Norm of the gradient", trace["gradient_norm"]),
         Panel("Step" if not run.solver.startswith("cma") else "Step size σ", trace["step"]),  # noqa: RUF001
+        *(Panel(name[:1].upper() + name[1:], trace[TOLD + name]) for name in trace.told),
     ]
 
 

@@ -71,6 +71,7 @@ def make_run(folder: Path, place: str, named: dict[str, object], result: dict[st
         advice=values.name(result.get("advice")),
         objective=values.number(result.get("objective")),
         costs=values.measures(result.get("costs")),
+        outputs=values.measures(result.get("outputs")),
         checks=tuple(make_check(entry) for entry in values.tables(result.get("checks"))),
         variables=tuple(make_variable(key, entry) for key, entry in values.table(result.get("z")).items()),
         effort=make_effort(result),

@@ -60,9 +60,14 @@ class Variable:
     upper: Array
 
 
+TOLD = "told: "
+
+
 @dataclass(frozen=True)
 class Trace:
     """The iterations of a solve, column by column; a column that the file lacks is all nan.
+
+    Columns whose names begin with ``TOLD`` are what problems and solvers tell.
 
     Attributes:
         columns: name -> (rows,).
@@ -75,6 +80,11 @@ class Trace:
     def __getitem__(self, name: str) -> Array:
         """(rows,): the column called ``name``."""
         return self.columns.get(name, np.full(self.rows, np.nan))
+
+    @property
+    def told(self) -> list[str]:
+        """The names of what is told."""
+        return [name.removeprefix(TOLD) for name in self.columns if name.startswith(TOLD)]
 
 
 @dataclass(frozen=True)
@@ -115,7 +125,8 @@ class Run:
         place: the folder's path below the report's folder, with forward slashes.
         readable: whether there is a result; if not, only names and ``faults`` mean anything.
         faults: what could not be read, one sentence each.
-        guess: "objective" and "worst" of what it started from, exactly.
+        outputs: what the problem tells of the result, by names with units.
+        guess: "objective", "worst" and what is told of what it started from, exactly.
     """
 
     folder: Path
@@ -131,6 +142,7 @@ class Run:
     advice: str
     objective: float
     costs: Mapping[str, float]
+    outputs: Mapping[str, float]
     checks: tuple[Check, ...]
     variables: tuple[Variable, ...]
     effort: Effort

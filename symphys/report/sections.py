@@ -12,7 +12,7 @@ from symphys.report import style, words
 from symphys.report.animation import animation
 from symphys.report.limbs import is_large
 from symphys.report.markup import Html, banner, card, facts, figures, fold, join, pill, stats, table, tag
-from symphys.report.records import Check, Run, Trajectory, Variable
+from symphys.report.records import TOLD, Check, Run, Trajectory, Variable
 from symphys.report.scenery import Scene
 from symphys.report.style import Picture
 from symphys.report.variables import component_names, knotted
@@ -73,6 +73,7 @@ def key_numbers(run: Run) -> Html:
         [
             ("Objective", show(run.objective)),
             ("Error / tolerance", show(run.worst)),
+            *((name[:1].upper() + name[1:], show(value)) for name, value in run.outputs.items()),
             ("Rollouts", words.count(run.effort.counts.get("rollouts", math.nan))),
             *used,
             ("Work, in rollouts", words.count(round(run.effort.equivalents, 1))),
@@ -100,9 +101,16 @@ def checks(run: Run) -> Html:
         table(["name", "error", "tolerance", "ratio", "", ""], rows, "tnnntt", "Checks") if rows else "",
         tag("h3", "Costs, weighted") if costs else "",
         costs,
+        tag("h3", "Told") if run.outputs else "",
+        facts([(name, told(run, name)) for name in run.outputs]),
         anchor="checks",
         note=HOW_JUDGED,
     )
+
+
+def told(run: Run, name: str) -> str:
+    """A number of the result, and what it was at the guess."""
+    return f"{show(run.outputs[name], 4)} (at the guess {show(run.guess.get(TOLD + name, math.nan), 4)})"
 
 
 def gauge(check: Check) -> Html:

@@ -22,6 +22,9 @@ except ImportError:  # not a POSIX system: concurrent commands are then kept apa
 PROBLEM, CONFIG, RESULT, CHECKPOINT = "problem.toml", "config.json", "result.json", "checkpoint.json"
 TRAJECTORY, GUESS, SCENE, TRACE, LOG = "trajectory.npz", "guess.npz", "scene.json", "trace.csv", "log.txt"
 
+TOLD = "told: "
+"""Before the names of columns of the trace that problems and solvers tell of."""
+
 
 class FolderBusy(files.FileError):
     """Another command is working in the folder."""
@@ -66,10 +69,11 @@ class RunFolder:
         files.write_json(self.path / CONFIG, config.to_json())
 
     def write_trace(self, rows: Iterable[Mapping[str, object]]) -> None:
-        """Write one line per iteration under a header with the names of the columns."""
+        """Write one line per iteration under a header with the names of the columns; what a row lacks is nan."""
         rows = list(rows)
+        columns = list(dict.fromkeys(key for row in rows for key in row))
         buffer = io.StringIO()
-        writer = csv.DictWriter(buffer, list(rows[0]) if rows else [], lineterminator="\n")
+        writer = csv.DictWriter(buffer, columns, restval="nan", lineterminator="\n")
         writer.writeheader()
         writer.writerows({key: repr(value) for key, value in row.items()} for row in rows)
         files.write_text(self.path / TRACE, buffer.getvalue())

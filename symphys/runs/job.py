@@ -75,7 +75,7 @@ def make_jobs(
 
 def fitting(problem: Problem) -> list[str]:
     """The solvers that are for such problems: with situations that differ, or without."""
-    return [name for name, each in SOLVERS.items() if each.situations == (problem.scenarios is not None)]
+    return [name for name, each in SOLVERS.items() if each.situations in (None, problem.scenarios is not None)]
 
 
 def solver_options(problem: Problem, name: str) -> Any:

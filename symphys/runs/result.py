@@ -68,6 +68,7 @@ class Result:
         status, advice: how the solver ended and what to try.
         objective: of the exact rollout.
         costs: weighted value of each cost by name.
+        outputs: what the problem tells, by name.
         checks: targets, constraints and the goal.
         z: the variables by name.
         iterations: of the solver.
@@ -76,7 +77,8 @@ class Result:
         equivalents: the whole work in rollouts.
         seconds: wall time of "build", "compile" and "solve"; what a solver loads beforehand is in none of them.
         trust: how far the solution can be trusted.
-        guess: what the run started from, exactly: "objective", and "worst", the largest error / tolerance.
+        guess: what the run started from, exactly: "objective", "worst", the largest error / tolerance, and what is
+            told, by "told: " and its name.
         stages: those of smoothing that were begun, in their order; the solution is the point of the last.
         versions: of everything that took part.
         when: UTC time of the end, ISO 8601.
@@ -94,6 +96,7 @@ class Result:
     advice: str
     objective: float | None = None
     costs: dict[str, float] | None = None
+    outputs: dict[str, float] | None = None
     checks: list[CheckRecord] | None = None
     z: dict[str, BlockRecord] | None = None
     iterations: int | None = None

@@ -11,7 +11,7 @@ import numpy as np
 
 from symphys import files, trust
 from symphys.errors import SymphysError
-from symphys.runs.folder import CHECKPOINT, GUESS, SCENE, TRAJECTORY
+from symphys.runs.folder import CHECKPOINT, GUESS, SCENE, TOLD, TRAJECTORY
 from symphys.runs.job import Job
 from symphys.runs.provenance import evaluated, stamp
 from symphys.runs.result import BlockRecord, CheckRecord, Result
@@ -19,7 +19,7 @@ from symphys.runs.scene import scene
 from symphys.runs.stages import guess_record, stage_records
 from symphys.runs.work import equivalents, used
 from symphys.shooting import Array, ShootingProblem
-from symphys.solvers import Monitor, Outcome, Status, solver
+from symphys.solvers import Monitor, Outcome, Status, TraceRow, solver
 from symphys.trajectory import Trajectory
 from symphys.transcription import Check, Transcription, Verdict
 
@@ -111,14 +111,20 @@ def write(
     job: Job, transcription: Transcription, outcome: Outcome, judgement: Judgement, price: Mapping[str, float]
 ) -> None:
     """Write trace, motion and checkpoint."""
-    rows = [{**asdict(row), "equivalents": equivalents(row, price)} for row in outcome.trace]
-    job.folder.write_trace(rows)
+    job.folder.write_trace([columns(row, price) for row in outcome.trace])
     if judgement.trajectory is not None:
         files.write_npz(job.folder.path / TRAJECTORY, judgement.trajectory.arrays())
         z = transcription.shooting.by_block(outcome.z)
         files.write_json(job.folder.path / SCENE, scene(job.problem, z, judgement.trajectory))
     if outcome.status is Status.INTERRUPTED:
         files.write_json(job.folder.path / CHECKPOINT, outcome.checkpoint)
+
+
+def columns(row: TraceRow, price: Mapping[str, float]) -> dict[str, object]:
+    """A row of the trace as a line of a table."""
+    numbers = asdict(row)
+    told = numbers.pop("told")
+    return {**numbers, "equivalents": equivalents(row, price), **{TOLD + name: value for name, value in told.items()}}
 
 
 def record(
@@ -139,6 +145,7 @@ def record(
         advice=judgement.advice,
         objective=verdict.objective if verdict else None,
         costs=dict(verdict.costs) if verdict else None,
+        outputs=dict(verdict.outputs) if verdict else None,
         checks=[check_record(check) for check in verdict.checks] if verdict else None,
         z=blocks(transcription, outcome.z),
         iterations=outcome.trace[-1].iteration if outcome.trace else 0,

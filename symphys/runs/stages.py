@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict
 
+from symphys.runs.folder import TOLD
 from symphys.runs.result import StageRecord
 from symphys.runs.work import equivalents
 from symphys.solvers import Outcome, StageResult
@@ -14,7 +15,11 @@ from symphys.transcription import Transcription
 def guess_record(transcription: Transcription, seed: int) -> dict[str, float]:
     """What the start of a seed is worth exactly."""
     exact = transcription.judge(transcription.shooting.start(seed))
-    return {"objective": exact.objective, "worst": exact.worst}
+    return {
+        "objective": exact.objective,
+        "worst": exact.worst,
+        **{TOLD + name: value for name, value in exact.outputs.items()},
+    }
 
 
 def stage_records(transcription: Transcription, outcome: Outcome, price: Mapping[str, float]) -> list[StageRecord]:

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.problem import Constraint, Cost, Target
+from symphys.problem import Constraint, Cost, Output, Target
 from symphys.state import Layout, input_columns
 from symphys.transcription.along import Rollout
 from symphys.transcription.blame import Blame, blame
 
 Array = NDArray[np.float64]
-Asked = Cost | Target | Constraint
+Asked = Cost | Target | Constraint | Output
 Columns = Sequence[str]
 """A name for each element of a vector."""
 
@@ -139,7 +139,12 @@ def _cause(found: Blame | None, names: Sequence[Columns], results: Sequence[Colu
 def _instants(rollout: Rollout) -> Iterator[tuple[str, Asked, int, int]]:
     """(kind, what is asked, number of the state, number of the inputs) of every look at a formula; see ``Rollout``."""
     problem, steps = rollout.problem, rollout.steps
-    groups = (("cost", problem.costs), ("target", problem.targets), ("constraint", problem.constraints))
+    groups = (
+        ("cost", problem.costs),
+        ("target", problem.targets),
+        ("constraint", problem.constraints),
+        ("output", problem.outputs),
+    )
     for kind, asked in ((kind, asked) for kind, group in groups for asked in group):
         if asked.at != "always":
             k = rollout.tick(asked.at)

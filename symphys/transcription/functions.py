@@ -18,7 +18,7 @@ class ExpressionFunctions:
         """Nothing is made yet."""
         self._rollout, self._terms = rollout, asked
         self._merit = asked.objective + asked.penalties
-        self._common = [asked.objective, asked.errors]
+        self._common, self._told = [asked.objective, asked.errors], asked.outputs
 
     @property
     def squares(self) -> Any:
@@ -28,25 +28,29 @@ class ExpressionFunctions:
 
     @cached_property
     def value(self) -> ca.Function:
-        """-> (merit, objective, errors)."""
-        return self._function("value", [self._merit, *self._common])
+        """-> (merit, objective, errors, outputs)."""
+        return self._function("value", [self._merit, *self._common, self._told])
 
     @cached_property
     def gradient(self) -> ca.Function:
-        """-> (merit, objective, errors, d merit / dz (n,))."""
-        return self._function("gradient", [self._merit, *self._common, ca.gradient(self._merit, self._rollout.z)])
+        """-> (merit, objective, errors, d merit / dz (n,), outputs)."""
+        slopes = ca.gradient(self._merit, self._rollout.z)
+        return self._function("gradient", [self._merit, *self._common, slopes, self._told])
 
     @cached_property
     def residuals(self) -> ca.Function | None:
-        """-> (r, objective, errors)."""
-        return None if self.squares is None else self._function("residuals", [self.squares, *self._common])
+        """-> (r, objective, errors, outputs)."""
+        if self.squares is None:
+            return None
+        return self._function("residuals", [self.squares, *self._common, self._told])
 
     @cached_property
     def jacobian(self) -> ca.Function | None:
-        """-> (r, objective, errors, dr/dz (m, n))."""
+        """-> (r, objective, errors, dr/dz (m, n), outputs)."""
         if self.squares is None:
             return None
-        return self._function("jacobian", [self.squares, *self._common, ca.jacobian(self.squares, self._rollout.z)])
+        slopes = ca.jacobian(self.squares, self._rollout.z)
+        return self._function("jacobian", [self.squares, *self._common, slopes, self._told])
 
     @cached_property
     def nlp(self) -> ca.Function:

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from symphys.problem import Problem
 from symphys.transcription.terms import goal_error
 
+Array = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
 class Check:
@@ -38,11 +40,12 @@ class Check:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Objective, each cost and each check of one candidate, by name."""
+    """Objective, each cost, each check and each number that is told of one candidate, by name."""
 
     objective: float
     costs: dict[str, float]
     checks: tuple[Check, ...]
+    outputs: dict[str, float]
 
     @property
     def solved(self) -> bool:
@@ -56,8 +59,8 @@ class Verdict:
         return max(ratios, key=lambda ratio: inf if isnan(ratio) else ratio, default=nan)
 
 
-def verdict(problem: Problem, objective: float, costs: NDArray[np.float64], errors: NDArray[np.float64]) -> Verdict:
-    """The verdict from the numbers of the exact rollout; ``errors`` as in ``Terms``."""
+def verdict(problem: Problem, objective: float, costs: Array, errors: Array, outputs: Array) -> Verdict:
+    """The verdict from the numbers of the exact rollout; the arrays as in ``Terms``."""
     checks = []
     held = [("target", t.name, t.tolerance) for t in problem.targets]
     held += [("constraint", c.name, c.tolerance) for c in problem.constraints]
@@ -66,4 +69,5 @@ def verdict(problem: Problem, objective: float, costs: NDArray[np.float64], erro
     if problem.goal is not None:
         checks.append(Check("goal", "objective", objective, problem.goal, float(goal_error(objective, problem.goal))))
     named = {cost.name: float(value) for cost, value in zip(problem.costs, costs, strict=True)}
-    return Verdict(objective, named, tuple(checks))
+    told = {output.label: float(value) for output, value in zip(problem.outputs, outputs, strict=True)}
+    return Verdict(objective, named, tuple(checks), told)

@@ -9,7 +9,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.problem import ALIVE, Constraint, Cost, Problem, Target
+from symphys.problem import ALIVE, Constraint, Cost, Output, Problem, Target
 from symphys.state import Layout, input_columns, input_sizes
 from symphys.step import accelerometer_bodies
 from symphys.world import World
@@ -76,7 +76,12 @@ class Memory:
 def memory_of(problem: Problem, world: World) -> Memory:
     """What the sensors of a problem, and its accelerometers, make necessary."""
     sensed = frozenset[str]().union(*(formula.names for sensor in problem.sensors for formula in sensor.formulas))
-    aims: list[Cost | Target | Constraint] = [*problem.costs, *problem.targets, *problem.constraints]
+    aims: list[Cost | Target | Constraint | Output] = [
+        *problem.costs,
+        *problem.targets,
+        *problem.constraints,
+        *problem.outputs,
+    ]
     asked = frozenset[str]().union(*(aim.formula.names for aim in aims))
     inputs = tuple(name for name in input_sizes(world) if name in sensed)
     margin = problem.fall.margin.names if problem.fall else frozenset[str]()

@@ -81,7 +81,7 @@ def dense(function: ca.Function) -> ca.Function:
 
 
 def rollout_program(rollout: Rollout, exact: bool = False) -> Program:
-    """A program of z and smoothing: merit, objective, errors, constraints, costs, probe, residuals, alive.
+    """A program of z and smoothing, with all that is asked of a rollout: see ``_epilogue``; and ``alive``.
 
     ``exact`` is for smoothing 0 only, whatever is given: it has less to compute.
     """
@@ -171,6 +171,7 @@ def _epilogue(samples: Samples, asked: Terms) -> tuple[Call, dict[str, Place]]:
         "errors": asked.errors,
         "constraints": asked.constraints,
         "costs": asked.costs,
+        "outputs": asked.outputs,
         "probe": combined(asked.means),
     }
     if asked.residuals is not None:

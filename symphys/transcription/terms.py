@@ -52,6 +52,7 @@ class Terms:
         penalties: scalar: quadratic penalties of violated constraints.
         errors: (e,) error / tolerance of each target, constraint and the goal: met where <= 1.
         constraints: (c,) values, with ``lower`` and ``upper`` (c,) as numbers and ``names`` one an entry.
+        outputs: (o,) what is told.
         means: (a,) the value of every formula, its mean over time where it is looked at always: what is differentiated
             to examine a gradient, since it means the same on any time grid and its slope does not vanish at a solution.
     """
@@ -65,6 +66,7 @@ class Terms:
     lower: np.ndarray[Any, np.dtype[np.float64]]
     upper: np.ndarray[Any, np.dtype[np.float64]]
     names: tuple[str, ...]
+    outputs: Expr
     means: Expr
 
 
@@ -92,6 +94,7 @@ def terms(rollout: Sampled) -> Terms:
         lower=np.concatenate([limit.lower for limit in limits] or [np.zeros(0)]),
         upper=np.concatenate([limit.upper for limit in limits] or [np.zeros(0)]),
         names=tuple(limit.name for limit in limits for _ in range(limit.lower.size)),
+        outputs=_stack([rollout.at(output.formula, output.at) for output in problem.outputs]),
         means=_stack(
             [cost.mean for cost in costs] + [value for _, value in targets] + [limit.mean for limit in limits]
         ),

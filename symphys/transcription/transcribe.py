@@ -50,5 +50,6 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
         constraint_upper=asked.upper,
         smoothing=problem.simulation.smoothing,
         stop_when_met=problem.stop_when_met,
+        output_names=tuple(output.label for output in problem.outputs),
     )
     return Transcription(problem, rollout, asked, functions, shooting, chosen.description, built)

@@ -100,11 +100,11 @@ class Transcription:
 
 def judge_of(rollout: Rollout, asked: Terms) -> Judge:
     """A judge of candidates by the exact rollout, without the functions that solvers need."""
-    numbers = function_of(rollout, "judge", [asked.objective, asked.costs, asked.errors])
+    numbers = function_of(rollout, "judge", [asked.objective, asked.costs, asked.errors, asked.outputs])
 
     def judge(z: Array, smoothing: float = 0.0) -> Verdict:
-        objective, costs, errors = numbers(z, smoothing)
-        return verdict(rollout.problem, float(objective), np.array(costs).ravel(), np.array(errors).ravel())
+        objective, *parts = (np.array(part).ravel() for part in numbers(z, smoothing))
+        return verdict(rollout.problem, float(objective[0]), *parts)
 
     return judge
 

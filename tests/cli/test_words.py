@@ -13,10 +13,11 @@ from rich.console import Console
 from rich.progress import Progress
 
 from symphys.cli.arguments import UsageFault, read_settings, read_value
-from symphys.cli.progress import Live
+from symphys.cli.progress import Live, at
 from symphys.cli.summary import advice, table
 from symphys.cli.wording import brief, duration, many_pairs, number, whole
 from symphys.runs import Result
+from symphys.solvers import TraceRow
 
 NAN = float("nan")
 
@@ -106,3 +107,8 @@ def test_a_world_with_many_pairs_says_what_it_costs_and_what_to_do() -> None:
     assert many_pairs("break", 11) == ""
     said = many_pairs("heap", 400)
     assert "400 pairs" in said and "120 s" in said and "collides_with" in said
+
+
+def test_what_is_told_is_shown_while_it_works() -> None:
+    row = TraceRow(3, 4, 4, 0, 0, 0.1, 2.0, 1.0, 0.5, NAN, NAN, 0.0, {"speed [m/s]": 1.25, "lasting": 0.875})
+    assert at(row) == "iteration 3, objective 1, worst 0.5, speed 1.25 m/s, lasting 0.875"

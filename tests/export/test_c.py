@@ -62,7 +62,7 @@ def test_the_example_prints_the_numbers_of_python(problem: str, kick: Transcript
     compile_c("-std=c99", *STRICT, *sources, "-o", tmp_path / "example")
     for z in ([], one.shooting.start(1).tolist()):
         printed = example(tmp_path, name, *z)
-        merit, objective, errors, slope = (
+        merit, objective, errors, slope, _ = (
             np.array(part).ravel() for part in one.functions.gradient(z or one.shooting.start(0), 0.0)
         )
         assert printed["merit"] == pytest.approx(merit[0], **CLOSE)

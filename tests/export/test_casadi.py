@@ -48,7 +48,7 @@ def test_plain_casadi_loads_them(kick: Transcription, tmp_path: Path) -> None:
 def test_the_readme_names_everything(kick: Transcription) -> None:
     text = casadi_files(kick, "1.2")["README.txt"].decode()
     for line in (
-        "gradient: z (7), smoothing (1) -> merit (1), objective (1), errors (2), gradient (7)",
+        "gradient: z (7), smoothing (1) -> merit (1), objective (1), errors (2), gradient (7), outputs (0)",
         "step: x (23), u (3), p (1), smoothing (1) -> x_next (23)",
         "x[7..9]            ball.velocity [m/s]",
         'errors[0]          target über "there" ?',

@@ -12,6 +12,7 @@ Refused = Callable[..., ProblemError]
 Names = Callable[[ProblemError, str, str], None]
 SETS = 'sets = "ball.velocity"\nguess = [1, 2, 3]'
 COST = 'at = "always"\nsquares = "marble.force"'
+OUTPUT = "[[output]]\nname = 'far'\nvalue = '"
 TARGET = 'value = "ball.position - [1, 0, 0.5]"'
 
 CASES = [
@@ -93,6 +94,10 @@ CASES = [
     ("upper = 5", "upper = [5, 6]", 'constraint "stays low".upper', "must be a number$"),
     ("upper = 5", "upper = [[5]]", 'constraint "stays low".upper', "must be a number$"),
     ("upper = 5", "upper = 5\npenalty = 0", 'constraint "stays low".penalty', "greater than 0"),
+    (COST, f"{COST}\n{OUTPUT}ball.position'", 'output "far".value', "must be a number, but is a vector of 3"),
+    (COST, f"{COST}\n{OUTPUT}ball.far'", 'output "far".value', "ball.far"),
+    (COST, f"{COST}\n{OUTPUT}1'\nat = 'always'", 'output "far".at', '"end" or a time'),
+    (COST, f"{COST}\n{OUTPUT}1'\n{OUTPUT}2'", "output[1].name", "already the name of another output"),
     (COST, f'{COST}\n[objective]\nstop = "now"', "objective.stop", "'met' or 'converged'"),
     (COST, f"{COST}\n[objective]\ngoal = nan", "objective.goal", "finite"),
 ]

@@ -28,6 +28,7 @@ SHIPPED = [
     "putt",
     "quadruped_shift",
     "quadruped_walk",
+    "quadruped_walk_net",
     "row_of_balls",
     "sled",
     "stairs",
@@ -106,9 +107,9 @@ def test_the_folder_is_no_package_of_its_own() -> None:
 
 def test_robots_are_listed_apart_from_problems(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["list"]) == 0
-    listed = capsys.readouterr().out.split("robots, for [[include]]:")
+    listed = capsys.readouterr().out.split("robots and tasks, for [[include]]:")
     assert "cart_pole" in listed[0]
     assert "robots/" not in listed[0]
-    assert "robots/table_robot.toml" in listed[1]
+    assert "robots/table_robot.toml" in listed[1] and "tasks/walk_ahead.toml" in listed[1]
     with pytest.raises(SymphysError, match="no shipped problem"):
         problems.find("table_robot")

@@ -1,4 +1,4 @@
-"""A quadruped that learns to walk: a short lesson here, the whole one as ``thorough``."""
+"""A quadruped that learns to walk, by a few numbers and by a net: short lessons here, whole ones as ``thorough``."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from symphys.transcription import Transcription, transcribe
 UNSEEN = 4711
 
 
-def taught(settings: dict[str, object], seed: int = 0) -> tuple[Transcription, Situations, Array]:
+def taught(name: str, settings: dict[str, object], seed: int = 0) -> tuple[Transcription, Situations, Array]:
     """The problem with these settings, its situations, and what the solver found."""
-    made = transcribe(load_problem(find("quadruped_walk"), settings), exact=True)
+    made = transcribe(load_problem(find(name), settings), exact=True)
     if made.shooting.situations is None:
         pytest.skip(made.backend.note)
     options = solver_options(made.problem, "stochastic")
@@ -37,8 +37,9 @@ def ahead(made: Transcription, z: Array) -> Any:
 
 def test_a_short_lesson_helps() -> None:
     """A hundred batches of 16 for 3 s: what stood walks, and costs less in situations that are new."""
+    name = "quadruped_walk"
     shorter = {"simulation.duration": 3, "solver.stochastic.iterations": 100, "solver.stochastic.samples": 16}
-    made, situations, z = taught(shorter)
+    made, situations, z = taught(name, shorter)
     still, learnt = (situations.value(each[None], situations.draw(np.random.default_rng(UNSEEN), 32), 0.0)
                      for each in (made.shooting.start(0), z))  # fmt: skip
     assert learnt.objective.mean() < 0.8 * still.objective.mean()
@@ -49,9 +50,10 @@ def test_a_short_lesson_helps() -> None:
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_it_walks(seed: int) -> None:
+@pytest.mark.parametrize("name", ["quadruped_walk", "quadruped_walk_net"])
+def test_it_walks(name: str, seed: int) -> None:
     """At 1.5 m/s and more, upright, straight on; nineteen of twenty in situations that it has not seen."""
-    made, situations, z = taught({}, seed)
+    made, situations, z = taught(name, {}, seed)
     assert made.judge(z).solved
     x, up = ahead(made, z)
     assert x > 15 and up > 0.866

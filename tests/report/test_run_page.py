@@ -102,6 +102,21 @@ def test_knots_and_controls_are_drawn(batch: Path) -> None:
     assert {"controls.svg", "variables.svg"} <= {p.name for p in (batch / "two_balls/gradient-seed0/figures").iterdir()}
 
 
+def test_what_is_told_is_shown_and_drawn(run_dir: Path, edit: Callable[..., None]) -> None:
+    """The number with that of the guess, and its way."""
+    guess = json.loads((run_dir / "result.json").read_text()).get("guess") or {}
+    edit(run_dir / "result.json", outputs={"speed [m/s]": 1.25}, guess={**guess, "told: speed [m/s]": 0.125})
+    plain = read(run_dir)
+    assert "1.25 (at the guess 0.125)" in Page(plain).text
+    before = (run_dir / "figures" / "convergence.svg").read_text(encoding="utf-8")
+    header, *rows = (run_dir / "trace.csv").read_text(encoding="utf-8").splitlines()
+    told = [f"{header},told: speed [m/s]", *(f"{row},{0.1 * k}" for k, row in enumerate(rows))]
+    (run_dir / "trace.csv").write_text("\n".join(told) + "\n", encoding="utf-8")
+    read(run_dir)
+    after = (run_dir / "figures" / "convergence.svg").read_text(encoding="utf-8")
+    assert "Speed [m/s]" in after and "Speed [m/s]" not in before
+
+
 def test_remade_page_is_the_same(run_dir: Path) -> None:
     first = read(run_dir)
     figures = {path.name: path.read_bytes() for path in (run_dir / "figures").iterdir()}

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from symphys import files, solvers
-from symphys.runs import Job, Result, execute
+from symphys.problem import load_problem
+from symphys.runs import Job, Result, execute, make_jobs
 from symphys.runs.workshop import Workshop
 from symphys.solvers import TraceRow
 from symphys.transcription import transcribe
@@ -52,6 +53,21 @@ def test_a_run_leaves_every_file(make_job: MakeJob) -> None:
     }
     assert job.folder.earlier(job.config) == result
     assert (job.folder.path / "problem.toml").read_text(encoding="utf-8") == job.problem.text
+
+
+def test_what_a_problem_tells_is_in_the_result_and_along_the_trace(problem_file: Path, tmp_path: Path) -> None:
+    """Of the guess, of the best point so far, and of what was found."""
+    output = '[[output]]\nname = "ahead"\nvalue = "ball.position[0]"\nunit = "m"\n'
+    problem_file.write_text(problem_file.read_text(encoding="utf-8") + output, encoding="utf-8")
+    (job,) = make_jobs([load_problem(problem_file)], ["gradient"], [0], {}, tmp_path / "out")
+    rows: list[TraceRow] = []
+    result = run(job, rows.append)
+    assert result.outputs == {"ahead [m]": pytest.approx(0.5, abs=0.01)}
+    assert result.guess and result.guess["told: ahead [m]"] == pytest.approx(0.2)
+    with (job.folder.path / "trace.csv").open(encoding="utf-8") as file:
+        column = [float(row["told: ahead [m]"]) for row in csv.DictReader(file)]
+    assert column == [row.told["ahead [m]"] for row in rows]
+    assert (column[0], column[-1]) == (pytest.approx(0.2), pytest.approx(0.5, abs=0.01))
 
 
 def test_the_result_is_that_of_the_exact_rollout(make_job: MakeJob) -> None:

@@ -19,10 +19,12 @@ every_solver = pytest.mark.parametrize("name", list(SOLVERS))
 
 
 def test_names() -> None:
-    assert list(SOLVERS) == ["gradient", "least_squares", "ipopt", "cma", "stochastic"]
+    assert list(SOLVERS) == ["gradient", "least_squares", "ipopt", "cma", "stochastic", "evolution"]
     for name in SOLVERS:
         assert solver(name).name == name
-    with pytest.raises(SymphysError, match=r"did you mean 'gradient'\? valid: gradient, .*, cma, stochastic"):
+    with pytest.raises(
+        SymphysError, match=r"did you mean 'gradient'\? valid: gradient, .*, cma, stochastic, evolution"
+    ):
         solver("gradent")
     with pytest.raises(SymphysError, match="valid: gradient"):
         solver("xyz")
@@ -31,7 +33,7 @@ def test_names() -> None:
 @every_solver
 def test_options_are_documented_and_have_defaults(name: str) -> None:
     kind = solver(name).Options
-    text = str(kind.__doc__)
+    text = "".join(str(each.__doc__) for each in kind.__mro__)
     assert all(field.name in text for field in fields(kind()))
 
 

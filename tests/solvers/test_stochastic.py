@@ -2,50 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
 from toys import toy
+from windy import BEST, Winds, windy
 
-from symphys.shooting import Array, Drawn, ShootingProblem, Values
+from symphys.shooting import Values
 from symphys.solvers import SOLVERS, Status, StochasticOptions, TraceRow
-from symphys.solvers.averages import average, evolution, together
+from symphys.solvers.averages import average, centred, evolution, together
 
 SOLVE = SOLVERS["stochastic"].solve
-BEST = np.array([0.5, -0.25])
-
-
-class Winds:
-    """(z - BEST - wind)^2, with a wind that differs; those above ``storm`` end the motion, and spoil it ``badly``."""
-
-    def __init__(self, spread: float = 0.3, storm: float = np.inf, badly: float = 0.0) -> None:
-        self.grids, self.spread, self.storm, self.badly = ("", "fine"), spread, storm, badly
-        self.asked: list[int] = []
-
-    def draw(self, rng: np.random.Generator, count: int, width: float = 1.0, grid: int = 0) -> Drawn:
-        rows = width * self.spread * rng.uniform(-1, 1, (count, 2))
-        rows[0] = 0
-        return Drawn(grid, rows)
-
-    def value(self, Z: Array, drawn: Drawn, smoothing: float) -> Values:
-        off = Z - BEST - drawn.numbers
-        merit = (off**2).sum(axis=1)
-        over = np.abs(drawn.numbers).max(axis=1) > self.storm
-        merit = np.where(over, merit + self.badly, merit)
-        return Values(merit, merit, np.zeros((len(merit), 0)), alive=1.0 - over)
-
-    def gradient(self, Z: Array, drawn: Drawn, smoothing: float, forget: float = 0.0) -> Values:
-        self.asked.append(drawn.grid)
-        found = self.value(Z, drawn, smoothing)
-        slopes = 2 * (Z - BEST - drawn.numbers) + 0 * found.merit[:, None]
-        return replace(found, gradient=slopes)
-
-
-def windy(**settings: Any) -> ShootingProblem:
-    return replace(toy(2, objective=lambda z, s: ca.sumsqr(z - BEST)), situations=Winds(**settings))
 
 
 def options(**changes: Any) -> StochasticOptions:
@@ -132,9 +101,18 @@ def test_evolution_estimates_the_gradient() -> None:
     winds, z, step = Winds(), np.array([1.5, 0.75]), np.array([0.1, 0.2])
     rng = np.random.default_rng(0)
     found = evolution(winds, z, step, winds.draw(rng, 20_000), 0.0, rng)
-    assert found == pytest.approx(2 * (z - BEST) * step, rel=0.1)
+    way = 2 * (z - BEST) * step
+    assert found.gradient @ way == pytest.approx(np.linalg.norm(found.gradient) * np.linalg.norm(way), rel=1e-3)
+    assert (found.pairs, found.alive) == (20_000, 1.0)
+    assert found.merit == pytest.approx(((z - BEST) ** 2).sum() + 2 * 0.3**2 / 3 + (step**2).sum(), rel=0.02)
     mixed = together(np.array([3.0, 0]), np.array([0, 0.1]), 0.25)
     assert mixed == pytest.approx([0.75, 0.25])
+
+
+def test_ranks() -> None:
+    """Equal merits share theirs; nothing is said where all are equal."""
+    assert centred(np.array([[3.0, 1.0], [9.0, 3.0]])) == pytest.approx(np.array([[0, -0.5], [0.5, 0]]))
+    assert centred(np.ones((2, 3))) == pytest.approx(np.zeros((2, 3)))
 
 
 @pytest.mark.parametrize(

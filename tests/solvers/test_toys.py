@@ -201,3 +201,14 @@ def test_compiled_toys(backend: str, name: str, options: dict[str, Any]) -> None
     assert solve(name, target(backend=backend), options=options).status is Status.MET
     if name == "ipopt":
         assert solve(name, constrained(backend=backend), options=options).z == pytest.approx([1, 0], abs=1e-7)
+
+
+@every_solver
+@pytest.mark.parametrize("backend", ["casadi", "simd"])
+def test_what_a_problem_tells_of_its_best_point_is_in_every_row(name: str, backend: str) -> None:
+    """By name; the last row tells of what was found."""
+    require(backend)
+    problem = toy(2, residuals=lambda z, s: z - 3, told=True, backend=backend)
+    found = solve(name, problem)
+    assert all(list(row.told) == ["sum [m]"] for row in found.trace)
+    assert found.trace[-1].told["sum [m]"] == pytest.approx(found.z.sum(), rel=1e-6)

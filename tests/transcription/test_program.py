@@ -27,7 +27,9 @@ def test_value_and_gradient_are_those_of_the_expression(problem: Problem) -> Non
     kernel = compile_program(program, seeded=("merit",), threads=1)
     z = transcription.shooting.start(1)
     for knob in (0.0, 1e-3):
-        merit, objective, errors, slope = (np.array(part).ravel() for part in transcription.functions.gradient(z, knob))
+        merit, objective, errors, slope, _ = (
+            np.array(part).ravel() for part in transcription.functions.gradient(z, knob)
+        )
         outputs, gradient = kernel.gradient(z, [1.0], [knob])
         for name, expected in (("merit", merit), ("objective", objective), ("errors", errors)):
             assert outputs[name][0] == pytest.approx(expected, rel=1e-12, abs=1e-12)
@@ -39,7 +41,7 @@ def test_residuals_and_their_jacobian_are_those_of_the_expression() -> None:
     transcription = transcribe(load_problem(find("ball_throw")), backend="casadi")
     kernel = compile_program(rollout_program(transcription.rollout), seeded=("residuals",), threads=1)
     z = transcription.shooting.start(1)
-    r, _, _, expected = (np.array(part) for part in transcription.functions.jacobian(z, 0.0))
+    r, _, _, expected, _ = (np.array(part) for part in transcription.functions.jacobian(z, 0.0))
     assert kernel.forward(z, [0.0])["residuals"][0] == pytest.approx(r.ravel(), rel=1e-12, abs=1e-12)
     jacobian = kernel.jacobian(z, "residuals", [0.0])
     assert jacobian == pytest.approx(expected, rel=1e-9, abs=1e-11 * np.abs(expected).max())

@@ -36,7 +36,7 @@ def test_objective_is_the_sum_of_the_file_s_terms(pushed):
     path = np.trapezoid(x + t, t)
     place = 3 * ((x[-1] - 1) ** 2 + y[-1] ** 2)
     z = pushed.shooting.start(0)
-    merit, objective, errors = (np.array(part).ravel() for part in pushed.functions.value(z, 0.0))
+    merit, objective, errors, _ = (np.array(part).ravel() for part in pushed.functions.value(z, 0.0))
     assert objective[0] == pytest.approx(effort + path + place, rel=1e-12)
     over = np.maximum(vx[1:] - 1.5, 0)
     assert merit[0] == pytest.approx(objective[0] + 7 * 0.01 * (over**2).sum(), rel=1e-12)
@@ -67,8 +67,8 @@ def test_residuals_square_to_the_merit(tmp_path):
     squares = transcribe(load_problem(file), backend="casadi")
     shooting = squares.functions
     z = squares.shooting.start(0)
-    r, _, _, jacobian = (np.array(part) for part in shooting.jacobian(z, 0.0))
-    merit, _, _, slope = (np.array(part).ravel() for part in shooting.gradient(z, 0.0))
+    r, _, _, jacobian, _ = (np.array(part) for part in shooting.jacobian(z, 0.0))
+    merit, _, _, slope, _ = (np.array(part).ravel() for part in shooting.gradient(z, 0.0))
     assert (r**2).sum() == pytest.approx(merit[0], rel=1e-12)
     assert 2 * jacobian.T @ r.ravel() == pytest.approx(slope, rel=1e-9)
 

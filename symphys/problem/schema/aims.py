@@ -86,6 +86,15 @@ class ConstraintTable(Table):
     )
 
 
+class OutputTable(Table):
+    """A number that is told: while solvers work, in results and in reports. Nothing depends on it."""
+
+    name: Label
+    at: Instant = Field(default="end", description='"end" or a time [s]')
+    value: str = Field(description="formula of a number")
+    unit: Label | None = Field(default=None, description='such as "m/s"')
+
+
 class FallTable(Table):
     """When a motion is over before its time: from then on nothing moves, and running costs stop."""
 

@@ -11,6 +11,7 @@ from symphys.problem.schema.aims import (
     CostTable,
     FallTable,
     ObjectiveTable,
+    OutputTable,
     TargetTable,
     VariableTable,
 )
@@ -60,6 +61,7 @@ class Document(Table):
     cost: list[CostTable] = Field(default=[])
     target: list[TargetTable] = Field(default=[])
     constraint: list[ConstraintTable] = Field(default=[])
+    output: list[OutputTable] = Field(default=[])
     scenario: list[ScenarioTable] = Field(default=[])
     fall: FallTable | None = None
     objective: ObjectiveTable = ObjectiveTable()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ class Shared:
     Attributes:
         merit, objective: (B,).
         errors: (B, e).
+        outputs: (B, o).
         small: (B, s) gradient of each robot's merit with respect to what robots do not share; None if not asked for.
         weights: for each net (w,) the gradient of the sum of merits; None likewise.
     """
@@ -34,6 +35,7 @@ class Shared:
     merit: Array
     objective: Array
     errors: Array
+    outputs: Array
     small: Array | None = None
     weights: tuple[Array, ...] | None = None
 
@@ -62,14 +64,12 @@ class LargeEvaluator(WithoutResiduals):
         else:
             with ThreadPoolExecutor(count) as pool:
                 found = list(pool.map(lambda part: self._part(nets, part, smoothing, gradient), parts))
-        merit, objective, errors = (
-            np.concatenate([getattr(part, name) for part in found]) for name in ("merit", "objective", "errors")
-        )
+        common = Shared(*stacked(found))
         if not gradient:
-            return Shared(merit, objective, errors)
+            return common
         small = np.concatenate([part.small for part in found if part.small is not None])
         sums = zip(*(part.weights for part in found if part.weights is not None), strict=True)
-        return Shared(merit, objective, errors, small, tuple(np.sum(own, axis=0) for own in sums))
+        return replace(common, small=small, weights=tuple(np.sum(own, axis=0) for own in sums))
 
     def way(self, z: Array, smoothing: float) -> Way:
         """The motion of one decision vector."""
@@ -89,12 +89,14 @@ class LargeEvaluator(WithoutResiduals):
         if not gradient:
             return values
         small, weights = Backward(self.made, self.stage, nets, way, smoothing, self.made.aims.slopes).run()
-        return Shared(values.merit, values.objective, values.errors, small, tuple(weights))
+        return replace(values, small=small, weights=tuple(weights))
 
-    def _values(self, way: Way) -> tuple[Array, Array, Array]:
+    def _values(self, way: Way) -> tuple[Array, Array, Array, Array]:
         found = [self.made.aims.value.call(aim_arguments(self.made, way, b)) for b in range(len(way.z))]
-        merit, objective, errors = (np.array([np.array(row[i]).ravel() for row in found]) for i in range(3))
-        return merit[:, 0], objective[:, 0], errors
+        merit, objective, errors, outputs = (
+            np.array([np.array(row[i]).ravel() for row in found]) for i in (0, 1, 2, 4)
+        )
+        return merit[:, 0], objective[:, 0], errors, outputs
 
     def value(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
@@ -109,13 +111,19 @@ class LargeEvaluator(WithoutResiduals):
         for z in Z:
             weights = [own.at(z) for own in split_.weights]
             found.append(self.shared(weights, z[None, split_.small], smoothing, gradient))
-        merit, objective, errors = (
-            np.concatenate([getattr(each, name) for each in found]) for name in ("merit", "objective", "errors")
-        )
+        values = Values(*stacked(found))
         if not gradient:
-            return Values(merit, objective, errors)
+            return values
         slopes = []
         for each in found:
             assert each.small is not None and each.weights is not None
             slopes.append(split_.joined(each.small[0], each.weights))
-        return Values(merit, objective, errors, gradient=np.array(slopes).reshape(len(Z), split_.n))
+        return replace(values, gradient=np.array(slopes).reshape(len(Z), split_.n))
+
+
+def stacked(parts: Sequence[Shared]) -> tuple[Array, Array, Array, Array]:
+    """Merits, objectives, errors and outputs of all."""
+    merit, objective, errors, outputs = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("merit", "objective", "errors", "outputs")
+    )
+    return merit, objective, errors, outputs

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from symphys.errors import Issue, ProblemError
-from symphys.problem import Constraint, Controller, Cost, Problem, Target
+from symphys.problem import Constraint, Controller, Cost, Output, Problem, Target
 
 
 def refuse_large(problem: Problem, nets: Sequence[Controller], most: int, what: str) -> None:
@@ -30,7 +30,8 @@ def refuse_formulas(problem: Problem, names: Sequence[str]) -> None:
         raise ProblemError(problem.file, issues)
 
 
-def _aims(problem: Problem) -> Iterator[tuple[str, Cost | Target | Constraint]]:
+def _aims(problem: Problem) -> Iterator[tuple[str, Cost | Target | Constraint | Output]]:
     yield from (("cost", cost) for cost in problem.costs)
     yield from (("target", target) for target in problem.targets)
     yield from (("constraint", constraint) for constraint in problem.constraints)
+    yield from (("output", output) for output in problem.outputs)

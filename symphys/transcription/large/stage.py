@@ -67,7 +67,7 @@ class Stages:
 class Aims:
     """What a problem asks of a rollout as functions of (z, p, x and u at moments, series), and their slopes.
 
-    ``value`` gives merit, objective, errors and costs, ``slopes`` the derivatives of the merit; ``probe`` and
+    ``value`` gives merit, objective, errors, costs and outputs, ``slopes`` the derivatives of the merit; ``probe`` and
     ``probe_slopes`` are the same of what is differentiated to examine gradients.
     """
 
@@ -79,7 +79,7 @@ class Aims:
         merit = asked.objective + asked.penalties
         moments = [symbol for pair in self.stages.moments.values() for symbol in pair]
         self.arguments = [self.stages.z, self.stages.p, *moments, *self.stages.series.values()]
-        results = [ca.densify(part) for part in (merit, asked.objective, asked.errors, asked.costs)]
+        results = [ca.densify(part) for part in (merit, asked.objective, asked.errors, asked.costs, asked.outputs)]
         self.value = ca.Function("aims", self.arguments, results)
         self.slopes, number = self._slopes(merit), combined(asked.means)
         self.probe, self.probe_slopes = ca.Function("probe", self.arguments, [number]), self._slopes(number)

@@ -45,10 +45,10 @@ class LargeTranscription(Transcription):
     def judge(self, z: Array, smoothing: float = 0.0) -> Verdict:
         """See ``Transcription``."""
         way = self._plain.way(z, smoothing)
-        _, objective, errors, costs = (
+        _, objective, errors, costs, outputs = (
             np.array(part).ravel() for part in self.made.aims.value.call(aim_arguments(self.made, way, 0))
         )
-        return verdict(self.problem, float(objective[0]), costs, errors)
+        return verdict(self.problem, float(objective[0]), costs, errors, outputs)
 
     def record(self, z: Array, smoothing: float = 0.0) -> Record:
         """See ``Transcription``."""
@@ -107,6 +107,7 @@ def transcribe_large(
         constraint_upper=made.aims.terms.upper,
         smoothing=problem.simulation.smoothing,
         stop_when_met=problem.stop_when_met,
+        output_names=tuple(output.label for output in problem.outputs),
     )
     functions = ExpressionFunctions(made.rollout, made.aims.terms)
     return LargeTranscription(

@@ -1,0 +1,45 @@
+"""A toy whose situations differ: a wind that moves what is best."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from toys import toy
+
+from symphys.shooting import Array, Drawn, ShootingProblem, Values
+
+BEST = np.array([0.5, -0.25])
+
+
+class Winds:
+    """(z - BEST - wind)^2, with a wind that differs; those above ``storm`` end the motion, and spoil it ``badly``."""
+
+    def __init__(self, spread: float = 0.3, storm: float = np.inf, badly: float = 0.0) -> None:
+        self.grids, self.spread, self.storm, self.badly = ("", "fine"), spread, storm, badly
+        self.asked: list[int] = []
+
+    def draw(self, rng: np.random.Generator, count: int, width: float = 1.0, grid: int = 0) -> Drawn:
+        rows = width * self.spread * rng.uniform(-1, 1, (count, 2))
+        rows[0] = 0
+        return Drawn(grid, rows)
+
+    def value(self, Z: Array, drawn: Drawn, smoothing: float) -> Values:
+        off = Z - BEST - drawn.numbers
+        merit = (off**2).sum(axis=1)
+        over = np.abs(drawn.numbers).max(axis=1) > self.storm
+        merit = np.where(over, merit + self.badly, merit)
+        return Values(merit, merit, np.zeros((len(merit), 0)), alive=1.0 - over)
+
+    def gradient(self, Z: Array, drawn: Drawn, smoothing: float, forget: float = 0.0) -> Values:
+        self.asked.append(drawn.grid)
+        found = self.value(Z, drawn, smoothing)
+        slopes = 2 * (Z - BEST - drawn.numbers) + 0 * found.merit[:, None]
+        return replace(found, gradient=slopes)
+
+
+def windy(**settings: Any) -> ShootingProblem:
+    """The problem."""
+    return replace(toy(2, objective=lambda z, s: ca.sumsqr(z - BEST)), situations=Winds(**settings))
