@@ -125,11 +125,16 @@ LASTING = "share of the batch that lasts"
 
 
 class Descent(ABC, Generic[OptionsT]):
-    """The iterations of one stage."""
+    """The iterations of one stage.
+
+    Attributes:
+        scale: (n,) of the problem; 0 for what is held by equal bounds, so that it is no part of any gradient.
+    """
 
     def __init__(self, meter: Meter, situations: Situations, options: OptionsT, seed: int, log: Log | None) -> None:
         """Draw the situations for validation."""
         self.meter, self.situations, self.options, self.seed, self.log = meter, situations, options, seed, log
+        self.scale = np.where(meter.lower < meter.upper, meter.scale, 0.0)
         batch = Batch(options.validation, options.validation_width, seed)
         self.validation = Validation(meter, situations, batch, log)
 
@@ -154,7 +159,7 @@ class Descent(ABC, Generic[OptionsT]):
             grid = self.situations.grids[drawn.grid]
             self.log(f"{k}{f' {grid}' if grid else ''}: objective {found.point.objective:.5g}, {found.words}")
         direction, memory = adam(found.gradient, state.memory, options.rate_at(k), Habits(0.0, options.betas))
-        z = self.meter.clip(state.z + self.meter.scale * direction)
+        z = self.meter.clip(state.z + self.scale * direction)
         spoilt = self.validation.keep(z, state.spoilt) if options.validates(k + 1) else state.spoilt
         following = State(k + 1, z, memory, spoilt)
         self.meter.commit(found.point, following, found.typical, float(np.linalg.norm(z - state.z)), found.told)

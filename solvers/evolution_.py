@@ -65,7 +65,7 @@ class ByValues(Descent[EvolutionOptions]):
         """See ``Descent``."""
         options, meter = self.options, self.meter
         stream = np.random.default_rng([self.seed, NOISE, state.iteration])
-        step = options.sigma * meter.scale
+        step = options.sigma * self.scale
         found = evolution(self.situations, state.z, step, drawn, meter.smoothing, stream)
         meter.counts.rollouts += 2 * options.samples
         if not found.pairs:

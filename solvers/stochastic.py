@@ -39,6 +39,8 @@ class StochasticOptions(DescentOptions):
         clip: largest norm of each situation's scaled gradient; inf: none.
         forget: [1/s] how fast adjoints fade on their way back; 0: not at all.
         fallen: weight of a motion that was over before its time.
+        horizons: [s] shorter motions that gradients begin with, one after the other.
+        growth: share of the iterations that these take together.
         evolution: share of the direction that comes from values alone.
         sigma: its spread, in units of scale.
     """
@@ -48,6 +50,8 @@ class StochasticOptions(DescentOptions):
     clip: float = 1.0
     forget: float = 2.0
     fallen: float = 5.0
+    horizons: tuple[float, ...] = ()
+    growth: float = 0.5
     evolution: float = 0.0
     sigma: float = 0.03
 
@@ -58,7 +62,14 @@ class StochasticOptions(DescentOptions):
         require(self.clip > 0, "clip", "above 0")
         require(self.fallen > 0, "fallen", "above 0")
         require(0 < self.sigma < math.inf, "sigma", "above 0")
-        require(0 <= self.evolution <= 1, "evolution", "in [0, 1]")
+        require(all(horizon > 0 for horizon in self.horizons), "horizons", "above 0")
+        for name, share in {"evolution": self.evolution, "growth": self.growth}.items():
+            require(0 <= share <= 1, name, "in [0, 1]")
+
+    def horizon(self, iteration: int) -> float:
+        """[s] over which the motions of an iteration are computed."""
+        reached = int(len(self.horizons) * iteration / max(self.growth * self.iterations, 1))
+        return self.horizons[reached] if reached < len(self.horizons) else math.inf
 
 
 def solve(
@@ -80,8 +91,8 @@ class Pathwise(Descent[StochasticOptions]):
 
     def way(self, state: State, drawn: Drawn) -> Found:
         """See ``Descent``."""
-        values = self.gradients(state.z, drawn)
-        found = average(values, self.meter.scale, self.options.clip, self.options.fallen)
+        values = self.gradients(state, drawn)
+        found = average(values, self.scale, self.options.clip, self.options.fallen)
         if found.left_out == len(values.merit):
             raise Stop(Status.NOT_FINITE, NOT_FINITE)
         point = first(self.meter, state.z, values, found.merit, found.objective)
@@ -92,10 +103,12 @@ class Pathwise(Descent[StochasticOptions]):
         told = {LASTING: found.alive, "agreement of its gradients": found.agreement}
         return Found(point, self.mixed(state, drawn, found), found.typical, words, told)
 
-    def gradients(self, z: Array, drawn: Drawn) -> Values:
+    def gradients(self, state: State, drawn: Drawn) -> Values:
         """In each situation of the batch."""
-        self.meter.counts.gradients += self.options.samples
-        return self.situations.gradient(z[None], drawn, self.meter.smoothing, self.options.forget)
+        options, meter = self.options, self.meter
+        meter.counts.gradients += options.samples
+        horizon = options.horizon(state.iteration)
+        return self.situations.gradient(state.z[None], drawn, meter.smoothing, options.forget, horizon)
 
     def mixed(self, state: State, drawn: Drawn, found: Average) -> Array:
         """The gradient that the step is made of."""
@@ -103,7 +116,7 @@ class Pathwise(Descent[StochasticOptions]):
         if not options.evolution:
             return found.gradient
         stream = np.random.default_rng([self.seed, NOISE, state.iteration])
-        step = options.sigma * meter.scale
+        step = options.sigma * self.scale
         evolved = evolution(self.situations, state.z, step, drawn, meter.smoothing, stream)
         meter.counts.rollouts += 2 * options.samples
         return together(found.gradient, evolved.gradient, options.evolution)

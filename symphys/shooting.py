@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -134,11 +135,14 @@ class Situations(Protocol):
         """Z (batch, n), or (1, n) for all: merits, objectives, errors, alive."""
         ...
 
-    def gradient(self, Z: Array, drawn: Drawn, smoothing: float, forget: float = 0.0) -> Values:
+    def gradient(
+        self, Z: Array, drawn: Drawn, smoothing: float, forget: float = 0.0, horizon: float = math.inf
+    ) -> Values:
         """These and the gradients of the merits.
 
         With ``forget`` [1/s] above 0 the adjoint of the state falls like exp(-forget t) on its way back, and ends where
-        a motion was over: no derivative, but what descends where derivatives explode.
+        a motion was over: no derivative, but what descends where derivatives explode. After ``horizon`` [s] nothing
+        moves, and what is summed over time is 0: what is computed takes so much less time.
         """
         ...
 

@@ -20,6 +20,7 @@ class Winds:
     def __init__(self, spread: float = 0.3, storm: float = np.inf, badly: float = 0.0) -> None:
         self.grids, self.spread, self.storm, self.badly = ("", "fine"), spread, storm, badly
         self.asked: list[int] = []
+        self.horizons: list[float] = []
 
     def draw(self, rng: np.random.Generator, count: int, width: float = 1.0, grid: int = 0) -> Drawn:
         rows = width * self.spread * rng.uniform(-1, 1, (count, 2))
@@ -33,8 +34,11 @@ class Winds:
         merit = np.where(over, merit + self.badly, merit)
         return Values(merit, merit, np.zeros((len(merit), 0)), alive=1.0 - over)
 
-    def gradient(self, Z: Array, drawn: Drawn, smoothing: float, forget: float = 0.0) -> Values:
+    def gradient(
+        self, Z: Array, drawn: Drawn, smoothing: float, forget: float = 0.0, horizon: float = np.inf
+    ) -> Values:
         self.asked.append(drawn.grid)
+        self.horizons.append(horizon)
         found = self.value(Z, drawn, smoothing)
         slopes = 2 * (Z - BEST - drawn.numbers) + 0 * found.merit[:, None]
         return replace(found, gradient=slopes)

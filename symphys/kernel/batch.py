@@ -23,7 +23,7 @@ class Batch:
         """Check name -> (values, words in a row); ProgramError says which shape was wanted."""
         self._inputs: dict[str, Array] = {}
         self._results: dict[str, Array] = {}
-        self._place, self._count, self.loss = Place(0, 0), 0, 0.0
+        self._place, self._count, self.loss, self.spared = Place(0, 0), 0, 0.0, 0
         for name, (values, size) in inputs.items():
             array = np.ascontiguousarray(values, dtype=np.float64)
             if array.ndim not in (1, 2) or array.shape[-1] != size:
@@ -68,5 +68,5 @@ class Batch:
             setattr(data, name, array.ctypes.data + start * array[:1].nbytes)
         place = self._place
         data.offset, data.size, data.stride, data.count = place.offset, place.size, place.stride, self._count
-        data.loss = self.loss
+        data.loss, data.spared = self.loss, self.spared
         return data

@@ -11,6 +11,7 @@ typedef struct {
   table prologue, body, epilogue;                        /* forward */
   table again, back_body, back_prologue, back_epilogue;  /* backward */
   word fading[3], kept[2];                               /* (offset, size, stride), (offset, stride) */
+  struct { word count; const word *places; } written;    /* by each step: (offset, size, stride) */
 } program;
 typedef struct { const double *rows; word stride; } source; /* stride 0: one row for all lanes */
 typedef struct {
@@ -19,6 +20,7 @@ typedef struct {
   double *outputs, *gradient, *trajectory;
   word offset, size, stride, count; /* of the trajectory */
   double loss;                      /* of the adjoint of what fades, in each step back */
+  word spared;                      /* steps at the end, in which nothing moves */
 } batch;
 
 static void run(const table *calls, V *m, V *b, word k) {
@@ -59,9 +61,25 @@ static void fill(const program *p, const batch *x, V *m, word row, word rows) {
   gather(m, &p->knob, &x->knob, row, rows, 0);
 }
 
-static void roll(const program *p, V *m) {
+/* What the steps from here on would write is 0, but the state, which stays. */
+static void rest(const program *p, word steps, V *m) {
+  const word *t = p->written.places, *x = p->fading;
+  for (word i = 0; i < p->written.count; i++, t += 3)
+    for (word k = steps; k < p->steps; k++) memset(m + t[0] + k * t[2], 0, sizeof(V) * t[1]);
+  for (word k = steps + 1; k <= p->steps; k++)
+    memcpy(m + x[0] + k * x[2], m + x[0] + steps * x[2], sizeof(V) * x[1]);
+}
+
+static void rested(const program *p, word steps, V *b) {
+  const word *x = p->fading;
+  for (word k = steps + 1; k <= p->steps; k++)
+    for (word w = 0; w < x[1]; w++) b[x[0] + steps * x[2] + w] += b[x[0] + k * x[2] + w];
+}
+
+static void roll(const program *p, word steps, V *m) {
   run(&p->prologue, m, 0, 0);
-  for (word k = 0; k < p->steps; k++) run(&p->body, m, 0, k);
+  for (word k = 0; k < steps; k++) run(&p->body, m, 0, k);
+  if (steps < p->steps) rest(p, steps, m);
   run(&p->epilogue, m, 0, 0);
 }
 
@@ -74,9 +92,10 @@ static void fade(const program *p, double loss, const V *m, V *b, word k) {
 }
 
 /* States are in the memory; the scratch of a step, and the tape for its adjoints, are computed again. */
-static void pull(const program *p, double loss, V *m, V *b) {
+static void pull(const program *p, word steps, double loss, V *m, V *b) {
   run(&p->back_epilogue, m, b, 0);
-  for (word k = p->steps - 1; k >= 0; k--) {
+  if (steps < p->steps) rested(p, steps, b);
+  for (word k = steps - 1; k >= 0; k--) {
     run(&p->again, m, 0, k);
     run(&p->back_body, m, b, k);
     if (loss > 0) fade(p, loss, m, b, k);
@@ -97,13 +116,13 @@ API void evaluate(const program *p, const batch *x, V *m) {
   for (word row = 0; row < x->rows; row += LANES) {
     word rows = x->rows - row < LANES ? x->rows - row : LANES;
     fill(p, x, m, row, rows);
-    roll(p, m);
+    roll(p, p->steps - x->spared, m);
     if (x->outputs) scatter(x->outputs, m, &p->outputs, total(&p->outputs), row, rows);
     if (x->trajectory) record(x, m, row, rows);
     if (!x->gradient) continue;
     memset(b, 0, sizeof(V) * p->size);
     gather(b, &p->seeded, &x->seed, row, rows, 1);
-    pull(p, x->loss, m, b);
+    pull(p, p->steps - x->spared, x->loss, m, b);
     scatter(x->gradient, b, &p->z, total(&p->z), row, rows);
   }
 }

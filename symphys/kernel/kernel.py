@@ -47,7 +47,9 @@ class Kernel:
         self._run(batch)
         return self._named(outputs)
 
-    def gradient(self, Z: ArrayLike, seed: ArrayLike, knob: ArrayLike = (), loss: float = 0.0) -> tuple[Outputs, Array]:
+    def gradient(
+        self, Z: ArrayLike, seed: ArrayLike, knob: ArrayLike = (), loss: float = 0.0, spared: int = 0
+    ) -> tuple[Outputs, Array]:
         """Outputs, and (batch, n): the derivative of seed . outputs with respect to z, row by row.
 
         Args:
@@ -56,9 +58,13 @@ class Kernel:
             knob: (batch, p) or one (p,) for all.
             loss: the share of its adjoint that ``program.fading.state`` loses in each step back; above 0, adjoints also
                 end where ``kept`` is 0. What comes out is no derivative then.
+            spared: steps at the end that are not computed: ``program.fading.state`` stays as it is, and what else these
+                steps would write is 0.
         """
+        if spared and (self.program.fading is None or not 0 <= spared <= self.program.steps):
+            raise ProgramError(f"{spared} of {self.program.steps} steps cannot be spared, or no state is told")
         batch = self._batch(Z, knob, seed)
-        batch.loss = loss
+        batch.loss, batch.spared = loss, spared
         outputs, gradient = batch.outputs(self._width()), batch.gradient(self.program.z.size)
         self._run(batch)
         return self._named(outputs), gradient

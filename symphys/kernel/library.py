@@ -43,6 +43,7 @@ class ProgramData(ctypes.Structure):
         *((name, List) for name in TABLES),
         ("fading", WORD * 3),
         ("kept", WORD * 2),
+        ("written", List),
     )
 
 
@@ -55,6 +56,7 @@ class BatchData(ctypes.Structure):
         *((name, ctypes.c_void_p) for name in ("outputs", "gradient", "trajectory")),
         *((name, WORD) for name in ("offset", "size", "stride", "count")),
         ("loss", ctypes.c_double),
+        ("spared", WORD),
     )
 
 
@@ -82,6 +84,8 @@ class Loaded:
             setattr(self.data, name, self._list(len(listed), _ranges(listed)))
         for name in TABLES:
             setattr(self.data, name, self._list(*plan.tables[name]))
+        written = [place for call in program.body for place in call.outputs if place.stride]
+        self.data.written = self._list(len(written), _strided(written))
         if program.fading is not None:
             state, kept = program.fading.state, program.fading.kept
             self.data.fading = (WORD * 3)(state.offset, state.size, state.stride)
@@ -112,6 +116,10 @@ class Loaded:
 def _prepared(function: Any, *types: Any) -> Any:
     function.argtypes, function.restype = types, None
     return function
+
+
+def _strided(places: Sequence[Place]) -> Any:
+    return np.array([x for place in places for x in (place.offset, place.size, place.stride)] or [0], dtype=np.int64)
 
 
 def _ranges(places: Sequence[Place]) -> Any:

@@ -27,12 +27,12 @@ def fading(cache: Cache) -> Any:
 
 
 def swept(torque: Any, loss: float, kept: Any) -> Any:
-    """(STEPS,) the gradient of the merit by a sweep of its own."""
+    """The gradient of the merit by a sweep of its own, for each of the torques."""
     x = np.array([[1.0, 0.0]])
     for u in torque:
         x = np.vstack([x, x[-1] + 0.05 * np.array([x[-1][1], u - GRAVITY * np.sin(x[-1][0])])])
-    adjoint, gradient = 20 * x[-1], np.empty(STEPS)
-    for k in reversed(range(STEPS)):
+    adjoint, gradient = 20 * x[-1], np.empty(len(torque))
+    for k in reversed(range(len(torque))):
         gradient[k] = 0.05 * adjoint[1] + 0.02 * torque[k]
         step = np.array([[1, 0.05], [-0.05 * GRAVITY * np.cos(x[k][0]), 1]])
         running = np.array([2 * x[k][0] * (x[k][0] ** 2 > 0.1), 0])
@@ -57,6 +57,25 @@ def test_each_step_loses_its_share(fading: Any) -> None:
         assert gradient == pytest.approx(swept(torque, LOSS, torque), rel=1e-12, abs=1e-14)
     assert found[3, :9] == pytest.approx(swept(torques[3], LOSS, torques[3])[:9], abs=1e-14)
     assert np.abs(found[3] - found[0]).max() > 0.01
+
+
+@pytest.mark.parametrize("spared", [1, 7, STEPS])
+def test_steps_that_are_spared(fading: Any, spared: int) -> None:
+    """As a shorter rollout whose state is its last: also after a whole one in the same memory."""
+    torques = np.linspace(-1, 1, 9)[:, None] * np.ones(STEPS)
+    whole = fading.gradient(torques, [1, 0, 0], [GRAVITY])
+    outputs, found = fading.gradient(torques, [1, 0, 0], [GRAVITY], spared=spared)
+    for torque, gradient in zip(torques, found, strict=True):
+        short = swept(torque[: STEPS - spared], 0, np.ones(STEPS))
+        assert gradient[: STEPS - spared] == pytest.approx(short, rel=1e-12, abs=1e-14)
+    again = fading.gradient(torques, [1, 0, 0], [GRAVITY])
+    assert np.array_equal(again[1], whole[1])
+    assert not np.array_equal(outputs["merit"], whole[0]["merit"])
+
+
+def test_more_steps_than_there_are_cannot_be_spared(fading: Any) -> None:
+    with pytest.raises(ProgramError, match="cannot be spared"):
+        fading.gradient(np.zeros(STEPS), [1, 0, 0], [GRAVITY], spared=STEPS + 1)
 
 
 def test_what_fades_must_last() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -37,6 +38,14 @@ def test_discretisations_take_turns() -> None:
     SOLVE(problem, np.zeros(2), options(iterations=4))
     assert isinstance(problem.situations, Winds)
     assert problem.situations.asked == [0, 1, 0, 1]
+
+
+def test_horizons_grow() -> None:
+    """Over the first share of the iterations, evenly."""
+    problem = windy()
+    SOLVE(problem, np.zeros(2), options(iterations=8, horizons=(1.0, 2.0), growth=0.5))
+    assert isinstance(problem.situations, Winds)
+    assert problem.situations.horizons == [1, 1, 2, 2, np.inf, np.inf, np.inf, np.inf]
 
 
 def test_validation_keeps_the_best_point() -> None:
@@ -116,8 +125,20 @@ def test_ranks() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("rate", 0.0), ("clip", 0.0), ("samples", 0), ("evolution", 1.5), ("betas", (1.0, 0.5))]
+    ("name", "value"),
+    [("rate", 0.0), ("clip", 0.0), ("samples", 0), ("evolution", 1.5), ("betas", (1.0, 0.5)), ("horizons", (0.0,))],
 )
 def test_options_that_cannot_be(name: str, value: Any) -> None:
     with pytest.raises(ValueError, match=name):
         StochasticOptions(**{name: value})
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_what_is_held_by_equal_bounds_is_no_part_of_the_gradient(share: float) -> None:
+    """However steep the merit is along it."""
+    problem = windy()
+    (block,) = problem.blocks
+    held = replace(block, lower=np.array([-np.inf, 2.0]), upper=np.array([np.inf, 2.0]), scale=np.array([1, 1e6]))
+    found = SOLVE(replace(problem, blocks=(held,)), np.array([3.0, 2.0]), options(evolution=share))
+    assert found.z == pytest.approx([BEST[0], 2.0], abs=0.1)
+    assert all(row.gradient_norm < 10 for row in found.trace)

@@ -238,3 +238,17 @@ def test_without_kernels_there_are_none(problem: Problem) -> None:
     assert made.shooting.situations is None
     assert "no evaluation in other situations" in made.backend.note
     assert np.isfinite(made.shooting.evaluator.value(np.zeros((1, 2)), 0.0).merit).all()
+
+
+def test_a_shorter_horizon_is_a_shorter_motion(walker: Transcription, tmp_path: Path) -> None:
+    """The gradient is that of a file with less duration, in which both knots act together."""
+    situations = walker.shooting.situations
+    assert situations is not None
+    z, simulation = np.array([[0.3, 0.3]]), walker.problem.simulation
+    shorter = transcribe(replace(walker.problem, simulation=replace(simulation, duration=simulation.duration / 2)))
+    assert shorter.shooting.situations is not None
+    nominal = [each.draw(np.random.default_rng(0), 1) for each in (situations, shorter.shooting.situations)]
+    short = situations.gradient(z, nominal[0], 0.0, horizon=simulation.duration / 2)
+    alone = shorter.shooting.situations.gradient(z, nominal[1], 0.0)
+    assert short.gradient is not None and alone.gradient is not None
+    assert short.gradient[0] == pytest.approx([alone.gradient.sum(), 0], rel=1e-9)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import exp
+from math import exp, inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,10 +39,12 @@ class KernelSituations:
         outputs = kernel.forward(joined(Z, drawn), [smoothing])
         return replace(values(outputs), probe=probed(kernel, outputs))
 
-    def gradient(self, Z: Array, drawn: Drawn, smoothing: float, forget: float = 0.0) -> Values:
+    def gradient(self, Z: Array, drawn: Drawn, smoothing: float, forget: float = 0.0, horizon: float = inf) -> Values:
         """See ``Situations``."""
-        loss = 1 - exp(-forget * self.samplers[drawn.grid].problem.simulation.dt)
-        outputs, slopes = self.kernels[drawn.grid].gradient(joined(Z, drawn), [1.0], [smoothing], loss)
+        simulation = self.samplers[drawn.grid].problem.simulation
+        loss = 1 - exp(-forget * simulation.dt)
+        spared = max(0, simulation.steps - round(min(horizon, simulation.duration) / simulation.dt))
+        outputs, slopes = self.kernels[drawn.grid].gradient(joined(Z, drawn), [1.0], [smoothing], loss, spared)
         return values(outputs, np.ascontiguousarray(slopes[:, : Z.shape[1]]))
 
 
