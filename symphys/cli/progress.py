@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from time import monotonic
 from typing import TYPE_CHECKING
 
 import click
@@ -54,18 +55,22 @@ class Notes:
 
 
 class Plain:
-    """One line when a run begins and one when it ends; nothing is redrawn."""
+    """One line when a run begins, one when it ends, and some while it goes on; nothing is redrawn."""
 
-    def __init__(self) -> None:
-        """Nothing is told."""
+    def __init__(self, every: float = 30.0) -> None:
+        """Nothing is told; ``every``: seconds between lines while a run goes on."""
         self.notes = Notes()
+        self.every, self.last = every, monotonic()
 
     def started(self, job: Job, resumed: bool) -> None:
         """Say so."""
         click.echo(f"{job.name}: {'goes on' if resumed else 'begins'}", err=True)
 
     def advanced(self, job: Job, row: TraceRow) -> None:
-        """Say nothing."""
+        """Say where it is, now and then."""
+        if monotonic() - self.last >= self.every:
+            self.last = monotonic()
+            click.echo(f"{job.name}: {at(row)}", err=True)
 
     def ended(self, job: Job, result: Result, skipped: bool) -> None:
         """Say how."""

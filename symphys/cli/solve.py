@@ -55,6 +55,12 @@ MOST_JOBS = 256
     help="Solve the seeds of gradient and least_squares side by side, their evaluations in batches. Sooner done, but "
     "the seconds of each run are those of all.",
 )
+@click.option(
+    "--unexamined",
+    is_flag=True,
+    help="Leave out how far solutions can be trusted, which for long motions takes as long as solving them; "
+    "`symphys check --at RUN_FOLDER` tells later.",
+)
 @backend_option
 @out_option
 def solve(
@@ -64,6 +70,7 @@ def solve(
     assignments: tuple[str, ...],
     jobs: int,
     together: bool,
+    unexamined: bool,
     backend: str,
     out: Path,
 ) -> int:
@@ -81,7 +88,7 @@ def solve(
     solvers = read_solvers(names)
     problems = read_problems(sources, settings)
     command = shlex.join(["symphys", *sys.argv[1:]])
-    asked = make_jobs(problems, solvers, range(seeds), settings, out, command, read_backend(backend))
+    asked = make_jobs(problems, solvers, range(seeds), settings, out, command, read_backend(backend), not unexamined)
     for problem in problems:
         if note := many_pairs(problem.name, len(problem.world().pairs)):
             click.echo(note, err=True)

@@ -2,6 +2,7 @@
 
 from symphys.problem.fall import ALIVE, Fall
 from symphys.problem.feedback import Controller, Sensor
+from symphys.problem.follow import follow
 from symphys.problem.json_schema import json_schema
 from symphys.problem.load import load_problem
 from symphys.problem.model import Constraint, Cost, Output, Problem, Simulation, Slot, Target, Variable
@@ -26,6 +27,7 @@ __all__ = [
     "Target",
     "Variable",
     "Varied",
+    "follow",
     "json_schema",
     "load_problem",
     "require_solvable",

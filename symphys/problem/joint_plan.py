@@ -49,10 +49,16 @@ class JointPlan:
             return None
         return PairPlan(f"{self.second}-{self.first}", frozenset((self.first, self.second)), False, {})
 
+    @property
+    def anchor(self) -> str:
+        """The parameter that says where the joint is on its second side, (3,) [m]: body frame, or the world's."""
+        return f"{self.name}.anchor"
+
     def parameters(self) -> dict[str, Numbers]:
-        """Parameter names and values: those of motor and spring."""
+        """Parameter names and values: those of motor and spring, and the anchor."""
         parts = [part for part in (self.motor, self.spring) if part is not None]
-        return {f"{self.name}.{field.name}": getattr(part, field.name) for part in parts for field in fields(part)}
+        found = {f"{self.name}.{field.name}": getattr(part, field.name) for part in parts for field in fields(part)}
+        return found | {self.anchor: self.sockets[1].point}
 
     def joint(self, places: Mapping[str, int], value: Value) -> Joint:
         """The joint with its parameters' values; ``places`` has the indices of bodies."""
@@ -61,7 +67,7 @@ class JointPlan:
             kind=self.kind,
             first=places[self.first],
             second=None if self.second is None else places[self.second],
-            sockets=self.sockets,
+            sockets=(self.sockets[0], replace(self.sockets[1], point=value(self.anchor))),
             motor=None if self.motor is None else self._valued(self.motor, value),
             limits=self.limits,
             spring=None if self.spring is None else self._valued(self.spring, value),

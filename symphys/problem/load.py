@@ -19,6 +19,7 @@ from symphys.problem.crowd import check_crowd
 from symphys.problem.fall import ALIVE, Fall, costs_of_falling, read_fall
 from symphys.problem.faults import Faults, Place
 from symphys.problem.feedback import Controller, Sensor
+from symphys.problem.follow import check_anchors
 from symphys.problem.include import with_included
 from symphys.problem.joints import read_joints
 from symphys.problem.meetings import Meetings
@@ -134,9 +135,10 @@ def build(
     known |= weight_quantities(controllers)
     variables = read_variables(document.variable, known, simulation, faults)
     check_varied(plan, variables, faults)
+    check_anchors(plan, variables, faults)
     scenarios = read_scenarios(document.scenario, known, plan, simulation, variables, faults)
     faults.stop_if_any()
-    fall, aims = read_asked(document, simulation, plan, at_guess(known, variables), variables, faults)
+    fall, aims = read_asked(document, simulation, plan, at_guess(plan, known, variables), variables, faults)
     return Problem(
         name=path.stem,
         title=document.title or path.stem,
@@ -168,7 +170,7 @@ def read_control(
     faults: Faults,
 ) -> tuple[tuple[Sensor, ...], tuple[Controller, ...]]:
     """Sensors and controllers without fault."""
-    sensors = read_sensors(document.sensor, sensor_names(plan, at_guess(known, ())), faults)
+    sensors = read_sensors(document.sensor, sensor_names(plan, at_guess(plan, known, ())), faults)
     faults.stop_if_any()
     controllers = read_controllers(document.controller, sensors, known, functions, faults)
     faults.stop_if_any()

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.problem.faults import Faults
+from symphys.problem.follow import follow
 from symphys.problem.joint_plan import WORLD
 from symphys.problem.model import Variable
 from symphys.problem.plan import WorldPlan
@@ -24,7 +25,7 @@ OVERLAP = 1e-3
 """Deepest overlap at the start [m]; more would be pushed out in the first steps, which nobody means."""
 
 
-def at_guess(known: Mapping[str, Quantity], variables: Sequence[Variable]) -> dict[str, Array]:
+def at_guess(plan: WorldPlan, known: Mapping[str, Quantity], variables: Sequence[Variable]) -> dict[str, Array]:
     """Every quantity's value at t = 0, with the first knot of every guess put in."""
     values = {name: quantity.nominal.copy() for name, quantity in known.items()}
     for variable in variables:
@@ -33,7 +34,14 @@ def at_guess(known: Mapping[str, Quantity], variables: Sequence[Variable]) -> di
     for name, value in values.items():
         if name.endswith(".orientation"):
             values[name] = value / max(float(np.linalg.norm(value)), 1e-12)
-    return values
+    anchors = {name: ca.DM(values[name]) for name in varied(variables) if name.endswith(".anchor")}
+    moved = follow(plan, anchors, {name: ca.DM(values[name]) for name, q in known.items() if q.kind == "initial"})
+    return values | {name: np.array(value).ravel() for name, value in moved.items()}
+
+
+def varied(variables: Sequence[Variable]) -> list[str]:
+    """The quantities that variables set."""
+    return [slot.name for variable in variables for slot in variable.slots]
 
 
 def formula_names(plan: WorldPlan, values: Mapping[str, Array], variables: Sequence[Variable]) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from symphys.report.trust import advice, answers, findings, slopes
 from symphys.report.trust_physics import sliding
 from symphys.report.words import show
 
-NOT_EXAMINED = "This run was not examined."
+NOT_EXAMINED = "This run was not examined; “symphys check --at” its folder tells how far to trust it."
 TITLE = "How far to trust this"
 HOW_GROWN = (
     "By how much a small change of the state at time t is magnified until the end: distances in m, velocities in m/s, "

@@ -25,6 +25,7 @@ class Job:
         options: of the solver, validated.
         folder: where the run is written.
         command: what was typed.
+        examine: whether the solution is examined.
     """
 
     problem: Problem
@@ -32,6 +33,7 @@ class Job:
     options: Any
     folder: RunFolder
     command: str
+    examine: bool = True
 
     @property
     def name(self) -> str:
@@ -52,6 +54,7 @@ def make_jobs(
     out: Path,
     command: str = "",
     backend: str = BEST,
+    examine: bool = True,
 ) -> list[Job]:
     """Every problem with every solver and seed, below the folder ``out``.
 
@@ -69,7 +72,8 @@ def make_jobs(
             plain = dataclasses.asdict(options)
             for seed in seeds:
                 config = make_config(problem.name, problem.identity, name, seed, settings, plain, backend)
-                jobs.append(Job(problem, config, options, RunFolder.of(out, problem.name, name, seed), command))
+                folder = RunFolder.of(out, problem.name, name, seed)
+                jobs.append(Job(problem, config, options, folder, command, examine))
     return jobs
 
 

@@ -36,7 +36,7 @@ class Judgement:
     Attributes:
         verdict: costs and checks.
         trajectory: the motion.
-        trust: how far the solution can be trusted; None also for a run that is not over.
+        trust: how far the solution can be trusted; None also for a run that is not over, or not to be examined.
         advice: the solver's and what the rollout adds.
     """
 
@@ -69,7 +69,7 @@ def solve(
         log("solved side by side with other seeds: the seconds are those of all")
         outcome, spent = solved, solved.trace[-1].seconds if solved.trace else 0.0
     spent += ((earlier and earlier.seconds) or {}).get("solve", 0.0)
-    judgement = judge(transcription, outcome)
+    judgement = judge(transcription, outcome, job.examine)
     price = transcription.prices(used(outcome.counts))
     write(job, transcription, outcome, judgement, price)
     seconds = {"build": transcription.build_seconds, "compile": transcription.backend.seconds, "solve": spent}
@@ -94,13 +94,13 @@ def alone(
     return outcome, time.perf_counter() - began
 
 
-def judge(transcription: Transcription, outcome: Outcome) -> Judgement:
-    """Roll the solution out exactly."""
+def judge(transcription: Transcription, outcome: Outcome, examine: bool = True) -> Judgement:
+    """Roll the solution out exactly, and examine it."""
     try:
         verdict = transcription.judge(outcome.z)
         trajectory = transcription.simulate(outcome.z)
         over = outcome.status is not Status.INTERRUPTED
-        examined = trust.examine(transcription, outcome.z) if over else None
+        examined = trust.examine(transcription, outcome.z) if over and examine else None
     except SymphysError as error:
         return Judgement(None, None, None, f"{outcome.advice} {error}".strip())
     smoothed = outcome.status is Status.MET and not verdict.solved and outcome.trace[-1].smoothing > 0

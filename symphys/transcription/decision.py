@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from symphys.problem import Problem, Variable
+from symphys.problem import Problem, Variable, follow
 from symphys.shooting import Block
 from symphys.state import initial_state, input_columns, inputs_size
 from symphys.transcription.names import Parameters, spans
@@ -55,6 +55,8 @@ def start_of(problem: Problem, world: World, inputs: Sequence[str], parameters: 
             values[slot.name] = _replace(values[slot.name], slot.components, part)
     varied = {slot.name for variable in problem.variables for slot in variable.slots}
     initial |= {name: _unit(initial[name]) for name in varied if name.endswith(".orientation")}
+    anchors = {name: physical[name] for name in sorted(varied & physical.keys()) if name.endswith(".anchor")}
+    initial = follow(problem.plan, anchors, initial)
     return Start(initial_state(world, initial), u, ca.vertcat(ca.MX(0, 1), *physical.values()))
 
 

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from symphys.cli.arguments import UsageFault, read_settings, read_value
-from symphys.cli.progress import Live, at
+from symphys.cli.progress import Live, Plain, at
 from symphys.cli.summary import advice, table
 from symphys.cli.wording import brief, duration, many_pairs, number, whole
 from symphys.runs import Result
@@ -112,3 +112,13 @@ def test_a_world_with_many_pairs_says_what_it_costs_and_what_to_do() -> None:
 def test_what_is_told_is_shown_while_it_works() -> None:
     row = TraceRow(3, 4, 4, 0, 0, 0.1, 2.0, 1.0, 0.5, NAN, NAN, 0.0, {"speed [m/s]": 1.25, "lasting": 0.875})
     assert at(row) == "iteration 3, objective 1, worst 0.5, speed 1.25 m/s, lasting 0.875"
+
+
+@pytest.mark.parametrize(("every", "lines"), [(0.0, 3), (1000.0, 0)])
+def test_without_a_terminal_a_long_run_says_now_and_then_where_it_is(
+    every: float, lines: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plain = Plain(every)
+    for k in range(3):
+        plain.advanced(Job(), TraceRow(k, 4, 4, 0, 0, 0.1, 2.0, 1.0, 0.5, NAN, NAN, 0.0))  # type: ignore[arg-type]
+    assert capsys.readouterr().err.count("throw cma seed 0: iteration") == lines

@@ -20,6 +20,8 @@ SHIPPED = [
     "basket",
     "bowling",
     "cart_pole",
+    "gait_robot_build",
+    "gait_robot_fast",
     "gait_robot_trot",
     "hopper_jump",
     "juggle",

@@ -70,6 +70,11 @@ def test_what_a_problem_tells_is_in_the_result_and_along_the_trace(problem_file:
     assert (column[0], column[-1]) == (pytest.approx(0.2), pytest.approx(0.5, abs=0.01))
 
 
+def test_a_run_need_not_be_examined(make_job: MakeJob) -> None:
+    result = run(replace(make_job(), examine=False))
+    assert result.solved and result.trust is None
+
+
 def test_the_result_is_that_of_the_exact_rollout(make_job: MakeJob) -> None:
     result = run(make_job())
     assert result.solved and result.status == "met"

@@ -1,0 +1,64 @@
+"""What each option of the solver ``stochastic`` does for a walk: one thing changed at a time, two seeds each.
+
+    python benchmarks/lessons.py [ITERATIONS [SEEDS]]
+
+Shorter lessons than the shipped problem's, so that differences show. Then 500 situations that were not seen.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from math import inf
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from walking import SEED, UNSEEN, Walks
+
+from symphys.problem import load_problem
+from symphys.problems import find
+from symphys.runs.job import solver_options
+from symphys.solvers import SOLVERS
+
+CHANGES: dict[str, dict[str, Any]] = {
+    "nothing changed": {},
+    "forget 0: exact gradients": {"forget": 0.0},
+    "forget 2": {"forget": 2.0},
+    "forget 20": {"forget": 20.0},
+    "clip inf: plain mean": {"clip": inf},
+    "samples 8": {"samples": 8},
+    "width 0: one situation": {"width": 0.0},
+    "fallen 1: no more weight": {"fallen": 1.0},
+    "validation 0: the last point": {"validation": 0},
+    "hold 1: no falling rate": {"hold": 1.0},
+    "rate 0.03": {"rate": 0.03},
+    "rate 0.003": {"rate": 0.003},
+    "horizons 2, 5 s first": {"horizons": (2.0, 5.0)},
+    "evolution 0.5": {"evolution": 0.5},
+}
+
+
+def main() -> None:
+    """A line for each change and seed."""
+    iterations, seeds = int(sys.argv[1] if len(sys.argv) > 1 else 100), int(sys.argv[2] if len(sys.argv) > 2 else 2)
+    walks = Walks(load_problem(find("quadruped_walk")))
+    shooting, options = walks.made.shooting, solver_options(walks.problem, "stochastic")
+    for change, values in CHANGES.items():
+        for seed in range(seeds):
+            began = perf_counter()
+            asked = replace(options, iterations=iterations, **values)
+            found = SOLVERS["stochastic"].solve(shooting, shooting.start(seed), asked, seed)
+            spent = perf_counter() - began
+            unseen = walks.situations.draw(np.random.default_rng(SEED), UNSEEN)
+            speed, upright = walks(found.z, unseen)
+            mean = speed[upright].mean() if upright.any() else 0.0
+            print(
+                f"{change:<30} seed {seed}: nominal {speed[0]:5.2f} m/s{'' if upright[0] else ' (falls)'}, unseen "
+                f"{mean:5.2f} m/s, {upright.mean():.3f} upright, {spent:.0f} s",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()
