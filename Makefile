@@ -3,13 +3,16 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help demo test thorough lint typecheck bench bench-contact bench-robots bench-table1 bench-walk gallery clean
+.PHONY: help demo demo-walk test thorough lint typecheck bench bench-contact bench-robots bench-table1 bench-walk bench-lessons gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
 
 demo: $(VENV)/.installed  ## solve the ball throw with every solver and write the report
 	$(BIN)/symphys solve problems/ball_throw.toml --out reports
+
+demo-walk: $(VENV)/.installed  ## a quadruped learns to walk, in two minutes; Ctrl-C stops it, and the same command goes on
+	$(BIN)/symphys solve quadruped_walk --set solver.stochastic.iterations=120 --unexamined --out reports/walk
 
 test: $(VENV)/.developing  ## run the tests; ARGS="-m 'not slow'" passes options to pytest
 	$(BIN)/pytest -n auto --dist loadfile $(ARGS)
@@ -46,9 +49,18 @@ bench-robots: $(VENV)/.benching  ## jointed robots: what each device of joints b
 	$(BIN)/python benchmarks/robot_growth.py
 	$(BIN)/python benchmarks/robot_kernels.py
 
-bench-walk: $(VENV)/.benching  ## how the quadruped learns to walk, three seeds; its gaits in situations not seen before (10 minutes)
+bench-walk: $(VENV)/.benching  ## robots that learn to walk, three seeds each; their gaits in situations not seen before (half an hour)
 	$(BIN)/python benchmarks/trot.py
 	$(BIN)/python benchmarks/walking.py
+	$(BIN)/python benchmarks/walking.py quadruped_walk_net
+	$(BIN)/python benchmarks/walking.py gait_robot_fast
+	$(BIN)/python benchmarks/building.py
+	$(BIN)/python benchmarks/walk_gradient.py
+
+bench-lessons: $(VENV)/.benching  ## solvers on one walk against time, what situations that differ buy, what each option does (an hour)
+	$(BIN)/python benchmarks/race.py build
+	$(BIN)/python benchmarks/robustness.py build
+	$(BIN)/python benchmarks/lessons.py
 
 bench-table1: $(VENV)/.benching  ## the timing table of Degrave et al. (1 and 128 robots, small and large net), cost against weights
 	$(BIN)/python benchmarks/table1.py

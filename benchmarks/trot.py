@@ -17,6 +17,7 @@ from symphys.transcription import transcribe
 
 NOTHING: Mapping[str, object] = {}
 FEET = "frequency = 20                  # Hz\ndamping = 1\n"
+SERVOS = [f"{leg}_{joint}" for leg in ("fl", "fr", "hl", "hr") for joint in ("hip", "knee")]
 TORQUES = (4, 20, 40, 60, 100, 160)
 
 
@@ -34,7 +35,7 @@ def main() -> None:
         told(f"feet of {hertz} Hz", FEET, f"frequency = {hertz}\ndamping = 1\n")
     told("feet with half the damping", FEET, "frequency = 20\ndamping = 0.5\n")
     told("rigid feet", FEET, "friction = 0.5\n")
-    told("targets beyond 45 degrees", "-pi / 4, pi / 4", "-9, 9")
+    told("targets beyond 45 degrees", settings={f"joint.{name}.motor.servo.range": 9 for name in SERVOS})
 
 
 def told(what: str, old: str = "", new: str = "", torque: float = 80, settings: Mapping[str, object] = NOTHING) -> None:

@@ -43,7 +43,8 @@ class Validation:
     def keep(self, z: Array, spoilt: int) -> int:
         """Keep the point if it does best; Stop(MET) where that is enough.
 
-        Fewer situations that are not finite go before a lower merit. ``spoilt`` is their number at the point that was
+        Fewer situations that are not finite go first, then a point that meets everything in the problem's own, which
+        is what a run is judged by, then the lower merit. ``spoilt`` is the number of the first at the point that was
         kept so far; returns that of the point that is kept now.
         """
         meter, count = self.meter, len(self.drawn.numbers)
@@ -52,7 +53,7 @@ class Validation:
         known = np.isfinite(values.merit)
         merit, bad = mean(values.merit[known]), int((~known).sum())
         point = first(meter, z, values, merit, mean(values.objective[known]))
-        best = meter.best is None or (bad, merit) < (spoilt, meter.best.merit)
+        best = meter.best is None or (bad, not point.met, merit) < (spoilt, not meter.best.met, meter.best.merit)
         kept = not self.batch.count or (best and bad < count)
         if self.log:
             lasted = "" if values.alive is None else f", {values.alive.mean():.0%} last"

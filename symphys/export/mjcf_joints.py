@@ -150,5 +150,6 @@ def actuator(motor: Motor) -> tuple[str, dict[str, str]]:
     steepness = motor.torque / (GIVING_WAY * motor.velocity)
     attributes = {"kv": text([steepness]), "forcerange": bound}
     if isinstance(motor, Servo):
-        return "position", {"kp": text([steepness * motor.gain]), **attributes}
+        held = {} if motor.range is None else {"ctrlrange": text((-motor.range, motor.range))}
+        return "position", {"kp": text([steepness * motor.gain]), **attributes, **held}
     return "velocity", {**attributes, "ctrlrange": text((-motor.velocity, motor.velocity))}

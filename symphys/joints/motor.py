@@ -15,11 +15,13 @@ class Servo:
         gain: [1/s].
         torque: largest [N m], or force [N].
         velocity: largest [rad/s], or [m/s].
+        range: largest command [rad], or [m], either way; None: any.
     """
 
     gain: Scalar
     torque: Scalar
     velocity: Scalar
+    range: Scalar | None = None
 
 
 @dataclass(frozen=True)

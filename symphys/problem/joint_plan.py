@@ -57,7 +57,7 @@ class JointPlan:
     def parameters(self) -> dict[str, Numbers]:
         """Parameter names and values: those of motor and spring, and the anchor."""
         parts = [part for part in (self.motor, self.spring) if part is not None]
-        found = {f"{self.name}.{field.name}": getattr(part, field.name) for part in parts for field in fields(part)}
+        found = {f"{self.name}.{key}": getattr(part, key) for part in parts for key in given(part)}
         return found | {self.anchor: self.sockets[1].point}
 
     def joint(self, places: Mapping[str, int], value: Value) -> Joint:
@@ -77,4 +77,9 @@ class JointPlan:
 
     def _valued(self, part: Part, value: Value) -> Part:
         """Motor or spring with its parameters' values."""
-        return replace(part, **{field.name: value(f"{self.name}.{field.name}") for field in fields(part)})
+        return replace(part, **{key: value(f"{self.name}.{key}") for key in given(part)})
+
+
+def given(part: Motor | Spring) -> list[str]:
+    """The numbers that there are."""
+    return [field.name for field in fields(part) if getattr(part, field.name) is not None]

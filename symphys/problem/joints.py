@@ -155,7 +155,7 @@ class Reader:
             self.add("motor", f"{start} one of {text}torque = {{ torque = 30 }}")
             return None
         if table.servo is not None:
-            return Servo(table.servo.gain, table.servo.torque, table.servo.velocity)
+            return Servo(table.servo.gain, table.servo.torque, table.servo.velocity, table.servo.range)
         if table.velocity is not None:
             return VelocityMotor(table.velocity.torque, table.velocity.velocity)
         assert table.torque is not None

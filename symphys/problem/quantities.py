@@ -26,7 +26,7 @@ LIMITS: dict[str, tuple[float, float]] = {
     "restitution": (0.0, 1.0),
 }
 """What is physical; masses and sizes must exceed their limit."""
-ACTING = ("gain", "torque", "velocity", "stiffness", "damping")
+ACTING = ("gain", "torque", "velocity", "range", "stiffness", "damping")
 """Parameters of motors and springs, which must not be negative."""
 OPEN = ("mass", "radius", "size", "length")
 LEAST_SHARE = 1e-3

@@ -155,10 +155,17 @@ def motor_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr
         torque = clip(command, -motor.torque, motor.torque, setting.knob)
         return _row(at, by_law(-torque * stretch.kick, ca.SX(0), at.mobility), None, None, width)
     assert isinstance(motor, Servo | VelocityMotor)
-    wanted = motor.gain * (command - at.value) if isinstance(motor, Servo) else command
+    wanted = servo_velocity(motor, command, at.value, setting.knob) if isinstance(motor, Servo) else command
     target = clip(wanted, -motor.velocity, motor.velocity, setting.knob)
     most = motor.torque * stretch.kick
     return _row(at, towards(target, at.mobility), -most, most, width)
+
+
+def servo_velocity(servo: Servo, command: Expr, value: Expr, knob: Expr) -> Expr:
+    """What a servo aims at, but for its bounds; rounding off its range changes velocities by the knob."""
+    if servo.range is not None:
+        command = clip(command, -servo.range, servo.range, knob / servo.gain)
+    return servo.gain * (command - value)
 
 
 def lower_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr, stretch: Stretch) -> AxisRow:

@@ -54,6 +54,7 @@ def test_limits_springs_and_motors() -> None:
     assert numbers(hanging(motor=TorqueMotor(5.0)).find(".//motor"), "ctrlrange") == [-5, 5]
     servo = hanging(motor=Servo(20.0, 6.0, 3.0)).find(".//position")
     assert [numbers(servo, key) for key in ("kv", "kp", "forcerange")] == [[200], [4000], [-6, 6]]
+    assert numbers(hanging(motor=Servo(20.0, 6.0, 3.0, 0.5)).find(".//position"), "ctrlrange") == [-0.5, 0.5]
     velocity = hanging(motor=VelocityMotor(6.0, 3.0)).find(".//velocity")
     assert [numbers(velocity, key) for key in ("kv", "ctrlrange", "forcerange")] == [[200], [-3, 3], [-6, 6]]
 

@@ -65,6 +65,14 @@ def test_servo_goes_to_its_target() -> None:
     assert angles.max() < 1.5 + 1e-5
 
 
+def test_servo_keeps_its_range() -> None:
+    """Commands beyond it count as its end; those within are followed."""
+    free, held = (swung(rod(motor=Servo(20.0, 5.0, 2.0, reach)), 2.0, 1.5)[0] for reach in (None, 0.5))
+    assert held[-1] == pytest.approx(0.5, abs=1e-5) and free[-1] == pytest.approx(1.5, abs=1e-5)
+    within, plain = (swung(rod(motor=Servo(20.0, 5.0, 2.0, reach)), 1.0, -0.4)[0] for reach in (0.5, None))
+    assert np.array_equal(within, plain)
+
+
 def test_servo_holds_against_gravity() -> None:
     """Horizontal: m g l / 2 = 2.45 N m; with less torque than that it sinks."""
     strong, weak = (

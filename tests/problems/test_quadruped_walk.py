@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from walk_gradient import compared, gait
 
 from symphys.problem import load_problem
 from symphys.problems import find
@@ -46,6 +47,16 @@ def test_a_short_lesson_helps() -> None:
     assert learnt.alive is not None and learnt.alive.mean() > 0.6
     before, after = ahead(made, made.shooting.start(0))[0], ahead(made, z)[0]
     assert after > before + 1.0
+
+
+@pytest.mark.parametrize("duration", [3, pytest.param(10, marks=pytest.mark.thorough)])
+def test_the_adjoint_of_a_calm_walk_is_its_derivative(duration: float) -> None:
+    """Against central differences over hundreds of steps, in situations that differ."""
+    made = transcribe(load_problem(find("quadruped_walk"), {"simulation.duration": duration}), exact=True)
+    if made.shooting.situations is None:
+        pytest.skip(made.backend.note)
+    errors, _ = compared(made, gait(made, 0.05))
+    assert np.median(errors) < 1e-6
 
 
 @pytest.mark.thorough

@@ -136,7 +136,7 @@ def test_the_gait_robot_is_that_of_the_journal(robot: Robot) -> None:
         check_inertia(bodies[f"{leg}_tibia"], [tibia], [(ball, (0, 0, 0.05 - centre))])
         assert robot("gait_robot").initial[f"{leg}_tibia.position"][2] == pytest.approx(centre, abs=1e-7)
     motor = robot("gait_robot").plan.joints[0].motor
-    assert tuple(vars(motor).values()) == pytest.approx((50, 4, np.deg2rad(1440)))
+    assert tuple(vars(motor).values()) == pytest.approx((50, 4, np.deg2rad(1440), np.deg2rad(45)))
 
 
 def check_inertia(body: object, boxes: list[tuple[float, Array, Array]], balls: list[tuple[float, Array]]) -> None:

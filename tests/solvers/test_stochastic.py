@@ -11,7 +11,7 @@ import pytest
 from toys import toy
 from windy import BEST, Winds, windy
 
-from symphys.shooting import Values
+from symphys.shooting import Array, Drawn, Values
 from symphys.solvers import SOLVERS, Status, StochasticOptions, TraceRow
 from symphys.solvers.averages import average, centred, evolution, together
 
@@ -54,6 +54,21 @@ def test_validation_keeps_the_best_point() -> None:
                   for count in (32, 0))  # fmt: skip
     distance = [float(np.linalg.norm(found.z - BEST)) for found in (kept, last)]
     assert distance[0] < 0.5 * distance[1]
+
+
+def test_a_point_that_meets_everything_in_the_problem_s_own_situation_goes_first() -> None:
+    """However low the mean of one that does not: on its way to the lowest, the last that meets is kept."""
+
+    class Strict(Winds):
+        def value(self, Z: Array, drawn: Drawn, smoothing: float) -> Values:
+            found = super().value(Z, drawn, smoothing)
+            short = np.broadcast_to(BEST[:1] + 0.5 - Z[:, :1], (len(found.merit), 1))
+            return replace(found, errors=1 + short)
+
+    problem = replace(windy(), situations=Strict(), stop_when_met=False)
+    start = BEST + [1.0, 0.0]
+    found = SOLVE(problem, start, options(iterations=120, rate=0.02, hold=1.0, patience=0, every=1))
+    assert 0.5 <= found.z[0] - BEST[0] < 0.53
 
 
 @pytest.mark.parametrize("stop", [3, 40])

@@ -36,6 +36,9 @@ class ServoTable(Table):
     gain: Positive = Field(description="[1/s]")
     torque: Positive = Field(description="the most that it gives [N m], or [N] where the joint slides")
     velocity: Positive = Field(description="the fastest that it aims at [rad/s], or [m/s]")
+    range: Positive | None = Field(
+        default=None, description="commands are held within so much either way [rad], or [m]; default: any"
+    )
 
 
 class VelocityTable(Table):
