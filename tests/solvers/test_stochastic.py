@@ -66,7 +66,7 @@ def test_a_point_that_meets_everything_in_the_problem_s_own_situation_goes_first
             return replace(found, errors=1 + short)
 
     problem = replace(windy(), situations=Strict(), stop_when_met=False)
-    start = BEST + [1.0, 0.0]
+    start = np.add(BEST, [1.0, 0.0])
     found = SOLVE(problem, start, options(iterations=120, rate=0.02, hold=1.0, patience=0, every=1))
     assert 0.5 <= found.z[0] - BEST[0] < 0.53
 
