@@ -46,5 +46,6 @@ def bound(value: Scalar | None) -> float | None:
 
 
 def motor_entry(motor: Motor) -> dict[str, Any]:
-    """A motor as JSON: its kind as problem files call it, its bounds in SI units, and a servo's gain [1/s]."""
-    return {"kind": MOTORS[type(motor)], **{key: float(value) for key, value in asdict(motor).items()}}
+    """A motor as JSON: its kind as problem files call it, its bounds in SI units that there are, a servo's gain [1/s]."""
+    numbers = {key: float(value) for key, value in asdict(motor).items() if value is not None}
+    return {"kind": MOTORS[type(motor)], **numbers}
