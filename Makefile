@@ -73,6 +73,8 @@ gallery: $(VENV)/.installed  ## make the figures of the README again
 	    build/gallery/figures/knock-motion.svg build/gallery/figures/putt-motion.svg \
 	    build/gallery/figures/cart_pole-strip.svg reports/gallery/
 	cp build/gallery/sled/least_squares-seed0/figures/convergence.svg reports/gallery/sled-stages.svg
+	$(BIN)/symphys solve quadruped_walk --set solver.stochastic.iterations=120 --unexamined --out build/walk
+	cp build/walk/figures/quadruped_walk-strip.svg reports/gallery/
 
 clean:  ## remove what the other targets made, reports aside
 	rm -rf $(VENV) build dist *.egg-info

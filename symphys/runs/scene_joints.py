@@ -46,6 +46,6 @@ def bound(value: Scalar | None) -> float | None:
 
 
 def motor_entry(motor: Motor) -> dict[str, Any]:
-    """A motor as JSON: its kind as problem files call it, its bounds in SI units that there are, a servo's gain [1/s]."""
+    """A motor as JSON: its kind as in problem files, those of its bounds that there are, a servo's gain; SI units."""
     numbers = {key: float(value) for key, value in asdict(motor).items() if value is not None}
     return {"kind": MOTORS[type(motor)], **numbers}
