@@ -142,6 +142,7 @@ def _row(
         frame.normal,
         frame.normal,
         answer_of(sides, frame.normal, same),
+        yields=ca.SX(1),
         **effective_masses(*inverse_masses(sides, frame.normal, same)),
         softness=ca.SX(0),
         target=ca.SX(UNREACHED) if law.soft else ca.if_else(struck, speed, resting),

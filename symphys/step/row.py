@@ -129,6 +129,7 @@ class ContactRow:
         normal: (3,) at the row's instant; the impulse's normal is ``impulse_normal``.
         impulse_normal: (3,).
         answer: (3,) velocity of the touching points against each other for a unit normal impulse [1/kg].
+        yields: 1 if such an impulse parts them, else 0: the contact gives none then.
         normal_mass, tangent_mass: effective masses [kg], 1 / (k + gamma) and 1 / k; across the normal k is the
             largest eigenvalue, one number, so that sliding friction stays opposite to the slip.
         spin_mass, roll_mass: the same for torques [kg m^2].
@@ -150,6 +151,7 @@ class ContactRow:
     normal: Expr
     impulse_normal: Expr
     answer: Expr
+    yields: Expr
     normal_mass: Expr
     tangent_mass: Expr
     spin_mass: Expr

@@ -15,7 +15,7 @@ import casadi as ca
 from symphys.collide.contact import Contact
 from symphys.collide.touch import TINY_RATE
 from symphys.smooth import clip, positive
-from symphys.step.masses import answer_of, effective_masses, inverse_masses
+from symphys.step.masses import answer_of, effective_masses, inverse_masses, yields
 from symphys.step.row import UNREACHED, ContactRow, Moving, Side, at_touch, free_slip, make_sides
 from symphys.step.scene import Setting
 from symphys.world import Law
@@ -56,6 +56,8 @@ def prepare(
     k_normal, *k_others = inverse_masses(sides, frame.normal, same)
     softness, target = _normal_target(law, contact, duration, touch, k_normal, knob)
     landing = _landing(contact, duration, touch.time, target, ca.dot(frame.normal, free_slip(sides, motions)))
+    answer = answer_of(sides, applied.normal, same)
+    parts = yields(sides, frame.normal, answer)
     weight, load = LOADED * setting.reference / k_normal, ca.dot(applied.normal, force)
     lasts = _lasts(setting, law, contact, touch.leaving, load > weight)
     target = ca.if_else(lasts, -_parting(setting, contact, k_normal, ca.fmax(load, weight), duration), target)
@@ -64,10 +66,11 @@ def prepare(
         sides=sides,
         normal=frame.normal,
         impulse_normal=applied.normal,
-        answer=answer_of(sides, applied.normal, same),
+        answer=answer,
         **effective_masses(k_normal + softness, *k_others),
         softness=softness,
-        target=ca.if_else(spared, UNREACHED, target),
+        yields=parts,
+        target=ca.if_else(ca.logic_or(spared, 1 - parts), UNREACHED, target),
         slip_target=touch.slip(half) if scheme.impact_friction else ca.SX.zeros(3),
         delay=_delay(touch, landing, lasts, half, sides) if scheme.time_of_impact else ca.SX(0),
         leaving=touch.leaving,
