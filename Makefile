@@ -58,7 +58,8 @@ bench-walk: $(VENV)/.benching  ## robots that learn to walk, three seeds each; t
 	$(BIN)/python benchmarks/walk_gradient.py
 
 bench-lessons: $(VENV)/.benching  ## solvers on one walk against time, what situations that differ buy, what each option does (an hour)
-	$(BIN)/python benchmarks/race.py build
+	$(BIN)/python benchmarks/race.py quadruped_walk build
+	$(BIN)/python benchmarks/race.py quadruped_walk_net build
 	$(BIN)/python benchmarks/robustness.py build
 	$(BIN)/python benchmarks/lessons.py
 

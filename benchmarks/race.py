@@ -1,12 +1,12 @@
 """How soon a gait is fast: gradients, an evolution strategy and CMA-ES on the same walk, and CMA-ES with MuJoCo.
 
-    python benchmarks/race.py [FOLDER [SEEDS]]
+    python benchmarks/race.py [PROBLEM [FOLDER [SEEDS]]]
 
 Each solver has the options of the shipped file, so that all take about the same time, but validates from the start.
 What counts is the nominal speed of the point that the solver would keep so far, by its validation in 64 situations. At
-the end each gait walks in 500 situations that none has seen. In MuJoCo the robot is the same by our exporter, with
-contacts and servos of its own, 2 ms a step; it is alone, without feedback and without situations that differ:
-``rollout`` takes commands that are known before.
+the end each gait walks in 500 situations that none has seen. MuJoCo runs beside ``quadruped_walk``: the robot is the
+same by our exporter, with contacts and servos of its own, 2 ms a step; it is alone, without feedback and without
+situations that differ: ``rollout`` takes commands that are known before.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from symphys.runs.job import solver_options
 from symphys.solvers import SOLVERS, TraceRow
 
 Array = NDArray[np.float64]
+WALK = "quadruped_walk"
 PAPER, AN_HOUR = 1.17, 3600.0
 MARKS = (1.17, 2.0)
 NAMES = {"stochastic": "gradients", "evolution": "evolution strategy", "cma": "CMA-ES"}
@@ -52,17 +53,23 @@ class Course:
 
 def main() -> None:
     """A line for each solve, then a figure."""
-    folder, seeds = Path(sys.argv[1] if len(sys.argv) > 1 else "build"), int(sys.argv[2] if len(sys.argv) > 2 else 3)
-    walks = Walks(load_problem(find("quadruped_walk")))
-    courses = [raced(walks, name, seed) for name in NAMES for seed in range(seeds)]
+    name, folder, seeds = [*sys.argv[1:], *(WALK, "build", "3")[len(sys.argv) - 1 :]]
+    walks = Walks(load_problem(find(name)))
+    courses = [raced(walks, solver, seed) for solver in NAMES for seed in range(int(seeds))]
+    if name == WALK:
+        courses += raced_in_mujoco(int(seeds))
+    Path(folder).mkdir(exist_ok=True)
+    drawn(courses).savefig(Path(folder) / f"race-{name}.svg")
+
+
+def raced_in_mujoco(seeds: int) -> list[Course]:
+    """The same with MuJoCo, where it is installed."""
     try:
         from mujoco_gaits import raced_there
     except ImportError as error:
         print(f"without MuJoCo: {error}")
-    else:
-        courses += [raced_there(seed, seconds=80.0) for seed in range(seeds)]
-    folder.mkdir(exist_ok=True)
-    drawn(courses).savefig(folder / "race.svg")
+        return []
+    return [raced_there(seed, seconds=80.0) for seed in range(seeds)]
 
 
 def raced(walks: Walks, name: str, seed: int) -> Course:
