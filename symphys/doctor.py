@@ -16,9 +16,9 @@ import numpy as np
 from symphys.kernel import (
     Cache,
     Call,
-    Kernel,
     KernelUnavailable,
     Layout,
+    ProcessorKernel,
     Program,
     compile_program,
     default_cache,
@@ -152,7 +152,7 @@ def _compiler() -> str:
 def _kernels() -> Iterator[Finding]:
     """A tiny kernel, cold into an empty cache, then right, on two threads, and warm."""
     with tempfile.TemporaryDirectory(prefix="symphys-doctor-", ignore_cleanup_errors=True) as folder:
-        cache, program, built = Cache(Path(folder)), pendulum(), list[Kernel]()
+        cache, program, built = Cache(Path(folder)), pendulum(), list[ProcessorKernel]()
         yield _tried("kernel, compiled", lambda: _cold(program, cache, built))
         if built:
             (kernel,) = built
@@ -173,7 +173,7 @@ def pendulum() -> Program:
     return Program(at.size, state.still(), at.take(0), STEPS, {"cost": total}, body=body, zeroed=(total,))
 
 
-def _cold(program: Program, cache: Cache, built: list[Kernel]) -> str:
+def _cold(program: Program, cache: Cache, built: list[ProcessorKernel]) -> str:
     try:
         kernel = compile_program(program, cache=cache, threads=1)
     except KernelUnavailable as error:
@@ -182,20 +182,20 @@ def _cold(program: Program, cache: Cache, built: list[Kernel]) -> str:
     return f"a tiny one in {kernel.report.seconds:.2f} s, {kernel.report.lanes} lanes"
 
 
-def _values(kernel: Kernel) -> str:
+def _values(kernel: ProcessorKernel) -> str:
     mine, casadi = kernel.forward(Z)["cost"][0, 0], interpret(kernel.program, Z)["cost"][0]
     _require(mine, casadi, CLOSE)
     return "those of casadi" + (", to the bit" if mine == casadi else "")
 
 
-def _gradient(kernel: Kernel) -> str:
+def _gradient(kernel: ProcessorKernel) -> str:
     step = 1e-5 * np.eye(2)
     ahead, behind = ([interpret(kernel.program, Z + row)["cost"][0] for row in sign * step] for sign in (1, -1))
     _require(kernel.gradient(Z, [1.0])[1][0], (np.array(ahead) - np.array(behind)) / 2e-5, 1e-6)
     return "agrees with differences"
 
 
-def _threads(kernel: Kernel) -> str:
+def _threads(kernel: ProcessorKernel) -> str:
     rows = np.array(Z) + np.linspace(0, 1, ROWS)[:, None]
     alone = kernel.gradient(rows, [1.0])[1]
     kernel.threads = 2

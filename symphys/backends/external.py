@@ -14,7 +14,7 @@ import casadi as ca
 from symphys import kernel
 from symphys.backends.interface import Function
 from symphys.backends.seeds import Seeds
-from symphys.kernel import Fixed, Kernel
+from symphys.kernel import Fixed, ProcessorKernel
 from symphys.shooting import Array, Nlp
 
 ROOM = "symphys.backends"
@@ -33,7 +33,7 @@ class Task(ctypes.Structure):
 class External:
     """The functions of external.c over a kernel; they work as long as this lives."""
 
-    def __init__(self, made: Kernel, rows: Seeds | None) -> None:
+    def __init__(self, made: ProcessorKernel, rows: Seeds | None) -> None:
         """``rows``: of the constraints, where there are any."""
         seeds = [Seeds.whole(made, "objective").words, *([rows.words] if rows else [])]
         self.fixed = [made.fixed(), *map(made.fixed, seeds)]
@@ -51,7 +51,7 @@ class External:
         self.functions = load(sizes, tasks)
 
 
-def external_nlp(made: Kernel, expression: Function, rows: Seeds | None) -> Nlp:
+def external_nlp(made: ProcessorKernel, expression: Function, rows: Seeds | None) -> Nlp:
     """Objective and constraints by the kernel; ``rows``: of the constraints, where there are any."""
     external = External(made, rows)
     value, gradient, slopes = external.functions

@@ -7,7 +7,7 @@ from symphys.kernel.diagnosis import Bad
 from symphys.kernel.errors import KernelUnavailable, ProgramError
 from symphys.kernel.fixed import Fixed
 from symphys.kernel.interpret import interpret
-from symphys.kernel.kernel import Kernel
+from symphys.kernel.kernel import Kernel, ProcessorKernel
 from symphys.kernel.layout import Layout
 from symphys.kernel.program import Call, Fading, Place, Program
 from symphys.kernel.report import Report
@@ -24,6 +24,7 @@ __all__ = [
     "KernelUnavailable",
     "Layout",
     "Place",
+    "ProcessorKernel",
     "Program",
     "ProgramError",
     "Report",

@@ -14,7 +14,7 @@ from typing import Literal
 from symphys.kernel.cache import Cache, default_cache
 from symphys.kernel.compiler import Compiler, find_compiler
 from symphys.kernel.errors import KernelUnavailable, ProgramError
-from symphys.kernel.kernel import Kernel
+from symphys.kernel.kernel import ProcessorKernel
 from symphys.kernel.library import Loaded
 from symphys.kernel.plan import plan
 from symphys.kernel.processor import processor
@@ -30,7 +30,7 @@ def compile_program(
     cache: Cache | None = None,
     seeded: Sequence[str] | None = None,
     threads: int | None = None,
-) -> Kernel:
+) -> ProcessorKernel:
     """Build the kernel of a program, or take it from the cache.
 
     Args:
@@ -46,7 +46,7 @@ def compile_program(
     """
     started = time.perf_counter()
     single = precision == "single"
-    names, width = _names(program, seeded), _width(lanes, single)
+    names, width = names_of(program, seeded), _width(lanes, single)
     planned = plan(program, names, width * (4 if single else 8))
     with shared_library(sources(planned, width, single), cache or default_cache()) as built:
         loaded = Loaded(built.path, program, planned, names)
@@ -62,10 +62,11 @@ def compile_program(
         seconds=time.perf_counter() - started,
         note=built.note,
     )
-    return Kernel(program, loaded, report, names, threads)
+    return ProcessorKernel(program, loaded, report, names, threads)
 
 
-def _names(program: Program, seeded: Sequence[str] | None) -> tuple[str, ...]:
+def names_of(program: Program, seeded: Sequence[str] | None) -> tuple[str, ...]:
+    """The outputs that can be differentiated; None: all. ProgramError names one that does not exist."""
     names = tuple(program.outputs if seeded is None else seeded)
     if unknown := [name for name in names if name not in program.outputs]:
         raise ProgramError(f"no output is called {unknown[0]!r}; there are {', '.join(program.outputs)}")

@@ -1,4 +1,4 @@
-"""Compiled kernels on disk, one file each: ``<key>-<checksum of the content>.so``.
+"""Compiled kernels on disk, one file each: ``<key>-<checksum of the content>.so``, or ``.cubin`` for a device.
 
 A file appears whole under its name or not at all, so that readers need no lock; a file whose content is not that of
 its name is removed and built again. Processes that want the same kernel wait for the first one to build it.
@@ -36,14 +36,15 @@ class CacheInfo:
 
 @dataclass(frozen=True)
 class Cache:
-    """A folder of kernels, of at most ``limit`` bytes."""
+    """A folder of kernels of one kind, those for processors or those for devices, of at most ``limit`` bytes."""
 
     folder: Path
     limit: int = LIMIT
+    suffix: str = ".so"
 
     def find(self, key: str) -> Path | None:
         """The kernel of this key; None if there is none or if it is damaged."""
-        for path in self._files(f"{key}-*.so"):
+        for path in self._files(f"{key}-*{self.suffix}"):
             with contextlib.suppress(OSError):
                 if path.stem.split("-")[1] == _checksum(path):
                     with contextlib.suppress(OSError):
@@ -56,7 +57,7 @@ class Cache:
     def store(self, key: str, built: Path) -> Path:
         """Take over a library; OSError if the folder does not take it."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        target = self.folder / f"{key}-{_checksum(built)}.so"
+        target = self.folder / f"{key}-{_checksum(built)}{self.suffix}"
         handle, name = tempfile.mkstemp(prefix=".new-", dir=self.folder)
         os.close(handle)
         try:
@@ -118,7 +119,7 @@ class Cache:
     def _entries(self) -> list[tuple[float, int, Path]]:
         """(time of last use, bytes, path) of each kernel, oldest first."""
         found = []
-        for path in self._files("*.so"):
+        for path in self._files(f"*{self.suffix}"):
             with contextlib.suppress(OSError):
                 status = path.stat()
                 found.append((status.st_mtime, status.st_size, path))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import partial
 
@@ -22,18 +23,14 @@ Outputs = dict[str, NDArray[np.float64]]
 """name -> (batch, size)"""
 
 
-class Kernel:
-    """A compiled program. A row's result does not depend on the other rows, nor on the number of threads."""
+class Kernel(ABC):
+    """A compiled program. A row's result does not depend on the other rows."""
 
-    def __init__(
-        self, program: Program, loaded: Loaded, report: Report, seeded: Sequence[str], threads: int | None
-    ) -> None:
-        """Use ``compile_program``."""
-        self.program, self.loaded, self.report = program, loaded, report
-        self.seeded = tuple(seeded)
-        self.threads = processors() if threads is None else threads
-        real = np.dtype(np.float32 if report.precision == "single" else np.float64)
-        self._pool = Pool(report.bytes_per_lane // real.itemsize, report.lanes, real)
+    threads = 1
+
+    def __init__(self, program: Program, report: Report, seeded: Sequence[str]) -> None:
+        """``seeded``: names of the outputs that are differentiated."""
+        self.program, self.report, self.seeded = program, report, tuple(seeded)
 
     def forward(self, Z: ArrayLike, knob: ArrayLike = ()) -> Outputs:
         """The outputs of rollouts.
@@ -91,19 +88,6 @@ class Kernel:
         self._run(batch)
         return trajectory
 
-    def fixed(self, seed: ArrayLike = ()) -> Fixed:
-        """An evaluation of one z at fixed addresses, with a row for each seed (rows, s), or one row without any."""
-        seeds, z, knob = np.array(seed, float), np.zeros(self.program.z.size), np.zeros(self.program.knob.size)
-        batch = self._batch(z, knob, seeds if seeds.size else None)
-        outputs = batch.outputs(self._width())
-        gradient = batch.gradient(len(z)) if seeds.size else np.zeros((0, len(z)))
-        return Fixed(self.loaded, batch.part(0, batch.rows), self._pool.new(), z, knob, outputs, gradient, seeds)
-
-    def first_bad(self, z: ArrayLike, knob: ArrayLike = ()) -> Bad | None:
-        """The first call of one rollout that gives a value that is not finite; None if all are finite."""
-        batch = self._batch(np.ravel(z), np.ravel(knob))
-        return self._pool.lend(lambda memory: first_bad(self.program, self.loaded, batch, memory))
-
     def _batch(self, Z: ArrayLike, knob: ArrayLike, seed: ArrayLike | None = None) -> Batch:
         rows = {"z": (Z, self.program.z.size), "knob": (knob, self.program.knob.size)}
         return Batch(rows if seed is None else rows | {"seed": (seed, self._seeds())})
@@ -116,6 +100,37 @@ class Kernel:
 
     def _named(self, outputs: Array) -> Outputs:
         return {name: outputs[:, part] for name, part in self.program.output_slices().items()}
+
+    @abstractmethod
+    def _run(self, batch: Batch) -> None:
+        """Compute what a batch asks for."""
+
+
+class ProcessorKernel(Kernel):
+    """Blocks of lanes, spread over threads, on whose number results do not depend."""
+
+    def __init__(
+        self, program: Program, loaded: Loaded, report: Report, seeded: Sequence[str], threads: int | None
+    ) -> None:
+        """Use ``compile_program``."""
+        super().__init__(program, report, seeded)
+        self.loaded = loaded
+        self.threads = processors() if threads is None else threads
+        real = np.dtype(np.float32 if report.precision == "single" else np.float64)
+        self._pool = Pool(report.bytes_per_lane // real.itemsize, report.lanes, real)
+
+    def fixed(self, seed: ArrayLike = ()) -> Fixed:
+        """An evaluation of one z at fixed addresses, with a row for each seed (rows, s), or one row without any."""
+        seeds, z, knob = np.array(seed, float), np.zeros(self.program.z.size), np.zeros(self.program.knob.size)
+        batch = self._batch(z, knob, seeds if seeds.size else None)
+        outputs = batch.outputs(self._width())
+        gradient = batch.gradient(len(z)) if seeds.size else np.zeros((0, len(z)))
+        return Fixed(self.loaded, batch.part(0, batch.rows), self._pool.new(), z, knob, outputs, gradient, seeds)
+
+    def first_bad(self, z: ArrayLike, knob: ArrayLike = ()) -> Bad | None:
+        """The first call of one rollout that gives a value that is not finite; None if all are finite."""
+        batch = self._batch(np.ravel(z), np.ravel(knob))
+        return self._pool.lend(lambda memory: first_bad(self.program, self.loaded, batch, memory))
 
     def _run(self, batch: Batch) -> None:
         """Spread blocks over the threads."""

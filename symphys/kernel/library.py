@@ -74,18 +74,15 @@ class Loaded:
         self._perform = _prepared(library.perform, ctypes.c_void_p, ctypes.c_void_p, WORD)
         self._kept: list[Any] = []
         self.data = ProgramData(program.size, plan.tape, program.steps)
-        places = {"z": [program.z], "knob": [program.knob], "zeroed": program.zeroed}
-        places |= {"outputs": list(program.outputs.values()), "seeded": [program.outputs[name] for name in seeded]}
-        places |= {"constants": [place for place, _ in program.constants]}
         values = np.array([x for _, row in program.constants for x in row] or [0], dtype=np.float64)
         self._kept.append(values)
         self.data.values = values.ctypes.data
-        for name, listed in places.items():
+        for name, listed in data_places(program, seeded).items():
             setattr(self.data, name, self._list(len(listed), _ranges(listed)))
         for name in TABLES:
             setattr(self.data, name, self._list(*plan.tables[name]))
         written = [place for call in program.body for place in call.outputs if place.stride]
-        self.data.written = self._list(len(written), _strided(written))
+        self.data.written = self._list(len(written), strided(written))
         if program.fading is not None:
             state, kept = program.fading.state, program.fading.kept
             self.data.fading = (WORD * 3)(state.offset, state.size, state.stride)
@@ -118,7 +115,20 @@ def _prepared(function: Any, *types: Any) -> Any:
     return function
 
 
-def _strided(places: Sequence[Place]) -> Any:
+def data_places(program: Program, seeded: Sequence[str]) -> dict[str, Sequence[Place]]:
+    """The places that the drivers know by name."""
+    return {
+        "z": [program.z],
+        "knob": [program.knob],
+        "zeroed": program.zeroed,
+        "constants": [place for place, _ in program.constants],
+        "outputs": list(program.outputs.values()),
+        "seeded": [program.outputs[name] for name in seeded],
+    }
+
+
+def strided(places: Sequence[Place]) -> Any:
+    """Offset, size and stride of each, one after the other."""
     return np.array([x for place in places for x in (place.offset, place.size, place.stride)] or [0], dtype=np.int64)
 
 

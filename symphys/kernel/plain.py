@@ -6,8 +6,9 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from symphys.kernel.dialect import NUMBERS
 from symphys.kernel.instructions import graph_of
-from symphys.kernel.operations import PLAIN
+from symphys.kernel.library import data_places
 from symphys.kernel.plan import plan
 from symphys.kernel.program import Function, Place, Program
 from symphys.kernel.source import resource
@@ -35,16 +36,14 @@ class PlainSource:
 def plain_source(program: Program, seeded: Sequence[str], further: Mapping[str, Function]) -> PlainSource:
     """The program, the gradient of the seeded outputs, and further functions of their own."""
     planned = plan(program, seeded)
-    texts = [write(f"f{number}", graph, form, PLAIN) for number, (graph, form) in enumerate(planned.functions)]
+    texts = [write(f"f{number}", graph, form, NUMBERS) for number, (graph, form) in enumerate(planned.functions)]
     for name, function in further.items():
-        texts.append(write(name, graph_of(function), Form(primal=function.n_in(), adds=False), PLAIN))
+        texts.append(write(name, graph_of(function), Form(primal=function.n_in(), adds=False), NUMBERS))
     names = [f"f{number}" for number in range(len(planned.functions))]
     declared = [f"static void {name}(V *m, V *b, const word *t, word k);\n" for name in [*names, *further]]
     listed = _array("void (*const", "FUNCTIONS[])(V *, V *, const word *, word)", names)
     values = _array("double", "VALUES[]", [repr(float(x)) for _, row in program.constants for x in row])
-    places = {"z": [program.z], "knob": [program.knob], "zeroed": program.zeroed}
-    places |= {"constants": [place for place, _ in program.constants], "outputs": list(program.outputs.values())}
-    places |= {"seeded": [program.outputs[name] for name in seeded]}
+    places = data_places(program, seeded)
     counts = {name: len(places[name]) for name in RANGES} | {name: planned.tables[name][0] for name in TABLES}
     words = {name: [x for place in places[name] for x in (place.offset, place.size)] for name in RANGES}
     words |= {name: planned.tables[name][1].tolist() for name in TABLES}

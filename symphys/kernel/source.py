@@ -30,7 +30,7 @@ def sources(plan: Plan, lanes: int, single: bool) -> list[Source]:
     for backward in (False, True):
         mine = [i for i, (_, form) in enumerate(plan.functions) if form.backward == backward]
         work = [len(plan.functions[i][0].nodes) for i in mine]
-        for group in _spread([texts[i] for i in mine], work):
+        for group in spread([texts[i] for i in mine], work, FILES):
             found.append(Source("\n".join([head, *group]), fused=backward))
     names = [f"f{number}" for number in range(len(texts))]
     declared = "".join(f"void {name}(V *m, V *b, const word *t, word k);\n" for name in names)
@@ -39,9 +39,9 @@ def sources(plan: Plan, lanes: int, single: bool) -> list[Source]:
     return [*found, Source(head + listed + resource("driver.c") + resource("phases.c"))]
 
 
-def _spread(texts: Sequence[str], work: Sequence[int]) -> list[list[str]]:
-    """Groups of about equal work: the largest first, each to the group with the least so far."""
-    count = max(1, min(FILES, len(texts), sum(work) // SHARE))
+def spread(texts: Sequence[str], work: Sequence[int], most: int) -> list[list[str]]:
+    """At most so many groups of about equal work: the largest first, each to the group with the least so far."""
+    count = max(1, min(most, len(texts), sum(work) // SHARE))
     groups: list[list[str]] = [[] for _ in range(count)]
     loads = [0] * count
     for i in sorted(range(len(texts)), key=lambda i: -work[i]):

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
+from symphys.kernel.dialect import VECTORS, Dialect
 from symphys.kernel.graph import Graph
-from symphys.kernel.operations import FORMS, MASKS
+from symphys.kernel.operations import MASKS
 
 LONGEST = 500
-"""Statements in one C function: gcc's time grows faster than its length."""
+"""Statements in one C function, and copies of what is given: a compiler's time grows faster than its length."""
 
 
 @dataclass(frozen=True)
@@ -29,25 +30,22 @@ class Form:
     clears: bool = False
 
 
-def write(name: str, graph: Graph, form: Form, forms: Mapping[str, str] = FORMS) -> str:
-    """The C function ``name(m, b, t, k)``: memory, adjoint memory, places as (offset, stride) pairs, step.
-
-    ``forms`` says how operations are written: FORMS for vectors, PLAIN for single numbers.
-    """
-    pieces = _cut(graph, forms)
-    pointers = _pointers(graph, form)
+def write(name: str, graph: Graph, form: Form, dialect: Dialect = VECTORS) -> str:
+    """The C function ``name(m, b, t, k)``: memory, adjoint memory, places as (offset, stride) pairs, step."""
+    pieces = _cut(graph, dialect)
+    pointers = _pointers(graph, form, dialect)
     parameters = ", ".join(f"{kind}{pointer}" for kind, pointer, _ in pointers) + ", V *restrict w"
     text = []
     for i, piece in enumerate(pieces):
         lines = piece.statements(graph, form.adds)
         if piece is pieces[-1] and form.clears:
             lines += [
-                f"for (int j = 0; j < {graph.sizes[a]}; j++) i{a}[j] = S(0.0);"
+                f"for (int j = 0; j < {graph.sizes[a]}; j++) {dialect.word.format(f'i{a}', 'j')} = S(0.0);"
                 for a in range(form.primal, len(graph.sizes))
             ]
-        head = f"static {'inline' if len(pieces) == 1 else 'NOINLINE'} void {name}_{i}({parameters})"
+        head = f"{dialect.inline if len(pieces) == 1 else dialect.apart} {name}_{i}({parameters})"
         text.append("\n  ".join([f"{head} {{", "(void)w;", *lines]) + "\n}\n")
-    return "".join([*text, _entry(name, pointers, len(pieces), len(pieces[0].slots))])
+    return "".join([*text, _entry(name, pointers, len(pieces), len(pieces[0].slots), dialect)])
 
 
 @dataclass
@@ -57,13 +55,13 @@ class _Piece:
     Attributes:
         nodes: what it computes, in order.
         slots: the values that a later piece than their own reads, and their words in the buffer between pieces.
-        forms: how operations are written.
+        dialect: how it is written.
         targets: for a node, the words of results that it is.
     """
 
     nodes: list[int]
     slots: dict[int, int]
-    forms: Mapping[str, str]
+    dialect: Dialect
     targets: dict[int, list[str]] = field(default_factory=dict)
 
     def statements(self, graph: Graph, adds: bool) -> list[str]:
@@ -73,7 +71,7 @@ class _Piece:
         for x in self.nodes:
             node = graph.nodes[x]
             operands = [self._use(graph, y, names, lines) for y in node.operands]
-            lines.append(f"const {_type(node.op)} v{x} = {self.forms[node.op].format(*operands)};")
+            lines.append(f"const {_type(node.op)} v{x} = {self.dialect.forms[node.op].format(*operands)};")
             names[x] = f"v{x}"
             if x in self.slots:
                 lines.append(f"w[{self.slots[x]}] = (V)v{x};")
@@ -89,7 +87,8 @@ class _Piece:
         if node.op == "const":
             return literal(node.value)
         if x not in names:
-            source = f"i{node.at[0]}[{node.at[1]}]" if node.op == "input" else f"w[{self.slots[x]}]"
+            given = node.op == "input"
+            source = self.dialect.word.format(f"i{node.at[0]}", node.at[1]) if given else f"w[{self.slots[x]}]"
             names[x] = f"v{x}"
             lines.append(f"const {_type(node.op)} v{x} = ({_type(node.op)}){source};")
         return names[x]
@@ -102,16 +101,19 @@ class _Piece:
             yield f"{target} {'+=' if adds else '='} {value};"
 
 
-def _cut(graph: Graph, forms: Mapping[str, str]) -> list[_Piece]:
+def _cut(graph: Graph, dialect: Dialect) -> list[_Piece]:
     order = [x for x in graph.needed() if graph.nodes[x].op not in ("const", "input")]
     runs = [order[i : i + LONGEST] for i in range(0, len(order), LONGEST)] or [[]]
     home = {x: i for i, run in enumerate(runs) for x in run}
     crossing = sorted({y for x in order for y in graph.nodes[x].operands if home.get(y, home[x]) != home[x]})
     slots = {x: slot for slot, x in enumerate(crossing)}
-    pieces = [_Piece(run, slots, forms) for run in runs]
+    pieces = [_Piece(run, slots, dialect) for run in runs]
+    copied = 0
     for r, result in enumerate(graph.results):
         for word, x in enumerate(result):
-            pieces[home.get(x, -1)].targets.setdefault(x, []).append(f"o{r}[{word}]")
+            if x not in home and (copied := copied + 1) % LONGEST == 0:
+                pieces.append(_Piece([], slots, dialect))
+            pieces[home.get(x, -1)].targets.setdefault(x, []).append(dialect.word.format(f"o{r}", word))
     return pieces
 
 
@@ -119,20 +121,20 @@ def _type(op: str) -> str:
     return "I" if op in MASKS else "V"
 
 
-def _pointers(graph: Graph, form: Form) -> list[tuple[str, str, str]]:
+def _pointers(graph: Graph, form: Form, dialect: Dialect) -> list[tuple[str, str, str]]:
     """(type, name, memory) of every argument and result; adjoints of arguments may coincide, all others may not."""
-    primal = [("const V *", f"i{i}", "m") for i in range(form.primal)]
-    seeds = [("V *restrict ", f"i{i}", "b") for i in range(form.primal, len(graph.sizes))]
-    kind, memory = ("V *", "b") if form.backward else ("V *restrict ", "m")
+    primal = [(dialect.reads, f"i{i}", "m") for i in range(form.primal)]
+    seeds = [(dialect.writes, f"i{i}", "b") for i in range(form.primal, len(graph.sizes))]
+    kind, memory = (dialect.shares, "b") if form.backward else (dialect.writes, "m")
     return [*primal, *seeds, *((kind, f"o{i}", memory) for i in range(len(graph.results)))]
 
 
-def _entry(name: str, pointers: Sequence[tuple[str, str, str]], pieces: int, slots: int) -> str:
+def _entry(name: str, pointers: Sequence[tuple[str, str, str]], pieces: int, slots: int, dialect: Dialect) -> str:
     places = [f"{memory} + t[{2 * i}] + k * t[{2 * i + 1}]" for i, (_, _, memory) in enumerate(pointers)]
     arguments = ", ".join([*places, "w" if slots else "0"])
     lines = [f"V w[{slots}];"] if slots else []
     lines += [f"{name}_{i}({arguments});" for i in range(pieces)]
-    head = f"void {name}(V *m, V *b, const word *t, word k) {{"
+    head = f"{dialect.entry} {name}(V *m, V *b, const word *t, word k) {{"
     return "\n  ".join([head, "(void)b;", *lines]) + "\n}\n"
 
 

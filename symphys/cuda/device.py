@@ -1,0 +1,47 @@
+"""What the launcher of kernels needs of a device."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+from numpy.typing import DTypeLike, NDArray
+
+Array = Any
+"""An array in the memory of the device."""
+Module = Any
+"""Loaded kernels."""
+
+
+class Device(Protocol):
+    """Something that runs CUDA kernels.
+
+    Attributes:
+        name: in words.
+    """
+
+    name: str
+
+    def load(self, texts: Sequence[str]) -> tuple[Module, str, bool, str]:
+        """Kernels from their texts: with the compiler, whether they came from a cache, and a note or nothing."""
+
+    def free(self) -> int:
+        """Bytes that an array can have."""
+
+    def put(self, values: NDArray[Any]) -> Array:
+        """A copy on the device."""
+
+    def empty(self, shape: tuple[int, ...], dtype: DTypeLike) -> Array:
+        """Memory."""
+
+    def address(self, array: Array) -> int:
+        """Of the array's first word."""
+
+    def get(self, array: Array) -> NDArray[Any]:
+        """A copy of an array, once all that was launched is done."""
+
+    def launch(self, module: Module, name: str, blocks: int, threads: tuple[int, int], job: Array) -> None:
+        """Begin to run a kernel of one argument, the address of its job."""
+
+    def wait(self) -> None:
+        """Until all that was launched is done."""

@@ -1,0 +1,109 @@
+"""A program as the device's driver reads it: structures of addresses, and the words they lead to."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.cuda.device import Device
+from symphys.cuda.schedule import Schedule
+from symphys.cuda.source import LANES
+from symphys.kernel.library import TABLES, WORD, List, Source, data_places, strided
+from symphys.kernel.plan import Plan
+from symphys.kernel.program import Program
+
+Words = NDArray[np.int64]
+RANGES = ("z", "knob", "zeroed", "constants", "outputs", "seeded")
+
+
+class Phase(ctypes.Structure):
+    """The driver's ``phase``."""
+
+    _fields_ = (("levels", WORD), ("spans", ctypes.c_void_p), ("entries", ctypes.c_void_p))
+
+
+class DeviceProgram(ctypes.Structure):
+    """The driver's ``program``."""
+
+    _fields_ = (
+        ("size", WORD),
+        ("tape", WORD),
+        ("steps", WORD),
+        *((name, List) for name in RANGES),
+        ("values", ctypes.c_void_p),
+        *((name, Phase) for name in TABLES),
+        ("fading", WORD * 3),
+        ("kept", WORD * 2),
+        ("written", List),
+    )
+
+
+class Job(ctypes.Structure):
+    """The driver's ``job``."""
+
+    _fields_ = (
+        ("program", ctypes.c_void_p),
+        ("memory", ctypes.c_void_p),
+        *((name, WORD) for name in ("rows", "first", "end")),
+        *((name, Source) for name in ("z", "knob", "seed")),
+        *((name, ctypes.c_void_p) for name in ("outputs", "gradient", "trajectory")),
+        *((name, WORD) for name in ("offset", "size", "stride", "count")),
+        ("loss", ctypes.c_double),
+    )
+
+
+class Tables:
+    """A program's data in the memory of a device.
+
+    Attributes:
+        address: of the driver's ``program``.
+        warps: of a block.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        program: Program,
+        planned: Plan,
+        seeded: Sequence[str],
+        phases: Mapping[str, Schedule],
+        warps: int,
+    ) -> None:
+        """Copy everything there."""
+        self.device, self.warps = device, warps
+        data = DeviceProgram(program.size, planned.tape, program.steps)
+        values = [x for _, row in program.constants for x in row]
+        self._kept = [device.put(np.array(values or [0], float))]
+        data.values = device.address(self._kept[0])
+        for name, places in data_places(program, seeded).items():
+            words = np.array([x for place in places for x in (place.offset, place.size)], np.int64)
+            setattr(data, name, List(len(places), self._put(words)))
+        for name, each in phases.items():
+            spans = each.spans.ravel()
+            setattr(data, name, Phase(len(each.spans), self._put(spans), self._put(interleaved(each.entries))))
+        written = [place for call in program.body for place in call.outputs if place.stride]
+        data.written = List(len(written), self._put(strided(written)))
+        if program.fading is not None:
+            state, kept = program.fading.state, program.fading.kept
+            data.fading = (WORD * 3)(state.offset, state.size, state.stride)
+            data.kept = (WORD * 2)(*((kept.offset, kept.stride) if kept else (0, 0)))
+        self._kept.append(device.put(np.frombuffer(bytes(data), np.uint8)))
+        self.address = device.address(self._kept[-1])
+
+    def _put(self, words: Words) -> int:
+        """The address of a copy."""
+        self._kept.append(self.device.put(words if words.size else np.zeros(1, np.int64)))
+        return self.device.address(self._kept[-1])
+
+
+def interleaved(entries: Words) -> Words:
+    """Entries whose offsets and strides count the words of all lanes."""
+    found, at = entries.copy(), 0
+    while at < len(found):
+        length = int(found[at + 1])
+        found[at + 2 : at + length] *= LANES
+        at += length
+    return found
