@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help demo demo-walk test thorough lint typecheck bench bench-contact bench-robots bench-table1 bench-walk bench-lessons gallery clean
+.PHONY: help demo demo-walk test thorough lint typecheck bench bench-contact bench-robots bench-table1 bench-gpu bench-walk bench-lessons gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
@@ -66,6 +66,10 @@ bench-lessons: $(VENV)/.benching  ## solvers on one walk against time, what situ
 bench-table1: $(VENV)/.benching  ## the timing table of Degrave et al. (1 and 128 robots, small and large net), cost against weights
 	$(BIN)/python benchmarks/table1.py
 	$(BIN)/python benchmarks/weights.py build
+
+bench-gpu: $(VENV)/.benching  ## the same on a GPU, with the floors; without one: floors, registers and spills
+	$(BIN)/python -m pip install --quiet --editable '.[cuda]'
+	$(BIN)/python benchmarks/gpu.py
 
 gallery: $(VENV)/.installed  ## make the figures of the README again
 	$(BIN)/symphys solve ball_throw bank_shot sled basket knock putt cart_pole --out build/gallery

@@ -13,9 +13,11 @@ from typing import Any, Literal
 import casadi as ca
 import numpy as np
 
+from symphys.cuda import compile_on, find_gpu
 from symphys.kernel import (
     Cache,
     Call,
+    Kernel,
     KernelUnavailable,
     Layout,
     ProcessorKernel,
@@ -65,6 +67,7 @@ def examine() -> Iterator[Finding]:
     yield _tried("cache", _cache)
     compiler = _tried("compiler", _compiler)
     yield compiler
+    yield _tried("gpu", _gpu)
     if compiler.state == "ok":
         yield from _kernels()
     else:
@@ -173,6 +176,15 @@ def pendulum() -> Program:
     return Program(at.size, state.still(), at.take(0), STEPS, {"cost": total}, body=body, zeroed=(total,))
 
 
+def _gpu() -> str:
+    try:
+        device = find_gpu()
+        kernel = compile_on(device, pendulum())
+    except KernelUnavailable as error:
+        raise _Missing(f"{error}; --backend cuda is the processor then") from error
+    return f"{device.name}: values are {_values(kernel)}; its gradient {_gradient(kernel)}"
+
+
 def _cold(program: Program, cache: Cache, built: list[ProcessorKernel]) -> str:
     try:
         kernel = compile_program(program, cache=cache, threads=1)
@@ -182,13 +194,13 @@ def _cold(program: Program, cache: Cache, built: list[ProcessorKernel]) -> str:
     return f"a tiny one in {kernel.report.seconds:.2f} s, {kernel.report.lanes} lanes"
 
 
-def _values(kernel: ProcessorKernel) -> str:
+def _values(kernel: Kernel) -> str:
     mine, casadi = kernel.forward(Z)["cost"][0, 0], interpret(kernel.program, Z)["cost"][0]
     _require(mine, casadi, CLOSE)
     return "those of casadi" + (", to the bit" if mine == casadi else "")
 
 
-def _gradient(kernel: ProcessorKernel) -> str:
+def _gradient(kernel: Kernel) -> str:
     step = 1e-5 * np.eye(2)
     ahead, behind = ([interpret(kernel.program, Z + row)["cost"][0] for row in sign * step] for sign in (1, -1))
     _require(kernel.gradient(Z, [1.0])[1][0], (np.array(ahead) - np.array(behind)) / 2e-5, 1e-6)

@@ -15,14 +15,14 @@ import pytest
 from numpy.typing import DTypeLike, NDArray
 
 ROOM = Path(__file__).parent / "cuda"
-FLAGS = ("-std=c++17", "-O1", "-fPIC", "-w", "-ffp-contract=off", "-fno-math-errno")
+FLAGS = ("-std=c++17", "-O0", "-fPIC", "-w", "-ffp-contract=off", "-fno-math-errno")
 needs_compiler = pytest.mark.skipif(shutil.which("g++") is None, reason="no C++ compiler stands in for CUDA's")
 
 
 class Emulated:
     """See ``symphys.cuda.Device``; ``backwards``: threads take their turns from the last to the first."""
 
-    name = "this processor"
+    name, lanes = "this processor", 4
 
     def __init__(self, folder: Path, backwards: bool = False, room: int = 2**33) -> None:
         """``folder``: for what is compiled; ``room``: bytes that an array can have."""

@@ -1,10 +1,24 @@
-"""What evaluates a shooting problem: casadi's virtual machine, casadi's C, or a kernel of SIMD lanes.
+"""What evaluates a shooting problem: casadi's virtual machine, casadi's C, or a kernel, on the processor or on a GPU.
 
-One file a backend; ``choose`` takes the one that is asked for, or the best that this machine has. A backend for GPUs
-belongs into ``cuda.py``, beside the others.
+``choose`` takes the one that is asked for, or the best that this machine has.
 """
 
 from symphys.backends.choose import BACKENDS, BEST, NAMES, choose
 from symphys.backends.interface import Backend, Description, Functions, Source
+from symphys.backends.kernels import IN_PLACE, PRECISIONS, build_kernel
+from symphys.backends.simd import described
 
-__all__ = ["BACKENDS", "BEST", "NAMES", "Backend", "Description", "Functions", "Source", "choose"]
+__all__ = [
+    "BACKENDS",
+    "BEST",
+    "IN_PLACE",
+    "NAMES",
+    "PRECISIONS",
+    "Backend",
+    "Description",
+    "Functions",
+    "Source",
+    "build_kernel",
+    "choose",
+    "described",
+]

@@ -4,30 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from symphys.backends.c_ import c
 from symphys.backends.casadi_ import casadi
 from symphys.backends.interface import Backend, Source
-from symphys.backends.simd import simd, simd32
+from symphys.backends.kernels import IN_PLACE, PRECISIONS
+from symphys.backends.simd import by_kernel
 from symphys.kernel import KernelUnavailable, ProgramError, processors
 
-BACKENDS: dict[str, Callable[[Source, int], Backend]] = {"simd": simd, "simd32": simd32, "c": c, "casadi": casadi}
+BACKENDS: dict[str, Callable[[Source, int], Backend]] = {
+    **{name: partial(by_kernel, name=name) for name in PRECISIONS},
+    "c": c,
+    "casadi": casadi,
+}
 BEST = "auto"
 NAMES = (BEST, *BACKENDS)
 
 
 def choose(name: str, source: Source, threads: int | None = None) -> Backend:
-    """The backend of this name for a problem; one that cannot be built here gives way to casadi, and its note says why.
+    """The backend of this name for a problem; where it cannot be built another evaluates, and its note says why.
 
     Args:
-        name: one of NAMES; "auto" is the fastest, simd.
+        name: one of NAMES; "auto" is the fastest on a processor, simd.
         source: the problem.
         threads: that share a batch; None: one for each processor.
     """
-    count = processors() if threads is None else threads
+    count, wanted = processors() if threads is None else threads, "simd" if name == BEST else name
     try:
-        return BACKENDS["simd" if name == BEST else name](source, count)
+        return BACKENDS[wanted](source, count)
     except (KernelUnavailable, ProgramError) as error:
-        note = f"casadi's virtual machine evaluates, which is slower: {error}"
-        backend = casadi(source, count)
-        return replace(backend, description=replace(backend.description, note=note))
+        if wanted in IN_PLACE:
+            backend, note = choose(IN_PLACE[wanted], source, threads), f"the processor evaluates: {error}"
+        else:
+            backend, note = casadi(source, count), f"casadi's virtual machine evaluates, which is slower: {error}"
+        notes = "; ".join(filter(None, [note, backend.description.note]))
+        return replace(backend, description=replace(backend.description, note=notes))

@@ -1,19 +1,19 @@
-"""Kernels of SIMD lanes: a rollout in each lane, derivatives by adjoints, Jacobians by a lane for each seed."""
+"""Kernels: a rollout in each lane or thread, derivatives by adjoints, Jacobians by a lane for each seed."""
 
 from __future__ import annotations
 
 import time
-from typing import Literal
 
 import numpy as np
 
 from symphys.backends.casadi_ import squared
 from symphys.backends.external import external_nlp
 from symphys.backends.interface import Backend, Description, Source
+from symphys.backends.kernels import build_kernel
 from symphys.backends.seeds import Seeds
-from symphys.kernel import Kernel, KernelUnavailable, compile_program
+from symphys.kernel import Kernel, KernelUnavailable, ProcessorKernel
 from symphys.kernel.kernel import Outputs
-from symphys.shooting import Array, Values
+from symphys.shooting import Array, Nlp, Values
 
 SEEDED = ("merit", "objective", "residuals", "constraints")
 
@@ -73,37 +73,38 @@ def common(outputs: Outputs) -> tuple[Array, Array, Array, Array]:
     return merit[:, 0], outputs["objective"][:, 0], outputs.get("errors", none), outputs.get("outputs", none)
 
 
-def simd32(source: Source, threads: int) -> Backend:
-    """The same in single precision: twice the lanes; gradients agree with double precision to 1e-6 to 1e-4."""
-    return simd(source, threads, "single")
-
-
-def simd(source: Source, threads: int, precision: Literal["double", "single"] = "double") -> Backend:
-    """Compile the problem's program; KernelUnavailable if that cannot be. ``threads`` share the blocks of a batch."""
+def by_kernel(source: Source, threads: int, name: str) -> Backend:
+    """Compile the problem's program for a backend of ``PRECISIONS``; KernelUnavailable if that cannot be."""
     if source.program is None:
         raise KernelUnavailable("this problem has no program to compile")
     began = time.perf_counter()
     program = source.program()
-    seeded = [name for name in SEEDED if name in program.outputs]
-    kernel = compile_program(program, seeded=seeded, threads=threads, precision=precision)
+    kernel = build_kernel(name, program, [name for name in SEEDED if name in program.outputs], threads)
     rows = {
-        name: Seeds.compressed(kernel, name, function, index)
-        for name, function, index in (
+        output: Seeds.compressed(kernel, output, function, index)
+        for output, function, index in (
             ("residuals", source.functions.residuals, 0),
             ("constraints", source.functions.nlp, 1),
         )
-        if name in program.outputs
+        if output in program.outputs
     }
-    nlp = external_nlp(kernel, source.functions.nlp, rows.get("constraints"))
-    report, spent = kernel.report, time.perf_counter() - began
-    told = Description(
-        "simd" if precision == "double" else "simd32",
+    nlp = Nlp(source.functions.nlp)
+    if isinstance(kernel, ProcessorKernel):
+        nlp = external_nlp(kernel, source.functions.nlp, rows.get("constraints"))
+    evaluator = KernelEvaluator(kernel, rows.get("residuals"), source.exact)
+    return Backend(described(name, kernel, time.perf_counter() - began), evaluator, nlp)
+
+
+def described(name: str, kernel: Kernel, seconds: float, note: str = "") -> Description:
+    """A kernel for results."""
+    report = kernel.report
+    return Description(
+        name,
         report.lanes,
-        threads,
+        kernel.threads,
         report.precision,
         report.compiler,
         report.cached,
-        spent,
-        report.note,
+        seconds,
+        report.note or note,
     )
-    return Backend(told, KernelEvaluator(kernel, rows.get("residuals"), source.exact), nlp)

@@ -41,9 +41,9 @@ def backend_option(command: F) -> F:
         "--backend",
         default="auto",
         show_default=True,
-        metavar="auto|casadi|c|simd|simd32",
-        help="What evaluates: SIMD kernels (simd32: in single precision), casadi's C (all need a C compiler), or "
-        "casadi's virtual machine.",
+        metavar="auto|casadi|c|simd|simd32|cuda|cuda32",
+        help="What evaluates: SIMD kernels (simd32: in single precision), casadi's C (all need a C compiler), a GPU "
+        "(cuda32: in single precision; needs the extra symphys[cuda]), or casadi's virtual machine.",
     )(command)
 
 

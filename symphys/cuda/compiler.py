@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from symphys.kernel.cache import Cache
+from symphys.kernel.cache import KINDS, Cache
 from symphys.kernel.compiler import processors
 from symphys.kernel.errors import KernelUnavailable
 
@@ -40,7 +40,7 @@ def image(texts: Sequence[str], architecture: str, cache: Cache, folder: Path) -
     """Linked texts for an architecture such as "sm_90", from the cache or compiled; ``folder`` if the cache refuses."""
     nvrtc, _ = _libraries()
     version = "nvrtc {}.{}".format(*_checked(nvrtc, nvrtc.nvrtcVersion()))
-    own = replace(cache, suffix=".cubin")
+    own = replace(cache, suffix=KINDS[1])
     key = hashlib.sha256("\0".join([*texts, version, architecture, *FLAGS]).encode()).hexdigest()[:32]
     if (path := own.find(key)) is not None:
         return Image(path, version, cached=True)

@@ -18,9 +18,11 @@ class Device(Protocol):
 
     Attributes:
         name: in words.
+        lanes: threads of a warp, which are the robots of a block.
     """
 
     name: str
+    lanes: int
 
     def load(self, texts: Sequence[str]) -> tuple[Module, str, bool, str]:
         """Kernels from their texts: with the compiler, whether they came from a cache, and a note or nothing."""

@@ -26,7 +26,7 @@ class Gpu:
         """Use ``find_gpu``."""
         self.cupy, self.cache = cupy, cache
         properties = cupy.cuda.runtime.getDeviceProperties(cupy.cuda.runtime.getDevice())
-        self.name = properties["name"].decode()
+        self.name, self.lanes = properties["name"].decode(), int(properties["warpSize"])
         self.architecture = f"sm_{properties['major']}{properties['minor']}"
 
     @cached_property

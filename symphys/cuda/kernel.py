@@ -10,7 +10,7 @@ import numpy as np
 
 from symphys.cuda.device import Device
 from symphys.cuda.schedule import schedules
-from symphys.cuda.source import LANES, device_sources
+from symphys.cuda.source import device_sources
 from symphys.cuda.tables import Job, Tables
 from symphys.kernel.batch import Batch
 from symphys.kernel.build import names_of
@@ -42,21 +42,24 @@ class DeviceKernel(Kernel):
         self._blocks = 0
 
     def _run(self, batch: Batch) -> None:
-        wave = LANES * self._room(-(-batch.rows // LANES))
+        lanes = self.device.lanes
+        wave = lanes * self._room(-(-batch.rows // lanes))
         for start in range(0, batch.rows, wave):
             self._wave(batch, start, min(start + wave, batch.rows))
 
     def _room(self, wanted: int) -> int:
         """Blocks of a wave, at most as many as are wanted, in memory that is kept."""
         if wanted > self._blocks:
-            each, self._memory = LANES * self.report.bytes_per_lane, None  # before the device is asked what is free
-            found = min(wanted, self.device.free() // each)
+            self._memory = None  # before the device is asked what is free
+            device = self.device
+            free, each = device.free(), device.lanes * self.report.bytes_per_lane
+            found = min(wanted, free // each)
             if not found:
                 raise KernelUnavailable(
-                    f"{self.device.name} has {self.device.free() / 2**30:.1f} GiB free, and {LANES} rollouts take "
+                    f"{device.name} has {free / 2**30:.1f} GiB free, and {device.lanes} rollouts take "
                     f"{each / 2**30:.1f} GiB"
                 )
-            self._memory, self._blocks = self.device.empty((found * each // self.real.itemsize,), self.real), found
+            self._memory, self._blocks = device.empty((found * each // self.real.itemsize,), self.real), found
         return min(wanted, self._blocks)
 
     def _wave(self, batch: Batch, start: int, end: int) -> None:
@@ -74,7 +77,7 @@ class DeviceKernel(Kernel):
         job.loss = batch.loss
         for name, first, last in self._phases(self.program.steps - batch.spared, "gradient" in results):
             job.first, job.end = first, last
-            self._launch(name, -(-rows // LANES), job)
+            self._launch(name, -(-rows // device.lanes), job)
         for name, array in results.items():
             batch.results[name][start:end] = device.get(array)
 
@@ -94,7 +97,7 @@ class DeviceKernel(Kernel):
 
     def _launch(self, name: str, blocks: int, job: Job) -> None:
         held = self.device.put(np.frombuffer(bytes(job), np.uint8))
-        self.device.launch(self.module, name, blocks, (LANES, self.tables.warps), held)
+        self.device.launch(self.module, name, blocks, (self.device.lanes, self.tables.warps), held)
         self.device.wait()
 
 
@@ -120,12 +123,12 @@ def compile_on(
     began, single = time.perf_counter(), precision == "single"
     names = names_of(program, seeded)
     planned = plan(program, names, FAST_MEMORY)  # without a tape: memory is what a device waits for
-    texts = device_sources(planned, warps, single)
+    texts = device_sources(planned, device.lanes, warps, single)
     module, compiler, cached, note = device.load(texts)
     report = Report(
         compiler=compiler,
         flags=(),
-        lanes=LANES,
+        lanes=device.lanes,
         precision=precision,
         functions=len(planned.functions),
         operations=sum(len(graph.nodes) for graph, _ in planned.functions),

@@ -13,15 +13,13 @@ from symphys.kernel.source import spread
 from symphys.kernel.writer import write
 
 ROOM = "symphys.cuda"
-LANES = 32
-"""Robots of a block: the threads of a warp."""
 FILES = 24
 SIGNATURE = "(V *m, V *b, const word *t, word k)"
 
 
-def device_sources(planned: Plan, warps: int, single: bool) -> list[str]:
-    """The texts of a plan's kernels, for blocks of so many warps; the last one is the driver's."""
-    head = f"#define LANES {LANES}\n#define WARPS {warps}\n#define SINGLE {int(single)}\n{resource('device.h')}"
+def device_sources(planned: Plan, lanes: int, warps: int, single: bool) -> list[str]:
+    """The texts of a plan's kernels, for blocks of so many robots and warps; the last one is the driver's."""
+    head = f"#define LANES {lanes}\n#define WARPS {warps}\n#define SINGLE {int(single)}\n{resource('device.h')}"
     texts = [write(f"f{number}", graph, form, DEVICE) for number, (graph, form) in enumerate(planned.functions)]
     work = [len(graph.nodes) for graph, _ in planned.functions]
     names = [f"f{number}" for number in range(len(texts))]

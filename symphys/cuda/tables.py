@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from symphys.cuda.device import Device
 from symphys.cuda.schedule import Schedule
-from symphys.cuda.source import LANES
 from symphys.kernel.library import TABLES, WORD, List, Source, data_places, strided
 from symphys.kernel.plan import Plan
 from symphys.kernel.program import Program
@@ -82,8 +81,8 @@ class Tables:
             words = np.array([x for place in places for x in (place.offset, place.size)], np.int64)
             setattr(data, name, List(len(places), self._put(words)))
         for name, each in phases.items():
-            spans = each.spans.ravel()
-            setattr(data, name, Phase(len(each.spans), self._put(spans), self._put(interleaved(each.entries))))
+            spans, entries = self._put(each.spans.ravel()), self._put(interleaved(each.entries, device.lanes))
+            setattr(data, name, Phase(len(each.spans), spans, entries))
         written = [place for call in program.body for place in call.outputs if place.stride]
         data.written = List(len(written), self._put(strided(written)))
         if program.fading is not None:
@@ -99,11 +98,11 @@ class Tables:
         return self.device.address(self._kept[-1])
 
 
-def interleaved(entries: Words) -> Words:
+def interleaved(entries: Words, lanes: int) -> Words:
     """Entries whose offsets and strides count the words of all lanes."""
     found, at = entries.copy(), 0
     while at < len(found):
         length = int(found[at + 1])
-        found[at + 2 : at + length] *= LANES
+        found[at + 2 : at + length] *= lanes
         at += length
     return found

@@ -20,6 +20,8 @@ from symphys.kernel.errors import KernelUnavailable
 
 LIMIT = 512 * 2**20
 """Bytes that the kernels may take together; those not used for longest go first."""
+KINDS = (".so", ".cubin")
+"""Endings of kernels for processors and for devices."""
 LEFT = 3600.0
 """Seconds after which an unfinished file belongs to a process that was killed."""
 
@@ -36,11 +38,11 @@ class CacheInfo:
 
 @dataclass(frozen=True)
 class Cache:
-    """A folder of kernels of one kind, those for processors or those for devices, of at most ``limit`` bytes."""
+    """A folder of kernels, of at most ``limit`` bytes; finds and stores those of one of KINDS, its ``suffix``."""
 
     folder: Path
     limit: int = LIMIT
-    suffix: str = ".so"
+    suffix: str = KINDS[0]
 
     def find(self, key: str) -> Path | None:
         """The kernel of this key; None if there is none or if it is damaged."""
@@ -119,7 +121,7 @@ class Cache:
     def _entries(self) -> list[tuple[float, int, Path]]:
         """(time of last use, bytes, path) of each kernel, oldest first."""
         found = []
-        for path in self._files(f"*{self.suffix}"):
+        for path in (path for kind in KINDS for path in self._files(f"*{kind}")):
             with contextlib.suppress(OSError):
                 status = path.stat()
                 found.append((status.st_mtime, status.st_size, path))

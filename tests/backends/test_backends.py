@@ -173,7 +173,7 @@ def test_a_compiler_that_fails_is_no_obstacle_either(monkeypatch: pytest.MonkeyP
 
 
 def test_names() -> None:
-    assert set(NAMES) == {"auto", "casadi", "c", "simd", "simd32"}
+    assert set(NAMES) == {"auto", "casadi", "c", "simd", "simd32", "cuda", "cuda32"}
 
 
 def test_an_exact_kernel_refuses_smoothing() -> None:

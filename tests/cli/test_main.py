@@ -240,4 +240,4 @@ def test_the_help_names_every_backend(run: Run) -> None:
     from symphys.backends import NAMES
 
     _, out, _ = run("solve", "--help")
-    assert "|".join(sorted(NAMES, key=["auto", "casadi", "c", "simd", "simd32"].index)) in out
+    assert "|".join(sorted(NAMES, key=["auto", "casadi", "c", "simd", "simd32", "cuda", "cuda32"].index)) in out

@@ -70,6 +70,8 @@ def importers(wanted: str) -> set[str]:
         ("click", {"cli"}),
         ("rich", {"cli"}),
         ("cma", {"solvers"}),
+        ("cupy", {"cuda"}),
+        ("cuda", {"cuda"}),
     ],
 )
 def test_only_these_rooms_import(wanted: str, allowed: set[str]) -> None:
@@ -91,16 +93,23 @@ def test_kernels_know_no_physics(name: str, path: Path) -> None:
         assert not target.startswith("symphys") or room(target) in {"kernel", "errors"}, target
 
 
+@pytest.mark.parametrize(("name", "path"), [pair for pair in modules() if room(pair[0]) == "cuda"])
+def test_devices_see_kernels_alone(name: str, path: Path) -> None:
+    for target in imported(path):
+        assert target.split(".")[0] in RUNTIME | {"numpy", "cupy", "cuda", "symphys"}, target
+        assert not target.startswith("symphys") or room(target) in {"cuda", "kernel"}, target
+
+
 @pytest.mark.parametrize(("name", "path"), [pair for pair in modules() if room(pair[0]) == "backends"])
 def test_backends_see_kernels_and_the_shooting_problem_alone(name: str, path: Path) -> None:
     for target in imported(path):
         assert target.split(".")[0] in RUNTIME | {"casadi", "numpy", "symphys"}, target
-        assert not target.startswith("symphys") or room(target) in {"backends", "kernel", "shooting"}, target
+        assert not target.startswith("symphys") or room(target) in {"backends", "cuda", "kernel", "shooting"}, target
 
 
 @pytest.mark.parametrize(("name", "path"), [pair for pair in modules() if room(pair[0]) == "doctor"])
 def test_the_doctor_sees_kernels_alone(name: str, path: Path) -> None:
-    assert {room(target) for target in imported(path) if target.split(".")[0] == "symphys"} <= {"kernel"}
+    assert {room(target) for target in imported(path) if target.split(".")[0] == "symphys"} <= {"cuda", "kernel"}
 
 
 @pytest.mark.parametrize(("name", "path"), [pair for pair in modules() if room(pair[0]) == "export"])

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from emulated import Emulated, needs_compiler
 from numpy.typing import NDArray
 
 from symphys.errors import ProblemError
@@ -199,6 +200,23 @@ def test_single_precision_of_nets(both: tuple[Transcription, LargeTranscription]
     assert a.gradient is not None and b.gradient is not None
     assert np.allclose(a.gradient, b.gradient, atol=1e-4 * np.abs(a.gradient).max())
     assert not np.array_equal(a.gradient, b.gradient)
+
+
+@needs_compiler
+@pytest.mark.parametrize("both", ["skip = true"], indirect=True)
+def test_nets_on_a_device(
+    both: tuple[Transcription, LargeTranscription], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Steps by a device's kernel, products by its library: the same numbers."""
+    monkeypatch.setattr("symphys.cuda.find_gpu", lambda: Emulated(tmp_path))
+    beside = both[1]
+    there = transcribe(beside.problem, backend="cuda")
+    assert (there.backend.name, there.backend.note) == ("cuda", "nets by matrix products")
+    Z = points(beside)
+    a, b = (made.shooting.evaluator.gradient(Z, 0.0) for made in (beside, there))
+    assert a.gradient is not None and b.gradient is not None
+    assert np.array_equal(a.merit, b.merit)
+    assert np.allclose(a.gradient, b.gradient, rtol=0, atol=1e-11 * np.abs(a.gradient).max())
 
 
 def test_what_large_nets_cannot_have(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.cuda import Device
 from symphys.shooting import Values, WithoutResiduals
 from symphys.transcription.large.layers import Layers
 from symphys.transcription.large.made import Made, Stage
@@ -43,9 +44,11 @@ class Shared:
 class LargeEvaluator(WithoutResiduals):
     """See ``Evaluator``; and ``shared`` for robots that share their weights."""
 
-    def __init__(self, made: Made, stage: Stage, threads: int, real: Any = np.float64) -> None:
-        """``threads`` share the robots of a call; ``real``: precision of the nets, numpy.float64 or float32."""
-        self.made, self.stage, self.threads, self.real = made, stage, threads, real
+    def __init__(
+        self, made: Made, stage: Stage, threads: int, real: Any = np.float64, device: Device | None = None
+    ) -> None:
+        """``threads`` share the robots of a call; the nets have their precision, ``real``, and may be on a device."""
+        self.made, self.stage, self.threads, self.real, self.device = made, stage, threads, real, device
 
     def shared(self, weights: Sequence[Array], Z: Array, smoothing: float = 0.0, gradient: bool = False) -> Shared:
         """Roll out robots.
@@ -81,7 +84,9 @@ class LargeEvaluator(WithoutResiduals):
         return self._nets([own.at(z) for own in self.made.split.weights])
 
     def _nets(self, weights: Sequence[Array]) -> list[Layers]:
-        return [Layers(law, own, self.real) for law, own in zip(self.made.split.laws, weights, strict=True)]
+        return [
+            Layers(law, own, self.real, self.device) for law, own in zip(self.made.split.laws, weights, strict=True)
+        ]
 
     def _part(self, nets: Sequence[Layers], Z: Array, smoothing: float, gradient: bool) -> Shared:
         way = forward(self.made, self.stage, nets, Z, smoothing)

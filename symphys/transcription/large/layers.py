@@ -1,4 +1,7 @@
-"""A net over a batch: forwards, backwards, and the gradient of its weights as one product for many steps."""
+"""A net over a batch: forwards, backwards, and the gradient of its weights as one product for many steps.
+
+Arrays of a device know numpy's functions.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ from numpy.typing import NDArray
 
 from symphys.controllers import Net
 from symphys.controllers.net import Activation
+from symphys.cuda import Device
 
 Array = NDArray[Any]
 
@@ -17,17 +21,29 @@ Array = NDArray[Any]
 class Layers:
     """A net with its weights in one precision; the arrays of a layer's values end in its width."""
 
-    def __init__(self, net: Net, weights: Array, real: Any) -> None:
-        """``real``: numpy.float64 or float32."""
-        self.net, self.real, self.layers = net, real, tuple(net.layers())
-        weights = weights.astype(real)
+    def __init__(self, net: Net, weights: Array, real: Any, device: Device | None = None) -> None:
+        """``real``: numpy.float64 or float32; ``device``: where products are computed; None: here."""
+        self.net, self.real, self.device, self.layers = net, real, device, tuple(net.layers())
+        weights = self.put(weights)
         self.matrices = [weights[layer.matrix].reshape(layer.outputs, layer.inputs) for layer in self.layers]
         self.biases = [weights[layer.biases] for layer in self.layers]
         self.straight = weights[net.straight].reshape(net.outputs, net.senses) if net.skip else None
 
-    def forward(self, sensed: Array) -> list[Array]:
-        """(..., n) -> what is sensed, then the values of every layer, of the last one before ``skip`` is added."""
-        values = [np.asarray(sensed, self.real)]
+    def put(self, values: Array) -> Any:
+        """Numbers in this precision, where products are computed."""
+        own = np.asarray(values, self.real)
+        return own if self.device is None else self.device.put(own)
+
+    def get(self, values: Any) -> Array:
+        """Numbers here."""
+        return np.asarray(values if self.device is None else self.device.get(values))
+
+    def forward(self, sensed: Array) -> list[Any]:
+        """(..., n) -> what is sensed, then the values of every layer, of the last one before ``skip`` is added.
+
+        They stay where they are computed, as all that is handed on between the methods does.
+        """
+        values = [self.put(sensed)]
         for layer, matrix, bias in zip(self.layers, self.matrices, self.biases, strict=True):
             raw = values[-1] @ matrix.T
             if bias.size:
@@ -35,11 +51,11 @@ class Layers:
             values.append(activate(layer.activation, raw))
         return values
 
-    def outputs(self, values: Sequence[Array]) -> Array:
+    def outputs(self, values: Sequence[Any]) -> Array:
         """(..., m) from the values of ``forward``."""
-        return values[-1] if self.straight is None else values[-1] + values[0] @ self.straight.T
+        return self.get(values[-1] if self.straight is None else values[-1] + values[0] @ self.straight.T)
 
-    def pull(self, values: Sequence[Array], adjoint: Array) -> tuple[Array, list[Array]]:
+    def pull(self, values: Sequence[Any], adjoint: Array) -> tuple[Array, list[Any]]:
         """Backwards through the net.
 
         Args:
@@ -49,7 +65,7 @@ class Layers:
         Returns:
             The adjoint (..., n) of what is sensed, and those of every layer before its activation.
         """
-        back = np.asarray(adjoint, self.real)
+        back = self.put(adjoint)
         sensed = 0.0 if self.straight is None else back @ self.straight
         deltas = []
         for layer, matrix, value in zip(
@@ -57,9 +73,9 @@ class Layers:
         ):
             deltas.append(back * slope(layer.activation, value))
             back = deltas[-1] @ matrix
-        return back + sensed, deltas[::-1]
+        return self.get(back + sensed), deltas[::-1]
 
-    def gradient(self, values: Sequence[Array], deltas: Sequence[Array], adjoint: Array) -> Array:
+    def gradient(self, values: Sequence[Any], deltas: Sequence[Any], adjoint: Array) -> Array:
         """(w,) of all weights: a product a layer over all that lies in the leading axes (..., width)."""
         flat = [value.reshape(-1, value.shape[-1]) for value in values]
         parts = []
@@ -69,18 +85,18 @@ class Layers:
             if self.net.biases:
                 parts.append(rows.sum(axis=0))
         if self.straight is not None:
-            parts.append((np.asarray(adjoint, self.real).reshape(-1, self.net.outputs).T @ flat[0]).ravel())
-        return np.concatenate(parts).astype(float)
+            parts.append((self.put(adjoint).reshape(-1, self.net.outputs).T @ flat[0]).ravel())
+        return self.get(np.concatenate(parts)).astype(float)
 
 
-def activate(activation: Activation, raw: Array) -> Array:
+def activate(activation: Activation, raw: Any) -> Any:
     """The activation of every number; ``raw`` may be written over."""
     if activation == "tanh":
         return np.tanh(raw, out=raw)
     return np.maximum(raw, 0, out=raw) if activation == "relu" else raw
 
 
-def slope(activation: Activation, value: Array) -> Array | float:
+def slope(activation: Activation, value: Any) -> Any:
     """Of an activation where its value is this."""
     if activation == "tanh":
         return 1 - value * value

@@ -11,7 +11,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.kernel import Kernel, compile_program
+from symphys.backends import build_kernel
+from symphys.kernel import Kernel
 from symphys.problem import Problem
 from symphys.transcription.along import Rollout
 from symphys.transcription.large.plain import PlainStage
@@ -90,11 +91,11 @@ class Made:
         """The step on casadi's virtual machine."""
         return PlainStage(self.rollout, self.aims, self.sensors)
 
-    def compiled(self, exact: bool) -> KernelStage:
-        """The step as a kernel, of one thread; KernelUnavailable if that cannot be."""
+    def compiled(self, exact: bool, backend: str) -> KernelStage:
+        """The step as a kernel of a backend, of one thread; KernelUnavailable if that cannot be."""
         program = stage_program(self.rollout, self.aims, self.sensors, exact)
         seeded = [name for name in RESULTS if name in program.outputs]
-        return KernelStage(compile_program(program, seeded=seeded, threads=1))
+        return KernelStage(build_kernel(backend, program, seeded, threads=1))
 
 
 def make(problem: Problem) -> Made:

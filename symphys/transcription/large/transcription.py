@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.backends import BEST, Description
+from symphys.backends import BEST, IN_PLACE, PRECISIONS, Description, described
+from symphys.cuda import DeviceKernel
 from symphys.kernel import KernelUnavailable, ProgramError, processors
 from symphys.problem import Problem
 from symphys.shooting import Nlp, ShootingProblem
@@ -30,6 +31,7 @@ from symphys.transcription.transcription import Transcription, fastest
 
 Array = NDArray[np.float64]
 PLAIN = ("casadi", "c")
+REALS = {"double": np.float64, "single": np.float32}
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,28 +118,35 @@ def transcribe_large(
 
 
 def _evaluator(made: Made, exact: bool, backend: str, threads: int) -> tuple[LargeEvaluator, Description]:
-    """The evaluator that is asked for, or casadi's with a note."""
-    note, began = "", perf_counter()
-    if backend not in PLAIN:
+    """The evaluator that is asked for, or another with a note. Steps are in double precision always."""
+    began, name, note = perf_counter(), "simd" if backend == BEST else backend, ""
+    if name in PLAIN:
+        return LargeEvaluator(made, made.plain, threads), Description("casadi", threads=threads)
+    if name in IN_PLACE:
         try:
-            stage = made.compiled(exact)
-        except (KernelUnavailable, ProgramError) as error:
-            note = f"casadi's virtual machine evaluates, which is slower: {error}"
-        else:
-            real = np.float32 if backend == "simd32" else np.float64
-            return LargeEvaluator(made, stage, threads, real), _description(stage, backend, threads, began)
-    return LargeEvaluator(made, made.plain, threads), Description("casadi", threads=threads, note=note)
+            return _on_device(made, exact, name, began)
+        except KernelUnavailable as error:
+            name, note = IN_PLACE[name], f"the processor evaluates: {error}"
+    try:
+        stage = made.compiled(exact, "simd")
+    except (KernelUnavailable, ProgramError) as error:
+        note = f"casadi's virtual machine evaluates, which is slower: {error}"
+        return LargeEvaluator(made, made.plain, threads), Description("casadi", threads=threads, note=note)
+    evaluator = LargeEvaluator(made, stage, threads, REALS[PRECISIONS[name]])
+    return evaluator, _description(stage, name, threads, began, note)
 
 
-def _description(stage: KernelStage, backend: str, threads: int, began: float) -> Description:
-    report, single = stage.kernel.report, backend == "simd32"
-    return Description(
-        "simd32" if single else "simd",
-        report.lanes,
-        threads,
-        "single" if single else "double",
-        report.compiler,
-        report.cached,
-        perf_counter() - began,
-        "nets by matrix products" + (" in single precision, steps in double" if single else ""),
-    )
+def _on_device(made: Made, exact: bool, name: str, began: float) -> tuple[LargeEvaluator, Description]:
+    """Steps and products on a GPU."""
+    stage = made.compiled(exact, "cuda")
+    assert isinstance(stage.kernel, DeviceKernel)
+    evaluator = LargeEvaluator(made, stage, 1, REALS[PRECISIONS[name]], stage.kernel.device)
+    return evaluator, _description(stage, name, 1, began, "")
+
+
+def _description(stage: KernelStage, name: str, threads: int, began: float, note: str) -> Description:
+    single = PRECISIONS[name] == "single"
+    nets = "nets by matrix products" + (" in single precision, steps in double" if single else "")
+    told = described(name, stage.kernel, perf_counter() - began)
+    notes = "; ".join(filter(None, [note, nets, told.note]))
+    return replace(told, threads=threads, precision=PRECISIONS[name], note=notes)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 from time import perf_counter
-from typing import Literal
 
-from symphys.backends import BEST, Description
-from symphys.kernel import Kernel, KernelUnavailable, ProgramError, compile_program, processors
+from symphys.backends import BEST, IN_PLACE, PRECISIONS, build_kernel, described
+from symphys.kernel import Kernel, KernelUnavailable, ProgramError, processors
 from symphys.problem import Problem
 from symphys.shooting import Nlp
 from symphys.transcription.along import symbolic_rollout
@@ -16,8 +15,6 @@ from symphys.transcription.situations.evaluator import KernelSituations, Nominal
 from symphys.transcription.situations.sampler import Sampler
 from symphys.transcription.transcription import Transcription
 
-Precision = Literal["double", "single"]
-KERNELS = {BEST: "double", "simd": "double", "simd32": "single"}
 WITHOUT = "there is no evaluation in other situations"
 
 
@@ -28,38 +25,42 @@ def with_situations(
 
     Where there can be no kernels it stays as it is, and its backend's note says so.
     """
-    began = perf_counter()
+    began, wanted = perf_counter(), "simd" if backend == BEST else backend
     try:
-        if backend not in KERNELS:
-            raise KernelUnavailable(f"the backend {backend} has no situations")
-        situations = _situations(problem, exact, backend, processors() if threads is None else threads)
+        if wanted not in PRECISIONS:
+            raise KernelUnavailable(f"the backend {wanted} has no situations")
+        wanted, situations, why = _built(problem, exact, wanted, processors() if threads is None else threads)
     except (KernelUnavailable, ProgramError) as error:
         told = replace(plain.backend, note=f"{WITHOUT}: {error}")
         return replace(plain, problem=problem, backend=told)
     shooting = replace(
         plain.shooting, evaluator=NominalEvaluator(situations), situations=situations, squares=False, nlp=Nlp(None)
     )
-    told = _description(situations.kernels, perf_counter() - began)
-    return replace(plain, problem=problem, shooting=shooting, backend=told)
+    grids = f"{len(situations.kernels)} discretisations" if len(situations.kernels) > 1 else ""
+    told = described(wanted, situations.kernels[0], perf_counter() - began, grids)
+    cached = all(kernel.report.cached for kernel in situations.kernels)
+    notes = "; ".join(filter(None, [why, told.note]))
+    return replace(plain, problem=problem, shooting=shooting, backend=replace(told, cached=cached, note=notes))
+
+
+def _built(problem: Problem, exact: bool, backend: str, threads: int) -> tuple[str, KernelSituations, str]:
+    """The backend that evaluates, its kernels, and why it is not the one that was asked for."""
+    try:
+        return backend, _situations(problem, exact, backend, threads), ""
+    except KernelUnavailable as error:
+        if backend not in IN_PLACE:
+            raise
+        name = IN_PLACE[backend]
+        return name, _situations(problem, exact, name, threads), f"the processor evaluates: {error}"
 
 
 def _situations(problem: Problem, exact: bool, backend: str, threads: int) -> KernelSituations:
     assert problem.scenarios is not None, "nothing differs"
     grids = {"": problem.simulation, **{grid.name: grid.simulation for grid in problem.scenarios.grids}}
     samplers = [Sampler(replace(problem, simulation=simulation)) for simulation in grids.values()]
-    precision: Precision = "single" if backend == "simd32" else "double"
-    return KernelSituations(list(grids), samplers, [_kernel(each, exact, precision, threads) for each in samplers])
+    return KernelSituations(list(grids), samplers, [_kernel(each, exact, backend, threads) for each in samplers])
 
 
-def _kernel(sampler: Sampler, exact: bool, precision: Precision, threads: int) -> Kernel:
+def _kernel(sampler: Sampler, exact: bool, backend: str, threads: int) -> Kernel:
     program = rollout_program(symbolic_rollout(sampler.problem), exact)
-    return compile_program(program, seeded=("merit",), threads=threads, precision=precision)
-
-
-def _description(kernels: tuple[Kernel, ...], seconds: float) -> Description:
-    report, cached = kernels[0].report, all(kernel.report.cached for kernel in kernels)
-    name = "simd" if report.precision == "double" else "simd32"
-    note = f"{len(kernels)} discretisations" if len(kernels) > 1 else ""
-    return Description(
-        name, report.lanes, kernels[0].threads, report.precision, report.compiler, cached, seconds, report.note or note
-    )
+    return build_kernel(backend, program, ("merit",), threads)
