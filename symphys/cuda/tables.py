@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from symphys.cuda.device import Device
 from symphys.cuda.schedule import Schedule
-from symphys.kernel.library import TABLES, WORD, List, Source, data_places, strided
+from symphys.kernel.library import WORD, List, Source, data_places, program_fields, strided
 from symphys.kernel.plan import Plan
 from symphys.kernel.program import Program
 
 Words = NDArray[np.int64]
-RANGES = ("z", "knob", "zeroed", "constants", "outputs", "seeded")
 
 
 class Phase(ctypes.Structure):
@@ -27,17 +26,7 @@ class Phase(ctypes.Structure):
 class DeviceProgram(ctypes.Structure):
     """The driver's ``program``."""
 
-    _fields_ = (
-        ("size", WORD),
-        ("tape", WORD),
-        ("steps", WORD),
-        *((name, List) for name in RANGES),
-        ("values", ctypes.c_void_p),
-        *((name, Phase) for name in TABLES),
-        ("fading", WORD * 3),
-        ("kept", WORD * 2),
-        ("written", List),
-    )
+    _fields_ = program_fields(Phase)
 
 
 class Job(ctypes.Structure):

@@ -31,20 +31,25 @@ class Source(ctypes.Structure):
     _fields_ = (("rows", ctypes.c_void_p), ("stride", WORD))
 
 
-class ProgramData(ctypes.Structure):
-    """The driver's ``program``."""
-
-    _fields_ = (
+def program_fields(phase: type) -> Any:
+    """Of a driver's ``program``, whose phases are of this type."""
+    return (
         ("size", WORD),
         ("tape", WORD),
         ("steps", WORD),
         *((name, List) for name in ("z", "knob", "zeroed", "constants", "outputs", "seeded")),
         ("values", ctypes.c_void_p),
-        *((name, List) for name in TABLES),
+        *((name, phase) for name in TABLES),
         ("fading", WORD * 3),
         ("kept", WORD * 2),
         ("written", List),
     )
+
+
+class ProgramData(ctypes.Structure):
+    """The driver's ``program``."""
+
+    _fields_ = program_fields(List)
 
 
 class BatchData(ctypes.Structure):
