@@ -5,13 +5,11 @@
 
 from symphys.backends.choose import BACKENDS, BEST, NAMES, choose
 from symphys.backends.interface import Backend, Description, Functions, Source
-from symphys.backends.kernels import IN_PLACE, PRECISIONS, build_kernel
-from symphys.backends.simd import described
+from symphys.backends.kernels import PRECISIONS, build_kernel, described
 
 __all__ = [
     "BACKENDS",
     "BEST",
-    "IN_PLACE",
     "NAMES",
     "PRECISIONS",
     "Backend",

@@ -9,7 +9,7 @@ from functools import partial
 from symphys.backends.c_ import c
 from symphys.backends.casadi_ import casadi
 from symphys.backends.interface import Backend, Source
-from symphys.backends.kernels import IN_PLACE, PRECISIONS
+from symphys.backends.kernels import PRECISIONS
 from symphys.backends.simd import by_kernel
 from symphys.kernel import KernelUnavailable, ProgramError, processors
 
@@ -23,7 +23,7 @@ NAMES = (BEST, *BACKENDS)
 
 
 def choose(name: str, source: Source, threads: int | None = None) -> Backend:
-    """The backend of this name for a problem; where it cannot be built another evaluates, and its note says why.
+    """The backend of this name for a problem; one that cannot be built here gives way to casadi, and its note says why.
 
     Args:
         name: one of NAMES; "auto" is the fastest on a processor, simd.
@@ -34,9 +34,6 @@ def choose(name: str, source: Source, threads: int | None = None) -> Backend:
     try:
         return BACKENDS[wanted](source, count)
     except (KernelUnavailable, ProgramError) as error:
-        if wanted in IN_PLACE:
-            backend, note = choose(IN_PLACE[wanted], source, threads), f"the processor evaluates: {error}"
-        else:
-            backend, note = casadi(source, count), f"casadi's virtual machine evaluates, which is slower: {error}"
-        notes = "; ".join(filter(None, [note, backend.description.note]))
-        return replace(backend, description=replace(backend.description, note=notes))
+        note = f"casadi's virtual machine evaluates, which is slower: {error}"
+        backend = casadi(source, count)
+        return replace(backend, description=replace(backend.description, note=note))

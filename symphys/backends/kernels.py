@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
-from symphys.kernel import Kernel, Program, compile_program
+from symphys.backends.interface import Description
+from symphys.cuda import DeviceKernel, compile_on, find_gpu
+from symphys.kernel import Kernel, KernelUnavailable, Program, compile_program
 
 PRECISIONS: dict[str, Literal["double", "single"]] = {
     "simd": "double",
@@ -14,17 +17,42 @@ PRECISIONS: dict[str, Literal["double", "single"]] = {
     "cuda32": "single",
 }
 """Of the backends that are kernels."""
-IN_PLACE = {"cuda": "simd", "cuda32": "simd32"}
-"""What evaluates where there is no GPU."""
+ON_DEVICE = ("cuda", "cuda32")
 
 
 def build_kernel(name: str, program: Program, seeded: Sequence[str], threads: int) -> Kernel:
     """The kernel of a program, whose outputs ``seeded`` can be differentiated; KernelUnavailable if that cannot be.
 
-    ``threads`` share the blocks of a batch on the processor.
+    Where there is no GPU for it, it is one for the processor, and the note of its report says why. ``threads`` share
+    the blocks of a batch there.
     """
-    if name not in IN_PLACE:
-        return compile_program(program, seeded=seeded, threads=threads, precision=PRECISIONS[name])
-    from symphys.cuda import compile_on, find_gpu
+    note, precision = "", PRECISIONS[name]
+    if name in ON_DEVICE:
+        try:
+            return compile_on(find_gpu(), program, precision, seeded)
+        except KernelUnavailable as error:
+            note = f"the processor evaluates: {error}"
+    kernel = compile_program(program, seeded=seeded, threads=threads, precision=precision)
+    kernel.report = replace(kernel.report, note=joined(note, kernel.report.note))
+    return kernel
 
-    return compile_on(find_gpu(), program, PRECISIONS[name], seeded)
+
+def described(kernel: Kernel, seconds: float, precision: str | None = None, note: str = "") -> Description:
+    """A kernel for results; ``precision``: where it is not the kernel's alone."""
+    report, wanted = kernel.report, precision or kernel.report.precision
+    kind = "cuda" if isinstance(kernel, DeviceKernel) else "simd"
+    return Description(
+        name=kind if wanted == "double" else f"{kind}32",
+        lanes=report.lanes,
+        threads=kernel.threads,
+        precision=wanted,
+        compiler=report.compiler,
+        cached=report.cached,
+        seconds=seconds,
+        note=joined(report.note, note),
+    )
+
+
+def joined(*notes: str) -> str:
+    """What there is to say, in one line."""
+    return "; ".join(filter(None, notes))

@@ -8,8 +8,8 @@ import numpy as np
 
 from symphys.backends.casadi_ import squared
 from symphys.backends.external import external_nlp
-from symphys.backends.interface import Backend, Description, Source
-from symphys.backends.kernels import build_kernel
+from symphys.backends.interface import Backend, Source
+from symphys.backends.kernels import build_kernel, described
 from symphys.backends.seeds import Seeds
 from symphys.kernel import Kernel, KernelUnavailable, ProcessorKernel
 from symphys.kernel.kernel import Outputs
@@ -92,19 +92,4 @@ def by_kernel(source: Source, threads: int, name: str) -> Backend:
     if isinstance(kernel, ProcessorKernel):
         nlp = external_nlp(kernel, source.functions.nlp, rows.get("constraints"))
     evaluator = KernelEvaluator(kernel, rows.get("residuals"), source.exact)
-    return Backend(described(name, kernel, time.perf_counter() - began), evaluator, nlp)
-
-
-def described(name: str, kernel: Kernel, seconds: float, note: str = "") -> Description:
-    """A kernel for results."""
-    report = kernel.report
-    return Description(
-        name,
-        report.lanes,
-        kernel.threads,
-        report.precision,
-        report.compiler,
-        report.cached,
-        seconds,
-        report.note or note,
-    )
+    return Backend(described(kernel, time.perf_counter() - began), evaluator, nlp)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -47,13 +46,15 @@ def image(texts: Sequence[str], architecture: str, cache: Cache, folder: Path) -
     with own.building(key):
         if (path := own.find(key)) is not None:  # another process may have built it meanwhile
             return Image(path, version, cached=True)
-        built = Path(tempfile.mkstemp(suffix=".cubin", dir=folder)[1])
+        built = folder / f"{key}.cubin"
         built.write_bytes(linked([part for part, _ in compiled(texts, architecture)], architecture))
         try:
-            return Image(own.store(key, built), version, cached=False)
+            stored = own.store(key, built)
         except OSError as error:
             why = f"the kernel was not kept in {cache.folder} ({error.strerror}); it will be compiled again next time"
             return Image(built, version, cached=False, note=why)
+        built.unlink()
+        return Image(stored, version, cached=False)
 
 
 def compiled(texts: Sequence[str], architecture: str, flags: Sequence[str] = ()) -> list[tuple[bytes, str]]:

@@ -1,17 +1,5 @@
 /* The loops over calls and time. A block has LANES robots and WARPS threads for each; a robot's words are LANES apart,
    so that neighbouring threads touch neighbouring words. Programs are data, as in the driver for processors. */
-typedef struct { word count; const word *places; } ranges; /* (offset, size) pairs */
-typedef struct { word levels; const word *spans, *entries; } phase; /* spans: (first, calls) by level and warp */
-typedef struct {
-  word size, tape, steps;
-  ranges z, knob, zeroed, constants, outputs, seeded;
-  const double *values;                                  /* of the constants */
-  phase prologue, body, epilogue;                        /* forward */
-  phase again, back_body, back_prologue, back_epilogue;  /* backward */
-  word fading[3], kept[2];                               /* (offset, size, stride), (offset, stride) */
-  ranges written;                                        /* by each step: (offset, size, stride) */
-} program;
-typedef struct { const double *rows; word stride; } source; /* stride 0: one row for all */
 typedef struct {
   const program *p;
   V *memory;

@@ -42,6 +42,8 @@ class DeviceKernel(Kernel):
         self._blocks = 0
 
     def _run(self, batch: Batch) -> None:
+        if not batch.rows:
+            return
         lanes = self.device.lanes
         wave = lanes * self._room(-(-batch.rows // lanes))
         for start in range(0, batch.rows, wave):
@@ -50,7 +52,7 @@ class DeviceKernel(Kernel):
     def _room(self, wanted: int) -> int:
         """Blocks of a wave, at most as many as are wanted, in memory that is kept."""
         if wanted > self._blocks:
-            self._memory = None  # before the device is asked what is free
+            self._memory, self._blocks = None, 0  # before the device is asked what is free
             device = self.device
             free, each = device.free(), device.lanes * self.report.bytes_per_lane
             found = min(wanted, free // each)

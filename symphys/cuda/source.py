@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from importlib.resources import files
 
+from symphys.kernel import source
 from symphys.kernel.dialect import DEVICE
 from symphys.kernel.plan import Plan
-from symphys.kernel.source import spread
 from symphys.kernel.writer import write
 
 ROOM = "symphys.cuda"
@@ -29,8 +29,8 @@ def device_sources(planned: Plan, lanes: int, warps: int, single: bool) -> list[
         "static __device__ __forceinline__ void call(word number, V *m, V *b, const word *t, word k) {\n"
         f"  switch (number) {{\n{cases}  }}\n}}\n"
     )
-    driver = "\n".join([head, declared, call, resource("driver.cu")])
-    return [*("\n".join([head, *group]) for group in spread(texts, work, FILES)), driver]
+    driver = "\n".join([head, declared, call, source.resource("program.h"), resource("driver.cu")])
+    return [*("\n".join([head, *group]) for group in source.spread(texts, work, FILES)), driver]
 
 
 def resource(name: str) -> str:

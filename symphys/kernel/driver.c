@@ -1,19 +1,6 @@
-/* The loops over blocks of lanes, time and calls. Programs are data: what is compiled does not depend on their length.
-   A table is a list of entries: number of the function, length of the entry, then (offset, stride) of each place. */
+/* The loops over blocks of lanes, time and calls. Programs are data: what is compiled does not depend on their length. */
 #include <string.h>
 
-typedef struct { word count; const word *entries; } table;
-typedef struct { word count; const word *places; } ranges; /* (offset, size) pairs */
-typedef struct {
-  word size, tape, steps;
-  ranges z, knob, zeroed, constants, outputs, seeded;
-  const double *values;                                  /* of the constants */
-  table prologue, body, epilogue;                        /* forward */
-  table again, back_body, back_prologue, back_epilogue;  /* backward */
-  word fading[3], kept[2];                               /* (offset, size, stride), (offset, stride) */
-  struct { word count; const word *places; } written;    /* by each step: (offset, size, stride) */
-} program;
-typedef struct { const double *rows; word stride; } source; /* stride 0: one row for all lanes */
 typedef struct {
   word rows;
   source z, knob, seed;
@@ -23,7 +10,7 @@ typedef struct {
   word spared;                      /* steps at the end, in which nothing moves */
 } batch;
 
-static void run(const table *calls, V *m, V *b, word k) {
+static void run(const phase *calls, V *m, V *b, word k) {
   const word *t = calls->entries;
   for (word c = 0; c < calls->count; c++, t += t[1]) FUNCTIONS[t[0]](m, b, t + 2, k);
 }

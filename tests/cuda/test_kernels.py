@@ -82,6 +82,11 @@ def test_what_does_not_fit_at_once_is_computed_in_waves(tmp_path: Path, cache: C
     assert device.launched.count("begin") == 3
 
 
+def test_no_rows_are_no_work(pair: tuple[DeviceKernel, Kernel]) -> None:
+    there, here = pair
+    assert there.forward(rows(here, 0), [9.81])["merit"].shape == (0, 1)
+
+
 def test_a_device_without_room_says_what_is_wanted(device: Emulated) -> None:
     kernel = compile_on(device, programs.chain())
     device.room = 100

@@ -208,7 +208,7 @@ def test_nets_on_a_device(
     both: tuple[Transcription, LargeTranscription], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Steps by a device's kernel, products by its library: the same numbers."""
-    monkeypatch.setattr("symphys.cuda.find_gpu", lambda: Emulated(tmp_path))
+    monkeypatch.setattr("symphys.backends.kernels.find_gpu", lambda: Emulated(tmp_path))
     beside = both[1]
     there = transcribe(beside.problem, backend="cuda")
     assert (there.backend.name, there.backend.note) == ("cuda", "nets by matrix products")

@@ -91,11 +91,11 @@ class Made:
         """The step on casadi's virtual machine."""
         return PlainStage(self.rollout, self.aims, self.sensors)
 
-    def compiled(self, exact: bool, backend: str) -> KernelStage:
+    def compiled(self, exact: bool, backend: str) -> Kernel:
         """The step as a kernel of a backend, of one thread; KernelUnavailable if that cannot be."""
         program = stage_program(self.rollout, self.aims, self.sensors, exact)
         seeded = [name for name in RESULTS if name in program.outputs]
-        return KernelStage(build_kernel(backend, program, seeded, threads=1))
+        return build_kernel(backend, program, seeded, threads=1)
 
 
 def make(problem: Problem) -> Made:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.backends import BEST, IN_PLACE, PRECISIONS, Description, described
+from symphys.backends import BEST, PRECISIONS, Description, described
 from symphys.cuda import DeviceKernel
 from symphys.kernel import KernelUnavailable, ProgramError, processors
 from symphys.problem import Problem
@@ -32,6 +32,8 @@ from symphys.transcription.transcription import Transcription, fastest
 Array = NDArray[np.float64]
 PLAIN = ("casadi", "c")
 REALS = {"double": np.float64, "single": np.float32}
+STEPPING = {"simd": "simd", "simd32": "simd", "cuda": "cuda", "cuda32": "cuda"}
+"""What computes steps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,35 +120,18 @@ def transcribe_large(
 
 
 def _evaluator(made: Made, exact: bool, backend: str, threads: int) -> tuple[LargeEvaluator, Description]:
-    """The evaluator that is asked for, or another with a note. Steps are in double precision always."""
-    began, name, note = perf_counter(), "simd" if backend == BEST else backend, ""
+    """The evaluator that is asked for, or casadi's with a note. Steps are in double precision always."""
+    began, name = perf_counter(), "simd" if backend == BEST else backend
     if name in PLAIN:
         return LargeEvaluator(made, made.plain, threads), Description("casadi", threads=threads)
-    if name in IN_PLACE:
-        try:
-            return _on_device(made, exact, name, began)
-        except KernelUnavailable as error:
-            name, note = IN_PLACE[name], f"the processor evaluates: {error}"
     try:
-        stage = made.compiled(exact, "simd")
+        kernel = made.compiled(exact, STEPPING[name])
     except (KernelUnavailable, ProgramError) as error:
         note = f"casadi's virtual machine evaluates, which is slower: {error}"
         return LargeEvaluator(made, made.plain, threads), Description("casadi", threads=threads, note=note)
-    evaluator = LargeEvaluator(made, stage, threads, REALS[PRECISIONS[name]])
-    return evaluator, _description(stage, name, threads, began, note)
-
-
-def _on_device(made: Made, exact: bool, name: str, began: float) -> tuple[LargeEvaluator, Description]:
-    """Steps and products on a GPU."""
-    stage = made.compiled(exact, "cuda")
-    assert isinstance(stage.kernel, DeviceKernel)
-    evaluator = LargeEvaluator(made, stage, 1, REALS[PRECISIONS[name]], stage.kernel.device)
-    return evaluator, _description(stage, name, 1, began, "")
-
-
-def _description(stage: KernelStage, name: str, threads: int, began: float, note: str) -> Description:
-    single = PRECISIONS[name] == "single"
-    nets = "nets by matrix products" + (" in single precision, steps in double" if single else "")
-    told = described(name, stage.kernel, perf_counter() - began)
-    notes = "; ".join(filter(None, [note, nets, told.note]))
-    return replace(told, threads=threads, precision=PRECISIONS[name], note=notes)
+    precision, device = PRECISIONS[name], kernel.device if isinstance(kernel, DeviceKernel) else None
+    shared, nets = threads if device is None else 1, "nets by matrix products"
+    if precision == "single":
+        nets += " in single precision, steps in double"
+    told = replace(described(kernel, perf_counter() - began, precision, nets), threads=shared)
+    return LargeEvaluator(made, KernelStage(kernel), shared, REALS[precision], device), told

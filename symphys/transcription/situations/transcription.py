@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from time import perf_counter
 
-from symphys.backends import BEST, IN_PLACE, PRECISIONS, build_kernel, described
+from symphys.backends import BEST, PRECISIONS, build_kernel, described
 from symphys.kernel import Kernel, KernelUnavailable, ProgramError, processors
 from symphys.problem import Problem
 from symphys.shooting import Nlp
@@ -29,7 +29,7 @@ def with_situations(
     try:
         if wanted not in PRECISIONS:
             raise KernelUnavailable(f"the backend {wanted} has no situations")
-        wanted, situations, why = _built(problem, exact, wanted, processors() if threads is None else threads)
+        situations = _situations(problem, exact, wanted, processors() if threads is None else threads)
     except (KernelUnavailable, ProgramError) as error:
         told = replace(plain.backend, note=f"{WITHOUT}: {error}")
         return replace(plain, problem=problem, backend=told)
@@ -37,21 +37,9 @@ def with_situations(
         plain.shooting, evaluator=NominalEvaluator(situations), situations=situations, squares=False, nlp=Nlp(None)
     )
     grids = f"{len(situations.kernels)} discretisations" if len(situations.kernels) > 1 else ""
-    told = described(wanted, situations.kernels[0], perf_counter() - began, grids)
+    told = described(situations.kernels[0], perf_counter() - began, note=grids)
     cached = all(kernel.report.cached for kernel in situations.kernels)
-    notes = "; ".join(filter(None, [why, told.note]))
-    return replace(plain, problem=problem, shooting=shooting, backend=replace(told, cached=cached, note=notes))
-
-
-def _built(problem: Problem, exact: bool, backend: str, threads: int) -> tuple[str, KernelSituations, str]:
-    """The backend that evaluates, its kernels, and why it is not the one that was asked for."""
-    try:
-        return backend, _situations(problem, exact, backend, threads), ""
-    except KernelUnavailable as error:
-        if backend not in IN_PLACE:
-            raise
-        name = IN_PLACE[backend]
-        return name, _situations(problem, exact, name, threads), f"the processor evaluates: {error}"
+    return replace(plain, problem=problem, shooting=shooting, backend=replace(told, cached=cached))
 
 
 def _situations(problem: Problem, exact: bool, backend: str, threads: int) -> KernelSituations:

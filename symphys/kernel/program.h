@@ -1,0 +1,17 @@
+/* A program's data. A phase is entries: number of the function, length, then (offset, stride) of each place. */
+#ifdef WARPS
+typedef struct { word levels; const word *spans, *entries; } phase; /* spans: (first, calls) by level and warp */
+#else
+typedef struct { word count; const word *entries; } phase;
+#endif
+typedef struct { word count; const word *places; } ranges; /* (offset, size) pairs */
+typedef struct {
+  word size, tape, steps;
+  ranges z, knob, zeroed, constants, outputs, seeded;
+  const double *values;                                  /* of the constants */
+  phase prologue, body, epilogue;                        /* forward */
+  phase again, back_body, back_prologue, back_epilogue;  /* backward */
+  word fading[3], kept[2];                               /* (offset, size, stride), (offset, stride) */
+  ranges written;                                        /* by each step: (offset, size, stride) */
+} program;
+typedef struct { const double *rows; word stride; } source; /* stride 0: one row for all lanes */
