@@ -36,6 +36,7 @@ CHANGES: dict[str, dict[str, Any]] = {
     "rate 0.003": {"rate": 0.003},
     "horizons 2, 5 s first": {"horizons": (2.0, 5.0)},
     "evolution 0.5": {"evolution": 0.5},
+    "twice as many of half the size, rate 0.02": {"samples": 16, "rate": 0.02, "iterations": 200},
 }
 
 
@@ -47,14 +48,14 @@ def main() -> None:
     for change, values in CHANGES.items():
         for seed in range(seeds):
             began = perf_counter()
-            asked = replace(options, iterations=iterations, **values)
+            asked = replace(options, **{"iterations": iterations, **values})
             found = SOLVERS["stochastic"].solve(shooting, shooting.start(seed), asked, seed)
             spent = perf_counter() - began
             unseen = walks.situations.draw(np.random.default_rng(SEED), UNSEEN)
             speed, upright = walks(found.z, unseen)
             mean = speed[upright].mean() if upright.any() else 0.0
             print(
-                f"{change:<30} seed {seed}: nominal {speed[0]:5.2f} m/s{'' if upright[0] else ' (falls)'}, unseen "
+                f"{change:<42} seed {seed}: nominal {speed[0]:5.2f} m/s{'' if upright[0] else ' (falls)'}, unseen "
                 f"{mean:5.2f} m/s, {upright.mean():.3f} upright, {spent:.0f} s",
                 flush=True,
             )

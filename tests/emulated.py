@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.lib.mixins import NDArrayOperatorsMixin
 from numpy.typing import DTypeLike, NDArray
 
 ROOM = Path(__file__).parent / "cuda"
@@ -61,16 +62,73 @@ class Emulated:
         """A copy."""
         return array.copy()
 
-    def launch(self, module: Any, name: str, blocks: int, threads: tuple[int, int], job: NDArray[Any]) -> None:
+    def launch(self, module: Any, name: str, blocks: int, threads: tuple[int, int], job: Any) -> None:
         """Run it at once."""
         self.launched.append(name)
         kernel = ctypes.cast(getattr(module, name), ctypes.c_void_p)
-        address = ctypes.c_void_p(job.ctypes.data)
+        address = ctypes.c_void_p(self.address(job))
         uneven = module.launch(kernel, blocks, *threads, address, int(self.backwards))
         assert not uneven, f"the threads of {name} meet different numbers of barriers"
 
     def wait(self) -> None:
         """Nothing goes on."""
+
+
+class Held(NDArrayOperatorsMixin):
+    """An array that stays where it is, as CuPy's: numpy's functions take it, numpy's arrays do not mix with it."""
+
+    def __init__(self, array: NDArray[Any]) -> None:
+        self.array = array
+        self.shape, self.dtype, self.size = array.shape, array.dtype, array.size
+
+    def __array__(self, *given: Any, **named: Any) -> NDArray[Any]:
+        raise TypeError("an array of a device is not turned into one of numpy's by itself")
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **named: Any) -> Any:
+        if any(isinstance(value, np.ndarray) and value.ndim for value in inputs):
+            raise TypeError("an array of a device and one of numpy's")
+        named |= {"out": tuple(map(unheld, named["out"]))} if "out" in named else {}
+        return held(getattr(ufunc, method)(*map(unheld, inputs), **named))
+
+    def __array_function__(self, function: Any, types: Any, inputs: Any, named: Any) -> Any:
+        return held(function(*([unheld(value) for value in each] for each in inputs), **named))
+
+    def __getitem__(self, key: Any) -> Any:
+        return held(self.array[key])
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(self.array, name)
+        return (lambda *given, **named: held(found(*given, **named))) if callable(found) else held(found)
+
+
+class Remote(Emulated):
+    """A device whose arrays are ``Held``."""
+
+    def put(self, values: NDArray[Any]) -> Any:
+        """A copy."""
+        return Held(super().put(values))
+
+    def empty(self, shape: tuple[int, ...], dtype: DTypeLike) -> Any:
+        """See ``Emulated``."""
+        return Held(super().empty(shape, dtype))
+
+    def address(self, array: Any) -> int:
+        """See ``Emulated``."""
+        return super().address(array.array)
+
+    def get(self, array: Any) -> NDArray[Any]:
+        """See ``Emulated``."""
+        return super().get(array.array)
+
+
+def held(value: Any) -> Any:
+    """Arrays held, all else as it is."""
+    return Held(value) if isinstance(value, np.ndarray) else value
+
+
+def unheld(value: Any) -> Any:
+    """The array that is held."""
+    return value.array if isinstance(value, Held) else value
 
 
 def compiled(file: Path, folder: Path) -> Path:

@@ -3,9 +3,9 @@
 ``choose`` takes the one that is asked for, or the best that this machine has.
 """
 
-from symphys.backends.choose import BACKENDS, BEST, NAMES, choose
+from symphys.backends.choose import BACKENDS, NAMES, choose
 from symphys.backends.interface import Backend, Description, Functions, Source
-from symphys.backends.kernels import PRECISIONS, build_kernel, described
+from symphys.backends.kernels import BEST, PRECISIONS, build_kernel, described
 
 __all__ = [
     "BACKENDS",

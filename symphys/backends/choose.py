@@ -18,21 +18,20 @@ BACKENDS: dict[str, Callable[[Source, int], Backend]] = {
     "c": c,
     "casadi": casadi,
 }
-BEST = "auto"
-NAMES = (BEST, *BACKENDS)
+NAMES = tuple(BACKENDS)
 
 
 def choose(name: str, source: Source, threads: int | None = None) -> Backend:
     """The backend of this name for a problem; one that cannot be built here gives way to casadi, and its note says why.
 
     Args:
-        name: one of NAMES; "auto" is the fastest on a processor, simd.
+        name: one of NAMES; "auto" is the fastest: simd, and cuda for large batches where there is a GPU.
         source: the problem.
         threads: that share a batch; None: one for each processor.
     """
-    count, wanted = processors() if threads is None else threads, "simd" if name == BEST else name
+    count = processors() if threads is None else threads
     try:
-        return BACKENDS[wanted](source, count)
+        return BACKENDS[name](source, count)
     except (KernelUnavailable, ProgramError) as error:
         note = f"casadi's virtual machine evaluates, which is slower: {error}"
         backend = casadi(source, count)

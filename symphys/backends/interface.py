@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from symphys.kernel import Program
@@ -53,6 +53,11 @@ class Source:
     exact: bool = False
 
 
+def nothing() -> str:
+    """Nothing was decided."""
+    return ""
+
+
 @dataclass(frozen=True)
 class Description:
     """What evaluates, for results.
@@ -66,6 +71,7 @@ class Description:
         cached: whether what was compiled came from the cache; None where nothing is compiled.
         seconds: until it could evaluate.
         note: what the user should know, such as why it is not the backend that was wanted; or empty.
+        later: what was decided while it evaluated, to be asked when that is over; or empty.
     """
 
     name: str
@@ -76,6 +82,7 @@ class Description:
     cached: bool | None = None
     seconds: float = 0.0
     note: str = ""
+    later: Callable[[], str] = field(default=nothing, repr=False, compare=False)
 
     def __str__(self) -> str:
         """In a line."""

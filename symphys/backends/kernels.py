@@ -6,11 +6,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
-from symphys.backends.interface import Description
+from symphys.backends.fastest import FastestKernel
+from symphys.backends.interface import Description, nothing
 from symphys.cuda import DeviceKernel, compile_on, find_gpu
 from symphys.kernel import Kernel, KernelUnavailable, Program, compile_program
 
+BEST = "auto"
 PRECISIONS: dict[str, Literal["double", "single"]] = {
+    BEST: "double",
     "simd": "double",
     "simd32": "single",
     "cuda": "double",
@@ -24,7 +27,7 @@ def build_kernel(name: str, program: Program, seeded: Sequence[str], threads: in
     """The kernel of a program, whose outputs ``seeded`` can be differentiated; KernelUnavailable if that cannot be.
 
     Where there is no GPU for it, it is one for the processor, and the note of its report says why. ``threads`` share
-    the blocks of a batch there.
+    the blocks of a batch there. "auto" is the processor's, which takes large batches to a GPU where that is faster.
     """
     note, precision = "", PRECISIONS[name]
     if name in ON_DEVICE:
@@ -34,6 +37,8 @@ def build_kernel(name: str, program: Program, seeded: Sequence[str], threads: in
             note = f"the processor evaluates: {error}"
     kernel = compile_program(program, seeded=seeded, threads=threads, precision=precision)
     kernel.report = replace(kernel.report, note=joined(note, kernel.report.note))
+    if name == BEST:
+        return FastestKernel(kernel, lambda: compile_on(find_gpu(), program, precision, seeded))
     return kernel
 
 
@@ -50,6 +55,7 @@ def described(kernel: Kernel, seconds: float, precision: str | None = None, note
         cached=report.cached,
         seconds=seconds,
         note=joined(report.note, note),
+        later=(lambda: kernel.chosen) if isinstance(kernel, FastestKernel) else nothing,
     )
 
 

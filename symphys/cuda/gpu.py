@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -37,7 +38,8 @@ class Gpu:
     def load(self, texts: Sequence[str]) -> tuple[Any, str, bool, str]:
         """See ``Device``."""
         found = image(texts, self.architecture, self.cache, Path(self.folder.name))
-        return self.cupy.RawModule(path=str(found.path)), found.compiler, found.cached, found.note
+        with self._told():
+            return self.cupy.RawModule(path=str(found.path)), found.compiler, found.cached, found.note
 
     def free(self) -> int:
         """See ``Device``."""
@@ -46,11 +48,13 @@ class Gpu:
 
     def put(self, values: NDArray[Any]) -> Any:
         """See ``Device``."""
-        return self.cupy.asarray(np.ascontiguousarray(values))
+        with self._told():
+            return self.cupy.asarray(np.ascontiguousarray(values))
 
     def empty(self, shape: tuple[int, ...], dtype: DTypeLike) -> Any:
         """See ``Device``."""
-        return self.cupy.empty(shape, dtype)
+        with self._told():
+            return self.cupy.empty(shape, dtype)
 
     def address(self, array: Any) -> int:
         """See ``Device``."""
@@ -58,15 +62,31 @@ class Gpu:
 
     def get(self, array: Any) -> NDArray[Any]:
         """See ``Device``."""
-        return np.asarray(self.cupy.asnumpy(array))
+        with self._told():
+            return np.asarray(self.cupy.asnumpy(array))
 
     def launch(self, module: Any, name: str, blocks: int, threads: tuple[int, int], job: Any) -> None:
         """See ``Device``."""
-        module.get_function(name)((blocks,), threads, (job,))
+        with self._told():
+            module.get_function(name)((blocks,), threads, (job,))
 
     def wait(self) -> None:
         """See ``Device``."""
-        self.cupy.cuda.get_current_stream().synchronize()
+        with self._told():
+            self.cupy.cuda.get_current_stream().synchronize()
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        """CUDA's errors in a line of ours."""
+        cuda = self.cupy.cuda
+        try:
+            yield
+        except (
+            cuda.memory.OutOfMemoryError,
+            cuda.runtime.CUDARuntimeError,
+            cuda.driver.CUDADriverError,
+        ) as error:
+            raise KernelUnavailable(f"{self.name} failed: {' '.join(str(error).split())}") from error
 
 
 def find_gpu(cache: Cache | None = None) -> Gpu:

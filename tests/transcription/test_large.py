@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from emulated import Emulated, needs_compiler
+from emulated import Remote, needs_compiler
 from numpy.typing import NDArray
 
 from symphys.errors import ProblemError
@@ -207,8 +207,8 @@ def test_single_precision_of_nets(both: tuple[Transcription, LargeTranscription]
 def test_nets_on_a_device(
     both: tuple[Transcription, LargeTranscription], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Steps by a device's kernel, products by its library: the same numbers."""
-    monkeypatch.setattr("symphys.backends.kernels.find_gpu", lambda: Emulated(tmp_path))
+    """Steps by a device's kernel, products by its library, on arrays that stay there: the same numbers and trust."""
+    monkeypatch.setattr("symphys.backends.kernels.find_gpu", lambda: Remote(tmp_path))
     beside = both[1]
     there = transcribe(beside.problem, backend="cuda")
     assert (there.backend.name, there.backend.note) == ("cuda", "nets by matrix products")
@@ -217,6 +217,9 @@ def test_nets_on_a_device(
     assert a.gradient is not None and b.gradient is not None
     assert np.array_equal(a.merit, b.merit)
     assert np.allclose(a.gradient, b.gradient, rtol=0, atol=1e-11 * np.abs(a.gradient).max())
+    one, other = (examine(made, Z[0]) for made in (beside, there))
+    assert max(row["error"] for row in other["gradient"]) < 1e-6
+    assert other["growth"]["factor"] == pytest.approx(one["growth"]["factor"], rel=1e-7)
 
 
 def test_what_large_nets_cannot_have(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

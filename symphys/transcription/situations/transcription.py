@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from time import perf_counter
 
-from symphys.backends import BEST, PRECISIONS, build_kernel, described
+from symphys.backends import PRECISIONS, build_kernel, described
 from symphys.kernel import Kernel, KernelUnavailable, ProgramError, processors
 from symphys.problem import Problem
 from symphys.shooting import Nlp
@@ -25,11 +25,11 @@ def with_situations(
 
     Where there can be no kernels it stays as it is, and its backend's note says so.
     """
-    began, wanted = perf_counter(), "simd" if backend == BEST else backend
+    began = perf_counter()
     try:
-        if wanted not in PRECISIONS:
-            raise KernelUnavailable(f"the backend {wanted} has no situations")
-        situations = _situations(problem, exact, wanted, processors() if threads is None else threads)
+        if backend not in PRECISIONS:
+            raise KernelUnavailable(f"the backend {backend} has no situations")
+        situations = _situations(problem, exact, backend, processors() if threads is None else threads)
     except (KernelUnavailable, ProgramError) as error:
         told = replace(plain.backend, note=f"{WITHOUT}: {error}")
         return replace(plain, problem=problem, backend=told)
