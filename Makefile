@@ -67,8 +67,9 @@ bench-table1: $(VENV)/.benching  ## the timing table of Degrave et al. (1 and 12
 	$(BIN)/python benchmarks/table1.py
 	$(BIN)/python benchmarks/weights.py build
 
-bench-gpu: $(VENV)/.benching  ## the same on a GPU, with the floors; without one: floors, registers and spills
+bench-gpu: $(VENV)/.benching  ## the same on a GPU, with the floors; without one: floors, registers and spills; errors of single precision
 	$(BIN)/python -m pip install --quiet --editable '.[cuda]'
+	$(BIN)/python benchmarks/rounding.py
 	$(BIN)/python benchmarks/gpu.py
 
 gallery: $(VENV)/.installed  ## make the figures of the README again

@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 from table1 import STEPS
 from table_robot import fastest, starts, table_problem
 
-from symphys.cuda import DeviceKernel, compile_on, find_gpu
+from symphys.cuda import Device, DeviceKernel, compile_on, find_gpu
 from symphys.cuda.compiler import compiled
 from symphys.cuda.kernel import WARPS
 from symphys.cuda.schedule import schedules
 from symphys.cuda.source import device_sources
-from symphys.kernel import KernelUnavailable, Program
+from symphys.kernel import KernelUnavailable, Program, compile_program
 from symphys.kernel.plan import FAST_MEMORY, plan
 from symphys.transcription import rollout_program, symbolic_rollout
 from symphys.transcription.large import LargeEvaluator, transcribe_large
@@ -50,6 +50,7 @@ def main() -> None:
     for precision in ("double", "single"):
         kernel = compile_on(gpu, program, precision, ["merit"])  # type: ignore[arg-type]
         print(f"\n{gpu.name}, 1,296 weights, {precision}: compiled in {kernel.report.seconds:.0f} s")
+        compared(gpu, precision)
         for robots in ROBOTS:
             small(kernel, problem.variables[0].guess, robots, rounds)
     large(rounds)
@@ -88,15 +89,32 @@ def told(program: Program, architecture: str) -> None:
           "multiprocessor")  # fmt: skip
 
 
+def compared(gpu: Device, precision: str) -> None:
+    """The device's numbers against the processor's, over 100 steps with contact."""
+    program = rollout_program(symbolic_rollout(table_problem([], 100)), exact=True)
+    rows = np.hstack([np.tile(table_problem([], 100).variables[0].guess, (128, 1)), starts(128)])
+    here = compile_program(program, seeded=["merit"])
+    there = compile_on(gpu, program, precision, ["merit"])  # type: ignore[arg-type]
+    (ends, slopes), (near, close) = (kernel.gradient(rows, [1.0], [0.0]) for kernel in (here, there))
+    off = np.abs(near["objective"] - ends["objective"]).max() / np.abs(ends["objective"]).max()
+    wrong = np.abs(close - slopes).max() / np.abs(slopes).max()
+    print(f"  100 steps of 128 robots: values off by {off:.1e}, gradients by {wrong:.1e} of the largest")
+
+
 def small(kernel: DeviceKernel, weights: NDArray[np.float64], robots: int, rounds: int) -> None:
-    """A cell of the table."""
+    """A cell of the table, and what part of the card's bandwidth its words would take if no cache kept any."""
+    planned = plan(kernel.program, ["merit"], FAST_MEMORY)
+    found, word = schedules(planned, kernel.program, WARPS), kernel.real.itemsize
+    memory = next((card[-1] for name, card in CARDS.items() if name in kernel.device.name), np.nan)
     rows = np.hstack([np.tile(weights, (robots, 1)), starts(robots)])
     calls = {"forward": partial(kernel.forward, rows, [0.0]), "gradient": partial(kernel.gradient, rows, [1.0], [0.0])}
     for name, call in calls.items():
         call()
         seconds, _ = fastest(call, rounds)
-        rate = robots * STEPS / seconds / 1e6
-        print(f"  {robots:>5} robots {name:<9} {seconds:8.3f} s   {rate:.3f} million robots x steps/s", flush=True)
+        rate = robots * STEPS / seconds
+        share = rate * word * sum(found[phase].words for phase in PHASES[name]) / memory
+        print(f"  {robots:>5} robots {name:<9} {seconds:8.3f} s   {rate / 1e6:.3f} million robots x steps/s, "
+              f"{share:.2f} of the bandwidth", flush=True)  # fmt: skip
 
 
 def large(rounds: int) -> None:
