@@ -32,10 +32,8 @@ class FastestKernel(ProcessorKernel):
     @property
     def chosen(self) -> str:
         """What was decided so far, in a line, or empty; without a GPU nothing is."""
-        if not self._name:
-            return ""
-        parts = [_told(*each) for each in sorted(self._gains.items())]
-        return "; ".join(filter(None, [f"{self._name} against the processor: {', '.join(parts)}", self._refused]))
+        parts = ", ".join(_told(*each) for each in sorted(self._gains.items()))
+        return "; ".join(filter(None, [parts and f"{self._name} against the processor: {parts}", self._refused]))
 
     def _run(self, batch: Batch) -> None:
         kind = "gradient" in batch.results, batch.rows.bit_length() - 1
