@@ -8,12 +8,14 @@ import signal
 import subprocess
 import threading
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
+from queue import Empty, SimpleQueue
 
 from symphys.kernel.errors import KernelUnavailable
 
+PARTING = 10.0
+"""[s] that a thread is waited for whose compiler was stopped."""
 ADVICE = "install gcc or clang (or `pip install ziglang`), or set CC to a C compiler"
 MEMORY_WORDS = (
     "memory exhausted",
@@ -63,27 +65,57 @@ def run(command: Sequence[str], limit: float) -> str:
 
 
 def run_all(commands: Sequence[Sequence[str]], limit: float, at_once: int) -> None:
-    """Run commands side by side; the first that fails ends the others, and so does Ctrl-C."""
-    started: list[Running] = []
-    over = threading.Event()
+    """Run commands side by side; the first that fails ends the others, and so does Ctrl-C.
 
-    def work(command: Sequence[str]) -> None:
-        running = _start(command, limit)
-        started.append(running)
-        if over.is_set():
+    Threads hand over by simple queues: the locks of ``concurrent.futures``, written in Python, can stay locked where
+    Ctrl-C strikes, and then nothing ends.
+    """
+    waiting: SimpleQueue[Sequence[str]] = SimpleQueue()
+    for command in commands:
+        waiting.put(command)
+    over, started, ended = threading.Event(), list[Running](), SimpleQueue[BaseException | None]()
+    workers = [
+        threading.Thread(target=_work, args=(waiting, limit, over, started, ended), daemon=True)
+        for _ in range(min(at_once, len(commands)))
+    ]
+    try:
+        for worker in workers:
+            worker.start()
+        for _ in commands:
+            if (error := ended.get()) is not None:
+                raise error
+    finally:
+        over.set()
+        for running in started:
             running.stop()
-        running.said()
+        for worker in workers:
+            if worker.ident is not None:
+                worker.join(PARTING)
 
-    with ThreadPoolExecutor(at_once) as pool:
+
+def _work(
+    waiting: SimpleQueue[Sequence[str]],
+    limit: float,
+    over: threading.Event,
+    started: list[Running],
+    ended: SimpleQueue[BaseException | None],
+) -> None:
+    """Run one command after the other; each leaves an error, or None."""
+    while not over.is_set():
         try:
-            for done in as_completed([pool.submit(work, command) for command in commands]):
-                done.result()
-        except BaseException:
-            over.set()
-            pool.shutdown(wait=False, cancel_futures=True)
-            for running in started:
+            command = waiting.get_nowait()
+        except Empty:
+            return
+        try:
+            running = _start(command, limit)
+            started.append(running)
+            if over.is_set():
                 running.stop()
-            raise
+            running.said()
+        except BaseException as error:
+            ended.put(error)
+        else:
+            ended.put(None)
 
 
 def _start(command: Sequence[str], limit: float) -> Running:
