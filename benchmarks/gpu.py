@@ -91,8 +91,9 @@ def told(program: Program, architecture: str) -> None:
 
 def compared(gpu: Device, precision: str) -> None:
     """The device's numbers against the processor's, over 100 steps with contact."""
-    program = rollout_program(symbolic_rollout(table_problem([], 100)), exact=True)
-    rows = np.hstack([np.tile(table_problem([], 100).variables[0].guess, (128, 1)), starts(128)])
+    problem = table_problem([], 100)
+    program = rollout_program(symbolic_rollout(problem), exact=True)
+    rows = np.hstack([np.tile(problem.variables[0].guess, (128, 1)), starts(128)])
     here = compile_program(program, seeded=["merit"])
     there = compile_on(gpu, program, precision, ["merit"])  # type: ignore[arg-type]
     (ends, slopes), (near, close) = (kernel.gradient(rows, [1.0], [0.0]) for kernel in (here, there))

@@ -7,6 +7,7 @@ from functools import partial
 from math import inf
 from time import perf_counter
 
+from symphys.backends.interface import joined
 from symphys.cuda import DeviceKernel
 from symphys.kernel import KernelUnavailable, ProcessorKernel
 from symphys.kernel.batch import Batch
@@ -33,7 +34,7 @@ class FastestKernel(ProcessorKernel):
     def chosen(self) -> str:
         """What was decided so far, in a line, or empty; without a GPU nothing is."""
         parts = ", ".join(_told(*each) for each in sorted(self._gains.items()))
-        return "; ".join(filter(None, [parts and f"{self._name} against the processor: {parts}", self._refused]))
+        return joined(parts and f"{self._name} against the processor: {parts}", self._refused)
 
     def _run(self, batch: Batch) -> None:
         kind = "gradient" in batch.results, batch.rows.bit_length() - 1

@@ -58,6 +58,11 @@ def nothing() -> str:
     return ""
 
 
+def joined(*notes: str) -> str:
+    """What there is to say, in one line."""
+    return "; ".join(filter(None, notes))
+
+
 @dataclass(frozen=True)
 class Description:
     """What evaluates, for results.
@@ -89,7 +94,11 @@ class Description:
         parts = [f"{self.name}: lanes {self.lanes}, threads {self.threads}, {self.precision} precision"]
         if self.cached is not None:
             parts.append(f"{self.compiler}, {'taken from the cache' if self.cached else 'compiled'}")
-        return "; ".join([*parts, *filter(None, [self.note])])
+        return joined(*parts, self.note)
+
+    def said(self) -> str:
+        """The note, with what was decided since."""
+        return joined(self.note, self.later())
 
 
 @dataclass(frozen=True)

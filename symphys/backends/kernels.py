@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Literal
 
 from symphys.backends.fastest import FastestKernel
-from symphys.backends.interface import Description, nothing
+from symphys.backends.interface import Description, joined, nothing
 from symphys.cuda import DeviceKernel, compile_on, find_gpu
 from symphys.kernel import Kernel, KernelUnavailable, Program, compile_program
 
@@ -57,8 +57,3 @@ def described(kernel: Kernel, seconds: float, precision: str | None = None, note
         note=joined(report.note, note),
         later=(lambda: kernel.chosen) if isinstance(kernel, FastestKernel) else nothing,
     )
-
-
-def joined(*notes: str) -> str:
-    """What there is to say, in one line."""
-    return "; ".join(filter(None, notes))

@@ -29,9 +29,8 @@ def stamp(job: Job) -> dict[str, Any]:
 def evaluated(backend: Description) -> dict[str, Any]:
     """The "backend" of a result."""
     told = asdict(backend)
-    cached, _, later = told.pop("cached"), told.pop("seconds"), told.pop("later")
-    compiled = "" if cached is None else "warm" if cached else "cold"
-    return {**told, "note": "; ".join(filter(None, [backend.note, later()])), "compiled": compiled}
+    cached, _, _ = told.pop("cached"), told.pop("seconds"), told.pop("later")
+    return {**told, "note": backend.said(), "compiled": "" if cached is None else "warm" if cached else "cold"}
 
 
 def versions() -> dict[str, str]:

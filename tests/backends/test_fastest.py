@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,13 +25,17 @@ LARGE = 8
 
 
 @pytest.fixture(scope="module")
-def pair(tmp_path_factory: pytest.TempPathFactory) -> tuple[ProcessorKernel, DeviceKernel]:
-    """The same program on the processor and on what plays a GPU."""
+def here() -> ProcessorKernel:
+    """A program on the processor."""
     require("simd")
     problem = load_problem(find("ball_throw"), {"simulation.duration": 0.2})
-    program = rollout_program(symbolic_rollout(problem), exact=True)
-    device = Emulated(tmp_path_factory.mktemp("device"))
-    return compile_program(program, threads=1), compile_on(device, program)
+    return compile_program(rollout_program(symbolic_rollout(problem), exact=True), threads=1)
+
+
+@pytest.fixture(scope="module")
+def there(here: ProcessorKernel, tmp_path_factory: pytest.TempPathFactory) -> DeviceKernel:
+    """The same on what plays a GPU."""
+    return compile_on(Emulated(tmp_path_factory.mktemp("device")), here.program)
 
 
 class Slowed:
@@ -54,9 +57,8 @@ def points(kernel: ProcessorKernel, count: int) -> np.ndarray:
 @needs_compiler
 @pytest.mark.parametrize("faster", [True, False])
 def test_a_large_batch_goes_where_the_first_of_its_size_was_faster(
-    pair: tuple[ProcessorKernel, DeviceKernel], faster: bool, monkeypatch: pytest.MonkeyPatch
+    here: ProcessorKernel, there: DeviceKernel, faster: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    here, there = pair
     run = Slowed(there._run, 0.0 if faster else 0.1)
     monkeypatch.setattr(there, "_run", run)
     kernel = FastestKernel(here, lambda: there, LARGE)
@@ -74,29 +76,22 @@ def test_a_large_batch_goes_where_the_first_of_its_size_was_faster(
     assert kernel.chosen in evaluated(described(kernel, 0.0))["note"]
 
 
-def test_small_batches_ask_no_gpu() -> None:
-    require("simd")
-    problem = load_problem(find("ball_throw"), {"simulation.duration": 0.2})
-    program = rollout_program(symbolic_rollout(problem), exact=True)
-
+def test_small_batches_ask_no_gpu(here: ProcessorKernel) -> None:
     def build() -> DeviceKernel:
         pytest.fail("a GPU was asked")
 
-    kernel = FastestKernel(compile_program(program, threads=1), build, LARGE)
+    kernel = FastestKernel(here, build, LARGE)
     kernel.forward(points(kernel, LARGE - 1), [0.0])
     assert kernel.chosen == ""
 
 
-def test_without_a_gpu_it_is_looked_for_once() -> None:
-    require("simd")
-    problem = load_problem(find("ball_throw"), {"simulation.duration": 0.2})
-    program, asked = rollout_program(symbolic_rollout(problem), exact=True), []
+def test_without_a_gpu_it_is_looked_for_once(here: ProcessorKernel) -> None:
+    asked = []
 
     def build() -> DeviceKernel:
         asked.append(1)
         raise KernelUnavailable("no GPU")
 
-    here = compile_program(program, threads=1)
     kernel = FastestKernel(here, build, LARGE)
     Z = points(here, LARGE)
     for _ in range(2):
@@ -107,10 +102,8 @@ def test_without_a_gpu_it_is_looked_for_once() -> None:
 
 @needs_compiler
 def test_a_gpu_that_fails_gives_way_to_the_processor_and_is_told(
-    pair: tuple[ProcessorKernel, DeviceKernel], monkeypatch: pytest.MonkeyPatch
+    here: ProcessorKernel, there: DeviceKernel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    here, there = pair
-
     def fail(batch: Batch) -> None:
         raise KernelUnavailable("no memory is left")
 
@@ -123,10 +116,7 @@ def test_a_gpu_that_fails_gives_way_to_the_processor_and_is_told(
     assert kernel.chosen == "no memory is left"
 
 
-def test_auto_is_such_a_kernel(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    require("simd")
-    problem = load_problem(find("ball_throw"), {"simulation.duration": 0.2})
-    program = rollout_program(symbolic_rollout(problem), exact=True)
-    assert isinstance(build_kernel(BEST, program, ["merit"], 1), FastestKernel)
-    told = transcribe(problem, backend=BEST).backend
-    assert (told.name, told.later()) == ("simd", "")
+def test_auto_is_such_a_kernel(here: ProcessorKernel) -> None:
+    assert isinstance(build_kernel(BEST, here.program, ["merit"], 1), FastestKernel)
+    told = transcribe(load_problem(find("ball_throw"), {"simulation.duration": 0.2}), backend=BEST).backend
+    assert (told.name, told.said()) == ("simd", told.note)

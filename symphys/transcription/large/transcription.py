@@ -32,7 +32,7 @@ from symphys.transcription.transcription import Transcription, fastest
 Array = NDArray[np.float64]
 PLAIN = ("casadi", "c")
 REALS = {"double": np.float64, "single": np.float32}
-STEPPING = {"simd": "simd", "simd32": "simd", "cuda": "cuda", "cuda32": "cuda"}
+STEPPING = {BEST: "simd", "simd": "simd", "simd32": "simd", "cuda": "cuda", "cuda32": "cuda"}
 """What computes steps."""
 
 
@@ -121,15 +121,15 @@ def transcribe_large(
 
 def _evaluator(made: Made, exact: bool, backend: str, threads: int) -> tuple[LargeEvaluator, Description]:
     """The evaluator that is asked for, or casadi's with a note. Steps are in double precision always."""
-    began, name = perf_counter(), "simd" if backend == BEST else backend
-    if name in PLAIN:
+    began = perf_counter()
+    if backend in PLAIN:
         return LargeEvaluator(made, made.plain, threads), Description("casadi", threads=threads)
     try:
-        kernel = made.compiled(exact, STEPPING[name])
+        kernel = made.compiled(exact, STEPPING[backend])
     except (KernelUnavailable, ProgramError) as error:
         note = f"casadi's virtual machine evaluates, which is slower: {error}"
         return LargeEvaluator(made, made.plain, threads), Description("casadi", threads=threads, note=note)
-    precision, device = PRECISIONS[name], kernel.device if isinstance(kernel, DeviceKernel) else None
+    precision, device = PRECISIONS[backend], kernel.device if isinstance(kernel, DeviceKernel) else None
     shared, nets = threads if device is None else 1, "nets by matrix products"
     if precision == "single":
         nets += " in single precision, steps in double"
