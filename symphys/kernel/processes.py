@@ -7,7 +7,7 @@ import os
 import signal
 import subprocess
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -25,6 +25,8 @@ MEMORY_WORDS = (
     "bad_alloc",
     "failed to map segment",
 )
+Ended = SimpleQueue[BaseException | None]
+"""An error, or None, of each command that is over."""
 
 
 @dataclass
@@ -65,57 +67,71 @@ def run(command: Sequence[str], limit: float) -> str:
 
 
 def run_all(commands: Sequence[Sequence[str]], limit: float, at_once: int) -> None:
-    """Run commands side by side; the first that fails ends the others, and so does Ctrl-C.
+    """Run commands side by side; the first that fails ends the others, and so does Ctrl-C."""
+    ended: Ended = SimpleQueue()
+    with _interrupted(ended):
+        _Crew(commands, limit, ended).run(at_once)
 
-    Threads hand over by simple queues: the locks of ``concurrent.futures``, written in Python, can stay locked where
-    Ctrl-C strikes, and then nothing ends.
-    """
-    waiting: SimpleQueue[Sequence[str]] = SimpleQueue()
-    for command in commands:
-        waiting.put(command)
-    over, started, ended = threading.Event(), list[Running](), SimpleQueue[BaseException | None]()
-    workers = [
-        threading.Thread(target=_work, args=(waiting, limit, over, started, ended), daemon=True)
-        for _ in range(min(at_once, len(commands)))
-    ]
+
+@contextlib.contextmanager
+def _interrupted(ended: Ended) -> Iterator[None]:
+    """Ctrl-C is one more error that is waited for: raised wherever it strikes, it is lost in a finalizer."""
+    ours = threading.current_thread() is threading.main_thread()
+    if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    signal.signal(signal.SIGINT, lambda *_: ended.put(KeyboardInterrupt()))
     try:
-        for worker in workers:
-            worker.start()
-        for _ in commands:
-            if (error := ended.get()) is not None:
-                raise error
+        yield
     finally:
-        over.set()
-        for running in started:
-            running.stop()
-        for worker in workers:
-            if worker.ident is not None:
-                worker.join(PARTING)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    if not ended.empty():
+        raise KeyboardInterrupt
 
 
-def _work(
-    waiting: SimpleQueue[Sequence[str]],
-    limit: float,
-    over: threading.Event,
-    started: list[Running],
-    ended: SimpleQueue[BaseException | None],
-) -> None:
-    """Run one command after the other; each leaves an error, or None."""
-    while not over.is_set():
+class _Crew:
+    """Threads that run commands, each a process, one after the other."""
+
+    def __init__(self, commands: Sequence[Sequence[str]], limit: float, ended: Ended) -> None:
+        self.limit, self.ended = limit, ended
+        self.over, self.started = threading.Event(), list[Running]()
+        self.waiting: SimpleQueue[Sequence[str]] = SimpleQueue()
+        for command in commands:
+            self.waiting.put(command)
+
+    def run(self, at_once: int) -> None:
+        """Wait for all commands."""
+        count = self.waiting.qsize()
+        workers = [threading.Thread(target=self.work, daemon=True) for _ in range(min(at_once, count))]
         try:
-            command = waiting.get_nowait()
-        except Empty:
-            return
-        try:
-            running = _start(command, limit)
-            started.append(running)
-            if over.is_set():
+            for worker in workers:
+                worker.start()
+            for _ in range(count):
+                if (error := self.ended.get()) is not None:
+                    raise error
+        finally:
+            self.over.set()
+            for running in self.started:
                 running.stop()
-            running.said()
-        except BaseException as error:
-            ended.put(error)
-        else:
-            ended.put(None)
+            for worker in workers:
+                if worker.ident is not None:
+                    worker.join(PARTING)
+
+    def work(self) -> None:
+        """Run one command after the other; each leaves an error, or None."""
+        while not self.over.is_set():
+            try:
+                running = _start(self.waiting.get_nowait(), self.limit)
+                self.started.append(running)
+                if self.over.is_set():
+                    running.stop()
+                running.said()
+            except Empty:
+                return
+            except BaseException as error:
+                self.ended.put(error)
+            else:
+                self.ended.put(None)
 
 
 def _start(command: Sequence[str], limit: float) -> Running:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import signal
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -114,6 +115,32 @@ def test_ctrl_c_ends_the_compilers(tmp_path: Path) -> None:
     process.send_signal(signal.SIGINT)
     assert "KeyboardInterrupt" in process.communicate(timeout=20)[1]
     assert_gone(tmp_path / "started")
+
+
+STRUCK = """
+import os, signal
+from symphys.kernel.processes import run_all
+
+class Struck(list):
+    def __iter__(self):
+        Finalized()
+        return super().__iter__()
+
+class Finalized:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+        [None for _ in range(1000)]
+
+run_all(Struck([["sleep", "15"]]), 60, at_once=1)
+"""
+
+
+@UNIX
+def test_ctrl_c_is_not_lost_in_a_finalizer() -> None:
+    began = time.monotonic()
+    found = subprocess.run([sys.executable, "-c", STRUCK], capture_output=True, text=True, timeout=60, check=False)
+    assert found.returncode and "Exception ignored" not in found.stderr
+    assert time.monotonic() - began < 10
 
 
 @pytest.mark.parametrize(
