@@ -101,12 +101,18 @@ def _flat(
     world: World, scheme: Scheme | None, inputs: Sequence[str], parameters: Sequence[Any]
 ) -> tuple[list[Expr], Scene, State]:
     """The step's arguments, the scene of a step as one expression, and x in parts."""
-    arguments, pieces = arguments_of(world, inputs, parameters), Inline()
-    for column in arguments:
-        pieces.take(column)
+    arguments = arguments_of(world, inputs, parameters)
     x, u, _, knob = arguments
-    scene = make_scene(world, scheme, tuple(inputs), u, knob, pieces)
+    scene = make_scene(world, scheme, tuple(inputs), u, knob, inline(world, arguments))
     return arguments, scene, parts_of(Layout(world), x)
+
+
+def inline(world: World, arguments: Sequence[Expr]) -> Inline:
+    """Pieces that know x, u, p and smoothing; x by its parts, so that bodies alike share what they compute."""
+    (x, *others), pieces = arguments, Inline()
+    for column in (*parts_of(Layout(world), x).values(), *others):
+        pieces.take(column)
+    return pieces
 
 
 def _packed(scene: Scene, x: State) -> Expr:

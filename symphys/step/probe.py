@@ -9,9 +9,8 @@ import casadi as ca
 
 from symphys.collide import Contact
 from symphys.state import Layout
-from symphys.step.function import arguments_of, parts_of
+from symphys.step.function import arguments_of, inline, parts_of
 from symphys.step.paths import bodies_of, expected_motions, look
-from symphys.step.pieces import Inline
 from symphys.step.row import Moving, at_touch
 from symphys.step.scene import Scene, make_scene
 from symphys.world import Scheme, World
@@ -48,10 +47,8 @@ def _slip(contact: Contact, motions: Moving) -> Expr:
 def _scene(
     world: World, scheme: Scheme | None, inputs: Sequence[str], parameters: Sequence[Any]
 ) -> tuple[Scene, list[Expr]]:
-    arguments, pieces = arguments_of(world, inputs, parameters), Inline()
-    for column in arguments:
-        pieces.take(column)
-    return make_scene(world, scheme, tuple(inputs), arguments[1], ca.SX(0), pieces), arguments
+    arguments = arguments_of(world, inputs, parameters)
+    return make_scene(world, scheme, tuple(inputs), arguments[1], ca.SX(0), inline(world, arguments)), arguments
 
 
 def _contacts(scene: Scene, x: Expr) -> tuple[list[Contact], list[Any]]:
