@@ -1,13 +1,18 @@
-"""Compiled kernels of all tests go into a cache of the checkout; what takes minutes runs only when asked for."""
+"""Compiled kernels of all tests go into a cache of the checkout; what takes minutes runs only when asked for.
+
+Ctrl-C reaches tests that send it themselves also where the shell ignores it, as with ``nohup make test &``.
+"""
 
 from __future__ import annotations
 
 import os
+import signal
 from pathlib import Path
 
 import pytest
 
 os.environ.setdefault("SYMPHYS_CACHE", str(Path(__file__).parents[1] / "build" / "kernels"))
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
