@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from symphys.collide.contact import Contact, Expr, Frame, Shift
-from symphys.collide.touch import NEWTON_STEPS, TINY_RATE, falls
+from symphys.collide.touch import NEWTON_STEPS, TINY_RATE, falls, no_later
 from symphys.course import Course, Parabola
 from symphys.shapes import Sphere
 from symphys.smooth import TINY_SQUARE
@@ -61,11 +61,11 @@ def first_touch(path: Parabola, reach: Expr, dt: Expr) -> Expr:
     closing, speed2 = -ca.dot(d, w), ca.dot(w, w)
     excess = ca.dot(d, d) - reach * reach
     root = ca.sqrt(ca.fmax(closing * closing - speed2 * excess, 0) + TINY_SQUARE)
-    t = ca.fmin(excess / ca.fmax(closing + root, TINY_RATE), dt)
+    t = no_later(excess / ca.fmax(closing + root, TINY_RATE), dt)
     for _ in range(NEWTON_STEPS):
         at = path.at(t)
         slope = ca.fmin(2 * ca.dot(at, path.velocity_at(t)), -TINY_RATE)
-        t = ca.fmin(ca.fmax(t - (ca.dot(at, at) - reach * reach) / slope, -dt), dt)
+        t = no_later(ca.fmax(t - (ca.dot(at, at) - reach * reach) / slope, -dt), dt)
     apart = distance(d)
     return ca.if_else(falls(apart - reach, -closing / apart), t, 0)
 

@@ -24,6 +24,8 @@ NEWTON_STEPS = 3
 """Corrections of the first estimate of the instant."""
 FOUND = 1e-9
 """[m] gap at which an instant counts as one of touch."""
+ROUNDING = 1e-9
+"""Of dt: an instant so little beyond the end of a step keeps its slope, since rounding may have put it there."""
 
 
 def falls(gap: Expr, rate: Expr) -> Expr:
@@ -40,7 +42,17 @@ def first_root(gap: Expr, rate: Expr, bend: Expr, dt: Expr) -> Expr:
     """The first t in [0, dt] with gap + rate t + bend t^2/2 = 0; 0 when overlapping, dt when there is none."""
     discriminant = ca.fmax(rate * rate - 2 * bend * gap, 0)
     closing = ca.fmax(ca.sqrt(discriminant + TINY_SQUARE) - rate, TINY_RATE)
-    return ca.fmin(ca.if_else(falls(gap, rate), 2 * gap, 0) / closing, dt)
+    return no_later(ca.if_else(falls(gap, rate), 2 * gap, 0) / closing, dt)
+
+
+def no_later(t: Expr, dt: Expr) -> Expr:
+    """min(t, dt) with the slope of t where rounding decides: an impact may fall exactly on the end of a step."""
+    return ca.if_else(t > (1 + ROUNDING) * dt, dt, t)
+
+
+def within(t: Expr, dt: Expr) -> Expr:
+    """The instant t held in [0, dt], with the slope of t at both ends; see ``no_later``."""
+    return no_later(ca.if_else(t < -ROUNDING * dt, 0, t), dt)
 
 
 class Timed(Meeting, Protocol):
@@ -65,7 +77,7 @@ def contact_along(meeting: Timed, dt: Expr, newton_steps: int = NEWTON_STEPS) ->
     for _ in range(newton_steps):
         here, slope, _ = at(time)
         better = ca.if_else(slope < 0, time - here / ca.fmin(slope, -TINY_RATE), straight)
-        time = ca.fmin(ca.fmax(better, 0), dt)
+        time = within(better, dt)
     time = ca.if_else(falls(start, pace), time, 0)
     here, slope, _ = at(time)
     through = ca.logic_and(ca.logic_and(time > 0, time < dt), ca.logic_and(ca.fabs(here) < FOUND, slope < 0))

@@ -8,29 +8,28 @@ from typing import Any
 
 import casadi as ca
 
+from symphys import rotation
 from symphys.collide import Contact
-from symphys.motion import Motion, angular_velocity
+from symphys.motion import Motion, angular_velocity, apply
 from symphys.smooth import positive
-from symphys.step.impulse import ZERO
+from symphys.step.impulse import ZERO, Impulse
 from symphys.step.jointed import locks_at, make_trees, momenta_of
 from symphys.step.masses import answer_of, effective_masses, inverse_masses
 from symphys.step.momentum import Momentum
 from symphys.step.paths import bodies_of, expected_motions, look
-from symphys.step.pgs import Solution
+from symphys.step.pgs import Row, Solution
 from symphys.step.phase import Phase
 from symphys.step.restitution import rebound
 from symphys.step.row import UNREACHED, ContactRow, Moving, at_touch, make_sides
-from symphys.step.rows import width_of
+from symphys.step.rows import SHORTEST, width_of
 from symphys.step.scene import Scene, Setting, State
 from symphys.world import Law
 
 Expr = Any
 """casadi SX, MX or DM"""
 
-MARGIN = 1e-6
-"""Of the stretch that is cut: the shortest one before or after an impact."""
 TOGETHER = 1e-9
-"""Of the time until then: impacts that are no further apart are one."""
+"""Of dt: impacts that are no further apart are one."""
 TOUCHING = 1e-3
 """Of the distance a_ref dt^2: surfaces that near to each other take part in an impact of their bodies."""
 
@@ -44,12 +43,14 @@ class Cut:
         first: length of the first stretch [s].
         fast: per pair: 1 if it closes at speed.
         struck: per pair: 1 if it meets at speed then.
+        late: per pair: how much later than the cut a struck pair meets [s]: rounding, but with a slope.
     """
 
     impact: Expr
     first: Expr
     fast: tuple[Expr, ...]
     struck: tuple[Expr, ...]
+    late: tuple[Expr, ...]
 
 
 def find_cut(scene: Scene, x: State, duration: Expr, share: float) -> Cut:
@@ -63,8 +64,11 @@ def find_cut(scene: Scene, x: State, duration: Expr, share: float) -> Cut:
     earliest = ca.SX(0), duration
     for contact, closes in zip(contacts, fast, strict=True):
         earliest = do(_earlier, earliest, closes, contact.hit, contact.time)
-    struck = [do(_is_struck, earliest, c, contact.hit, contact.time) for contact, c in zip(contacts, fast, strict=True)]
-    return Cut(earliest[0], do(_inside, earliest, duration, share), tuple(fast), tuple(struck))
+    first = do(_inside, earliest, duration, share)
+    until = do(_until, earliest[1], first, scene.setting.scheme.dt)
+    struck = [do(_is_struck, c, contact.hit, contact.time, until) for contact, c in zip(contacts, fast, strict=True)]
+    late = [do(_late, first, s, contact.time) for contact, s in zip(contacts, struck, strict=True)]
+    return Cut(earliest[0], first, tuple(fast), tuple(struck), tuple(late))
 
 
 def closes_fast(setting: Setting, law: Law, contact: Contact) -> Expr:
@@ -78,8 +82,17 @@ def _earlier(earliest: tuple[Expr, Expr], closes: Expr, hit: Expr, time: Expr) -
     return ca.fmax(earliest[0], meets), ca.if_else(meets, ca.fmin(earliest[1], time), earliest[1])
 
 
-def _is_struck(earliest: tuple[Expr, Expr], closes: Expr, hit: Expr, time: Expr) -> Expr:
-    return ca.logic_and(ca.logic_and(closes, hit), time <= earliest[1] + TOGETHER * ca.fabs(earliest[1]))
+def _until(earliest: Expr, first: Expr, dt: float) -> Expr:
+    """When the last of the impacts that share the cut may be; none may be left between its instant and the cut."""
+    return ca.fmax(earliest, first) + TOGETHER * dt
+
+
+def _is_struck(closes: Expr, hit: Expr, time: Expr, until: Expr) -> Expr:
+    return ca.logic_and(ca.logic_and(closes, hit), time <= until)
+
+
+def _late(first: Expr, struck: Expr, time: Expr) -> Expr:
+    return ca.if_else(struck, time - first, 0)
 
 
 def _inside(earliest: tuple[Expr, Expr], duration: Expr, share: float) -> Expr:
@@ -87,7 +100,7 @@ def _inside(earliest: tuple[Expr, Expr], duration: Expr, share: float) -> Expr:
 
     Surfaces that rounding has put beyond each other meet at a time below 0 (``touch.falls``).
     """
-    least, time = MARGIN * duration, earliest[1]
+    least, time = SHORTEST * duration, earliest[1]
     early = least * (1 + ca.ceil(ca.fmax(-time, 0) / least))
     shift = ca.if_else(time < least, early, ca.if_else(time > duration - least, -least, 0))
     return ca.if_else(earliest[0], time + shift, share * duration)
@@ -111,6 +124,7 @@ def collide_now(scene: Scene, x: State, cut: Cut) -> Phase:
     every = (*(row for row, _ in locks), *rows)
     solved = rebound(scene, every, Solution(trees.states, still, still), motions, trees)
     after = _with_velocities(scene, x, motions, momenta_of(scene, trees, solved.momenta), cut.impact)
+    _delay(scene, after, rows, solved.impulses[n:], cut.late)
     forces = (x[f"{pair.name}.force"] for pair in scene.world.pairs)
     ahead = tuple(scene.pieces.do(_ahead, cut.impact, x["lag"], force) for force in forces)
     changes = tuple(zip(solved.impulses, solved.last, strict=True))
@@ -151,6 +165,7 @@ def _row(
         leaving=struck,
         lasts=ca.SX(0),
         load=ca.SX(0),
+        slack=ca.SX(0),
         struck=struck,
         width=struck * width_of(setting, contact),
         knob=setting.knob,
@@ -168,6 +183,28 @@ def _with_velocities(
         values |= zip(names, scene.pieces.do(_after, motion, momentum, before, impact), strict=True)
     values["lag"] = scene.pieces.do(_renewed, impact, x["lag"])
     return values
+
+
+def _delay(scene: Scene, x: State, rows: Sequence[Row], impulses: Sequence[Impulse], late: Sequence[Expr]) -> None:
+    """Take back what each impulse does to positions before its own instant, on bodies without joints.
+
+    Impacts of several bodies at one instant share a cut, but each has an instant with a slope of its own.
+    """
+    held = {index for joint in scene.world.joints for index in joint.bodies}
+    for each, impulse, time in zip(rows, impulses, late, strict=True):
+        for k, index in enumerate(each.bodies):
+            names = tuple(f"{scene.world.bodies[index].name}.{part}" for part in ("position", "orientation"))
+            if index not in held:
+                pose = x[names[0]], x[names[1]]
+                x |= zip(names, scene.pieces.do(_delayed, pose, each.row, k, impulse, time), strict=True)
+
+
+def _delayed(pose: tuple[Expr, Expr], row: ContactRow, k: int, impulse: Impulse, time: Expr) -> tuple[Expr, Expr]:
+    side, (position, q) = row.sides[k], pose
+    push, twist = impulse.linear(row.impulse_normal), impulse.angular(row.impulse_normal)
+    early = -time * side.sign
+    turn = early * apply(side.inverse_inertia, ca.cross(side.impulse_arm, push) + twist)
+    return position + early * side.inverse_mass * push, q + rotation.multiply(ca.vertcat(0, turn / 2), q)
 
 
 def _after(motion: Motion, momentum: Momentum, before: tuple[Expr, ...], impact: Expr) -> tuple[Expr, Expr]:

@@ -21,6 +21,7 @@ from symphys.step.axis import AxisRow, OfTree, by_law, towards
 from symphys.step.lock import LockRow, inverse
 from symphys.step.momentum import Momentum
 from symphys.step.row import Moving, Side
+from symphys.step.rows import TIE
 from symphys.step.scene import Setting
 from symphys.step.sockets import Sockets, errors, free, locked
 
@@ -173,16 +174,21 @@ def lower_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr
 
     What is beyond it is taken back by the position pass, without velocity.
     """
-    left = at.value - joint.limits.lower
-    law = towards(-ca.fmax(left, 0) / stretch.duration, at.mobility)
-    return _row(at, law, ca.SX(0), None, setting.knob / at.mobility, left, _strikes(setting, at, -at.rate_now))
+    left, strikes = at.value - joint.limits.lower, _strikes(setting, at, -at.rate_now)
+    law = towards(-_room(left, strikes) / stretch.duration, at.mobility)
+    return _row(at, law, ca.SX(0), None, setting.knob / at.mobility, left + TIE * strikes, strikes)
 
 
 def upper_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr, stretch: Stretch) -> AxisRow:
     """A limit from above."""
-    left = joint.limits.upper - at.value
-    law = towards(ca.fmax(left, 0) / stretch.duration, at.mobility)
-    return _row(at, law, None, ca.SX(0), setting.knob / at.mobility, left, _strikes(setting, at, at.rate_now))
+    left, strikes = joint.limits.upper - at.value, _strikes(setting, at, at.rate_now)
+    law = towards(_room(left, strikes) / stretch.duration, at.mobility)
+    return _row(at, law, None, ca.SX(0), setting.knob / at.mobility, left + TIE * strikes, strikes)
+
+
+def _room(left: Expr, strikes: Expr) -> Expr:
+    """How far a limit may go within the stretch; by rounding more where it strikes, see ``rows.TIE``."""
+    return ca.if_else(left < -TIE, 0, left) + TIE * strikes
 
 
 def _strikes(setting: Setting, at: AlongCoordinate, closing: Expr) -> Expr:

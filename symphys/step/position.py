@@ -175,7 +175,7 @@ def _push(
     old: Expr,
     share: float,
 ) -> tuple[tuple[Displaced, ...], Expr]:
-    gap = contact.meeting.gap_after(moved[0], moved[1] if len(moved) > 1 else UNMOVED)
+    gap = contact.meeting.gap_after(moved[0], moved[1] if len(moved) > 1 else UNMOVED) + row.slack
     free = old - share * gap * row.normal_mass * row.yields
     # at 0 the slope is that of ``free``: a body that exactly touches is held by the surface
     new = ca.if_else(ca.logic_or(lasts, free >= 0), free, 0)

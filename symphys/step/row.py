@@ -140,6 +140,7 @@ class ContactRow:
         leaving: hit chi: the share of the contact that is an impact, in [0, 1].
         lasts: 1 if the contact carried load and goes on.
         load: the least normal impulse that counts as load [N s].
+        slack: overlap at the end of the stretch that counts as rounding [m].
         struck: 1 if the surfaces meet at speed, else 0.
         width: of the smoothed normal projection [m/s]; 0 for fast approach.
         knob: smoothing [m/s].
@@ -163,6 +164,7 @@ class ContactRow:
     leaving: Expr
     lasts: Expr
     load: Expr
+    slack: Expr
     struck: Expr
     width: Expr
     knob: Expr

@@ -13,7 +13,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.collide.contact import Contact
-from symphys.collide.touch import TINY_RATE
+from symphys.collide.touch import TINY_RATE, TOUCH
 from symphys.smooth import clip, positive
 from symphys.step.masses import answer_of, effective_masses, inverse_masses, yields
 from symphys.step.row import UNREACHED, ContactRow, Moving, Side, at_touch, free_slip, make_sides
@@ -29,6 +29,10 @@ MARGIN = 1e-4
 
 NEAR = 0.1
 """Of the distance a_ref dt^2: surfaces that carried load and are that near to each other go on touching."""
+TIE = 1e-11
+"""[m] surfaces that move at speed and are that near at the end of a stretch do not touch then; see ``_slack``."""
+SHORTEST = 1e-6
+"""Of dt: the shortest stretch before or after an impact."""
 LOADED = 1e-3
 """Of the weight of the effective mass: what counts as load. A smooth contact always carries a little."""
 
@@ -54,7 +58,8 @@ def prepare(
     frame, applied = contact.meeting.frame(row_time), contact.meeting.frame(touch.leaving * touch.time)
     sides = make_sides(motions, row_time, frame, applied)
     k_normal, *k_others = inverse_masses(sides, frame.normal, same)
-    softness, target = _normal_target(law, contact, duration, touch, k_normal, knob)
+    slack = _slack(setting, contact, touch)
+    softness, target = _normal_target(law, contact, duration, touch, k_normal, slack, knob)
     landing = _landing(contact, duration, touch.time, target, ca.dot(frame.normal, free_slip(sides, motions)))
     answer = answer_of(sides, applied.normal, same)
     parts = yields(sides, frame.normal, answer)
@@ -76,6 +81,7 @@ def prepare(
         leaving=touch.leaving,
         lasts=lasts,
         load=weight * duration,
+        slack=slack,
         struck=ca.SX(0) if law.soft else ca.logic_and(touch.hit, contact.rate < -setting.fast),
         width=width_of(setting, contact),
         knob=knob,
@@ -162,8 +168,21 @@ def _landing(contact: Contact, duration: Expr, time: Expr, target: Expr, free: E
     return ca.fmin(ca.fmax(share, 0), time)
 
 
+def _slack(setting: Setting, contact: Contact, touch: _Touch) -> Expr:
+    """[m] an overlap at the end of the stretch that is rounding: that of an impact which falls on its very end.
+
+    Whether such an impact belongs to this stretch or to the next is rounding's choice. Either way nothing but the
+    impact may act: a constraint that holds the surfaces where they just touch would have half of its slope there.
+    Cuts are off the impact by the shortest stretch at most.
+    """
+    lands = ca.logic_and(touch.hit, ca.logic_and(touch.leaving < 0.5, contact.rate < 0))
+    speed = ca.fabs(contact.rate)
+    passes = ca.logic_and(speed > setting.fast, ca.logic_not(lands))
+    return ca.if_else(passes, TIE + 2 * SHORTEST * setting.scheme.dt * speed, 0)
+
+
 def _normal_target(
-    law: Law, contact: Contact, duration: Expr, touch: _Touch, inverse_mass: Expr, knob: Expr
+    law: Law, contact: Contact, duration: Expr, touch: _Touch, inverse_mass: Expr, slack: Expr, knob: Expr
 ) -> tuple[Expr, Expr]:
     """(softness, target): the velocity that the normal row asks for at the middle of the step.
 
@@ -171,7 +190,7 @@ def _normal_target(
     Soft (Catto, GDC 2011), deviation: the spring acts over what is left of the step, so that a contact that
     begins late in the step begins gently.
     """
-    away = -ca.fmax(contact.gap, 0) / duration
+    away = -(ca.fmax(contact.gap, 0) + slack) / duration
     if not law.soft:
         carried = positive(touch.rebound + touch.pull * (duration / 2 - touch.time), knob)
         return ca.SX(0), ca.if_else(contact.hit, carried, away)
@@ -180,4 +199,4 @@ def _normal_target(
     left = duration - touch.time
     beta = stiffness / (damper + left * stiffness)
     gamma = 1 / (left * (damper + left * stiffness) + 1e-30)
-    return gamma, ca.if_else(contact.hit, -beta * ca.fmin(contact.gap, 0), away)
+    return gamma, ca.if_else(contact.hit, -beta * ca.if_else(contact.gap < -TOUCH, contact.gap, 0), away)
