@@ -6,13 +6,14 @@ step reads as leapfrog; see ARCHITECTURE.md, "The time step".
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import casadi as ca
 
-from symphys import rotation
+from symphys import free_rotation, rotation
 from symphys.course import Course
+from symphys.rotation import turn
 
 Expr = Any
 """casadi SX, MX or DM"""
@@ -84,6 +85,14 @@ class Motion(Course):
             return self.inverse_mid
         return self.inverse_mid + (t - self.dt / 2) * self.inverse_rate
 
+    def at_start(self) -> Motion:
+        """The same with the inertia of t = 0 at any time: for impulses there."""
+        if self.inverse_rate is None:
+            return self
+        inverse = inverse_inertia(self.inertia, self.rotation)
+        now = in_world(inertia_matrix(self.inertia), self.rotation)
+        return replace(self, inverse_mid=inverse, inverse_rate=None, inertia_mid=now)
+
     def inertia_at(self, t: Expr) -> Expr:
         """(3, 3), world frame: the inverse of what ``inverse_inertia`` gives."""
         if self.inverse_rate is None or ca.SX(t - self.dt / 2).is_zero():
@@ -134,21 +143,31 @@ def in_world(tensor: Expr, r_wb: Expr) -> Expr:
     return ca.triu2symm(ca.triu(ca.densify(ca.mtimes(r_wb, ca.mtimes(tensor, r_wb.T)))))
 
 
-def free_motion(mass: Expr, inertia: Expr, state: BodyState, gravity: Expr, dt: Expr) -> Motion:
-    """The motion from ``state`` under gravity, force and torque, all constant over the step."""
+def free_motion(mass: Expr, inertia: Expr, state: BodyState, gravity: Expr, dt: Expr, jointed: bool = False) -> Motion:
+    """The motion from ``state`` under gravity, force and torque, all constant over the step.
+
+    ``jointed``: whether joints hold the body, so that it does not turn freely.
+    """
     turned = rotation.matrix(state.orientation)
     w = apply(inverse_inertia(inertia, turned), state.angular_momentum)
-    return motion_from(mass, inertia, state, (turned, w), gravity, dt)
+    return motion_from(mass, inertia, state, (turned, w), gravity, dt, jointed)
 
 
 def motion_from(
-    mass: Expr, inertia: Expr, state: BodyState, turning: tuple[Expr, Expr], gravity: Expr, dt: Expr
+    mass: Expr,
+    inertia: Expr,
+    state: BodyState,
+    turning: tuple[Expr, Expr],
+    gravity: Expr,
+    dt: Expr,
+    jointed: bool = True,
 ) -> Motion:
     """The same from what ``state`` stands for, ``turning``: its rotation (3, 3) and angular velocity."""
     turned, w = turning
     acceleration = gravity + state.force / mass
     mid_momentum = state.angular_momentum + dt / 2 * state.torque
-    inverse_mid, inertia_mid, inverse_rate = _inertias(inertia, state, dt / 2 * w, mid_momentum)
+    middle = _middle(inertia, state.orientation, w if jointed else None, mid_momentum, dt / 2)
+    inverse_mid, inertia_mid, inverse_rate = _inertias(inertia, middle, mid_momentum)
     return Motion(
         position=state.position,
         rotation=turned,
@@ -170,11 +189,18 @@ def motion_from(
     )
 
 
-def _inertias(inertia: Expr, state: BodyState, turn: Expr, momentum: Expr) -> tuple[Expr, Expr, Expr | None]:
-    """Mid-step, turned by ``turn`` (3,): inverse inertia, inertia, and the rate of the inverse, None if isotropic."""
+def _middle(inertia: Expr, q: Expr, w: Expr | None, momentum: Expr, t: Expr) -> Expr:
+    """(4,): orientation ``q`` after half a step ``t`` [s], at the angular velocity ``w`` or, for None, freely."""
+    if isotropic(inertia):
+        return q
+    return free_rotation.turned(inertia, q, momentum, t, free_rotation.SECOND_ORDER) if w is None else turn(q, t * w)
+
+
+def _inertias(inertia: Expr, middle: Expr, momentum: Expr) -> tuple[Expr, Expr, Expr | None]:
+    """At the orientation ``middle``: inverse inertia, inertia, and the rate of the inverse, None if isotropic."""
     if isotropic(inertia):
         return 1 / inertia, inertia_matrix(inertia), None
-    turned = rotation.matrix(rotation.turn(state.orientation, turn))
+    turned = rotation.matrix(middle)
     inverse = inverse_inertia(inertia, turned)
     changing: Expr = ca.mtimes(rotation.cross_matrix(apply(inverse, momentum)), inverse)
     return inverse, in_world(inertia_matrix(inertia), turned), changing + changing.T

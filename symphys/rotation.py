@@ -67,8 +67,13 @@ def between(p: Expr, q: Expr) -> Expr:
 
 
 def turn(q: Expr, r: Expr) -> Expr:
-    """(4,): orientation ``q`` after a rotation by the vector ``r`` [rad], world frame."""
-    return multiply(exponential(r), q)
+    """(4,): orientation ``q`` after a rotation by the vector ``r`` [rad], world frame; of length 1 up to rounding."""
+    return unit(multiply(exponential(r), q))
+
+
+def unit(q: Expr) -> Expr:
+    """(4,): a quaternion of almost length 1 nearer to it: a step of Newton's method."""
+    return q * (3 - ca.dot(q, q)) / 2
 
 
 def rotate(q: Expr, a: Expr) -> Expr:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import casadi as ca
@@ -66,6 +66,7 @@ class Contact:
         hit: 1 if the free paths meet within the step, else 0. A hard select at every smoothing: whether an impact
             falls into this step or the next must not change the motion.
         time: [s] of the first touch inside the step, in [0, dt].
+        end: gap at the end of the step, on the free paths [m].
         meeting: the geometry.
     """
 
@@ -73,6 +74,7 @@ class Contact:
     rate: Expr
     hit: Expr
     time: Expr
+    end: Expr
     meeting: Meeting
 
 
@@ -93,4 +95,4 @@ class Flipped:
 
 def flipped(contact: Contact) -> Contact:
     """The contact with its sides exchanged."""
-    return Contact(contact.gap, contact.rate, contact.hit, contact.time, Flipped(contact.meeting))
+    return replace(contact, meeting=Flipped(contact.meeting))

@@ -47,10 +47,12 @@ def ball_on_plane(course: Course, offset: Sequence[Any], radius: Expr, plane: Pl
     gap = ca.dot(normal, path.start) - plane.offset - radius
     rate = ca.dot(normal, path.velocity)
     bend = ca.dot(normal, path.acceleration)
+    end = gap + dt * rate + dt * dt / 2 * bend
     return Contact(
         gap=gap,
         rate=rate,
-        hit=gap + dt * rate + dt * dt / 2 * bend < 0,
+        hit=end < 0,
         time=first_root(gap, rate, bend, dt),
+        end=end,
         meeting=OnPlane(normal, plane.offset, radius, course.arm(offset), path.start),
     )

@@ -47,6 +47,7 @@ def sphere_sphere(ball_a: Sphere, ball_b: Sphere, a: Course, b: Course) -> list[
             rate=ca.dot(direction(path.start), path.velocity),
             hit=_meets(path, reach, a.dt),
             time=first_touch(path, reach, a.dt),
+            end=distance(path.at(a.dt)) - reach,
             meeting=OnSphere(paths, (a.arm(ball_a.centre), b.arm(ball_b.centre)), (ball_a.radius, ball_b.radius)),
         )
     ]

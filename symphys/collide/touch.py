@@ -81,8 +81,8 @@ def contact_along(meeting: Timed, dt: Expr, newton_steps: int = NEWTON_STEPS) ->
     time = ca.if_else(falls(start, pace), time, 0)
     here, slope, _ = at(time)
     through = ca.logic_and(ca.logic_and(time > 0, time < dt), ca.logic_and(ca.fabs(here) < FOUND, slope < 0))
-    hit = ca.fmax(at(dt)[0] < 0, through)
-    return Contact(start, pace, hit, time, meeting)
+    end = at(dt)[0]
+    return Contact(start, pace, ca.fmax(end < 0, through), time, end, meeting)
 
 
 def gap_rate_bend(meeting: Timed) -> Callable[[Expr], list[Expr]]:

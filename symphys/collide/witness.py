@@ -78,5 +78,6 @@ def contact_of(witness: Witness) -> Contact:
         rate=ca.if_else(off, 0, met.rate),
         hit=ca.logic_and(met.hit, ca.logic_not(off)),
         time=ca.if_else(off, witness.end, met.time),
+        end=ca.if_else(off, witness.far, met.end),
         meeting=witness,
     )

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.collide import Contact
-from symphys.step.impact import Cut, closes_fast
+from symphys.step.impact import Cut, strikes
 from symphys.step.paths import bodies_of, expected_motions, look
 from symphys.step.restitution import eccentric_bodies
 from symphys.step.scene import Scene, Setting, State
@@ -43,7 +43,7 @@ def deferred(scene: Scene, x: State, duration: Expr, cuts: Sequence[Cut]) -> lis
 
 def _hit(setting: Setting, law: Law, contact: Contact) -> tuple[Expr, Expr]:
     """(whether it closes at speed, whether it then meets)."""
-    fast = closes_fast(setting, law, contact)
+    fast = strikes(setting, law, contact)
     return fast, ca.logic_and(fast, contact.hit)
 
 

@@ -12,16 +12,17 @@ from symphys import rotation
 from symphys.collide import Contact
 from symphys.motion import Motion, angular_velocity, apply
 from symphys.smooth import positive
+from symphys.step.coupled import coupling_of, may_couple
 from symphys.step.impulse import ZERO, Impulse
 from symphys.step.jointed import locks_at, make_trees, momenta_of
-from symphys.step.masses import answer_of, effective_masses, inverse_masses
+from symphys.step.masses import answer_of, effective_masses, inverse_masses, symmetric_mobilities
 from symphys.step.momentum import Momentum
 from symphys.step.paths import bodies_of, expected_motions, look
 from symphys.step.pgs import Row, Solution
 from symphys.step.phase import Phase
 from symphys.step.restitution import rebound
 from symphys.step.row import UNREACHED, ContactRow, Moving, at_touch, make_sides
-from symphys.step.rows import SHORTEST, width_of
+from symphys.step.rows import SHORTEST, closes_fast, width_of
 from symphys.step.scene import Scene, Setting, State
 from symphys.world import Law
 
@@ -60,7 +61,7 @@ def find_cut(scene: Scene, x: State, duration: Expr, share: float) -> Cut:
     """
     do = scene.pieces.do
     contacts = look(scene, expected_motions(scene, x, duration), duration)
-    fast = [do(closes_fast, scene.setting, p.law, c) for p, c in zip(scene.world.pairs, contacts, strict=True)]
+    fast = [do(strikes, scene.setting, p.law, c) for p, c in zip(scene.world.pairs, contacts, strict=True)]
     earliest = ca.SX(0), duration
     for contact, closes in zip(contacts, fast, strict=True):
         earliest = do(_earlier, earliest, closes, contact.hit, contact.time)
@@ -71,9 +72,9 @@ def find_cut(scene: Scene, x: State, duration: Expr, share: float) -> Cut:
     return Cut(earliest[0], first, tuple(fast), tuple(struck), tuple(late))
 
 
-def closes_fast(setting: Setting, law: Law, contact: Contact) -> Expr:
-    """1 if a contact closes at a speed that makes its meeting an impact."""
-    return ca.SX(0) if law.soft else contact.rate < -setting.fast
+def strikes(setting: Setting, law: Law, contact: Contact) -> Expr:
+    """1 if a contact's meeting is an impact."""
+    return ca.SX(0) if law.soft else closes_fast(setting, contact)
 
 
 def _earlier(earliest: tuple[Expr, Expr], closes: Expr, hit: Expr, time: Expr) -> tuple[Expr, Expr]:
@@ -109,7 +110,7 @@ def _inside(earliest: tuple[Expr, Expr], duration: Expr, share: float) -> Expr:
 def collide_now(scene: Scene, x: State, cut: Cut) -> Phase:
     """The state after the impacts at ``cut``; leapfrog begins anew there, so ``lag`` is 0. Without one the same x."""
     duration = ca.SX(scene.setting.scheme.dt)
-    motions = expected_motions(scene, x, duration)
+    motions = [scene.pieces.do(Motion.at_start, motion) for motion in expected_motions(scene, x, duration)]
     contacts = look(scene, motions, duration)
     momenta = tuple(scene.pieces.do(_momentum, motion) for motion in motions)
     trees = make_trees(scene, motions, momenta, ca.SX(0))
@@ -117,7 +118,8 @@ def collide_now(scene: Scene, x: State, cut: Cut) -> Phase:
     for pair, contact, struck in zip(scene.world.pairs, contacts, cut.struck, strict=True):
         bodies = bodies_of(pair)
         moving = tuple(trees.motions[i] for i in bodies)
-        arguments = pair.law, contact, moving, struck, cut.impact, trees.same(bodies)
+        coupled = may_couple(scene.world, pair)
+        arguments = pair.law, contact, moving, struck, cut.impact, trees.same(bodies), coupled
         rows.append(trees.row(bodies, scene.pieces.do(_row, scene.setting, *arguments)))
     locks = locks_at(scene, trees)
     n, still = len(locks), (*(nothing for _, nothing in locks), *(ZERO for _ in rows))
@@ -140,7 +142,14 @@ def _ahead(impact: Expr, lag: Expr, force: Expr) -> Expr:
 
 
 def _row(
-    setting: Setting, law: Law, contact: Contact, motions: Moving, struck: Expr, impact: Expr, same: bool
+    setting: Setting,
+    law: Law,
+    contact: Contact,
+    motions: Moving,
+    struck: Expr,
+    impact: Expr,
+    same: bool,
+    coupled: bool,
 ) -> ContactRow:
     """The row of a contact at the instant of an impact: of it where ``struck``, of its bodies where they touch."""
     now, scheme = ca.SX(0), setting.scheme
@@ -150,6 +159,7 @@ def _row(
     frame = contact.meeting.frame(now)
     sides = make_sides(motions, now, frame, frame)
     resting = ca.if_else(touching, 0, UNREACHED)
+    push, twist = symmetric_mobilities(sides, same)
     return ContactRow(
         law,
         sides,
@@ -157,7 +167,7 @@ def _row(
         frame.normal,
         answer_of(sides, frame.normal, same),
         yields=ca.SX(1),
-        **effective_masses(*inverse_masses(sides, frame.normal, same)),
+        **effective_masses(*inverse_masses(sides, frame.normal, push, twist)),
         softness=ca.SX(0),
         target=ca.SX(UNREACHED) if law.soft else ca.if_else(struck, speed, resting),
         slip_target=ca.SX.zeros(3),
@@ -170,6 +180,7 @@ def _row(
         width=struck * width_of(setting, contact),
         knob=setting.knob,
         same=same,
+        coupling=coupling_of(push, frame.normal, law.friction, ca.SX(0)) if coupled else None,
     )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 
 from symphys.smooth import onto_disc, positive
+from symphys.step import coupled
 from symphys.step.momentum import States
 
 if TYPE_CHECKING:
@@ -69,15 +70,24 @@ def give(row: ContactRow, momenta: States, impulse: Impulse) -> States:
 
 def visit(row: ContactRow, momenta: States, old: Impulse) -> tuple[States, Impulse]:
     """One projection of each of the row's impulses, one after the other."""
-    zero, slip = ca.SX.zeros(3), row.slip(momenta)
-    normal = _normal(row, slip, old)
-    tangent = _tangent(row, slip + row.answer * (normal - old.normal), old, normal)
+    zero = ca.SX.zeros(3)
+    normal, tangent = _pressed(row, row.slip(momenta), old)
     momenta = give(row, momenta, Impulse(normal - old.normal, tangent - old.tangent, ca.SX(0), zero))
     if not row.law.spins:
         return momenta, Impulse(normal, tangent, old.spin, old.roll)
     spin, roll = _torques(row, momenta, old, normal)
     momenta = give(row, momenta, Impulse(ca.SX(0), zero, spin - old.spin, roll - old.roll))
     return momenta, Impulse(normal, tangent, spin, roll)
+
+
+def _pressed(row: ContactRow, slip: Expr, old: Impulse) -> tuple[Expr, Expr]:
+    """The normal impulse and that of friction."""
+    if row.coupling is not None:
+        exact, rounded = (by(row, row.coupling, slip, old) for by in (coupled.solve, coupled.smooth))
+        smooth = row.knob > 0
+        return ca.if_else(smooth, rounded[0], exact[0]), ca.if_else(smooth, rounded[1], exact[1])
+    normal = _normal(row, slip, old)
+    return normal, _tangent(row, slip + row.answer * (normal - old.normal), old, normal)
 
 
 def _normal(row: ContactRow, slip: Expr, old: Impulse) -> Expr:

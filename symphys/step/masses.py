@@ -59,12 +59,18 @@ def yields(sides: Sequence[Side], n: Expr, answer: Expr) -> Expr:
     return ca.dot(n, answer) > HELD * sum(side.inverse_mass for side in sides)
 
 
-def inverse_masses(sides: Sequence[Side], n: Expr, same: bool) -> tuple[Expr, Expr, Expr, Expr]:
-    """k along the normal, across it, and for torques about it and across it."""
+def symmetric_mobilities(sides: Sequence[Side], same: bool) -> tuple[Expr, Expr]:
+    """Those of ``mobilities``, on trees their symmetric parts."""
     push, twist = mobilities(sides, same)
     if all(side.reach is None for side in sides):
+        return push, twist
+    return (push + push.T) / 2, (twist + twist.T) / 2
+
+
+def inverse_masses(sides: Sequence[Side], n: Expr, push: Expr, twist: Expr) -> tuple[Expr, Expr, Expr, Expr]:
+    """k along the normal, across it, and for torques about it and across it; from ``symmetric_mobilities``."""
+    if all(side.reach is None for side in sides):
         return along(push, n), across(push, n), along(twist, n), across(twist, n)
-    push, twist = (push + push.T) / 2, (twist + twist.T) / 2
     normal, least = along(push, n), HELD * sum(side.inverse_mass for side in sides)
     return ca.if_else(normal < least, least, normal), across(push, n), along(twist, n), across(twist, n)
 

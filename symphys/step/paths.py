@@ -15,7 +15,7 @@ from symphys.motion import BodyState, Motion, free_motion, momentum, motion_from
 from symphys.state import BODY_FIELDS
 from symphys.step.articulate import accelerations, world_inertia
 from symphys.step.scene import Scene, State
-from symphys.world import Pair
+from symphys.world import Pair, World
 
 Expr = Any
 """casadi SX, MX or DM"""
@@ -30,6 +30,11 @@ def look(scene: Scene, motions: Sequence[Motion], duration: Expr) -> list[Contac
         b = at_rest(duration) if second.body is None else motions[second.body].course()
         found += scene.pieces.do(collide, *surfaces, a, b)
     return found
+
+
+def jointed_bodies(world: World) -> set[int]:
+    """The indices of the bodies that joints hold."""
+    return {index for joint in world.joints for index in joint.bodies}
 
 
 def bodies_of(pair: Pair) -> tuple[int, ...]:
@@ -72,13 +77,13 @@ def _as_held(motion: Motion, tensor: Expr, change: tuple[Expr, Expr], gravity: E
 def _motions(scene: Scene, x: State, duration: Expr, freed: int, share: int) -> list[Motion]:
     """Motions with ``freed`` lags of the persistent forces in the velocities and ``share`` of them acting."""
     zero, lag = ca.SX.zeros(3), x["lag"]
-    motions = []
-    for body in scene.world.bodies:
+    motions, jointed = [], jointed_bodies(scene.world)
+    for index, body in enumerate(scene.world.bodies):
         part = {name: x[f"{body.name}.{name}"] for name, _ in BODY_FIELDS}
         given = (scene.given(f"{body.name}.{name}") for name in ("force", "torque"))
         push = tuple(zero if each is None else each for each in given)
         inertial, times = (body.mass, body.inertia), (freed, lag, share, duration)
-        motions.append(scene.pieces.do(_motion, inertial, part, push, scene.setting.gravity, times))
+        motions.append(scene.pieces.do(_motion, inertial, part, push, scene.setting.gravity, times, index in jointed))
     return motions
 
 
@@ -88,6 +93,7 @@ def _motion(
     push: tuple[Expr, ...],
     gravity: Expr,
     times: tuple[int, Expr, int, Expr],
+    jointed: bool,
 ) -> Motion:
     (mass, inertia), (freed, lag, share, duration) = inertial, times
     turning = momentum(inertia, part["orientation"], part["angular_velocity"])
@@ -100,7 +106,7 @@ def _motion(
         force=push[0] + share * part["reaction_force"],
         torque=push[1] + share * part["reaction_torque"],
     )
-    return free_motion(mass, inertia, state, gravity, duration)
+    return free_motion(mass, inertia, state, gravity, duration, jointed)
 
 
 def _index(body: int | None) -> int:

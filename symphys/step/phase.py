@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -11,15 +11,17 @@ import casadi as ca
 from symphys import rotation
 from symphys.collide import Contact
 from symphys.collide.contact import Shift
-from symphys.motion import Motion, angular_velocity
+from symphys.free_rotation import turned
+from symphys.motion import Motion, angular_velocity, apply, isotropic
 from symphys.state import BODY_FIELDS
+from symphys.step.coupled import may_couple
 from symphys.step.holding import fitting, hold, keep_up, kept
 from symphys.step.impulse import ZERO, Impulse
 from symphys.step.jointed import JointRow, Trees, joint_rows, make_trees, momenta_of, resumed
 from symphys.step.momentum import Momenta, Momentum
-from symphys.step.paths import bodies_of, expected_motions, free_motions, look
+from symphys.step.paths import bodies_of, expected_motions, free_motions, jointed_bodies, look
 from symphys.step.pgs import Row, Solution, begin, relax
-from symphys.step.position import close_gaps, displacements
+from symphys.step.position import Displaced, close_gaps, displacements
 from symphys.step.row import ContactRow
 from symphys.step.rows import prepare
 from symphys.step.scene import Scene, State
@@ -79,7 +81,7 @@ def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = ())
     # the next state
     values: State = {"lag": half}
     resting = _store_forces(scene, rows, impulses, kick, values)
-    poses = [scene.pieces.do(_pose, *each) for each in zip(motions, shifts, strict=True)]
+    poses, momenta = _poses(scene, motions, moved, shifts, momenta)
     if scene.world.joints:
         struck, forces = kept(scene, rows, joints, by_joints, x, kick)
         hold(scene, forces, poses, resting)
@@ -96,7 +98,8 @@ def _contact_rows(
     rows = []
     for pair, contact, off in zip(scene.world.pairs, contacts, spared, strict=True):
         bodies, force = bodies_of(pair), x[f"{pair.name}.force"]
-        arguments = tuple(trees.motions[i] for i in bodies), duration, off, force, trees.same(bodies)
+        coupled = may_couple(scene.world, pair)
+        arguments = tuple(trees.motions[i] for i in bodies), duration, off, force, trees.same(bodies), coupled
         rows.append(trees.row(bodies, scene.pieces.do(prepare, scene.setting, pair.law, contact, *arguments)))
     return rows
 
@@ -109,6 +112,21 @@ def _sweep(
     state = begin(scene.pieces, every, trees.states, start)
     solved = relax(scene.pieces, scene.setting.scheme.sweeps, every, state)
     return solved, solved.impulses[: len(joints)], solved.impulses[len(joints) :]
+
+
+def _poses(
+    scene: Scene, motions: Sequence[Motion], moved: Sequence[Displaced], shifts: Sequence[Shift], momenta: Momenta
+) -> tuple[list[tuple[Expr, Expr]], Momenta]:
+    """(position, orientation) of all bodies at the end of the stretch, and momenta that turn with pushes."""
+    poses, turned = list[tuple[Expr, Expr]](), list(momenta)
+    jointed = jointed_bodies(scene.world)
+    for k, (motion, shift) in enumerate(zip(motions, shifts, strict=True)):
+        if k in jointed or isotropic(motion.inertia):
+            poses.append(scene.pieces.do(_pose, motion, shift))
+        else:
+            pose, turned[k] = scene.pieces.do(_free_pose, motion, moved[k], shift, momenta[k])
+            poses.append(pose)
+    return poses, tuple(turned)
 
 
 def _moving_bodies(
@@ -191,8 +209,20 @@ def _summed(total: tuple[Expr, Expr], row: ContactRow, k: int, force: Expr, torq
 
 
 def _pose(motion: Motion, shift: Shift) -> tuple[Expr, Expr]:
-    """Position and orientation at the end of the stretch."""
     return motion.position + shift.linear, rotation.turn(motion.orientation, shift.angular)
+
+
+def _free_pose(motion: Motion, moved: Shift, shift: Shift, momentum: Momentum) -> tuple[tuple[Expr, Expr], Momentum]:
+    """Free rotation with the momentum after the impulses, less what these did too early, then pushes.
+
+    A push turns the angular momentum with the body: about the axis of a slender body it would else become a spin, with
+    energy from nowhere.
+    """
+    late = moved.angular - motion.dt * apply(motion.inverse_mid, momentum.angular)
+    pushed = rotation.exponential(shift.angular - moved.angular)
+    free = turned(motion.inertia, motion.orientation, momentum.angular, motion.dt)
+    q = rotation.unit(rotation.multiply(pushed, rotation.turn(free, late)))
+    return (motion.position + shift.linear, q), replace(momentum, angular=rotation.rotate(pushed, momentum.angular))
 
 
 def _end_momentum(motion: Motion, momentum: Momentum, resting: tuple[Expr, Expr]) -> Momentum:

@@ -12,6 +12,7 @@ from symphys.collide.contact import Contact, Frame
 from symphys.motion import Motion, apply
 from symphys.rotation import cross_matrix
 from symphys.step import impulse
+from symphys.step.coupled import Coupling
 from symphys.step.momentum import Momentum, Rates
 from symphys.world import Law
 
@@ -145,6 +146,7 @@ class ContactRow:
         width: of the smoothed normal projection [m/s]; 0 for fast approach.
         knob: smoothing [m/s].
         same: whether both sides are of one tree of joints.
+        coupling: where friction may act strongly on the normal velocity.
     """
 
     law: Law
@@ -169,6 +171,7 @@ class ContactRow:
     width: Expr
     knob: Expr
     same: bool
+    coupling: Coupling | None = None
 
     def slip(self, momenta: tuple[Any, ...]) -> Expr:
         """(3,) [m/s]: relative velocity of the touching points."""

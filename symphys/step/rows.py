@@ -15,7 +15,8 @@ import casadi as ca
 from symphys.collide.contact import Contact
 from symphys.collide.touch import TINY_RATE, TOUCH
 from symphys.smooth import clip, positive
-from symphys.step.masses import answer_of, effective_masses, inverse_masses, yields
+from symphys.step.coupled import coupling_of
+from symphys.step.masses import answer_of, effective_masses, inverse_masses, symmetric_mobilities, yields
 from symphys.step.row import UNREACHED, ContactRow, Moving, Side, at_touch, free_slip, make_sides
 from symphys.step.scene import Setting
 from symphys.world import Law
@@ -38,7 +39,15 @@ LOADED = 1e-3
 
 
 def prepare(
-    setting: Setting, law: Law, contact: Contact, motions: Moving, duration: Expr, spared: Expr, force: Expr, same: bool
+    setting: Setting,
+    law: Law,
+    contact: Contact,
+    motions: Moving,
+    duration: Expr,
+    spared: Expr,
+    force: Expr,
+    same: bool,
+    coupled: bool,
 ) -> ContactRow:
     """The row of one contact over a stretch of time.
 
@@ -51,16 +60,20 @@ def prepare(
         spared: 1 for a contact that gives no impulse.
         force: (3,) with which the contact acted at the end of the last step [N].
         same: whether both sides are of one tree of joints.
+        coupled: whether friction may act strongly on the normal velocity.
     """
     scheme, knob, half = setting.scheme, setting.knob, duration / 2
     touch = _touch(setting, law, contact, motions, duration, spared)
     row_time = half + touch.leaving * (touch.time - half)
     frame, applied = contact.meeting.frame(row_time), contact.meeting.frame(touch.leaving * touch.time)
     sides = make_sides(motions, row_time, frame, applied)
-    k_normal, *k_others = inverse_masses(sides, frame.normal, same)
+    push, twist = symmetric_mobilities(sides, same)
+    k_normal, *k_others = inverse_masses(sides, frame.normal, push, twist)
     slack = _slack(setting, contact, touch)
-    softness, target = _normal_target(law, contact, duration, touch, k_normal, slack, knob)
-    landing = _landing(contact, duration, touch.time, target, ca.dot(frame.normal, free_slip(sides, motions)))
+    free = ca.dot(frame.normal, free_slip(sides, motions))
+    away = ca.fmin(free - (contact.end + slack) / duration, 0)
+    softness, target = _normal_target(law, contact, duration, touch, k_normal, away, knob)
+    landing = _landing(contact, duration, touch.time, target, free)
     answer = answer_of(sides, applied.normal, same)
     parts = yields(sides, frame.normal, answer)
     weight, load = LOADED * setting.reference / k_normal, ca.dot(applied.normal, force)
@@ -82,10 +95,11 @@ def prepare(
         lasts=lasts,
         load=weight * duration,
         slack=slack,
-        struck=ca.SX(0) if law.soft else ca.logic_and(touch.hit, contact.rate < -setting.fast),
+        struck=ca.SX(0) if law.soft else ca.logic_and(touch.hit, closes_fast(setting, contact)),
         width=width_of(setting, contact),
         knob=knob,
         same=same,
+        coupling=coupling_of(push, frame.normal, law.friction, softness) if coupled else None,
     )
 
 
@@ -137,6 +151,12 @@ def _parting(setting: Setting, contact: Contact, k_normal: Expr, load: Expr, dur
     return width_of(setting, contact) ** 2 / (4 * k_normal * load * duration)
 
 
+def closes_fast(setting: Setting, contact: Contact) -> Expr:
+    """1 if a contact closes at a speed that makes its meeting an impact: now, or as a tip that swings round."""
+    swings = contact.gap > setting.fast * contact.time + NEAR * setting.reference * setting.scheme.dt**2
+    return ca.logic_or(contact.rate < -setting.fast, ca.logic_and(contact.hit, swings))
+
+
 def width_of(setting: Setting, contact: Contact) -> Expr:
     """Of the smoothed projection [m/s]: the knob at rest, nothing for an impact."""
     return setting.knob * ca.exp(-((contact.rate / setting.fast) ** 2))
@@ -175,22 +195,22 @@ def _slack(setting: Setting, contact: Contact, touch: _Touch) -> Expr:
     impact may act: a constraint that holds the surfaces where they just touch would have half of its slope there.
     Cuts are off the impact by the shortest stretch at most.
     """
-    lands = ca.logic_and(touch.hit, ca.logic_and(touch.leaving < 0.5, contact.rate < 0))
-    speed = ca.fabs(contact.rate)
-    passes = ca.logic_and(speed > setting.fast, ca.logic_not(lands))
+    fast, speed = closes_fast(setting, contact), ca.fabs(contact.rate)
+    lands = ca.logic_and(touch.hit, ca.logic_and(touch.leaving < 0.5, fast))
+    passes = ca.logic_and(ca.logic_or(fast, speed > setting.fast), ca.logic_not(lands))
     return ca.if_else(passes, TIE + 2 * SHORTEST * setting.scheme.dt * speed, 0)
 
 
 def _normal_target(
-    law: Law, contact: Contact, duration: Expr, touch: _Touch, inverse_mass: Expr, slack: Expr, knob: Expr
+    law: Law, contact: Contact, duration: Expr, touch: _Touch, inverse_mass: Expr, away: Expr, knob: Expr
 ) -> tuple[Expr, Expr]:
     """(softness, target): the velocity that the normal row asks for at the middle of the step.
 
-    Hit: the rebound carried from t* to the middle, b = max(u + n.f* (dt/2 - t*), 0). Not hit: -gap / dt.
+    Hit: the rebound carried from t* to the middle, b = max(u + n.f* (dt/2 - t*), 0). Not hit: ``away``, that of the
+    free motion less what would close the gap that this leaves at the end.
     Soft (Catto, GDC 2011), deviation: the spring acts over what is left of the step, so that a contact that
     begins late in the step begins gently.
     """
-    away = -(ca.fmax(contact.gap, 0) + slack) / duration
     if not law.soft:
         carried = positive(touch.rebound + touch.pull * (duration / 2 - touch.time), knob)
         return ca.SX(0), ca.if_else(contact.hit, carried, away)
