@@ -89,8 +89,8 @@ def stick(e: float, mu: float, dt: float, sweeps: int = 10) -> Lab:
 
 SWEPT = pytest.mark.xfail(
     strict=True,
-    reason="normal and friction of one contact are solved by turns: 10 sweeps leave 0.0099 m/s of 2.4 along the rod, at "
-    "any dt; 40 sweeps 6e-8 (friction's mass is that across the rod, 4 / m, where along the floor it is 2 / m)",
+    reason="normal and friction of one contact are solved by turns: 10 sweeps leave 0.0099 m/s of 2.4 along the rod, "
+    "at any dt; 40 sweeps 6e-8 (friction's mass is that across the rod, 4 / m, where along the floor it is 2 / m)",
 )
 
 
