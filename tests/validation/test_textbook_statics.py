@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 from blocks import turned_by
 from laboratory import Lab
-from scipy.optimize import linprog
-from textbook import Array, G, final
+from textbook import G, final
 
-from symphys.shapes import Box, Fixture, Plane, Sphere
-from symphys.world import Body, Law, Scheme, World, make_world
+from symphys.shapes import Plane, Sphere
+from symphys.world import Body, Law, Scheme, make_world
 
 
 @pytest.mark.parametrize("dt", [0.01, 0.0025])
@@ -127,84 +126,3 @@ def test_pencil_falls_about_its_point(dt: float) -> None:
     # forces are those of the middle of the last step
     assert force[2:last, 2] == pytest.approx(normal[2:last], abs=15 * dt)
     assert force[2:last, 0] == pytest.approx(level[2:last], abs=15 * dt)
-
-
-def arch(count: int, thick: float, dt: float = 0.01) -> tuple[Lab, dict[str, Any], Array, Array]:
-    """A half-round arch of equal voussoirs of mean radius 1, its start, its joints' angles (count + 1,), and weights.
-
-    Each side face of a voussoir is that of a thin slab on it; it meets the slab of its neighbour and nothing else.
-    """
-    mu, part = ca.SX.sym("mu"), np.pi / count
-    slab, halves = 0.02, (0.02, 0.2, thick / 2)
-    bodies, start, weights = [], dict[str, Any](), []
-    for k in range(count):
-        faces = []
-        for side in (-1, 1):
-            # in the body's frame z is outward, x along the arch; the face lies at the edge of the part
-            lean = side * part / 2
-            outward, along = np.array([np.sin(lean), 0, np.cos(lean)]), np.array([np.cos(lean), 0, -np.sin(lean)])
-            centre = outward - side * slab * along - [0, 0, 1]
-            faces.append(Box(halves, tuple(centre), tuple(turned_by((0, 1, 0), lean))))
-        bodies.append(Body(f"v{k}", 1.0, (0.02, 0.03, 0.03), tuple(faces)))
-        angle = -np.pi / 2 + part * (k + 0.5)
-        start[f"v{k}.position"] = [np.sin(angle), 0, np.cos(angle)]
-        start[f"v{k}.orientation"] = turned_by((0, 1, 0), angle)
-        weights.append(G)
-    world = make_world(bodies, [Plane.ground()], Law(mu))
-    springs = {(0, 0), (count - 1, 1)}
-    pairs = tuple(
-        p
-        for p in world.pairs
-        if (
-            (p.first.body, p.first.shape) in springs
-            if p.second.body is None
-            else (p.second.body - p.first.body, p.first.shape, p.second.shape) == (1, 1, 0)
-        )
-    )
-    lab = Lab(World(world.bodies, world.statics, pairs), Scheme(dt=dt, sweeps=40, cuts=0), parameters=[mu])
-    return lab, start, -np.pi / 2 + part * np.arange(count + 1), np.array(weights)
-
-
-def can_stand(count: int, thick: float, mu: float) -> bool:
-    """Limit analysis (Heyman 1966; with friction Livesley 1978): whether forces within the cones balance every block.
-
-    At each joint a normal and a tangential force at either edge; a linear programme.
-    """
-    part = np.pi / count
-    joints = -np.pi / 2 + part * np.arange(count + 1)
-    balance, load = np.zeros((3 * count, 4 * (count + 1))), np.zeros(3 * count)
-    for j, angle in enumerate(joints):
-        out, along = np.array([np.sin(angle), np.cos(angle)]), np.array([np.cos(angle), -np.sin(angle)])
-        for edge, radius in enumerate((1 - thick / 2, 1 + thick / 2)):
-            for kind, force in enumerate((along, out)):
-                for block, sign in ((j, 1), (j - 1, -1)):
-                    if 0 <= block < count:
-                        column = 4 * j + 2 * edge + kind
-                        point, f = radius * out, sign * force
-                        balance[3 * block : 3 * block + 2, column] = f
-                        balance[3 * block + 2, column] = point[0] * f[1] - point[1] * f[0]
-    for block in range(count):
-        angle = joints[block] + part / 2
-        load[3 * block + 1], load[3 * block + 2] = G, np.sin(angle) * G
-    cone = np.zeros((4 * (count + 1), 4 * (count + 1)))
-    for i in range(2 * (count + 1)):
-        cone[2 * i, 2 * i : 2 * i + 2] = [-mu, 1]
-        cone[2 * i + 1, 2 * i : 2 * i + 2] = [-mu, -1]
-    bounds = [(0, None), (None, None)] * (2 * (count + 1))
-    n = 4 * (count + 1)
-    return bool(linprog(np.zeros(n), cone, np.zeros(n), balance, load, bounds).status == 0)
-
-
-@pytest.mark.parametrize("thick", [0.05, 0.3])
-def test_arch(thick: float) -> None:
-    lab, start, _, _ = arch(5, thick)
-    for mu in (0.1, 0.2, 0.3, 0.35, 0.4, 0.5, 0.7):
-        states = lab.states(start, 1.0, p=[mu])
-        fallen = start["v2.position"][2] - states["v2.position"][-1, 2]
-        print(
-            thick,
-            mu,
-            can_stand(5, thick, mu),
-            fallen,
-            max(np.abs(states[f"v{k}.velocity"][-1]).max() for k in range(5)),
-        )
