@@ -80,7 +80,7 @@ def test_ladder_against_a_wall(mu_floor: float, mu_wall: float, over: float) -> 
 
 @pytest.mark.parametrize("dt", [0.01, 0.0025])
 def test_ladder_slides_down_smooth_walls(dt: float) -> None:
-    """Energy: theta'^2 = 3 g / L (sin(theta0) - sin(theta)) with L the length; it leaves the wall at 2/3 sin(theta0)."""
+    """Energy: theta'^2 = 3 g / L (sin(theta0) - sin(theta)) for a length L; it leaves the wall at 2/3 sin(theta0)."""
     theta = 1.2
     lab = ladder(0.0, 0.0)
     lab = Lab(lab.world, Scheme(dt=dt))
