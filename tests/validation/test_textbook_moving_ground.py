@@ -121,7 +121,9 @@ def test_block_on_an_accelerated_slope(share: float, side: int) -> None:
     states = lab.states(start, time, u=force)
     relative = states["b.velocity"][:, 0] - states["sled.velocity"][:, 0]
     if share < 1:
-        assert np.abs(relative).max() < 1e-4
+        # the first steps find the forces
+        assert np.abs(relative).max() < 2e-3
+        assert np.abs(relative[-10:]).max() < 1e-9
         assert states["sled.velocity"][-1, 0] == pytest.approx(a * time, abs=1e-6)
     else:
         # along the slope g (sin - mu' cos) - A (cos + mu' sin), mu' = -side mu; A from (M, m) along x
@@ -130,7 +132,7 @@ def test_block_on_an_accelerated_slope(share: float, side: int) -> None:
         matrix = [[mass + 1, c], [c + rough * s, 1]]
         whole, along = np.linalg.solve(matrix, [force[0, 0], G * (s - rough * c)])
         assert states["sled.velocity"][-1, 0] == pytest.approx(whole * time, abs=1e-3)
-        assert relative[-1] == pytest.approx(along * c * time, rel=0.01)
+        assert relative[-1] - relative[10] == pytest.approx(along * c * (time - 0.1), rel=0.01)
 
 
 @pytest.mark.parametrize("dt", [0.01, 0.005])
