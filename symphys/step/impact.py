@@ -64,7 +64,7 @@ def find_cut(scene: Scene, x: State, duration: Expr, share: float) -> Cut:
     fast = [do(strikes, scene.setting, p.law, c) for p, c in zip(scene.world.pairs, contacts, strict=True)]
     earliest = ca.SX(0), duration
     for contact, closes in zip(contacts, fast, strict=True):
-        earliest = do(_earlier, earliest, closes, contact.hit, contact.time)
+        earliest = do(_earlier, earliest, closes, contact.hit, contact.time, scene.setting.scheme.dt)
     first = do(_inside, earliest, duration, share)
     until = do(_until, earliest[1], first, scene.setting.scheme.dt)
     struck = [do(_is_struck, c, contact.hit, contact.time, until) for contact, c in zip(contacts, fast, strict=True)]
@@ -77,10 +77,11 @@ def strikes(setting: Setting, law: Law, contact: Contact) -> Expr:
     return ca.SX(0) if law.soft else closes_fast(setting, contact)
 
 
-def _earlier(earliest: tuple[Expr, Expr], closes: Expr, hit: Expr, time: Expr) -> tuple[Expr, Expr]:
-    """(whether there is an impact, when), with one more contact looked at."""
+def _earlier(earliest: tuple[Expr, Expr], closes: Expr, hit: Expr, time: Expr, dt: float) -> tuple[Expr, Expr]:
+    """(whether there is an impact, when), with one more contact looked at; at a tie with the slope of this one."""
     meets = ca.logic_and(closes, hit)
-    return ca.fmax(earliest[0], meets), ca.if_else(meets, ca.fmin(earliest[1], time), earliest[1])
+    sooner = ca.logic_and(meets, time < earliest[1] + TOGETHER * dt)
+    return ca.fmax(earliest[0], meets), ca.if_else(sooner, time, earliest[1])
 
 
 def _until(earliest: Expr, first: Expr, dt: float) -> Expr:

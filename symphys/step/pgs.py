@@ -9,8 +9,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from symphys.motion import Motion
+from symphys.step.acceleration import EVERY, Cluster, clusters, lengthened
 from symphys.step.momentum import Moved, Rates, States
 from symphys.step.pieces import Pieces
+from symphys.world import World
 
 Given = Any
 """What a row gives: ``impulse.Impulse`` of a contact, ``along.Along`` of a joint."""
@@ -52,9 +55,34 @@ class Row:
     carriers: tuple[int, ...]
 
 
-def relax(pieces: Pieces, sweeps: int, rows: tuple[Row, ...], start: Solution) -> Solution:
-    """All sweeps."""
-    return pieces.repeat(sweeps, sweep, rows, start)
+@dataclass(frozen=True)
+class Leaning:
+    """Rows, and the bodies that lean on each other by them, with their motions; see ``acceleration``."""
+
+    rows: tuple[Row, ...]
+    clusters: tuple[Cluster, ...]
+    motions: tuple[Motion, ...]
+
+
+def relax(
+    pieces: Pieces, world: World, sweeps: int, rows: tuple[Row, ...], start: Solution, motions: Sequence[Motion]
+) -> Solution:
+    """All sweeps; among bodies that lean on each other with longer steps now and then."""
+    found = tuple(clusters(world, rows))
+    if not found:
+        return pieces.repeat(sweeps, sweep, rows, start)
+    rounds = max((sweeps - 1) // EVERY, 0)
+    moved = pieces.repeat(rounds, _round, Leaning(rows, found, tuple(motions)), start)
+    return pieces.repeat(sweeps - rounds * EVERY, sweep, rows, moved)
+
+
+def _round(pieces: Pieces, leaning: Leaning, state: Solution) -> Solution:
+    """Some sweeps, then a longer step along the last."""
+    before = pieces.repeat(EVERY - 1, sweep, leaning.rows, state)
+    now = sweep(pieces, leaning.rows, before)
+    for cluster in leaning.clusters:
+        now = lengthened(pieces, cluster, leaning.rows, leaning.motions, before, now)
+    return now
 
 
 def sweep(pieces: Pieces, rows: tuple[Row, ...], before: Solution) -> Solution:

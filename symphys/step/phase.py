@@ -110,7 +110,7 @@ def _sweep(
     """What sweeps come to from these impulses; and of it the impulses of joints, and those of contacts."""
     every = (*(each.row for each in joints), *rows)
     state = begin(scene.pieces, every, trees.states, start)
-    solved = relax(scene.pieces, scene.setting.scheme.sweeps, every, state)
+    solved = relax(scene.pieces, scene.world, scene.setting.scheme.sweeps, every, state, trees.motions)
     return solved, solved.impulses[: len(joints)], solved.impulses[len(joints) :]
 
 

@@ -44,10 +44,10 @@ def rebound(scene: Scene, rows: tuple[Row, ...], start: Solution, motions: Seque
     """The impulses of an impact, and the momenta after it."""
     pieces, scheme = scene.pieces, scene.setting.scheme
     if not (scheme.energy_cap and eccentric_bodies(scene.world)):
-        return relax(pieces, scheme.sweeps, rows, start)
+        return relax(pieces, scene.world, scheme.sweeps, rows, start, motions)
     dead = tuple(replace(each, row=pieces.do(_without_rebound, each.row)) for each in rows)
-    plastic = relax(pieces, scheme.sweeps, dead, start)
-    newton = relax(pieces, scheme.sweeps, rows, plastic)
+    plastic = relax(pieces, scene.world, scheme.sweeps, dead, start, motions)
+    newton = relax(pieces, scene.world, scheme.sweeps, rows, plastic, motions)
     sums: tuple[Expr, Expr, Expr] = (ca.SX(0), ca.SX(0), ca.SX(0))
     bodies = (momenta_of(scene, trees, solution.momenta) for solution in (start, plastic, newton))
     for motion, *momenta in zip(motions, *bodies, strict=True):
