@@ -50,14 +50,12 @@ class Trail:
         start: (n,) z where the strategy began.
         merits: (population,) of every generation so far, in the order in which its candidates were asked for.
         mean, sigma: where that led, to compare; mean (free,) as pycma holds it.
-        spoilt: see ``Validation.keep``.
     """
 
     start: Array
     merits: tuple[tuple[float, ...], ...]
     mean: Array
     sigma: float
-    spoilt: int = 0
 
 
 class Strategy:
