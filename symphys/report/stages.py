@@ -20,8 +20,8 @@ NARROWEST = 0.09
 """A stage that takes less of the axis has no room for its name."""
 HOW_READ = (
     "Each stage starts from the best point of the one before. “There” is at the stage's own smoothing, as the solver "
-    "saw it; “exact” is the same point in the exact rollout, which alone counts. The last point is the result, unless an "
-    "earlier one or the guess is worth more exactly."
+    "saw it; “exact” is the same point in the exact rollout, which alone counts. The last point is the result, unless "
+    "an earlier one or the guess is worth more exactly."
 )
 
 
