@@ -79,10 +79,10 @@ def run_stages(request: Request, stage: Stage, meter: Meter, log: Log) -> Verdic
 
 
 def run_stage(solver: str, meter: Meter, stage: Stage, z: Array, state: dict[str, object] | None) -> Verdict:
-    """Run a stage; errors of foreign code become a verdict."""
+    """Run a stage; errors of foreign code, and matrices that there is no memory for, become a verdict."""
     try:
         return attempt(meter, stage, z, state)
-    except (RuntimeError, ArithmeticError, np.linalg.LinAlgError) as error:
+    except (RuntimeError, ArithmeticError, np.linalg.LinAlgError, MemoryError) as error:
         return Verdict(Status.FAILED, f"{solver} failed: {str(error).strip() or type(error).__name__}")
 
 
