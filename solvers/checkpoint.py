@@ -12,8 +12,9 @@ import numpy as np
 
 from symphys.errors import SymphysError
 from symphys.shooting import ShootingProblem
-from symphys.solvers.meter import Point, Snapshot
+from symphys.solvers.meter import Snapshot
 from symphys.solvers.outcome import Counts, StageResult, Status, TraceRow
+from symphys.solvers.point import Point
 
 T = TypeVar("T")
 READERS: dict[str, Callable[[Any], Any]] = {
@@ -41,6 +42,7 @@ def to_checkpoint(solver: str, snapshot: Snapshot, rows: Iterable[TraceRow]) -> 
             "objective": best.objective,
             "errors": plain(best.errors),
             "outputs": plain(best.outputs),
+            "spoilt": best.spoilt,
         },
         "last": plain(snapshot.last),
         "counts": list(astuple(snapshot.counts)),
@@ -58,7 +60,8 @@ def from_checkpoint(
     try:
         best = checkpoint["best"]
         z, errors, outputs = (np.array(best[name], float) for name in ("z", "errors", "outputs"))
-        point = Point(z, float(best["merit"]), float(best["objective"]), errors, problem.met(errors), outputs)
+        numbers, met = (float(best["merit"]), float(best["objective"])), problem.met(errors)
+        point = Point(z, *numbers, errors, met, outputs, spoilt=int(best["spoilt"]))
         counts = Counts(*map(int, checkpoint["counts"]))
         rows = [revive(TraceRow, dict(zip(names(TraceRow), row, strict=True))) for row in checkpoint["rows"]]
         stages = tuple(revive(StageResult, dict(each), Counts) for each in checkpoint["stages"])

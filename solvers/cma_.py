@@ -7,7 +7,8 @@ pycma's: ``tolflatfitness`` is 50. Generations whose merits are all the same are
 ``plateau``), which the search leaves as its candidates spread; pycma gives up on the second one.
 
 Where situations differ, each candidate of a generation is rated by its mean over the same few of them, which the next
-generation draws anew, and the means of the search are validated, since what is best in a few situations was lucky.
+generation draws anew, and the start and the means of the search are validated, since what is best in a few
+situations was lucky.
 
 A solve goes on by replay: the strategy is asked again from the same random stream and told the recorded merits, so
 that mean, step size, covariance and paths are the same to the last bit under any options, at the cost of no rollout.
@@ -16,7 +17,7 @@ that mean, step size, covariance and paths are the same to the last bit under an
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -25,14 +26,15 @@ from symphys.shooting import ShootingProblem
 from symphys.solvers.checkpoint import damaged
 from symphys.solvers.cma_strategy import PLATEAU, Strategy, Trail, load
 from symphys.solvers.interface import Log, Solver
-from symphys.solvers.meter import Meter, Point, Verdict
+from symphys.solvers.meter import Meter, Verdict
 from symphys.solvers.options import at_least, require
 from symphys.solvers.outcome import Array, Monitor, Outcome, Status
 from symphys.solvers.plateau import FLAT
+from symphys.solvers.point import Point, best_of
 from symphys.solvers.session import begin, converged, run
 from symphys.solvers.staged import Request
 from symphys.solvers.trials import Alone, Drawing, Trials
-from symphys.solvers.validation import Batch
+from symphys.solvers.validation import Batch, comparing
 
 BUDGETS = {"maxiter", "timeout"}
 CONVERGED = {"tolfun", "tolfunhist", "tolfunrel", "tolx", "ftarget"}
@@ -53,7 +55,7 @@ class CmaOptions:
             2,000 variables the covariance is diagonal.
         samples: where situations differ: in how many each candidate is rolled out.
         width: how widely these vary, relative to their tables.
-        validation: situations that decide which mean of the search is kept; 0: the last is.
+        validation: situations that decide which mean of the search, or the start, is kept; 0: the last is.
         validation_width: how widely these vary.
         every: generations between two validations.
     """
@@ -78,6 +80,10 @@ class CmaOptions:
         at_least(0, width=self.width, validation_width=self.validation_width)
         at_least(1, samples=self.samples, every=self.every)
 
+    def batch(self, seed: int) -> Batch:
+        """For validation, where situations differ."""
+        return Batch(self.validation, self.validation_width, seed)
+
 
 def solve(
     problem: ShootingProblem,
@@ -100,10 +106,11 @@ def solve(
             meter, trail.start if trail else z, options.sigma, options.population, options.options, stream
         )
         search = Search(meter, options, strategy, trials(meter, options, seed, log))
-        search.follow(trail) if trail else search.begin(z)
+        strategy.follow(trail) if trail else search.begin(z)
         return search.run()
 
-    return run(Request("cma", problem, start, monitor, checkpoint, log), stage)
+    rate = comparing(options.batch(seed)) if problem.situations else None
+    return run(Request("cma", problem, start, monitor, checkpoint, log, rate=rate), stage)
 
 
 def trials(meter: Meter, options: CmaOptions, seed: int, log: Log | None) -> Trials:
@@ -111,8 +118,7 @@ def trials(meter: Meter, options: CmaOptions, seed: int, log: Log | None) -> Tri
     situations = meter.problem.situations
     if situations is None:
         return Alone(meter)
-    batch = Batch(options.validation, options.validation_width, seed)
-    return Drawing(meter, situations, options.samples, options.width, batch, options.every, log)
+    return Drawing(meter, situations, options.samples, options.width, options.batch(seed), options.every, log)
 
 
 class Search:
@@ -121,16 +127,12 @@ class Search:
     def __init__(self, meter: Meter, options: CmaOptions, strategy: Strategy, trials: Trials) -> None:
         """Nothing is asked for yet."""
         self.meter, self.options, self.strategy, self.trials = meter, options, strategy, trials
-        self.spoilt = options.validation
 
     def begin(self, z: Array) -> None:
-        """Evaluate where it begins."""
-        self.commit(self.trials.start(z))
-
-    def follow(self, trail: Trail) -> None:
-        """Go on from there."""
-        self.strategy.follow(trail)
-        self.spoilt = trail.spoilt
+        """Evaluate where it begins, which is the first point that may be kept."""
+        point = self.trials.start(z)
+        self.trials.keep(z, self.generations, due=True)
+        self.commit(point)
 
     def run(self) -> Verdict:
         """Until something ends it."""
@@ -138,8 +140,8 @@ class Search:
         while verdict is None:
             verdict = self.ended() or self.generation()
         if verdict.status is not Status.NOT_FINITE:
-            self.trials.keep(self.strategy.centre, self.generations, self.spoilt, last=True)
-        return verdict
+            self.trials.keep(self.strategy.centre, self.generations, due=True)
+        return self.trials.told(verdict, self.strategy.start)
 
     @property
     def generations(self) -> int:
@@ -164,39 +166,25 @@ class Search:
     def generation(self) -> Verdict | None:
         """Ask, evaluate, tell."""
         points = self.trials.rate([self.meter.clip(z) for z in self.strategy.ask()], self.generations)
-        best = lowest(points)
+        best = best_of(points)
         if best is None:
             return Verdict(Status.NOT_FINITE, NOT_FINITE)
         self.strategy.tell(tuple(point.merit if point.finite else math.inf for point in points))
-        self.spoilt = self.trials.keep(self.strategy.centre, self.generations, self.spoilt)
+        self.trials.keep(self.strategy.centre, self.generations)
         self.commit(best)
         return None
 
     def commit(self, point: Point) -> None:
         """End an iteration."""
-        trail = replace(self.strategy.trail(), spoilt=self.spoilt)
-        self.meter.commit(point, trail, step=self.strategy.sigma)
-
-
-def lowest(points: list[Point]) -> Point | None:
-    """The best of a generation; None if none is finite."""
-    best = None
-    for point in points:
-        best = point if point.better(best) else best
-    return best
+        self.meter.commit(point, self.strategy.trail(), step=self.strategy.sigma)
 
 
 def read_trail(saved: dict[str, Any]) -> Trail:
     """From the plain values of a checkpoint."""
     try:
         merits = tuple(tuple(float(merit) for merit in each) for each in saved["merits"])
-        return Trail(
-            np.array(saved["start"], float),
-            merits,
-            np.array(saved["mean"], float),
-            float(saved["sigma"]),
-            int(saved["spoilt"]),
-        )
+        start, mean = (np.array(saved[name], float) for name in ("start", "mean"))
+        return Trail(start, merits, mean, float(saved["sigma"]))
     except (KeyError, TypeError, ValueError) as error:
         raise damaged(error) from error
 

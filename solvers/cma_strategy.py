@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -50,14 +51,12 @@ class Trail:
         start: (n,) z where the strategy began.
         merits: (population,) of every generation so far, in the order in which its candidates were asked for.
         mean, sigma: where that led, to compare; mean (free,) as pycma holds it.
-        spoilt: see ``Validation.keep``.
     """
 
     start: Array
     merits: tuple[tuple[float, ...], ...]
     mean: Array
     sigma: float
-    spoilt: int = 0
 
 
 class Strategy:
@@ -84,7 +83,8 @@ class Strategy:
         if population:
             own["popsize"] = population
         with pycma():
-            self.es = cma.CMAEvolutionStrategy((start / meter.scale)[self.free], sigma, own)
+            kind = single(cma) if self.free.sum() == 1 else cma.CMAEvolutionStrategy
+            self.es = kind((start / meter.scale)[self.free], sigma, own)
         self.merits: tuple[tuple[float, ...], ...] = ()
 
     def draw(self, *shape: int) -> Array:
@@ -147,6 +147,26 @@ def load() -> Any:
     import cma
 
     return cma
+
+
+def single(cma: Any) -> Any:
+    """pycma's strategy for one variable.
+
+    Where a standard deviation leaves its limits, as in narrow bounds, pycma (4.5) changes the scaling of that variable,
+    which it refuses to do where there is one only: it takes a scaling of length 1 for one that has no length yet.
+    """
+
+    def limited(strategy: Any, *arguments: Any, **named: Any) -> Any:
+        strategy.sigma_vec.set_i = partial(rescale, strategy.sigma_vec)
+        return cma.CMAEvolutionStrategy._stds_into_limits(strategy, *arguments, **named)
+
+    return type("Single", (cma.CMAEvolutionStrategy,), {"_stds_into_limits": limited})
+
+
+def rescale(scaling: Any, index: int, value: float) -> None:
+    """What pycma's ``DiagonalDecoding.set_i`` does."""
+    scaling.is_identity = False
+    scaling.scaling[index] = value
 
 
 def check(options: Mapping[str, Any], defaults: Mapping[str, Any]) -> None:

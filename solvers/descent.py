@@ -16,9 +16,10 @@ from symphys.shooting import Drawn, Situations
 from symphys.solvers.checkpoint import revive
 from symphys.solvers.directions import Habits, Memory, adam
 from symphys.solvers.interface import Log
-from symphys.solvers.meter import Meter, Point, Verdict
+from symphys.solvers.meter import Meter, Verdict
 from symphys.solvers.options import at_least, require
 from symphys.solvers.outcome import Array, Status
+from symphys.solvers.point import Point
 from symphys.solvers.staged import Stage
 from symphys.solvers.validation import SITUATIONS, Batch, Validation
 
@@ -41,7 +42,7 @@ class DescentOptions:
         hold: share of the iterations at the full rate; from then on it falls in proportion, to ``last`` of it.
         last: share of the rate at the end.
         betas: of Adam.
-        validation: situations that decide which point is kept; 0: the last point is.
+        validation: situations that decide which point is kept, the start among them; 0: the last point is.
         validation_width: how widely these vary.
         every: iterations between two validations.
         patience: share of the iterations before the first of them.
@@ -74,6 +75,10 @@ class DescentOptions:
         left = (self.iterations - iteration) / max((1 - self.hold) * self.iterations, 1)
         return self.rate * min(1.0, max(self.last, left))
 
+    def batch(self, seed: int) -> Batch:
+        """For validation."""
+        return Batch(self.validation, self.validation_width, seed)
+
     def validates(self, iteration: int) -> bool:
         """Whether the point of this iteration is validated; the last one always is."""
         if not self.validation:
@@ -90,13 +95,11 @@ class State:
         iteration: batches that were drawn.
         z: (n,) the point.
         memory: Adam's.
-        spoilt: situations for validation in which the point that is kept is not finite.
     """
 
     iteration: int
     z: Array
     memory: Memory
-    spoilt: int
 
 
 @dataclass(frozen=True)
@@ -135,20 +138,21 @@ class Descent(ABC, Generic[OptionsT]):
         """Draw the situations for validation."""
         self.meter, self.situations, self.options, self.seed, self.log = meter, situations, options, seed, log
         self.scale = np.where(meter.lower < meter.upper, meter.scale, 0.0)
-        batch = Batch(options.validation, options.validation_width, seed)
-        self.validation = Validation(meter, situations, batch, log)
+        self.validation = Validation(meter, situations, options.batch(seed), log)
 
     @abstractmethod
     def way(self, state: State, drawn: Drawn) -> Found:
         """What a batch says; Stop where that is nothing."""
 
     def run(self, z: Array, saved: dict[str, object] | None) -> Verdict:
-        """All of them, or those that are left."""
+        """All of them, or those that are left; the start is the first point that is validated."""
         options = self.options
-        state = revive(State, saved, Memory) if saved else State(0, z, Memory.empty(z.size), options.validation)
+        if options.validation and not saved:
+            self.validation.keep(z)
+        state = revive(State, saved, Memory) if saved else State(0, z, Memory.empty(z.size))
         while state.iteration < options.iterations:
             state = self.advance(state)
-        return Verdict(Status.BUDGET, DONE)
+        return self.validation.told(Verdict(Status.BUDGET, DONE), z)
 
     def advance(self, state: State) -> State:
         """One batch, one step, perhaps a validation."""
@@ -160,8 +164,9 @@ class Descent(ABC, Generic[OptionsT]):
             self.log(f"{k}{f' {grid}' if grid else ''}: objective {found.point.objective:.5g}, {found.words}")
         direction, memory = adam(found.gradient, state.memory, options.rate_at(k), Habits(0.0, options.betas))
         z = self.meter.clip(state.z + self.scale * direction)
-        spoilt = self.validation.keep(z, state.spoilt) if options.validates(k + 1) else state.spoilt
-        following = State(k + 1, z, memory, spoilt)
+        if options.validates(k + 1):
+            self.validation.keep(z)
+        following = State(k + 1, z, memory)
         self.meter.commit(found.point, following, found.typical, float(np.linalg.norm(z - state.z)), found.told)
         return following
 

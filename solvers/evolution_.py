@@ -21,7 +21,7 @@ from symphys.solvers.options import require
 from symphys.solvers.outcome import Array, Monitor, Outcome, Status
 from symphys.solvers.session import run
 from symphys.solvers.staged import Request
-from symphys.solvers.validation import NOISE, first
+from symphys.solvers.validation import NOISE, comparing, first
 
 NOT_FINITE = "not one pair of a batch is finite: bound the variables, lower `sigma`, or add [fall]"
 
@@ -55,7 +55,8 @@ def solve(
 ) -> Outcome:
     """Descend. See ``interface.Solve``."""
     stage = stage_of(ByValues, options, seed, log)
-    return run(Request("evolution", problem, start, monitor, checkpoint, log), stage)
+    rate = comparing(options.batch(seed))
+    return run(Request("evolution", problem, start, monitor, checkpoint, log, rate=rate), stage)
 
 
 class ByValues(Descent[EvolutionOptions]):
@@ -70,7 +71,7 @@ class ByValues(Descent[EvolutionOptions]):
         meter.counts.rollouts += 2 * options.samples
         if not found.pairs:
             raise Stop(Status.NOT_FINITE, NOT_FINITE)
-        point = first(meter, state.z, found.first, found.merit, found.objective)
+        point = first(meter, state.z, found.first, found.merit, found.objective, options.validation)
         left_out = options.samples - found.pairs
         words = f"{found.alive:.0%} last" + f", {left_out} pairs not finite" * (left_out > 0)
         return Found(point, found.gradient, math.nan, words, {LASTING: found.alive})

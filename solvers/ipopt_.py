@@ -1,9 +1,12 @@
 """IPOPT (Waechter and Biegler 2006) through casadi's nlpsol, in x = z / scale, with exact bounds and constraints.
 
 The objective and the constraints are those of ``ShootingProblem.nlp``; its penalty on violated constraints, the merit,
-plays no part, except that it ranks the points of a solve that fails. Each iterate costs one rollout more, which tells
-whether the targets are met. The default Hessian is limited-memory BFGS, where IPOPT's own default is the exact one:
-that pays for few variables, and is dear for many controls.
+ranks iterates that violate no constraint, or one as much as the other. Each iterate costs one rollout more, which tells
+whether the targets are met. IPOPT may leave its best iterate for ever, by a step of its watchdog or over a cliff of the
+objective; the best iterate is the result all the same.
+
+The default Hessian is limited-memory BFGS, where IPOPT's own default is the exact one: that pays for few variables, and
+is dear for many controls.
 
 IPOPT's options pass through ``options`` unchanged, without a prefix. Its text goes to the log; it reads no option file.
 A solve goes on from its last iterate with a fresh barrier, so its end may differ from that of one without a break.
@@ -30,6 +33,7 @@ from symphys.solvers.ipopt_options import SILENT, check
 from symphys.solvers.meter import Meter, Verdict
 from symphys.solvers.options import at_least, require
 from symphys.solvers.outcome import Array, Counts, Monitor, Outcome, Status
+from symphys.solvers.point import Point
 from symphys.solvers.session import begin, converged, run, silent
 from symphys.solvers.staged import Request
 
@@ -63,6 +67,13 @@ ENDS: dict[str, tuple[Status, str]] = {
     "Not_Enough_Degrees_Of_Freedom": (Status.FAILED, "there are more equality constraints than variables"),
 }
 """By IPOPT's name for how it ended."""
+PASSED = (
+    "IPOPT ended at a point that is worse than one that it had passed, which is kept: the objective may have a cliff "
+    "or a kink there (smoothing above 0 rounds it), or a watchdog step led away (watchdog_shortened_iter_trigger = 0 "
+    "in `options` forbids these)"
+)
+LOSS = 1e-6
+"""Of 1 + |merit|: a solution may be worse by so much than an iterate before it."""
 GOOD = ("Solve_Succeeded", "Solved_To_Acceptable_Level", "Feasible_Point_Found")
 
 
@@ -122,7 +133,7 @@ def solve(
             meter.commit(begin(meter.value(z)), state)
         return descend(meter, options, state, log or silent)
 
-    return run(Request("ipopt", problem, start, monitor, checkpoint, log), stage)
+    return run(Request("ipopt", problem, start, monitor, checkpoint, log, constraints=True), stage)
 
 
 def descend(meter: Meter, options: IpoptOptions, state: State, log: Log) -> Verdict:
@@ -181,14 +192,17 @@ def work(stats: dict[str, Any], constrained: bool) -> Counts:
 
 
 def judged(meter: Meter, ending: str, z: Array) -> Verdict:
-    """The verdict; a solution stands as it is, even where the penalty would rank another point above it."""
+    """The verdict; a solution that is worse than an iterate before it is none."""
     if ending in GOOD:
         solution = meter.value(meter.clip(z))
-        if solution.met or not (meter.best and meter.best.met):
-            meter.best = solution
-        return converged(meter)
+        return Verdict(Status.STALLED, PASSED) if worse(solution, meter.best or solution) else converged(meter)
     unknown = (Status.FAILED, f"IPOPT ended with {ending.replace('_', ' ').lower()}")
     return Verdict(*ENDS.get(ending, unknown))
+
+
+def worse(solution: Point, best: Point) -> bool:
+    """Whether the best iterate was better by more than what an end within a tolerance may lose."""
+    return solution.rank[:-1] != best.rank[:-1] or solution.merit - best.merit > LOSS * (1 + abs(best.merit))
 
 
 class Watch(ca.Callback):

@@ -23,10 +23,11 @@ from symphys.shooting import ShootingProblem
 from symphys.solvers.checkpoint import revive
 from symphys.solvers.interface import Log, Solver
 from symphys.solvers.line_search import ROUNDING
-from symphys.solvers.meter import Meter, Point, Verdict
+from symphys.solvers.meter import Meter, Verdict
 from symphys.solvers.options import at_least, require
 from symphys.solvers.outcome import Array, Monitor, Outcome, Status
 from symphys.solvers.plateau import REFUSALS, lost
+from symphys.solvers.point import Point
 from symphys.solvers.probe import believed
 from symphys.solvers.progress import Progress
 from symphys.solvers.session import begin, not_finite, run

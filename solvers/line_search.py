@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symphys.solvers.meter import Meter, Point
+from symphys.solvers.meter import Meter
 from symphys.solvers.outcome import Array
+from symphys.solvers.point import Point
 
 SLOPE_SHARE = 1e-4
 """Of the decrease that the slope promises, so much must come (Armijo)."""

@@ -5,60 +5,16 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, astuple, dataclass, field, replace
-from functools import cached_property
+from dataclasses import asdict, astuple, dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
 
 from symphys.shooting import ShootingProblem, Values
 from symphys.solvers.outcome import Array, Counts, Monitor, StageResult, Status, TraceRow
+from symphys.solvers.point import Point
 
 NOTHING: Mapping[str, float] = MappingProxyType({})
-
-
-@dataclass(frozen=True)
-class Point:
-    """An evaluated z.
-
-    Attributes:
-        z: (n,).
-        merit, objective: see ``ShootingProblem``.
-        errors: normalised; met where <= 1.
-        met: all errors met.
-        outputs: what the problem tells of it; empty where it tells nothing.
-        gradient: (n,) of the merit by z; empty where it was not asked for.
-        residuals, jacobian: (m,) and (m, n), merit = r . r; empty where they were not asked for.
-    """
-
-    z: Array
-    merit: float
-    objective: float
-    errors: Array
-    met: bool = False
-    outputs: Array = field(default_factory=lambda: np.zeros(0))
-    gradient: Array = field(default_factory=lambda: np.zeros(0))
-    residuals: Array = field(default_factory=lambda: np.zeros(0))
-    jacobian: Array = field(default_factory=lambda: np.zeros((0, 0)))
-
-    @property
-    def miss(self) -> float:
-        """The largest of the errors; nan without any."""
-        return float(np.max(self.errors)) if self.errors.size else math.nan
-
-    @cached_property
-    def finite(self) -> bool:
-        """Whether every number that was asked for is finite."""
-        if not (math.isfinite(self.merit) and math.isfinite(self.objective)):
-            return False
-        parts = (self.errors, self.gradient, self.residuals, self.jacobian)
-        return all(bool(np.isfinite(part).all()) for part in parts if part.size)
-
-    def better(self, other: Point | None) -> bool:
-        """Met before not met, then the lower merit; one that is not finite is never better."""
-        if not self.finite:
-            return False
-        return other is None or not other.finite or (not self.met, self.merit) < (not other.met, other.merit)
 
 
 @dataclass(frozen=True)
@@ -103,13 +59,14 @@ class Meter:
     """Evaluates a problem at points inside its bounds.
 
     ``value``, ``gradient``, ``residuals`` and ``jacobian`` raise Stop(MET) once a point meets everything, where the
-    problem asks to stop there; the point is ``best`` then.
+    problem asks to stop there; the point is ``best`` then. ``solution`` (n,) is set where that is not the last best.
     """
 
-    def __init__(self, problem: ShootingProblem, monitor: Monitor | None = None) -> None:
-        """Nothing is evaluated yet."""
+    def __init__(self, problem: ShootingProblem, monitor: Monitor | None = None, constraints: bool = False) -> None:
+        """Nothing is evaluated yet; ``constraints``: violated ones come before the merit."""
         self.problem = problem
         self.monitor = monitor
+        self.constraints = constraints
         self.scale, self.lower, self.upper = (problem.stacked(field) for field in ("scale", "lower", "upper"))
         self.counts = Counts()
         self.rows: list[TraceRow] = []
@@ -118,6 +75,7 @@ class Meter:
         self.stages: tuple[StageResult, ...] = ()
         self.smoothing = problem.smoothing[0]
         self.snapshot: Snapshot | None = None
+        self.solution: Array | None = None
         self.began, self.earlier = time.perf_counter(), 0.0
 
     def enter(self, smoothing: float, resumed: bool = False) -> None:
@@ -128,7 +86,8 @@ class Meter:
 
     def restore(self, snapshot: Snapshot, rows: Iterable[TraceRow]) -> None:
         """Go on from a snapshot and its trace, as if there had been no break."""
-        self.snapshot, self.best, self.last = snapshot, snapshot.best, snapshot.last
+        best = replace(snapshot.best, violation=self.violation(snapshot.best.errors))
+        self.snapshot, self.best, self.last = snapshot, best, snapshot.last
         self.stages = snapshot.stages
         self.counts, self.rows = replace(snapshot.counts), list(rows)
         self.earlier, self.began = snapshot.seconds, time.perf_counter()
@@ -152,10 +111,14 @@ class Meter:
 
     def values(self, population: Iterable[Array]) -> list[Point]:
         """One rollout for each, in one call; stops after it if one of them meets everything."""
+        return self.seen(self.rated(population))
+
+    def rated(self, population: Iterable[Array]) -> list[Point]:
+        """One rollout for each, in one call, of which nothing is remembered."""
         Z = np.array(list(population))
         values = self.problem.evaluator.value(Z, self.smoothing)
         self.counts.rollouts += len(Z)
-        return self.seen(self.points(Z, values))
+        return self.points(Z, values)
 
     def gradient(self, z: Array) -> Point:
         """One gradient at z."""
@@ -215,8 +178,13 @@ class Meter:
             if "jacobian" in parts:
                 parts["gradient"] = 2 * parts["jacobian"].T @ parts["residuals"]
             errors = values.errors[row].copy()
-            points.append(Point(Z[row].copy(), merit, objective, errors, self.problem.met(errors), **parts))
+            z, met, violation = Z[row].copy(), self.problem.met(errors), self.violation(errors)
+            points.append(Point(z, merit, objective, errors, met, **parts, violation=violation))
         return points
+
+    def violation(self, errors: Array) -> float:
+        """See ``Point``."""
+        return self.problem.violation(errors) if self.constraints else 0.0
 
     def seen(self, points: list[Point]) -> list[Point]:
         """Remember the best; Stop(MET) if it meets everything and the problem asks to stop there."""

@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from symphys.solvers.meter import Meter, Point
+from symphys.solvers.meter import Meter
 from symphys.solvers.outcome import Array
+from symphys.solvers.point import Point
 
 REFUSALS = 6
 """A step is shortened so often at most."""

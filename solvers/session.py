@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from symphys.solvers.checkpoint import to_checkpoint
-from symphys.solvers.meter import Meter, Point, Stop, Verdict
+from symphys.solvers.meter import Meter, Stop, Verdict
 from symphys.solvers.outcome import Outcome, Status
 from symphys.solvers.plateau import FLAT, flat
+from symphys.solvers.point import Point
 from symphys.solvers.staged import Request, Stage, halfway, run_stages, words
 
 INTERRUPTED = "interrupted; with its checkpoint the solve goes on from here"
@@ -26,7 +27,7 @@ GRADIENT_NOT_FINITE = (
 
 def run(request: Request, stage: Stage) -> Outcome:
     """Run every stage; whatever happens becomes a status with advice. SymphysError alone passes through."""
-    meter = Meter(request.problem, request.monitor)
+    meter = Meter(request.problem, request.monitor, request.constraints)
     log = request.log or silent
     try:
         verdict = run_stages(request, stage, meter, log)
@@ -40,7 +41,8 @@ def outcome(request: Request, meter: Meter, verdict: Verdict) -> Outcome:
     """The best point; of an interrupted solve that of its last complete iteration, and all that belongs to it."""
     snapshot = meter.snapshot
     if verdict.status is not Status.INTERRUPTED or snapshot is None:
-        z = meter.stages[-1].z if meter.stages else meter.clip(np.array(request.start, float))
+        end = meter.stages[-1].z if meter.stages else meter.clip(np.array(request.start, float))
+        z = end if meter.solution is None else meter.solution
         return Outcome(verdict.status, verdict.advice, z, tuple(meter.rows), replace(meter.counts), {}, meter.stages)
     rows = tuple(meter.rows[: snapshot.rows])
     return Outcome(

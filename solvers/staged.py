@@ -4,7 +4,8 @@ What a stage hands on is a point and nothing else. Step lengths, damping and sig
 with are small because it has converged, and say nothing of the next one, whose merit is another function. A stage ends
 as a solve does, when it has converged, stalled or used up its budget, each stage having the whole of it; where the
 problem stops at the first point that meets everything, a stage stops at the first that does at its own smoothing. The
-last stage decides how the solve ended, and its best point is the solution: what an earlier one met counts for nothing.
+last stage decides how the solve ended: what an earlier one met at its own smoothing counts for nothing. Its best point
+is the solution, unless the start or the point of another stage does better at smoothing 0, see ``comparison``.
 
 A solver knows nothing of this: it gives one function that minimises at the meter's smoothing.
 """
@@ -18,6 +19,7 @@ import numpy as np
 
 from symphys.shooting import ShootingProblem
 from symphys.solvers.checkpoint import from_checkpoint
+from symphys.solvers.comparison import Rate, compared
 from symphys.solvers.interface import Log
 from symphys.solvers.meter import Meter, Snapshot, Stop, Verdict
 from symphys.solvers.outcome import Array, Counts, Monitor, StageResult, Status
@@ -38,6 +40,8 @@ class Request:
     Attributes:
         solver: its name.
         problem, start, monitor, checkpoint, log: see ``interface.Solve``.
+        constraints: whether the solver knows constraints, so that violated ones come before the merit.
+        rate: how the solver compares points; None: by one rollout each.
     """
 
     solver: str
@@ -46,6 +50,8 @@ class Request:
     monitor: Monitor | None
     checkpoint: dict[str, object] | None
     log: Log | None
+    constraints: bool = False
+    rate: Rate | None = None
 
 
 def run_stages(request: Request, stage: Stage, meter: Meter, log: Log) -> Verdict:
@@ -55,26 +61,28 @@ def run_stages(request: Request, stage: Stage, meter: Meter, log: Log) -> Verdic
     if request.checkpoint:
         snapshot, state, rows = from_checkpoint(request.checkpoint, request.solver, request.problem)
         meter.restore(snapshot, rows)
-        z = snapshot.best.z
+        z = snapshot.stages[-1].z if snapshot.stages else z
     verdict, knobs = Verdict(Status.MET), request.problem.smoothing
     for index, smoothing in enumerate(knobs[len(meter.stages) :], len(meter.stages)):
         meter.enter(smoothing, resumed=state is not None)
         log(f"stage {index + 1} of {len(knobs)}: smoothing {smoothing:g}")
         verdict = Verdict(Status.MET) if state == FINISHED else run_stage(request.solver, meter, stage, z, state)
         z, state = (meter.best.z if meter.best else z), None
-        meter.stages = (*meter.stages, ended(meter, verdict.status, z))
-        if verdict.status in FATAL:
+        over, status = verdict.status in FATAL or index + 1 == len(knobs), verdict.status
+        if over:
+            verdict = compared(meter, request.rate or Meter.rated, request.start, z, verdict)
+        meter.stages = (*meter.stages, ended(meter, status, z))
+        if over:
             break
-        if index + 1 < len(knobs):
-            log(words(verdict))
+        log(words(verdict))
     return verdict
 
 
 def run_stage(solver: str, meter: Meter, stage: Stage, z: Array, state: dict[str, object] | None) -> Verdict:
-    """Run a stage; errors of foreign code become a verdict."""
+    """Run a stage; errors of foreign code, and matrices that there is no memory for, become a verdict."""
     try:
         return attempt(meter, stage, z, state)
-    except (RuntimeError, ArithmeticError, np.linalg.LinAlgError) as error:
+    except (RuntimeError, ArithmeticError, np.linalg.LinAlgError, MemoryError) as error:
         return Verdict(Status.FAILED, f"{solver} failed: {str(error).strip() or type(error).__name__}")
 
 

@@ -26,7 +26,7 @@ from symphys.solvers.options import at_least, require
 from symphys.solvers.outcome import Array, Monitor, Outcome, Status
 from symphys.solvers.session import run
 from symphys.solvers.staged import Request
-from symphys.solvers.validation import NOISE, first
+from symphys.solvers.validation import NOISE, comparing, first
 
 NOT_FINITE = "not one situation of a batch is finite: bound the variables, lower `rate`, or add [fall]"
 
@@ -83,7 +83,8 @@ def solve(
 ) -> Outcome:
     """Descend. See ``interface.Solve``."""
     stage = stage_of(Pathwise, options, seed, log)
-    return run(Request("stochastic", problem, start, monitor, checkpoint, log), stage)
+    rate = comparing(options.batch(seed))
+    return run(Request("stochastic", problem, start, monitor, checkpoint, log, rate=rate), stage)
 
 
 class Pathwise(Descent[StochasticOptions]):
@@ -95,7 +96,7 @@ class Pathwise(Descent[StochasticOptions]):
         found = average(values, self.scale, self.options.clip, self.options.fallen)
         if found.left_out == len(values.merit):
             raise Stop(Status.NOT_FINITE, NOT_FINITE)
-        point = first(self.meter, state.z, values, found.merit, found.objective)
+        point = first(self.meter, state.z, values, found.merit, found.objective, self.options.validation)
         words = (
             f"{found.alive:.0%} last, gradients {found.typical:.2g} (at most {found.longest:.2g}), agreement "
             f"{found.agreement:.2f}" + f", {found.left_out} not finite" * (found.left_out > 0)

@@ -9,8 +9,9 @@ import numpy as np
 
 from symphys.shooting import Drawn, Situations
 from symphys.solvers.interface import Log
-from symphys.solvers.meter import Meter, Point, Verdict
+from symphys.solvers.meter import Meter, Verdict
 from symphys.solvers.outcome import Array, Status
+from symphys.solvers.point import Point
 from symphys.solvers.session import begin, converged
 from symphys.solvers.validation import SITUATIONS, Batch, Validation, told
 
@@ -32,12 +33,16 @@ class Trials(Protocol):
         """A generation."""
         ...
 
-    def keep(self, z: Array, generation: int, spoilt: int, last: bool = False) -> int:
-        """See whether the mean of a search is to be kept; takes and gives what ``Validation.keep`` does."""
+    def keep(self, z: Array, generation: int, due: bool = False) -> None:
+        """See whether the mean of a search is to be kept; ``due``: in whatever generation."""
         ...
 
     def converged(self) -> Verdict:
         """What to say of a search that has come to its end."""
+        ...
+
+    def told(self, verdict: Verdict, start: Array) -> Verdict:
+        """The verdict on a search from there, or what to say where its start (n,) is kept."""
         ...
 
 
@@ -58,13 +63,16 @@ class Alone:
         """See ``Trials``."""
         return self.meter.values(Z)
 
-    def keep(self, z: Array, generation: int, spoilt: int, last: bool = False) -> int:
+    def keep(self, z: Array, generation: int, due: bool = False) -> None:
         """See ``Trials``."""
-        return 0
 
     def converged(self) -> Verdict:
         """See ``Trials``."""
         return converged(self.meter)
+
+    def told(self, verdict: Verdict, start: Array) -> Verdict:
+        """See ``Trials``."""
+        return verdict
 
 
 class Drawing:
@@ -97,19 +105,24 @@ class Drawing:
         many = Drawn(drawn.grid, np.tile(drawn.numbers, (len(Z), 1)))
         values = self.situations.value(np.repeat(np.array(Z), each, axis=0), many, meter.smoothing)
         meter.counts.rollouts += len(many.numbers)
+        spoilt = self.validation.batch.count
         merits, objectives = (part.reshape(-1, each).mean(axis=1) for part in (values.merit, values.objective))
         return [
-            Point(z, merit, objective, errors.copy(), meter.problem.met(errors), told(values, k * each))
+            Point(z, merit, objective, errors.copy(), meter.problem.met(errors), told(values, k * each), spoilt=spoilt)
             for k, (z, merit, objective, errors) in enumerate(
                 zip(Z, merits.tolist(), objectives.tolist(), values.errors[::each], strict=True)
             )
         ]
 
-    def keep(self, z: Array, generation: int, spoilt: int, last: bool = False) -> int:
+    def keep(self, z: Array, generation: int, due: bool = False) -> None:
         """See ``Trials``."""
-        due = last or generation % self.every == 0
-        return self.validation.keep(self.meter.clip(z), spoilt) if due else spoilt
+        if due or generation % self.every == 0:
+            self.validation.keep(self.meter.clip(z))
 
     def converged(self) -> Verdict:
         """See ``Trials``."""
         return Verdict(Status.CONVERGED)
+
+    def told(self, verdict: Verdict, start: Array) -> Verdict:
+        """See ``Trials``."""
+        return self.validation.told(verdict, start)

@@ -182,6 +182,7 @@ class ShootingProblem:
         squares: whether the merit is a sum of squared residuals; otherwise these cannot be asked for.
         constraint_names: one per entry of the constraints.
         constraint_lower, constraint_upper: (m,).
+        limits: which of the errors are those of constraints.
         smoothing: stages of the knob, decreasing, at least one; each starts from the best point of the one before.
         stop_when_met: stop at the first point whose errors are all <= 1, instead of at a stationary point.
         output_names: of the numbers that are told.
@@ -196,6 +197,7 @@ class ShootingProblem:
     constraint_names: tuple[str, ...] = ()
     constraint_lower: Array = field(default_factory=lambda: np.zeros(0))
     constraint_upper: Array = field(default_factory=lambda: np.zeros(0))
+    limits: range = range(0)
     smoothing: tuple[float, ...] = (0.0,)
     stop_when_met: bool = True
     output_names: tuple[str, ...] = ()
@@ -229,3 +231,8 @@ class ShootingProblem:
     def met(self, errors: Array) -> bool:
         """Whether there is something to meet and all of it is met; NaN never is."""
         return errors.size > 0 and bool(np.all(errors <= 1))
+
+    def violation(self, errors: Array) -> float:
+        """The largest error of a constraint, 0 where all constraints are met."""
+        largest = float(np.max(errors[self.limits], initial=0.0))
+        return 0.0 if largest <= 1 else largest

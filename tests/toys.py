@@ -83,6 +83,7 @@ def toy(
         squares=residuals is not None,
         constraint_lower=zeros,
         constraint_upper=zeros,
+        limits=range(e.numel() - c.numel(), e.numel()),
         output_names=("sum [m]",) if told else (),
         **more,
     )

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot, isfinite
+from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symphys.problem.faults import Faults
-from symphys.problem.inertia import centre_of_mass, complaint, specific, volume
+from symphys.problem.inertia import centre_of_mass, complaint, volume
+from symphys.problem.magnitude import check_magnitudes
 from symphys.problem.parts import COMBINE, BodyPlan
 from symphys.problem.schema.physics import BodyTable, SurfaceTable
 from symphys.problem.sizes import extent
@@ -43,19 +44,8 @@ def read_body(index: int, table: BodyTable, faults: Faults) -> BodyPlan:
         group=table.group,
     )
     if len(faults.issues) == before:
-        check_finite(place, table, plan, faults)
+        check_magnitudes(place, table, plan, faults)
     return plan
-
-
-def check_finite(place: tuple[str, int], table: BodyTable, plan: BodyPlan, faults: Faults) -> None:
-    """Mass and inertia that follow from the shape must be positive and finite."""
-    if not (isfinite(plan.mass) and plan.mass > 0):
-        faults.add((*place, "density"), "the mass that follows from it is no positive finite number")
-    elif table.inertia is None:
-        tensor = specific(plan.shapes)
-        entries = [entry for row in tensor for entry in row]
-        if not (all(map(isfinite, entries)) and min(tensor[k][k] for k in range(3)) > 0):
-            faults.add((*place, "shape"), "the inertia that follows from it is no positive finite number")
 
 
 def read_density(place: tuple[str, int], table: BodyTable, hollow: bool, faults: Faults) -> float | None:

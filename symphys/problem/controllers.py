@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import casadi as ca
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from symphys.controllers import Given, Law, Linear, Net, Periodic
 from symphys.problem.faults import Faults, Place
 from symphys.problem.feedback import Controller, Sensor
+from symphys.problem.memory import check_net
 from symphys.problem.quantities import Quantity, SlotError, read_slot
 from symphys.problem.schema.control import ControllerTable, NetTable
 from symphys.problem.weights import random_weights, read_weights
@@ -32,6 +33,7 @@ def read_controllers(
     known: Mapping[str, Quantity],
     functions: Mapping[str, ca.Function],
     faults: Faults,
+    varied: Collection[str] = (),
 ) -> tuple[Controller, ...]:
     """Every controller that is clear.
 
@@ -41,9 +43,11 @@ def read_controllers(
         known: every quantity; those of kind "control" can be driven.
         functions: by name, those that Python gives.
         faults: gets what is wrong.
+        varied: names of quantities that variables set.
     """
     widths = {sensor.name: sensor.size for sensor in sensors}
-    found = [Reader(index, table, widths, known, functions, faults).read() for index, table in enumerate(tables)]
+    readers = [Reader(index, table, widths, known, functions, faults, varied) for index, table in enumerate(tables)]
+    found = [reader.read() for reader in readers]
     for name in functions.keys() - {table.name for table in tables if table.function is not None}:
         faults.add(("controller",), f'Python gives a function {quote(name)}, but no controller "{name}" has function')
     return tuple(controller for controller in found if controller)
@@ -60,10 +64,12 @@ class Reader:
         known: Mapping[str, Quantity],
         functions: Mapping[str, ca.Function],
         faults: Faults,
+        varied: Collection[str] = (),
     ) -> None:
         """Keep what all steps need."""
         self.place: Place = ("controller", index)
         self.table, self.widths, self.known, self.functions, self.faults = table, widths, known, functions, faults
+        self.varied = f"{table.name}.weights" in varied
 
     def add(self, key: str, message: str) -> None:
         """Note a fault of one key, or of a key of a table within."""
@@ -132,7 +138,9 @@ class Reader:
         if table.net is None:
             return Linear(senses, outputs)
         net = table.net
-        return Net(senses, outputs, tuple(net.hidden), net.activation, net.output, net.biases, net.skip)
+        law = Net(senses, outputs, tuple(net.hidden), net.activation, net.output, net.biases, net.skip)
+        fits = check_net((*self.place, "net", "hidden"), law.sizes["weights"], self.varied, self.faults)
+        return law if fits else None
 
     def function(self, senses: int, outputs: int) -> Law | None:
         """The function that Python gives, if its sizes fit."""

@@ -23,6 +23,7 @@ from symphys.problem.follow import check_anchors
 from symphys.problem.include import with_included
 from symphys.problem.joints import read_joints
 from symphys.problem.meetings import Meetings
+from symphys.problem.memory import check_rollout
 from symphys.problem.model import NOTHING, Array, Problem, Simulation, Variable
 from symphys.problem.placing import placed
 from symphys.problem.plan import WorldPlan
@@ -134,6 +135,7 @@ def build(
     sensors, controllers = read_control(document, plan, known, functions, faults)
     known |= weight_quantities(controllers)
     variables = read_variables(document.variable, known, simulation, faults)
+    check_rollout(plan, simulation, variables, faults)
     check_varied(plan, variables, faults)
     check_anchors(plan, variables, faults)
     scenarios = read_scenarios(document.scenario, known, plan, simulation, variables, faults)
@@ -172,7 +174,8 @@ def read_control(
     """Sensors and controllers without fault."""
     sensors = read_sensors(document.sensor, sensor_names(plan, at_guess(plan, known, ())), faults)
     faults.stop_if_any()
-    controllers = read_controllers(document.controller, sensors, known, functions, faults)
+    varied = {name.partition("[")[0].strip() for table in document.variable for name in table.sets}
+    controllers = read_controllers(document.controller, sensors, known, functions, faults, varied)
     faults.stop_if_any()
     return sensors, controllers
 

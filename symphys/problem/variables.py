@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.problem.faults import Faults, Place
+from symphys.problem.magnitude import check_mass
 from symphys.problem.model import Kind, Simulation, Slot, Variable
 from symphys.problem.quantities import OPEN, Quantity, SlotError, limits, physical, read_slot
 from symphys.problem.schema.aims import VariableTable
@@ -151,6 +152,8 @@ class Reader:
                 self.add("lower", f"{slot.name} must {'be greater than' if name in OPEN else 'be at least'} {low:g}")
             if np.any(variable.upper > high):
                 self.add("upper", f"{slot.name} must be at most {high:g}")
+            if name == "mass":
+                check_mass((*self.place, "guess"), float(variable.guess[0]), self.faults)
             if name == "orientation" and len(slot.components) == 4 and not np.any(variable.guess):
                 self.add("guess", "a quaternion must not be zero; [1, 0, 0, 0] is no rotation")
 

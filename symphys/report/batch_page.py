@@ -10,6 +10,7 @@ from symphys.report import comparison, style, words
 from symphys.report.animation import NUMBERS, animation
 from symphys.report.checks import MOST_CHECKS, draw_checks, ratios
 from symphys.report.convergence import draw_convergence
+from symphys.report.drawable import OVERSIZED, drawable, oversized
 from symphys.report.finding import Study, read_all, studies
 from symphys.report.markup import Html, card, facts, figures, join, page, table, tag
 from symphys.report.motion import draw_motion
@@ -85,7 +86,7 @@ def build_study(study: Study, root: Path, numbers: int, anchor: str, titled: boo
     """Everything about one problem; ``titled`` where the page has several."""
     motion, guess, scene, why = best_motion(study.best)
     with style.paper():
-        converged = style.picture(f"{anchor}-convergence", "Objective and errors", draw_convergence(study))
+        converged = style.picture(f"{anchor}-convergence", "Objective and errors", draw_convergence(drawable(study)))
         checked = style.picture(f"{anchor}-checks", "Errors against tolerances", draw_checks(study))
         strip = draw_strip(motion, scene) if motion else None
         drawn = draw_motion(motion, scene, guess) if motion else None
@@ -101,6 +102,7 @@ def build_study(study: Study, root: Path, numbers: int, anchor: str, titled: boo
         tag("h2", study.title) if titled else "",
         tag("p", f"{study.problem}{place}", class_="kicker") if titled else "",
         comparison.study_verdict(study),
+        tag("p", OVERSIZED, class_="note") if oversized(study) else "",
         card("Solvers", comparison.solver_table(study), note=comparison.table_note(study)),
         card("Convergence", figures(converged, comparison.convergence_note(study))),
         card("The motion", played, figures(moved), note=which),

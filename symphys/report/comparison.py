@@ -7,10 +7,8 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from urllib.parse import quote
 
-import numpy as np
-
 from symphys.report import style, words
-from symphys.report.finding import Entry, Study
+from symphys.report.finding import Entry, Study, middle
 from symphys.report.markup import ICONS, Html, banner, card, dot, join, pill, table, tag
 from symphys.report.records import Run
 from symphys.report.stage import smoothed
@@ -192,7 +190,7 @@ def check_cell(study: Study, name: str, solver: str) -> Html:
     level = "good" if met == len(found) else "fair" if met else "bad"
     text = {"good": "met", "bad": "missed"}.get(level, f"{met} of {len(found)}")
     errors = [check.error for check in found if math.isfinite(check.error)]
-    median = float(np.median(errors)) if errors else math.nan
+    median = middle(errors) if errors else math.nan
     return tag("span", f"{show(median, 2)} ", pill(level, text), class_="nowrap")
 
 

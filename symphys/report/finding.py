@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +13,11 @@ from symphys.report.reading import CONFIG, PROBLEM, RESULT, read_run
 from symphys.report.records import ReportError, Run
 
 FIGURES = "figures"
+
+
+def middle(numbers: Sequence[float]) -> float:
+    """The median; the sum of two may be beyond the largest double, that of their halves is not."""
+    return 2 * float(np.median(np.asarray(numbers, float) / 2))
 
 
 @dataclass(frozen=True)
@@ -29,7 +35,7 @@ class Entry:
     def median(self, numbers: list[float]) -> float:
         """The median of those that are finite; nan if none is."""
         finite = [number for number in numbers if np.isfinite(number)]
-        return float(np.median(finite)) if finite else np.nan
+        return middle(finite) if finite else np.nan
 
 
 @dataclass(frozen=True)

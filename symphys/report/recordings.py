@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from symphys.report import values
+from symphys.report.drawable import largest, oversized
 from symphys.report.records import Array, ReportError, Trajectory
 
 TRAJECTORY = "trajectory.npz"
@@ -25,7 +26,8 @@ def read_trajectory(path: Path) -> Trajectory:
     """Read a recorded motion, up to the first state that is not finite.
 
     Raises:
-        ReportError: no such file, not an archive of plain arrays, or shapes that do not fit.
+        ReportError: no such file, not an archive of plain arrays, shapes that do not fit, or numbers beyond what can be
+            drawn.
     """
     try:
         with path.open("rb") as file:
@@ -35,9 +37,13 @@ def read_trajectory(path: Path) -> Trajectory:
     except UNREADABLE as error:
         raise ReportError(f"{path.name}: not an archive of plain arrays ({values.name(str(error))})") from error
     try:
-        return trim(make_trajectory(arrays))
+        motion = trim(make_trajectory(arrays))
     except (ValueError, KeyError, TypeError) as error:
         raise ReportError(f"{path.name}: not a recorded motion ({values.name(str(error))})") from error
+    for name, array in vars(motion).items():
+        if oversized(array):
+            raise ReportError(f"{path.name}: {name} has numbers up to {largest(array):.3g}, which cannot be drawn")
+    return motion
 
 
 def unpack(content: object) -> dict[str, Array]:

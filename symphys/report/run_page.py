@@ -9,6 +9,7 @@ from pathlib import Path
 from symphys import files
 from symphys.report import sections, style, values, words
 from symphys.report.contacts import by_surfaces, draw_contacts, shown_pairs
+from symphys.report.drawable import OVERSIZED, drawable, oversized
 from symphys.report.finding import is_run
 from symphys.report.history import draw_run
 from symphys.report.joint_section import gait_card, joint_card, joint_pictures
@@ -61,7 +62,7 @@ def write_run_report(run_dir: Path) -> Path:
     run = read_run(run_dir, run_dir)
     recording = read_recording(run_dir)
     with style.paper():
-        pictures = draw(run, recording)
+        pictures = draw(drawable(run), recording)
     write_figures(run_dir, pictures.values())
     body = build(run, recording, pictures)
     title = f"{run.title}: {run.solver}, seed {run.seed}"
@@ -125,7 +126,8 @@ def build(run: Run, recording: Recording, pictures: dict[str, Picture]) -> Html:
         sources(run),
     ]
     header = sections.header(run, cards)
-    return join([header, sections.key_numbers(run), *cards, sections.FOOTER])
+    note = [tag("p", OVERSIZED, class_="note")] if oversized(run) else []
+    return join([header, *note, sections.key_numbers(run), *cards, sections.FOOTER])
 
 
 def how_drawn(run: Run) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from symphys.report import values
+from symphys.report.drawable import LARGEST, small
 from symphys.report.records import Array
 from symphys.report.scene_joints import make_joints
 from symphys.report.scenery import UPRIGHT, Scene, SceneBody, SceneFixture, ScenePlane, SceneTerrain, Solid
@@ -41,7 +42,7 @@ def make_solids(shapes: object) -> tuple[Solid, ...]:
 
 
 def make_solid(entry: dict[str, object]) -> Solid | None:
-    """A sphere, a box or a capsule; None if it has no finite size and place."""
+    """A sphere, a box or a capsule; None if it has no size and place that can be drawn."""
     kind = entry.get("kind", "sphere")
     radius, half = values.number(entry.get("radius")), np.zeros(3)
     if kind == "box":
@@ -50,7 +51,7 @@ def make_solid(entry: dict[str, object]) -> Solid | None:
         half = np.array([0.0, 0.0, values.number(entry.get("length")) / 2])
     sizes = half if kind == "box" else np.array([radius, *half[2:]]) if kind == "capsule" else np.array([radius])
     centre = values.vector(entry.get("centre"))
-    if kind not in ("sphere", "box", "capsule") or not (np.isfinite([*sizes, *centre]).all() and (sizes > 0).all()):
+    if kind not in ("sphere", "box", "capsule") or not (small([*sizes, *centre]) and (sizes > 0).all()):
         return None
     return Solid(radius, half, centre, make_orientation(entry.get("orientation")))
 
@@ -66,7 +67,7 @@ def make_plane(entry: dict[str, object]) -> ScenePlane | None:
     """One of ``planes``; None if it has no direction."""
     normal, offset = values.vector(entry.get("normal")), values.number(entry.get("offset", 0.0))
     length = float(np.linalg.norm(normal))
-    if not (0 < length < np.inf and np.isfinite(offset)):
+    if not (0 < length < np.inf and small(offset)):
         return None
     return ScenePlane(values.name(entry.get("name")), normal / length, offset)
 
@@ -83,7 +84,7 @@ def make_terrain(entry: dict[str, object]) -> SceneTerrain | None:
     found = [values.numbers(row) for row in rows] if isinstance(rows, list) else []
     if len(found) != y.size or any(row.size != x.size for row in found) or min(x.size, y.size) < 2:
         return None
-    if not all(np.isfinite(side).all() and (np.diff(side) > 0).all() for side in (x, y)):
+    if not all(small(side) and (np.diff(side) > 0).all() for side in (x, y)):
         return None
     z = np.array(found)
-    return SceneTerrain(values.name(entry.get("name")), x, y, np.where(np.isfinite(z), z, np.nan))
+    return SceneTerrain(values.name(entry.get("name")), x, y, np.where(np.abs(z) <= LARGEST, z, np.nan))

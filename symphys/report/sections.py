@@ -12,7 +12,7 @@ from symphys.report import style, words
 from symphys.report.animation import animation
 from symphys.report.limbs import is_large
 from symphys.report.markup import Html, banner, card, facts, figures, fold, join, pill, stats, table, tag
-from symphys.report.records import TOLD, Check, Run, Trajectory, Variable
+from symphys.report.records import TOLD, Array, Check, Run, Trajectory, Variable
 from symphys.report.scenery import Scene
 from symphys.report.style import Picture
 from symphys.report.variables import component_names, knotted
@@ -176,14 +176,21 @@ def many_row(variable: Variable) -> list[str]:
     label = join([tag("b", variable.name), f" {len(value)} numbers ", tag("small", ", ".join(variable.sets))])
     ranges = [f"{show(float(of.min()))} to {show(float(of.max()))}" for of in (guess, value)]
     bounds = [show(float(variable.lower[:, 0].min())), show(float(variable.upper[:, 0].max()))]
-    change = math.sqrt(float(((value - guess) ** 2).mean()))
+    change = root_mean_square(value / 2 - guess / 2) * 2
     return [label, ranges[0], tag("b", ranges[1]), *bounds, f"changed by {show(change)} (rms)"]
+
+
+def root_mean_square(numbers: Array) -> float:
+    """Of numbers whose squares may be beyond the largest double; nan if one is."""
+    size = float(np.max(np.abs(numbers)))
+    return size * math.sqrt(float(((numbers / size) ** 2).mean())) if 0 < size < math.inf else size
 
 
 def between(value: float, guess: float, low: float, high: float) -> Html:
     """Where value and guess lie between finite bounds; says so where a bound is active."""
     if not (math.isfinite(low) and math.isfinite(high) and high > low and math.isfinite(value)):
         return tag("small", "free" if math.isinf(low) and math.isinf(high) else "")
+    value, guess, low, high = (number / 2 for number in (value, guess, low, high))  # differences may overflow else
     spots = [
         tag("i", class_=kind, style=f"left:{100 * np.clip((at - low) / (high - low), 0, 1):.1f}%")
         for at, kind in ((guess, "guess"), (value, "value"))

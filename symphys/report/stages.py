@@ -20,7 +20,8 @@ NARROWEST = 0.09
 """A stage that takes less of the axis has no room for its name."""
 HOW_READ = (
     "Each stage starts from the best point of the one before. “There” is at the stage's own smoothing, as the solver "
-    "saw it; “exact” is the same point in the exact rollout, which alone counts. The last point is the result."
+    "saw it; “exact” is the same point in the exact rollout, which alone counts. The last point is the result, unless "
+    "an earlier one or the guess is worth more exactly."
 )
 
 
@@ -55,11 +56,15 @@ def row(stage: Stage, kinds: Sequence[str], checked: bool) -> list[Html | str]:
 
 
 def remark(run: Run) -> Html:
-    """Says so where an earlier stage came closer than the last."""
+    """Says so where an earlier stage came closer than the last; its point is the result then, unless means decided."""
     last, best = run.stages[-1], min(run.stages, key=rank)
     if run.status == "interrupted" or rank(best) >= rank(last):
         return Html("")
-    text = f"The point of the stage at {show(best.smoothing)} m/s does better in the exact rollout than the result"
+    text = f"The point of the stage at {show(best.smoothing)} m/s "
+    if run.objective == best.exact_objective:
+        text += "is the result: it does better in the exact rollout than that of the last stage"
+    else:
+        text += "does better in the exact rollout than the result"
     return tag("p", f"{text}: what the last stages gained, they gained for another problem.", class_="caption")
 
 

@@ -79,7 +79,8 @@ class Result:
         trust: how far the solution can be trusted.
         guess: what the run started from, exactly: "objective", "worst", the largest error / tolerance, and what is
             told, by "told: " and its name.
-        stages: those of smoothing that were begun, in their order; the solution is the point of the last.
+        stages: those of smoothing that were begun, in their order; the solution is the point of the last, unless that
+            of another or the guess is better exactly.
         versions: of everything that took part.
         when: UTC time of the end, ISO 8601.
         command: what was typed.

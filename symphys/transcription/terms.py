@@ -106,6 +106,11 @@ def goal_error(objective: Any, goal: float) -> Any:
     return 1 + (objective - goal) / max(abs(goal), 1e-9)
 
 
+def limits(problem: Problem) -> range:
+    """Which of the errors are those of constraints."""
+    return range(len(problem.targets), len(problem.targets) + len(problem.constraints))
+
+
 def _stack(parts: list[Expr]) -> Expr:
     return ca.vertcat(ca.MX(0, 1), *(ca.vec(part) for part in parts))
 

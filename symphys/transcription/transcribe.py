@@ -14,7 +14,7 @@ from symphys.transcription.functions import ExpressionFunctions
 from symphys.transcription.large import has_large_nets, require_small_nets, transcribe_large
 from symphys.transcription.program import rollout_program
 from symphys.transcription.situations import with_situations
-from symphys.transcription.terms import terms
+from symphys.transcription.terms import limits, terms
 from symphys.transcription.transcription import Transcription
 
 
@@ -48,6 +48,7 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
         constraint_names=asked.names,
         constraint_lower=asked.lower,
         constraint_upper=asked.upper,
+        limits=limits(problem),
         smoothing=problem.simulation.smoothing,
         stop_when_met=problem.stop_when_met,
         output_names=tuple(output.label for output in problem.outputs),

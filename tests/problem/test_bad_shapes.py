@@ -73,10 +73,28 @@ CASES = [
         "must not be zero",
     ),
     (body(OFF), f"{BODY}.shape.parts", r"is 0.995.* m from the body's origin, at \[0.995.*, 0, 0\]; subtract"),
-    (body("{ box = { size = [1e-120, 1e-120, 1e-120] } }", "density = 1"), f"{BODY}.density", "no positive finite"),
-    (body("{ box = { size = [1e200, 1e200, 1e200] } }"), f"{BODY}.shape", "inertia .* no positive finite"),
-    (body("{ sphere = { radius = 1e-170 } }"), f"{BODY}.shape", "inertia .* no positive finite"),
+    (
+        body("{ box = { size = [1e-120, 1e-120, 1e-120] } }", "density = 1"),
+        f"{BODY}.density",
+        "the mass .* kg, not 0$",
+    ),
+    (
+        body("{ box = { size = [1e200, 1e200, 1e200] } }"),
+        f"{BODY}.shape",
+        "the inertia that follows .* from 1e-140",
+    ),
+    (
+        body("{ sphere = { radius = 1e-170 } }"),
+        f"{BODY}.shape",
+        "the inertia that follows .* from 1e-140",
+    ),
     # variables
+    (
+        body("{ box = { size = [1, 1, 1] } }")
+        + '[[variable]]\nname = "v"\nsets = "it.mass"\nlower = 5e-324\nguess = 1e-320',
+        'variable "v".guess',
+        r"a mass must be from 1e-100 to 1e\+100 kg, not 9.99.*e-321",
+    ),
     (
         body("{ box = { size = [1, 1, 1] } }") + '[[variable]]\nname = "v"\nsets = "it.size"\nlower = [0.5, 0, 0.5]',
         'variable "v".lower',

@@ -70,9 +70,21 @@ CASES = [
     # bodies
     (MASS, "mass = -1", 'body "ball".mass', "greater than 0, not -1"),
     (MASS, "mass = 0", 'body "ball".mass', "greater than 0, not 0"),
+    (MASS, "mass = 5e-324", 'body "ball".mass', r"must be from 1e-100 to 1e\+100 kg, not 4.94066e-324"),
+    (MASS, "mass = 1e-310", 'body "ball".mass', r"must be from 1e-100 to 1e\+100 kg, not 1e-310"),
+    (MASS, "mass = 1e308", 'body "ball".mass', r"must be from 1e-100 to 1e\+100 kg, not 1e\+308"),
+    (MASS, "mass = 2.0\ninertia = 1e-320", 'body "ball".inertia', r"from 1e-140 to 1e\+140 kg m\^2, not 9.99.*e-321"),
+    (MASS, "mass = 2.0\ninertia = [1, 1, 1e200]", 'body "ball".inertia', "exceed the sum of the other two"),
+    (MASS, "mass = 2.0\ninertia = 1e200", 'body "ball".inertia', r"from 1e-140 to 1e\+140 kg m\^2, not 1e\+200"),
+    (
+        "{ radius = 0.5 }",
+        "{ radius = 1e-160 }",
+        'body "ball".shape',
+        "the inertia that follows .* from 1e-140",
+    ),
     (MASS, "", 'body "ball".mass', "give either mass .* or density"),
     (MASS, "mass = 2.0\ndensity = 1", 'body "ball".mass', "give either mass .* or density"),
-    ("{ radius = 0.1 }", "{ radius = 1e-120 }", 'body "marble".density', "no positive finite number"),
+    ("{ radius = 0.1 }", "{ radius = 1e-120 }", 'body "marble".density', r"the mass .* from 1e-100 to 1e\+100 kg"),
     ("{ radius = 0.1 }", "{ radius = 0.1, hollow = true }", 'body "marble".density', "hollow sphere .* give mass"),
     ("radius = 0.5", "radius = -0.5", 'body "ball".shape.sphere.radius', "greater than 0"),
     (

@@ -84,6 +84,8 @@ def test_an_earlier_stage_that_did_better_is_named(staged: Path, edit: Edit) -> 
     better = [STAGES[0], stage(0.01, 1e-5, 1e-5, True), STAGES[2]]
     edit(staged / "result.json", stages=better)
     assert "The point of the stage at 0.01 m/s does better" in text_of(write_run_report(staged))
+    edit(staged / "result.json", stages=better, objective=1e-5)
+    assert "The point of the stage at 0.01 m/s is the result: it does better" in text_of(write_run_report(staged))
     edit(staged / "result.json", stages=better, status="interrupted")
     assert "does better" not in text_of(write_run_report(staged))
 

@@ -128,6 +128,13 @@ def test_what_casadi_raises_is_a_failure(name: str) -> None:
 
 
 @every_solver
+def test_a_matrix_that_there_is_no_memory_for_is_a_failure(name: str) -> None:
+    found = solve(name, failing(quadratic(), KINDS, 2, MemoryError("Unable to allocate 72 TiB")))
+    assert found.status is Status.FAILED
+    assert "72 TiB" in found.advice
+
+
+@every_solver
 def test_a_fault_of_the_program_is_not_hidden(name: str) -> None:
     with pytest.raises(KeyError):
         solve(name, failing(quadratic(), KINDS, 2, KeyError("bug")))

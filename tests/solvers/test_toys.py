@@ -2,12 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from toys import PENALTY, PLAIN, constrained, counted, quadratic, require, rosenbrock, solve, target, toy, values
+from toys import (
+    PENALTY,
+    PLAIN,
+    constrained,
+    counted,
+    quadratic,
+    require,
+    rosenbrock,
+    solve,
+    stop_at,
+    target,
+    through_json,
+    toy,
+    values,
+)
 
 from symphys.solvers import SOLVERS, Status
 
@@ -212,3 +227,31 @@ def test_what_a_problem_tells_of_its_best_point_is_in_every_row(name: str, backe
     found = solve(name, problem)
     assert all(list(row.told) == ["sum [m]"] for row in found.trace)
     assert found.trace[-1].told["sum [m]"] == pytest.approx(found.z.sum(), rel=1e-6)
+
+
+@pytest.mark.parametrize("bounds", [(-np.inf, np.inf), (0, np.inf), (-np.inf, 5), (0, 5), (-1, 0.9), (0, 1e-3)])
+@pytest.mark.parametrize("options", [{}, {"sigma": 30.0}, {"options": {"maxstd": 0.02}}, {"options": {"minstd": 1e-4}}])
+def test_cma_with_one_variable(bounds: tuple[float, float], options: dict[str, Any]) -> None:
+    """Bounded on both sides, on one, on none; standard deviations beyond their limits."""
+    lower, upper = bounds
+    problem, watch = counted(toy(1, lambda z, s: z - 1, bounds=bounds, guess=min(0.5, upper)))
+    found = solve("cma", problem, options=options)
+    assert found.z == pytest.approx([min(1.0, upper)], abs=2e-3)
+    assert found.status in (Status.CONVERGED, Status.STALLED)
+    points = np.array(watch.points)
+    assert np.all((points >= lower) & (points <= upper))
+
+
+def test_cma_with_one_variable_that_may_vary_of_several() -> None:
+    """The others are held by equal bounds."""
+    problem = quadratic()
+    (block,) = problem.blocks
+    held = replace(block, lower=np.array([0.0, 0, 0]), upper=np.array([0.0, 0, 3.5]))
+    assert solve("cma", replace(problem, blocks=(held,))).z == pytest.approx([0, 0, 3], abs=1e-4)
+
+
+def test_cma_with_one_variable_goes_on_to_the_last_bit() -> None:
+    problem = toy(1, lambda z, s: z - 1, bounds=(-1.0, 0.9), guess=0.5)
+    whole, part = solve("cma", problem), solve("cma", problem, monitor=stop_at(7))
+    rest = solve("cma", problem, checkpoint=through_json(part.checkpoint))
+    assert np.array_equal(rest.z, whole.z) and rest.counts == whole.counts

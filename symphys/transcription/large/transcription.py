@@ -27,6 +27,7 @@ from symphys.transcription.large.probe import LargeProbe
 from symphys.transcription.large.sensitivity import back
 from symphys.transcription.probe import Probe
 from symphys.transcription.simulate import Record, simulate
+from symphys.transcription.terms import limits
 from symphys.transcription.transcription import Transcription, fastest
 
 Array = NDArray[np.float64]
@@ -109,6 +110,7 @@ def transcribe_large(
         constraint_names=made.aims.terms.names,
         constraint_lower=made.aims.terms.lower,
         constraint_upper=made.aims.terms.upper,
+        limits=limits(problem),
         smoothing=problem.simulation.smoothing,
         stop_when_met=problem.stop_when_met,
         output_names=tuple(output.label for output in problem.outputs),

@@ -1,0 +1,57 @@
+"""What can be drawn: axes, their ticks and what is computed from positions overflow far below the largest double.
+
+Tables tell every number as it is. Figures leave out what is beyond ``LARGEST``, and the page says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+T = TypeVar("T")
+LARGEST = 1e50
+"""In whatever unit: no length, cost or time of a sensible motion is near it, and its sixth power is a double still."""
+OVERSIZED = f"Numbers beyond {LARGEST:g} are left out of the figures; tables have them."
+
+
+def small(numbers: Any) -> bool:
+    """Whether all of them are finite and can be drawn."""
+    return bool(np.all(np.abs(np.asarray(numbers, float)) <= LARGEST))
+
+
+def largest(array: Any) -> float:
+    """The largest size of those that are finite; 0 without any."""
+    sizes = np.abs(np.asarray(array, float))
+    return float(np.max(sizes[np.isfinite(sizes)], initial=0.0))
+
+
+def drawable(value: T) -> T:
+    """A record, or a part of one, with nan for every number that is finite and cannot be drawn."""
+    found: Any = value
+    if isinstance(value, np.ndarray) and value.dtype.kind == "f":
+        found = np.where(np.isfinite(value) & (np.abs(value) > LARGEST), np.nan, value)
+    elif isinstance(value, float) and np.isfinite(value) and abs(value) > LARGEST:
+        found = np.nan
+    elif isinstance(value, Mapping):
+        found = {key: drawable(entry) for key, entry in value.items()}
+    elif isinstance(value, tuple):
+        found = tuple(drawable(entry) for entry in value)
+    elif is_dataclass(value) and not isinstance(value, type):
+        found = replace(value, **{field.name: drawable(getattr(value, field.name)) for field in fields(value)})
+    return found  # type: ignore[no-any-return]
+
+
+def oversized(value: Any) -> bool:
+    """Whether a number in a record, or a part of one, is finite and cannot be drawn."""
+    if isinstance(value, float) or (isinstance(value, np.ndarray) and value.dtype.kind == "f"):
+        return largest(value) > LARGEST
+    if isinstance(value, Mapping):
+        return any(map(oversized, value.values()))
+    if isinstance(value, tuple):
+        return any(map(oversized, value))
+    if is_dataclass(value) and not isinstance(value, type):
+        return any(oversized(getattr(value, field.name)) for field in fields(value))
+    return False
