@@ -14,12 +14,12 @@ from rich.table import Table
 from rich.text import Text
 
 from symphys import files
-from symphys.report.examination import Trust
-from symphys.report.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN, Judged
-from symphys.report.reading_examination import make_trust
-from symphys.report.trust import FAULT, VERDICTS, advice, answers, findings, slopes
-from symphys.report.trust_numerics import GRADIENT, GRID, reach
-from symphys.report.trust_physics import sliding
+from symphys.findings.examination import Trust
+from symphys.findings.examined import FAULT, VERDICTS, advice, answers, findings, slopes
+from symphys.findings.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN, Judged
+from symphys.findings.numerics import GRADIENT, GRID, reach
+from symphys.findings.physics import sliding
+from symphys.findings.reading import make_trust
 from symphys.transcription import Verdict
 
 COLOURS = {GOOD: "green", FAIR: "yellow", BAD: "red", UNKNOWN: "dim"}

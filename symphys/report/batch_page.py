@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from symphys import files
-from symphys.report import comparison, style, words
+from symphys.findings import writing
+from symphys.report import comparison, style
 from symphys.report.animation import NUMBERS, animation
 from symphys.report.checks import MOST_CHECKS, draw_checks, ratios
 from symphys.report.convergence import draw_convergence
@@ -41,7 +42,7 @@ def write_batch_report(batch_dir: Path) -> Path:
     if not runs and not broken:
         raise ReportError(f"{batch_dir}: no run folder at or below it; `symphys solve --out` writes them")
     found = studies(runs)
-    title = found[0].title if len(found) == 1 else f"{words.several(len(found), 'problem')} in “{name_of(batch_dir)}”"
+    title = found[0].title if len(found) == 1 else f"{writing.several(len(found), 'problem')} in “{name_of(batch_dir)}”"
     parts = [
         tag("p", "Batch report", class_="kicker"),
         tag("h1", title),

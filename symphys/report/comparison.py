@@ -9,12 +9,13 @@ from urllib.parse import quote
 
 import numpy as np
 
+from symphys.findings import writing
+from symphys.findings.writing import show
 from symphys.report import style, words
 from symphys.report.finding import Entry, Study
 from symphys.report.markup import ICONS, Html, banner, card, dot, join, pill, table, tag
 from symphys.report.records import Run
 from symphys.report.stage import smoothed
-from symphys.report.words import show
 
 RUN_PAGE = "report.html"
 MOST_BROKEN = 50
@@ -26,12 +27,12 @@ def summary(found: Sequence[Study], broken: Sequence[Run]) -> str:
     """How many runs of how many are solved."""
     runs = [run for study in found for run in study.runs]
     solved = sum(run.solved for run in runs)
-    text = f"{solved} of {words.several(len(runs), 'run')} solved"
+    text = f"{solved} of {writing.several(len(runs), 'run')} solved"
     if len(found) > 1:
         whole = sum(all(entry.solved for entry in study.entries) for study in found)
         text += f"; {whole} of {len(found)} problems by every solver that was tried"
     if broken:
-        text += f"; {words.several(len(broken), 'folder')} without a readable result"
+        text += f"; {writing.several(len(broken), 'folder')} without a readable result"
     return text + "."
 
 
@@ -53,10 +54,10 @@ def tally(entries: Sequence[Entry], full: Sequence[Entry], none: Sequence[Entry]
         everyone = some.get(len(full), f"All {len(full)} solvers")
         return f"{everyone} met every target" + (" from every seed." if seeds > 1 else ".")
     partial = [entry for entry in entries if entry not in full and entry not in none]
-    parts = [f"{words.listed([entry.solver for entry in full])} met every target"] if full else []
+    parts = [f"{writing.listed([entry.solver for entry in full])} met every target"] if full else []
     parts += [f"{entry.solver} met every target in {entry.solved} of {len(entry.runs)} runs" for entry in partial]
     if none:
-        names = words.listed([entry.solver for entry in none])
+        names = writing.listed([entry.solver for entry in none])
         parts.append(f"{names} never did" if parts else f"{names} did not meet every target")
     return "; ".join(parts) + "."
 
@@ -147,7 +148,7 @@ def statuses(entry: Entry) -> Html:
     counted = Counter(words.ended(run.status) for run in entry.runs)
     if len(counted) == 1:
         return join(list(counted))
-    return join([words.listed([f"{text} ({number})" for text, number in counted.most_common()])])
+    return join([writing.listed([f"{text} ({number})" for text, number in counted.most_common()])])
 
 
 def table_note(study: Study) -> str:
@@ -164,13 +165,13 @@ def smoothing_note(study: Study) -> str:
     for entry in study.entries:
         for knobs in dict.fromkeys(stages_of(run) for run in entry.runs if smoothed(run.stages)):
             used.setdefault(knobs, []).append(entry.solver)
-    told = [f"{knobs} m/s: {words.listed(list(dict.fromkeys(names)))}" for knobs, names in used.items()]
+    told = [f"{knobs} m/s: {writing.listed(list(dict.fromkeys(names)))}" for knobs, names in used.items()]
     return f"Solved in stages of smoothing, {'; '.join(told)}. All that is told here is exact." if told else ""
 
 
 def stages_of(run: Run) -> str:
     """The knobs of its stages."""
-    return words.listed([show(stage.smoothing) for stage in run.stages])
+    return writing.listed([show(stage.smoothing) for stage in run.stages])
 
 
 def convergence_note(study: Study) -> str:
@@ -187,7 +188,7 @@ def check_cell(study: Study, name: str, solver: str) -> Html:
     """The median error of one check for one solver, and how many seeds met it."""
     found = [check for run in study.runs if run.solver == solver for check in run.checks if check.name == name]
     if not found:
-        return Html(words.DASH)
+        return Html(writing.DASH)
     met = sum(check.met for check in found)
     level = "good" if met == len(found) else "fair" if met else "bad"
     text = {"good": "met", "bad": "missed"}.get(level, f"{met} of {len(found)}")

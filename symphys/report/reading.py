@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from symphys.report import values
-from symphys.report.reading_examination import make_trust
+from symphys.findings import values
+from symphys.findings.reading import make_trust
+from symphys.report import tables
 from symphys.report.records import (
     Array,
     Check,
@@ -129,7 +130,7 @@ def backend_words(value: object) -> str:
 def read_or_note(path: Path, faults: list[str]) -> dict[str, object]:
     """The table in a file; empty, with a sentence in ``faults``, if there is none."""
     try:
-        return values.read_table(path)
+        return tables.read_table(path)
     except ReportError as error:
         faults.append(str(error))
         return {}
@@ -138,7 +139,7 @@ def read_or_note(path: Path, faults: list[str]) -> dict[str, object]:
 def read_problem(path: Path) -> dict[str, object]:
     """The tables of a problem file; empty if it cannot be read: it is shown as text elsewhere."""
     try:
-        return tomllib.loads(values.read_words(path))
+        return tomllib.loads(tables.read_words(path))
     except (ReportError, tomllib.TOMLDecodeError, RecursionError):
         return {}
 
@@ -196,7 +197,7 @@ def read_trace(path: Path, faults: list[str]) -> Trace:
         with path.open(encoding="utf-8", errors="replace", newline="") as file:
             rows = list(csv.reader(file))
     except OSError as error:
-        faults.append(f"{path.name}: {values.reason(error)}")
+        faults.append(f"{path.name}: {tables.reason(error)}")
         return Trace({}, 0)
     except csv.Error as error:
         faults.append(f"{path.name}: {values.name(str(error))}")

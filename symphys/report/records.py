@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.errors import SymphysError
-from symphys.report.examination import Trust
+from symphys.findings.examination import Trust
 from symphys.report.stage import Stage
 
 Array = NDArray[np.float64]

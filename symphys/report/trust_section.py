@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from symphys.report.examination import Trust
-from symphys.report.levels import MARKS, Judged
+from symphys.findings.examination import Trust
+from symphys.findings.examined import advice, answers, findings, slopes
+from symphys.findings.levels import MARKS, Judged
+from symphys.findings.physics import sliding
+from symphys.findings.writing import show
 from symphys.report.markup import Html, Part, card, figures, pill, table, tag
 from symphys.report.records import Run
 from symphys.report.style import Picture
-from symphys.report.trust import advice, answers, findings, slopes
-from symphys.report.trust_physics import sliding
-from symphys.report.words import show
 
 NOT_EXAMINED = "This run was not examined; “symphys check --at” its folder tells how far to trust it."
 TITLE = "How far to trust this"

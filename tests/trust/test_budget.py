@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from symphys.findings.examination import Energy, Gain, Trust
+from symphys.findings.levels import BAD, GOOD
+from symphys.findings.physics import balance_finding, gains_finding
 from symphys.problem import load_problem
 from symphys.problems import find
-from symphys.report.examination import Energy, Gain, Trust
-from symphys.report.levels import BAD, GOOD
-from symphys.report.trust_physics import balance_finding, gains_finding
 from symphys.transcription import transcribe
 from symphys.trust.budget import budget, momentum_gap
 from symphys.trust.contacts import contacts, surface

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from symphys.report.examination import Trust
-from symphys.report.levels import BAD, FAIR, GOOD, UNKNOWN, Finding, graded, worst_of
-from symphys.report.words import listed, several, show
+from symphys.findings.examination import Trust
+from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Finding, graded, worst_of
+from symphys.findings.writing import listed, several, show
 
 ENERGY, CONTACTS = "energy", "contacts"
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symphys.report.examination import GradientCheck, Growth, Refined, Smoothed, Trust
-from symphys.report.levels import BAD, FAIR, GOOD, UNKNOWN, Finding, Judged, graded, relative_change, worst_of
-from symphys.report.words import listed, percent, show
+from symphys.findings.examination import GradientCheck, Growth, Refined, Smoothed, Trust
+from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Finding, Judged, graded, relative_change, worst_of
+from symphys.findings.writing import listed, percent, show
 
 GRADIENT, GRID, GROWTH, SMOOTHING = "gradient", "grid", "growth", "smoothing"
 

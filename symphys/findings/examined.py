@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from symphys.report.examination import Trust
-from symphys.report.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN, Finding, Judged, worst_of
-from symphys.report.trust_numerics import (
+from symphys.findings.examination import Trust
+from symphys.findings.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN, Finding, Judged, worst_of
+from symphys.findings.numerics import (
     GRADIENT,
     GRID,
     GROWTH,
@@ -22,7 +22,7 @@ from symphys.report.trust_numerics import (
     slope_finding,
     smoothed_findings,
 )
-from symphys.report.trust_physics import (
+from symphys.findings.physics import (
     CONTACTS,
     ENERGY,
     balance_finding,
@@ -31,7 +31,7 @@ from symphys.report.trust_physics import (
     impacts_finding,
     residual_finding,
 )
-from symphys.report.words import percent, show
+from symphys.findings.writing import percent, show
 
 FAULT = "fault"
 SUBJECTS = (GRADIENT, GROWTH, GRID, SMOOTHING, ENERGY, CONTACTS)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import fields
 
-from symphys.report import values
-from symphys.report.examination import Energy, Gain, GradientCheck, Growth, Refined, Slide, Smoothed, Trust
-from symphys.report.records import Array
+from symphys.findings import values
+from symphys.findings.examination import Energy, Gain, GradientCheck, Growth, Refined, Slide, Smoothed, Trust
+from symphys.findings.values import Array
 
 PLAIN = (
     *("gained", "drift", "momentum", "residual", "impulse"),
