@@ -18,8 +18,8 @@ from symphys.findings.examination import Trust
 from symphys.findings.examined import FAULT, VERDICTS, advice, answers, findings, slopes
 from symphys.findings.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN, Judged
 from symphys.findings.numerics import GRADIENT, GRID, reach
-from symphys.findings.physics import sliding
 from symphys.findings.reading import make_trust
+from symphys.findings.touching import sliding
 from symphys.transcription import Verdict
 
 COLOURS = {GOOD: "green", FAIR: "yellow", BAD: "red", UNKNOWN: "dim"}

@@ -107,10 +107,15 @@ class Trust:
         growth: of changes, along the horizon.
         energy: along the horizon.
         gains, gained: the steps in which contacts added most energy, and all that they added [J].
-        drift: largest change of energy in a step that nothing accounts for [J].
+        drift, drift_at: largest change of energy in a step that nothing accounts for [J], and when [s].
+        drifted: the largest sum of such changes since the start [J].
         momentum: largest change of momentum in a step that nothing accounts for, relative.
-        residual, impulse: largest change of an impulse in the last sweep, and largest impulse in a step [N s].
+        residual, residual_at, impulse: largest change of an impulse in the last sweep [N s], when [s], and largest
+            impulse in a step [N s].
+        residual_finer: the residual with twice the sweeps [N s], where that was looked at.
         deepest, depth_contact, depth_time, size: deepest penetration [m], where, when; size of the smallest body [m].
+        passed, passed_contact, passed_time, passed_depth: the deepest that a body was in another between two instants,
+            as a share of its size, which contact, when [s], and how deep [m].
         multiple_impacts, steps: steps with two or more impacts on a body, of all.
         slides: the contacts that slid furthest.
         fault: where the first number that is not finite comes from; empty if all are finite.
@@ -126,13 +131,21 @@ class Trust:
     gains: tuple[Gain, ...] = ()
     gained: float = np.nan
     drift: float = np.nan
+    drift_at: float = np.nan
+    drifted: float = np.nan
     momentum: float = np.nan
     residual: float = np.nan
+    residual_at: float = np.nan
+    residual_finer: float = np.nan
     impulse: float = np.nan
     deepest: float = np.nan
     depth_contact: str = ""
     depth_time: float = np.nan
     size: float = np.nan
+    passed: float = np.nan
+    passed_contact: str = ""
+    passed_time: float = np.nan
+    passed_depth: float = np.nan
     multiple_impacts: float = np.nan
     steps: float = np.nan
     slides: tuple[Slide, ...] = ()

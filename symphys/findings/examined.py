@@ -22,15 +22,8 @@ from symphys.findings.numerics import (
     slope_finding,
     smoothed_findings,
 )
-from symphys.findings.physics import (
-    CONTACTS,
-    ENERGY,
-    balance_finding,
-    depth_finding,
-    gains_finding,
-    impacts_finding,
-    residual_finding,
-)
+from symphys.findings.physics import ENERGY, balance_finding, gains_finding
+from symphys.findings.touching import CONTACTS, contact_findings
 from symphys.findings.writing import percent, show
 
 FAULT = "fault"
@@ -47,14 +40,9 @@ def findings(trust: Trust, judged: Judged) -> list[Finding]:
     lines += slope_finding(trust)
     lines += [growth_finding(trust.growth)] if trust.growth.factor.size else []
     lines += smoothed_findings(trust.smoothed, judged)
-    numbers = (
-        (trust.gained, gains_finding),
-        (trust.momentum, balance_finding),
-        (trust.residual, residual_finding),
-        (trust.deepest, depth_finding),
-        (trust.multiple_impacts, impacts_finding),
-    )
-    return lines + [find(trust) for number, find in numbers if not math.isnan(number)]
+    numbers = ((trust.gained, gains_finding), (trust.momentum, balance_finding))
+    lines += [find(trust) for number, find in numbers if not math.isnan(number)]
+    return lines + contact_findings(trust)
 
 
 def slopes(trust: Trust) -> tuple[list[str], list[list[str]]]:
@@ -88,7 +76,7 @@ def advice(trust: Trust, judged: Judged) -> str:
     parts = (
         of_gradient(level[GRADIENT], level[GROWTH]),
         of_growth(trust, level[GROWTH]),
-        of_grid(level[GRID], judged.solved),
+        of_grid(level[GRID], judged),
         of_smoothing(level[SMOOTHING]),
         of_physics(lines, level),
     )
@@ -115,20 +103,19 @@ def of_growth(trust: Trust, level: str) -> str:
         if math.isfinite(far.end):
             return (
                 f"Changes double every {show(far.doubling, 2)} s, so the gradient is not to be trusted beyond "
-                f"{show(far.end, 2)} s: shorten the horizon to less than that, or use multiple shooting with "
-                "stretches as short."
+                f"{show(far.end, 2)} s: shorten the horizon to less than that, or use a solver that needs none."
             )
-        return "The end is too sensitive for any gradient: shorten the horizon, or use multiple shooting."
+        return "The end is too sensitive for any gradient: shorten the horizon, or use a solver that needs none."
     return {
         GOOD: "It reaches over the whole horizon, since changes hardly grow on the way.",
         FAIR: "The end is sensitive to what comes before, so small steps are to be expected.",
     }.get(level, "")
 
 
-def of_grid(level: str, solved: bool) -> str:
+def of_grid(level: str, judged: Judged) -> str:
     """What refinement advises."""
     if level == GOOD:
-        held = "still meets every target" if solved else "changes little"
+        held = "still meets every check" if judged.met and judged.checked else "changes little"
         return f"The result {held} when it is simulated more finely, so it is not an accident of the time grid."
     return {
         FAIR: "Simulated more finely it drifts a little: to build on the result, solve again with half the time step.",

@@ -58,7 +58,7 @@ def refined_finding(refined: Refined, judged: Judged) -> Finding:
     number = f"objective {show(refined.objective)}"
     if judged.checked and not math.isnan(refined.worst):
         number += f", worst error {show(refined.worst)} × tolerance"  # noqa: RUF001
-    if judged.solved and judged.checked:
+    if judged.met and judged.checked:
         level = graded(refined.worst, WORST_LIMITS)
         meaning = {
             GOOD: "Every check is still met.",
@@ -152,7 +152,8 @@ def growth_finding(growth: Growth) -> Finding:
         BAD: f"A change at t = {show(far.start)} s doubles every {show(far.doubling, 2)} s{too_far(far)}.",
         UNKNOWN: "Could not be measured.",
     }[level]
-    return Finding(GROWTH, level, what, f"× {show(far.total, 2)}", meaning)  # noqa: RUF001
+    doubt = f"a change at t = {show(far.start)} s is {show(far.total, 2)} times as large at the end"
+    return Finding(GROWTH, level, what, f"× {show(far.total, 2)}", meaning, doubt * (level == BAD))  # noqa: RUF001
 
 
 def too_far(far: Reach) -> str:
@@ -185,6 +186,6 @@ def smoothed_findings(rows: tuple[Smoothed, ...], judged: Judged) -> list[Findin
 
 def harmless(row: Smoothed, judged: Judged) -> bool:
     """Whether this smoothing leaves the answer what it is."""
-    if judged.solved and judged.checked:
+    if judged.met and judged.checked:
         return row.worst <= WORST_LIMITS[0]
     return relative_change(judged.objective, row.objective) <= OBJECTIVE_LIMITS[0]

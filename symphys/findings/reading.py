@@ -9,15 +9,15 @@ from symphys.findings.examination import Energy, Gain, GradientCheck, Growth, Re
 from symphys.findings.values import Array
 
 PLAIN = (
-    *("gained", "drift", "momentum", "residual", "impulse"),
-    *("deepest", "size", "multiple_impacts", "steps"),
+    *("gained", "drift", "drift_at", "drifted", "momentum", "residual", "residual_at", "residual_finer", "impulse"),
+    *("deepest", "size", "passed", "multiple_impacts", "steps"),
 )
 """Fields that are one number."""
 
 
 def make_trust(entry: dict[str, object]) -> Trust:
     """The record; what is absent or no number becomes nan."""
-    number, place = values.number, values.table(entry.get("deepest_at"))
+    number, place, passed = values.number, values.table(entry.get("deepest_at")), values.table(entry.get("passed_at"))
     gradient = values.tables(entry.get("gradient"))
     return Trust(
         gradient=tuple(
@@ -38,6 +38,9 @@ def make_trust(entry: dict[str, object]) -> Trust:
         gains=tuple(make_gain(row) for row in values.tables(entry.get("gains"))),
         depth_contact=values.name(place.get("contact")),
         depth_time=number(place.get("time")),
+        passed_contact=values.name(passed.get("contact")),
+        passed_time=number(passed.get("time")),
+        passed_depth=number(passed.get("depth")),
         slides=tuple(make_slide(row) for row in values.tables(entry.get("slides"))),
         fault=values.name(entry.get("fault")),
         **{name: number(entry.get(name)) for name in PLAIN},

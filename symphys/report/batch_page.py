@@ -95,7 +95,7 @@ def build_study(study: Study, root: Path, numbers: int, anchor: str, titled: boo
     write_figures(root, converged + checked + moved)
     played = animation(motion, scene, guess, numbers) if motion else tag("p", f"There is no motion to draw: {why}.")
     best = study.best
-    which = f"The {'best run' if best.solved else 'run that came closest'}: {best.solver}, seed {best.seed}."
+    which = f"The {'best run' if best.met else 'run that came closest'}: {best.solver}, seed {best.seed}."
     place = f" in {study.place}" if study.place and study.place != study.problem else ""
     return tag(
         "section",

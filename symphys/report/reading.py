@@ -11,6 +11,7 @@ import numpy as np
 
 from symphys.findings import values
 from symphys.findings.reading import make_trust
+from symphys.findings.verdict import rule
 from symphys.report import tables
 from symphys.report.records import (
     Array,
@@ -58,7 +59,8 @@ def read_run(folder: Path, root: Path) -> Run:
 def make_run(folder: Path, place: str, named: dict[str, object], result: dict[str, object], trace: Trace) -> Run:
     """Turn the tables of a run folder into a record; ``named`` tells problem, solver and seed."""
     problem = values.name(named.get("problem")) or folder.resolve().parent.name
-    return Run(
+    checks = tuple(make_check(entry) for entry in values.tables(result.get("checks")))
+    run = Run(
         folder=folder,
         place=place,
         readable=True,
@@ -68,12 +70,15 @@ def make_run(folder: Path, place: str, named: dict[str, object], result: dict[st
         solver=values.name(named.get("solver")) or folder.resolve().name,
         seed=values.whole(named.get("seed")),
         solved=result.get("solved") is True,
+        met=all(check.met for check in checks) and ("verdict" in result or result.get("solved") is True),
+        verdict=values.name(result.get("verdict")),
+        doubts=values.names(result.get("doubts")),
         status=values.name(result.get("status")),
         advice=values.name(result.get("advice")),
         objective=values.number(result.get("objective")),
         costs=values.measures(result.get("costs")),
         outputs=values.measures(result.get("outputs")),
-        checks=tuple(make_check(entry) for entry in values.tables(result.get("checks"))),
+        checks=checks,
         variables=tuple(make_variable(key, entry) for key, entry in values.table(result.get("z")).items()),
         effort=make_effort(result),
         trust=make_trust(values.table(result.get("trust"))),
@@ -83,6 +88,13 @@ def make_run(folder: Path, place: str, named: dict[str, object], result: dict[st
         stages=tuple(make_stage(entry) for entry in values.tables(result.get("stages"))),
         faults=(),
     )
+    return run if run.verdict else judged_late(run, values.table(result.get("trust")))
+
+
+def judged_late(run: Run, trust: dict[str, object]) -> Run:
+    """A run whose file is older than verdicts, ruled on as a new one would be."""
+    ruling = rule(run.status, run.judged, trust)
+    return replace(run, solved=ruling.solved, verdict=ruling.verdict, doubts=ruling.doubts)
 
 
 def make_effort(result: dict[str, object]) -> Effort:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from symphys.findings.verdict import BEST_FOUND, DOUBTED, SOLVED, told
 from symphys.findings.writing import listed, plain, show
 from symphys.report.records import Check, Run
 
 STATUS = {
-    "met": "every target met",
+    "met": "everything met",
     "converged": "converged",
     "budget": "budget spent",
     "stalled": "no more progress",
@@ -21,7 +22,7 @@ STATUS = {
 }
 
 STOPPED = {
-    "converged": "The solver converged to a point that misses them.",
+    "converged": "The solver converged.",
     "budget": "The solver's budget was spent.",
     "stalled": "The solver could make no more progress.",
     "not_finite": "A number in the simulation was not finite.",
@@ -53,17 +54,27 @@ def ended(code: str) -> str:
     return {"met": "met", "not_finite": "not finite"}.get(code, status(code))
 
 
+def came_to(run: Run) -> str:
+    """How a run ended, in a few words for tables: as its solver did, or its verdict, where that says more."""
+    if run.verdict in (DOUBTED, BEST_FOUND):
+        return told(run.verdict, run.status, bool(run.checks))
+    return ended(run.status)
+
+
 def level(run: Run) -> str:
     """``good``, ``fair`` (nothing went wrong, but not solved) or ``bad``."""
     if run.solved:
         return "good"
+    if run.verdict == DOUBTED:
+        return "bad"
     return "bad" if run.status in ("failed", "not_finite", "unreadable", "") else "fair"
 
 
 def headline(run: Run) -> str:
-    """Two words for a run."""
-    if run.solved:
-        return "Solved"
+    """A few words for a run."""
+    if run.verdict in (SOLVED, DOUBTED, BEST_FOUND):
+        words = told(run.verdict, run.status, bool(run.checks))
+        return words[:1].upper() + words[1:]
     known = {"interrupted": "Interrupted", "not_applicable": "Not applicable", "failed": "Failed"}
     return known.get(run.status, "Not solved" if run.readable else "No result")
 
@@ -80,16 +91,20 @@ def verdict(run: Run) -> str:
     if not run.checks and run.status in STOPPED and math.isnan(run.objective):
         return f"{STOPPED[run.status]} There is nothing to judge."
     if not run.checks:
-        return f"The problem states no targets; the objective is {show(run.objective)}." + stopped(run)
-    if run.solved:
+        text = (
+            f"The problem states nothing to meet; the objective is {show(run.objective)}. {STOPPED.get(run.status, '')}"
+        )
+    elif run.verdict in (SOLVED, DOUBTED):
         total = "The only check is" if len(run.checks) == 1 else f"All {len(run.checks)} checks are"
-        return f"{total} met; the largest error is {show(run.worst, 2)} of its tolerance{work(run)}."
-    return f"{misses(missed, len(run.checks))} {STOPPED.get(run.status, '')}".strip()
+        text = f"{total} met; the largest error is {show(run.worst, 2)} of its tolerance{work(run)}."
+    else:
+        text = f"{misses(missed, len(run.checks))} {STOPPED.get(run.status, '')}"
+    return f"{text.strip()} {doubted(run)}".strip()
 
 
-def stopped(run: Run) -> str:
-    """How a run without targets ended, where that is bad news."""
-    return f" Status: {status(run.status)}." if run.status not in ("met", "converged") else ""
+def doubted(run: Run) -> str:
+    """Why a run is not to be relied on, in a sentence; empty where it is, or where it came to nothing anyway."""
+    return f"But it is not to be relied on: {'; '.join(run.doubts)}." if run.verdict == DOUBTED else ""
 
 
 def misses(missed: Sequence[Check], total: int) -> str:

@@ -4,5 +4,6 @@ Its numbers are told in words by ``symphys.findings``.
 """
 
 from symphys.trust.examine import examine
+from symphys.trust.survey import survey
 
-__all__ = ["examine"]
+__all__ = ["examine", "survey"]

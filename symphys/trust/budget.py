@@ -40,7 +40,8 @@ def budget(rollout: Rollout, record: Record) -> dict[str, Any]:
         joints and joints that give way gave (negative: took) [J].
         "gains": the steps in which rigid contacts gave most, each with "step", "time" [s], "energy" [J], "contacts";
         steps in which a soft contact acts are left out, since it gives back what it has stored. "gained" [J]: the sum
-        of all such steps. "drift" [J]: the largest change in a step that neither forces nor contacts account for.
+        of all such steps. "drift" [J]: the largest change in a step that neither forces nor contacts account for, in
+        the step from "drift_at" [s]; "drifted" [J]: the largest sum of such changes since the start.
         "momentum": the largest part of a body's linear momentum that impulses of gravity, forces and contacts leave
         unexplained in a step, relative to the largest momentum or impulse; rounding, if the engine is right. Bodies
         that joints hold together count as one; those that are held by the world are left out.
@@ -56,11 +57,14 @@ def budget(rollout: Rollout, record: Record) -> dict[str, Any]:
     floor = GAIN * kinetic.max() + 1e-12 * np.abs(potential).max()
     gains = np.where(gains > floor, gains, 0.0)
     first = np.argsort(-gains, kind="stable")[:MOST_GAINS]
+    free = np.where(touched, 0.0, surplus)
     return {
         "energy": _thinned(motion.time, kinetic, potential, applied, contact),
         "gains": [_gain(motion, int(k), float(gains[k])) for k in first if gains[k] > 0],
         "gained": float(gains.sum()),
-        "drift": float(np.abs(surplus[~touched]).max(initial=0.0)),
+        "drift": float(np.abs(free).max()),
+        "drift_at": float(motion.time[int(np.abs(free).argmax())]),
+        "drifted": float(np.abs(np.cumsum(free)).max()),
         "momentum": momentum_gap(rollout, record),
     }
 

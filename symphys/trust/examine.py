@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.transcription import Record, Transcription, first_derivative_fault, first_fault
-from symphys.trust import budget, contacts, gradient, growth, refinement, smoothing
+from symphys.trust import gradient, growth, refinement, smoothing
+from symphys.trust.contacts import slides
+from symphys.trust.survey import survey
 
 Array = NDArray[np.float64]
 Tell = Callable[[str], None]
@@ -39,8 +41,8 @@ def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: No
         **finer,
         "growth": grown,
         "smoothed": smoothing.smoothed(transcription, z),
-        **budget.budget(transcription.rollout, record),
-        **contacts.contacts(transcription.rollout, record),
+        **survey(transcription, record),
+        "slides": slides(transcription.rollout, record),
         "fault": _fault(transcription, record, compared),
     }
 

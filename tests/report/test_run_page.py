@@ -199,7 +199,7 @@ def test_run_without_motion_says_so(batch: Path) -> None:
         ({"status": "budget", "solved": False}, "The run did not end as solved"),
         ({"status": "interrupted", "solved": False}, "goes on from where it stopped"),
         ({"status": "not_applicable", "solved": False}, "does not apply"),
-        ({"checks": []}, "states no targets"),
+        ({"checks": []}, "states nothing to meet"),
         ({"checks": None, "objective": None, "status": "failed", "solved": False}, "There is nothing to judge."),
         ({"objective": None, "counts": None, "seconds": None, "trust": None, "z": None, "price": None}, "Solved"),
         ({"objective": "inf", "equivalents": "nan", "z": [], "checks": "none"}, "∞"),

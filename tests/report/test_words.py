@@ -16,7 +16,7 @@ from symphys.findings.examination import Energy, Gain, GradientCheck, Growth, Re
 from symphys.findings.examined import advice, answers, findings, slopes
 from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Judged, graded
 from symphys.findings.numerics import slope_finding, smoothed_findings
-from symphys.findings.physics import depth_finding, residual_finding
+from symphys.findings.touching import depth_finding, residual_finding
 from symphys.report.markup import Html, tag
 from symphys.report.output import slug
 from symphys.report.records import Variable
@@ -107,7 +107,7 @@ def test_advice_of_a_sound_solution() -> None:
     assert {line.level for line in findings(SOUND, MET)} == {GOOD}
     assert advice(SOUND, MET) == (
         "The gradient is right: it agrees with differences. It reaches over the whole horizon, since changes hardly "
-        "grow on the way. The result still meets every target when it is simulated more finely, so it is not an "
+        "grow on the way. The result still meets every check when it is simulated more finely, so it is not an "
         "accident of the time grid. The contacts are resolved cleanly."
     )
 
