@@ -20,6 +20,7 @@ def nothing() -> Array:
 class GradientCheck:
     """|adjoint - difference| of one variable, relative to ``scale``, the norm of its gradient.
 
+    ``felt``: what a change by the variable's scale changes, as a share of the value; 0 where nothing depends on it.
     ``jump``: where only differences of either side agree, what is between them, as a change of the variable.
     """
 
@@ -27,6 +28,7 @@ class GradientCheck:
     error: float
     scale: float
     jump: float = 0.0
+    felt: float = np.nan
 
 
 @dataclass(frozen=True)
@@ -47,12 +49,18 @@ class Refined:
 
 @dataclass(frozen=True)
 class Smoothed:
-    """The same z with contacts smoothed over ``smoothing`` [m/s]; ``own``: as the problem's solvers see it."""
+    """The same z with contacts smoothed over ``smoothing`` [m/s]; ``own``: as the problem's solvers see it.
+
+    ``costs``: the sum of what is minimised. ``moved``: how far bodies get from their places in the exact motion, as a
+    share of the longest way of one.
+    """
 
     smoothing: float
     own: bool
     objective: float
     worst: float
+    costs: float = np.nan
+    moved: float = np.nan
 
 
 @dataclass(frozen=True)
@@ -82,6 +90,24 @@ class Gain:
     time: float
     energy: float
     contacts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Miss:
+    """Two surfaces that hardly miss or hardly touch each other, by ``gap`` [m] at ``time`` [s].
+
+    ``touches``: which of the two. ``change`` of ``variable``, in its own unit, makes the one out of the other;
+    ``steps`` and ``spreads``: how many scales, or spreads, of all variables together do.
+    """
+
+    contact: str
+    touches: bool
+    time: float
+    gap: float
+    variable: str
+    change: float
+    steps: float
+    spreads: float
 
 
 @dataclass(frozen=True)
@@ -118,6 +144,7 @@ class Trust:
             as a share of its size, which contact, when [s], and how deep [m].
         multiple_impacts, steps: steps with two or more impacts on a body, of all.
         slides: the contacts that slid furthest.
+        misses: surfaces that hardly miss or hardly touch each other.
         fault: where the first number that is not finite comes from; empty if all are finite.
     """
 
@@ -149,4 +176,5 @@ class Trust:
     multiple_impacts: float = np.nan
     steps: float = np.nan
     slides: tuple[Slide, ...] = ()
+    misses: tuple[Miss, ...] = ()
     fault: str = ""

@@ -10,10 +10,12 @@ from collections.abc import Sequence
 
 from symphys.findings.examination import Trust
 from symphys.findings.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN, Finding, Judged, worst_of
+from symphys.findings.nearby import miss_findings
 from symphys.findings.numerics import (
     GRADIENT,
     GRID,
     GROWTH,
+    SLOPE_LIMITS,
     SMOOTHING,
     gradient_finding,
     growth_finding,
@@ -21,12 +23,13 @@ from symphys.findings.numerics import (
     refined_finding,
     slope_finding,
     smoothed_findings,
+    unfelt,
 )
 from symphys.findings.physics import ENERGY, balance_finding, gains_finding
 from symphys.findings.touching import CONTACTS, contact_findings
-from symphys.findings.writing import percent, show
+from symphys.findings.writing import listed, percent, show
 
-FAULT = "fault"
+FAULT, NO_SLOPE = "fault", "zero"
 SUBJECTS = (GRADIENT, GROWTH, GRID, SMOOTHING, ENERGY, CONTACTS)
 VERDICTS = {GOOD: "agrees", FAIR: "agrees roughly", BAD: "disagrees", UNKNOWN: "not compared"}
 """Of a gradient with differences."""
@@ -38,6 +41,7 @@ def findings(trust: Trust, judged: Judged) -> list[Finding]:
     lines += [gradient_finding(check) for check in trust.gradient]
     lines += [refined_finding(refined, judged) for refined in trust.refined]
     lines += slope_finding(trust)
+    lines += miss_findings(trust)
     lines += [growth_finding(trust.growth)] if trust.growth.factor.size else []
     lines += smoothed_findings(trust.smoothed, judged)
     numbers = ((trust.gained, gains_finding), (trust.momentum, balance_finding))
@@ -51,7 +55,7 @@ def slopes(trust: Trust) -> tuple[list[str], list[list[str]]]:
     rows = []
     for check in trust.gradient:
         changes = [percent(row.gradient.get(check.variable, math.nan)) for row in trust.refined]
-        verdict = VERDICTS[gradient_finding(check).level]
+        verdict = NO_SLOPE if unfelt(check) else VERDICTS[gradient_finding(check).level]
         rows.append([check.variable, show(check.scale), show(check.error, 2), verdict, *changes])
     return header, rows
 
@@ -74,13 +78,33 @@ def advice(trust: Trust, judged: Judged) -> str:
         return f"Mend this first, since solvers cannot pass it: {trust.fault}."
     level = {about: worst_of(each.level for each in lines if each.about == about) for about in SUBJECTS}
     parts = (
+        of_influence(trust),
+        of_misses(trust),
         of_gradient(level[GRADIENT], level[GROWTH]),
         of_growth(trust, level[GROWTH]),
-        of_grid(level[GRID], judged),
+        of_grid(trust, level[GRID], judged),
         of_smoothing(level[SMOOTHING]),
         of_physics(lines, level),
     )
     return " ".join(part for part in parts if part)
+
+
+def of_influence(trust: Trust) -> str:
+    """What to say of variables that change nothing."""
+    none = [check.variable for check in trust.gradient if unfelt(check)]
+    if not none:
+        return ""
+    return (
+        f"The gradient of {listed(none)} is zero or next to it: nothing that the problem asks for depends on it here, "
+        "as where a body is held by friction or misses what it should hit; begin elsewhere, smooth the contacts, or "
+        "use a solver that needs no gradient."
+    )
+
+
+def of_misses(trust: Trust) -> str:
+    """What near misses and glancing touches advise."""
+    line = next(iter(miss_findings(trust)), None)
+    return f"Close by the motion is another one. {line.meaning}" if line else ""
 
 
 def of_gradient(level: str, growth: str) -> str:
@@ -112,15 +136,22 @@ def of_growth(trust: Trust, level: str) -> str:
     }.get(level, "")
 
 
-def of_grid(level: str, judged: Judged) -> str:
+def of_grid(trust: Trust, level: str, judged: Judged) -> str:
     """What refinement advises."""
     if level == GOOD:
         held = "still meets every check" if judged.met and judged.checked else "changes little"
         return f"The result {held} when it is simulated more finely, so it is not an accident of the time grid."
     return {
         FAIR: "Simulated more finely it drifts a little: to build on the result, solve again with half the time step.",
-        BAD: "Simulated more finely it falls apart: halve the time step or add sweeps until the result holds.",
+        BAD: f"Simulated more finely it falls apart: {finer(trust, judged)} until the result holds.",
     }.get(level, "")
+
+
+def finer(trust: Trust, judged: Judged) -> str:
+    """What to refine: that by which the answer changes most."""
+    bad = [row for row in trust.refined if refined_finding(row, judged).level == BAD or row.change > SLOPE_LIMITS[1]]
+    by_sweeps = bad and all(row.what == "sweeps x 2" for row in bad)
+    return "add sweeps" if by_sweeps else "halve the time step"
 
 
 def of_smoothing(level: str) -> str:

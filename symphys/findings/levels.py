@@ -34,12 +34,14 @@ class Judged:
         worst: the largest error / tolerance; nan without any.
         met: whether nothing is missed, true also where there is nothing to meet.
         checked: whether there is anything to meet.
+        costs: the sum of what is minimised, targets aside; nan where a goal says how small that must be.
     """
 
     objective: float
     worst: float
     met: bool
     checked: bool
+    costs: float = math.nan
 
 
 def graded(value: float, limits: tuple[float, float]) -> str:

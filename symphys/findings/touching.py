@@ -28,6 +28,7 @@ COUNTED = (
 """Kinds of steps that are counted: the number in ``Trust`` (and in ``reading.PLAIN``), what it is, and what it means
 where it is not 0. A kind that nobody counted is left out."""
 IN_TIME = "Every impact was resolved in time."
+NOT_SOUND = "There were none; but other lines here say that not every impact was resolved."
 
 
 def contact_findings(trust: Trust) -> list[Finding]:
@@ -106,8 +107,9 @@ def impact_findings(trust: Trust) -> list[Finding]:
     known = [kind for kind in kinds if not math.isnan(kind[0])]
     sound = not any(number > 0 for number, _, _ in known) and resolved(trust)
     of = f" of {several(int(trust.steps), 'step')}" if math.isfinite(trust.steps) else ""
+    none = IN_TIME if sound else NOT_SOUND
     return [
-        Finding(CONTACTS, FAIR if number else GOOD, what, show(number) + of, meaning if number else IN_TIME * sound)
+        Finding(CONTACTS, FAIR if number else GOOD, what, show(number) + of, meaning if number else none)
         for number, what, meaning in known
     ]
 

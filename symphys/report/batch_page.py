@@ -7,6 +7,7 @@ from pathlib import Path
 
 from symphys import files
 from symphys.findings import writing
+from symphys.findings.verdict import ACCEPTED
 from symphys.report import comparison, style
 from symphys.report.animation import NUMBERS, animation
 from symphys.report.checks import MOST_CHECKS, draw_checks, ratios
@@ -23,6 +24,7 @@ from symphys.report.strip import draw_strip
 from symphys.report.style import Picture
 
 PAGE = "index.html"
+CLOSEST = "run that came closest"
 
 
 def write_batch_report(batch_dir: Path) -> Path:
@@ -95,7 +97,8 @@ def build_study(study: Study, root: Path, numbers: int, anchor: str, titled: boo
     write_figures(root, converged + checked + moved)
     played = animation(motion, scene, guess, numbers) if motion else tag("p", f"There is no motion to draw: {why}.")
     best = study.best
-    which = f"The {'best run' if best.met else 'run that came closest'}: {best.solver}, seed {best.seed}."
+    kind = "best run" if best.verdict in ACCEPTED else "run with the lowest objective" if best.met else CLOSEST
+    which = f"The {kind}: {best.solver}, seed {best.seed}."
     place = f" in {study.place}" if study.place and study.place != study.problem else ""
     return tag(
         "section",

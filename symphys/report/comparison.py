@@ -63,9 +63,12 @@ def doubted(runs: Sequence[Run]) -> str:
     """Which runs met everything by a motion that is not to be relied on, and why the first of them is not."""
     if not runs:
         return ""
+    why = "; ".join(runs[0].doubts)
+    if len(runs) == 1:
+        return f"{runs[0].solver}, seed {runs[0].seed}, is not to be relied on: {why}."
     named = writing.listed([f"{run.solver} seed {run.seed}" for run in runs[:MOST_NAMED]])
     more = f" and {len(runs) - MOST_NAMED} more" if len(runs) > MOST_NAMED else ""
-    return f"Not to be relied on: {named}{more}. Of the first: {'; '.join(runs[0].doubts)}."
+    return f"Not to be relied on: {named}{more}. Of the first: {why}."
 
 
 def tally(entries: Sequence[Entry], full: Sequence[Entry], none: Sequence[Entry]) -> str:

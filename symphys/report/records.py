@@ -164,7 +164,9 @@ class Run:
     @property
     def judged(self) -> Judged:
         """How it was judged."""
-        return Judged(self.objective, self.worst, self.met, bool(self.checks))
+        goal = any(check.kind == "goal" for check in self.checks)
+        costs = np.nan if goal else sum(self.costs.values())
+        return Judged(self.objective, self.worst, self.met, bool(self.checks), costs)
 
     @property
     def worst(self) -> float:

@@ -206,6 +206,13 @@ def test_run_without_motion_says_so(batch: Path) -> None:
         ({"trust": {"refined": [{"what": "dt / 2", "objective": 1.0, "worst": 7.0}]}}, "Misses by far"),
         ({"trust": {"gradient": [{"variable": "throw", "error": 0.3, "scale": 1.0}]}}, "Does not agree"),
         ({"trust": {"gradient": [{"variable": "throw", "error": 0.3, "scale": 1e-9}]}}, "says little"),
+        ({"trust": {"deepest": 0.2, "size": 0.1}}, "Met, but not to be trusted"),
+        ({"trust": {"passed": 1.6, "passed_at": {"contact": "a-b", "time": 1}}}, "a body goes through another: a-b"),
+        ({"verdict": "doubted", "doubts": ["it flies"], "solved": False}, "But it is not to be relied on: it flies."),
+        ({"checks": [], "status": "budget"}, "Best found, budget ended"),
+        ({"checks": [], "status": "stalled"}, "Best found, no more progress"),
+        ({"checks": [], "status": "converged"}, "Solved"),
+        ({"trust": {"deepest": 0.0, "size": 0.1}}, "Only the motion was looked at."),
         ({"format": 2}, "this report reads 1"),
     ],
 )
