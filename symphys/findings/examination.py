@@ -133,7 +133,8 @@ class Trust:
         growth: of changes, along the horizon.
         energy: along the horizon.
         gains, gained: the steps in which contacts added most energy, and all that they added [J].
-        drift, drift_at: largest change of energy in a step that nothing accounts for [J], and when [s].
+        drift: largest change of energy in a step that nothing accounts for [J].
+        unexplained, drift_at: the largest that the work of motors cannot explain [J], and when [s].
         drifted: the largest sum of such changes since the start [J].
         momentum: largest change of momentum in a step that nothing accounts for, relative.
         residual, residual_at, impulse: largest change of an impulse in the last sweep [N s], when [s], and largest
@@ -158,6 +159,7 @@ class Trust:
     gains: tuple[Gain, ...] = ()
     gained: float = np.nan
     drift: float = np.nan
+    unexplained: float = np.nan
     drift_at: float = np.nan
     drifted: float = np.nan
     momentum: float = np.nan

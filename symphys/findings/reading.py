@@ -9,7 +9,8 @@ from symphys.findings.examination import Energy, Gain, GradientCheck, Growth, Mi
 from symphys.findings.values import Array
 
 PLAIN = (
-    *("gained", "drift", "drift_at", "drifted", "momentum", "residual", "residual_at", "residual_finer", "impulse"),
+    *("gained", "drift", "unexplained", "drift_at", "drifted", "momentum"),
+    *("residual", "residual_at", "residual_finer", "impulse"),
     *("deepest", "size", "passed", "multiple_impacts", "steps"),
 )
 """Fields that are one number."""

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from symphys.findings.examination import Trust
 from symphys.findings.examined import findings
-from symphys.findings.levels import Judged
+from symphys.findings.levels import FAIR, GOOD, Judged
+from symphys.findings.numerics import GROWTH, refined_finding
 from symphys.findings.reading import make_trust
 
 SOLVED = "solved"
@@ -47,8 +48,18 @@ def rule(status: str, judged: Judged, trust: Mapping[str, object] | None) -> Rul
 
 
 def doubts(trust: Trust, judged: Judged) -> tuple[str, ...]:
-    """Why a result is not to be relied on, one clause for each finding that refutes it; empty if none does."""
-    return tuple(line.doubt for line in findings(trust, judged) if line.doubt)
+    """Why a result is not to be relied on, one clause for each finding that refutes it; empty if none does.
+
+    That changes grow beyond use spoils gradients. It refutes a result unless finer simulations come to the same: a walk
+    may be a walk whatever its last state is.
+    """
+    found = [line for line in findings(trust, judged) if line.doubt]
+    return tuple(line.doubt for line in found if line.about != GROWTH or not holds(trust, judged))
+
+
+def holds(trust: Trust, judged: Judged) -> bool:
+    """Whether finer simulations were done, and none of them is far from the result."""
+    return bool(trust.refined) and all(refined_finding(row, judged).level in (GOOD, FAIR) for row in trust.refined)
 
 
 def verdict(status: str, judged: Judged, doubted: bool) -> str:

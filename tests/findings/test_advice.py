@@ -14,6 +14,7 @@ from symphys.findings.examined import advice, findings, slopes
 from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Judged
 from symphys.findings.nearby import miss_findings
 from symphys.findings.numerics import smoothed_findings
+from symphys.findings.physics import balance_finding
 from symphys.findings.touching import IN_TIME, impact_findings, residual_finding
 
 MET = Judged(1.0, 0.5, True, True, 1.0)
@@ -113,3 +114,31 @@ def test_near_misses_are_told_where_a_small_step_or_a_seed_would_make_them_touch
     assert "spread of seeds" in by_seed.meaning and "the objective jumps" in by_seed.meaning
     assert (touch.what, touch.level) == ("Glancing touch", FAIR) and "misses it" in touch.meaning
     assert advice(Trust(misses=(replace(miss, spreads=0.5),)), MET).startswith("Close by the motion is another one.")
+
+
+@pytest.mark.parametrize(
+    ("numbers", "level", "doubted"),
+    [
+        ({"drift": 0.5, "unexplained": 0.5, "drifted": 0.5}, BAD, True),
+        ({"drift": 0.5, "unexplained": 0.0, "drifted": 0.0}, FAIR, False),
+        ({"drift": 1e-3, "unexplained": 1e-3, "drifted": 0.2}, BAD, True),
+        ({"drift": 1e-3, "unexplained": 1e-3, "drifted": 0.01}, FAIR, False),
+        ({"drift": 0.5}, BAD, True),
+        ({"drift": 0.0, "unexplained": 0.0, "drifted": 0.0}, GOOD, False),
+    ],
+)
+def test_energy_that_servos_may_have_done_refutes_nothing(numbers: dict[str, float], level: str, doubted: bool) -> None:
+    """Of 1 J of motion; the last but one is of a file that tells one number only."""
+    line = balance_finding(Trust(momentum=0.0, energy=Energy(*(np.array([0.0, 1.0]) for _ in range(5))), **numbers))
+    assert (line.level, bool(line.doubt)) == (level, doubted)
+
+
+def test_rounding_of_what_stands_still_is_no_energy_from_nowhere() -> None:
+    """A body of 100 J hangs still: what is left of its energies is rounding, however small the kinetic one is."""
+    still, high = np.array([0.0, 1e-25]), np.array([100.0, 100.0])
+    energy = Energy(still, still, high, still, still)
+    assert (
+        balance_finding(Trust(momentum=0.0, drift=1e-14, unexplained=1e-14, drifted=1e-14, energy=energy)).doubt == ""
+    )
+    lost = balance_finding(Trust(momentum=0.0, drift=1.0, unexplained=1.0, drifted=1.0, energy=energy))
+    assert "1 J of energy come from nowhere" in lost.doubt

@@ -13,6 +13,7 @@ from symphys.runs.config import make_config
 from symphys.runs.result import CheckRecord
 
 NAN = float("nan")
+GROWN = {"time": [0, 1], "factor": [1e5, 1]}
 ENERGY = {name: [0.0, 1.0] for name in ("time", "kinetic", "potential", "applied", "contact")}
 GAIN = {"step": 1, "time": 0.1, "energy": 9.0, "contacts": ["a-b"]}
 
@@ -43,8 +44,10 @@ def test_a_result_survives_its_file(tmp_path: Path) -> None:
         ({"trust": {"passed": 1.5}}, "doubted"),
         ({"trust": {"residual": 0.5, "impulse": 1.0}}, "doubted"),
         ({"trust": {"residual": 0.01, "impulse": 1.0}}, "solved"),
-        ({"trust": {"growth": {"time": [0, 1], "factor": [1e5, 1]}}}, "doubted"),
+        ({"trust": {"growth": GROWN}}, "doubted"),
         ({"trust": {"growth": {"time": [0, 1], "factor": [1e3, 1]}}}, "solved"),
+        ({"trust": {"growth": GROWN, "refined": [{"what": "dt / 2", "objective": 1.0, "worst": 0.6}]}}, "solved"),
+        ({"trust": {"growth": GROWN, "refined": [{"what": "dt / 2", "objective": 1.0, "worst": 9.0}]}}, "doubted"),
         ({"trust": {"gained": 9.0, "energy": ENERGY, "gains": [GAIN]}}, "doubted"),
         ({"trust": {"momentum": 0.0, "drift": 0.1, "drifted": 0.1, "energy": ENERGY}}, "doubted"),
     ],
