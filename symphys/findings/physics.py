@@ -8,7 +8,7 @@ import numpy as np
 
 from symphys.findings.examination import Trust
 from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Finding, graded, worst_of
-from symphys.findings.writing import listed, show
+from symphys.findings.writing import listed, percent, show
 
 ENERGY = "energy"
 
@@ -66,5 +66,5 @@ def balance_finding(trust: Trust) -> Finding:
     number = f"{show(trust.momentum, 2)} of the momentum, {show(trust.drift, 2)} J"
     total = f"{show(largest, 2)} J of energy come from nowhere"
     when = f", most in the step from t = {show(trust.drift_at)} s" * math.isfinite(trust.drift_at)
-    doubt = total + when if by_energy == BAD else f"{show(trust.momentum, 2)} of the momentum come from nowhere"
+    doubt = total + when if by_energy == BAD else f"{percent(trust.momentum)} of the momentum comes from nowhere"
     return Finding(ENERGY, level, "Left unexplained in a step", number, meaning, doubt * (level == BAD))
