@@ -50,7 +50,8 @@ for command in (solve, report, show, check, export, listing, schema, doctor, cac
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line; the exit code.
 
-    0: every run solved; 1: some run not solved or failed, or a gradient that is wrong; 2: wrong usage or problem file;
+    0: every run solved, or found its best where there is nothing to meet; 1: some run not solved, not to be trusted, or
+    failed, or a gradient that is wrong; 2: wrong usage or problem file;
     130: interrupted.
     """
     try:

@@ -14,16 +14,18 @@ from rich.table import Table
 from rich.text import Text
 
 from symphys import files
-from symphys.report.examination import Trust
-from symphys.report.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN, Judged
-from symphys.report.reading_examination import make_trust
-from symphys.report.trust import FAULT, VERDICTS, advice, answers, findings, slopes
-from symphys.report.trust_numerics import GRADIENT, GRID, reach
-from symphys.report.trust_physics import sliding
+from symphys.findings.examination import Trust
+from symphys.findings.examined import FAULT, NO_SLOPE, VERDICTS, advice, answers, findings, of_influence, slopes
+from symphys.findings.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN, Judged
+from symphys.findings.numerics import GRADIENT, GRID, reach
+from symphys.findings.reading import make_trust
+from symphys.findings.touching import sliding
 from symphys.transcription import Verdict
 
 COLOURS = {GOOD: "green", FAIR: "yellow", BAD: "red", UNKNOWN: "dim"}
-WORDS = {text: COLOURS[level] for words in (MARKS, VERDICTS) for level, text in words.items()}
+WORDS = {text: COLOURS[level] for words in (MARKS, VERDICTS) for level, text in words.items()} | {
+    NO_SLOPE: COLOURS[FAIR]
+}
 WIDTH = 110
 """Characters of a line that goes to no terminal."""
 IN_TABLES = (GRADIENT, GRID)
@@ -40,7 +42,9 @@ class Examined:
     @classmethod
     def of(cls, verdict: Verdict, trust: Mapping[str, Any]) -> Examined:
         """From a verdict and what ``symphys.trust.examine`` has found."""
-        judged = Judged(verdict.objective, verdict.worst, verdict.solved, bool(verdict.checks))
+        goal = any(check.kind == "goal" for check in verdict.checks)
+        costs = math.nan if goal else sum(verdict.costs.values())
+        judged = Judged(verdict.objective, verdict.worst, verdict.solved, bool(verdict.checks), costs)
         return cls(judged, make_trust(files.strict(trust)))
 
     @property
@@ -54,6 +58,8 @@ def print_examined(examined: Examined) -> None:
     """Print it."""
     trust, judged = examined.trust, examined.judged
     console = Console(width=None if sys.stdout.isatty() else WIDTH)
+    if first := of_influence(trust):
+        console.print(Text("\n" + printable(first, console)))
     print_table(console, *slopes(trust))
     print_table(console, *answers(trust, judged))
     lines = [line for line in findings(trust, judged) if line.about not in IN_TABLES]

@@ -107,7 +107,7 @@ def conclude(jobs: list[Job], batch: Batch, out: Path) -> int:
         click.echo(last_words(batch, out), err=True)
         return 130
     write_reports(jobs, out)
-    return 0 if batch.solved else 1
+    return 0 if batch.accepted else 1
 
 
 def last_words(batch: Batch, out: Path) -> str:

@@ -12,7 +12,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from symphys.cli.wording import duration, first_line, number, whole
+from symphys.cli.wording import duration, first_line, number, verdict, whole
+from symphys.findings.verdict import BEST_FOUND, DOUBTED
 
 if TYPE_CHECKING:
     from symphys.runs import Batch, Job, Result
@@ -54,7 +55,7 @@ def table(groups: dict[tuple[str, str], list[Result]]) -> Table:
 def cells(group: list[Result]) -> list[Text]:
     """The numbers of one row."""
     solved = sum(result.solved for result in group)
-    ends = Counter(result.status.replace("_", " ") for result in group)
+    ends = Counter(ended(result) for result in group)
     texts = [
         number(median(result.objective for result in group)),
         number(median(result.worst for result in group)),
@@ -63,8 +64,14 @@ def cells(group: list[Result]) -> list[Text]:
         duration(median((result.seconds or {}).get("solve") for result in group)),
         ", ".join(status if count == len(group) else f"{status} {count}" for status, count in ends.items()),
     ]
-    style = "green" if group and solved == len(group) else "red"
+    fine = group and all(result.accepted for result in group)
+    style = "red" if not fine else "green" if solved == len(group) else "yellow"
     return [Text(f"{solved}/{len(group)}", style=style), *map(Text, texts)]
+
+
+def ended(result: Result) -> str:
+    """How a run ended: as its solver did, or the verdict, where that says more."""
+    return verdict(result) if result.verdict in (DOUBTED, BEST_FOUND) else result.status.replace("_", " ")
 
 
 def median(values: Iterable[float | None]) -> float | None:
@@ -74,11 +81,19 @@ def median(values: Iterable[float | None]) -> float | None:
 
 
 def advice(groups: dict[tuple[str, str], list[Result]]) -> list[str]:
-    """What to try for runs that are not solved, each piece of advice once per problem and solver."""
+    """Why runs are not to be trusted, and what to try for the unsolved, each once per problem and solver."""
     lines = [
-        f"{problem} {solver}: {first_line(result.advice)}"
+        f"{problem} {solver}: {line}"
         for (problem, solver), group in groups.items()
         for result in group
-        if result.advice and not result.solved
+        for line in said(result)
+        if line
     ]
     return list(dict.fromkeys(lines))
+
+
+def said(result: Result) -> list[str]:
+    """The lines on one run."""
+    if result.verdict == DOUBTED:
+        return [f"not to be trusted: {'; '.join(result.doubts)}"]
+    return [] if result.solved else [first_line(result.advice)]

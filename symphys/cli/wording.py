@@ -63,7 +63,9 @@ def brief(job: Job, result: Result, skipped: bool) -> str:
 
 def verdict(result: Result) -> str:
     """Solved, or why not."""
-    return "solved" if result.solved else f"not solved ({result.status.replace('_', ' ')})"
+    from symphys.findings.verdict import told
+
+    return told(result.verdict, result.status, bool(result.checks))
 
 
 def first_line(text: str) -> str:

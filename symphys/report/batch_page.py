@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from symphys import files
-from symphys.report import comparison, style, words
+from symphys.findings import writing
+from symphys.findings.verdict import ACCEPTED
+from symphys.report import comparison, style
 from symphys.report.animation import NUMBERS, animation
 from symphys.report.checks import MOST_CHECKS, draw_checks, ratios
 from symphys.report.convergence import draw_convergence
@@ -23,6 +25,7 @@ from symphys.report.strip import draw_strip
 from symphys.report.style import Picture
 
 PAGE = "index.html"
+CLOSEST = "run that came closest"
 
 
 def write_batch_report(batch_dir: Path) -> Path:
@@ -42,7 +45,7 @@ def write_batch_report(batch_dir: Path) -> Path:
     if not runs and not broken:
         raise ReportError(f"{batch_dir}: no run folder at or below it; `symphys solve --out` writes them")
     found = studies(runs)
-    title = found[0].title if len(found) == 1 else f"{words.several(len(found), 'problem')} in “{name_of(batch_dir)}”"
+    title = found[0].title if len(found) == 1 else f"{writing.several(len(found), 'problem')} in “{name_of(batch_dir)}”"
     parts = [
         tag("p", "Batch report", class_="kicker"),
         tag("h1", title),
@@ -95,7 +98,8 @@ def build_study(study: Study, root: Path, numbers: int, anchor: str, titled: boo
     write_figures(root, converged + checked + moved)
     played = animation(motion, scene, guess, numbers) if motion else tag("p", f"There is no motion to draw: {why}.")
     best = study.best
-    which = f"The {'best run' if best.solved else 'run that came closest'}: {best.solver}, seed {best.seed}."
+    kind = "best run" if best.verdict in ACCEPTED else "run with the lowest objective" if best.met else CLOSEST
+    which = f"The {kind}: {best.solver}, seed {best.seed}."
     place = f" in {study.place}" if study.place and study.place != study.problem else ""
     return tag(
         "section",

@@ -7,15 +7,21 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from urllib.parse import quote
 
+from symphys.findings import writing
+from symphys.findings.verdict import BEST_FOUND, DOUBTED
+from symphys.findings.writing import show
 from symphys.report import style, words
 from symphys.report.finding import Entry, Study, middle
 from symphys.report.markup import ICONS, Html, banner, card, dot, join, pill, table, tag
 from symphys.report.records import Run
 from symphys.report.stage import smoothed
-from symphys.report.words import show
 
 RUN_PAGE = "report.html"
 MOST_BROKEN = 50
+MOST_NAMED = 4
+NOTHING_TO_MEET = (
+    "The problem states nothing to meet, and no solver converged: what was found is the best of what was tried."
+)
 
 Column = tuple[str, Callable[[Run], float], Callable[[float], str]]
 
@@ -24,12 +30,15 @@ def summary(found: Sequence[Study], broken: Sequence[Run]) -> str:
     """How many runs of how many are solved."""
     runs = [run for study in found for run in study.runs]
     solved = sum(run.solved for run in runs)
-    text = f"{solved} of {words.several(len(runs), 'run')} solved"
+    text = f"{solved} of {writing.several(len(runs), 'run')} solved"
+    for word, meaning in ((DOUBTED, "met, but not to be trusted"), (BEST_FOUND, "the best found with nothing to meet")):
+        number = sum(run.verdict == word for run in runs)
+        text += f"; {number} {meaning}" if number else ""
     if len(found) > 1:
         whole = sum(all(entry.solved for entry in study.entries) for study in found)
         text += f"; {whole} of {len(found)} problems by every solver that was tried"
     if broken:
-        text += f"; {words.several(len(broken), 'folder')} without a readable result"
+        text += f"; {writing.several(len(broken), 'folder')} without a readable result"
     return text + "."
 
 
@@ -38,9 +47,26 @@ def study_verdict(study: Study) -> Html:
     entries = [entry for entry in study.entries if any(run.status != "not_applicable" for run in entry.runs)]
     full = [entry for entry in entries if entry.solved == len(entry.runs)]
     none = [entry for entry in entries if entry.solved == 0]
+    if study.runs and all(run.verdict == BEST_FOUND for run in study.runs):
+        return banner("fair", "Best found", NOTHING_TO_MEET)
     level = "good" if entries and len(full) == len(entries) else "bad" if len(none) == len(entries) else "fair"
     title = {"good": "Solved", "fair": "Solved in part", "bad": "Not solved"}[level]
-    return banner(level, title, tally(entries, full, none), thrift(study))
+    doubtful = [run for run in study.runs if run.verdict == DOUBTED]
+    if level == "bad" and doubtful:
+        title = "Met, but not to be trusted" if any(run.checks for run in doubtful) else "Found, but not to be trusted"
+    return banner(level, title, tally(entries, full, none), doubted(doubtful), thrift(study))
+
+
+def doubted(runs: Sequence[Run]) -> str:
+    """Which runs met everything by a motion that is not to be relied on, and why the first of them is not."""
+    if not runs:
+        return ""
+    why = "; ".join(runs[0].doubts)
+    if len(runs) == 1:
+        return f"{runs[0].solver}, seed {runs[0].seed}, is not to be relied on: {why}."
+    named = writing.listed([f"{run.solver} seed {run.seed}" for run in runs[:MOST_NAMED]])
+    more = f" and {len(runs) - MOST_NAMED} more" if len(runs) > MOST_NAMED else ""
+    return f"Not to be relied on: {named}{more}. Of the first: {why}."
 
 
 def tally(entries: Sequence[Entry], full: Sequence[Entry], none: Sequence[Entry]) -> str:
@@ -49,13 +75,13 @@ def tally(entries: Sequence[Entry], full: Sequence[Entry], none: Sequence[Entry]
     if len(entries) == len(full):
         some = {1: entries[0].solver if entries else "", 2: "Both solvers"}
         everyone = some.get(len(full), f"All {len(full)} solvers")
-        return f"{everyone} met every target" + (" from every seed." if seeds > 1 else ".")
+        return f"{everyone} solved it" + (" from every seed." if seeds > 1 else ".")
     partial = [entry for entry in entries if entry not in full and entry not in none]
-    parts = [f"{words.listed([entry.solver for entry in full])} met every target"] if full else []
-    parts += [f"{entry.solver} met every target in {entry.solved} of {len(entry.runs)} runs" for entry in partial]
+    parts = [f"{writing.listed([entry.solver for entry in full])} solved it"] if full else []
+    parts += [f"{entry.solver} solved it in {entry.solved} of {len(entry.runs)} runs" for entry in partial]
     if none:
-        names = words.listed([entry.solver for entry in none])
-        parts.append(f"{names} never did" if parts else f"{names} did not meet every target")
+        names = writing.listed([entry.solver for entry in none])
+        parts.append(f"{names} never did" if parts else f"{names} did not solve it")
     return "; ".join(parts) + "."
 
 
@@ -142,10 +168,10 @@ def seed_chip(run: Run) -> Html:
 
 def statuses(entry: Entry) -> Html:
     """How the runs ended; with counts where they differ."""
-    counted = Counter(words.ended(run.status) for run in entry.runs)
+    counted = Counter(words.came_to(run) for run in entry.runs)
     if len(counted) == 1:
         return join(list(counted))
-    return join([words.listed([f"{text} ({number})" for text, number in counted.most_common()])])
+    return join([writing.listed([f"{text} ({number})" for text, number in counted.most_common()])])
 
 
 def table_note(study: Study) -> str:
@@ -162,13 +188,13 @@ def smoothing_note(study: Study) -> str:
     for entry in study.entries:
         for knobs in dict.fromkeys(stages_of(run) for run in entry.runs if smoothed(run.stages)):
             used.setdefault(knobs, []).append(entry.solver)
-    told = [f"{knobs} m/s: {words.listed(list(dict.fromkeys(names)))}" for knobs, names in used.items()]
+    told = [f"{knobs} m/s: {writing.listed(list(dict.fromkeys(names)))}" for knobs, names in used.items()]
     return f"Solved in stages of smoothing, {'; '.join(told)}. All that is told here is exact." if told else ""
 
 
 def stages_of(run: Run) -> str:
     """The knobs of its stages."""
-    return words.listed([show(stage.smoothing) for stage in run.stages])
+    return writing.listed([show(stage.smoothing) for stage in run.stages])
 
 
 def convergence_note(study: Study) -> str:
@@ -185,7 +211,7 @@ def check_cell(study: Study, name: str, solver: str) -> Html:
     """The median error of one check for one solver, and how many seeds met it."""
     found = [check for run in study.runs if run.solver == solver for check in run.checks if check.name == name]
     if not found:
-        return Html(words.DASH)
+        return Html(writing.DASH)
     met = sum(check.met for check in found)
     level = "good" if met == len(found) else "fair" if met else "bad"
     text = {"good": "met", "bad": "missed"}.get(level, f"{met} of {len(found)}")

@@ -9,10 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
+from symphys.findings.verdict import BEST_FOUND, DOUBTED, SOLVED
 from symphys.report.reading import CONFIG, PROBLEM, RESULT, read_run
 from symphys.report.records import ReportError, Run
 
 FIGURES = "figures"
+RANKS = {word: rank for rank, word in enumerate((SOLVED, BEST_FOUND, DOUBTED))}
+"""Of verdicts; what is not named comes last."""
 
 
 def middle(numbers: Sequence[float]) -> float:
@@ -29,7 +32,7 @@ class Entry:
 
     @property
     def solved(self) -> int:
-        """How many runs met every check."""
+        """How many runs are solved."""
         return sum(run.solved for run in self.runs)
 
     def median(self, numbers: list[float]) -> float:
@@ -58,11 +61,11 @@ class Study:
 
     @property
     def best(self) -> Run:
-        """Solved before unsolved, then the lowest objective, then the least work."""
+        """The best by its verdict, then the lowest objective, then the least work."""
 
-        def merit(run: Run) -> tuple[bool, float, float]:
+        def merit(run: Run) -> tuple[int, float, float]:
             known = [np.inf if np.isnan(number) else number for number in (run.objective, run.effort.equivalents)]
-            return not run.solved, known[0], known[1]
+            return RANKS.get(run.verdict, len(RANKS)), known[0], known[1]
 
         return min(self.runs, key=merit)
 

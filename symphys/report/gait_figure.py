@@ -5,13 +5,13 @@ from __future__ import annotations
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from symphys.findings.writing import percent
 from symphys.report import style
 from symphys.report.gait import Stance, has_gait, stances
 from symphys.report.limbs import colours
 from symphys.report.records import Array, Trajectory
 from symphys.report.scenery import Scene
 from symphys.report.spans import spans
-from symphys.report.words import percent
 
 MOST_ROWS = 24
 ROW = 0.3

@@ -10,7 +10,8 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.patches import Polygon
 from matplotlib.ticker import MaxNLocator
 
-from symphys.report import style, words
+from symphys.findings import writing
+from symphys.report import style
 from symphys.report.outlines import inner_edges, outline
 from symphys.report.panel import Panel
 from symphys.report.records import Trajectory
@@ -72,7 +73,7 @@ def draw_heights(axes: Axes, panel: Panel, ground: SceneTerrain) -> None:
     x, y, z = (ground.y, ground.x, ground.z.T) if turned else (ground.x, ground.y, ground.z)
     axes.contourf(x, y, z, levels=levels, cmap=SHADES, zorder=1.4)
     axes.contour(x, y, z, levels=levels, colors=style.FAINT, linewidths=0.8, linestyles="solid", zorder=1.5)
-    axes.set_title(f"{panel.view.title}; a line of height every {words.show(levels[1] - levels[0], 3)} m")
+    axes.set_title(f"{panel.view.title}; a line of height every {writing.show(levels[1] - levels[0], 3)} m")
 
 
 def draw_planes(axes: Axes, panel: Panel, trajectory: Trajectory, scene: Scene) -> None:

@@ -11,13 +11,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from symphys.findings.writing import percent
 from symphys.report import style
 from symphys.report.joint_grid import FEW, Grid, colour_of, make_grid, shown
 from symphys.report.joint_use import Channel, channels
 from symphys.report.records import Array, Trajectory
 from symphys.report.scenery import Scene
 from symphys.report.spans import spans
-from symphys.report.words import percent
 
 BEYOND = "#e9edf0"
 FULL = style.VERMILION

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from symphys.findings.writing import listed, percent, several, show
 from symphys.report.gait import LOADED, stances, weight
 from symphys.report.gait_figure import draw_gait
 from symphys.report.joint_figures import draw_joints
@@ -18,7 +19,6 @@ from symphys.report.scene_joints import SceneMotor
 from symphys.report.scenery import Scene
 from symphys.report.strip import draw_strip
 from symphys.report.style import Picture, picture
-from symphys.report.words import listed, percent, several, show
 
 OFTEN = 0.25
 """A motor that is saturated for this share of the time is marked in the table."""

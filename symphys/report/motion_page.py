@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from symphys import files
+from symphys.findings.writing import show
 from symphys.report import sections, style
 from symphys.report.contacts import draw_contacts
 from symphys.report.joint_section import gait_card, joint_card, joint_pictures
@@ -15,7 +16,6 @@ from symphys.report.records import Trajectory
 from symphys.report.scene_file import read_scene
 from symphys.report.scenery import Scene
 from symphys.report.states import draw_controls, draw_states
-from symphys.report.words import show
 
 
 def write_motion(trajectory_npz: Path, scene_json: Path, out: Path, title: str = "Motion") -> Path:

@@ -9,8 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from symphys.report import values
-from symphys.report.reading_examination import make_trust
+from symphys.findings import values
+from symphys.findings.reading import make_trust
+from symphys.findings.verdict import rule
+from symphys.report import tables
 from symphys.report.records import (
     Array,
     Check,
@@ -57,7 +59,8 @@ def read_run(folder: Path, root: Path) -> Run:
 def make_run(folder: Path, place: str, named: dict[str, object], result: dict[str, object], trace: Trace) -> Run:
     """Turn the tables of a run folder into a record; ``named`` tells problem, solver and seed."""
     problem = values.name(named.get("problem")) or folder.resolve().parent.name
-    return Run(
+    checks = tuple(make_check(entry) for entry in values.tables(result.get("checks")))
+    run = Run(
         folder=folder,
         place=place,
         readable=True,
@@ -67,12 +70,15 @@ def make_run(folder: Path, place: str, named: dict[str, object], result: dict[st
         solver=values.name(named.get("solver")) or folder.resolve().name,
         seed=values.whole(named.get("seed")),
         solved=result.get("solved") is True,
+        met=all(check.met for check in checks) and ("verdict" in result or result.get("solved") is True),
+        verdict=values.name(result.get("verdict")),
+        doubts=values.names(result.get("doubts")),
         status=values.name(result.get("status")),
         advice=values.name(result.get("advice")),
         objective=values.number(result.get("objective")),
         costs=values.measures(result.get("costs")),
         outputs=values.measures(result.get("outputs")),
-        checks=tuple(make_check(entry) for entry in values.tables(result.get("checks"))),
+        checks=checks,
         variables=tuple(make_variable(key, entry) for key, entry in values.table(result.get("z")).items()),
         effort=make_effort(result),
         trust=make_trust(values.table(result.get("trust"))),
@@ -82,6 +88,13 @@ def make_run(folder: Path, place: str, named: dict[str, object], result: dict[st
         stages=tuple(make_stage(entry) for entry in values.tables(result.get("stages"))),
         faults=(),
     )
+    return run if run.verdict else judged_late(run, values.table(result.get("trust")))
+
+
+def judged_late(run: Run, trust: dict[str, object]) -> Run:
+    """A run whose file is older than verdicts, ruled on as a new one would be."""
+    ruling = rule(run.status, run.judged, trust)
+    return replace(run, solved=ruling.solved, verdict=ruling.verdict, doubts=ruling.doubts)
 
 
 def make_effort(result: dict[str, object]) -> Effort:
@@ -129,7 +142,7 @@ def backend_words(value: object) -> str:
 def read_or_note(path: Path, faults: list[str]) -> dict[str, object]:
     """The table in a file; empty, with a sentence in ``faults``, if there is none."""
     try:
-        return values.read_table(path)
+        return tables.read_table(path)
     except ReportError as error:
         faults.append(str(error))
         return {}
@@ -138,7 +151,7 @@ def read_or_note(path: Path, faults: list[str]) -> dict[str, object]:
 def read_problem(path: Path) -> dict[str, object]:
     """The tables of a problem file; empty if it cannot be read: it is shown as text elsewhere."""
     try:
-        return tomllib.loads(values.read_words(path))
+        return tomllib.loads(tables.read_words(path))
     except (ReportError, tomllib.TOMLDecodeError, RecursionError):
         return {}
 
@@ -196,7 +209,7 @@ def read_trace(path: Path, faults: list[str]) -> Trace:
         with path.open(encoding="utf-8", errors="replace", newline="") as file:
             rows = list(csv.reader(file))
     except OSError as error:
-        faults.append(f"{path.name}: {values.reason(error)}")
+        faults.append(f"{path.name}: {tables.reason(error)}")
         return Trace({}, 0)
     except csv.Error as error:
         faults.append(f"{path.name}: {values.name(str(error))}")

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from symphys.report import values
+from symphys.findings import values
 from symphys.report.drawable import largest, oversized
 from symphys.report.records import Array, ReportError, Trajectory
 

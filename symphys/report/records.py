@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.errors import SymphysError
-from symphys.report.examination import Trust
+from symphys.findings.examination import Trust
+from symphys.findings.levels import Judged
 from symphys.report.stage import Stage
 
 Array = NDArray[np.float64]
@@ -125,6 +126,10 @@ class Run:
         place: the folder's path below the report's folder, with forward slashes.
         readable: whether there is a result; if not, only names and ``faults`` mean anything.
         faults: what could not be read, one sentence each.
+        solved: the same as a verdict of "solved".
+        met: whether nothing is missed.
+        verdict: a word of ``symphys.findings.verdict``; of an older run made from what it measured.
+        doubts: why its motion is not to be relied on.
         outputs: what the problem tells of the result, by names with units.
         guess: "objective", "worst" and what is told of what it started from, exactly.
     """
@@ -138,6 +143,9 @@ class Run:
     solver: str
     seed: int
     solved: bool
+    met: bool
+    verdict: str
+    doubts: tuple[str, ...]
     status: str
     advice: str
     objective: float
@@ -152,6 +160,13 @@ class Run:
     guess: Mapping[str, float]
     stages: tuple[Stage, ...]
     faults: tuple[str, ...]
+
+    @property
+    def judged(self) -> Judged:
+        """How it was judged."""
+        goal = any(check.kind == "goal" for check in self.checks)
+        costs = np.nan if goal else sum(self.costs.values())
+        return Judged(self.objective, self.worst, self.met, bool(self.checks), costs)
 
     @property
     def worst(self) -> float:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from symphys import files
-from symphys.report import sections, style, values, words
+from symphys.findings import writing
+from symphys.report import sections, style, tables
 from symphys.report.contacts import by_surfaces, draw_contacts, shown_pairs
 from symphys.report.drawable import OVERSIZED, drawable, oversized
 from symphys.report.finding import is_run
@@ -183,9 +184,9 @@ def sources(run: Run) -> Html:
 def read_text(path: Path) -> str:
     """A file's text, JSON set out in lines; empty if it cannot be read."""
     try:
-        text = values.read_words(path)
+        text = tables.read_words(path)
         return json.dumps(json.loads(text), indent=2, ensure_ascii=False) if path.suffix == ".json" else text
     except (ReportError, RecursionError):
         return ""
     except ValueError:
-        return words.several(len(text), "character") + " that are no JSON:\n" + text
+        return writing.several(len(text), "character") + " that are no JSON:\n" + text

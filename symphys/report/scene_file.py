@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from symphys.report import values
+from symphys.findings import values
+from symphys.report import tables
 from symphys.report.drawable import LARGEST, small
 from symphys.report.records import Array
 from symphys.report.scene_joints import make_joints
@@ -17,7 +18,7 @@ SCENE = "scene.json"
 
 def read_scene(path: Path) -> Scene:
     """Read the bodies, what stands still, the joints and gravity. Raises ReportError."""
-    content = values.read_table(path)
+    content = tables.read_table(path)
     bodies = tuple(
         SceneBody(values.name(entry.get("name")), make_solids(entry.get("shapes")), values.number(entry.get("mass")))
         for entry in values.tables(content.get("bodies"))

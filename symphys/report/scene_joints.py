@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from symphys.report import values
+from symphys.findings import values
 from symphys.report.records import Array
 
 

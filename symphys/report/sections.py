@@ -8,6 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from symphys.findings import writing
+from symphys.findings.writing import show
 from symphys.report import style, words
 from symphys.report.animation import animation
 from symphys.report.limbs import is_large
@@ -16,7 +18,6 @@ from symphys.report.records import TOLD, Array, Check, Run, Trajectory, Variable
 from symphys.report.scenery import Scene
 from symphys.report.style import Picture
 from symphys.report.variables import component_names, knotted
-from symphys.report.words import show
 
 FOOTER = tag("footer", "Made by symphys from the files of the run folder; make it again with “symphys report”.")
 MOST_ROWS = 60
@@ -143,7 +144,7 @@ def found(run: Run, pictures: dict[str, Picture]) -> Html:
     more = tag("p", f"and {len(rows) - MOST_ROWS} more, in result.json", class_="note") if len(rows) > MOST_ROWS else ""
     header = ["variable", "guess", "found", "lower bound", "upper bound", "between bounds"]
     curves = [
-        f"{v.name}: {words.several(v.value.shape[1], 'knot')} of {words.several(v.value.shape[0], 'component')}"
+        f"{v.name}: {writing.several(v.value.shape[1], 'knot')} of {writing.several(v.value.shape[0], 'component')}"
         for v in knotted(run)
     ]
     return card(
@@ -215,7 +216,7 @@ def time_split(run: Run) -> Html:
         for name, took, c in known
     ]
     prices = [f"{name} {show(price, 2)}" for name, price in run.effort.price.items() if math.isfinite(price)]
-    priced = f"Measured price in rollouts: {words.listed(prices)}." if prices else ""
+    priced = f"Measured price in rollouts: {writing.listed(prices)}." if prices else ""
     return card(
         "Where the time went",
         tag("div", *bars, class_="split", aria_hidden="true"),

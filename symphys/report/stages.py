@@ -10,11 +10,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from symphys.findings.writing import show
 from symphys.report import style, words
 from symphys.report.markup import Html, card, pill, table, tag
 from symphys.report.records import Array, Run
 from symphys.report.stage import Stage, smoothed
-from symphys.report.words import show
 
 NARROWEST = 0.09
 """A stage that takes less of the axis has no room for its name."""

@@ -17,7 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator, SymmetricalLogLocator
 
-from symphys.report import words
+from symphys.findings import writing
 from symphys.report.records import Array
 
 WIDTH = 10.0
@@ -137,7 +137,7 @@ def short(text: str, length: int = 38) -> str:
 
 def number_label(value: float, _position: int = 0) -> str:
     """A tick's label: powers of ten only where they are shorter."""
-    return words.show(value, 4).replace("1 × 10", "10") if value else "0"  # noqa: RUF001
+    return writing.show(value, 4).replace("1 × 10", "10") if value else "0"  # noqa: RUF001
 
 
 def use_numbers(axes: Axes) -> None:

@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from symphys.findings.examination import Energy, Growth
+from symphys.findings.numerics import reach
+from symphys.findings.writing import show
 from symphys.report import style
-from symphys.report.examination import Energy, Growth
 from symphys.report.records import Array, Trajectory
-from symphys.report.trust_numerics import reach
-from symphys.report.words import show
 
 HEIGHT = 2.3
 LEAST_RANGE = 100.0

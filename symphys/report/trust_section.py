@@ -5,16 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from symphys.report.examination import Trust
-from symphys.report.levels import MARKS, Judged
+from symphys.findings.examination import Trust
+from symphys.findings.examined import advice, answers, findings, slopes
+from symphys.findings.levels import MARKS, Judged
+from symphys.findings.touching import sliding
+from symphys.findings.writing import show
 from symphys.report.markup import Html, Part, card, figures, pill, table, tag
 from symphys.report.records import Run
 from symphys.report.style import Picture
-from symphys.report.trust import advice, answers, findings, slopes
-from symphys.report.trust_physics import sliding
-from symphys.report.words import show
 
 NOT_EXAMINED = "This run was not examined; “symphys check --at” its folder tells how far to trust it."
+ONLY_MOTION = (
+    "Only the motion was looked at. “symphys check --at” this folder also tells of its gradient, finer time steps and "
+    "the growth of changes."
+)
 TITLE = "How far to trust this"
 HOW_GROWN = (
     "By how much a small change of the state at time t is magnified until the end: distances in m, velocities in m/s, "
@@ -28,7 +32,7 @@ HOW_REFINED = "The same variables, simulated otherwise: the answers, and in perc
 
 def trusted(run: Run, pictures: Mapping[str, Picture]) -> Html:
     """Advice, findings, figures, and the refinements as numbers."""
-    judged = Judged(run.objective, run.worst, run.solved, bool(run.checks))
+    judged = run.judged
     lines = findings(run.trust, judged)
     if not lines:
         unknown = tag("p", NOT_EXAMINED) if run.readable else ""
@@ -37,6 +41,7 @@ def trusted(run: Run, pictures: Mapping[str, Picture]) -> Html:
     return card(
         TITLE,
         tag("p", advice(run.trust, judged)),
+        tag("p", ONLY_MOTION) if not run.trust.gradient else "",
         table(["", "looked at", "number", "meaning"], rows, "tttt", "Trust"),
         notes(run.trust),
         drawn(pictures, "growth", HOW_GROWN),

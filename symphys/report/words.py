@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from symphys.findings.verdict import BEST_FOUND, DOUBTED, SOLVED, told
+from symphys.findings.writing import listed, plain, show
 from symphys.report.records import Check, Run
 
-SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-MINUS = "\N{MINUS SIGN}"
-DASH = "\N{EN DASH}"
-THIN = "\N{NARROW NO-BREAK SPACE}"
-
 STATUS = {
-    "met": "every target met",
+    "met": "everything met",
     "converged": "converged",
     "budget": "budget spent",
     "stalled": "no more progress",
@@ -25,52 +22,12 @@ STATUS = {
 }
 
 STOPPED = {
-    "converged": "The solver converged to a point that misses them.",
+    "converged": "The solver converged.",
     "budget": "The solver's budget was spent.",
     "stalled": "The solver could make no more progress.",
     "not_finite": "A number in the simulation was not finite.",
     "failed": "The solver failed.",
 }
-
-
-def show(value: float, digits: int = 3) -> str:
-    """A number with ``digits`` significant digits, as people write it; a dash for nan."""
-    if math.isnan(value):
-        return DASH
-    if math.isinf(value):
-        return "∞" if value > 0 else MINUS + "∞"
-    text = f"{value:.{digits - 1}e}"
-    mantissa, exponent = float(text[: text.index("e")]), int(text[text.index("e") + 1 :])
-    if value == 0 or -4 < exponent < 6:
-        return plain(float(text), max(digits - 1 - exponent, 0) if value else 0)
-    return sign(f"{mantissa:g}" if mantissa not in (1, -1) else f"{mantissa:.0f}") + f" × 10{power(exponent)}"  # noqa: RUF001
-
-
-def percent(share: float) -> str:
-    """A share >= 0 in percent; a dash for nan."""
-    if not math.isfinite(share):
-        return show(share)
-    return f"{show(100 * share, 2)} %" if share == 0 or share >= 1e-6 else "< 0.0001 %"
-
-
-def plain(value: float, decimals: int) -> str:
-    """Without an exponent; trailing zeros after the point go, thousands are set apart from 10 000 on."""
-    text = f"{value:.{decimals}f}"
-    text = text.rstrip("0").rstrip(".") if "." in text else text
-    if abs(value) >= 10_000:
-        whole, point, rest = text.partition(".")
-        text = f"{int(whole):,}".replace(",", THIN) + point + rest
-    return sign("0" if text == "-0" else text)
-
-
-def sign(text: str) -> str:
-    """A true minus sign."""
-    return text.replace("-", MINUS)
-
-
-def power(exponent: int) -> str:
-    """An exponent in superscripts."""
-    return str(exponent).translate(SUPERSCRIPTS)
 
 
 def count(value: float) -> str:
@@ -87,16 +44,6 @@ def seconds(value: float) -> str:
     return f"{show(value, 3)} s" if value < 600 else f"{show(value / 60, 3)} min"
 
 
-def several(number: int, noun: str, plural: str = "") -> str:
-    """``1 run``, ``3 runs``."""
-    return f"{number} {noun if number == 1 else plural or noun + 's'}"
-
-
-def listed(parts: Sequence[str]) -> str:
-    """``a``, ``a and b``, ``a, b and c``."""
-    return " and ".join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else "".join(parts)
-
-
 def status(code: str) -> str:
     """A status in plain words; one that is not known is told as it stands."""
     return STATUS.get(code, code.replace("_", " ") or "no status")
@@ -107,17 +54,27 @@ def ended(code: str) -> str:
     return {"met": "met", "not_finite": "not finite"}.get(code, status(code))
 
 
+def came_to(run: Run) -> str:
+    """How a run ended, in a few words for tables: as its solver did, or its verdict, where that says more."""
+    if run.verdict in (DOUBTED, BEST_FOUND):
+        return told(run.verdict, run.status, bool(run.checks))
+    return ended(run.status)
+
+
 def level(run: Run) -> str:
     """``good``, ``fair`` (nothing went wrong, but not solved) or ``bad``."""
     if run.solved:
         return "good"
+    if run.verdict == DOUBTED:
+        return "bad"
     return "bad" if run.status in ("failed", "not_finite", "unreadable", "") else "fair"
 
 
 def headline(run: Run) -> str:
-    """Two words for a run."""
-    if run.solved:
-        return "Solved"
+    """A few words for a run."""
+    if run.verdict in (SOLVED, DOUBTED, BEST_FOUND):
+        words = told(run.verdict, run.status, bool(run.checks))
+        return words[:1].upper() + words[1:]
     known = {"interrupted": "Interrupted", "not_applicable": "Not applicable", "failed": "Failed"}
     return known.get(run.status, "Not solved" if run.readable else "No result")
 
@@ -134,16 +91,20 @@ def verdict(run: Run) -> str:
     if not run.checks and run.status in STOPPED and math.isnan(run.objective):
         return f"{STOPPED[run.status]} There is nothing to judge."
     if not run.checks:
-        return f"The problem states no targets; the objective is {show(run.objective)}." + stopped(run)
-    if run.solved:
+        text = (
+            f"The problem states nothing to meet; the objective is {show(run.objective)}. {STOPPED.get(run.status, '')}"
+        )
+    elif run.verdict in (SOLVED, DOUBTED):
         total = "The only check is" if len(run.checks) == 1 else f"All {len(run.checks)} checks are"
-        return f"{total} met; the largest error is {show(run.worst, 2)} of its tolerance{work(run)}."
-    return f"{misses(missed, len(run.checks))} {STOPPED.get(run.status, '')}".strip()
+        text = f"{total} met; the largest error is {show(run.worst, 2)} of its tolerance{work(run)}."
+    else:
+        text = f"{misses(missed, len(run.checks))} {STOPPED.get(run.status, '')}"
+    return f"{text.strip()} {doubted(run)}".strip()
 
 
-def stopped(run: Run) -> str:
-    """How a run without targets ended, where that is bad news."""
-    return f" Status: {status(run.status)}." if run.status not in ("met", "converged") else ""
+def doubted(run: Run) -> str:
+    """Why a run is not to be relied on, in a sentence; empty where it is, or where it came to nothing anyway."""
+    return f"But it is not to be relied on: {'; '.join(run.doubts)}." if run.verdict == DOUBTED else ""
 
 
 def misses(missed: Sequence[Check], total: int) -> str:

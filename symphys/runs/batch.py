@@ -42,9 +42,9 @@ class Batch:
     interrupted: bool
 
     @property
-    def solved(self) -> bool:
-        """Whether every run solved its problem."""
-        return all(result is not None and result.solved for result in self.results)
+    def accepted(self) -> bool:
+        """Whether every run did what was asked."""
+        return all(result is not None and result.accepted for result in self.results)
 
 
 def run_batch(

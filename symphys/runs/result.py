@@ -10,9 +10,13 @@ from pathlib import Path
 from typing import Any, TypedDict
 
 from symphys import files
+from symphys.findings.levels import Judged
+from symphys.findings.verdict import ACCEPTED, NOT_SOLVED, Ruling, rule
 
 FORMAT = 1
 MEASURES = ("error", "tolerance", "ratio")
+JUDGED_LATE = {"verdict", "doubts"}
+"""Fields that older files do not have."""
 
 
 class CheckRecord(TypedDict):
@@ -64,7 +68,8 @@ class Result:
     Attributes:
         problem, title: the file's stem and its title.
         solver, seed: who solved it, from which guess.
-        solved: whether every check is met.
+        solved: whether every check is met, or the point is stationary where there is none, by a motion that can be
+            relied on; the same as a verdict of "solved".
         status, advice: how the solver ended and what to try.
         objective: of the exact rollout.
         costs: weighted value of each cost by name.
@@ -76,7 +81,7 @@ class Result:
         price: measured cost of one evaluation by kind, in rollouts.
         equivalents: the whole work in rollouts.
         seconds: wall time of "build", "compile" and "solve"; what a solver loads beforehand is in none of them.
-        trust: how far the solution can be trusted.
+        trust: how far the solution can be trusted; of a run that was not examined what ``symphys.trust.survey`` says.
         guess: what the run started from, exactly: "objective", "worst", the largest error / tolerance, and what is
             told, by "told: " and its name.
         stages: those of smoothing that were begun, in their order; the solution is the point of the last, unless that
@@ -86,6 +91,8 @@ class Result:
         command: what was typed.
         backend: what evaluated: "name", "lanes", "threads", "precision", "compiler"; "compiled": "cold", "warm" (from
             the cache) or empty; "note": why it is not what was asked for, or empty.
+        verdict: a word of ``symphys.findings.verdict``.
+        doubts: why the motion is not to be relied on, one clause each.
     """
 
     problem: str
@@ -112,11 +119,18 @@ class Result:
     when: str = ""
     command: str = ""
     backend: dict[str, Any] = field(default_factory=dict)
+    verdict: str = NOT_SOLVED
+    doubts: list[str] = field(default_factory=list)
 
     @property
     def interrupted(self) -> bool:
         """Whether the same command would go on with it."""
         return self.status == "interrupted"
+
+    @property
+    def accepted(self) -> bool:
+        """Whether it did what was asked: solved, or the best was found of what has nothing to meet."""
+        return self.verdict in ACCEPTED
 
     @property
     def worst(self) -> float | None:
@@ -134,13 +148,25 @@ class Result:
         if not isinstance(value, Mapping) or value.get("format") != FORMAT:
             raise files.FileError(f"not a result of format {FORMAT}")
         known = {f.name for f in dataclasses.fields(cls)}
-        if missing := known - value.keys():
+        if missing := known - JUDGED_LATE - value.keys():
             raise files.FileError(f"a result without {', '.join(sorted(missing))}")
-        kept = {"problem", "title", "status", "advice", "checks", "backend"}
-        fields = {key: value[key] if key in kept else files.numbers(value[key]) for key in known}
+        kept = {"problem", "title", "status", "advice", "checks", "backend", "verdict", "doubts"}
+        fields = {key: value[key] if key in kept else files.numbers(value[key]) for key in known & value.keys()}
         if fields["checks"] is not None:
             fields["checks"] = [{**c, **files.numbers({k: c[k] for k in MEASURES})} for c in fields["checks"]]
-        return cls(**fields)
+        result = cls(**fields)
+        return result if value.keys() >= JUDGED_LATE else result.judged_late()
+
+    def judged_late(self) -> Result:
+        """The result of a file that is older than verdicts, whose ``solved`` means that everything is met."""
+        objective, worst = (math.nan if number is None else number for number in (self.objective, self.worst))
+        judged = Judged(objective, worst, self.solved, bool(self.checks))
+        return dataclasses.replace(self, **ruled(rule(self.status, judged, self.trust)))
+
+
+def ruled(ruling: Ruling) -> dict[str, Any]:
+    """The fields of a result that say what was ruled."""
+    return {"solved": ruling.solved, "verdict": ruling.verdict, "doubts": list(ruling.doubts)}
 
 
 def read_result(path: Path) -> Result:

@@ -11,17 +11,19 @@ import numpy as np
 
 from symphys import files, trust
 from symphys.errors import SymphysError
+from symphys.findings.levels import Judged
+from symphys.findings.verdict import rule
 from symphys.runs.folder import CHECKPOINT, GUESS, SCENE, TOLD, TRAJECTORY
 from symphys.runs.job import Job
 from symphys.runs.provenance import evaluated, stamp
-from symphys.runs.result import BlockRecord, CheckRecord, Result
+from symphys.runs.result import BlockRecord, CheckRecord, Result, ruled
 from symphys.runs.scene import scene
 from symphys.runs.stages import guess_record, stage_records
 from symphys.runs.work import equivalents, used
 from symphys.shooting import Array, ShootingProblem
 from symphys.solvers import Monitor, Outcome, Status, TraceRow, solver
 from symphys.trajectory import Trajectory
-from symphys.transcription import Check, Transcription, Verdict
+from symphys.transcription import Check, Record, Transcription, Verdict
 
 SMOOTHED = (
     "what the solver's smoothed rollout meets, the exact one does not: lower the smoothing, or add a stage at 0, "
@@ -36,7 +38,8 @@ class Judgement:
     Attributes:
         verdict: costs and checks.
         trajectory: the motion.
-        trust: how far the solution can be trusted; None also for a run that is not over, or not to be examined.
+        trust: how far the solution can be trusted, or, not examined, what is always measured; None also for a run that
+            is not over.
         advice: the solver's and what the rollout adds.
     """
 
@@ -98,13 +101,18 @@ def judge(transcription: Transcription, outcome: Outcome, examine: bool = True) 
     """Roll the solution out exactly, and examine it."""
     try:
         verdict = transcription.judge(outcome.z)
-        trajectory = transcription.simulate(outcome.z)
+        taken = transcription.record(outcome.z)
         over = outcome.status is not Status.INTERRUPTED
-        examined = trust.examine(transcription, outcome.z) if over and examine else None
+        examined = measured(transcription, taken, examine) if over else None
     except SymphysError as error:
         return Judgement(None, None, None, f"{outcome.advice} {error}".strip())
     smoothed = outcome.status is Status.MET and not verdict.solved and outcome.trace[-1].smoothing > 0
-    return Judgement(verdict, trajectory, examined, outcome.advice or (SMOOTHED if smoothed else ""))
+    return Judgement(verdict, taken.motion, examined, outcome.advice or (SMOOTHED if smoothed else ""))
+
+
+def measured(transcription: Transcription, taken: Record, examine: bool) -> dict[str, Any]:
+    """The object "trust" of the result."""
+    return trust.examine(transcription, taken.z) if examine else trust.survey(transcription, taken)
 
 
 def write(
@@ -140,7 +148,7 @@ def record(
     return Result(
         **stamp(job),
         backend=evaluated(transcription.backend),
-        solved=verdict is not None and verdict.solved and outcome.status is not Status.INTERRUPTED,
+        **ruled(rule(outcome.status.value, judged(verdict), files.strict(judgement.trust))),
         status=outcome.status.value,
         advice=judgement.advice,
         objective=verdict.objective if verdict else None,
@@ -157,6 +165,13 @@ def record(
         guess=guess_record(transcription, job.config.seed),
         stages=stage_records(transcription, outcome, price),
     )
+
+
+def judged(verdict: Verdict | None) -> Judged:
+    """What is known of how the exact rollout does."""
+    if verdict is None:
+        return Judged(np.nan, np.nan, met=False, checked=False)
+    return Judged(verdict.objective, verdict.worst, verdict.solved, bool(verdict.checks))
 
 
 def check_record(check: Check) -> CheckRecord:

@@ -133,10 +133,10 @@ def may_couple(world: World, pair: Pair) -> bool:
     if is_zero(pair.law.friction):
         return False
     held = {index for joint in world.joints for index in joint.bodies}
-    sides = [side for side in (pair.first, pair.second) if side.body is not None]
-    if any(side.body in held for side in sides):
+    sides = [(side.body, side.shape) for side in (pair.first, pair.second) if side.body is not None]
+    if any(body in held for body, _ in sides):
         return True
-    return max(_ratio(world.bodies[side.body], side.shape, pair.law.friction) for side in sides) > STRONG
+    return max(_ratio(world.bodies[body], shape, pair.law.friction) for body, shape in sides) > STRONG
 
 
 def _ratio(body: Body, shape: int, friction: Any) -> float:
@@ -154,7 +154,7 @@ def _ratio(body: Body, shape: int, friction: Any) -> float:
         return np.inf
     moments = np.linalg.eigvalsh(np.array(ca.DM(inertia_matrix(body.inertia))))
     reach = np.linalg.norm(np.array(surface.centre, float)) + extent(surface)
-    return float(friction) * float(reach) / (2 * np.sqrt(moments[0] / float(body.mass)))
+    return float(float(friction) * reach / (2 * np.sqrt(moments[0] / float(body.mass))))
 
 
 def sizes(shape: Shape) -> Sequence[Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from time import perf_counter
@@ -82,12 +82,61 @@ class Transcription:
     def back(self, record: Record, ends: Array) -> Iterator[Array]:
         """Derivatives of ends . x_N, with ``ends`` (nx, m), with respect to x_N-1, x_N-2 ... x_0: (nx, m) each."""
         course, step = record.course, self.rollout.closed
-        backward, adjoint = step.reverse(ends.shape[1]), ends
+        backward, adjoint = self._backward(ends.shape[1]), ends
         results = [np.zeros(step.numel_out(i)) for i in range(step.n_out())]
         inert = [np.zeros((len(result), ends.shape[1])) for result in results[1:]]
         for k in reversed(range(self.rollout.steps)):
             adjoint = np.array(backward(*course.closed_arguments(k, self.rollout), *results, adjoint, *inert)[0])
             yield adjoint
+
+    def pull(self, record: Record, states: Mapping[int, Array], parameters: Array) -> Array | None:
+        """Derivatives by z of numbers that depend on single states and on the parameters: (n, m).
+
+        Args:
+            record: an exact rollout.
+            states: by the number of a state, the derivatives of all numbers by it, (nx, m).
+            parameters: (np, m) their derivatives by p.
+
+        Returns:
+            None for problems with large nets, of which that is not known.
+        """
+        course, step, count = record.course, self.rollout.closed, parameters.shape[1]
+        backward, adjoint = self._backward(count), np.zeros((step.size1_in(0), count))
+        results = [np.zeros(step.numel_out(i)) for i in range(step.n_out())]
+        inert = [np.zeros((len(result), count)) for result in results[1:]]
+        inputs = np.zeros((*course.given.shape, count))
+        for k in reversed(range(max(states) + 1)):
+            adjoint = adjoint + states.get(k, 0)
+            if k == 0:
+                break
+            arguments = course.closed_arguments(k - 1, self.rollout)
+            adjoint, given, p = (np.array(part) for part in backward(*arguments, *results, adjoint, *inert)[:3])
+            inputs[k - 1] = given[: inputs.shape[1]]
+            parameters = parameters + p
+        return self._pulled_start(record.z, adjoint, inputs, parameters)
+
+    def _pulled_start(self, z: Array, x0: Array, inputs: Array, p: Array) -> Array:
+        """(n, m): what derivatives (nx, m), (N, nu, m) and (np, m) by the start's parts are by z."""
+        start, count = self._start, p.shape[1]
+        given = np.concatenate([inputs[:, :, i].T for i in range(count)], axis=1)
+        known = [np.zeros(start.size_out(i)) for i in range(start.n_out())]
+        return np.array(start.reverse(count)(z, *known, x0, given, p))
+
+    def _backward(self, count: int) -> ca.Function:
+        """The adjoint of the step for so many directions; kept, since a robot's takes its time to build."""
+        if count not in self._adjoints:
+            self._adjoints[count] = self.rollout.closed.reverse(count)
+        return self._adjoints[count]
+
+    @cached_property
+    def _adjoints(self) -> dict[int, ca.Function]:
+        return {}
+
+    @cached_property
+    def _start(self) -> ca.Function:
+        """z -> (x0, given, p)."""
+        rollout = self.rollout
+        return ca.Function("start", [rollout.z], [ca.densify(part) for part in (rollout.x0, rollout.given, rollout.p)])
 
     @cached_property
     def _judge(self) -> Judge:

@@ -41,13 +41,17 @@ def budget(rollout: Rollout, record: Record) -> dict[str, Any]:
         "gains": the steps in which rigid contacts gave most, each with "step", "time" [s], "energy" [J], "contacts";
         steps in which a soft contact acts are left out, since it gives back what it has stored. "gained" [J]: the sum
         of all such steps. "drift" [J]: the largest change in a step that neither forces nor contacts account for.
+        "unexplained" [J]: the largest that is more than twice what servos and springs did in the step, whose work is
+        not known to that precision, in the step from "drift_at" [s]; "drifted" [J]: the largest sum of such changes
+        since the start.
         "momentum": the largest part of a body's linear momentum that impulses of gravity, forces and contacts leave
         unexplained in a step, relative to the largest momentum or impulse; rounding, if the engine is right. Bodies
         that joints hold together count as one; those that are held by the world are left out.
     """
     motion = record.motion
     kinetic, potential, applied = _energies(rollout, record)
-    applied += joint_work(rollout, record)
+    by_motors, uncertain = joint_work(rollout, record)
+    applied += by_motors
     surplus = np.diff(kinetic + potential) - applied
     by_joints = uncounted(rollout, record)
     touched = (np.abs(motion.contact_force).sum(axis=(1, 2)) > 0) | by_joints
@@ -56,11 +60,16 @@ def budget(rollout: Rollout, record: Record) -> dict[str, Any]:
     floor = GAIN * kinetic.max() + 1e-12 * np.abs(potential).max()
     gains = np.where(gains > floor, gains, 0.0)
     first = np.argsort(-gains, kind="stable")[:MOST_GAINS]
+    free = np.where(touched, 0.0, surplus)
+    unknown = np.where(np.abs(free) <= 2 * uncertain, 0.0, free)
     return {
         "energy": _thinned(motion.time, kinetic, potential, applied, contact),
         "gains": [_gain(motion, int(k), float(gains[k])) for k in first if gains[k] > 0],
         "gained": float(gains.sum()),
-        "drift": float(np.abs(surplus[~touched]).max(initial=0.0)),
+        "drift": float(np.abs(free).max()),
+        "unexplained": float(np.abs(unknown).max()),
+        "drift_at": float(motion.time[int(np.abs(unknown).argmax())]),
+        "drifted": float(np.abs(np.cumsum(unknown)).max()),
         "momentum": momentum_gap(rollout, record),
     }
 

@@ -21,23 +21,20 @@ def contacts(rollout: Rollout, record: Record) -> dict[str, Any]:
     """What is to be said of the contacts.
 
     Returns:
-        "residual" [N s]: the largest change of an impulse in a last sweep; "impulse" [N s]: the largest impulse of a
-        contact in a step. "deepest" [m]: how far rigid surfaces overlapped, with the "contact" and "time" [s] in
-        "deepest_at" (None where they did not); "size" [m]: the smallest radius of gyration of a body. "steps", and
-        "multiple_impacts": in how many of them a body had several impacts.
-        "slides": the contacts that slid furthest, each with its "contact", "distance" [m], largest "speed" [m/s] and
-        when, "time" [s]. Sliding is measured at the start of each step, where a contact bears a load in it and bore
-        one in the step before: the slip of an impact is none.
+        "residual" [N s]: the largest change of an impulse in a last sweep, at "residual_at" [s]; "impulse" [N s]: the
+        largest impulse of a contact in a step. "deepest" [m]: how far rigid surfaces overlapped, with the "contact" and
+        "time" [s] in "deepest_at" (None where they did not); "size" [m]: the smallest radius of gyration of a body.
+        "steps", and "multiple_impacts": in how many of them a body had several impacts.
     """
     motion = record.motion
     return {
         "residual": float(motion.residual.max(initial=0.0)),
+        "residual_at": float(motion.time[int(motion.residual.argmax())]),
         "impulse": float(np.linalg.norm(motion.contact_force, axis=2).max(initial=0.0) * rollout.dt),
         "steps": rollout.steps,
         "multiple_impacts": int(motion.crowded.sum()),
         "size": float(bodies(rollout, record).size.min()),
         **_deepest(rollout, motion),
-        "slides": slides(rollout, record),
     }
 
 
@@ -57,7 +54,13 @@ def touching(motion: Trajectory, k: int) -> list[str]:
 
 
 def slides(rollout: Rollout, record: Record) -> list[dict[str, Any]]:
-    """See ``contacts``; of surfaces that touch in several points the one that slides furthest."""
+    """The contacts that slid furthest; of surfaces that touch in several points the one that slides furthest.
+
+    Returns:
+        Each with its "contact", "distance" [m], largest "speed" [m/s] and when, "time" [s]. Sliding is measured at the
+        start of each step, where a contact bears a load in it and bore one in the step before: the slip of an impact is
+        none.
+    """
     motion = record.motion
     if not motion.contact_names:
         return []

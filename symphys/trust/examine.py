@@ -9,7 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.transcription import Record, Transcription, first_derivative_fault, first_fault
-from symphys.trust import budget, contacts, gradient, growth, refinement, smoothing
+from symphys.trust import gradient, growth, refinement, smoothing
+from symphys.trust.contacts import slides
+from symphys.trust.misses import misses
+from symphys.trust.survey import survey
 
 Array = NDArray[np.float64]
 Tell = Callable[[str], None]
@@ -33,14 +36,19 @@ def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: No
     finer = refinement.refine(transcription, z)
     tell("sweeping the sensitivity back through time")
     grown = growth.growth(transcription, record)
+    tell("looking for near misses")
+    near = misses(transcription, record)
     tell("smoothing, and adding up energy and momentum")
+    motion = survey(transcription, record)
     return {
         "gradient": compared,
         **finer,
         "growth": grown,
-        "smoothed": smoothing.smoothed(transcription, z),
-        **budget.budget(transcription.rollout, record),
-        **contacts.contacts(transcription.rollout, record),
+        "smoothed": smoothing.smoothed(transcription, record),
+        **motion,
+        **refinement.settling(transcription, z, motion["residual"], motion["impulse"]),
+        "misses": near,
+        "slides": slides(transcription.rollout, record),
         "fault": _fault(transcription, record, compared),
     }
 

@@ -29,14 +29,19 @@ def compare_gradient(transcription: Transcription, z: Array) -> list[dict[str, A
 
     Returns:
         For each variable "error", |adjoint - difference| / scale; "scale", the norm of its slope; "step", the step of
-        the best difference as a share of the variable's scale; NaN where one is not finite. "jump" is 0 where central
-        differences agree best. Where those of either side, without z itself, agree better, the value jumps at z, by
-        as much as a change of the variable by "jump" of its scale brings about. An impact at the very end of a step
-        does that: the time grid changes sides.
+        the best difference as a share of the variable's scale; NaN where one is not finite. "felt": what a change by
+        the variable's scale changes, as a share of the value, of what the variable that is felt most changes, or of 1,
+        whichever is largest; 0 where nothing depends on it. "jump" is 0 where central differences agree best. Where
+        those of either side, without z itself, agree better, the value jumps at z, by as much as a change of the
+        variable by "jump" of its scale brings about. An impact at the very end of a step does that: the time grid
+        changes sides.
     """
-    probe = transcription.probe
+    probe, blocks = transcription.probe, transcription.shooting.blocks
     slope = probe.gradient(z)
-    return [_compare_block(probe.values, block, z, slope) for block in transcription.shooting.blocks]
+    rows = [_compare_block(probe.values, block, z, slope) for block in blocks]
+    effects = [float(np.linalg.norm(slope[block.start : block.stop] * block.scale)) for block in blocks]
+    size = max(abs(float(probe.values(z[None])[0])), *effects, 1.0)
+    return [row | {"felt": effect / size} for row, effect in zip(rows, effects, strict=True)]
 
 
 def _compare_block(value: Values, block: Block, z: Array, slope: Array) -> dict[str, Any]:

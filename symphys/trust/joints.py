@@ -23,22 +23,25 @@ AT_LIMIT = 1e-6
 """How near to a limit a coordinate counts as there [rad] or [m]; what it moves in a step comes on top."""
 
 
-def joint_work(rollout: Rollout, record: Record) -> Array:
-    """(N,) [J]: the work of motors and springs in each step.
+def joint_work(rollout: Rollout, record: Record) -> tuple[Array, Array]:
+    """(N,) [J]: the work of motors and springs in each step, and the sum of its sizes, joint by joint.
 
     Leapfrog: velocities at the ends of a step hold the persistent forces half a stretch ahead. Of a step that is cut
-    only the last force is known: torque motors act with it all along, others are taken to get there in even steps.
+    only the last force is known: torque motors act with it all along, others are taken to get there in even steps. Of
+    a servo that goes from one bound to the other within a step that is wrong by up to twice its work.
     """
     layout, x = Layout(rollout.world), record.course.x
-    total, lag = np.zeros(rollout.steps), x[:, layout["lag"]]
+    total, gross, lag = np.zeros(rollout.steps), np.zeros(rollout.steps), x[:, layout["lag"]]
     for joint, _, rate in coordinates(rollout, record):
         for part in (part for part in WORKING if part in joint.acting):
             force = x[:, layout[f"{joint.name}.{part}"]]
             told = part == "motor" and isinstance(joint.motor, TorqueMotor)
             ahead = lag[:-1] + (rollout.dt if told else rollout.dt / 2 + lag[1:])
             impulse = rollout.dt * force[:-1] + ahead * (force[1:] - force[:-1])
-            total += (impulse * (rate[:-1] + rate[1:]) / 2).sum(axis=1)
-    return total
+            work = impulse * (rate[:-1] + rate[1:]) / 2
+            total += work.sum(axis=1)
+            gross += 0 if told else np.abs(work).sum(axis=1)
+    return total, gross
 
 
 def uncounted(rollout: Rollout, record: Record) -> Mask:

@@ -12,10 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from symphys.problem import Problem
 from symphys.shooting import Block
+from symphys.trajectory import NotFinite
 from symphys.transcription import Transcription, transcribe
 
 Array = NDArray[np.float64]
 
+FINER_DT, FINEST_DT, MORE_SWEEPS = "dt / 2", "dt / 4", "sweeps x 2"
+SETTLED = 1e-3
+"""Residuals below this share of the largest impulse are not looked into."""
 ROUNDING = 1e-9
 """Relative changes below this say nothing about the order of convergence."""
 
@@ -39,6 +43,20 @@ def refine(transcription: Transcription, z: Array) -> dict[str, Any]:
         objectives.append(verdict.objective)
         slopes.append(slope)
     return {"refined": rows, "order": {"objective": order(objectives[:3]), "gradient": order(slopes[:3])}}
+
+
+def settling(transcription: Transcription, z: Array, residual: float, impulse: float) -> dict[str, float]:
+    """Whether more sweeps would settle the contacts: "residual_finer" [N s], what twice the sweeps leave.
+
+    Nothing where the ``residual`` is small beside the largest ``impulse`` of a contact in a step [N s].
+    """
+    if not residual > SETTLED * impulse:
+        return {}
+    finer = dict(finer_problems(transcription))[MORE_SWEEPS]
+    try:
+        return {"residual_finer": float(finer.record(z).motion.residual.max(initial=0.0))}
+    except NotFinite:
+        return {"residual_finer": float("inf")}
 
 
 def change(block: Block, before: Array, after: Array) -> float | None:
@@ -67,7 +85,7 @@ def finer_problems(transcription: Transcription) -> list[tuple[str, Transcriptio
 def _variants(problem: Problem) -> list[tuple[str, Problem]]:
     simulation = problem.simulation
     return [
-        ("dt / 2", replace(problem, simulation=replace(simulation, dt=simulation.dt / 2))),
-        ("dt / 4", replace(problem, simulation=replace(simulation, dt=simulation.dt / 4))),
-        ("sweeps x 2", replace(problem, simulation=replace(simulation, sweeps=2 * simulation.sweeps))),
+        (FINER_DT, replace(problem, simulation=replace(simulation, dt=simulation.dt / 2))),
+        (FINEST_DT, replace(problem, simulation=replace(simulation, dt=simulation.dt / 4))),
+        (MORE_SWEEPS, replace(problem, simulation=replace(simulation, sweeps=2 * simulation.sweeps))),
     ]

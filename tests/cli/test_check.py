@@ -52,7 +52,7 @@ def test_check_can_look_at_what_a_run_found(run: Run, throw: Path, unreachable: 
     run("solve", throw, "--solver", "least_squares")
     code, out, _ = run("check", throw, "--at", "reports/throw/least_squares-seed0")
     assert code == 0
-    assert "still meets every target" in " ".join(out.split())
+    assert "still meets every check" in " ".join(out.split())
     assert "still meets" not in " ".join(run("check", throw)[1].split())
     other = throw.with_name("other.toml")
     other.write_text(throw.read_text(encoding="utf-8").replace('name = "throw"', 'name = "kick"'), encoding="utf-8")

@@ -49,6 +49,36 @@ def test_one_unsolved_run_exits_1_and_the_others_are_done(run: Run, throw: Path,
     assert not read_result(Path("o/unreachable/least_squares-seed0/result.json")).solved
 
 
+def test_what_is_met_by_a_motion_that_cannot_be_exits_1_with_its_reasons(run: Run, throw: Path) -> None:
+    """The ball may begin anywhere, and begins in the ground; with and without an examination."""
+    text = throw.read_text(encoding="utf-8").replace("ball.velocity[0:2]", "ball.position[2]")
+    text = text.replace("guess = [1, 0]", "guess = 1").replace("ball.position[0:2] - [0.5, 0]", "ball.position[2]")
+    throw.write_text(text.replace("tolerance = 0.01", "tolerance = 0.01\nat = 0"), encoding="utf-8")
+    for more in ((), ("--unexamined",)):
+        out = f"o{len(more)}"
+        code, table, err = run("solve", throw, "--solver", "least_squares", "--out", out, *more)
+        result = read_result(Path(out, "throw/least_squares-seed0/result.json"))
+        assert (code, result.verdict, result.solved) == (1, "doubted", False)
+        assert "0/1" in table and "met, but not to be trusted" in table
+        assert "throw least_squares: not to be trusted: " in table and "ball-ground" in table
+        assert "met, but not to be trusted" in err.splitlines()[1]
+        assert "Met, but not to be trusted" in Path(out, "index.html").read_text(encoding="utf-8")
+
+
+def test_the_best_of_a_budget_is_not_called_solved_and_exits_0(run: Run, throw: Path) -> None:
+    text = throw.read_text(encoding="utf-8")
+    cost = '[[cost]]\nname = "far"\nsquares = "ball.position[0] - 1"\n'
+    throw.write_text(text.partition("[[target]]")[0] + cost, encoding="utf-8")
+    settings = ("--set", "solver.gradient.iterations=1")
+    code, table, err = run("solve", throw, "--solver", "gradient", *settings)
+    assert code == 0
+    assert "best found, budget ended" in table and "1/1" not in table
+    assert "solved" not in err
+    assert "Best found" in Path("reports/index.html").read_text(encoding="utf-8")
+    code, table, _ = run("solve", throw, "--solver", "least_squares", "--out", "o")
+    assert code == 0 and "1/1" in table and "converged" in table
+
+
 def test_seeds_and_settings_reach_the_runs(run: Run, throw: Path) -> None:
     options = ("--seeds", "2", "--set", "simulation.dt=0.01", "--set", "solver.least_squares.iterations=30")
     code, out, _ = run("solve", throw, "--solver", "least_squares", *options)
@@ -180,6 +210,13 @@ def test_version_and_help(run: Run) -> None:
     assert run("--version")[:2] == (0, f"symphys {symphys.__version__}\n")
     code, out, _ = run("solve", "--help")
     assert code == 0 and "--seeds" in out
+
+
+def test_check_draws_nothing(throw: Path) -> None:
+    code = f"import sys; from symphys.cli import main; main(['check', {str(throw)!r}]); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = {name.partition(".")[0] for name in done.stdout.split()}
+    assert "casadi" in loaded and "matplotlib" not in loaded
 
 
 def test_help_loads_nothing_heavy() -> None:

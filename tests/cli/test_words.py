@@ -24,6 +24,7 @@ NAN = float("nan")
 
 def result(**changes: Any) -> Result:
     given = {"solver": "cma", "seed": 0, "solved": True, "status": "met", "advice": "", "seconds": {"solve": 1.5}}
+    given["verdict"] = "solved" if changes.get("solved", True) else "not_solved"
     given |= {"objective": 0.5, "iterations": 7, "equivalents": 1234.5}
     return Result(problem="throw", title="A throw", **(given | changes))
 
@@ -90,6 +91,25 @@ def test_seeds_share_a_row_of_medians() -> None:
 def test_advice_is_given_once_and_for_unsolved_runs_only() -> None:
     group = [result(solved=False, advice="try more"), result(solved=False, advice="try more"), result(advice="fine")]
     assert advice({("throw", "cma"): group}) == ["throw cma: try more"]
+
+
+def test_a_verdict_that_is_neither_solved_nor_unsolved_is_said_in_words() -> None:
+    job: Any = Job()
+    checks = [{"kind": "target", "name": "there", "error": 0.0, "tolerance": 1.0, "ratio": 0.0, "met": True}]
+    doubted = result(solved=False, verdict="doubted", doubts=["a goes through b", "5 J too many"], checks=checks)
+    best = result(solved=False, verdict="best_found", status="budget", advice="raise it")
+    assert brief(job, doubted, skipped=False).startswith("met, but not to be trusted, objective")
+    assert brief(job, best, skipped=False).startswith("best found, budget ended, objective")
+    groups = {("throw", "cma"): [doubted], ("walk", "cma"): [best]}
+    assert advice(groups) == [
+        "throw cma: not to be trusted: a goes through b; 5 J too many",
+        "walk cma: raise it",
+    ]
+    shown = io.StringIO()
+    Console(file=shown, width=140).print(table(groups))
+    rows = [line for line in shown.getvalue().splitlines() if " cma " in line]
+    assert "0/1" in rows[0] and rows[0].rstrip().endswith("met, but not to be trusted")
+    assert rows[1].rstrip().endswith("best found, budget ended")
 
 
 def test_live_progress_opens_and_closes_its_lines() -> None:

@@ -63,6 +63,7 @@ def importers(wanted: str) -> set[str]:
         ("symphys.runs", {"cli"}),
         ("symphys.report", {"cli"}),
         ("symphys.export", {"cli"}),
+        ("symphys.findings", {"cli", "report", "runs"}),
         ("symphys.doctor", {"cli"}),
         ("symphys.problems", {"cli", "problem"}),
         ("matplotlib", {"report"}),
@@ -127,4 +128,11 @@ def test_solvers_see_the_shooting_problem_alone(name: str, path: Path) -> None:
 @pytest.mark.parametrize(("name", "path"), [pair for pair in modules() if room(pair[0]) == "report"])
 def test_reports_read_run_folders_alone(name: str, path: Path) -> None:
     rooms = {room(target) for target in imported(path) if target.split(".")[0] == "symphys"}
-    assert rooms <= {"report", "errors", "files"}
+    assert rooms <= {"report", "findings", "errors", "files"}
+
+
+@pytest.mark.parametrize(("name", "path"), [pair for pair in modules() if room(pair[0]) == "findings"])
+def test_findings_know_numbers_and_texts_alone(name: str, path: Path) -> None:
+    for target in imported(path):
+        assert target.split(".")[0] in RUNTIME | {"numpy", "symphys"}, target
+        assert not target.startswith("symphys") or room(target) == "findings", target

@@ -11,16 +11,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from symphys.report import values
-from symphys.report.examination import Energy, Gain, GradientCheck, Growth, Refined, Smoothed, Trust
-from symphys.report.levels import BAD, FAIR, GOOD, UNKNOWN, Judged, graded
+from symphys.findings import values
+from symphys.findings.examination import Energy, Gain, GradientCheck, Growth, Refined, Smoothed, Trust
+from symphys.findings.examined import advice, answers, findings, slopes
+from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Judged, graded
+from symphys.findings.numerics import slope_finding, smoothed_findings
+from symphys.findings.touching import depth_finding, residual_finding
 from symphys.report.markup import Html, tag
 from symphys.report.output import slug
 from symphys.report.records import Variable
 from symphys.report.sections import variable_rows
-from symphys.report.trust import advice, answers, findings, slopes
-from symphys.report.trust_numerics import slope_finding, smoothed_findings
-from symphys.report.trust_physics import depth_finding, residual_finding
 from symphys.report.words import count, listed, seconds, show
 
 
@@ -107,7 +107,7 @@ def test_advice_of_a_sound_solution() -> None:
     assert {line.level for line in findings(SOUND, MET)} == {GOOD}
     assert advice(SOUND, MET) == (
         "The gradient is right: it agrees with differences. It reaches over the whole horizon, since changes hardly "
-        "grow on the way. The result still meets every target when it is simulated more finely, so it is not an "
+        "grow on the way. The result still meets every check when it is simulated more finely, so it is not an "
         "accident of the time grid. The contacts are resolved cleanly."
     )
 

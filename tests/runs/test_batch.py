@@ -36,7 +36,7 @@ def test_results_come_in_the_order_of_the_jobs(make_job: MakeJob, recorder: Any)
     jobs = [make_job(seed) for seed in range(3)]
     batch = run_batch(jobs, 1, recorder, transcribe)
     assert [result.seed for result in batch.results if result] == [0, 1, 2]
-    assert batch.solved and not batch.interrupted
+    assert batch.accepted and not batch.interrupted
     again = run_batch(jobs, 1, recorder, transcribe)
     assert again.results == batch.results
     assert [event for event, _ in recorder.events[-3:]] == ["skipped"] * 3
@@ -45,7 +45,7 @@ def test_results_come_in_the_order_of_the_jobs(make_job: MakeJob, recorder: Any)
 def test_a_failing_run_stops_no_other(make_job: MakeJob, recorder: Any) -> None:
     batch = run_batch([make_job(0, does="break"), make_job(1)], 1, recorder, transcribe)
     assert [result.status for result in batch.results if result] == ["failed", "met"]
-    assert not batch.solved
+    assert not batch.accepted
 
 
 def test_ctrl_c_stops_in_good_order_and_the_next_command_goes_on(make_job: MakeJob, recorder: Any) -> None:
@@ -59,13 +59,13 @@ def test_ctrl_c_stops_in_good_order_and_the_next_command_goes_on(make_job: MakeJ
 
     recorder.advanced = press
     batch = run_batch(jobs, 1, recorder, transcribe)
-    assert batch.interrupted and not batch.solved
+    assert batch.interrupted and not batch.accepted
     assert [result and result.status for result in batch.results] == ["met", "interrupted", None]
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
     recorder.advanced, recorder.events = told, []
     rest = run_batch(jobs, 1, recorder, transcribe)
-    assert rest.solved
+    assert rest.accepted
     starts = [event for event, _ in recorder.events if event in {"skipped", "resumed", "started"}]
     assert starts == ["skipped", "resumed", "started"]
 

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from symphys import files, solvers
 from symphys.problem import load_problem
 from symphys.runs import Job, Result, execute, make_jobs
 from symphys.runs.workshop import Workshop
-from symphys.solvers import TraceRow
+from symphys.solvers import Outcome, Status, TraceRow
 from symphys.transcription import transcribe
 
 MakeJob = Callable[..., Job]
@@ -71,8 +72,45 @@ def test_what_a_problem_tells_is_in_the_result_and_along_the_trace(problem_file:
 
 
 def test_a_run_need_not_be_examined(make_job: MakeJob) -> None:
+    """What is cheap is measured all the same, since the verdict rests on it."""
     result = run(replace(make_job(), examine=False))
-    assert result.solved and result.trust is None
+    assert result.solved and result.trust is not None
+    assert {"gained", "drift", "deepest", "residual", "passed"} <= result.trust.keys()
+    assert not {"gradient", "refined", "growth"} & result.trust.keys()
+
+
+def test_what_is_met_by_a_motion_that_cannot_be_is_not_solved(problem_file: Path, tmp_path: Path) -> None:
+    """What is varied is where the ball begins, and that is with its centre in the ground; examined or not."""
+    text = problem_file.read_text(encoding="utf-8").replace('sets = "ball.velocity"', 'sets = "ball.position"')
+    text = text.replace("guess = [1, 0, 0]", "guess = [0, 0, 1]").replace("- [0.5, 0]", "- [2.5, 0]")
+    problem_file.write_text(text, encoding="utf-8")
+    for examine in (True, False):
+        (job,) = make_jobs([load_problem(problem_file)], ["told"], [0], {}, tmp_path / str(examine))
+        result = run(replace(job, examine=examine))
+        assert all(check["met"] for check in result.checks or ())
+        assert (result.solved, result.accepted, result.verdict) == (False, False, "doubted")
+        assert any("ball-ground" in doubt and "t = 0 s" in doubt for doubt in result.doubts), result.doubts
+        assert job.folder.earlier(job.config) == result
+
+
+@pytest.mark.parametrize(
+    ("status", "verdict"), [("budget", "best_found"), ("stalled", "best_found"), ("met", "solved")]
+)
+def test_with_nothing_to_meet_only_a_stationary_point_is_solved(
+    problem_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, status: str, verdict: str
+) -> None:
+    text = problem_file.read_text(encoding="utf-8")
+    start, end = text.index("[[target]]"), text.index("[[cost]]")
+    problem_file.write_text(text[:start] + text[end:].partition("[objective]")[0], encoding="utf-8")
+    told = solvers.SOLVERS["told"]
+
+    def ends(*given: Any, **more: Any) -> Outcome:
+        return replace(told.solve(*given, **more), status=Status(status))
+
+    monkeypatch.setitem(solvers.SOLVERS, "told", replace(told, solve=ends))
+    (job,) = make_jobs([load_problem(problem_file)], ["told"], [0], {}, tmp_path / "out")
+    result = run(job)
+    assert (result.verdict, result.solved, result.accepted) == (verdict, verdict == "solved", True)
 
 
 def test_the_result_is_that_of_the_exact_rollout(make_job: MakeJob) -> None:

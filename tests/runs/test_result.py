@@ -13,6 +13,9 @@ from symphys.runs.config import make_config
 from symphys.runs.result import CheckRecord
 
 NAN = float("nan")
+GROWN = {"time": [0, 1], "factor": [1e5, 1]}
+ENERGY = {name: [0.0, 1.0] for name in ("time", "kinetic", "potential", "applied", "contact")}
+GAIN = {"step": 1, "time": 0.1, "energy": 9.0, "contacts": ["a-b"]}
 
 
 def result(*errors: float) -> Result:
@@ -26,6 +29,38 @@ def test_a_result_survives_its_file(tmp_path: Path) -> None:
     read = read_result(tmp_path / "result.json")
     assert repr(read) == repr(written)
     assert "NaN" not in (tmp_path / "result.json").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("fields", "verdict"),
+    [
+        ({}, "solved"),
+        ({"solved": False}, "not_solved"),
+        ({"checks": []}, "best_found"),
+        ({"checks": [], "status": "converged"}, "solved"),
+        ({"checks": [], "status": "failed"}, "not_solved"),
+        ({"status": "interrupted", "solved": False}, "interrupted"),
+        ({"trust": {"deepest": 0.2, "size": 0.1}}, "doubted"),
+        ({"trust": {"passed": 1.5}}, "doubted"),
+        ({"trust": {"residual": 0.5, "impulse": 1.0}}, "doubted"),
+        ({"trust": {"residual": 0.01, "impulse": 1.0}}, "solved"),
+        ({"trust": {"growth": GROWN}}, "doubted"),
+        ({"trust": {"growth": {"time": [0, 1], "factor": [1e3, 1]}}}, "solved"),
+        ({"trust": {"growth": GROWN, "refined": [{"what": "dt / 2", "objective": 1.0, "worst": 0.6}]}}, "solved"),
+        ({"trust": {"growth": GROWN, "refined": [{"what": "dt / 2", "objective": 1.0, "worst": 9.0}]}}, "doubted"),
+        ({"trust": {"gained": 9.0, "energy": ENERGY, "gains": [GAIN]}}, "doubted"),
+        ({"trust": {"momentum": 0.0, "drift": 0.1, "drifted": 0.1, "energy": ENERGY}}, "doubted"),
+    ],
+)
+def test_a_file_that_is_older_than_verdicts_is_ruled_on(
+    tmp_path: Path, fields: dict[str, object], verdict: str
+) -> None:
+    value = {**result(0.25).to_json(), "solved": True, "objective": 1.0, **fields}
+    del value["verdict"], value["doubts"]
+    files.write_json(tmp_path / "result.json", value)
+    read = read_result(tmp_path / "result.json")
+    assert (read.verdict, read.solved) == (verdict, verdict == "solved")
+    assert bool(read.doubts) == (verdict == "doubted")
 
 
 @pytest.mark.parametrize(("errors", "worst"), [((0.25, 1.0), 2.0), ((0.25, NAN), NAN), ((NAN, 0.25), NAN), ((), None)])

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from symphys.findings.examination import Energy, Gain, Trust
+from symphys.findings.levels import BAD, GOOD
+from symphys.findings.physics import balance_finding, gains_finding
 from symphys.problem import load_problem
 from symphys.problems import find
-from symphys.report.examination import Energy, Gain, Trust
-from symphys.report.levels import BAD, GOOD
-from symphys.report.trust_physics import balance_finding, gains_finding
 from symphys.transcription import transcribe
 from symphys.trust.budget import budget, momentum_gap
-from symphys.trust.contacts import contacts, surface
+from symphys.trust.contacts import slides, surface
 
 ROD = """
 title = "A rod strikes the ground with its lower end"
@@ -130,7 +130,7 @@ def test_what_friction_takes(make):
     record = slide.record(slide.shooting.start(0))
     found = budget(slide.rollout, record)
     assert found["energy"]["contact"][-1] == pytest.approx(-2 / 7 * 2.0**2 / 2, rel=1e-9)
-    (ball,) = contacts(slide.rollout, record)["slides"]
+    (ball,) = slides(slide.rollout, record)
     assert ball["contact"] == "ball-ground"
     assert ball["distance"] == pytest.approx(2.0**2 / (7 * 0.3 * 9.81), rel=0.05)
     assert ball["speed"] == pytest.approx(2.0, rel=0.06)

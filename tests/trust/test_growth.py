@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from symphys.report.examination import Growth, Trust
-from symphys.report.levels import BAD, GOOD, Judged
-from symphys.report.trust import advice
-from symphys.report.trust_numerics import GROWTH_LIMITS, growth_finding, reach
+from symphys.findings.examination import Growth, Trust
+from symphys.findings.examined import advice
+from symphys.findings.levels import BAD, GOOD, Judged
+from symphys.findings.numerics import GROWTH_LIMITS, growth_finding, reach
 from symphys.trust.growth import backwards, growth, state_columns
 
 FLIGHT = """

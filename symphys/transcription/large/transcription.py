@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
@@ -77,6 +77,10 @@ class LargeTranscription(Transcription):
         plain, smoothing = self._plain, record.course.smoothing
         way = plain.way(record.z, smoothing)
         return back(self.made, plain.stage, plain.nets_at(record.z), way, smoothing, ends)
+
+    def pull(self, record: Record, states: Mapping[int, Array], parameters: Array) -> Array | None:
+        """See ``Transcription``."""
+        return None
 
     @cached_property
     def _plain(self) -> LargeEvaluator:

@@ -20,6 +20,7 @@ def nothing() -> Array:
 class GradientCheck:
     """|adjoint - difference| of one variable, relative to ``scale``, the norm of its gradient.
 
+    ``felt``: what a change by the variable's scale changes, as a share of the value; 0 where nothing depends on it.
     ``jump``: where only differences of either side agree, what is between them, as a change of the variable.
     """
 
@@ -27,6 +28,7 @@ class GradientCheck:
     error: float
     scale: float
     jump: float = 0.0
+    felt: float = np.nan
 
 
 @dataclass(frozen=True)
@@ -47,12 +49,18 @@ class Refined:
 
 @dataclass(frozen=True)
 class Smoothed:
-    """The same z with contacts smoothed over ``smoothing`` [m/s]; ``own``: as the problem's solvers see it."""
+    """The same z with contacts smoothed over ``smoothing`` [m/s]; ``own``: as the problem's solvers see it.
+
+    ``costs``: the sum of what is minimised. ``moved``: how far bodies get from their places in the exact motion, as a
+    share of the longest way of one.
+    """
 
     smoothing: float
     own: bool
     objective: float
     worst: float
+    costs: float = np.nan
+    moved: float = np.nan
 
 
 @dataclass(frozen=True)
@@ -85,6 +93,24 @@ class Gain:
 
 
 @dataclass(frozen=True)
+class Miss:
+    """Two surfaces that hardly miss or hardly touch each other, by ``gap`` [m] at ``time`` [s].
+
+    ``touches``: which of the two. ``change`` of ``variable``, in its own unit, makes the one out of the other;
+    ``steps`` and ``spreads``: how many scales, or spreads, of all variables together do.
+    """
+
+    contact: str
+    touches: bool
+    time: float
+    gap: float
+    variable: str
+    change: float
+    steps: float
+    spreads: float
+
+
+@dataclass(frozen=True)
 class Slide:
     """How far [m] two surfaces slid under load, and their largest speed [m/s] and when [s]."""
 
@@ -108,11 +134,18 @@ class Trust:
         energy: along the horizon.
         gains, gained: the steps in which contacts added most energy, and all that they added [J].
         drift: largest change of energy in a step that nothing accounts for [J].
+        unexplained, drift_at: the largest that the work of motors cannot explain [J], and when [s].
+        drifted: the largest sum of such changes since the start [J].
         momentum: largest change of momentum in a step that nothing accounts for, relative.
-        residual, impulse: largest change of an impulse in the last sweep, and largest impulse in a step [N s].
+        residual, residual_at, impulse: largest change of an impulse in the last sweep [N s], when [s], and largest
+            impulse in a step [N s].
+        residual_finer: the residual with twice the sweeps [N s], where that was looked at.
         deepest, depth_contact, depth_time, size: deepest penetration [m], where, when; size of the smallest body [m].
+        passed, passed_contact, passed_time, passed_depth: the deepest that a body was in another between two instants,
+            as a share of its size, which contact, when [s], and how deep [m].
         multiple_impacts, steps: steps with two or more impacts on a body, of all.
         slides: the contacts that slid furthest.
+        misses: surfaces that hardly miss or hardly touch each other.
         fault: where the first number that is not finite comes from; empty if all are finite.
     """
 
@@ -126,14 +159,24 @@ class Trust:
     gains: tuple[Gain, ...] = ()
     gained: float = np.nan
     drift: float = np.nan
+    unexplained: float = np.nan
+    drift_at: float = np.nan
+    drifted: float = np.nan
     momentum: float = np.nan
     residual: float = np.nan
+    residual_at: float = np.nan
+    residual_finer: float = np.nan
     impulse: float = np.nan
     deepest: float = np.nan
     depth_contact: str = ""
     depth_time: float = np.nan
     size: float = np.nan
+    passed: float = np.nan
+    passed_contact: str = ""
+    passed_time: float = np.nan
+    passed_depth: float = np.nan
     multiple_impacts: float = np.nan
     steps: float = np.nan
     slides: tuple[Slide, ...] = ()
+    misses: tuple[Miss, ...] = ()
     fault: str = ""

@@ -7,11 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symphys.report.examination import GradientCheck, Growth, Refined, Smoothed, Trust
-from symphys.report.levels import BAD, FAIR, GOOD, UNKNOWN, Finding, Judged, graded, relative_change, worst_of
-from symphys.report.words import listed, percent, show
+from symphys.findings.examination import GradientCheck, Growth, Refined, Smoothed, Trust
+from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Finding, Judged, graded, relative_change, worst_of
+from symphys.findings.writing import listed, percent, show
 
 GRADIENT, GRID, GROWTH, SMOOTHING = "gradient", "grid", "growth", "smoothing"
+INFLUENCE = "influence"
+
+NOTHING = 1e-8
+"""A variable whose change by its scale changes no more, as a share of the value, changes nothing; what friction holds
+creeps by about a hundredth of that."""
+NO_INFLUENCE = "Nothing that the problem asks for depends on it here, so no solver that follows gradients moves it."
 
 GRADIENT_LIMITS = (1e-4, 1e-2)
 """Relative errors of a gradient: below the first it agrees, above the second it must not be used."""
@@ -19,6 +25,8 @@ JUMP_LIMITS = (1e-3, 1e-1)
 """Of jumps: a solver does not notice those below the first."""
 FLAT = 1e-6
 """A gradient whose norm is below this is too small to be compared."""
+TINY = 1e-12
+"""A sum of costs below this is none."""
 OBJECTIVE_LIMITS = (0.05, 0.3)
 """Relative changes of the objective under refinement."""
 WORST_LIMITS = (1.0, 3.0)
@@ -34,6 +42,8 @@ ORDERS = (0.3, 5.0)
 def gradient_finding(check: GradientCheck) -> Finding:
     """The adjoint gradient against central differences, for one variable."""
     what, number = f"Gradient of {check.variable}", show(check.error, 2)
+    if unfelt(check):
+        return Finding(INFLUENCE, FAIR, what, show(check.scale), NO_INFLUENCE)
     level = graded(check.error, GRADIENT_LIMITS)
     if level in (FAIR, BAD) and check.scale <= FLAT:
         return Finding(
@@ -52,13 +62,18 @@ def gradient_finding(check: GradientCheck) -> Finding:
     return Finding(GRADIENT, level, what, number, meaning)
 
 
+def unfelt(check: GradientCheck) -> bool:
+    """Whether nothing that is asked for depends on the variable here."""
+    return check.felt <= NOTHING
+
+
 def refined_finding(refined: Refined, judged: Judged) -> Finding:
     """The same z, simulated more finely."""
     what = f"Simulated again with {unbroken(refined.what) or 'a refinement'}"
     number = f"objective {show(refined.objective)}"
     if judged.checked and not math.isnan(refined.worst):
         number += f", worst error {show(refined.worst)} × tolerance"  # noqa: RUF001
-    if judged.solved and judged.checked:
+    if judged.met and judged.checked:
         level = graded(refined.worst, WORST_LIMITS)
         meaning = {
             GOOD: "Every check is still met.",
@@ -152,7 +167,8 @@ def growth_finding(growth: Growth) -> Finding:
         BAD: f"A change at t = {show(far.start)} s doubles every {show(far.doubling, 2)} s{too_far(far)}.",
         UNKNOWN: "Could not be measured.",
     }[level]
-    return Finding(GROWTH, level, what, f"× {show(far.total, 2)}", meaning)  # noqa: RUF001
+    doubt = f"a change at t = {show(far.start)} s is {show(far.total, 2)} times as large at the end"
+    return Finding(GROWTH, level, what, f"× {show(far.total, 2)}", meaning, doubt * (level == BAD))  # noqa: RUF001
 
 
 def too_far(far: Reach) -> str:
@@ -169,22 +185,29 @@ def smoothed_findings(rows: tuple[Smoothed, ...], judged: Judged) -> list[Findin
     what = f"Smoothed over {listed([show(row.smoothing) for row in rows])} m/s"
     number = f"objective {listed([show(row.objective) for row in rows])}"
     if rows[0].own:
-        change = relative_change(judged.objective, rows[0].objective)
-        level = GOOD if harmless(rows[0], judged) else FAIR if graded(change, OBJECTIVE_LIMITS) != BAD else BAD
+        level = smoothed_level(rows[0], judged)
+        level = BAD if level == UNKNOWN else level
         meaning = {
             GOOD: "What the solver sees is what happens without smoothing.",
             FAIR: "The solver sees something a little better or worse than what happens: lower the smoothing at last.",
             BAD: "The solver sees another problem than the one that is judged: lower the smoothing.",
         }[level]
         return [Finding(SMOOTHING, level, what, number, meaning)]
-    most = max((row.smoothing for row in rows if harmless(row, judged)), default=math.nan)
+    most = max((row.smoothing for row in rows if smoothed_level(row, judged) == GOOD), default=math.nan)
     if math.isnan(most):
         return [Finding(SMOOTHING, UNKNOWN, what, number, "Even the least of these would make it another problem.")]
     return [Finding(SMOOTHING, GOOD, what, number, f"Up to {show(most)} m/s it would change little.")]
 
 
-def harmless(row: Smoothed, judged: Judged) -> bool:
-    """Whether this smoothing leaves the answer what it is."""
-    if judged.solved and judged.checked:
-        return row.worst <= WORST_LIMITS[0]
-    return relative_change(judged.objective, row.objective) <= OBJECTIVE_LIMITS[0]
+def smoothed_level(row: Smoothed, judged: Judged) -> str:
+    """How much this smoothing changes the answer: what is met, what is minimised, and the motion."""
+    if judged.met and judged.checked:
+        answer = worst_of([graded(row.worst, WORST_LIMITS), graded(share(judged.costs, row.costs), OBJECTIVE_LIMITS)])
+    else:
+        answer = graded(share(judged.objective, row.objective), OBJECTIVE_LIMITS)
+    return worst_of([answer, graded(row.moved, OBJECTIVE_LIMITS)])
+
+
+def share(before: float, after: float) -> float:
+    """The relative change; 0 where both are rounding, nan where one is not known."""
+    return 0.0 if max(abs(before), abs(after)) < TINY else relative_change(before, after)

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from dataclasses import fields
 
-from symphys.report import values
-from symphys.report.examination import Energy, Gain, GradientCheck, Growth, Refined, Slide, Smoothed, Trust
-from symphys.report.records import Array
+from symphys.findings import values
+from symphys.findings.examination import Energy, Gain, GradientCheck, Growth, Miss, Refined, Slide, Smoothed, Trust
+from symphys.findings.values import Array
 
 PLAIN = (
-    *("gained", "drift", "momentum", "residual", "impulse"),
-    *("deepest", "size", "multiple_impacts", "steps"),
+    *("gained", "drift", "unexplained", "drift_at", "drifted", "momentum"),
+    *("residual", "residual_at", "residual_finer", "impulse"),
+    *("deepest", "size", "passed", "multiple_impacts", "steps"),
 )
 """Fields that are one number."""
 
 
 def make_trust(entry: dict[str, object]) -> Trust:
     """The record; what is absent or no number becomes nan."""
-    number, place = values.number, values.table(entry.get("deepest_at"))
+    number, place, passed = values.number, values.table(entry.get("deepest_at")), values.table(entry.get("passed_at"))
     gradient = values.tables(entry.get("gradient"))
     return Trust(
         gradient=tuple(
@@ -26,6 +27,7 @@ def make_trust(entry: dict[str, object]) -> Trust:
                 number(row.get("error")),
                 number(row.get("scale")),
                 number(row.get("jump", 0.0)),
+                number(row.get("felt")),
             )
             for row in gradient
         ),
@@ -38,7 +40,11 @@ def make_trust(entry: dict[str, object]) -> Trust:
         gains=tuple(make_gain(row) for row in values.tables(entry.get("gains"))),
         depth_contact=values.name(place.get("contact")),
         depth_time=number(place.get("time")),
+        passed_contact=values.name(passed.get("contact")),
+        passed_time=number(passed.get("time")),
+        passed_depth=number(passed.get("depth")),
         slides=tuple(make_slide(row) for row in values.tables(entry.get("slides"))),
+        misses=tuple(make_miss(row) for row in values.tables(entry.get("misses"))),
         fault=values.name(entry.get("fault")),
         **{name: number(entry.get(name)) for name in PLAIN},
     )
@@ -52,7 +58,8 @@ def make_refined(row: dict[str, object]) -> Refined:
 
 def make_smoothed(row: dict[str, object]) -> Smoothed:
     """One of ``smoothed``."""
-    return Smoothed(values.number(row.get("smoothing")), row.get("own") is True, *measured(row))
+    costs, moved = values.number(row.get("costs")), values.number(row.get("moved"))
+    return Smoothed(values.number(row.get("smoothing")), row.get("own") is True, *measured(row), costs, moved)
 
 
 def measured(row: dict[str, object]) -> tuple[float, float]:
@@ -64,6 +71,15 @@ def make_gain(row: dict[str, object]) -> Gain:
     """One of ``gains``."""
     time, energy = values.number(row.get("time")), values.number(row.get("energy"))
     return Gain(values.whole(row.get("step")), time, energy, values.names(row.get("contacts")))
+
+
+def make_miss(row: dict[str, object]) -> Miss:
+    """One of ``misses``."""
+    time, gap, change, steps, spreads = (
+        values.number(row.get(key)) for key in ("time", "gap", "change", "steps", "spreads")
+    )
+    contact, variable = values.name(row.get("contact")), values.name(row.get("variable"))
+    return Miss(contact, row.get("touches") is True, time, gap, variable, change, steps, spreads)
 
 
 def make_slide(row: dict[str, object]) -> Slide:

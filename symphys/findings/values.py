@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import re
-from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from symphys.report.records import Array, ReportError
+Array = NDArray[np.float64]
 
 NAME_LENGTH = 200
 TEXT_LENGTH = 200_000
@@ -76,29 +75,3 @@ def name(value: object) -> str:
 def names(value: object) -> tuple[str, ...]:
     """The texts of a JSON list."""
     return tuple(name(entry) for entry in value) if isinstance(value, list) else ()
-
-
-def read_words(path: Path) -> str:
-    """The text of a file; bytes that are no UTF-8 are replaced. Raises ReportError."""
-    try:
-        return words(path.read_text(encoding="utf-8", errors="replace"))
-    except OSError as error:
-        raise ReportError(f"{path.name}: {reason(error)}") from error
-
-
-def read_table(path: Path) -> dict[str, object]:
-    """The JSON object in a file. Raises ReportError that names the file and the fault."""
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ReportError(f"{path.name}: {reason(error)}") from error
-    except (ValueError, RecursionError) as error:
-        raise ReportError(f"{path.name}: not valid JSON, perhaps half written ({name(str(error))})") from error
-    if not isinstance(content, dict):
-        raise ReportError(f"{path.name}: a JSON object is expected, this is a {type(content).__name__}")
-    return table(content)
-
-
-def reason(error: OSError) -> str:
-    """Why a file could not be read, without its path."""
-    return "there is no such file" if isinstance(error, FileNotFoundError) else (error.strerror or "cannot be read")

@@ -12,23 +12,36 @@ MARKS = {GOOD: "good", FAIR: "look closer", BAD: "do not rely on it", UNKNOWN: "
 
 @dataclass(frozen=True)
 class Finding:
-    """One line: its subject, a level, what was looked at, its number, and what that means."""
+    """One line: its subject, a level, what was looked at, its number, and what that means.
+
+    ``doubt``: a clause on why no result that rests on it is to be relied on; empty where that does not follow.
+    """
 
     about: str
     level: str
     what: str
     number: str
     meaning: str
+    doubt: str = ""
 
 
 @dataclass(frozen=True)
 class Judged:
-    """How what is examined was judged as it stands, and whether there is anything to meet."""
+    """How what is examined was judged as it stands.
+
+    Attributes:
+        objective: its value.
+        worst: the largest error / tolerance; nan without any.
+        met: whether nothing is missed, true also where there is nothing to meet.
+        checked: whether there is anything to meet.
+        costs: the sum of what is minimised, targets aside; nan where a goal says how small that must be.
+    """
 
     objective: float
     worst: float
-    solved: bool
+    met: bool
     checked: bool
+    costs: float = math.nan
 
 
 def graded(value: float, limits: tuple[float, float]) -> str:

@@ -8,12 +8,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from symphys.report.examination import Trust
-from symphys.report.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN, Finding, Judged, worst_of
-from symphys.report.trust_numerics import (
+from symphys.findings.examination import Trust
+from symphys.findings.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN, Finding, Judged, worst_of
+from symphys.findings.nearby import miss_findings
+from symphys.findings.numerics import (
     GRADIENT,
     GRID,
     GROWTH,
+    SLOPE_LIMITS,
     SMOOTHING,
     gradient_finding,
     growth_finding,
@@ -21,19 +23,13 @@ from symphys.report.trust_numerics import (
     refined_finding,
     slope_finding,
     smoothed_findings,
+    unfelt,
 )
-from symphys.report.trust_physics import (
-    CONTACTS,
-    ENERGY,
-    balance_finding,
-    depth_finding,
-    gains_finding,
-    impacts_finding,
-    residual_finding,
-)
-from symphys.report.words import percent, show
+from symphys.findings.physics import ENERGY, balance_finding, gains_finding
+from symphys.findings.touching import CONTACTS, contact_findings
+from symphys.findings.writing import listed, percent, show
 
-FAULT = "fault"
+FAULT, NO_SLOPE = "fault", "zero"
 SUBJECTS = (GRADIENT, GROWTH, GRID, SMOOTHING, ENERGY, CONTACTS)
 VERDICTS = {GOOD: "agrees", FAIR: "agrees roughly", BAD: "disagrees", UNKNOWN: "not compared"}
 """Of a gradient with differences."""
@@ -45,16 +41,12 @@ def findings(trust: Trust, judged: Judged) -> list[Finding]:
     lines += [gradient_finding(check) for check in trust.gradient]
     lines += [refined_finding(refined, judged) for refined in trust.refined]
     lines += slope_finding(trust)
+    lines += miss_findings(trust)
     lines += [growth_finding(trust.growth)] if trust.growth.factor.size else []
     lines += smoothed_findings(trust.smoothed, judged)
-    numbers = (
-        (trust.gained, gains_finding),
-        (trust.momentum, balance_finding),
-        (trust.residual, residual_finding),
-        (trust.deepest, depth_finding),
-        (trust.multiple_impacts, impacts_finding),
-    )
-    return lines + [find(trust) for number, find in numbers if not math.isnan(number)]
+    numbers = ((trust.gained, gains_finding), (trust.momentum, balance_finding))
+    lines += [find(trust) for number, find in numbers if not math.isnan(number)]
+    return lines + contact_findings(trust)
 
 
 def slopes(trust: Trust) -> tuple[list[str], list[list[str]]]:
@@ -63,7 +55,7 @@ def slopes(trust: Trust) -> tuple[list[str], list[list[str]]]:
     rows = []
     for check in trust.gradient:
         changes = [percent(row.gradient.get(check.variable, math.nan)) for row in trust.refined]
-        verdict = VERDICTS[gradient_finding(check).level]
+        verdict = NO_SLOPE if unfelt(check) else VERDICTS[gradient_finding(check).level]
         rows.append([check.variable, show(check.scale), show(check.error, 2), verdict, *changes])
     return header, rows
 
@@ -86,13 +78,33 @@ def advice(trust: Trust, judged: Judged) -> str:
         return f"Mend this first, since solvers cannot pass it: {trust.fault}."
     level = {about: worst_of(each.level for each in lines if each.about == about) for about in SUBJECTS}
     parts = (
+        of_influence(trust),
+        of_misses(trust),
         of_gradient(level[GRADIENT], level[GROWTH]),
         of_growth(trust, level[GROWTH]),
-        of_grid(level[GRID], judged.solved),
+        of_grid(trust, level[GRID], judged),
         of_smoothing(level[SMOOTHING]),
         of_physics(lines, level),
     )
     return " ".join(part for part in parts if part)
+
+
+def of_influence(trust: Trust) -> str:
+    """What to say of variables that change nothing."""
+    none = [check.variable for check in trust.gradient if unfelt(check)]
+    if not none:
+        return ""
+    return (
+        f"The gradient of {listed(none)} is zero or next to it: nothing that the problem asks for depends on it here, "
+        "as where a body is held by friction or misses what it should hit; begin elsewhere, smooth the contacts, or "
+        "use a solver that needs no gradient."
+    )
+
+
+def of_misses(trust: Trust) -> str:
+    """What near misses and glancing touches advise."""
+    line = next(iter(miss_findings(trust)), None)
+    return f"Close by the motion is another one. {line.meaning}" if line else ""
 
 
 def of_gradient(level: str, growth: str) -> str:
@@ -115,25 +127,31 @@ def of_growth(trust: Trust, level: str) -> str:
         if math.isfinite(far.end):
             return (
                 f"Changes double every {show(far.doubling, 2)} s, so the gradient is not to be trusted beyond "
-                f"{show(far.end, 2)} s: shorten the horizon to less than that, or use multiple shooting with "
-                "stretches as short."
+                f"{show(far.end, 2)} s: shorten the horizon to less than that, or use a solver that needs none."
             )
-        return "The end is too sensitive for any gradient: shorten the horizon, or use multiple shooting."
+        return "The end is too sensitive for any gradient: shorten the horizon, or use a solver that needs none."
     return {
         GOOD: "It reaches over the whole horizon, since changes hardly grow on the way.",
         FAIR: "The end is sensitive to what comes before, so small steps are to be expected.",
     }.get(level, "")
 
 
-def of_grid(level: str, solved: bool) -> str:
+def of_grid(trust: Trust, level: str, judged: Judged) -> str:
     """What refinement advises."""
     if level == GOOD:
-        held = "still meets every target" if solved else "changes little"
+        held = "still meets every check" if judged.met and judged.checked else "changes little"
         return f"The result {held} when it is simulated more finely, so it is not an accident of the time grid."
     return {
         FAIR: "Simulated more finely it drifts a little: to build on the result, solve again with half the time step.",
-        BAD: "Simulated more finely it falls apart: halve the time step or add sweeps until the result holds.",
+        BAD: f"Simulated more finely it falls apart: {finer(trust, judged)} until the result holds.",
     }.get(level, "")
+
+
+def finer(trust: Trust, judged: Judged) -> str:
+    """What to refine: that by which the answer changes most."""
+    bad = [row for row in trust.refined if refined_finding(row, judged).level == BAD or row.change > SLOPE_LIMITS[1]]
+    by_sweeps = bad and all(row.what == "sweeps x 2" for row in bad)
+    return "add sweeps" if by_sweeps else "halve the time step"
 
 
 def of_smoothing(level: str) -> str:

@@ -1,0 +1,129 @@
+"""Whether contacts are resolved: settled, not too deep, nobody through anybody, every impact in time."""
+
+from __future__ import annotations
+
+import math
+
+from symphys.findings.examination import Trust
+from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Finding, graded
+from symphys.findings.writing import listed, several, show
+
+CONTACTS = "contacts"
+
+RESIDUAL_LIMITS = (1e-3, 5e-2)
+"""PGS residual as a share of the largest impulse."""
+SETTLING = 0.5
+"""Twice the sweeps help where they leave less than this share of a residual."""
+DEPTH_LIMITS = (0.02, 0.1)
+"""Penetration as a share of the smallest radius of gyration."""
+PASSED_LIMITS = (0.5, 1.0)
+"""Penetration between two instants, as a share of a body's own: above the second its centre goes inside."""
+COUNTED = (
+    (
+        "multiple_impacts",
+        "Several impacts of a body in one step",
+        "Only one impact a body and step is resolved exactly; a smaller time step sets them apart.",
+    ),
+)
+"""Kinds of steps that are counted: the number in ``Trust`` (and in ``reading.PLAIN``), what it is, and what it means
+where it is not 0. A kind that nobody counted is left out."""
+IN_TIME = "Every impact was resolved in time."
+NOT_SOUND = "There were none; but other lines here say that not every impact was resolved."
+
+
+def contact_findings(trust: Trust) -> list[Finding]:
+    """Every line on contacts for which there is a number."""
+    numbers = (
+        (trust.residual, residual_finding),
+        (trust.deepest, depth_finding),
+        (trust.passed, passage_finding),
+    )
+    return [find(trust) for number, find in numbers if not math.isnan(number)] + impact_findings(trust)
+
+
+def residual_finding(trust: Trust) -> Finding:
+    """How far the contact solver was from its end."""
+    share = trust.residual / trust.impulse if trust.impulse > 0 else math.nan
+    level = GOOD if trust.residual == 0 else graded(share, RESIDUAL_LIMITS)
+    meaning = {
+        GOOD: "Contact impulses had settled.",
+        FAIR: f"Contact impulses still moved a little in the last sweep{more_sweeps(trust)}.",
+        BAD: f"Contact impulses had not settled{more_sweeps(trust)}.",
+        UNKNOWN: "Largest change of an impulse in the last sweep.",
+    }[level]
+    when = f" at t = {show(trust.residual_at)} s" * math.isfinite(trust.residual_at)
+    doubt = f"impulses of contacts have not settled{when}: {show(trust.residual, 2)} of {show(trust.impulse, 2)} N s"
+    number = f"{show(trust.residual, 2)} N s"
+    return Finding(CONTACTS, level, "Contact solver's residual", number, meaning, doubt * (level == BAD))
+
+
+def more_sweeps(trust: Trust) -> str:
+    """A clause on what more sweeps would do, as far as that was measured."""
+    if math.isnan(trust.residual_finer):
+        return ""
+    twice = f"twice the sweeps leave {show(trust.residual_finer, 2)} N s"
+    if trust.residual_finer < SETTLING * trust.residual:
+        return f"; {twice}: raise the number of sweeps"
+    return (
+        f", and {twice}: they go round in a cycle or hardly move on, so more of them do not help; a smaller time step, "
+        "less friction or masses that differ less may"
+    )
+
+
+def depth_finding(trust: Trust) -> Finding:
+    """How deep bodies sank into each other."""
+    level = GOOD if trust.deepest <= 0 else graded(trust.deepest / trust.size, DEPTH_LIMITS)
+    place = f" ({trust.depth_contact} at t = {show(trust.depth_time)} s)" if trust.depth_contact else ""
+    meaning = {
+        GOOD: "Nothing to be seen beside the size of the bodies.",
+        FAIR: "Small beside the bodies, but visible; a smaller time step lessens it.",
+        BAD: "Bodies sink into each other; use a smaller time step or more position sweeps.",
+        UNKNOWN: "Largest overlap of two surfaces.",
+    }[level]
+    if level == BAD and trust.depth_time == 0:
+        meaning = "The motion begins with surfaces inside each other: bound what is varied so that they begin apart."
+    doubt = f"surfaces overlap by {show(trust.deepest, 2)} m{place}"
+    number = f"{show(trust.deepest, 2)} m{place}"
+    return Finding(CONTACTS, level, "Deepest penetration", number, meaning, doubt * (level == BAD))
+
+
+def passage_finding(trust: Trust) -> Finding:
+    """Whether a body went through another between two instants."""
+    what, level = "Passing through between two instants", graded(trust.passed, PASSED_LIMITS)
+    where = f"{trust.passed_contact} at t = {show(trust.passed_time)} s, {show(trust.passed_depth, 2)} m deep"
+    meaning = {
+        GOOD: "Nobody went through anybody.",
+        FAIR: f"{where}: on the straight way between two instants; a smaller time step shows whether it was so.",
+        BAD: f"{where}: a body was on one side before the step and beyond after it; use a smaller time step.",
+    }[level]
+    doubt = f"a body goes through another: {where}"
+    number = f"{show(trust.passed, 2)} of a body's size"
+    return Finding(CONTACTS, level, what, number, meaning, doubt * (level == BAD))
+
+
+def impact_findings(trust: Trust) -> list[Finding]:
+    """Steps in which the exact time of impact does not hold, one line for each kind that was counted."""
+    kinds = [(getattr(trust, name), what, meaning) for name, what, meaning in COUNTED]
+    known = [kind for kind in kinds if not math.isnan(kind[0])]
+    sound = not any(number > 0 for number, _, _ in known) and resolved(trust)
+    of = f" of {several(int(trust.steps), 'step')}" if math.isfinite(trust.steps) else ""
+    none = IN_TIME if sound else NOT_SOUND
+    return [
+        Finding(CONTACTS, FAIR if number else GOOD, what, show(number) + of, meaning if number else none)
+        for number, what, meaning in known
+    ]
+
+
+def resolved(trust: Trust) -> bool:
+    """Whether no other number speaks against it that impacts were resolved in time."""
+    unsettled = residual_finding(trust).level == BAD
+    gains = trust.gained > 0
+    return not (unsettled or gains or trust.passed > PASSED_LIMITS[0] or depth_finding(trust).level == BAD)
+
+
+def sliding(trust: Trust) -> str:
+    """A sentence on how far surfaces slid; empty where none did."""
+    if not trust.slides:
+        return ""
+    told = [f"{slide.contact} {show(slide.distance, 2)} m (up to {show(slide.speed, 2)} m/s)" for slide in trust.slides]
+    return f"Under load these surfaces slid: {listed(told)}; the slip of impacts is not counted."

@@ -1,0 +1,90 @@
+"""What a run came to, in one word: whether everything is met, and whether the motion that meets it can be relied on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from symphys.findings.examination import Trust
+from symphys.findings.examined import findings
+from symphys.findings.levels import FAIR, GOOD, Judged
+from symphys.findings.numerics import GROWTH, refined_finding
+from symphys.findings.reading import make_trust
+
+SOLVED = "solved"
+"""Everything is met, or the point is stationary where there is nothing to meet; nothing speaks against it."""
+DOUBTED = "doubted"
+"""The same, but of a motion that is not to be relied on."""
+BEST_FOUND = "best_found"
+"""There is nothing to meet, and the solver ended before it converged."""
+NOT_SOLVED = "not_solved"
+"""Something is missed, or there is no result."""
+INTERRUPTED = "interrupted"
+
+ACCEPTED = (SOLVED, BEST_FOUND)
+"""What a run was asked for, it did."""
+ENDED_BADLY = ("not_finite", "not_applicable", "failed")
+STATIONARY = ("met", "converged")
+"""Of the ways in which solvers end."""
+
+
+@dataclass(frozen=True)
+class Ruling:
+    """What a run came to, and why it is not to be relied on, where it is not."""
+
+    verdict: str
+    doubts: tuple[str, ...]
+
+    @property
+    def solved(self) -> bool:
+        """Whether that is "solved"."""
+        return self.verdict == SOLVED
+
+
+def rule(status: str, judged: Judged, trust: Mapping[str, object] | None) -> Ruling:
+    """The ruling on a run that ended with ``status``; ``trust`` as in result.json, None where nothing was measured."""
+    found = doubts(make_trust(dict(trust or {})), judged)
+    return Ruling(verdict(status, judged, bool(found)), found)
+
+
+def doubts(trust: Trust, judged: Judged) -> tuple[str, ...]:
+    """Why a result is not to be relied on, one clause for each finding that refutes it; empty if none does.
+
+    That changes grow beyond use spoils gradients. It refutes a result unless finer simulations come to the same: a walk
+    may be a walk whatever its last state is.
+    """
+    found = [line for line in findings(trust, judged) if line.doubt]
+    return tuple(line.doubt for line in found if line.about != GROWTH or not holds(trust, judged))
+
+
+def holds(trust: Trust, judged: Judged) -> bool:
+    """Whether finer simulations were done, and none of them is far from the result."""
+    return bool(trust.refined) and all(refined_finding(row, judged).level in (GOOD, FAIR) for row in trust.refined)
+
+
+def verdict(status: str, judged: Judged, doubted: bool) -> str:
+    """The word for a run.
+
+    Args:
+        status: how its solver ended.
+        judged: the exact rollout of what it found.
+        doubted: whether there are any ``doubts``.
+    """
+    if status == INTERRUPTED:
+        return INTERRUPTED
+    if not judged.met or not (judged.checked or status not in ENDED_BADLY):
+        return NOT_SOLVED
+    if doubted:
+        return DOUBTED
+    return SOLVED if judged.checked or status in STATIONARY else BEST_FOUND
+
+
+def told(word: str, status: str, checked: bool) -> str:
+    """A verdict in a few words, such as "best found, budget ended"."""
+    how = {"budget": "budget ended", "stalled": "no more progress"}.get(status, status.replace("_", " "))
+    return {
+        SOLVED: "solved",
+        DOUBTED: "met, but not to be trusted" if checked else "found, but not to be trusted",
+        BEST_FOUND: f"best found, {how}",
+        INTERRUPTED: "interrupted",
+    }.get(word, f"not solved ({how})")
