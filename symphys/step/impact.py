@@ -44,7 +44,7 @@ class Cut:
         first: length of the first stretch [s].
         fast: per pair: 1 if it closes at speed.
         struck: per pair: 1 if it meets at speed then.
-        late: per pair: how much later than the cut a struck pair meets [s]: rounding, but with a slope.
+        late: per pair: how much later than the first a struck pair meets [s]: rounding, but with a slope.
     """
 
     impact: Expr
@@ -68,7 +68,7 @@ def find_cut(scene: Scene, x: State, duration: Expr, share: float) -> Cut:
     first = do(_inside, earliest, duration, share)
     until = do(_until, earliest[1], first, scene.setting.scheme.dt)
     struck = [do(_is_struck, c, contact.hit, contact.time, until) for contact, c in zip(contacts, fast, strict=True)]
-    late = [do(_late, first, s, contact.time) for contact, s in zip(contacts, struck, strict=True)]
+    late = [do(_late, earliest[1], s, contact.time) for contact, s in zip(contacts, struck, strict=True)]
     return Cut(earliest[0], first, tuple(fast), tuple(struck), tuple(late))
 
 
@@ -93,8 +93,8 @@ def _is_struck(closes: Expr, hit: Expr, time: Expr, until: Expr) -> Expr:
     return ca.logic_and(ca.logic_and(closes, hit), time <= until)
 
 
-def _late(first: Expr, struck: Expr, time: Expr) -> Expr:
-    return ca.if_else(struck, time - first, 0)
+def _late(earliest: Expr, struck: Expr, time: Expr) -> Expr:
+    return ca.if_else(struck, time - earliest, 0)
 
 
 def _inside(earliest: tuple[Expr, Expr], duration: Expr, share: float) -> Expr:
