@@ -34,7 +34,9 @@ class Trajectory:
             stretch's impulse in the next one: a contact that begins shows up to a quarter less in its first step.
         contact_gap: (N + 1, C) [m]; the last row repeats the one before it.
         residual: (N,) largest change of an impulse in the last sweep [N s].
-        crowded: (N,) 1 where a body had two or more impacts in one step.
+        crowded: (N,) 1 where a body had two or more impacts at once, or impacts of a chain come late.
+        ambiguous: (N,) 1 where several bodies met at one instant and rebounded.
+        paradox: (N,) 1 where friction pulled a sliding contact together.
         joint_names: (J,).
         joint_value, joint_rate: (N + 1, J, K) coordinates [rad] or [m] and their rates; K is that of the joint that has
             most, NaN where another has fewer.
@@ -56,6 +58,8 @@ class Trajectory:
     contact_gap: Array
     residual: Array
     crowded: Array
+    ambiguous: Array
+    paradox: Array
     joint_names: tuple[str, ...]
     joint_value: Array
     joint_rate: Array

@@ -143,7 +143,8 @@ class Trust:
         deepest, depth_contact, depth_time, size: deepest penetration [m], where, when; size of the smallest body [m].
         passed, passed_contact, passed_time, passed_depth: the deepest that a body was in another between two instants,
             as a share of its size, which contact, when [s], and how deep [m].
-        multiple_impacts, steps: steps with two or more impacts on a body, of all.
+        multiple_impacts, ambiguous_impacts, paradoxes, steps: steps with two or more impacts on a body, with several
+            bodies that meet at one instant, with friction that pulls surfaces together, of all.
         slides: the contacts that slid furthest.
         misses: surfaces that hardly miss or hardly touch each other.
         fault: where the first number that is not finite comes from; empty if all are finite.
@@ -176,6 +177,8 @@ class Trust:
     passed_time: float = np.nan
     passed_depth: float = np.nan
     multiple_impacts: float = np.nan
+    ambiguous_impacts: float = np.nan
+    paradoxes: float = np.nan
     steps: float = np.nan
     slides: tuple[Slide, ...] = ()
     misses: tuple[Miss, ...] = ()

@@ -11,7 +11,7 @@ from symphys.findings.values import Array
 PLAIN = (
     *("gained", "drift", "unexplained", "drift_at", "drifted", "momentum"),
     *("residual", "residual_at", "residual_finer", "impulse"),
-    *("deepest", "size", "passed", "multiple_impacts", "steps"),
+    *("deepest", "size", "passed", "multiple_impacts", "ambiguous_impacts", "paradoxes", "steps"),
 )
 """Fields that are one number."""
 

@@ -22,11 +22,21 @@ COUNTED = (
     (
         "multiple_impacts",
         "Several impacts of a body in one step",
-        "Only one impact a body and step is resolved exactly; a smaller time step sets them apart.",
+        "Impacts that follow one another faster come late or at once; a smaller time step or more `cuts` resolve them.",
+    ),
+    (
+        "ambiguous_impacts",
+        "Several bodies that meet at one instant",
+        "Rigid bodies have no one answer then: with the least gap between them the outcome is another.",
+    ),
+    (
+        "paradoxes",
+        "Contacts that friction pulls together",
+        "Painleve's paradox: Coulomb's law has no sliding solution there, or several; the contact sticks at once.",
     ),
 )
 """Kinds of steps that are counted: the number in ``Trust`` (and in ``reading.PLAIN``), what it is, and what it means
-where it is not 0. A kind that nobody counted is left out."""
+where it is not 0. A kind that nobody counted is left out, and so are all but the first where there were none."""
 IN_TIME = "Every impact was resolved in time."
 NOT_SOUND = "There were none; but other lines here say that not every impact was resolved."
 
@@ -110,7 +120,8 @@ def impact_findings(trust: Trust) -> list[Finding]:
     none = IN_TIME if sound else NOT_SOUND
     return [
         Finding(CONTACTS, FAIR if number else GOOD, what, show(number) + of, meaning if number else none)
-        for number, what, meaning in known
+        for k, (number, what, meaning) in enumerate(known)
+        if number or k == 0
     ]
 
 

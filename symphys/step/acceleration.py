@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 Expr = Any
 """casadi SX"""
 
+UNEQUAL = 8.0
+"""Ratio of masses from which on plain sweeps are too slow."""
 EVERY = 4
 """Sweeps between two longer steps."""
 LONGEST = 1e4
@@ -46,18 +48,25 @@ class Cluster:
 
 
 def clusters(world: World, rows: Sequence[Row]) -> list[Cluster]:
-    """Those of two bodies or more."""
+    """Those of bodies that differ much in mass, or may: where a symbol decides it."""
     groups = {k: {k} for k in range(len(world.bodies))}
     links = [row.bodies for row in rows] + [joint.bodies for joint in world.joints]
     for bodies in links:
         joined = set().union(*(groups[k] for k in bodies))
         groups |= dict.fromkeys(joined, joined)
     held = {k for joint in world.joints for k in joint.bodies}
-    apart = {min(group): group for group in groups.values() if len(group) > 1 and not group & held}
+    apart = {min(group): group for group in groups.values() if _unequal(world, group) and not group & held}
     return [
         Cluster(tuple(sorted(group)), tuple(k for k, row in enumerate(rows) if group & set(row.bodies)))
         for group in apart.values()
     ]
+
+
+def _unequal(world: World, group: set[int]) -> bool:
+    masses = [ca.SX(world.bodies[k].mass) for k in group]
+    if len(group) > 1 and not all(mass.is_constant() for mass in masses):
+        return True
+    return max(map(float, masses)) > UNEQUAL * min(map(float, masses)) if len(group) > 1 else False
 
 
 def lengthened(

@@ -63,6 +63,12 @@ def coupling_of(mobility: Expr, n: Expr, friction: Expr, softness: Expr) -> Coup
     return Coupling(w, ca.inv_minor(w), 1 / (ca.dot(n, along) + friction * length(across)))
 
 
+def pulls_together(mobility: Expr, n: Expr, friction: Expr, slip: Expr) -> Expr:
+    """1 if an impulse on the edge of the cone, against the ``slip`` (3,), brings the surfaces together (Painleve)."""
+    across = _across(slip, n)
+    return ca.dot(n, ca.mtimes(mobility, n - friction * across / length(across))) <= 0
+
+
 def solve(row: ContactRow, coupling: Coupling, slip: Expr, old: Impulse) -> tuple[Expr, Expr]:
     """(normal impulse, friction impulse (3,)) after which the contact obeys its law, all else as it is.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import casadi as ca
@@ -49,12 +49,12 @@ def step_function(
 def report_function(
     world: World, scheme: Scheme | None = None, inputs: Sequence[str] = (), parameters: Sequence[Any] = ()
 ) -> ca.Function:
-    """The same step with all of its ``Report``: (x, u, p, smoothing) -> (x_next, forces, gaps, residual, crowded)."""
+    """The same step with all of its ``Report``: (x, u, p, smoothing) -> (x_next, forces, gaps, .. paradox)."""
     arguments, scene, x = _flat(world, scheme, inputs, parameters)
     after, phases = take_step(scene, x)
     r = report(scene, phases)
-    outputs = [_packed(scene, after), *map(scene.pieces.value, (r.forces, r.gaps, r.residual, r.crowded))]
-    names = ["x_next", "forces", "gaps", "residual", "crowded"]
+    told = {field.name: scene.pieces.value(getattr(r, field.name)) for field in fields(r)}
+    outputs, names = [_packed(scene, after), *told.values()], ["x_next", *told]
     return ca.Function("report", arguments, outputs, ["x", "u", "p", "smoothing"], names)
 
 

@@ -31,6 +31,9 @@ Expr = Any
 """casadi SX, MX or DM"""
 
 
+NONE = ca.SX(0)
+
+
 @dataclass(frozen=True)
 class Phase:
     """A stretch that has been advanced.
@@ -42,6 +45,7 @@ class Phase:
         changes: of every row, joints too, what it has given and what it had before the final sweep.
         ahead: (3,) each [N s]: what persistent forces had given to the true velocities ahead of the impulses of
             sweeps. The next stretch takes it off again, but after an impact, where leapfrog begins anew, it stays.
+        chained: 1 if impacts were left to the next step.
     """
 
     x: State
@@ -50,10 +54,15 @@ class Phase:
     impulses: tuple[Impulse, ...]
     changes: tuple[tuple[Any, Any], ...]
     ahead: tuple[Expr, ...] = ()
+    chained: Expr = NONE
 
 
-def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = ()) -> Phase:
-    """The state after ``duration`` [s]; pairs whose ``spared`` is 1 give no impulse: the stretch ends as they meet."""
+def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = (), plastic: Expr = NONE) -> Phase:
+    """The state after ``duration`` [s].
+
+    Pairs whose ``spared`` is 1 give no impulse, since the stretch ends as they meet. Where ``plastic`` is 1 nothing
+    rebounds.
+    """
     kick, half = scene.pieces.do(_times, duration, x["lag"])
 
     # free motion, in which impacts find their instant; what joints hold moves as the last step's forces say
@@ -66,7 +75,7 @@ def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = ())
     trees = make_trees(scene, paths, free, half)
 
     # rows: where, when and how the surfaces meet, what acts along the coordinates of joints
-    rows = _contact_rows(scene, x, trees, contacts, duration, spared or [ca.SX(0)] * len(contacts))
+    rows = _contact_rows(scene, x, trees, contacts, duration, spared or [ca.SX(0)] * len(contacts), plastic)
     joints, fitted = joint_rows(scene, trees, paths, duration, kick)
 
     # velocities: warm start, then sweeps
@@ -93,13 +102,20 @@ def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = ())
 
 
 def _contact_rows(
-    scene: Scene, x: State, trees: Trees, contacts: Sequence[Contact], duration: Expr, spared: Sequence[Expr]
+    scene: Scene,
+    x: State,
+    trees: Trees,
+    contacts: Sequence[Contact],
+    duration: Expr,
+    spared: Sequence[Expr],
+    plastic: Expr,
 ) -> list[Row]:
     rows = []
     for pair, contact, off in zip(scene.world.pairs, contacts, spared, strict=True):
         bodies, force = bodies_of(pair), x[f"{pair.name}.force"]
         coupled = may_couple(scene.world, pair)
-        arguments = tuple(trees.motions[i] for i in bodies), duration, off, force, trees.same(bodies), coupled
+        moving = tuple(trees.motions[i] for i in bodies)
+        arguments = moving, duration, off, plastic, force, trees.same(bodies), coupled
         rows.append(trees.row(bodies, scene.pieces.do(prepare, scene.setting, pair.law, contact, *arguments)))
     return rows
 

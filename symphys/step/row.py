@@ -22,6 +22,7 @@ Expr = Any
 Moving = tuple[Motion, ...]
 """The motions of the sides that can move: of the first, or of both."""
 
+NEVER = ca.SX(0)
 UNREACHED = -1e6
 """[m/s] a normal velocity that no row reaches: it gives no impulse."""
 
@@ -147,6 +148,7 @@ class ContactRow:
         knob: smoothing [m/s].
         same: whether both sides are of one tree of joints.
         coupling: where friction may act strongly on the normal velocity.
+        paradox: 1 if the friction of the free slip would pull the surfaces together.
     """
 
     law: Law
@@ -172,6 +174,7 @@ class ContactRow:
     knob: Expr
     same: bool
     coupling: Coupling | None = None
+    paradox: Expr = NEVER
 
     def slip(self, momenta: tuple[Any, ...]) -> Expr:
         """(3,) [m/s]: relative velocity of the touching points."""

@@ -15,7 +15,7 @@ import casadi as ca
 from symphys.collide.contact import Contact
 from symphys.collide.touch import TINY_RATE, TOUCH
 from symphys.smooth import clip, positive
-from symphys.step.coupled import coupling_of
+from symphys.step.coupled import coupling_of, pulls_together
 from symphys.step.masses import answer_of, effective_masses, inverse_masses, symmetric_mobilities, yields
 from symphys.step.row import UNREACHED, ContactRow, Moving, Side, at_touch, free_slip, make_sides
 from symphys.step.scene import Setting
@@ -32,6 +32,8 @@ NEAR = 0.1
 """Of the distance a_ref dt^2: surfaces that carried load and are that near to each other go on touching."""
 TIE = 1e-11
 """[m] surfaces that move at speed and are that near at the end of a stretch do not touch then; see ``_slack``."""
+ANY = 1e6
+"""[m] more than any overlap: what gives no impulse is not pushed out either."""
 SHORTEST = 1e-6
 """Of dt: the shortest stretch before or after an impact."""
 LOADED = 1e-3
@@ -45,6 +47,7 @@ def prepare(
     motions: Moving,
     duration: Expr,
     spared: Expr,
+    plastic: Expr,
     force: Expr,
     same: bool,
     coupled: bool,
@@ -58,18 +61,19 @@ def prepare(
         motions: of the sides that can move.
         duration: of the stretch [s].
         spared: 1 for a contact that gives no impulse.
+        plastic: 1 where it does not rebound.
         force: (3,) with which the contact acted at the end of the last step [N].
         same: whether both sides are of one tree of joints.
         coupled: whether friction may act strongly on the normal velocity.
     """
     scheme, knob, half = setting.scheme, setting.knob, duration / 2
-    touch = _touch(setting, law, contact, motions, duration, spared)
+    touch = _touch(setting, law, contact, motions, duration, spared, plastic)
     row_time = half + touch.leaving * (touch.time - half)
     frame, applied = contact.meeting.frame(row_time), contact.meeting.frame(touch.leaving * touch.time)
     sides = make_sides(motions, row_time, frame, applied)
     push, twist = symmetric_mobilities(sides, same)
     k_normal, *k_others = inverse_masses(sides, frame.normal, push, twist)
-    slack = _slack(setting, contact, touch)
+    slack = ca.if_else(spared, ANY, _slack(setting, contact, touch))
     free = ca.dot(frame.normal, free_slip(sides, motions))
     away = ca.fmin(free - (contact.end + slack) / duration, 0)
     softness, target = _normal_target(law, contact, duration, touch, k_normal, away, knob)
@@ -100,6 +104,7 @@ def prepare(
         knob=knob,
         same=same,
         coupling=coupling_of(push, frame.normal, law.friction, softness) if coupled else None,
+        paradox=pulls_together(push, frame.normal, law.friction, free_slip(sides, motions)) if coupled else ca.SX(0),
     )
 
 
@@ -130,11 +135,19 @@ class _Touch:
         return self.hit * self.leaving * (half - self.time) * (self.acceleration - self.normal * self.pull)
 
 
-def _touch(setting: Setting, law: Law, contact: Contact, motions: Moving, duration: Expr, spared: Expr) -> _Touch:
+def _touch(
+    setting: Setting,
+    law: Law,
+    contact: Contact,
+    motions: Moving,
+    duration: Expr,
+    spared: Expr,
+    plastic: Expr,
+) -> _Touch:
     time = contact.time if setting.scheme.time_of_impact else ca.SX(0)
     velocity, acceleration, normal = at_touch(contact, motions, time)
     pull = ca.dot(normal, acceleration)
-    rebound = law.restitution * positive(-ca.dot(normal, velocity), setting.knob)
+    rebound = law.restitution * (1 - plastic) * positive(-ca.dot(normal, velocity), setting.knob)
     hit = ca.if_else(spared, 0, contact.hit)  # at the end of a stretch rounding decides whether a spared one meets
     chi = _leaves(rebound, pull, duration - time, setting.reference, setting.scheme.dt, setting.knob)
     return _Touch(time, acceleration, normal, pull, rebound, hit, hit * chi)

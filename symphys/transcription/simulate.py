@@ -29,7 +29,7 @@ class Record:
 
 
 def recorder(rollout: Rollout) -> ca.Function:
-    """(z, smoothing) -> (x, u, given, p, forces, gaps, residual, crowded) of the whole horizon."""
+    """(z, smoothing) -> (x, u, given, p, forces, gaps, residual, crowded, ambiguous, paradox) of the whole horizon."""
     scheme = rollout.problem.simulation.scheme()
     step = report_function(rollout.world, scheme, rollout.inputs, rollout.parameters.symbols)
     x, u, happened = rollout.rolled(rollout.remembering(step))
@@ -49,7 +49,7 @@ def simulate(rollout: Rollout, record: Callable[..., Any], z: Array, smoothing: 
 
 
 def _trajectory(
-    rollout: Rollout, x: Array, u: Array, p: Array, forces: Array, gaps: Array, residual: Array, crowded: Array
+    rollout: Rollout, x: Array, u: Array, p: Array, forces: Array, gaps: Array, residual: Array, *counted: Array
 ) -> Trajectory:
     world, steps = rollout.world, rollout.steps
     layout = Layout(world)
@@ -66,9 +66,14 @@ def _trajectory(
         contact_force=forces.reshape(steps, len(world.pairs), 3),
         contact_gap=np.concatenate([gaps, gaps[-1:]]),
         residual=residual.ravel(),
-        crowded=crowded.ravel(),
+        **_counts(*counted),
         **_joints(rollout, x, u, p),
     )
+
+
+def _counts(crowded: Array, ambiguous: Array, paradox: Array) -> dict[str, Any]:
+    """The fields that count steps of a kind."""
+    return {"crowded": crowded.ravel(), "ambiguous": ambiguous.ravel(), "paradox": paradox.ravel()}
 
 
 def plain(rollout: Rollout, x: Array) -> Array:

@@ -24,7 +24,8 @@ def contacts(rollout: Rollout, record: Record) -> dict[str, Any]:
         "residual" [N s]: the largest change of an impulse in a last sweep, at "residual_at" [s]; "impulse" [N s]: the
         largest impulse of a contact in a step. "deepest" [m]: how far rigid surfaces overlapped, with the "contact" and
         "time" [s] in "deepest_at" (None where they did not); "size" [m]: the smallest radius of gyration of a body.
-        "steps", and "multiple_impacts": in how many of them a body had several impacts.
+        "steps", and in how many of them "multiple_impacts" of a body, "ambiguous_impacts" of several bodies at one
+        instant, and "paradoxes" of friction.
     """
     motion = record.motion
     return {
@@ -33,6 +34,8 @@ def contacts(rollout: Rollout, record: Record) -> dict[str, Any]:
         "impulse": float(np.linalg.norm(motion.contact_force, axis=2).max(initial=0.0) * rollout.dt),
         "steps": rollout.steps,
         "multiple_impacts": int(motion.crowded.sum()),
+        "ambiguous_impacts": int(motion.ambiguous.sum()),
+        "paradoxes": int(motion.paradox.sum()),
         "size": float(bodies(rollout, record).size.min()),
         **_deepest(rollout, motion),
     }
