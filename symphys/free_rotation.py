@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import casadi as ca
@@ -53,30 +52,25 @@ def turned(inertia: Expr, q: Expr, momentum: Expr, t: Expr, shares: Sequence[flo
         shares: of the time in each step of the composition.
     """
     split = splitting(inertia)
-    shares = shares if len(split.terms) > 1 else SECOND_ORDER
     own = ca.mtimes(rotation.matrix(q).T, momentum)
-    for first, share, last in _halves(shares):
-        own, q = _spin(split.terms[1:], own, q, first * t)
-        own, q = _spin(split.terms[:1], own, q, share * t)
-        own, q = _spin(split.terms[:0:-1], own, q, last * t)
+    for k, share in _composition(len(split.terms), shares):
+        strength, axis = split.terms[k]
+        turn = rotation.exponential(share * t * strength * ca.dot(axis, own) * axis)
+        own, q = ca.mtimes(rotation.matrix(turn).T, own), rotation.multiply(q, turn)
     return rotation.turn(q, split.sphere * t * momentum)
 
 
-def _halves(shares: Sequence[float]) -> list[tuple[float, float, float]]:
-    """Of each step of second order the times of its three parts; half steps that meet are one."""
-    before = [shares[0] / 2] + [(a + b) / 2 for a, b in pairwise(shares)]
-    after = [0.0] * (len(shares) - 1) + [shares[-1] / 2]
-    return list(zip(before, shares, after, strict=True))
-
-
-def _spin(terms: Sequence[tuple[Expr, Expr]], own: Expr, q: Expr, t: Expr) -> tuple[Expr, Expr]:
-    """(momentum in the body's frame, orientation) after a rotation about each of the axes."""
-    if isinstance(t, ca.SX) and t.is_zero():
-        return own, q
-    for strength, axis in terms:
-        turn = rotation.exponential(t * strength * ca.dot(axis, own) * axis)
-        own, q = ca.mtimes(rotation.matrix(turn).T, own), rotation.multiply(q, turn)
-    return own, q
+def _composition(terms: int, shares: Sequence[float]) -> list[tuple[int, float]]:
+    """The rotations in their order: (which term, share of the time); symmetric, those that meet as one."""
+    if terms < 2:
+        return [(k, 1.0) for k in range(terms)]
+    ways = list(range(terms - 1, 0, -1))
+    found: list[tuple[int, float]] = []
+    for share in shares:
+        for k, part in [*((k, share / 2) for k in ways), (0, share), *((k, share / 2) for k in reversed(ways))]:
+            before = found.pop()[1] if found and found[-1][0] == k else 0.0
+            found.append((k, before + part))
+    return found
 
 
 def splitting(inertia: Expr) -> Splitting:
