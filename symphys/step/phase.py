@@ -23,7 +23,7 @@ from symphys.step.paths import bodies_of, expected_motions, free_motions, jointe
 from symphys.step.pgs import Row, Solution, begin, relax
 from symphys.step.position import Displaced, close_gaps, displacements
 from symphys.step.row import ContactRow
-from symphys.step.rows import prepare
+from symphys.step.rows import Conditions, prepare
 from symphys.step.scene import Scene, State
 from symphys.step.sharing import shared
 
@@ -113,10 +113,9 @@ def _contact_rows(
     rows = []
     for pair, contact, off in zip(scene.world.pairs, contacts, spared, strict=True):
         bodies, force = bodies_of(pair), x[f"{pair.name}.force"]
-        coupled = may_couple(scene.world, pair)
-        moving = tuple(trees.motions[i] for i in bodies)
-        arguments = moving, duration, off, plastic, force, trees.same(bodies), coupled
-        rows.append(trees.row(bodies, scene.pieces.do(prepare, scene.setting, pair.law, contact, *arguments)))
+        conditions = Conditions(off, plastic, force, trees.same(bodies), may_couple(scene.world, pair))
+        arguments = pair.law, contact, tuple(trees.motions[i] for i in bodies), duration, conditions
+        rows.append(trees.row(bodies, scene.pieces.do(prepare, scene.setting, *arguments)))
     return rows
 
 

@@ -40,47 +40,46 @@ LOADED = 1e-3
 """Of the weight of the effective mass: what counts as load. A smooth contact always carries a little."""
 
 
-def prepare(
-    setting: Setting,
-    law: Law,
-    contact: Contact,
-    motions: Moving,
-    duration: Expr,
-    spared: Expr,
-    plastic: Expr,
-    force: Expr,
-    same: bool,
-    coupled: bool,
-) -> ContactRow:
-    """The row of one contact over a stretch of time.
+@dataclass(frozen=True)
+class Conditions:
+    """What a stretch makes of a contact.
 
-    Args:
-        setting: what holds over the step.
-        law: of the pair.
-        contact: along the free motion.
-        motions: of the sides that can move.
-        duration: of the stretch [s].
+    Attributes:
         spared: 1 for a contact that gives no impulse.
         plastic: 1 where it does not rebound.
         force: (3,) with which the contact acted at the end of the last step [N].
         same: whether both sides are of one tree of joints.
         coupled: whether friction may act strongly on the normal velocity.
     """
+
+    spared: Expr
+    plastic: Expr
+    force: Expr
+    same: bool
+    coupled: bool
+
+
+def prepare(
+    setting: Setting, law: Law, contact: Contact, motions: Moving, duration: Expr, conditions: Conditions
+) -> ContactRow:
+    """The row of a contact along the free motions of its moving sides, over a stretch of ``duration`` [s]."""
     scheme, knob, half = setting.scheme, setting.knob, duration / 2
-    touch = _touch(setting, law, contact, motions, duration, spared, plastic)
+    spared, same = conditions.spared, conditions.same
+    touch = _touch(setting, law, contact, motions, duration, conditions)
     row_time = half + touch.leaving * (touch.time - half)
     frame, applied = contact.meeting.frame(row_time), contact.meeting.frame(touch.leaving * touch.time)
     sides = make_sides(motions, row_time, frame, applied)
     push, twist = symmetric_mobilities(sides, same)
     k_normal, *k_others = inverse_masses(sides, frame.normal, push, twist)
     slack = ca.if_else(spared, ANY, _slack(setting, contact, touch))
-    free = ca.dot(frame.normal, free_slip(sides, motions))
+    slip = free_slip(sides, motions)
+    free = ca.dot(frame.normal, slip)
     away = ca.fmin(free - (contact.end + slack) / duration, 0)
     softness, target = _normal_target(law, contact, duration, touch, k_normal, away, knob)
     landing = _landing(contact, duration, touch.time, target, free)
     answer = answer_of(sides, applied.normal, same)
     parts = yields(sides, frame.normal, answer)
-    weight, load = LOADED * setting.reference / k_normal, ca.dot(applied.normal, force)
+    weight, load = LOADED * setting.reference / k_normal, ca.dot(applied.normal, conditions.force)
     lasts = _lasts(setting, law, contact, touch.leaving, load > weight)
     target = ca.if_else(lasts, -_parting(setting, contact, k_normal, ca.fmax(load, weight), duration), target)
     return ContactRow(
@@ -103,8 +102,8 @@ def prepare(
         width=width_of(setting, contact),
         knob=knob,
         same=same,
-        coupling=coupling_of(push, frame.normal, law.friction, softness) if coupled else None,
-        paradox=pulls_together(push, frame.normal, law.friction, free_slip(sides, motions)) if coupled else ca.SX(0),
+        coupling=coupling_of(push, frame.normal, law.friction, softness) if conditions.coupled else None,
+        paradox=pulls_together(push, frame.normal, law.friction, slip) if conditions.coupled else ca.SX(0),
     )
 
 
@@ -136,19 +135,15 @@ class _Touch:
 
 
 def _touch(
-    setting: Setting,
-    law: Law,
-    contact: Contact,
-    motions: Moving,
-    duration: Expr,
-    spared: Expr,
-    plastic: Expr,
+    setting: Setting, law: Law, contact: Contact, motions: Moving, duration: Expr, conditions: Conditions
 ) -> _Touch:
     time = contact.time if setting.scheme.time_of_impact else ca.SX(0)
     velocity, acceleration, normal = at_touch(contact, motions, time)
     pull = ca.dot(normal, acceleration)
-    rebound = law.restitution * (1 - plastic) * positive(-ca.dot(normal, velocity), setting.knob)
-    hit = ca.if_else(spared, 0, contact.hit)  # at the end of a stretch rounding decides whether a spared one meets
+    rebound = law.restitution * (1 - conditions.plastic) * positive(-ca.dot(normal, velocity), setting.knob)
+    hit = ca.if_else(
+        conditions.spared, 0, contact.hit
+    )  # at the end of a stretch rounding decides whether a spared one meets
     chi = _leaves(rebound, pull, duration - time, setting.reference, setting.scheme.dt, setting.knob)
     return _Touch(time, acceleration, normal, pull, rebound, hit, hit * chi)
 
