@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PHYSICS = {"course", "shapes", "heightfield", "world", "state", "rotation", "free_rotation", "smooth", "collide", "motion", "step"}
-PHYSICS |= {"rollout", "joints", "controllers"}
+PHYSICS = {"course", "shapes", "heightfield", "world", "state", "rotation", "smooth", "collide", "motion", "step"}
+PHYSICS |= {"free_rotation", "rollout", "joints", "controllers"}
 RUNTIME = set(sys.stdlib_module_names)
 
 
