@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,12 +11,14 @@ import casadi as ca
 from symphys.collide.contact import UNMOVED, Contact, Shift
 from symphys.joints import linkages
 from symphys.motion import Held, Motion, apply
+from symphys.step.along import Along
+from symphys.step.arrival import Made, arrival
 from symphys.step.axis import AxisRow
-from symphys.step.chart import body_shifts
 from symphys.step.impulse import Impulse
 from symphys.step.jointed import Trees
+from symphys.step.kinematics import Arrived
 from symphys.step.lock import LockRow
-from symphys.step.momentum import Momenta, Momentum, Moved, Rates, States
+from symphys.step.momentum import Moved, Rates, States
 from symphys.step.pgs import Row
 from symphys.step.pieces import Pieces
 from symphys.step.row import ContactRow, Side
@@ -75,20 +77,31 @@ def _delayed(late: Displaced, row: ContactRow, k: int, impulses: list[Impulse], 
     return Shift(late.linear - early * side.inverse_mass * force, late.angular - early * apply(turning, torque))
 
 
+@dataclass(frozen=True)
+class Closed:
+    """What the pass comes to.
+
+    Attributes:
+        shifts: displacements of bodies that are not part of a tree.
+        arrived: of each body of a tree where it comes to.
+        made: of each body of a tree what joints did to its displacement. Velocities are not touched.
+    """
+
+    shifts: Mapping[int, Shift]
+    arrived: Mapping[int, Arrived]
+    made: Mapping[int, Made]
+
+
 def close_gaps(
     scene: Scene,
     trees: Trees,
     rows: Sequence[tuple[Row, Contact, Impulse]],
     joints: Sequence[Row],
     moved: Sequence[Displaced],
-) -> tuple[Shifts, Momenta]:
+) -> Closed:
     """Gauss-Seidel on the displacements until no rigid contact overlaps, and those that last do not gape; then joints.
 
-    What is on a tree is pushed along the tree's coordinates, so that joints are left with errors of third order only.
-
-    Returns:
-        The displacements, and what joints did to them as momenta times a time: mass [kg m] and inertia [kg m^2] times
-        displacement. Velocities are not touched.
+    What is on a tree is pushed along the tree's coordinates. Joints that close loops push along them too.
     """
     do, scheme = scene.pieces.do, scene.setting.scheme
     rigid = tuple(
@@ -98,19 +111,29 @@ def close_gaps(
     context = Passing(trees.motions, rigid, limits, scheme.push_out)
     before: Pushed = tuple(moved), tuple(ca.SX(0) for _ in rigid)
     along, _ = scene.pieces.repeat(scheme.position_sweeps, _push_all, context, before)
-    shifts = _shifts(scene, trees, along)
-    none = Momentum(ca.SX.zeros(3), ca.SX.zeros(3))
-    locks = tuple(each for each in joints if not _of_tree(each))
-    return scene.pieces.repeat(scheme.position_sweeps, _fit_all, locks, (shifts, tuple(none for _ in shifts)))
+    loops = Fitting(trees.motions, tuple(each for each in joints if not _of_tree(each)))
+    looped = {each.carriers[0] for each in loops.loops}
+    still = tuple(do(_still, each) if i in looped else None for i, each in enumerate(along))
+    along, by_loops = scene.pieces.repeat(scheme.position_sweeps, _fit_all, loops, (along, still))
+    return _closed(scene, trees, along, by_loops)
 
 
-def _shifts(scene: Scene, trees: Trees, along: Sequence[Displaced]) -> Shifts:
-    """Of all bodies, those of trees from displacements along the tree's coordinates."""
-    found = list(along)
-    for tree, chart in zip(linkages(scene.world.joints), trees.charts, strict=True):
-        for body, shift in zip(tree.bodies, body_shifts(scene.pieces, chart, along[tree.root]), strict=True):
-            found[body] = shift
-    return tuple(found)  # type: ignore[arg-type]
+def _closed(scene: Scene, trees: Trees, along: Sequence[Displaced], by_loops: Sequence[Rates | None]) -> Closed:
+    shifts = {i: each for i, each in enumerate(along) if isinstance(each, Shift)}
+    arrived, made, joints = dict[int, Arrived](), dict[int, Made](), scene.world.joints
+    for tree, chart in zip(linkages(joints), trees.charts, strict=True):
+        displaced = along[tree.root]
+        assert isinstance(displaced, Rates)
+        own = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
+        motions = [trees.motions[i] for i in tree.bodies]
+        places, gained = arrival(scene.pieces, tree, own, chart, motions, displaced, by_loops[tree.root])
+        arrived |= zip(tree.bodies, places, strict=True)
+        made |= zip(tree.bodies, gained, strict=True)
+    return Closed(shifts, arrived, made)
+
+
+def _still(along: Rates) -> Rates:
+    return Rates(ca.SX(along.numbers.size1(), 1))
 
 
 Pushed = tuple[tuple[Displaced, ...], tuple[Expr, ...]]
@@ -203,6 +226,37 @@ def _back(row: AxisRow, along: Rates) -> Rates:
     return Rates(along.numbers + ca.mtimes(row.of_tree.gain, row.fitting(moved)))
 
 
+@dataclass(frozen=True)
+class Fitting:
+    """What stays the same over the sweeps of the pass over joints that close loops."""
+
+    motions: tuple[Motion, ...]
+    loops: tuple[Row, ...]
+
+
+Fitted = tuple[tuple[Displaced, ...], tuple[Rates | None, ...]]
+"""Displacements, and of each tree what locks did to them."""
+
+
+def _fit_all(pieces: Pieces, context: Fitting, state: Fitted) -> Fitted:
+    """One pass over joints that close loops, and their limits."""
+    along, made = list(state[0]), list(state[1])
+    for each in context.loops:
+        root = each.carriers[0]
+        moved = tuple(pieces.do(_displaced, context.motions[i].held, along[root]) for i in each.bodies)
+        along[root], made[root] = pieces.do(_fit, each.row, moved, along[root], made[root])
+    return tuple(along), tuple(made)
+
+
+def _fit(row: LockRow | AxisRow, moved: Shifts, along: Rates, made: Rates) -> tuple[Rates, Rates]:
+    """Displacements after which the joint fits, and what locks did to them."""
+    impulse = Along(row.fitting(_relative(row, moved)))
+    fitted = row.given(tuple(along for _ in moved), impulse)[0]
+    if not isinstance(row, LockRow):
+        return fitted, made
+    return fitted, Rates(made.numbers + fitted.numbers - along.numbers)
+
+
 def _relative(row: LockRow | AxisRow, moved: Shifts) -> Expr:
     """Of the first side against the second along the row's directions, to third order in the rotation."""
     linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
@@ -210,25 +264,3 @@ def _relative(row: LockRow | AxisRow, moved: Shifts) -> Expr:
         linear += side.sign * (shift.linear + ca.cross(shift.angular, side.arm))
         angular += side.sign * shift.angular
     return row.seen.forwards(linear, angular)
-
-
-def _fit_all(pieces: Pieces, locks: tuple[Row, ...], state: tuple[Shifts, Momenta]) -> tuple[Shifts, Momenta]:
-    """One pass over what joints lock."""
-    shifts, made = list(state[0]), list(state[1])
-    for each in locks:
-        own = tuple(shifts[i] for i in each.bodies), tuple(made[i] for i in each.bodies)
-        for i, shift, momentum in zip(each.bodies, *pieces.do(_fit, each.row, *own), strict=True):
-            shifts[i], made[i] = shift, momentum
-    return tuple(shifts), tuple(made)
-
-
-def _fit(row: LockRow | AxisRow, moved: Shifts, made: Momenta) -> tuple[Shifts, Momenta]:
-    """Displacements after which the joint fits."""
-    push, twist = row.given_along.split(row.fitting(_relative(row, moved)))
-    fitted, gained = [], []
-    for side, shift, m in zip(row.sides, moved, made, strict=True):
-        linear, angular = side.sign * push, side.sign * (ca.cross(side.impulse_arm, push) + twist)
-        turn = apply(side.inverse_inertia, angular)
-        fitted.append(Shift(shift.linear + side.inverse_mass * linear, shift.angular + turn))
-        gained.append(Momentum(m.velocity + side.inverse_mass * linear, m.angular + angular))
-    return tuple(fitted), tuple(gained) if isinstance(row, LockRow) else made
