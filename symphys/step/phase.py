@@ -19,10 +19,11 @@ from symphys.step.holding import fitting, hold, keep_up, kept
 from symphys.step.impulse import ZERO, Impulse
 from symphys.step.jointed import JointRow, Trees, joint_rows, make_trees, momenta_of, resumed
 from symphys.step.kinematics import Arrived
+from symphys.step.loops import Displaced
 from symphys.step.momentum import Momenta, Momentum
 from symphys.step.paths import bodies_of, expected_motions, free_motions, jointed_bodies, look
 from symphys.step.pgs import Row, Solution, begin, relax
-from symphys.step.position import Closed, Displaced, close_gaps, displacements
+from symphys.step.position import Closed, close_gaps, displacements
 from symphys.step.row import ContactRow
 from symphys.step.rows import prepare
 from symphys.step.scene import Scene, State

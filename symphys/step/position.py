@@ -10,14 +10,13 @@ import casadi as ca
 
 from symphys.collide.contact import UNMOVED, Contact, Shift
 from symphys.joints import linkages
-from symphys.motion import Held, Motion, apply
-from symphys.step.along import Along
+from symphys.motion import Motion, apply
 from symphys.step.arrival import Made, arrival
 from symphys.step.axis import AxisRow
 from symphys.step.impulse import Impulse
 from symphys.step.jointed import Trees
 from symphys.step.kinematics import Arrived
-from symphys.step.lock import LockRow
+from symphys.step.loops import Displaced, Shifts, close_loops, displaced
 from symphys.step.momentum import Moved, Rates, States
 from symphys.step.pgs import Row
 from symphys.step.pieces import Pieces
@@ -26,12 +25,6 @@ from symphys.step.scene import Scene
 
 Expr = Any
 """casadi SX, MX or DM"""
-
-Shifts = tuple[Shift, ...]
-
-
-Displaced = Shift | Rates | None
-"""Of a body; of a tree along its coordinates, at its root; None for other bodies of a tree."""
 
 
 def displacements(
@@ -111,10 +104,8 @@ def close_gaps(
     context = Passing(trees.motions, rigid, limits, scheme.push_out)
     before: Pushed = tuple(moved), tuple(ca.SX(0) for _ in rigid)
     along, _ = scene.pieces.repeat(scheme.position_sweeps, _push_all, context, before)
-    loops = Fitting(trees.motions, tuple(each for each in joints if not _of_tree(each)))
-    looped = {each.carriers[0] for each in loops.loops}
-    still = tuple(do(_still, each) if i in looped else None for i, each in enumerate(along))
-    along, by_loops = scene.pieces.repeat(scheme.position_sweeps, _fit_all, loops, (along, still))
+    others = tuple(each for each in joints if not _of_tree(each))
+    along, by_loops = close_loops(scene.pieces, scheme.position_sweeps, trees.motions, others, along)
     return _closed(scene, trees, along, by_loops)
 
 
@@ -122,18 +113,14 @@ def _closed(scene: Scene, trees: Trees, along: Sequence[Displaced], by_loops: Se
     shifts = {i: each for i, each in enumerate(along) if isinstance(each, Shift)}
     arrived, made, joints = dict[int, Arrived](), dict[int, Made](), scene.world.joints
     for tree, chart in zip(linkages(joints), trees.charts, strict=True):
-        displaced = along[tree.root]
-        assert isinstance(displaced, Rates)
+        ended = along[tree.root]
+        assert isinstance(ended, Rates)
         own = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
         motions = [trees.motions[i] for i in tree.bodies]
-        places, gained = arrival(scene.pieces, tree, own, chart, motions, displaced, by_loops[tree.root])
+        places, gained = arrival(scene.pieces, tree, own, chart, motions, ended, by_loops[tree.root])
         arrived |= zip(tree.bodies, places, strict=True)
         made |= zip(tree.bodies, gained, strict=True)
     return Closed(shifts, arrived, made)
-
-
-def _still(along: Rates) -> Rates:
-    return Rates(ca.SX(along.numbers.size1(), 1))
 
 
 Pushed = tuple[tuple[Displaced, ...], tuple[Expr, ...]]
@@ -166,24 +153,15 @@ def _lasts(row: ContactRow, impulse: Impulse) -> Expr:
     return ca.logic_and(row.lasts, impulse.normal > row.load)
 
 
-def _displaced(held: Held | None, along: Displaced) -> Shift:
-    """A body's displacement."""
-    if held is not None and isinstance(along, Rates):
-        more = apply(held.see, along.numbers)
-        return Shift(more[:3], more[3:])
-    assert isinstance(along, Shift)
-    return along
-
-
 def _push_all(pieces: Pieces, context: Passing, state: Pushed) -> Pushed:
     """One pass over all rigid contacts and limits."""
     along, pushes = list(state[0]), list(state[1])
     for k, (each, contact, lasts) in enumerate(context.rigid):
         own = tuple(along[i] for i in each.carriers)
-        moved = tuple(pieces.do(_displaced, context.motions[i].held, a) for i, a in zip(each.bodies, own, strict=True))
+        moved = tuple(pieces.do(displaced, context.motions[i].held, a) for i, a in zip(each.bodies, own, strict=True))
         after, pushes[k] = pieces.do(_push, each.row, contact, lasts, moved, own, pushes[k], context.share)
-        for i, displaced in zip(each.carriers, after, strict=True):
-            along[i] = displaced
+        for i, own_after in zip(each.carriers, after, strict=True):
+            along[i] = own_after
     for each in context.limits:
         along[each.carriers[0]] = pieces.do(_back, each.row, along[each.carriers[0]])
     return tuple(along), tuple(pushes)
@@ -224,43 +202,3 @@ def _back(row: AxisRow, along: Rates) -> Rates:
     assert row.of_tree is not None
     moved = ca.mtimes(row.of_tree.see, along.numbers)
     return Rates(along.numbers + ca.mtimes(row.of_tree.gain, row.fitting(moved)))
-
-
-@dataclass(frozen=True)
-class Fitting:
-    """What stays the same over the sweeps of the pass over joints that close loops."""
-
-    motions: tuple[Motion, ...]
-    loops: tuple[Row, ...]
-
-
-Fitted = tuple[tuple[Displaced, ...], tuple[Rates | None, ...]]
-"""Displacements, and of each tree what locks did to them."""
-
-
-def _fit_all(pieces: Pieces, context: Fitting, state: Fitted) -> Fitted:
-    """One pass over joints that close loops, and their limits."""
-    along, made = list(state[0]), list(state[1])
-    for each in context.loops:
-        root = each.carriers[0]
-        moved = tuple(pieces.do(_displaced, context.motions[i].held, along[root]) for i in each.bodies)
-        along[root], made[root] = pieces.do(_fit, each.row, moved, along[root], made[root])
-    return tuple(along), tuple(made)
-
-
-def _fit(row: LockRow | AxisRow, moved: Shifts, along: Rates, made: Rates) -> tuple[Rates, Rates]:
-    """Displacements after which the joint fits, and what locks did to them."""
-    impulse = Along(row.fitting(_relative(row, moved)))
-    fitted = row.given(tuple(along for _ in moved), impulse)[0]
-    if not isinstance(row, LockRow):
-        return fitted, made
-    return fitted, Rates(made.numbers + fitted.numbers - along.numbers)
-
-
-def _relative(row: LockRow | AxisRow, moved: Shifts) -> Expr:
-    """Of the first side against the second along the row's directions, to third order in the rotation."""
-    linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
-    for side, shift in zip(row.sides, moved, strict=True):
-        linear += side.sign * (shift.linear + ca.cross(shift.angular, side.arm))
-        angular += side.sign * shift.angular
-    return row.seen.forwards(linear, angular)
