@@ -15,7 +15,6 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.collide.contact import Shift
 from symphys.joints import Linkage
 from symphys.motion import Held, Motion, apply
 from symphys.step import screws
@@ -100,18 +99,8 @@ def body_momenta(pieces: Pieces, chart: Chart, rates: Any) -> tuple[Momentum, ..
     return tuple(pieces.do(_momentum, *each) for each in zip(_moving(pieces, chart, rates), chart.bodies, strict=True))
 
 
-def body_shifts(pieces: Pieces, chart: Chart, along: Any) -> tuple[Shift, ...]:
-    """Of the bodies of a tree, from displacements along its coordinates."""
-    return tuple(pieces.do(_shift, *each) for each in zip(_moving(pieces, chart, along), chart.bodies, strict=True))
-
-
 def _moving(pieces: Pieces, chart: Chart, rates: Any) -> tuple[Screw, ...]:
-    apart = pieces.do(_apart, numbering(chart.tree), rates.numbers)
-    return moving(pieces, chart.tree, chart.matrix, apart).screws
-
-
-def _shift(screw: Screw, body: Placed) -> Shift:
-    return Shift(*screws.at_place(screw.parts, body.place))
+    return moving(pieces, chart.tree, chart.matrix, pieces.do(apart, numbering(chart.tree), rates.numbers)).screws
 
 
 def _momentum(screw: Screw, body: Placed) -> Momentum:
@@ -134,6 +123,7 @@ def _joined(numbering: Numbering, rates: Solved) -> Expr:
     return spread(numbering, (rates.r, *rates.z))
 
 
-def _apart(numbering: Numbering, numbers: Expr) -> Solved:
-    r, *z = (numbers[list(each)] for each in numbering)
+def apart(numbering: Numbering, numbers: Expr) -> Solved:
+    """What sweeps know of a tree, by its root and limbs."""
+    r, *z = (numbers[list(each), 0] for each in numbering)
     return Solved(r, tuple(z))

@@ -9,6 +9,7 @@ import casadi as ca
 
 from symphys.joints import Joint, linkages, tree_joints
 from symphys.step.along import Along
+from symphys.step.arrival import Made
 from symphys.step.articulate import consistent
 from symphys.step.axis import AxisRow
 from symphys.step.jointed import LIMITS, JointRow, own
@@ -138,21 +139,25 @@ def _added(total: tuple[Expr, Expr], wrench: tuple[Expr, Expr]) -> tuple[Expr, E
     return total[0] + wrench[0], total[1] + wrench[1]
 
 
-def keep_up(scene: Scene, momenta: Momenta, made: Momenta, struck: Struck, duration: Expr) -> Momenta:
+def keep_up(scene: Scene, momenta: Momenta, made: Mapping[int, Made], struck: Struck, duration: Expr) -> Momenta:
     """The momenta, with those that the displacements by joints stand for (as SHAKE has it), so that spin is kept.
 
-    Not in a stretch with an impact, where they make up for impulses that act late. They are no part of the forces that
-    the next sweeps start from.
+    Not those by loops in a stretch with an impact, where they make up for impulses that act late. They are no part of
+    the forces that the next sweeps start from.
     """
     found, dt = list(momenta), scene.setting.scheme.dt
-    for i in sorted({i for joint in scene.world.joints for i in joint.bodies}):
-        found[i] = scene.pieces.do(_kept_up, momenta[i], made[i], of_body(struck, i), duration, dt)
+    for i, more in made.items():
+        found[i] = scene.pieces.do(_kept_up, momenta[i], more, of_body(struck, i), duration, dt)
     return tuple(found)
 
 
-def _kept_up(momentum: Momentum, made: Momentum, impact: Expr, duration: Expr, dt: float) -> Momentum:
-    share = ca.if_else(impact, 0, duration / dt**2)
-    return Momentum(momentum.velocity + share * made.velocity, momentum.angular + share * made.angular)
+def _kept_up(momentum: Momentum, made: Made, impact: Expr, duration: Expr, dt: float) -> Momentum:
+    velocity, angular = made.by_tree.velocity, made.by_tree.angular
+    if made.by_loops is not None:
+        velocity += ca.if_else(impact, 0, made.by_loops.velocity)
+        angular += ca.if_else(impact, 0, made.by_loops.angular)
+    share = duration / dt**2
+    return Momentum(momentum.velocity + share * velocity, momentum.angular + share * angular)
 
 
 def fitting(

@@ -111,11 +111,10 @@ def joint_rows(
         moving = tuple(trees.motions[i] for i in joint.bodies)
         bare = tuple(paths[i] for i in joint.bodies)
         sockets, same = do(sockets_of, joint, bare), trees.same(joint.bodies)
-        if not joint.soft:
-            fitted.append(trees.row(joint.bodies, do(lock_row, setting, sockets, bare, stretch, False)))
         if index not in places:
-            lock = do(lock_row, setting, sockets, moving, stretch, same)
-            visited.append(JointRow(trees.row(joint.bodies, lock), f"{joint.name}.lock"))
+            lock = trees.row(joint.bodies, do(lock_row, setting, sockets, moving, stretch, same))
+            visited.append(JointRow(lock, f"{joint.name}.lock"))
+            fitted += [] if joint.soft else [lock]
         for k in range(len(joint.kind.coordinates)) if joint.acting else ():
             states = tuple(trees.states[trees.carriers[i]] for i in joint.bodies)
             at = do(along_coordinate, sockets, k, moving, states, duration, places.get(index, same))

@@ -172,7 +172,7 @@ def summed_down(above: Above, axes: Columns, rates: Expr, root: Expr) -> list[Ex
     start = 0
     for parent, columns in zip(above, axes, strict=True):
         end = start + columns.size2()
-        found.append((root if parent is None else found[parent]) + ca.mtimes(columns, rates[start:end]))
+        found.append((root if parent is None else found[parent]) + ca.mtimes(columns, rates[start:end, 0]))
         start = end
     return found
 

@@ -18,10 +18,12 @@ from symphys.step.coupled import may_couple
 from symphys.step.holding import fitting, hold, keep_up, kept
 from symphys.step.impulse import ZERO, Impulse
 from symphys.step.jointed import JointRow, Trees, joint_rows, make_trees, momenta_of, resumed
+from symphys.step.kinematics import Arrived
+from symphys.step.loops import Displaced
 from symphys.step.momentum import Momenta, Momentum
 from symphys.step.paths import bodies_of, expected_motions, free_motions, jointed_bodies, look
 from symphys.step.pgs import Row, Solution, begin, relax
-from symphys.step.position import Displaced, close_gaps, displacements
+from symphys.step.position import Closed, close_gaps, displacements
 from symphys.step.row import ContactRow
 from symphys.step.rows import Conditions, prepare
 from symphys.step.scene import Scene, State
@@ -85,16 +87,16 @@ def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = (),
 
     # positions
     moved = displacements(scene, trees, rows, given, solved.momenta, impulses, duration)
-    shifts, made = close_gaps(scene, trees, list(zip(rows, contacts, impulses, strict=True)), fitted, moved)
+    closed = close_gaps(scene, trees, list(zip(rows, contacts, impulses, strict=True)), fitted, moved)
 
     # the next state
     values: State = {"lag": half}
     resting = _store_forces(scene, rows, impulses, kick, values)
-    poses, momenta = _poses(scene, motions, moved, shifts, momenta)
+    poses, momenta = _poses(scene, motions, moved, closed, momenta)
     if scene.world.joints:
         struck, forces = kept(scene, rows, joints, by_joints, x, kick)
         hold(scene, forces, poses, resting)
-        momenta = keep_up(scene, momenta, made, struck, duration)
+        momenta = keep_up(scene, momenta, closed.made, struck, duration)
         warm = scene.setting.scheme.warm_start
         values |= forces if warm else {name: ca.SX.zeros(force.shape) for name, force in forces.items()}
     values |= _moving_bodies(scene, motions, momenta, resting, poses)
@@ -130,13 +132,17 @@ def _sweep(
 
 
 def _poses(
-    scene: Scene, motions: Sequence[Motion], moved: Sequence[Displaced], shifts: Sequence[Shift], momenta: Momenta
+    scene: Scene, motions: Sequence[Motion], moved: Sequence[Displaced], closed: Closed, momenta: Momenta
 ) -> tuple[list[tuple[Expr, Expr]], Momenta]:
     """(position, orientation) of all bodies at the end of the stretch, and momenta that turn with pushes."""
     poses, turned = list[tuple[Expr, Expr]](), list(momenta)
     jointed = jointed_bodies(scene.world)
-    for k, (motion, shift) in enumerate(zip(motions, shifts, strict=True)):
-        if k in jointed or isotropic(motion.inertia):
+    for k, motion in enumerate(motions):
+        if k in closed.arrived:
+            poses.append(scene.pieces.do(_arrived, motion, closed.arrived[k]))
+            continue
+        shift = closed.shifts[k]
+        if k in jointed or isotropic(scene.world.bodies[k].inertia):
             poses.append(scene.pieces.do(_pose, motion, shift))
         else:
             pose, turned[k] = scene.pieces.do(_free_pose, motion, moved[k], shift, momenta[k])
@@ -225,6 +231,10 @@ def _summed(total: tuple[Expr, Expr], row: ContactRow, k: int, force: Expr, torq
 
 def _pose(motion: Motion, shift: Shift) -> tuple[Expr, Expr]:
     return motion.position + shift.linear, rotation.turn(motion.orientation, shift.angular)
+
+
+def _arrived(motion: Motion, arrived: Arrived) -> tuple[Expr, Expr]:
+    return arrived.position, rotation.unit(rotation.multiply(arrived.turn, motion.orientation))
 
 
 def _free_pose(motion: Motion, moved: Shift, shift: Shift, momentum: Momentum) -> tuple[tuple[Expr, Expr], Momentum]:

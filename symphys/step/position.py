@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,13 +10,14 @@ import casadi as ca
 
 from symphys.collide.contact import UNMOVED, Contact, Shift
 from symphys.joints import linkages
-from symphys.motion import Held, Motion, apply
+from symphys.motion import Motion, apply
+from symphys.step.arrival import Made, arrival
 from symphys.step.axis import AxisRow
-from symphys.step.chart import body_shifts
 from symphys.step.impulse import Impulse
 from symphys.step.jointed import Trees
-from symphys.step.lock import LockRow
-from symphys.step.momentum import Momenta, Momentum, Moved, Rates, States
+from symphys.step.kinematics import Arrived
+from symphys.step.loops import Displaced, Shifts, close_loops, displaced
+from symphys.step.momentum import Moved, Rates, States
 from symphys.step.pgs import Row
 from symphys.step.pieces import Pieces
 from symphys.step.row import ContactRow, Side
@@ -24,12 +25,6 @@ from symphys.step.scene import Scene
 
 Expr = Any
 """casadi SX, MX or DM"""
-
-Shifts = tuple[Shift, ...]
-
-
-Displaced = Shift | Rates | None
-"""Of a body; of a tree along its coordinates, at its root; None for other bodies of a tree."""
 
 
 def displacements(
@@ -75,20 +70,31 @@ def _delayed(late: Displaced, row: ContactRow, k: int, impulses: list[Impulse], 
     return Shift(late.linear - early * side.inverse_mass * force, late.angular - early * apply(turning, torque))
 
 
+@dataclass(frozen=True)
+class Closed:
+    """What the pass comes to.
+
+    Attributes:
+        shifts: displacements of bodies that are not part of a tree.
+        arrived: of each body of a tree where it comes to.
+        made: of each body of a tree what joints did to its displacement. Velocities are not touched.
+    """
+
+    shifts: Mapping[int, Shift]
+    arrived: Mapping[int, Arrived]
+    made: Mapping[int, Made]
+
+
 def close_gaps(
     scene: Scene,
     trees: Trees,
     rows: Sequence[tuple[Row, Contact, Impulse]],
     joints: Sequence[Row],
     moved: Sequence[Displaced],
-) -> tuple[Shifts, Momenta]:
+) -> Closed:
     """Gauss-Seidel on the displacements until no rigid contact overlaps, and those that last do not gape; then joints.
 
-    What is on a tree is pushed along the tree's coordinates, so that joints are left with errors of third order only.
-
-    Returns:
-        The displacements, and what joints did to them as momenta times a time: mass [kg m] and inertia [kg m^2] times
-        displacement. Velocities are not touched.
+    What is on a tree is pushed along the tree's coordinates. Joints that close loops push along them too.
     """
     do, scheme = scene.pieces.do, scene.setting.scheme
     rigid = tuple(
@@ -98,19 +104,23 @@ def close_gaps(
     context = Passing(trees.motions, rigid, limits, scheme.push_out)
     before: Pushed = tuple(moved), tuple(ca.SX(0) for _ in rigid)
     along, _ = scene.pieces.repeat(scheme.position_sweeps, _push_all, context, before)
-    shifts = _shifts(scene, trees, along)
-    none = Momentum(ca.SX.zeros(3), ca.SX.zeros(3))
-    locks = tuple(each for each in joints if not _of_tree(each))
-    return scene.pieces.repeat(scheme.position_sweeps, _fit_all, locks, (shifts, tuple(none for _ in shifts)))
+    others = tuple(each for each in joints if not _of_tree(each))
+    along, by_loops = close_loops(scene.pieces, scheme.position_sweeps, trees.motions, others, along)
+    return _closed(scene, trees, along, by_loops)
 
 
-def _shifts(scene: Scene, trees: Trees, along: Sequence[Displaced]) -> Shifts:
-    """Of all bodies, those of trees from displacements along the tree's coordinates."""
-    found = list(along)
-    for tree, chart in zip(linkages(scene.world.joints), trees.charts, strict=True):
-        for body, shift in zip(tree.bodies, body_shifts(scene.pieces, chart, along[tree.root]), strict=True):
-            found[body] = shift
-    return tuple(found)  # type: ignore[arg-type]
+def _closed(scene: Scene, trees: Trees, along: Sequence[Displaced], by_loops: Sequence[Rates | None]) -> Closed:
+    shifts = {i: each for i, each in enumerate(along) if isinstance(each, Shift)}
+    arrived, made, joints = dict[int, Arrived](), dict[int, Made](), scene.world.joints
+    for tree, chart in zip(linkages(joints), trees.charts, strict=True):
+        ended = along[tree.root]
+        assert isinstance(ended, Rates)
+        own = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
+        motions = [trees.motions[i] for i in tree.bodies]
+        places, gained = arrival(scene.pieces, tree, own, chart, motions, ended, by_loops[tree.root])
+        arrived |= zip(tree.bodies, places, strict=True)
+        made |= zip(tree.bodies, gained, strict=True)
+    return Closed(shifts, arrived, made)
 
 
 Pushed = tuple[tuple[Displaced, ...], tuple[Expr, ...]]
@@ -143,24 +153,15 @@ def _lasts(row: ContactRow, impulse: Impulse) -> Expr:
     return ca.logic_and(row.lasts, impulse.normal > row.load)
 
 
-def _displaced(held: Held | None, along: Displaced) -> Shift:
-    """A body's displacement."""
-    if held is not None and isinstance(along, Rates):
-        more = apply(held.see, along.numbers)
-        return Shift(more[:3], more[3:])
-    assert isinstance(along, Shift)
-    return along
-
-
 def _push_all(pieces: Pieces, context: Passing, state: Pushed) -> Pushed:
     """One pass over all rigid contacts and limits."""
     along, pushes = list(state[0]), list(state[1])
     for k, (each, contact, lasts) in enumerate(context.rigid):
         own = tuple(along[i] for i in each.carriers)
-        moved = tuple(pieces.do(_displaced, context.motions[i].held, a) for i, a in zip(each.bodies, own, strict=True))
+        moved = tuple(pieces.do(displaced, context.motions[i].held, a) for i, a in zip(each.bodies, own, strict=True))
         after, pushes[k] = pieces.do(_push, each.row, contact, lasts, moved, own, pushes[k], context.share)
-        for i, displaced in zip(each.carriers, after, strict=True):
-            along[i] = displaced
+        for i, own_after in zip(each.carriers, after, strict=True):
+            along[i] = own_after
     for each in context.limits:
         along[each.carriers[0]] = pieces.do(_back, each.row, along[each.carriers[0]])
     return tuple(along), tuple(pushes)
@@ -201,34 +202,3 @@ def _back(row: AxisRow, along: Rates) -> Rates:
     assert row.of_tree is not None
     moved = ca.mtimes(row.of_tree.see, along.numbers)
     return Rates(along.numbers + ca.mtimes(row.of_tree.gain, row.fitting(moved)))
-
-
-def _relative(row: LockRow | AxisRow, moved: Shifts) -> Expr:
-    """Of the first side against the second along the row's directions, to third order in the rotation."""
-    linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
-    for side, shift in zip(row.sides, moved, strict=True):
-        linear += side.sign * (shift.linear + ca.cross(shift.angular, side.arm))
-        angular += side.sign * shift.angular
-    return row.seen.forwards(linear, angular)
-
-
-def _fit_all(pieces: Pieces, locks: tuple[Row, ...], state: tuple[Shifts, Momenta]) -> tuple[Shifts, Momenta]:
-    """One pass over what joints lock."""
-    shifts, made = list(state[0]), list(state[1])
-    for each in locks:
-        own = tuple(shifts[i] for i in each.bodies), tuple(made[i] for i in each.bodies)
-        for i, shift, momentum in zip(each.bodies, *pieces.do(_fit, each.row, *own), strict=True):
-            shifts[i], made[i] = shift, momentum
-    return tuple(shifts), tuple(made)
-
-
-def _fit(row: LockRow | AxisRow, moved: Shifts, made: Momenta) -> tuple[Shifts, Momenta]:
-    """Displacements after which the joint fits."""
-    push, twist = row.given_along.split(row.fitting(_relative(row, moved)))
-    fitted, gained = [], []
-    for side, shift, m in zip(row.sides, moved, made, strict=True):
-        linear, angular = side.sign * push, side.sign * (ca.cross(side.impulse_arm, push) + twist)
-        turn = apply(side.inverse_inertia, angular)
-        fitted.append(Shift(shift.linear + side.inverse_mass * linear, shift.angular + turn))
-        gained.append(Momentum(m.velocity + side.inverse_mass * linear, m.angular + angular))
-    return tuple(fitted), tuple(gained) if isinstance(row, LockRow) else made

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from laboratory import Lab, central_difference, value_and_gradient
-from linkage import ABOUT_Y, ABOUT_Z, Array, chain, hanging, separations
+from linkage import ABOUT_Y, ABOUT_Z, Array, chain, hanging, momenta, separations
 
 from symphys.joints import (
     FIXED,
@@ -225,3 +225,21 @@ def test_joints_fit_while_a_leg_lands() -> None:
     world = chain(3)
     states = Lab(world, Scheme(sweeps=20)).states(hanging(3, [0.5, 1.0, 1.5]), 2.0)
     assert separations(world, states).max() < 1e-3
+
+
+def test_a_soft_joint_of_two_free_bodies_keeps_its_limit() -> None:
+    """No tree holds them: what is beyond the limit is taken back, and no momentum is made."""
+    bodies = (Body("a", 1.0, (0.02, 0.03, 0.04)), Body("b", 2.0, (0.05, 0.04, 0.06)))
+    sockets = Socket((0, 0, -0.2), ABOUT_Y), Socket((0, 0, 0.2), ABOUT_Y)
+    joint = Joint("j", HINGE, 0, 1, sockets, limits=Limits(upper=0.3), frequency=5.0, damping=1.0)
+    lab = Lab(World(bodies, gravity=(0, 0, 0), joints=(joint,)), Scheme())
+    q = [np.cos(0.2), 0, np.sin(0.2), 0]
+    start = {"a.position": [0.2 * np.sin(0.4), 0, 0.2 + 0.2 * np.cos(0.4)], "a.orientation": q}
+    states = lab.states(start, 0.5)
+    turns = [2 * np.arctan2(states[f"{name}.orientation"][:, 2], states[f"{name}.orientation"][:, 0]) for name in "ab"]
+    assert (turns[0] - turns[1])[0] == pytest.approx(0.4)
+    assert (turns[0] - turns[1])[1] == pytest.approx(0.3, abs=1e-6)
+    assert (turns[0] - turns[1])[1:].max() < 0.3 + 1e-6
+    linear, angular = momenta(lab.world, states)
+    assert np.abs(linear).max() < 1e-12
+    assert np.abs(angular).max() < 1e-12

