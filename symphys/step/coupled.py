@@ -6,7 +6,8 @@ Here both are found at once: the impulse that stops the slip if it lies in the c
 r = l (n + mu d), whose direction d is opposite to the slip that is left. (Acary and Brogliato, Numerical methods for
 nonsmooth dynamical systems, 2008, section 13.7, have such local solvers; the search for d by one step of projection and
 one of Newton's method in each visit is our own.) Where friction of this direction would pull the surfaces together
-(Painleve's paradox) no sliding impulse may exist, and sticking is preferred where it can be.
+(Painleve's paradox) no sliding impulse may exist, and sticking is preferred where it can be. A contact that opens
+without an impulse gives none.
 """
 
 from __future__ import annotations
@@ -84,9 +85,10 @@ def solve(row: ContactRow, coupling: Coupling, slip: Expr, old: Impulse) -> tupl
     stopping = given - ca.mtimes(coupling.inverse, error)
     press = ca.dot(n, stopping)
     hold = stopping - n * press
-    sticks = ca.logic_and(press > 0, ca.dot(hold, hold) <= (mu * press) ** 2)
-
     free = error - ca.mtimes(w, given)
+    closes = ca.dot(n, free) < 0
+    sticks = ca.logic_and(ca.logic_and(closes, press > 0), ca.dot(hold, hold) <= (mu * press) ** 2)
+
     wanted = old.tangent - row.tangent_mass * _across(error, n)
     direction = _turned(wanted / length(wanted), free, w, n, mu)
     load, _ = _load(direction, free, w, n, mu)
@@ -135,13 +137,13 @@ def may_couple(world: World, pair: Pair) -> bool:
 
     A body at whose centre of mass impulses through the point act with arm r answers with
     W_nt / W_nn <= |r| / (2 k), k the least radius of gyration. At a ball about its centre r is along the normal.
+    Bodies with joints are left to projections in turn: what an impulse does there is not symmetric, since it acts at
+    another instant than that at which velocities are asked for, and a robot that stands would not come to rest.
     """
-    if is_zero(pair.law.friction):
-        return False
-    held = {index for joint in world.joints for index in joint.bodies}
     sides = [(side.body, side.shape) for side in (pair.first, pair.second) if side.body is not None]
-    if any(body in held for body, _ in sides):
-        return True
+    held = {index for joint in world.joints for index in joint.bodies}
+    if is_zero(pair.law.friction) or any(body in held for body, _ in sides):
+        return False
     return max(_ratio(world.bodies[body], shape, pair.law.friction) for body, shape in sides) > STRONG
 
 

@@ -161,6 +161,7 @@ def _row(
     sides = make_sides(motions, now, frame, frame)
     resting = ca.if_else(touching, 0, UNREACHED)
     push, twist = symmetric_mobilities(sides, same)
+    masses = inverse_masses(sides, frame.normal, push, twist)
     return ContactRow(
         law,
         sides,
@@ -168,7 +169,7 @@ def _row(
         frame.normal,
         answer_of(sides, frame.normal, same),
         yields=ca.SX(1),
-        **effective_masses(*inverse_masses(sides, frame.normal, push, twist)),
+        **effective_masses(*masses),
         softness=ca.SX(0),
         target=ca.SX(UNREACHED) if law.soft else ca.if_else(struck, speed, resting),
         slip_target=ca.SX.zeros(3),

@@ -64,7 +64,7 @@ def prepare(
 ) -> ContactRow:
     """The row of a contact along the free motions of its moving sides, over a stretch of ``duration`` [s]."""
     scheme, knob, half = setting.scheme, setting.knob, duration / 2
-    spared, same = conditions.spared, conditions.same
+    spared, same, coupled = conditions.spared, conditions.same, conditions.coupled
     touch = _touch(setting, law, contact, motions, duration, conditions)
     row_time = half + touch.leaving * (touch.time - half)
     frame, applied = contact.meeting.frame(row_time), contact.meeting.frame(touch.leaving * touch.time)
@@ -102,8 +102,8 @@ def prepare(
         width=width_of(setting, contact),
         knob=knob,
         same=same,
-        coupling=coupling_of(push, frame.normal, law.friction, softness) if conditions.coupled else None,
-        paradox=pulls_together(push, frame.normal, law.friction, slip) if conditions.coupled else ca.SX(0),
+        coupling=coupling_of(push, frame.normal, law.friction, softness) if coupled else None,
+        paradox=pulls_together(push, frame.normal, law.friction, slip) if coupled else ca.SX(0),
     )
 
 
