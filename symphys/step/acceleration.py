@@ -49,17 +49,27 @@ class Cluster:
 
 def clusters(world: World, rows: Sequence[Row]) -> list[Cluster]:
     """Those of bodies that differ much in mass, or may: where a symbol decides it."""
-    groups = {k: {k} for k in range(len(world.bodies))}
-    links = [row.bodies for row in rows] + [joint.bodies for joint in world.joints]
-    for bodies in links:
-        joined = set().union(*(groups[k] for k in bodies))
-        groups |= dict.fromkeys(joined, joined)
+    roots = list(range(len(world.bodies)))
+    for bodies in [row.bodies for row in rows] + [joint.bodies for joint in world.joints]:
+        for k in bodies[1:]:
+            roots[_root(roots, k)] = _root(roots, bodies[0])
+    groups: dict[int, set[int]] = {}
+    for k in range(len(roots)):
+        groups.setdefault(_root(roots, k), set()).add(k)
     held = {k for joint in world.joints for k in joint.bodies}
-    apart = {min(group): group for group in groups.values() if _unequal(world, group) and not group & held}
+    apart = [group for group in groups.values() if _unequal(world, group) and not group & held]
     return [
         Cluster(tuple(sorted(group)), tuple(k for k, row in enumerate(rows) if group & set(row.bodies)))
-        for group in apart.values()
+        for group in apart
     ]
+
+
+def _root(roots: list[int], k: int) -> int:
+    """The representative of a body's group."""
+    while roots[k] != k:
+        roots[k] = roots[roots[k]]
+        k = roots[k]
+    return k
 
 
 def _unequal(world: World, group: set[int]) -> bool:

@@ -60,7 +60,7 @@ def deferred(scene: Scene, x: State, duration: Expr, cuts: Sequence[Cut]) -> Def
             struck = [cut.struck[j] for cut in cuts for j, other in enumerate(pairs) if body in bodies_of(other)]
             struck = struck if body in eccentric else []
             waits = do(_later, waits, fast, contact.time, first[body][0], tuple(struck))
-            if (room := _room(world, pair)) is not None:
+            if (room := _room(world, pair, eccentric)) is not None:
                 before = waits, chained, plastic
                 waits, chained, plastic = do(_driven, scene.setting, before, fast, contact, first[body], duration, room)
         found.append(waits)
@@ -68,9 +68,9 @@ def deferred(scene: Scene, x: State, duration: Expr, cuts: Sequence[Cut]) -> Def
     return Deferral(tuple(found), chained, plastic)
 
 
-def _room(world: World, pair: Pair) -> Expr | None:
+def _room(world: World, pair: Pair, eccentric: set[int]) -> Expr | None:
     """How far two balls that rebound may go into each other before they are parted [m]; None for other pairs."""
-    if pair.law.soft or is_zero(pair.law.restitution) or eccentric_bodies(world) & set(bodies_of(pair)):
+    if pair.law.soft or is_zero(pair.law.restitution) or eccentric & set(bodies_of(pair)):
         return None
     shapes = [world.surface(side) for side in (pair.first, pair.second) if side.body is not None]
     radii = [shape.radius for shape in shapes if isinstance(shape, Sphere)]
