@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 Expr = Any
 """casadi SX"""
 
-UNEQUAL = 8.0
+UNEQUAL = 20.0
 """Ratio of masses from which on plain sweeps are too slow."""
 EVERY = 4
 """Sweeps between two longer steps."""

@@ -31,8 +31,10 @@ if TYPE_CHECKING:
 Expr = Any
 """casadi SX, MX or DM"""
 
-STRONG = 0.75
-"""Ratio mu W_nt / W_nn up to which projections in turn converge well."""
+STRONG = 2.0
+"""Bound of mu W_nt / W_nn, which few contacts of a body reach, up to which projections in turn are taken.
+
+The corners of a box at rest converge sooner by those: a block pushed at mu = 1 is off by 1e-6 m, not 3e-5."""
 LEAST = 0.01
 """Of W_nn: the least effective inverse mass of a sliding contact."""
 FLAT = 1e-12
