@@ -35,6 +35,8 @@ EVERY = 4
 """Sweeps between two longer steps."""
 LONGEST = 1e4
 """Times the last change."""
+TINY = 1e-100
+"""[N s] whose inverse square is still a number: slopes are finite where nothing falls."""
 SETTLED = 1e-10
 """[m/s] changes of velocity below which nothing is repeated."""
 
@@ -114,7 +116,7 @@ def _of_row(
     press = now.normal - before.normal
     asked = row.target * press + ca.dot(row.slip_target, now.tangent - before.tangent)
     slope = sums[0] - asked + row.softness * now.normal * press
-    falls = ca.if_else(press < 0, now.normal / ca.fmax(-press, 1e-300), LONGEST)
+    falls = ca.if_else(press < 0, now.normal / ca.fmax(-press, TINY), LONGEST)
     return (slope, sums[1] + row.softness * press * press), ca.fmin(longest, falls)
 
 

@@ -140,11 +140,12 @@ def may_couple(world: World, pair: Pair) -> bool:
     A body at whose centre of mass impulses through the point act with arm r answers with
     W_nt / W_nn <= |r| / (2 k), k the least radius of gyration. At a ball about its centre r is along the normal.
     Bodies with joints are left to projections in turn: what an impulse does there is not symmetric, since it acts at
-    another instant than that at which velocities are asked for, and a robot that stands would not come to rest.
+    another instant than that at which velocities are asked for, and a robot that stands would not come to rest. So are
+    soft contacts, whose softness grows beyond all bounds towards the end of a step.
     """
     sides = [(side.body, side.shape) for side in (pair.first, pair.second) if side.body is not None]
     held = {index for joint in world.joints for index in joint.bodies}
-    if is_zero(pair.law.friction) or any(body in held for body, _ in sides):
+    if is_zero(pair.law.friction) or pair.law.soft or any(body in held for body, _ in sides):
         return False
     return max(_ratio(world.bodies[body], shape, pair.law.friction) for body, shape in sides) > STRONG
 
