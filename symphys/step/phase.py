@@ -59,13 +59,11 @@ class Phase:
     chained: Expr = NONE
 
 
-def advance(
-    scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = (), room: float = 0.0, plastic: Expr = NONE
-) -> Phase:
+def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = (), plastic: Expr = NONE) -> Phase:
     """The state after ``duration`` [s].
 
-    Pairs whose ``spared`` is 1 give no impulse: the stretch ends as they meet, or they wait for the next step and may
-    go into each other by ``room`` [m] more until then. Where ``plastic`` is 1 nothing rebounds.
+    Pairs whose ``spared`` is 1 give no impulse, since the stretch ends as they meet. Where ``plastic`` is 1 nothing
+    rebounds.
     """
     kick, half = scene.pieces.do(_times, duration, x["lag"])
 
@@ -79,8 +77,7 @@ def advance(
     trees = make_trees(scene, paths, free, half)
 
     # rows: where, when and how the surfaces meet, what acts along the coordinates of joints
-    conditions = _conditions(scene, x, trees, spared, room, plastic)
-    rows = _contact_rows(scene, trees, contacts, duration, conditions)
+    rows = _contact_rows(scene, x, trees, contacts, duration, spared or [ca.SX(0)] * len(contacts), plastic)
     joints, fitted = joint_rows(scene, trees, paths, duration, kick)
 
     # velocities: warm start, then sweeps
@@ -106,24 +103,20 @@ def advance(
     return Phase(values, tuple(rows), tuple(contacts), impulses, tuple(zip(solved.impulses, solved.last, strict=True)))
 
 
-def _conditions(
-    scene: Scene, x: State, trees: Trees, spared: Sequence[Expr], room: float, plastic: Expr
-) -> list[Conditions]:
-    """What the stretch makes of each pair."""
-    found = []
-    for pair, off in zip(scene.world.pairs, spared or [NONE] * len(scene.world.pairs), strict=True):
-        force, same, coupled = x[f"{pair.name}.force"], trees.same(bodies_of(pair)), may_couple(scene.world, pair)
-        found.append(Conditions(off, room, plastic, force, same, coupled))
-    return found
-
-
 def _contact_rows(
-    scene: Scene, trees: Trees, contacts: Sequence[Contact], duration: Expr, conditions: Sequence[Conditions]
+    scene: Scene,
+    x: State,
+    trees: Trees,
+    contacts: Sequence[Contact],
+    duration: Expr,
+    spared: Sequence[Expr],
+    plastic: Expr,
 ) -> list[Row]:
     rows = []
-    for pair, contact, condition in zip(scene.world.pairs, contacts, conditions, strict=True):
-        bodies = bodies_of(pair)
-        arguments = pair.law, contact, tuple(trees.motions[i] for i in bodies), duration, condition
+    for pair, contact, off in zip(scene.world.pairs, contacts, spared, strict=True):
+        bodies, force = bodies_of(pair), x[f"{pair.name}.force"]
+        conditions = Conditions(off, plastic, force, trees.same(bodies), may_couple(scene.world, pair))
+        arguments = pair.law, contact, tuple(trees.motions[i] for i in bodies), duration, conditions
         rows.append(trees.row(bodies, scene.pieces.do(prepare, scene.setting, *arguments)))
     return rows
 

@@ -32,6 +32,8 @@ NEAR = 0.1
 """Of the distance a_ref dt^2: surfaces that carried load and are that near to each other go on touching."""
 TIE = 1e-11
 """[m] surfaces that move at speed and are that near at the end of a stretch do not touch then; see ``_slack``."""
+ANY = 1e6
+"""[m] more than any overlap: what gives no impulse is not pushed out either."""
 SHORTEST = 1e-6
 """Of dt: the shortest stretch before or after an impact."""
 LOADED = 1e-3
@@ -44,7 +46,6 @@ class Conditions:
 
     Attributes:
         spared: 1 for a contact that gives no impulse.
-        room: how much more than before it may overlap then [m].
         plastic: 1 where it does not rebound.
         force: (3,) with which the contact acted at the end of the last step [N].
         same: whether both sides are of one tree of joints.
@@ -52,7 +53,6 @@ class Conditions:
     """
 
     spared: Expr
-    room: float
     plastic: Expr
     force: Expr
     same: bool
@@ -71,7 +71,7 @@ def prepare(
     sides = make_sides(motions, row_time, frame, applied)
     push, twist = symmetric_mobilities(sides, same)
     k_normal, *k_others = inverse_masses(sides, frame.normal, push, twist)
-    slack = _slack(setting, contact, touch) + spared * (conditions.room + ca.fmax(-contact.gap, 0))
+    slack = ca.if_else(spared, ANY, _slack(setting, contact, touch))
     slip = free_slip(sides, motions)
     free = ca.dot(frame.normal, slip)
     away = ca.fmin(free - (contact.end + slack) / duration, 0)
@@ -141,8 +141,9 @@ def _touch(
     velocity, acceleration, normal = at_touch(contact, motions, time)
     pull = ca.dot(normal, acceleration)
     rebound = law.restitution * (1 - conditions.plastic) * positive(-ca.dot(normal, velocity), setting.knob)
-    # at the end of a stretch rounding decides whether a spared one meets
-    hit = ca.if_else(conditions.spared, 0, contact.hit)
+    hit = ca.if_else(
+        conditions.spared, 0, contact.hit
+    )  # at the end of a stretch rounding decides whether a spared one meets
     chi = _leaves(rebound, pull, duration - time, setting.reference, setting.scheme.dt, setting.knob)
     return _Touch(time, acceleration, normal, pull, rebound, hit, hit * chi)
 

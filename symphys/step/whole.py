@@ -31,8 +31,8 @@ Expr = Any
 
 CUTS_OFF_CENTRE = 2
 """Of a step where bodies may be hit off their centres: a box seldom lands on one corner alone."""
-ANY = 1e6
-"""[m] more than any overlap: an impact that waits for the next step is not pushed apart before it."""
+
+
 ACROSS = 1e-3
 """Cosine of normals up to which two impacts of a body do not act on each other."""
 
@@ -74,7 +74,7 @@ def take_step(scene: Scene, x: State) -> tuple[State, list[Phase]]:
         phases += [before, struck]
         cuts.append(cut)
     late = deferred(scene, x, left, cuts)
-    after = replace(advance(scene, x, left, late.spared, ANY, late.plastic), chained=late.chained)
+    after = replace(advance(scene, x, left, late.spared, late.plastic), chained=late.chained)
     return after.x, [*phases, after]
 
 
