@@ -56,6 +56,9 @@ def test_superball_under_a_table(e: float) -> None:
 SPOKES, SPOKE = 8, 0.4
 SECTOR = np.pi / SPOKES
 """Half the angle between two spokes."""
+RATE_ERROR = 20.0
+"""[rad/s^3] what the rate may be off, over the step squared. Displacements of first order in the rotation lift the feet by
+0.2 |w|^2 dt^2 [m], 1e-6 m here at 2.5 ms."""
 
 
 def rimless(slope: float, dt: float, moment: float) -> Lab:
@@ -95,7 +98,7 @@ def test_rimless_wheel(moment: float, dt: float) -> None:
     for _ in steps[1:]:
         expected.append(keeps * np.sqrt(expected[-1] ** 2 + gain))
     assert len(found) >= 4
-    assert found == pytest.approx(expected, abs=10 * dt**2)
+    assert found == pytest.approx(expected, abs=RATE_ERROR * dt**2)
 
 
 def eccentric(mu: float, dt: float) -> Lab:
