@@ -57,8 +57,9 @@ SPOKES, SPOKE = 8, 0.4
 SECTOR = np.pi / SPOKES
 """Half the angle between two spokes."""
 RATE_ERROR = 20.0
-"""[rad/s^3] what the rate may be off, over the step squared. Displacements of first order in the rotation lift the feet by
-0.2 |w|^2 dt^2 [m], 1e-6 m here at 2.5 ms."""
+"""[rad/s^3] what the rate may be off, over the step squared.
+
+Displacements of first order in the rotation lift the feet by 0.2 |w|^2 dt^2 [m]: 1e-6 m here at 2.5 ms."""
 
 
 def rimless(slope: float, dt: float, moment: float) -> Lab:
