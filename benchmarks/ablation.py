@@ -29,9 +29,9 @@ from numpy.typing import NDArray
 from rolling import Rolling, Walk
 from scenes import Scene, Solid
 
-from symphys.state import Layout, initial_state
-from symphys.step import step_function
-from symphys.world import Scheme, World
+from symphys.dynamics import step_function
+from symphys.model.state_layout import Layout, initial_state
+from symphys.model.world import Scheme, World
 
 Array = NDArray[np.float64]
 DT = 0.01

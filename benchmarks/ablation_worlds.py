@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scenes import Scene, Solid, turned
 
-from symphys.shapes import Plane
-from symphys.state import Layout, initial_state
-from symphys.world import Law, Pair, World, make_world
+from symphys.model.shapes import Plane
+from symphys.model.state_layout import Layout, initial_state
+from symphys.model.world import Law, Pair, World, make_world
 
 Array = NDArray[np.float64]
 RADIUS = 0.0286

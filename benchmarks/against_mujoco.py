@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from worlds import problem_of
 
-from symphys.kernel import Kernel, compile_program
+from symphys.codegen import Kernel, compile_program
 from symphys.transcription import rollout_program
-from symphys.transcription.along import symbolic_rollout
+from symphys.transcription.rollout import symbolic_rollout
 
 STEPS = (0.01, 0.005, 0.0025)
 FINEST = STEPS[0] / 64

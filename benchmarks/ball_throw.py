@@ -14,7 +14,7 @@ from symphys.problem import load_problem
 from symphys.problems import find
 from symphys.shooting import ShootingProblem
 from symphys.solvers import solver
-from symphys.solvers.outcome import Counts, Status
+from symphys.solvers.core.outcome import Counts, Status
 from symphys.transcription import Transcription, transcribe
 
 SEEDS = 10

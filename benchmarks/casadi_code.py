@@ -12,7 +12,7 @@ from time import perf_counter
 
 import casadi as ca
 
-from symphys.kernel.compiler import find_compiler
+from symphys.codegen.toolchain.compiler import find_compiler
 
 
 @contextmanager

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from rolling import Walk
 from scenes import Scene, heap_of_capsules, tumbling_box
 
-from symphys.world import Scheme, World
+from symphys.model.world import Scheme, World
 
 Array = NDArray[np.float64]
 STEPS = (0.016, 0.008, 0.004, 0.002, 0.001, 0.0005, 0.00025)

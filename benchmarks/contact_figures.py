@@ -14,7 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from symphys.report import style
+from symphys.report.figures import style
 
 Array = NDArray[np.float64]
 LOOKS = {

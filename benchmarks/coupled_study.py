@@ -18,16 +18,16 @@ from numpy.typing import NDArray
 from scenes import Solid
 from table_robot import table_problem
 
-from symphys.shapes import Capsule, Plane
-from symphys.state import Layout, initial_state
-from symphys.step import report_function
-from symphys.step.coupled import STRONG, may_couple
+from symphys.dynamics import report_function
+from symphys.dynamics.contact.local_solver import STRONG, may_couple
+from symphys.model.shapes import Capsule, Plane
+from symphys.model.state_layout import Layout, initial_state
+from symphys.model.world import Body, Law, Pair, Scheme, World, is_zero, make_world
 from symphys.transcription import symbolic_rollout
-from symphys.transcription.simulate import recorder, simulate
-from symphys.world import Body, Law, Pair, Scheme, World, is_zero, make_world
+from symphys.transcription.simulation import recorder, simulate
 
 Array = NDArray[np.float64]
-coupled, phase, impact = (import_module(f"symphys.step.{name}") for name in ("coupled", "phase", "impact"))
+coupled, phase, impact = (import_module(f"symphys.dynamics.{name}") for name in ("coupled", "phase", "impact"))
 Run = tuple[float, Array, Array, Layout]
 """Instructions of a step, states (nx, steps + 1), residuals (steps,) [N s], where each quantity is."""
 

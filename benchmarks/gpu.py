@@ -19,15 +19,15 @@ from numpy.typing import NDArray
 from table1 import STEPS
 from table_robot import fastest, starts, table_problem
 
-from symphys.cuda import Device, DeviceKernel, compile_on, find_gpu
-from symphys.cuda.compiler import compiled
-from symphys.cuda.kernel import WARPS
-from symphys.cuda.schedule import schedules
-from symphys.cuda.source import device_sources
-from symphys.kernel import KernelUnavailable, Program, compile_program
-from symphys.kernel.plan import FAST_MEMORY, plan
+from symphys.codegen import KernelUnavailable, Program, compile_program
+from symphys.codegen.cuda import Device, DeviceKernel, compile_on, find_gpu
+from symphys.codegen.cuda.compiler import compiled
+from symphys.codegen.cuda.kernel import WARPS
+from symphys.codegen.cuda.schedule import schedules
+from symphys.codegen.cuda.source import device_sources
+from symphys.codegen.emit.plan import FAST_MEMORY, plan
 from symphys.transcription import rollout_program, symbolic_rollout
-from symphys.transcription.large import LargeEvaluator, transcribe_large
+from symphys.transcription.network_rollout import LargeEvaluator, transcribe_large
 
 ROBOTS = (1, 128, 1024, 8192)
 CARDS = {"A100": (108, 32, 1.41e9, 1.94e12), "H100": (132, 64, 1.98e9, 3.35e12), "H200": (132, 64, 1.98e9, 4.8e12)}

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from rolling import Rolling
 from scenes import Scene, Solid, tumbling_box
 
-from symphys.state import initial_state
-from symphys.world import Scheme
+from symphys.model.state_layout import initial_state
+from symphys.model.world import Scheme
 
 Array = NDArray[np.float64]
 FINE = 0.001 / 32

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from symphys.report import style
+from symphys.report.figures import style
 
 Array = NDArray[np.float64]
 MARKERS = "os^DvPX"

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from robots import JointedScene
 from rolling import Walk
 
-from symphys.state import Layout
-from symphys.step import reading_function, record_step
-from symphys.world import Scheme, World
+from symphys.dynamics import reading_function, record_step
+from symphys.model.state_layout import Layout
+from symphys.model.world import Scheme, World
 
 Array = NDArray[np.float64]
 Switches = Mapping[str, Any]

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 from robots import SERVO, SOCKETS, JointedScene, Pose, Rotation, block, quadruped, state_of
 
-from symphys.joints import HINGE, Joint, Socket
-from symphys.shapes import Plane, Sphere
-from symphys.world import Body, Law, World, make_world
+from symphys.model.joints import HINGE, Joint, Socket
+from symphys.model.shapes import Plane, Sphere
+from symphys.model.world import Body, Law, World, make_world
 
 LENGTH, FOOT = 0.5, 0.05
 """Of a rod, radius of a foot [m]."""

@@ -22,13 +22,13 @@ import numpy as np
 from spheres import BATCH, COUNT, STEPS, around, fastest, guess_of
 from worlds import spheres_on_ground
 
-from symphys.kernel import Program, compile_program
-from symphys.kernel.compiler import find_compiler
-from symphys.kernel.operations import MASKS
-from symphys.kernel.plan import Plan, plan
-from symphys.kernel.processor import processor
+from symphys.codegen import Program, compile_program
+from symphys.codegen.emit.plan import Plan, plan
+from symphys.codegen.graph.operations import MASKS
+from symphys.codegen.toolchain.compiler import find_compiler
+from symphys.codegen.toolchain.processor import processor
 from symphys.transcription import rollout_program
-from symphys.transcription.along import symbolic_rollout
+from symphys.transcription.rollout import symbolic_rollout
 
 LOOPS, CHAINS = 200_000, 12
 MEMORY = "load, store"

@@ -12,8 +12,8 @@ from mujoco import rollout
 from numpy.typing import NDArray
 from race import MARKS, Course
 
+from symphys.codegen import processors
 from symphys.export import mjcf
-from symphys.kernel import processors
 from symphys.problem import Problem, load_problem
 from symphys.problems import find
 

@@ -14,9 +14,9 @@ import matplotlib.pyplot as plt
 from spheres import around, fastest, guess_of
 from worlds import pile
 
-from symphys.kernel import Cache, compile_program
+from symphys.codegen import Cache, compile_program
 from symphys.transcription import rollout_program
-from symphys.transcription.along import symbolic_rollout
+from symphys.transcription.rollout import symbolic_rollout
 
 COUNTS = (2, 4, 8, 16, 32, 64)
 BATCH, STEPS = 8, 20

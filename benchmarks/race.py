@@ -25,7 +25,7 @@ from walking import SEED, UNSEEN, Walks
 
 from symphys.problem import load_problem
 from symphys.problems import find
-from symphys.report import style
+from symphys.report.figures import style
 from symphys.runs.job import solver_options
 from symphys.solvers import SOLVERS, TraceRow
 

@@ -22,7 +22,7 @@ from robot_consistency import BATCH, EVERY, WINDOW
 from robots import HELD, JointedScene, standing
 from rolling import Rolling
 
-from symphys.world import Scheme
+from symphys.model.world import Scheme
 
 Array = NDArray[np.float64]
 DT = 0.01

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from robots import JointedScene, Pose, Rotation, chain, quadruped, state_of
 from rolling import Walk
 
-from symphys.joints import Spring
-from symphys.world import Scheme, World
+from symphys.model.joints import Spring
+from symphys.model.world import Scheme, World
 
 Array = NDArray[np.float64]
 STEPS = (0.01, 0.005, 0.0025, 0.00125)

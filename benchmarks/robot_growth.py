@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from table_robot import table_problem
 
-from symphys.kernel import Kernel, compile_program
-from symphys.state import Layout
+from symphys.codegen import Kernel, compile_program
+from symphys.model.state_layout import Layout
 from symphys.transcription import symbolic_rollout
-from symphys.transcription.along import Rollout
-from symphys.transcription.large.stage import Aims, stage_program, start_function
+from symphys.transcription.network_rollout.step_program import Aims, stage_program, start_function
+from symphys.transcription.rollout import Rollout
 
 Array = NDArray[np.float64]
 STEPS = 300

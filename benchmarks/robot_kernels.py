@@ -19,7 +19,7 @@ from casadi_code import compiled_by_casadi
 from numpy.typing import NDArray
 from table_robot import starts, table_problem
 
-from symphys.kernel import compile_program
+from symphys.codegen import compile_program
 from symphys.transcription import Transcription, transcribe
 from symphys.transcription.program import rollout_program
 

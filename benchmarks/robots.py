@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from symphys.joints import HINGE, Joint, Link, Motor, Servo, Socket, Spring, linkages
-from symphys.shapes import Plane, Sphere
-from symphys.state import Layout, initial_state
-from symphys.world import Body, Law, World, make_world
+from symphys.model.joints import HINGE, Joint, Link, Motor, Servo, Socket, Spring, linkages
+from symphys.model.shapes import Plane, Sphere
+from symphys.model.state_layout import Layout, initial_state
+from symphys.model.world import Body, Law, World, make_world
 
 Array = NDArray[np.float64]
 Values = dict[str, Any]

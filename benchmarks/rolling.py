@@ -10,10 +10,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.kernel import Call, Kernel, Layout, Place, Program, compile_program
-from symphys.state import Layout as Columns
-from symphys.step import record_step
-from symphys.world import Scheme, World
+from symphys.codegen import Call, Kernel, Layout, Place, Program, compile_program
+from symphys.dynamics import record_step
+from symphys.model.state_layout import Layout as Columns
+from symphys.model.world import Scheme, World
 
 Array = NDArray[np.float64]
 Expr = Any

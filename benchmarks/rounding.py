@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from table_robot import starts, table_problem
 
-from symphys.kernel import Kernel, compile_program
+from symphys.codegen import Kernel, compile_program
 from symphys.transcription import rollout_program, symbolic_rollout
 
 STEPS = (10, 100, 1000)

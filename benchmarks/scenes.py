@@ -10,9 +10,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.shapes import Box, Capsule, Plane, Sphere
-from symphys.state import Layout, initial_state
-from symphys.world import Body, Law, World, make_world
+from symphys.model.shapes import Box, Capsule, Plane, Sphere
+from symphys.model.state_layout import Layout, initial_state
+from symphys.model.world import Body, Law, World, make_world
 
 Array = NDArray[np.float64]
 KINDS = ("sphere", "capsule", "box")

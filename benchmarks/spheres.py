@@ -18,12 +18,12 @@ import numpy as np
 from casadi_code import compiled_by_casadi
 from worlds import spheres_on_ground
 
-from symphys.kernel import Cache, Kernel, Program, compile_program
-from symphys.kernel.compiler import find_compiler
+from symphys.codegen import Cache, Kernel, Program, compile_program
+from symphys.codegen.toolchain.compiler import find_compiler
 from symphys.problem import Problem, load_problem
 from symphys.problems import find
 from symphys.transcription import rollout_program, transcribe
-from symphys.transcription.along import symbolic_rollout
+from symphys.transcription.rollout import symbolic_rollout
 
 BATCH, REPEATS, COUNT, STEPS = 128, 7, 20, 50
 

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.kernel import compile_program
+from symphys.codegen import compile_program
 from symphys.problem import Problem, load_problem
 from symphys.transcription import symbolic_rollout
-from symphys.transcription.large import LargeEvaluator, has_large_nets, transcribe_large
+from symphys.transcription.network_rollout import LargeEvaluator, has_large_nets, transcribe_large
 from symphys.transcription.program import rollout_program
 
 Array = NDArray[np.float64]

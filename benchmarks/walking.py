@@ -16,14 +16,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.kernel import Place
+from symphys.codegen import Place
 from symphys.problem import Problem, load_problem
 from symphys.problems import find
 from symphys.runs.job import solver_options
 from symphys.shooting import Drawn
 from symphys.solvers import SOLVERS
 from symphys.transcription import Transcription, transcribe
-from symphys.transcription.situations.evaluator import KernelSituations
+from symphys.transcription.randomization.evaluator import KernelSituations
 
 Array = NDArray[np.float64]
 UNSEEN, SEED, LEAST = 500, 20161105, 0.7

@@ -21,7 +21,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from table_robot import calls, fastest, table_problem
 
-from symphys.transcription.large import split
+from symphys.transcription.network_rollout import partition as split
 
 STEPS = 200
 HIDDEN = ([1], [4], [12], [], [40], [100], [256], [256, 256], [512, 512], [1024, 1024])

@@ -13,15 +13,15 @@ from difflib import get_close_matches
 from typing import Any
 
 from symphys.errors import SymphysError
-from symphys.solvers.cma_ import CMA, CmaOptions
-from symphys.solvers.evolution_ import EVOLUTION, EvolutionOptions
-from symphys.solvers.gradient import GRADIENT, GradientOptions
-from symphys.solvers.interface import Solver
-from symphys.solvers.ipopt_ import IPOPT, IpoptOptions
-from symphys.solvers.least_squares import LEAST_SQUARES, LeastSquaresOptions
-from symphys.solvers.outcome import Counts, Monitor, Outcome, StageResult, Status, TraceRow
-from symphys.solvers.stochastic import STOCHASTIC, StochasticOptions
-from symphys.solvers.together import solve_together
+from symphys.solvers.core.interface import Solver
+from symphys.solvers.core.multi_start import solve_together
+from symphys.solvers.core.outcome import Counts, Monitor, Outcome, StageResult, Status, TraceRow
+from symphys.solvers.methods.cma_es import CMA, CmaOptions
+from symphys.solvers.methods.evolution import EVOLUTION, EvolutionOptions
+from symphys.solvers.methods.gradient import GRADIENT, GradientOptions
+from symphys.solvers.methods.ipopt import IPOPT, IpoptOptions
+from symphys.solvers.methods.least_squares import LEAST_SQUARES, LeastSquaresOptions
+from symphys.solvers.methods.stochastic import STOCHASTIC, StochasticOptions
 
 __all__ = [
     "SOLVERS",

@@ -11,17 +11,17 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from symphys.dynamics import step_function
+    from symphys.dynamics.horizon import roll_out
     from symphys.errors import ProblemError, SymphysError
+    from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain
+    from symphys.model.state_layout import Layout, initial_state
+    from symphys.model.world import Body, Law, Scheme, World, make_world
     from symphys.problem import Problem, load_problem
-    from symphys.rollout import roll_out
-    from symphys.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain
     from symphys.shooting import ShootingProblem
-    from symphys.state import Layout, initial_state
-    from symphys.step import step_function
     from symphys.trajectory import Trajectory
     from symphys.transcription import Transcription
     from symphys.transcription.transcribe import transcribe
-    from symphys.world import Body, Law, Scheme, World, make_world
 
 __version__ = "0.1.0"
 

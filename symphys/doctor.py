@@ -13,8 +13,7 @@ from typing import Any, Literal
 import casadi as ca
 import numpy as np
 
-from symphys.cuda import compile_on, find_gpu
-from symphys.kernel import (
+from symphys.codegen import (
     Cache,
     Call,
     Kernel,
@@ -26,8 +25,9 @@ from symphys.kernel import (
     default_cache,
     interpret,
 )
-from symphys.kernel.compiler import find_compiler, processors
-from symphys.kernel.processor import processor
+from symphys.codegen.cuda import compile_on, find_gpu
+from symphys.codegen.toolchain.compiler import find_compiler, processors
+from symphys.codegen.toolchain.processor import processor
 
 PACKAGES = ("casadi", "click", "cma", "matplotlib", "numpy", "pydantic", "rich", "scipy")
 LINEAR_SOLVERS = ("mumps", "ma27", "ma57", "ma77", "ma86", "ma97", "pardiso", "spral")

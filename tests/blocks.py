@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.shapes import Box, Capsule, Plane
-from symphys.world import Body, Law, World, make_world
+from symphys.model.shapes import Box, Capsule, Plane
+from symphys.model.world import Body, Law, World, make_world
 
 Array = NDArray[np.float64]
 LYING = (float(np.sqrt(0.5)), 0.0, float(np.sqrt(0.5)), 0.0)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import programs
 
-BUILD = "import programs; from symphys.kernel import compile_program as c; print(c(programs.pendulum()).report.cached)"
+BUILD = "import programs; from symphys.codegen import compile_program as c; print(c(programs.pendulum()).report.cached)"
 
 
 def fake(folder: Path, script: str) -> str:

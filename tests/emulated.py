@@ -21,7 +21,7 @@ needs_compiler = pytest.mark.skipif(shutil.which("g++") is None, reason="no C++ 
 
 
 class Emulated:
-    """See ``symphys.cuda.Device``; ``backwards``: threads take their turns from the last to the first."""
+    """See ``symphys.codegen.cuda.Device``; ``backwards``: threads take their turns from the last to the first."""
 
     name, lanes = "this processor", 4
 

@@ -9,9 +9,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.state import Layout, initial_state
-from symphys.step import step_function
-from symphys.world import Scheme, World
+from symphys.dynamics import step_function
+from symphys.model.state_layout import Layout, initial_state
+from symphys.model.world import Scheme, World
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from symphys.joints import HINGE, Joint, Socket
-from symphys.world import Body, World
+from symphys.model.joints import HINGE, Joint, Socket
+from symphys.model.world import Body, World
 
 Array = NDArray[np.float64]
 HALF = float(np.sqrt(0.5))

@@ -1,4 +1,4 @@
-"""Pairs of shapes under test: the rules of symphys.collide as numeric functions, and bodies that move numerically."""
+"""Pairs of shapes under test: the rules of collision as numeric functions, and bodies that move numerically."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from distances import Solid, distance
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from symphys import rotation
-from symphys.collide import collide
-from symphys.collide.contact import Shift
-from symphys.course import Course, at_rest
-from symphys.shapes import Box, Capsule, Sphere, Surface
+from symphys.dynamics.collision import collide
+from symphys.dynamics.collision.contact_geometry import Shift
+from symphys.dynamics.collision.predicted_points import Course, at_rest
+from symphys.maths import rotation
+from symphys.model.shapes import Box, Capsule, Sphere, Surface
 
 Array = NDArray[np.float64]
 WIDTHS = {"sphere": 1, "capsule": 2, "box": 3}

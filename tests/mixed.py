@@ -8,8 +8,8 @@ import numpy as np
 from robots import Pose, state_of
 from scipy.spatial.transform import Rotation
 
-from symphys.joints import BALL, FIXED, HINGE, SLIDER, UNIVERSAL, Joint, Kind, Limits, Socket, Spring, TorqueMotor
-from symphys.world import Body, World
+from symphys.model.joints import BALL, FIXED, HINGE, SLIDER, UNIVERSAL, Joint, Kind, Limits, Socket, Spring, TorqueMotor
+from symphys.model.world import Body, World
 
 HELD: tuple[tuple[Kind, int, int | None], ...] = (
     (HINGE, 1, 0),

@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from symphys.kernel import Call, Layout, Program
+from symphys.codegen import Call, Layout, Program
 
 ARGUMENTS = (3, 2)
 SMOOTH = [

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from symphys.report.markup import HERE, SCRIPTS
+from symphys.report.pages.markup import HERE, SCRIPTS
 
 NODE = pytest.mark.skipif(shutil.which("node") is None, reason="needs node to run the page's script")
 

@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from symphys.kernel import Call, Layout, Place, Program
+from symphys.codegen import Call, Layout, Place, Program
 
 STEPS, BODIES, SWEEPS, KNOTS = 30, 4, 3, 5
 PENDULUM_STATE = Place(STEPS + 5, 2, 2)

@@ -11,10 +11,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.shapes import Box, Capsule, Fixture, Plane, Shape, Sphere, Static, Terrain
-from symphys.state import Layout, initial_state
-from symphys.step import step_function
-from symphys.world import Body, Law, Scheme, World, make_world
+from symphys.dynamics import step_function
+from symphys.model.shapes import Box, Capsule, Fixture, Plane, Shape, Sphere, Static, Terrain
+from symphys.model.state_layout import Layout, initial_state
+from symphys.model.world import Body, Law, Scheme, World, make_world
 
 Array = NDArray[np.float64]
 KNOBS = (0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0)

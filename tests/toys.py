@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from symphys.backends import Source, choose
-from symphys.kernel import Call, KernelUnavailable, Layout, Program
-from symphys.kernel.compiler import find_compiler
+from symphys.codegen import Call, KernelUnavailable, Layout, Program
+from symphys.codegen.backends import Source, choose
+from symphys.codegen.toolchain.compiler import find_compiler
 from symphys.shooting import Block, Evaluator, ShootingProblem, Values
 from symphys.solvers import SOLVERS, Outcome, TraceRow, solver
 
@@ -31,7 +31,7 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class ToyFunctions:
-    """See ``symphys.backends.Functions``."""
+    """See ``symphys.codegen.backends.Functions``."""
 
     value: Any
     gradient: Any

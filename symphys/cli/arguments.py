@@ -49,7 +49,7 @@ def backend_option(command: F) -> F:
 
 def read_backend(name: str) -> str:
     """The name, if it is one."""
-    from symphys.backends import NAMES
+    from symphys.codegen.backends import NAMES
 
     if name not in NAMES:
         raise UsageFault(f"--backend: there is no backend {name!r}; {hint(name, NAMES)}")

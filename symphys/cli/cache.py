@@ -13,7 +13,7 @@ def cache() -> None:
 @cache.command()
 def info() -> None:
     """Say where compiled kernels are kept, how many, and how much room they take."""
-    from symphys.kernel import default_cache
+    from symphys.codegen import default_cache
 
     found = default_cache().info()
     click.echo(f"folder   {found.folder}{'' if found.folder.is_dir() else ' (not made yet)'}")
@@ -25,7 +25,7 @@ def info() -> None:
 @cache.command()
 def clear() -> int:
     """Remove all kernels; those that are needed again are compiled again."""
-    from symphys.kernel import default_cache
+    from symphys.codegen import default_cache
 
     kept = default_cache()
     before = kept.info()

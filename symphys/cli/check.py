@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from symphys.cli.examined import Examined
     from symphys.problem import Problem
     from symphys.transcription import Transcription
-    from symphys.trust.examine import Tell
+    from symphys.verification.examination import Tell
 
 
 @click.command()
@@ -60,7 +60,7 @@ def check(source: str, assignments: tuple[str, ...], folder: Path | None) -> int
 def look(transcription: Transcription, z: NDArray[Any]) -> Examined:
     """Examine ``z``."""
     from symphys.cli.examined import Examined
-    from symphys.trust import examine
+    from symphys.verification import examine
 
     with telling() as tell:
         return Examined.of(transcription.judge(z), examine(transcription, z, tell))

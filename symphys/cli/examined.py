@@ -41,7 +41,7 @@ class Examined:
 
     @classmethod
     def of(cls, verdict: Verdict, trust: Mapping[str, Any]) -> Examined:
-        """From a verdict and what ``symphys.trust.examine`` has found."""
+        """From a verdict and what ``symphys.verification.examination`` has found."""
         goal = any(check.kind == "goal" for check in verdict.checks)
         costs = math.nan if goal else sum(verdict.costs.values())
         judged = Judged(verdict.objective, verdict.worst, verdict.solved, bool(verdict.checks), costs)

@@ -49,7 +49,7 @@ def written(
     from symphys.export import c_files, casadi_files, mjcf_files
     from symphys.problem import require_solvable
     from symphys.transcription import transcribe
-    from symphys.transcription.large import require_small_nets
+    from symphys.transcription.network_rollout import require_small_nets
 
     if c is not None or casadi is not None:
         require_solvable(problem)

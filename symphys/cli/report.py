@@ -12,7 +12,7 @@ import click
 def report(folder: Path) -> None:
     """Make the report of a run folder, or of all runs below a folder, again from its files alone."""
     from symphys.report import write_batch_report, write_run_report
-    from symphys.report.finding import run_folders
+    from symphys.results.discovery import run_folders
 
     below = run_folders(folder)
     for run in below:

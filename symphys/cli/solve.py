@@ -123,7 +123,7 @@ def last_words(batch: Batch, out: Path) -> str:
 def write_reports(jobs: list[Job], out: Path) -> None:
     """Write the pages of the runs that are new, and that of the batch; print where to look."""
     from symphys.report import write_batch_report, write_run_report
-    from symphys.report.run_page import PAGE
+    from symphys.report.pages.run import PAGE
     from symphys.runs import RESULT
 
     for job in jobs:

@@ -29,15 +29,15 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.dynamics.motion import inertia_matrix
 from symphys.export.folder import ExportError
 from symphys.export.mjcf_joints import Start, actuators, freedoms, plain
 from symphys.export.mjcf_surfaces import geoms, pairs, text
-from symphys.joints import Link, linkages, tree_joints
-from symphys.joints.linkage import FLOATING
-from symphys.motion import inertia_matrix
+from symphys.model.joints import Link, linkages, tree_joints
+from symphys.model.joints.kinematic_tree import FLOATING
+from symphys.model.shapes import Terrain
+from symphys.model.world import Body, World, is_zero
 from symphys.problem import Problem
-from symphys.shapes import Terrain
-from symphys.world import Body, World, is_zero
 
 Array = NDArray[np.float64]
 APART = 1e-5

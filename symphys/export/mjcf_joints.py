@@ -12,13 +12,13 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys import rotation
+from symphys.dynamics.joints.joint_frames import sockets_at
+from symphys.dynamics.observation.joint_coordinates import Reading, readings
 from symphys.export.mjcf_surfaces import text
-from symphys.joints import Joint, Link, Motor, Servo, TorqueMotor
-from symphys.state import Layout, initial_state
-from symphys.step.coordinates import Reading, readings
-from symphys.step.sockets import sockets_at
-from symphys.world import World
+from symphys.maths import rotation
+from symphys.model.joints import Joint, Link, Motor, Servo, TorqueMotor
+from symphys.model.state_layout import Layout, initial_state
+from symphys.model.world import World
 
 Array = NDArray[np.float64]
 GIVING_WAY = 0.01

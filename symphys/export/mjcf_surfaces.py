@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from typing import Any
 from xml.etree.ElementTree import Element
 
-from symphys.shapes import Box, Capsule, Plane, Shape, Sphere, Terrain, surface
-from symphys.world import Law, Side, World, is_zero, side_name
+from symphys.model.shapes import Box, Capsule, Plane, Shape, Sphere, Terrain, surface
+from symphys.model.world import Law, Side, World, is_zero, side_name
 
 
 def text(numbers: Iterable[Any]) -> str:

@@ -12,11 +12,11 @@ from string import Template
 import casadi as ca
 import numpy as np
 
+from symphys.codegen import Layout, Program
+from symphys.codegen.emit.plain import plain_source, table
 from symphys.export import words
-from symphys.kernel import Layout, Program
-from symphys.kernel.plain import plain_source, table
 from symphys.transcription import Transcription, rollout_program
-from symphys.transcription.along import Rollout
+from symphys.transcription.rollout import Rollout
 
 ROOM = "symphys.export"
 

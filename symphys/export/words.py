@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from symphys.joints import Joint, Servo, TorqueMotor, VelocityMotor
+from symphys.model.joints import Joint, Servo, TorqueMotor, VelocityMotor
+from symphys.model.state_layout import Layout, input_columns, input_size
+from symphys.model.world import World
 from symphys.problem import Problem, Slot, Variable
-from symphys.state import Layout, input_columns, input_size
 from symphys.transcription import Transcription
-from symphys.transcription.along import Rollout
-from symphys.world import World
+from symphys.transcription.rollout import Rollout
 
 UNITS = {
     "position": "m",

@@ -8,8 +8,8 @@ from functools import reduce
 
 import casadi as ca
 
-from symphys import rotation
 from symphys.expression.columns import Expr, length, require_fit, require_length, require_same
+from symphys.maths import rotation
 
 NORM_WIDTH = 1e-12
 """norm(v) is sqrt(v . v + NORM_WIDTH^2), and hypot likewise: finite derivatives at 0, where the value is 1e-12."""

@@ -1,4 +1,4 @@
-"""The object "trust" of a result, as ``symphys.trust.examine`` makes it, read with care."""
+"""The object "trust" of a result, as ``symphys.verification.examination`` makes it, read with care."""
 
 from __future__ import annotations
 

@@ -1,14 +1,14 @@
 """Problem files: reading, validation, and the model that everything after works with."""
 
-from symphys.problem.fall import ALIVE, Fall
+from symphys.problem.checks.solvable import require_solvable
 from symphys.problem.feedback import Controller, Sensor
-from symphys.problem.follow import follow
-from symphys.problem.json_schema import json_schema
 from symphys.problem.load import load_problem
 from symphys.problem.model import Constraint, Cost, Output, Problem, Simulation, Slot, Target, Variable
-from symphys.problem.options import require_solvers, validate_options
-from symphys.problem.solvable import require_solvable
-from symphys.problem.variation import Grid, Posed, Scenarios, Varied
+from symphys.problem.parametric.reposition import follow
+from symphys.problem.randomization import Grid, Posed, Scenarios, Varied
+from symphys.problem.reading.solver_options import require_solvers, validate_options
+from symphys.problem.schema.json_schema import json_schema
+from symphys.problem.tables.termination import ALIVE, Fall
 
 __all__ = [
     "ALIVE",

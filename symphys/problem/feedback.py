@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.controllers import Law
 from symphys.expression import Formula
+from symphys.model.controllers import Law
 
 Array = NDArray[np.float64]
 

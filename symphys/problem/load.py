@@ -10,41 +10,41 @@ from typing import Any
 import casadi as ca
 from pydantic import ValidationError
 
-from symphys.problem.aims import Aims, read_aims
-from symphys.problem.bodies import read_body, read_state
-from symphys.problem.carry import carry
-from symphys.problem.complaints import report
-from symphys.problem.controllers import read_controllers
-from symphys.problem.crowd import check_crowd
-from symphys.problem.fall import ALIVE, Fall, costs_of_falling, read_fall
-from symphys.problem.faults import Faults, Place
+from symphys.model.state_layout import input_sizes
+from symphys.problem.checks.memory import check_rollout
+from symphys.problem.checks.pair_limit import check_crowd
+from symphys.problem.checks.start import at_guess, check_joints, check_overlap, formula_names, sensor_names
 from symphys.problem.feedback import Controller, Sensor
-from symphys.problem.follow import check_anchors
-from symphys.problem.include import with_included
-from symphys.problem.joints import read_joints
-from symphys.problem.meetings import Meetings
-from symphys.problem.memory import check_rollout
+from symphys.problem.include.files import with_included
+from symphys.problem.include.placing import placed
 from symphys.problem.model import NOTHING, Array, Problem, Simulation, Variable
-from symphys.problem.placing import placed
-from symphys.problem.plan import WorldPlan
+from symphys.problem.parametric.collision_filter import Meetings
+from symphys.problem.parametric.forward_kinematics import carry
+from symphys.problem.parametric.reposition import check_anchors
+from symphys.problem.parametric.world import WorldPlan
 from symphys.problem.quantities import Quantity, quantities, weight_quantities
-from symphys.problem.scenarios import read_scenarios
+from symphys.problem.reading.faults import Faults, Place
+from symphys.problem.reading.messages import report
+from symphys.problem.reading.settings import apply_settings
+from symphys.problem.reading.source import parse_toml, read_source
 from symphys.problem.schema import Document
-from symphys.problem.sensors import read_sensors
-from symphys.problem.settings import apply_settings
-from symphys.problem.simulation import read_simulation
-from symphys.problem.source import parse_toml, read_source
-from symphys.problem.start import at_guess, check_joints, check_overlap, formula_names, sensor_names
-from symphys.problem.statics import read_statics
-from symphys.problem.surfaces import (
+from symphys.problem.tables.bodies import read_body, read_state
+from symphys.problem.tables.contact import (
     check_laws,
     check_mates,
     check_varied,
     read_contact,
     read_pairs,
 )
-from symphys.problem.variables import read_variables
-from symphys.state import input_sizes
+from symphys.problem.tables.controllers import read_controllers
+from symphys.problem.tables.joints import read_joints
+from symphys.problem.tables.objectives import Aims, read_aims
+from symphys.problem.tables.scenarios import read_scenarios
+from symphys.problem.tables.sensors import read_sensors
+from symphys.problem.tables.simulation import read_simulation
+from symphys.problem.tables.statics import read_statics
+from symphys.problem.tables.termination import ALIVE, Fall, costs_of_falling, read_fall
+from symphys.problem.tables.variables import read_variables
 
 MEMBERS = ("body", "plane", "block", "terrain")
 SHARED_NAMES = (*MEMBERS, "joint", "sensor", "controller", "variable")

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.expression import Formula
+from symphys.model.world import Scheme, World
 from symphys.problem.feedback import Controller, Sensor
-from symphys.problem.plan import WorldPlan
-from symphys.world import Scheme, World
+from symphys.problem.parametric.world import WorldPlan
 
 if TYPE_CHECKING:
-    from symphys.problem.fall import Fall
-    from symphys.problem.variation import Scenarios
+    from symphys.problem.randomization import Scenarios
+    from symphys.problem.tables.termination import Fall
 
 Array = NDArray[np.float64]
 NOTHING: Mapping[str, Any] = MappingProxyType({})

@@ -4,8 +4,8 @@ Every page is one HTML file that needs nothing else: no network, no other file. 
 matplotlib; import it where a report is written, not before.
 """
 
-from symphys.report.batch_page import write_batch_report
-from symphys.report.motion_page import write_motion
-from symphys.report.run_page import write_run_report
+from symphys.report.pages.batch import write_batch_report
+from symphys.report.pages.motion import write_motion
+from symphys.report.pages.run import write_run_report
 
 __all__ = ["write_batch_report", "write_motion", "write_run_report"]

@@ -1,11 +1,11 @@
 """Runs: solve problems, and keep what was found in folders that can be read, skipped and continued."""
 
+from symphys.results.result import Result, read_result
+from symphys.results.scene import scene
 from symphys.runs.batch import Batch, Observer, run_batch
 from symphys.runs.execute import execute
 from symphys.runs.folder import RESULT, SCENE, TRAJECTORY, RunFolder
 from symphys.runs.job import Job, check_tables, make_jobs
-from symphys.runs.result import Result, read_result
-from symphys.runs.scene import scene
 
 __all__ = [
     "RESULT",

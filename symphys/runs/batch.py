@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from symphys.results.result import Result
 from symphys.runs.execute import execute
 from symphys.runs.job import Job
-from symphys.runs.result import Result
+from symphys.runs.multi_start import groups, solve_group
 from symphys.runs.stopping import Interrupts, Stop
-from symphys.runs.together import groups, solve_group
+from symphys.runs.transcription_cache import Transcribe, Workshop
 from symphys.runs.workers import side_by_side
-from symphys.runs.workshop import Transcribe, Workshop
 from symphys.solvers import Monitor, TraceRow
 
 

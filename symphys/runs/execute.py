@@ -6,12 +6,12 @@ import traceback
 
 from symphys import files
 from symphys.errors import SymphysError
+from symphys.results.result import Result
 from symphys.runs.folder import CHECKPOINT, LOG, RESULT, FolderBusy
 from symphys.runs.job import Job
 from symphys.runs.provenance import stamp
-from symphys.runs.result import Result
 from symphys.runs.solving import solve
-from symphys.runs.workshop import Workshop
+from symphys.runs.transcription_cache import Workshop
 from symphys.solvers import Monitor, Outcome
 
 

@@ -11,8 +11,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from symphys import files
+from symphys.results.result import Result, read_result
 from symphys.runs.config import Config
-from symphys.runs.result import Result, read_result
 
 try:
     import fcntl

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from symphys.backends import BEST
+from symphys.codegen.backends import BEST
 from symphys.problem import Problem, require_solvable, require_solvers, validate_options
 from symphys.runs.config import Config, make_config
 from symphys.runs.folder import RunFolder

@@ -9,7 +9,7 @@ from importlib.metadata import version
 from typing import Any
 
 from symphys import __version__
-from symphys.backends import Description
+from symphys.codegen.backends import Description
 from symphys.runs.job import Job
 
 

@@ -9,17 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from symphys import files, trust
+from symphys import files
+from symphys import verification as trust
 from symphys.errors import SymphysError
 from symphys.findings.levels import Judged
 from symphys.findings.verdict import rule
+from symphys.results.result import BlockRecord, CheckRecord, Result, ruled
+from symphys.results.scene import scene
+from symphys.runs.cost import equivalents, used
 from symphys.runs.folder import CHECKPOINT, GUESS, SCENE, TOLD, TRAJECTORY
 from symphys.runs.job import Job
 from symphys.runs.provenance import evaluated, stamp
-from symphys.runs.result import BlockRecord, CheckRecord, Result, ruled
-from symphys.runs.scene import scene
 from symphys.runs.stages import guess_record, stage_records
-from symphys.runs.work import equivalents, used
 from symphys.shooting import Array, ShootingProblem
 from symphys.solvers import Monitor, Outcome, Status, TraceRow, solver
 from symphys.trajectory import Trajectory

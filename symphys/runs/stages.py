@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict
 
+from symphys.results.result import StageRecord
+from symphys.runs.cost import equivalents
 from symphys.runs.folder import TOLD
-from symphys.runs.result import StageRecord
-from symphys.runs.work import equivalents
 from symphys.solvers import Outcome, StageResult
 from symphys.transcription import Transcription
 

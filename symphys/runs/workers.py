@@ -16,11 +16,11 @@ from typing import Protocol
 
 from symphys import threads
 from symphys.errors import SymphysError
+from symphys.results.result import Result
 from symphys.runs.execute import execute, give_up
 from symphys.runs.job import Job
-from symphys.runs.result import Result
 from symphys.runs.stopping import Stop, deaf
-from symphys.runs.workshop import Transcribe, Workshop
+from symphys.runs.transcription_cache import Transcribe, Workshop
 from symphys.solvers import TraceRow
 
 TICK = 0.1

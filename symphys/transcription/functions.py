@@ -7,12 +7,12 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.transcription.along import Rollout
-from symphys.transcription.terms import Terms
+from symphys.transcription.objective import Terms
+from symphys.transcription.rollout import Rollout
 
 
 class ExpressionFunctions:
-    """Each function is made when it is first asked for; see ``symphys.backends.Functions``."""
+    """Each function is made when it is first asked for; see ``symphys.codegen.backends.Functions``."""
 
     def __init__(self, rollout: Rollout, asked: Terms) -> None:
         """Nothing is made yet."""

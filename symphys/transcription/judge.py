@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.problem import Problem
-from symphys.transcription.terms import goal_error
+from symphys.transcription.objective import goal_error
 
 Array = NDArray[np.float64]
 

@@ -7,16 +7,16 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from symphys.codegen import Call, Fading, Layout, Place, Program
+from symphys.dynamics import Slot, record_step
 from symphys.expression import Formula
-from symphys.kernel import Call, Fading, Layout, Place, Program
+from symphys.model.state_layout import Layout as Columns
 from symphys.problem import ALIVE
-from symphys.state import Layout as Columns
-from symphys.step import Slot, record_step
-from symphys.transcription.along import Rollout
-from symphys.transcription.control_calls import Places, control_calls
-from symphys.transcription.decision import start_of
-from symphys.transcription.probe import combined
-from symphys.transcription.terms import Terms, terms
+from symphys.transcription.decision_variables import start_of
+from symphys.transcription.feedback.controller_calls import Places, control_calls
+from symphys.transcription.gradient_probe import combined
+from symphys.transcription.objective import Terms, terms
+from symphys.transcription.rollout import Rollout
 
 Expr = Any
 """casadi MX"""

@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 from time import perf_counter
 
-from symphys.backends import BEST, Source, choose
+from symphys.codegen.backends import BEST, Source, choose
 from symphys.problem import Problem
 from symphys.shooting import ShootingProblem
-from symphys.transcription.along import symbolic_rollout
-from symphys.transcription.decision import blocks
+from symphys.transcription.decision_variables import blocks
 from symphys.transcription.functions import ExpressionFunctions
-from symphys.transcription.large import has_large_nets, require_small_nets, transcribe_large
+from symphys.transcription.network_rollout import has_large_nets, require_small_nets, transcribe_large
+from symphys.transcription.objective import limits, terms
 from symphys.transcription.program import rollout_program
-from symphys.transcription.situations import with_situations
-from symphys.transcription.terms import limits, terms
+from symphys.transcription.randomization import with_situations
+from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.transcription import Transcription
 
 
@@ -24,7 +24,7 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
     Args:
         problem: what to solve.
         exact: whether smoothing 0 is all that will be asked for; kernels then leave the knob out.
-        backend: what evaluates it, a name of ``symphys.backends.NAMES``.
+        backend: what evaluates it, a name of ``symphys.codegen.backends.NAMES``.
         threads: that share a batch; None: one for each processor.
     """
     if problem.scenarios is not None:

@@ -11,16 +11,16 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.backends import Description
+from symphys.codegen.backends import Description
 from symphys.problem import Problem
 from symphys.shooting import ShootingProblem
 from symphys.trajectory import Trajectory
-from symphys.transcription.along import Rollout
 from symphys.transcription.functions import ExpressionFunctions, function_of
+from symphys.transcription.gradient_probe import ExpressionProbe, Probe
 from symphys.transcription.judge import Verdict, verdict
-from symphys.transcription.probe import ExpressionProbe, Probe
-from symphys.transcription.simulate import Record, recorder, simulate
-from symphys.transcription.terms import Terms
+from symphys.transcription.objective import Terms
+from symphys.transcription.rollout import Rollout
+from symphys.transcription.simulation import Record, recorder, simulate
 
 Array = NDArray[np.float64]
 Judge = Callable[..., Verdict]

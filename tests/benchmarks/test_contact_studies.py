@@ -13,9 +13,9 @@ import pytest
 from contact_figures import Curve, consistency_figure, gradient_figure
 from scenes import Solid, tumbling_box
 
-from symphys.kernel import KernelUnavailable
-from symphys.kernel.compiler import find_compiler
-from symphys.world import Scheme
+from symphys.codegen import KernelUnavailable
+from symphys.codegen.toolchain.compiler import find_compiler
+from symphys.model.world import Scheme
 
 
 @pytest.fixture(autouse=True)

@@ -10,9 +10,9 @@ from joint_figure import joint_figure
 from joint_study import Run, Study, curves, drift, parted, report
 from joint_worlds import falling_chain, lowest, parallelograms, swinging
 
-from symphys.kernel import KernelUnavailable
-from symphys.kernel.compiler import find_compiler
-from symphys.world import Scheme
+from symphys.codegen import KernelUnavailable
+from symphys.codegen.toolchain.compiler import find_compiler
+from symphys.model.world import Scheme
 
 
 @pytest.fixture(autouse=True)

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from robots import JointedScene, Pose, Rotation, chain, quadruped, standing, state_of, swinging
 
-from symphys.joints import Spring
-from symphys.kernel import KernelUnavailable
-from symphys.kernel.compiler import find_compiler
-from symphys.state import initial_state
-from symphys.step.coordinates import readings
+from symphys.codegen import KernelUnavailable
+from symphys.codegen.toolchain.compiler import find_compiler
+from symphys.dynamics.observation.joint_coordinates import readings
+from symphys.model.joints import Spring
+from symphys.model.state_layout import initial_state
 
 
 @pytest.fixture

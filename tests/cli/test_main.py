@@ -274,7 +274,7 @@ def test_without_a_compiler_one_line_says_so(
 
 
 def test_the_help_names_every_backend(run: Run) -> None:
-    from symphys.backends import NAMES
+    from symphys.codegen.backends import NAMES
 
     _, out, _ = run("solve", "--help")
     assert "|".join(sorted(NAMES, key=["auto", "casadi", "c", "simd", "simd32", "cuda", "cuda32"].index)) in out

@@ -11,8 +11,8 @@ import pytest
 from compilers import fake
 
 from symphys import doctor
-from symphys.kernel import KernelUnavailable
-from symphys.kernel.compiler import find_compiler
+from symphys.codegen import KernelUnavailable
+from symphys.codegen.toolchain.compiler import find_compiler
 
 Run = Callable[..., tuple[int, str, str]]
 Patch = pytest.MonkeyPatch

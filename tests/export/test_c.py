@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from symphys.codegen import KernelUnavailable
+from symphys.codegen.toolchain.compiler import find_compiler
 from symphys.export import c_files, write_folders
 from symphys.export.sources import identifier, string
-from symphys.kernel import KernelUnavailable
-from symphys.kernel.compiler import find_compiler
 from symphys.problem import load_problem
 from symphys.problems import find
 from symphys.transcription import Transcription, transcribe

@@ -12,11 +12,11 @@ from mixed import mixed
 from robots import REST, quadruped, state_of
 
 from symphys.export import ExportError, mjcf, mjcf_files
-from symphys.heightfield import Heightfield
-from symphys.joints import BALL, HINGE, Joint, Limits, Servo, Socket, Spring, TorqueMotor, VelocityMotor
+from symphys.model.heightfield import Heightfield
+from symphys.model.joints import BALL, HINGE, Joint, Limits, Servo, Socket, Spring, TorqueMotor, VelocityMotor
+from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain
+from symphys.model.world import Body, Law, Pair, World, make_world
 from symphys.problem import load_problem
-from symphys.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain
-from symphys.world import Body, Law, Pair, World, make_world
 
 ARM = Joint("arm", HINGE, 0, None, (Socket((0, 0, 0.5)), Socket()))
 ROD = Body("rod", 2.0, 0.1)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from symphys.export import words
 from symphys.problem import load_problem
-from symphys.transcription.along import symbolic_rollout
+from symphys.transcription.rollout import symbolic_rollout
 
 ARM = """
 [simulation]

@@ -63,7 +63,7 @@ def test_public_surface_is_small_and_real() -> None:
 
 @pytest.mark.parametrize(
     "package",
-    ["symphys.solvers", "symphys.problem", "symphys.report", "symphys.runs", "symphys.export", "symphys.kernel"],
+    ["symphys.solvers", "symphys.problem", "symphys.report", "symphys.runs", "symphys.export", "symphys.codegen"],
 )
 def test_exported_names_exist(package: str) -> None:
     module = importlib.import_module(package)

@@ -10,15 +10,15 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from symphys import shapes
 from symphys.errors import ProblemError
+from symphys.model import shapes
+from symphys.model.shapes import Box, Capsule, Plane, Sphere, Terrain, contact_points
+from symphys.model.world import Law
 from symphys.problem import Problem
-from symphys.problem.crowd import MOST_POINTS
-from symphys.problem.meetings import KINDS, Meetings
-from symphys.problem.parts import BlockPlan, BodyPlan, PairPlan, Part, PlanePlan
-from symphys.problem.plan import WorldPlan
-from symphys.shapes import Box, Capsule, Plane, Sphere, Terrain, contact_points
-from symphys.world import Law
+from symphys.problem.checks.pair_limit import MOST_POINTS
+from symphys.problem.parametric.collision_filter import KINDS, Meetings
+from symphys.problem.parametric.parts import BlockPlan, BodyPlan, PairPlan, Part, PlanePlan
+from symphys.problem.parametric.world import WorldPlan
 
 Load = Callable[..., Problem]
 Refused = Callable[..., ProblemError]

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from included import MAIN, ROBOT
 
+from symphys.dynamics import gap_function
+from symphys.dynamics.observation.joint_coordinates import readings
+from symphys.model.state_layout import initial_state
 from symphys.problem import Problem, json_schema, load_problem
-from symphys.problem.include import LISTS
-from symphys.problem.prefix import prefixed
-from symphys.state import initial_state
-from symphys.step import gap_function
-from symphys.step.coordinates import readings
+from symphys.problem.include.files import LISTS
+from symphys.problem.include.prefix import prefixed
 
 Load = Callable[..., Problem]
 

@@ -150,10 +150,10 @@ def test_two_included_files_must_not_differ(refused_both: Refused, tmp_path: Pat
 
 
 def test_a_file_that_is_too_large(refused_both: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("symphys.problem.source.MAX_BYTES", len(ROBOT) - 1)
+    monkeypatch.setattr("symphys.problem.reading.source.MAX_BYTES", len(ROBOT) - 1)
     assert "too large for a problem file" in refused_both(problem=(MAIN, MAIN[:-2]))[0]
     monkeypatch.undo()
-    monkeypatch.setattr("symphys.problem.include.MAX_BYTES", len(ROBOT) + len(MAIN))
+    monkeypatch.setattr("symphys.problem.include.files.MAX_BYTES", len(ROBOT) + len(MAIN))
     assert refused_both()[0].startswith("main.toml: with the files that it includes, it is larger than")
 
 

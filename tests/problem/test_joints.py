@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from symphys.dynamics.observation.joint_coordinates import readings
 from symphys.errors import ProblemError
-from symphys.joints import Joint, Limits, Servo, Spring, TorqueMotor, VelocityMotor
+from symphys.model.joints import Joint, Limits, Servo, Spring, TorqueMotor, VelocityMotor
+from symphys.model.state_layout import initial_state, input_size
 from symphys.problem import Problem
-from symphys.state import initial_state, input_size
-from symphys.step.coordinates import readings
 
 Load = Callable[..., Problem]
 Refused = Callable[..., ProblemError]

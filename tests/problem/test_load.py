@@ -9,8 +9,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from symphys.model.world import Scheme
 from symphys.problem import Problem, Slot
-from symphys.world import Scheme
 
 Load = Callable[..., Problem]
 

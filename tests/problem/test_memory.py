@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from symphys.errors import ProblemError
-from symphys.problem import load_problem, memory
+from symphys.problem import load_problem
+from symphys.problem.checks import memory
 
 BALL = """[simulation]
 duration = 1.0

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from symphys import rotation
+from symphys.maths import rotation
+from symphys.model.shapes import Box, Capsule, Shape, Sphere
 from symphys.problem import Problem
-from symphys.problem.inertia import moments, specific, volume
-from symphys.shapes import Box, Capsule, Shape, Sphere
+from symphys.problem.checks.inertia import moments, specific, volume
 
 Array = NDArray[np.float64]
 Load = Callable[..., Problem]

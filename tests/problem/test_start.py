@@ -11,10 +11,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from symphys.dynamics.observation.joint_coordinates import Reading, readings
 from symphys.errors import ProblemError
+from symphys.model.state_layout import initial_state
 from symphys.problem import Problem
-from symphys.state import initial_state
-from symphys.step.coordinates import Reading, readings
 
 Load = Callable[..., Problem]
 Refused = Callable[..., ProblemError]

@@ -9,8 +9,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain, contact_points
 from symphys.problem import Problem
-from symphys.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain, contact_points
 
 Load = Callable[..., Problem]
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from symphys.errors import ProblemError
+from symphys.model.world import Law
 from symphys.problem import Problem
-from symphys.world import Law
 
 Load = Callable[..., Problem]
 Refused = Callable[..., ProblemError]

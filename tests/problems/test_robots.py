@@ -11,10 +11,10 @@ import pytest
 from numpy.typing import NDArray
 
 from symphys import problems
+from symphys.dynamics import gap_function, reading_function, step_function
+from symphys.model.state_layout import Layout, initial_state
+from symphys.model.world import Scheme
 from symphys.problem import Problem, load_problem
-from symphys.state import Layout, initial_state
-from symphys.step import gap_function, reading_function, step_function
-from symphys.world import Scheme
 
 Array = NDArray[np.float64]
 Robot = Callable[..., Problem]

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from walker import SCENE, write_walker
 
-from symphys.report.recordings import read_trajectory
-from symphys.report.records import Trajectory
-from symphys.report.scene_file import read_scene
-from symphys.report.scenery import Scene
+from symphys.results.records import Trajectory
+from symphys.results.scene_reading import read_scene
+from symphys.results.scene_records import Scene
+from symphys.results.trajectories import read_trajectory
 
 Arrays = dict[str, Any]
 GRAVITY, BOUNCE, RADIUS = 9.81, 0.5, 0.5

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from symphys.report import write_batch_report, write_run_report
-from symphys.report.finding import run_folders
-from symphys.report.records import ReportError
+from symphys.results.discovery import run_folders
+from symphys.results.records import ReportError
 
 
 def read(folder: Path) -> str:

@@ -9,18 +9,18 @@ import matplotlib
 import numpy as np
 import pytest
 
-from symphys.report import style
-from symphys.report.checks import limits, ratios
-from symphys.report.contacts import pair_normals, shown_pairs
-from symphys.report.curves import Curve, best_so_far, median_curve, miss_so_far
-from symphys.report.finding import read_all, studies
-from symphys.report.motion import draw_motion
-from symphys.report.reading import read_run
-from symphys.report.recordings import read_trajectory
-from symphys.report.records import Trace, Trajectory
-from symphys.report.scene_file import read_scene
-from symphys.report.scenery import Scene, ScenePlane
-from symphys.report.views import SIDE_XZ, SIDE_YZ, TOP, TOP_TURNED, choose_views, turn
+from symphys.report.figures import style
+from symphys.report.figures.contacts import pair_normals, shown_pairs
+from symphys.report.figures.curves import Curve, best_so_far, median_curve, miss_so_far
+from symphys.report.pages.checks import limits, ratios
+from symphys.report.scene.motion import draw_motion
+from symphys.report.scene.views import SIDE_XZ, SIDE_YZ, TOP, TOP_TURNED, choose_views, turn
+from symphys.results.discovery import read_all, studies
+from symphys.results.reading import read_run
+from symphys.results.records import Trace, Trajectory
+from symphys.results.scene_reading import read_scene
+from symphys.results.scene_records import Scene, ScenePlane
+from symphys.results.trajectories import read_trajectory
 
 GROUND = Scene(planes=(ScenePlane("ground", np.array([0.0, 0.0, 1.0]), 0.0),))
 

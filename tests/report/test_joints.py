@@ -14,13 +14,14 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from walker import DT, SCENE, STEPS, hinge, motion, write_walker
 
-from symphys.report import style, write_motion, write_run_report
-from symphys.report.joint_figures import BEYOND, FULL, TARGET, draw_joints, unwound, window
-from symphys.report.joint_grid import make_grid, shown
-from symphys.report.joint_section import limits_told, motors_told, separation_told
-from symphys.report.joint_use import channels, separation
-from symphys.report.records import Trajectory
-from symphys.report.scenery import Scene
+from symphys.report import write_motion, write_run_report
+from symphys.report.figures import style
+from symphys.report.pages.joints import limits_told, motors_told, separation_told
+from symphys.report.robots.joint_figures import BEYOND, FULL, TARGET, draw_joints, unwound, window
+from symphys.report.robots.joint_grid import make_grid, shown
+from symphys.report.robots.joint_use import channels, separation
+from symphys.results.records import Trajectory
+from symphys.results.scene_records import Scene
 
 Load = Callable[..., tuple[Trajectory, Scene]]
 KNEE = 3

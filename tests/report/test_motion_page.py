@@ -12,10 +12,10 @@ import pytest
 from page_scripts import NODE, plays_to_the_end
 
 from symphys.report import write_motion
-from symphys.report.animation import NUMBERS, motion_data
-from symphys.report.recordings import read_trajectory
-from symphys.report.records import ReportError
-from symphys.report.scene_file import read_scene
+from symphys.report.scene.animation import NUMBERS, motion_data
+from symphys.results.records import ReportError
+from symphys.results.scene_reading import read_scene
+from symphys.results.trajectories import read_trajectory
 
 
 def test_page_plays_and_draws(made: Path, tmp_path: Path) -> None:

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from symphys.report import write_batch_report, write_run_report
-from symphys.report.drawable import LARGEST, OVERSIZED, drawable, oversized
-from symphys.report.reading import read_run
+from symphys.report.figures.drawable import LARGEST, OVERSIZED, drawable, oversized
+from symphys.results.reading import read_run
 
 HUGE = [1e155, 1e299, 1e307]
 RECORDED = ("objective", "best", "miss", "gradient_norm", "step")

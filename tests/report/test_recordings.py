@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from symphys.report.recordings import read_trajectory
-from symphys.report.records import ReportError
+from symphys.results.records import ReportError
+from symphys.results.trajectories import read_trajectory
 
 BODIES = {"time": np.linspace(0, 0.3, 4), "body_names": np.array(["arm"]), "position": np.zeros((4, 1, 3))}
 VALUE = np.arange(16.0).reshape(4, 2, 2)

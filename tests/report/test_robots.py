@@ -11,20 +11,20 @@ import pytest
 from page_scripts import NODE, plays_to_the_end, run_script
 from walker import DT, LEGS, NAMES, SCENE, STEPS, TURNED, hinge, motion
 
-from symphys.report import style
-from symphys.report.animation import NUMBERS, motion_data
-from symphys.report.gait import stances, weight
-from symphys.report.gait_figure import draw_gait
-from symphys.report.joint_section import steps_told
-from symphys.report.limbs import colours, keys, limbs, traced
-from symphys.report.motion import draw_motion
-from symphys.report.pivots import axes_of, bones, on_side, pivot
-from symphys.report.records import Trajectory
-from symphys.report.robots import extents, spaced
-from symphys.report.scenery import Scene
-from symphys.report.spans import spans
-from symphys.report.strip import draw_strip, make_strip
-from symphys.report.views import SIDE_XZ, TOP
+from symphys.report.figures import style
+from symphys.report.figures.spans import spans
+from symphys.report.pages.joints import steps_told
+from symphys.report.robots.branches import colours, keys, limbs, traced
+from symphys.report.robots.gait import stances, weight
+from symphys.report.robots.gait_figure import draw_gait
+from symphys.report.robots.joint_positions import axes_of, bones, on_side, pivot
+from symphys.report.robots.snapshots import extents, spaced
+from symphys.report.robots.strip import draw_strip, make_strip
+from symphys.report.scene.animation import NUMBERS, motion_data
+from symphys.report.scene.motion import draw_motion
+from symphys.report.scene.views import SIDE_XZ, TOP
+from symphys.results.records import Trajectory
+from symphys.results.scene_records import Scene
 
 Load = Callable[..., tuple[Trajectory, Scene]]
 

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from symphys.report import write_run_report
-from symphys.report.records import ReportError
-from symphys.report.trust_section import NOT_EXAMINED
+from symphys.report.pages.verification import NOT_EXAMINED
+from symphys.results.records import ReportError
 
 LARGEST = 3_000_000
 SLOWEST = 10.0

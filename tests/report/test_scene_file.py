@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from yard import write_yard
 
-from symphys.report.scene_file import read_scene
-from symphys.report.scenery import Scene
+from symphys.results.scene_reading import read_scene
+from symphys.results.scene_records import Scene
 
 
 def test_scene_is_read(tmp_path: Path) -> None:

@@ -10,8 +10,8 @@ import pytest
 from page_scripts import NODE, run_script
 from yard import area
 
-from symphys.report.outlines import outline
-from symphys.report.scenery import Solid
+from symphys.report.scene.outlines import outline
+from symphys.results.scene_records import Solid
 
 pytestmark = NODE
 

@@ -13,17 +13,18 @@ import pytest
 from matplotlib.patches import Polygon
 from yard import QUARTER, X, area, write_yard
 
-from symphys.report import style, write_motion, write_run_report
-from symphys.report.animation import motion_data
-from symphys.report.contacts import by_surfaces, draw_contacts, pair_normals, shown_pairs
-from symphys.report.motion import draw_motion
-from symphys.report.outlines import inner_edges, outline
-from symphys.report.panel import make_panel
-from symphys.report.recordings import read_trajectory
-from symphys.report.records import Trajectory
-from symphys.report.scene_file import read_scene
-from symphys.report.scenery import Scene, Solid
-from symphys.report.views import SIDE_XZ, SIDE_YZ, TOP, TOP_TURNED, choose_views, half_axes
+from symphys.report import write_motion, write_run_report
+from symphys.report.figures import style
+from symphys.report.figures.contacts import by_surfaces, draw_contacts, pair_normals, shown_pairs
+from symphys.report.scene.animation import motion_data
+from symphys.report.scene.motion import draw_motion
+from symphys.report.scene.outlines import inner_edges, outline
+from symphys.report.scene.panel import make_panel
+from symphys.report.scene.views import SIDE_XZ, SIDE_YZ, TOP, TOP_TURNED, choose_views, half_axes
+from symphys.results.records import Trajectory
+from symphys.results.scene_reading import read_scene
+from symphys.results.scene_records import Scene, Solid
+from symphys.results.trajectories import read_trajectory
 
 
 @pytest.fixture(scope="module")

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from symphys.report import write_batch_report, write_run_report
-from symphys.report.curves import Curve, best_so_far, curve, miss_so_far
-from symphys.report.history import draw_run
-from symphys.report.reading import read_run
-from symphys.report.records import Run
-from symphys.report.stages import exact_ends, segments
+from symphys.report.figures.curves import Curve, best_so_far, curve, miss_so_far
+from symphys.report.figures.history import draw_run
+from symphys.report.pages.stages import exact_ends, segments
+from symphys.results.reading import read_run
+from symphys.results.records import Run
 
 Edit = Callable[..., None]
 KNOBS = (0.1, 0.01, 0.0)

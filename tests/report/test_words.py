@@ -17,11 +17,11 @@ from symphys.findings.examined import advice, answers, findings, slopes
 from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Judged, graded
 from symphys.findings.numerics import slope_finding, smoothed_findings
 from symphys.findings.touching import depth_finding, residual_finding
-from symphys.report.markup import Html, tag
-from symphys.report.output import slug
-from symphys.report.records import Variable
-from symphys.report.sections import variable_rows
-from symphys.report.words import count, listed, seconds, show
+from symphys.report.figures.output import slug
+from symphys.report.pages.markup import Html, tag
+from symphys.report.pages.sections import variable_rows
+from symphys.report.pages.words import count, listed, seconds, show
+from symphys.results.records import Variable
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ import pytest
 from symphys import files, solvers
 from symphys.problem import load_problem
 from symphys.runs import Job, Result, execute, make_jobs
-from symphys.runs.workshop import Workshop
+from symphys.runs.transcription_cache import Workshop
 from symphys.solvers import Outcome, Status, TraceRow
 from symphys.transcription import transcribe
 

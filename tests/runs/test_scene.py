@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from symphys.problem import Problem, load_problem
-from symphys.runs.scene import scene
+from symphys.results.scene import scene
 from symphys.transcription import transcribe
 
 SHAPES = """

@@ -13,7 +13,7 @@ import pytest
 from symphys.problem import Problem, load_problem
 from symphys.problems import find
 from symphys.runs import Job, Result, execute, make_jobs, read_result, run_batch
-from symphys.runs.workshop import Workshop
+from symphys.runs.transcription_cache import Workshop
 from symphys.solvers import TraceRow
 from symphys.transcription import Transcription, transcribe
 

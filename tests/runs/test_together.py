@@ -11,7 +11,7 @@ import pytest
 
 from symphys.problem import load_problem
 from symphys.runs import Job, make_jobs, run_batch
-from symphys.runs.together import groups
+from symphys.runs.multi_start import groups
 from symphys.solvers import TraceRow
 from symphys.transcription import transcribe
 
@@ -65,6 +65,6 @@ def test_one_that_fails_spoils_no_other(
     def broken(*_: Any) -> Any:
         raise RuntimeError("out of order")
 
-    monkeypatch.setattr("symphys.runs.together.solve_together", broken)
+    monkeypatch.setattr("symphys.runs.multi_start.solve_together", broken)
     batch = run_batch(jobs_of(problem_file, tmp_path), 1, recorder, transcribe, together=True)
     assert batch.accepted

@@ -11,7 +11,7 @@ from toys import PLAIN, counted, solve, stop_at, through_json, toy
 
 from symphys.shooting import ShootingProblem
 from symphys.solvers import Status
-from symphys.solvers.plateau import FLAT, REFUSALS
+from symphys.solvers.core.vanishing_gradient import FLAT, REFUSALS
 
 every_solver = pytest.mark.parametrize("name", PLAIN)
 descents = pytest.mark.parametrize("name", ["gradient", "least_squares"])

@@ -11,10 +11,10 @@ import pytest
 from toys import PLAIN, failing, solve, stop_at, through_json, toy, values
 
 from symphys.errors import SymphysError
+from symphys.maths.smoothing import positive
 from symphys.shooting import ShootingProblem
-from symphys.smooth import positive
 from symphys.solvers import Counts, Outcome, StageResult, Status, solve_together, solver
-from symphys.solvers.plateau import FLAT
+from symphys.solvers.core.vanishing_gradient import FLAT
 
 KNOBS = (1.0, 0.1, 0.0)
 every_solver = pytest.mark.parametrize("name", PLAIN)

@@ -13,7 +13,7 @@ from windy import BEST, Winds, windy
 
 from symphys.shooting import Array, Drawn, Values
 from symphys.solvers import SOLVERS, Status, StochasticOptions, TraceRow
-from symphys.solvers.averages import average, centred, evolution, together
+from symphys.solvers.randomized.aggregation import average, centred, evolution, together
 
 SOLVE = SOLVERS["stochastic"].solve
 

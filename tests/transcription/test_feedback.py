@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from symphys import trust
+from symphys import verification as trust
 from symphys.errors import ProblemError
 from symphys.problem import Problem, load_problem
 from symphys.transcription import Transcription, transcribe

@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from symphys.errors import ProblemError
 from symphys.problem import load_problem
 from symphys.transcription import Transcription, transcribe
-from symphys.transcription.large import LargeEvaluator, LargeTranscription, passes, require_small_nets, split
-from symphys.trust import examine
+from symphys.transcription.network_rollout import LargeEvaluator, LargeTranscription, require_small_nets
+from symphys.transcription.network_rollout import forward_backward as passes
+from symphys.transcription.network_rollout import partition as split
+from symphys.verification import examine
 
 Array = NDArray[np.float64]
 
@@ -208,7 +210,7 @@ def test_nets_on_a_device(
     both: tuple[Transcription, LargeTranscription], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Steps by a device's kernel, products by its library, on arrays that stay there: the same numbers and trust."""
-    monkeypatch.setattr("symphys.backends.kernels.find_gpu", lambda: Remote(tmp_path))
+    monkeypatch.setattr("symphys.codegen.backends.kernels.find_gpu", lambda: Remote(tmp_path))
     beside = both[1]
     there = transcribe(beside.problem, backend="cuda")
     assert (there.backend.name, there.backend.note) == ("cuda", "nets by matrix products")

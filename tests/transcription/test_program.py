@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pushed import PUSHED
 
-from symphys.kernel import compile_program, interpret
+from symphys.codegen import compile_program, interpret
 from symphys.problem import Problem, load_problem
 from symphys.problems import find
 from symphys.transcription import rollout_program, transcribe

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from symphys.dynamics import gap_function
+from symphys.dynamics.observation.joint_coordinates import readings
+from symphys.model.state_layout import initial_state
 from symphys.problem import Problem, load_problem
 from symphys.shooting import Drawn
-from symphys.state import initial_state
-from symphys.step import gap_function
-from symphys.step.coordinates import readings
 from symphys.transcription import Transcription, transcribe
-from symphys.transcription.situations.sampler import Sampler
+from symphys.transcription.randomization.sampler import Sampler
 
 Array = NDArray[np.float64]
 WALKER = """

@@ -9,7 +9,7 @@ from pushed import PUSHED
 from symphys.problem import load_problem
 from symphys.trajectory import NotFinite
 from symphys.transcription import transcribe
-from symphys.transcription.decision import knot_weights
+from symphys.transcription.decision_variables import knot_weights
 
 
 @pytest.fixture

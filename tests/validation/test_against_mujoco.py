@@ -11,8 +11,8 @@ from mixed import mixed
 from robots import REST, chain, quadruped, state_of
 
 from symphys.export import mjcf
-from symphys.joints import Spring, TorqueMotor
-from symphys.world import Scheme, World
+from symphys.model.joints import Spring, TorqueMotor
+from symphys.model.world import Scheme, World
 
 mujoco = pytest.importorskip("mujoco")
 FINE = 2e-4

@@ -17,9 +17,9 @@ from agreement import transcribed
 from laboratory import Lab
 from numpy.typing import NDArray
 
-from symphys.joints import HINGE, SLIDER, Joint, Limits, Socket
-from symphys.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain
-from symphys.world import Body, Law, Scheme, World, make_world
+from symphys.model.joints import HINGE, SLIDER, Joint, Limits, Socket
+from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain
+from symphys.model.world import Body, Law, Scheme, World, make_world
 
 Array = NDArray[np.float64]
 DT, STEPS = 1 / 16, 16

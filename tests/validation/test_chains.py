@@ -8,10 +8,10 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symphys.shapes import Plane
-from symphys.state import Layout, initial_state
-from symphys.step import report_function
-from symphys.world import Body, Law, Scheme, World, make_world
+from symphys.dynamics import report_function
+from symphys.model.shapes import Plane
+from symphys.model.state_layout import Layout, initial_state
+from symphys.model.world import Body, Law, Scheme, World, make_world
 
 RADIUS, START = 0.05, -0.5
 

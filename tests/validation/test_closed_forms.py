@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from laboratory import Lab, value_and_gradient
 
-from symphys.shapes import Plane, Sphere
-from symphys.world import Body, Law, Scheme, World, make_world
+from symphys.model.shapes import Plane, Sphere
+from symphys.model.world import Body, Law, Scheme, World, make_world
 
 G = 9.81
 

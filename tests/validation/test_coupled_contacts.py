@@ -9,11 +9,11 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symphys.shapes import Box, Capsule, Plane, Sphere
-from symphys.state import Layout, initial_state
-from symphys.step import report_function
-from symphys.step.coupled import may_couple
-from symphys.world import Body, Law, Scheme, World, make_world
+from symphys.dynamics import report_function
+from symphys.dynamics.contact.local_solver import may_couple
+from symphys.model.shapes import Box, Capsule, Plane, Sphere
+from symphys.model.state_layout import Layout, initial_state
+from symphys.model.world import Body, Law, Scheme, World, make_world
 
 HALF, RADIUS, INERTIA, SMALL = 0.5, 0.01, 1 / 12, 1e-6
 SHARE = 5 / 6

@@ -9,13 +9,13 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symphys.shapes import Box, Plane
-from symphys.state import Layout, initial_state
-from symphys.step import step_function
-from symphys.step.acceleration import clusters
-from symphys.step.paths import bodies_of
-from symphys.step.pgs import Row
-from symphys.world import Body, Law, Scheme, World, make_world
+from symphys.dynamics import step_function
+from symphys.dynamics.line_search import clusters
+from symphys.dynamics.pgs import Row
+from symphys.dynamics.prediction import bodies_of
+from symphys.model.shapes import Box, Plane
+from symphys.model.state_layout import Layout, initial_state
+from symphys.model.world import Body, Law, Scheme, World, make_world
 
 SIZE, TIME = 0.2, 0.6
 

@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from laboratory import Lab, central_difference, value_and_gradient
 
-from symphys.shapes import Plane, Sphere
-from symphys.state import initial_state
-from symphys.step import step_function
-from symphys.world import Body, Law, Scheme, make_world
+from symphys.dynamics import step_function
+from symphys.model.shapes import Plane, Sphere
+from symphys.model.state_layout import initial_state
+from symphys.model.world import Body, Law, Scheme, make_world
 
 KNOBS = (0.0, 1e-12, 1e-6, 1e-3, 0.1)
 PLACES = {

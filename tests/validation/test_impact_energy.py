@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from laboratory import Lab
 
-from symphys import rotation
-from symphys.shapes import Box, Plane, Sphere
-from symphys.world import Body, Law, Scheme, make_world
+from symphys.maths import rotation
+from symphys.model.shapes import Box, Plane, Sphere
+from symphys.model.world import Body, Law, Scheme, make_world
 
 SIZE = (0.2, 0.3, 0.1)
 MOMENTS = tuple((SIZE[(i + 1) % 3] ** 2 + SIZE[(i + 2) % 3] ** 2) / 12 for i in range(3))

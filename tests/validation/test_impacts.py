@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from laboratory import Lab, value_and_gradient
 
-from symphys.shapes import Plane, Sphere
-from symphys.world import Body, Law, Scheme, make_world
+from symphys.model.shapes import Plane, Sphere
+from symphys.model.world import Body, Law, Scheme, make_world
 
 ELASTIC = Law(friction=0.0, restitution=1.0)
 WEIGHTLESS = (0.0, 0.0, 0.0)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from laboratory import Lab
 
-from symphys import rotation
-from symphys.shapes import Plane, Sphere
-from symphys.world import Body, Law, Scheme, World, make_world
+from symphys.maths import rotation
+from symphys.model.shapes import Plane, Sphere
+from symphys.model.world import Body, Law, Scheme, World, make_world
 
 WEIGHTLESS = (0.0, 0.0, 0.0)
 INERTIA = (0.02, 0.03, 0.045)

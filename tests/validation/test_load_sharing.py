@@ -11,9 +11,9 @@ from blocks import Array, block
 from laboratory import Lab
 from plate import Plate
 
-from symphys.shapes import Box, Plane
-from symphys.step.sharing import faces
-from symphys.world import Body, Law, Scheme, make_world
+from symphys.dynamics.contact.load_distribution import faces
+from symphys.model.shapes import Box, Plane
+from symphys.model.world import Body, Law, Scheme, make_world
 
 HALVES, FRICTION = (0.15, 0.2, 0.1), 0.3
 FEET = [f"b-ground:{k}.force" for k in range(8)]

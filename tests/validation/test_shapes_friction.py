@@ -13,8 +13,8 @@ import pytest
 from blocks import Array, among, block, turned_by
 from laboratory import Lab
 
-from symphys.shapes import Box, Fixture, Plane
-from symphys.world import Body, Law, Scheme, World, make_world
+from symphys.model.shapes import Box, Fixture, Plane
+from symphys.model.world import Body, Law, Scheme, World, make_world
 
 G, MU = 9.81, 0.6
 HEADINGS = np.arange(16) * np.pi / 8

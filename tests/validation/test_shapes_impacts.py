@@ -13,9 +13,9 @@ from laboratory import Lab, value_and_gradient
 from meetings import matrix
 from scipy.integrate import solve_ivp
 
-from symphys.heightfield import Heightfield
-from symphys.shapes import Box, Fixture, Plane, Static, Terrain
-from symphys.world import Body, Law, Scheme, make_world
+from symphys.model.heightfield import Heightfield
+from symphys.model.shapes import Box, Fixture, Plane, Static, Terrain
+from symphys.model.world import Body, Law, Scheme, make_world
 
 G = 9.81
 CORNER = {

@@ -11,8 +11,8 @@ import pytest
 from blocks import among, block, drift, rod, stack, turned_by, unrest
 from laboratory import Lab
 
-from symphys.shapes import Box, Capsule, Fixture, Plane, Static
-from symphys.world import Body, Law, Scheme, make_world
+from symphys.model.shapes import Box, Capsule, Fixture, Plane, Static
+from symphys.model.world import Body, Law, Scheme, make_world
 
 MOST_DRIFT, MOST_TURN, STILL = 1e-4, 0.01, 1e-6
 """[m], [degrees] in 10 s, and [m/s], [rad/s] at the end."""

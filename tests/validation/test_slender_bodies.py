@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from symphys import rotation
-from symphys.free_rotation import SECOND_ORDER, turned
-from symphys.problem.inertia import moments
-from symphys.shapes import Box, Capsule, Plane, Shape
-from symphys.state import Layout, initial_state
-from symphys.step import step_function
-from symphys.world import Body, Law, Scheme, World, make_world
+from symphys.dynamics import step_function
+from symphys.dynamics.free_rotation import SECOND_ORDER, turned
+from symphys.maths import rotation
+from symphys.model.shapes import Box, Capsule, Plane, Shape
+from symphys.model.state_layout import Layout, initial_state
+from symphys.model.world import Body, Law, Scheme, World, make_world
+from symphys.problem.checks.inertia import moments
 
 Array = NDArray[np.float64]
 THROWN: dict[str, Shape] = {

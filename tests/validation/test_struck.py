@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from laboratory import Lab
 
-from symphys.shapes import Plane
-from symphys.world import Body, Law, Pair, Scheme, World, make_world
+from symphys.model.shapes import Plane
+from symphys.model.world import Body, Law, Pair, Scheme, World, make_world
 
 RADIUS = 0.0286
 

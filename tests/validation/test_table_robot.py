@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from robot_growth import grown, rollout_of, visited
 from table_robot import starts, table_problem
 
-from symphys.kernel import Kernel, compile_program
+from symphys.codegen import Kernel, compile_program
+from symphys.model.state_layout import Layout
 from symphys.problem import Problem
-from symphys.state import Layout
 from symphys.transcription import Rollout, symbolic_rollout
 from symphys.transcription.program import rollout_program
-from symphys.transcription.simulate import recorder, simulate
+from symphys.transcription.simulation import recorder, simulate
 
 Array = NDArray[np.float64]
 STEPS = 50

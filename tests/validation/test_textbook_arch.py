@@ -13,8 +13,8 @@ from laboratory import Lab
 from scipy.optimize import linprog
 from textbook import Array, G
 
-from symphys.shapes import Box, Plane
-from symphys.world import Body, Law, Scheme, World, make_world
+from symphys.model.shapes import Box, Plane
+from symphys.model.world import Body, Law, Scheme, World, make_world
 
 COUNT = 5
 PART = np.pi / COUNT

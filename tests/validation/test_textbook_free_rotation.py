@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 from scipy.special import ellipk
 from textbook import Array, about_a_point, differences, final, turn
 
-from symphys import rotation
-from symphys.world import Body, Scheme, World
+from symphys.maths import rotation
+from symphys.model.world import Body, Scheme, World
 
 MOMENTS = (1.0, 2.0, 3.0)
 BODIES = {

@@ -11,8 +11,8 @@ from blocks import turned_by
 from laboratory import Lab
 from textbook import Array, G, about_a_point, differences, final, turn
 
-from symphys.joints import BALL, HINGE, Joint, Socket
-from symphys.world import Body, Scheme, World
+from symphys.model.joints import BALL, HINGE, Joint, Socket
+from symphys.model.world import Body, Scheme, World
 
 MASS, ARM = 0.5, 0.08
 MOMENTS = (8e-4, 8e-4, 5e-4)

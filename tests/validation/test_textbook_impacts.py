@@ -11,8 +11,8 @@ from blocks import turned_by
 from laboratory import Lab
 from textbook import Array, G, differences, final
 
-from symphys.shapes import Plane, Sphere
-from symphys.world import Body, Law, Scheme, World, make_world
+from symphys.model.shapes import Plane, Sphere
+from symphys.model.world import Body, Law, Scheme, World, make_world
 
 R = 0.05
 

@@ -13,9 +13,9 @@ from laboratory import Lab
 from linkage import ABOUT_Z
 from textbook import Array, G, differences, final
 
-from symphys.joints import HINGE, SLIDER, Joint, Socket
-from symphys.shapes import Box
-from symphys.world import Body, Law, Scheme, World, make_world
+from symphys.model.joints import HINGE, SLIDER, Joint, Socket
+from symphys.model.shapes import Box
+from symphys.model.world import Body, Law, Scheme, World, make_world
 
 R = 0.05
 

@@ -12,10 +12,10 @@ from linkage import ABOUT_Y, ABOUT_Z
 from scipy.integrate import solve_ivp
 from textbook import Array, G, differences, final
 
-from symphys.joints import BALL, FIXED, HINGE, SLIDER, Joint, Socket, Spring, VelocityMotor
-from symphys.joints.kind import Kind
-from symphys.shapes import Capsule, Plane, Sphere
-from symphys.world import Body, Law, Scheme, World, make_world
+from symphys.model.joints import BALL, FIXED, HINGE, SLIDER, Joint, Socket, Spring, VelocityMotor
+from symphys.model.joints.kind import Kind
+from symphys.model.shapes import Capsule, Plane, Sphere
+from symphys.model.world import Body, Law, Scheme, World, make_world
 
 
 @pytest.mark.parametrize("dt", [0.01, 0.0025])

@@ -12,9 +12,9 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 from textbook import Array, G
 
-from symphys.joints import BALL, HINGE, SLIDER, Joint, Limits, Socket, Spring, VelocityMotor
-from symphys.shapes import Plane, Sphere
-from symphys.world import Body, Law, Scheme, World, make_world
+from symphys.model.joints import BALL, HINGE, SLIDER, Joint, Limits, Socket, Spring, VelocityMotor
+from symphys.model.shapes import Plane, Sphere
+from symphys.model.world import Body, Law, Scheme, World, make_world
 
 LENGTH = 0.3
 

@@ -11,8 +11,8 @@ import pytest
 from laboratory import Lab
 from textbook import Array, G, differences, final
 
-from symphys.shapes import Box, Fixture, Plane, Terrain
-from symphys.world import Body, Law, Scheme, make_world
+from symphys.model.shapes import Box, Fixture, Plane, Terrain
+from symphys.model.world import Body, Law, Scheme, make_world
 
 R = 0.05
 

@@ -12,8 +12,8 @@ from blocks import turned_by
 from laboratory import Lab
 from textbook import G, final
 
-from symphys.shapes import Plane, Sphere
-from symphys.world import Body, Law, Scheme, make_world
+from symphys.model.shapes import Plane, Sphere
+from symphys.model.world import Body, Law, Scheme, make_world
 
 
 @pytest.mark.parametrize("dt", [0.01, 0.0025])

@@ -13,8 +13,8 @@ from linkage import energy
 from scipy.integrate import solve_ivp
 from textbook import Array, G, differences, final, spinning, turn
 
-from symphys.shapes import Plane, Sphere
-from symphys.world import Body, Law, Scheme, make_world
+from symphys.model.shapes import Plane, Sphere
+from symphys.model.world import Body, Law, Scheme, make_world
 
 
 @pytest.mark.parametrize("e", [1.0, 0.8])

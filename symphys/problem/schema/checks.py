@@ -11,7 +11,7 @@ from typing import Any, TypeGuard
 from pydantic_core import PydanticCustomError
 
 from symphys.expression import CONSTANTS, FUNCTIONS
-from symphys.problem.words import shown
+from symphys.problem.reading.value_texts import shown
 from symphys.suggest import quote
 
 RESERVED = frozenset({*FUNCTIONS, *CONSTANTS, *keyword.kwlist, "time", "gravity", "ground"})

@@ -6,7 +6,10 @@ from typing import Any
 
 from pydantic import ConfigDict, Field
 
-from symphys.problem.schema.aims import (
+from symphys.problem.schema.control import ControllerTable, SensorTable
+from symphys.problem.schema.include import MOST_INCLUDES, IncludedTable, IncludeTable
+from symphys.problem.schema.joints import JointTable
+from symphys.problem.schema.objectives import (
     ConstraintTable,
     CostTable,
     FallTable,
@@ -15,9 +18,6 @@ from symphys.problem.schema.aims import (
     TargetTable,
     VariableTable,
 )
-from symphys.problem.schema.control import ControllerTable, SensorTable
-from symphys.problem.schema.include import MOST_INCLUDES, IncludedTable, IncludeTable
-from symphys.problem.schema.joints import JointTable
 from symphys.problem.schema.physics import (
     BlockTable,
     BodyTable,

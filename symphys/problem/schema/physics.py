@@ -6,6 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from symphys.model.world import GRAVITY, Scheme
 from symphys.problem.schema.shapes import UPRIGHT, ShapeTable, SolidTable
 from symphys.problem.schema.types import (
     Finite,
@@ -22,7 +23,6 @@ from symphys.problem.schema.types import (
     Table,
     Vector,
 )
-from symphys.world import GRAVITY, Scheme
 
 Sweeps = Annotated[int, Field(ge=1, le=1000)]
 PositionSweeps = Annotated[int, Field(ge=0, le=1000)]

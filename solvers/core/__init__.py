@@ -1,0 +1,1 @@
+"""What all methods share: the driver, the counting evaluator, the checkpoint, continuation, line search."""

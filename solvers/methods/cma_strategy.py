@@ -1,0 +1,204 @@
+"""pycma's evolution strategy over the variables that may vary: which options it takes, asking, telling, replaying."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.errors import SymphysError
+from symphys.solvers.core.evaluator import Meter
+from symphys.solvers.core.options import nearest, refuse
+from symphys.solvers.core.outcome import Array
+
+RESERVED = {
+    "bounds": "the bounds of the problem's variables are used",
+    "fixed_variables": "a variable is held by equal bounds",
+    "seed": "the seed of the solve is used",
+    "randn": "the seed of the solve is used",
+    "popsize": "use population",
+    "maxfevals": "use evaluations",
+    "signals_filename": "no files are read",
+    "verbose": "pycma is kept silent, see the trace",
+}
+"""Options of pycma that are not passed on, and why."""
+TEXTS = {"BoundaryHandler": ("BoundTransform", "BoundPenalty")}
+"""The options that take a name of pycma's, and which. It evaluates any other text as Python: so none can be allowed."""
+QUIET = {"verbose": -9, "verb_log": 0, "verb_disp": 0, "signals_filename": "", "seed": math.nan}
+PLATEAU = "tolflatfitness"
+"""The criterion that ends a search on a plateau: more generations in a row without a difference than this option."""
+DEFAULTS = {PLATEAU: 50}
+"""Where pycma's own default is not used."""
+MOST_FULL = 2000
+"""Variables up to which the covariance is a full matrix; beyond it is diagonal (Ros, Hansen 2008)."""
+CONFUSED = {"tolfun", "tolfunhist", "tolfunrel", "flat fitness"}
+"""Criteria that take a plateau for convergence."""
+DRIFTED = "this checkpoint leads elsewhere with the present versions of pycma and numpy: start afresh without it"
+
+
+@dataclass(frozen=True)
+class Trail:
+    """What a replay needs.
+
+    Attributes:
+        start: (n,) z where the strategy began.
+        merits: (population,) of every generation so far, in the order in which its candidates were asked for.
+        mean, sigma: where that led, to compare; mean (free,) as pycma holds it.
+    """
+
+    start: Array
+    merits: tuple[tuple[float, ...], ...]
+    mean: Array
+    sigma: float
+
+
+class Strategy:
+    """pycma's CMAEvolutionStrategy in x = z / scale, without the variables whose bounds are equal."""
+
+    def __init__(
+        self,
+        meter: Meter,
+        start: Array,
+        sigma: float,
+        population: int,
+        options: Mapping[str, Any],
+        stream: np.random.Generator,
+    ) -> None:
+        """Begin at ``start`` (n,) with the standard deviation ``sigma``; SymphysError for options that cannot be."""
+        cma = load()
+        check(options, cma.CMAOptions.defaults())
+        self.stream = stream
+        self.start, self.scale, self.free = start, meter.scale, meter.lower < meter.upper
+        bounds = [sides(bound / meter.scale, self.free) for bound in (meter.lower, meter.upper)]
+        named = {name: getattr(cma, options[name]) for name in TEXTS if name in options}
+        diagonal = {"CMA_diagonal": True} if self.free.sum() > MOST_FULL else {}
+        own = {**DEFAULTS, **diagonal, **options, **named, **QUIET, "bounds": bounds, "randn": self.draw}
+        if population:
+            own["popsize"] = population
+        with pycma():
+            kind = single(cma) if self.free.sum() == 1 else cma.CMAEvolutionStrategy
+            self.es = kind((start / meter.scale)[self.free], sigma, own)
+        self.merits: tuple[tuple[float, ...], ...] = ()
+
+    def draw(self, *shape: int) -> Array:
+        """Standard normals."""
+        return self.stream.standard_normal(shape)
+
+    def ask(self) -> list[Array]:
+        """A generation of z (n,)."""
+        with pycma():
+            self.asked = self.es.ask()
+        return [self.full(x) for x in self.asked]
+
+    def tell(self, merits: tuple[float, ...]) -> None:
+        """The merits of what was asked for; inf ranks last."""
+        with pycma():
+            self.es.tell(self.asked, list(merits))
+        self.es.sm.randn = self.draw  # a sampler that pycma makes on its way would draw from numpy's global stream
+        self.merits = (*self.merits, merits)
+
+    def stopped(self) -> set[str]:
+        """Which of pycma's own criteria hold."""
+        with pycma():
+            reasons = set(self.es.stop())
+        plateau = bool(self.merits) and min(self.merits[-1]) == max(self.merits[-1])
+        return reasons - CONFUSED if plateau else reasons
+
+    def trail(self) -> Trail:
+        """The way so far."""
+        return Trail(self.start, self.merits, self.es.mean.copy(), self.sigma)
+
+    def follow(self, trail: Trail) -> None:
+        """Replay; SymphysError if it does not lead where it led."""
+        for merits in trail.merits:
+            self.stopped()  # pycma counts the generations of a plateau there
+            self.ask()
+            self.tell(merits)
+        same = self.es.mean.shape == trail.mean.shape and np.allclose(self.es.mean, trail.mean, rtol=1e-6)
+        if not same or not math.isclose(self.sigma, trail.sigma, rel_tol=1e-6):
+            raise SymphysError(DRIFTED)
+
+    @property
+    def sigma(self) -> float:
+        """The present step size."""
+        return float(self.es.sigma)
+
+    @property
+    def centre(self) -> Array:
+        """(n,) z of the mean."""
+        return self.full(self.es.result.xfavorite)
+
+    def full(self, x: Array) -> Array:
+        """(n,) z of a candidate (free,)."""
+        z = self.start.copy()
+        z[self.free] = np.asarray(x) * self.scale[self.free]
+        return z
+
+
+def load() -> Any:
+    """Pycma, which takes a second or two to import the first time: so only those who use it wait."""
+    import cma
+
+    return cma
+
+
+def single(cma: Any) -> Any:
+    """pycma's strategy for one variable.
+
+    Where a standard deviation leaves its limits, as in narrow bounds, pycma (4.5) changes the scaling of that variable,
+    which it refuses to do where there is one only: it takes a scaling of length 1 for one that has no length yet.
+    """
+
+    def limited(strategy: Any, *arguments: Any, **named: Any) -> Any:
+        strategy.sigma_vec.set_i = partial(rescale, strategy.sigma_vec)
+        return cma.CMAEvolutionStrategy._stds_into_limits(strategy, *arguments, **named)
+
+    return type("Single", (cma.CMAEvolutionStrategy,), {"_stds_into_limits": limited})
+
+
+def rescale(scaling: Any, index: int, value: float) -> None:
+    """What pycma's ``DiagonalDecoding.set_i`` does."""
+    scaling.is_identity = False
+    scaling.scaling[index] = value
+
+
+def check(options: Mapping[str, Any], defaults: Mapping[str, Any]) -> None:
+    """SymphysError for the first option that pycma does not know, or that cannot be passed to it."""
+    for name, value in options.items():
+        if name in RESERVED or name.startswith("verb_"):
+            raise refuse("cma", name, f"cannot be set: {RESERVED.get(name, RESERVED['verbose'])}")
+        if name not in defaults:
+            raise refuse("cma", name, f"pycma has no such option; {nearest(name, defaults)}")
+        if not plain(value) and value not in TEXTS.get(name, ()):
+            valid = " or ".join(TEXTS.get(name, ("numbers", "true", "false", "lists of these")))
+            raise refuse("cma", name, f"valid are {valid}, not {value!r}")
+
+
+def plain(value: Any) -> bool:
+    """Whether a value is a number, a truth value or a list of these: nothing that pycma would evaluate."""
+    if isinstance(value, list | tuple):
+        return all(plain(each) for each in value)
+    return isinstance(value, bool | int | float)
+
+
+def sides(bound: Array, free: NDArray[np.bool_]) -> list[float | None]:
+    """One side of the bounds as pycma takes it: None where there is none."""
+    return [float(value) if math.isfinite(value) else None for value in bound[free]]
+
+
+@contextmanager
+def pycma() -> Iterator[None]:
+    """Keeps its warnings and those of numpy about merits that are inf; what it raises becomes a RuntimeError."""
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        try:
+            yield
+        except (ValueError, TypeError, AssertionError, AttributeError, IndexError) as error:
+            raise RuntimeError(f"pycma: {error}") from error

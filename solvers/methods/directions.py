@@ -1,0 +1,95 @@
+"""Directions of first-order descent: what each method makes of the gradient. All in x = z / scale.
+
+gradient   d = -rate g
+momentum   m <- momentum m + g,  d = -rate m                                 (Polyak 1964, heavy ball)
+adam       m <- b1 m + (1 - b1) g,  v <- b2 v + (1 - b2) g^2,  d = -rate m^ / (sqrt(v^) + 1e-8)
+with m^, v^ freed of their bias                                   (Kingma and Ba 2015, algorithm 1)
+spectral   d = -a g,  a = s.y / y.y, from the last step s and the change y of the gradient
+(Barzilai and Borwein 1988, the shorter of their two steps: the steadier one in bent valleys)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from symphys.solvers.core.outcome import Array
+
+ADAM_FLOOR = 1e-8
+"""Added to Adam's root mean square gradient, as in the paper."""
+LONGEST = 1e12
+"""A spectral step and its inverse stay below it."""
+GROWTH = 10.0
+"""The spectral step grows by it where the merit curves downward and so says nothing of a length."""
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What a method remembers of its past.
+
+    Attributes:
+        ticks: gradients seen since the memory was empty.
+        mean, square: (n,) running means of the gradient and of its square.
+        length: the spectral step a; 0 before the first step.
+    """
+
+    ticks: int
+    mean: Array
+    square: Array
+    length: float
+
+    @classmethod
+    def empty(cls, n: int) -> Memory:
+        """Nothing seen yet."""
+        return cls(0, np.zeros(n), np.zeros(n), 0.0)
+
+
+@dataclass(frozen=True)
+class Habits:
+    """How strongly the past counts: ``momentum`` and ``betas`` of ``GradientOptions``."""
+
+    momentum: float
+    betas: tuple[float, float]
+
+
+Method = Callable[[Array, Memory, float, Habits], tuple[Array, Memory]]
+"""(scaled gradient, memory, rate, habits) -> (direction, memory)."""
+
+
+def plain(g: Array, memory: Memory, rate: float, habits: Habits) -> tuple[Array, Memory]:
+    """Straight down."""
+    return -rate * g, memory
+
+
+def momentum(g: Array, memory: Memory, rate: float, habits: Habits) -> tuple[Array, Memory]:
+    """Heavy ball."""
+    mean = habits.momentum * memory.mean + g
+    return -rate * mean, replace(memory, mean=mean)
+
+
+def adam(g: Array, memory: Memory, rate: float, habits: Habits) -> tuple[Array, Memory]:
+    """Each component by its own root mean square."""
+    b1, b2 = habits.betas
+    ticks = memory.ticks + 1
+    mean = b1 * memory.mean + (1 - b1) * g
+    square = b2 * memory.square + (1 - b2) * g * g
+    spread = np.sqrt(square / (1 - b2**ticks)) + ADAM_FLOOR
+    return -rate * mean / (1 - b1**ticks) / spread, replace(memory, ticks=ticks, mean=mean, square=square)
+
+
+def spectral(g: Array, memory: Memory, rate: float, habits: Habits) -> tuple[Array, Memory]:
+    """As long as the last change of the gradient suggests; the first step has the length ``rate``."""
+    length = memory.length or rate / max(float(np.linalg.norm(g)), 1 / LONGEST)
+    return -length * g, replace(memory, length=length)
+
+
+METHODS: dict[str, Method] = {"spectral": spectral, "gradient": plain, "momentum": momentum, "adam": adam}
+
+
+def learn_length(memory: Memory, s: Array, y: Array) -> Memory:
+    """The spectral step after a step s that changed the gradient by y."""
+    curvature = float(s @ y)
+    length = curvature / float(y @ y) if curvature > 0 else GROWTH * memory.length
+    return replace(memory, length=min(max(length, 1 / LONGEST), LONGEST))

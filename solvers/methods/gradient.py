@@ -1,0 +1,239 @@
+"""First-order descent: d merit / dz by the adjoint of the rollout, one step along a direction of it at a time.
+
+``directions`` has the methods. A direction is projected into the bounds, then shortened until the merit is below the
+largest of the last few (``backtracking``; Grippo, Lampariello, Lucidi 1986; with bounds and the spectral step this is
+the SPG2 of Birgin, Martinez, Raydan 2000). A direction that does not descend is replaced by that of an empty memory.
+A step onto a plateau is refused and shortened, see ``plateau``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from symphys.shooting import ShootingProblem
+from symphys.solvers.core.checkpoint import revive
+from symphys.solvers.core.continuation import Request
+from symphys.solvers.core.driver import begin, not_finite, run
+from symphys.solvers.core.evaluator import Meter, Verdict
+from symphys.solvers.core.interface import Log, Solver
+from symphys.solvers.core.line_search import ROUNDING, backtrack
+from symphys.solvers.core.merit_probe import believed
+from symphys.solvers.core.options import at_least, require
+from symphys.solvers.core.outcome import Array, Monitor, Outcome, Status
+from symphys.solvers.core.point import Point
+from symphys.solvers.core.progress import Progress
+from symphys.solvers.core.vanishing_gradient import REFUSALS, SHORTER, lost
+from symphys.solvers.methods.directions import METHODS, Habits, Memory, learn_length
+
+RATES: dict[str, tuple[float, ...]] = {
+    "spectral": (1.0,),
+    "gradient": (1.0,),
+    "momentum": (1.0,),
+    "adam": (2.0, 1.0, 0.1, 0.05, 0.01),
+}
+"""What ``rates = ()`` stands for; that of Adam is the published schedule of the ball throw."""
+STALLED = (
+    "no lower merit was found along the gradient: it may be wrong there (`symphys check` compares it with "
+    "differences), the point may be at a kink (smoothing above 0 rounds it), or only rounding is left to gain"
+)
+SLOW = (
+    "the merit hardly falls any more: the point may be at a kink (smoothing above 0 rounds it), in a narrow valley "
+    "(other scales or least squares), or good enough"
+)
+BUDGET = "the iterations are used up: raise `iterations`, or look at the trace for rates that do not fit"
+NOT_FINITE = "the simulation along the descent direction is not finite: bound the variables or lower the rates"
+
+
+@dataclass(frozen=True)
+class GradientOptions:
+    """Options of first-order descent.
+
+    Attributes:
+        method: "spectral", "gradient", "momentum" or "adam".
+        iterations: at most, one gradient each (more where a plateau is refused), in each stage of smoothing.
+        rates: of learning, each for an equal share of the iterations; () stands for the method's own. Gradient and
+            momentum: factors on the scaled gradient. Adam: steps in units of scale. Spectral: one number, the length
+            of the first step in units of scale.
+        momentum: share of the last direction that is kept.
+        betas: of Adam: share of the mean gradient and of its mean square that is kept.
+        clip: largest norm of the scaled gradient; a longer one is shortened to it.
+        backtracking: compare the merit with the largest of this many last ones; 1 is Armijo's rule,
+            0 takes every step as it comes, plateaus too.
+        tolerance: converged where the projected scaled gradient is below tolerance * (1 + |merit|).
+        patience: stalled where the merit has not fallen by 1e-5 of itself in so many iterations at the last of the
+            rates; 0 goes on regardless.
+    """
+
+    __pydantic_config__: ClassVar[dict[str, object]] = {"extra": "forbid"}
+
+    method: Literal["spectral", "gradient", "momentum", "adam"] = "spectral"
+    iterations: int = 300
+    rates: tuple[float, ...] = ()
+    momentum: float = 0.9
+    betas: tuple[float, float] = (0.5, 0.9)
+    clip: float = math.inf
+    backtracking: int = 5
+    tolerance: float = 1e-6
+    patience: int = 30
+
+    def __post_init__(self) -> None:
+        """ValueError that names the option and says what would be valid."""
+        require(self.method in METHODS, "method", f"one of {', '.join(METHODS)}")
+        at_least(0, iterations=self.iterations, backtracking=self.backtracking)
+        at_least(0, tolerance=self.tolerance, patience=self.patience)
+        require(all(rate > 0 for rate in self.rates), "rates", "positive numbers")
+        require(self.method != "spectral" or len(self.rates) < 2, "rates", "one number with the spectral method")
+        require(all(0 <= share < 1 for share in (self.momentum, *self.betas)), "momentum, betas", "in [0, 1)")
+        require(self.clip > 0, "clip", "above 0")
+
+    def rate(self, iteration: int) -> float:
+        """The rate in force: each of the rates has an equal share of the iterations."""
+        return self.schedule[self.share(iteration)]
+
+    def at_last_rate(self, iteration: int) -> bool:
+        """Whether no other rate follows."""
+        return self.share(iteration) == len(self.schedule) - 1
+
+    @property
+    def schedule(self) -> tuple[float, ...]:
+        """The rates in their order, at least one."""
+        return self.rates or RATES[self.method]
+
+    def share(self, iteration: int) -> int:
+        """The index of the rate in force."""
+        return min(iteration * len(self.schedule) // max(self.iterations, 1), len(self.schedule) - 1)
+
+
+@dataclass(frozen=True)
+class State:
+    """Between two iterations.
+
+    Attributes:
+        iteration: of this stage.
+        z, gradient: (n,).
+        merits: the last ones, the present one at the end.
+        memory: of the method.
+        progress: of the merit.
+    """
+
+    iteration: int
+    z: Array
+    gradient: Array
+    merits: tuple[float, ...]
+    memory: Memory
+    progress: Progress
+
+
+def solve(
+    problem: ShootingProblem,
+    start: Array,
+    options: GradientOptions,
+    seed: int = 0,
+    monitor: Monitor | None = None,
+    checkpoint: dict[str, object] | None = None,
+    log: Log | None = None,
+) -> Outcome:
+    """Descend; nothing is drawn, so the seed acts through ``start`` alone. See ``interface.Solve``."""
+
+    def stage(meter: Meter, z: Array, saved: dict[str, object] | None) -> Verdict:
+        step: State | Verdict = revive(State, saved, Memory, Progress) if saved else first(meter, z)
+        while isinstance(step, State):
+            step = finished(meter, options, step) or advance(meter, options, step)
+        return step
+
+    return run(Request("gradient", problem, start, monitor, checkpoint, log), stage)
+
+
+def first(meter: Meter, z: Array) -> State:
+    """The gradient at the start."""
+    point = begin(meter.gradient(z))
+    state = State(0, z, point.gradient, (point.merit,), Memory.empty(z.size), Progress(point.merit))
+    return complete(meter, point, state, math.nan)
+
+
+def complete(meter: Meter, point: Point, state: State, length: float) -> State:
+    """End an iteration, ``length`` in z away from the last one."""
+    meter.commit(point, state, meter.stationarity(point.z, point.gradient), length)
+    return state
+
+
+def finished(meter: Meter, options: GradientOptions, state: State) -> Verdict | None:
+    """Whether the state is stationary, the budget used up, or the descent gets nowhere."""
+    if meter.stationarity(state.z, state.gradient) <= options.tolerance * (1 + abs(state.merits[-1])):
+        return believed(meter, state.z, state.merits[-1])
+    if state.iteration >= options.iterations:
+        return Verdict(Status.BUDGET, BUDGET)
+    return Verdict(Status.STALLED, SLOW) if state.progress.quiet >= (options.patience or math.inf) else None
+
+
+def advance(meter: Meter, options: GradientOptions, state: State) -> State | Verdict:
+    """One step: direction, line search, new gradient."""
+    g = shortened(state.gradient * meter.scale, options.clip)
+    step, memory = direction(meter, options, state, g)
+    point = follow(meter, options, state, step)
+    if isinstance(point, Verdict):
+        return point
+    if not point.finite:
+        return not_finite(point, NOT_FINITE)
+    z = point.z
+    if options.method == "spectral":
+        memory = learn_length(memory, (z - state.z) / meter.scale, (point.gradient - state.gradient) * meter.scale)
+    merits = (*state.merits, point.merit)[-max(options.backtracking, 1) :]
+    progress = state.progress.after(point.merit) if options.at_last_rate(state.iteration) else Progress(point.merit)
+    following = State(state.iteration + 1, z, point.gradient, merits, memory, progress)
+    return complete(meter, point, following, float(np.linalg.norm(z - state.z)))
+
+
+def direction(meter: Meter, options: GradientOptions, state: State, g: Array) -> tuple[Array, Memory]:
+    """The step (n,) in z to a point within the bounds; downhill, unless every step is taken as it comes."""
+    habits, rate = Habits(options.momentum, options.betas), options.rate(state.iteration)
+    for memory in (state.memory, Memory.empty(g.size)):
+        d, memory = METHODS[options.method](g, memory, rate, habits)
+        step = meter.clip(state.z + meter.scale * d) - state.z
+        if state.gradient @ step < 0 or not options.backtracking:
+            break
+    return step, memory
+
+
+def follow(meter: Meter, options: GradientOptions, state: State, step: Array) -> Point | Verdict:
+    """The next point with its gradient; one on a plateau is refused a few times, and the step shortened."""
+    plateau: Point | None = None
+    for _ in range(REFUSALS + 1):
+        z = search(meter, options, state, step)
+        if isinstance(z, Verdict):
+            return plateau or z
+        point = meter.gradient(z)
+        if not (options.backtracking and point.finite and lost(meter, point, point.gradient, state.gradient)):
+            return point
+        plateau, step = point, SHORTER * (z - state.z)
+    return point
+
+
+def search(meter: Meter, options: GradientOptions, state: State, step: Array) -> Array | Verdict:
+    """The next z along the step."""
+    if not options.backtracking:
+        return meter.clip(state.z + step)
+    merit, slope = state.merits[-1], float(state.gradient @ step)
+    found = backtrack(meter, state.z, step, slope, merit, max(state.merits))
+    if found.point:
+        return found.point.z
+    if found.not_finite:
+        return Verdict(Status.NOT_FINITE, NOT_FINITE)
+    if -slope <= ROUNDING * abs(merit):
+        return believed(meter, state.z, merit)
+    return Verdict(Status.STALLED, STALLED)
+
+
+def shortened(g: Array, longest: float) -> Array:
+    """The gradient, its norm at most ``longest``."""
+    norm = float(np.linalg.norm(g))
+    return g * (longest / norm) if norm > longest else g
+
+
+GRADIENT = Solver(
+    "gradient", "first-order descent by the adjoint of the rollout", GradientOptions, solve, threaded=True
+)

@@ -1,0 +1,130 @@
+"""What many situations make of a point: a direction from their gradients, and one from their values alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from symphys.shooting import Drawn, Situations, Values
+from symphys.solvers.core.outcome import Array
+
+TINY, LARGEST = 1e-300, 1e300
+
+
+@dataclass(frozen=True)
+class Average:
+    """Of a batch.
+
+    Attributes:
+        gradient: (n,) mean of the gradients, each scaled and shortened first.
+        objective, merit: means of those that are finite.
+        alive: share of the motions that lasted.
+        agreement: length of the mean of the gradients' directions: 1 where all agree, 0 where they cancel.
+        typical, longest: median and largest norm of the scaled gradients.
+        left_out: how many were not finite.
+    """
+
+    gradient: Array
+    objective: float
+    merit: float
+    alive: float
+    agreement: float
+    typical: float
+    longest: float
+    left_out: int
+
+
+def average(values: Values, scale: Array, clip: float, fallen: float) -> Average:
+    """Each gradient by itself at most ``clip`` long, then their mean; motions that fell count ``fallen`` times."""
+    assert values.gradient is not None, "gradients were asked for"
+    g = values.gradient * scale
+    finite = np.isfinite(values.merit) & np.isfinite(g).all(axis=1)
+    g = g[finite]
+    largest = np.maximum(np.abs(g).max(axis=1, initial=0.0), TINY)
+    directions = g / largest[:, None]
+    lengths = np.maximum(np.linalg.norm(directions, axis=1), TINY)
+    directions, norms = directions / lengths[:, None], largest * np.minimum(lengths, LARGEST / np.maximum(largest, 1))
+    lasted = np.ones(len(finite)) if values.alive is None else values.alive
+    weights = np.where(lasted[finite] > 0, 1.0, fallen)
+    short = directions * np.minimum(norms, clip)[:, None]
+    return Average(
+        gradient=weights @ short / max(weights.sum(), TINY),
+        objective=mean(values.objective[finite]),
+        merit=mean(values.merit[finite]),
+        alive=float((lasted * finite).mean()),
+        agreement=float(np.linalg.norm(directions.mean(axis=0))) if len(directions) else np.nan,
+        typical=float(np.median(norms)) if len(norms) else np.nan,
+        longest=float(norms.max(initial=0.0)),
+        left_out=int((~finite).sum()),
+    )
+
+
+def mean(numbers: Array) -> float:
+    """Of those that there are."""
+    return float(numbers.mean()) if numbers.size else np.nan
+
+
+@dataclass(frozen=True)
+class Evolved:
+    """What pairs of points to either side of one say of it.
+
+    Attributes:
+        gradient: (n,) scaled.
+        pairs: how many were finite.
+        objective, merit: means over these.
+        first: what was found on one side, whose first situation is the problem's own.
+        alive: share of the motions that lasted.
+    """
+
+    gradient: Array
+    pairs: int
+    objective: float
+    merit: float
+    first: Values
+    alive: float
+
+
+def evolution(
+    situations: Situations,
+    z: Array,
+    step: Array,
+    drawn: Drawn,
+    smoothing: float,
+    rng: np.random.Generator,
+) -> Evolved:
+    """A gradient from values: z moved to either side at random in each situation.
+
+    Antithetic pairs (Salimans et al. 2017, arXiv 1703.03864): the mean of (r(z + s e) - r(z - s e)) / 2 e over
+    situations, in units of ``step`` = s (n,), where r is the rank of a merit among all that are finite, from -1/2 to
+    1/2: how bad a fall is does not matter then, only that it is worse.
+    """
+    noise = rng.standard_normal((len(drawn.numbers), z.size))
+    sides = [situations.value(z + sign * step * noise, drawn, smoothing) for sign in (1, -1)]
+    merits = np.stack([side.merit for side in sides])
+    known = np.isfinite(merits).all(axis=0)
+    high, low = centred(merits[:, known])
+    pairs = int(known.sum())
+    objective = np.stack([side.objective for side in sides])[:, known]
+    lasted = [1.0 if side.alive is None else float(side.alive.mean()) for side in sides]
+    return Evolved(
+        gradient=np.asarray((high - low) / 2 @ noise[known] / max(pairs, 1)),
+        pairs=pairs,
+        objective=mean(objective),
+        merit=mean(merits[:, known]),
+        first=sides[0],
+        alive=sum(lasted) / 2,
+    )
+
+
+def centred(merits: Array) -> Array:
+    """Ranks of all merits, from -1/2 to 1/2, in their shape; equal ones share theirs."""
+    _, places, counts = np.unique(merits, return_inverse=True, return_counts=True)
+    ranks = np.cumsum(counts) - (counts + 1) / 2
+    return np.asarray(ranks[places].reshape(merits.shape) / max(merits.size - 1, 1) - 0.5)
+
+
+def together(pathwise: Array, evolved: Array, share: float) -> Array:
+    """Both at length 1, mixed by their shares."""
+    parts = [(1 - share, pathwise), (share, evolved)]
+    return np.asarray(sum(weight * g / max(float(np.linalg.norm(g)), TINY) for weight, g in parts))

@@ -1,0 +1,22 @@
+"""What evaluates a shooting problem: casadi's virtual machine, casadi's C, or a kernel, on the processor or on a GPU.
+
+``choose`` takes the one that is asked for, or the best that this machine has.
+"""
+
+from symphys.codegen.backends.choose import BACKENDS, NAMES, choose
+from symphys.codegen.backends.interface import Backend, Description, Functions, Source
+from symphys.codegen.backends.kernels import BEST, PRECISIONS, build_kernel, described
+
+__all__ = [
+    "BACKENDS",
+    "BEST",
+    "NAMES",
+    "PRECISIONS",
+    "Backend",
+    "Description",
+    "Functions",
+    "Source",
+    "build_kernel",
+    "choose",
+    "described",
+]

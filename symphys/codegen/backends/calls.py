@@ -1,0 +1,53 @@
+"""Calling a casadi function without its overhead: 0.1 us by buffers, against 15 us for ``function(z, smoothing)``."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.codegen.backends.interface import Function
+from symphys.shooting import Array
+
+
+class Call:
+    """A casadi function of (z, smoothing) for a batch of fixed size, with dense numpy arrays."""
+
+    def __init__(self, function: Function, batch: int = 1, threads: int = 1) -> None:
+        """Keep buffers for the arguments and for the nonzeros of each result."""
+        self.function = mapped(function, batch, threads)
+        self.shapes = [(batch, function.size2_out(i), function.size1_out(i)) for i in range(function.n_out())]
+        self.Z, self.smoothing = np.zeros((batch, function.numel_in(0))), np.zeros(batch)
+        sparsities = [self.function.sparsity_out(i) for i in range(function.n_out())]
+        self.places = [np.array(sparsity.find(), int) for sparsity in sparsities]
+        self.nonzeros = [np.zeros(places.size) for places in self.places]
+        self.buffer, self.evaluate = self.function.buffer()
+        self.buffer.set_arg(0, self.Z.reshape(-1).data)
+        self.buffer.set_arg(1, self.smoothing.data)
+        for index, values in enumerate(self.nonzeros):
+            self.buffer.set_res(index, values.data)
+
+    def __call__(self, Z: Array, smoothing: float) -> list[Array]:
+        """Evaluate at Z (batch, n); RuntimeError where casadi fails.
+
+        A result of k numbers is (batch, k), a matrix (batch, rows, columns); all are copies.
+        """
+        self.Z[:] = Z
+        self.smoothing[:] = smoothing
+        self.evaluate()
+        if self.buffer.ret():
+            raise RuntimeError(f"the evaluation of {self.function.name()} failed")
+        return [dense(*each) for each in zip(self.shapes, self.places, self.nonzeros, strict=True)]
+
+
+def mapped(function: Function, batch: int, threads: int) -> Function:
+    """The function for so many columns at once."""
+    if batch == 1:
+        return function
+    return function.map(batch) if threads == 1 else function.map(batch, "thread", min(batch, threads))
+
+
+def dense(shape: tuple[int, int, int], places: NDArray[np.int_], nonzeros: Array) -> Array:
+    """A dense copy of a result of which only the nonzeros are stored, at ``places`` counted column after column."""
+    full = np.zeros(shape)
+    full.reshape(-1)[places] = nonzeros
+    return full[:, 0] if shape[1] == 1 else full.transpose(0, 2, 1)

@@ -1,0 +1,38 @@
+"""The backend that is asked for, or the best that this machine has."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+from symphys.codegen import KernelUnavailable, ProgramError, processors
+from symphys.codegen.backends.c_ import c
+from symphys.codegen.backends.casadi_ import casadi
+from symphys.codegen.backends.interface import Backend, Source
+from symphys.codegen.backends.kernels import PRECISIONS
+from symphys.codegen.backends.simd import by_kernel
+
+BACKENDS: dict[str, Callable[[Source, int], Backend]] = {
+    **{name: partial(by_kernel, name=name) for name in PRECISIONS},
+    "c": c,
+    "casadi": casadi,
+}
+NAMES = tuple(BACKENDS)
+
+
+def choose(name: str, source: Source, threads: int | None = None) -> Backend:
+    """The backend of this name for a problem; one that cannot be built here gives way to casadi, and its note says why.
+
+    Args:
+        name: one of NAMES; "auto" is the fastest: simd, and cuda for large batches where there is a GPU.
+        source: the problem.
+        threads: that share a batch; None: one for each processor.
+    """
+    count = processors() if threads is None else threads
+    try:
+        return BACKENDS[name](source, count)
+    except (KernelUnavailable, ProgramError) as error:
+        note = f"casadi's virtual machine evaluates, which is slower: {error}"
+        backend = casadi(source, count)
+        return replace(backend, description=replace(backend.description, note=note))

@@ -1,0 +1,110 @@
+"""What every backend is made from, and what it gives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from symphys.codegen import Program
+from symphys.shooting import Evaluator, Nlp
+
+Function = Any
+"""casadi.Function"""
+
+
+class Functions(Protocol):
+    """A problem as casadi functions of (z, smoothing); each is made when it is first asked for."""
+
+    @property
+    def value(self) -> Function:
+        """-> (merit, objective, errors, outputs)."""
+
+    @property
+    def gradient(self) -> Function:
+        """-> (merit, objective, errors, d merit / dz (n,), outputs)."""
+
+    @property
+    def residuals(self) -> Function | None:
+        """-> (r, objective, errors, outputs) with merit = r . r; None where a cost is no sum of squares."""
+
+    @property
+    def jacobian(self) -> Function | None:
+        """-> (r, objective, errors, dr/dz (m, n), outputs); None likewise."""
+
+    @property
+    def nlp(self) -> Function:
+        """-> (objective, constraints)."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """A problem in the forms from which backends are made.
+
+    Attributes:
+        functions: as casadi functions.
+        program: makes the program of its rollout: the outputs merit, objective and, where the problem has any, errors,
+            constraints, outputs and residuals, of z and the smoothing as its knob. None: there is none.
+        exact: whether that program is for smoothing 0 only.
+    """
+
+    functions: Functions
+    program: Callable[[], Program] | None = None
+    exact: bool = False
+
+
+def nothing() -> str:
+    """Nothing was decided."""
+    return ""
+
+
+def joined(*notes: str) -> str:
+    """What there is to say, in one line."""
+    return "; ".join(filter(None, notes))
+
+
+@dataclass(frozen=True)
+class Description:
+    """What evaluates, for results.
+
+    Attributes:
+        name: of the backend.
+        lanes: rollouts that one instruction computes.
+        threads: blocks that are computed at once.
+        precision: of the arithmetic.
+        compiler: its version; empty where nothing is compiled.
+        cached: whether what was compiled came from the cache; None where nothing is compiled.
+        seconds: until it could evaluate.
+        note: what the user should know, such as why it is not the backend that was wanted; or empty.
+        later: what was decided while it evaluated, to be asked when that is over; or empty.
+    """
+
+    name: str
+    lanes: int = 1
+    threads: int = 1
+    precision: str = "double"
+    compiler: str = ""
+    cached: bool | None = None
+    seconds: float = 0.0
+    note: str = ""
+    later: Callable[[], str] = field(default=nothing, repr=False, compare=False)
+
+    def __str__(self) -> str:
+        """In a line."""
+        parts = [f"{self.name}: lanes {self.lanes}, threads {self.threads}, {self.precision} precision"]
+        if self.cached is not None:
+            parts.append(f"{self.compiler}, {'taken from the cache' if self.cached else 'compiled'}")
+        return joined(*parts, self.note)
+
+    def said(self) -> str:
+        """The note, with what was decided since."""
+        return joined(self.note, self.later())
+
+
+@dataclass(frozen=True)
+class Backend:
+    """A backend of one problem."""
+
+    description: Description
+    evaluator: Evaluator
+    nlp: Nlp

@@ -1,0 +1,59 @@
+"""Kernels by the name of a backend, on the processor or on a GPU."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+from symphys.codegen import Kernel, KernelUnavailable, Program, compile_program
+from symphys.codegen.backends.fastest import FastestKernel
+from symphys.codegen.backends.interface import Description, joined, nothing
+from symphys.codegen.cuda import DeviceKernel, compile_on, find_gpu
+
+BEST = "auto"
+PRECISIONS: dict[str, Literal["double", "single"]] = {
+    BEST: "double",
+    "simd": "double",
+    "simd32": "single",
+    "cuda": "double",
+    "cuda32": "single",
+}
+"""Of the backends that are kernels."""
+ON_DEVICE = ("cuda", "cuda32")
+
+
+def build_kernel(name: str, program: Program, seeded: Sequence[str], threads: int) -> Kernel:
+    """The kernel of a program, whose outputs ``seeded`` can be differentiated; KernelUnavailable if that cannot be.
+
+    Where there is no GPU for it, it is one for the processor, and the note of its report says why. ``threads`` share
+    the blocks of a batch there. "auto" is the processor's, which takes large batches to a GPU where that is faster.
+    """
+    note, precision = "", PRECISIONS[name]
+    if name in ON_DEVICE:
+        try:
+            return compile_on(find_gpu(), program, precision, seeded)
+        except KernelUnavailable as error:
+            note = f"the processor evaluates: {error}"
+    kernel = compile_program(program, seeded=seeded, threads=threads, precision=precision)
+    kernel.report = replace(kernel.report, note=joined(note, kernel.report.note))
+    if name == BEST:
+        return FastestKernel(kernel, lambda: compile_on(find_gpu(), program, precision, seeded))
+    return kernel
+
+
+def described(kernel: Kernel, seconds: float, precision: str | None = None, note: str = "") -> Description:
+    """A kernel for results; ``precision``: where it is not the kernel's alone."""
+    report, wanted = kernel.report, precision or kernel.report.precision
+    kind = "cuda" if isinstance(kernel, DeviceKernel) else "simd"
+    return Description(
+        name=kind if wanted == "double" else f"{kind}32",
+        lanes=report.lanes,
+        threads=kernel.threads,
+        precision=wanted,
+        compiler=report.compiler,
+        cached=report.cached,
+        seconds=seconds,
+        note=joined(report.note, note),
+        later=(lambda: kernel.chosen) if isinstance(kernel, FastestKernel) else nothing,
+    )

@@ -1,0 +1,104 @@
+"""A GPU by CuPy."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from symphys.codegen.cuda.compiler import ADVICE, image
+from symphys.codegen.errors import KernelUnavailable
+from symphys.codegen.toolchain.cache import Cache, default_cache
+
+SPARED = 2**28
+"""[bytes] left to others, and to what a launch needs: stacks of all resident threads."""
+
+
+class Gpu:
+    """See ``Device``."""
+
+    def __init__(self, cupy: Any, cache: Cache) -> None:
+        """Use ``find_gpu``."""
+        self.cupy, self.cache = cupy, cache
+        properties = cupy.cuda.runtime.getDeviceProperties(cupy.cuda.runtime.getDevice())
+        self.name, self.lanes = properties["name"].decode(), int(properties["warpSize"])
+        self.architecture = f"sm_{properties['major']}{properties['minor']}"
+
+    @cached_property
+    def folder(self) -> tempfile.TemporaryDirectory[str]:
+        """For images that no cache takes."""
+        return tempfile.TemporaryDirectory(prefix="symphys-cuda-", ignore_cleanup_errors=True)
+
+    def load(self, texts: Sequence[str]) -> tuple[Any, str, bool, str]:
+        """See ``Device``."""
+        found = image(texts, self.architecture, self.cache, Path(self.folder.name))
+        with self._told():
+            return self.cupy.RawModule(path=str(found.path)), found.compiler, found.cached, found.note
+
+    def free(self) -> int:
+        """See ``Device``."""
+        self.cupy.get_default_memory_pool().free_all_blocks()
+        return max(0, int(self.cupy.cuda.runtime.memGetInfo()[0]) - SPARED)
+
+    def put(self, values: NDArray[Any]) -> Any:
+        """See ``Device``."""
+        with self._told():
+            return self.cupy.asarray(np.ascontiguousarray(values))
+
+    def empty(self, shape: tuple[int, ...], dtype: DTypeLike) -> Any:
+        """See ``Device``."""
+        with self._told():
+            return self.cupy.empty(shape, dtype)
+
+    def address(self, array: Any) -> int:
+        """See ``Device``."""
+        return int(array.data.ptr)
+
+    def get(self, array: Any) -> NDArray[Any]:
+        """See ``Device``."""
+        with self._told():
+            return np.asarray(self.cupy.asnumpy(array))
+
+    def launch(self, module: Any, name: str, blocks: int, threads: tuple[int, int], job: Any) -> None:
+        """See ``Device``."""
+        with self._told():
+            module.get_function(name)((blocks,), threads, (job,))
+
+    def wait(self) -> None:
+        """See ``Device``."""
+        with self._told():
+            self.cupy.cuda.get_current_stream().synchronize()
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        """CUDA's errors in a line of ours."""
+        cuda = self.cupy.cuda
+        try:
+            yield
+        except (
+            cuda.memory.OutOfMemoryError,
+            cuda.runtime.CUDARuntimeError,
+            cuda.driver.CUDADriverError,
+        ) as error:
+            raise KernelUnavailable(f"{self.name} failed: {' '.join(str(error).split())}") from error
+
+
+def find_gpu(cache: Cache | None = None) -> Gpu:
+    """The GPU that CUDA names first; KernelUnavailable says what is missing."""
+    try:
+        import cupy
+    except ImportError as error:
+        raise KernelUnavailable(f"no CuPy to reach a GPU with: {ADVICE}") from error
+    try:
+        count = cupy.cuda.runtime.getDeviceCount()
+    except cupy.cuda.runtime.CUDARuntimeError as error:
+        raise KernelUnavailable(f"no GPU that CUDA can use: {error}") from error
+    if not count:
+        raise KernelUnavailable("no GPU that CUDA can use")
+    return Gpu(cupy, cache or default_cache())

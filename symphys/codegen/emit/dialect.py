@@ -1,0 +1,45 @@
+"""How functions are written for vectors of lanes, for single numbers in plain C, and for a thread of a device."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from symphys.codegen.graph.operations import FORMS, PLAIN
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """Words for what a function does, whatever computes it.
+
+    Attributes:
+        forms: expressions of operations.
+        reads: type of what is only read.
+        writes: type of what nothing else overlaps.
+        shares: type of results that may coincide with one another.
+        word: a word of a place, by the place's name and the number of the word.
+        inline: how a function begins that its only caller takes in; ``apart``: one that it does not.
+        entry: how a function begins that the driver calls.
+    """
+
+    forms: Mapping[str, str]
+    reads: str = "const V *"
+    writes: str = "V *restrict "
+    shares: str = "V *"
+    word: str = "{0}[{1}]"
+    inline: str = "static inline void"
+    apart: str = "static NOINLINE void"
+    entry: str = "void"
+
+
+VECTORS = Dialect(FORMS)
+NUMBERS = Dialect(PLAIN)
+DEVICE = Dialect(
+    PLAIN,
+    reads="const V *restrict ",
+    word="{0}[{1} * LANES]",
+    inline="static __device__ __forceinline__ void",
+    apart="static __device__ __noinline__ void",
+    entry='extern "C" __device__ void',
+)
+"""Memories are interleaved: LANES apart lie the words of one thread."""

@@ -1,0 +1,56 @@
+"""The C files of a plan: functions spread over several, so that they compile in parallel, and the driver."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+
+from symphys.codegen.emit.plan import Plan
+from symphys.codegen.emit.writer import write
+
+ROOM = "symphys.codegen"
+FILES, SHARE = 4, 400
+"""Most files of values and most of adjoints; nodes for which another file is begun."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """A C file, and whether the compiler may fuse products and sums in it."""
+
+    text: str
+    fused: bool = False
+
+
+def sources(plan: Plan, lanes: int, single: bool) -> list[Source]:
+    """The C files; each compiles alone. Adjoints are fused; values are not, so that they are casadi's to the bit."""
+    head = f"#define LANES {lanes}\n#define SINGLE {int(single)}\n{resource('vector.h')}"
+    texts = [write(f"f{number}", graph, form) for number, (graph, form) in enumerate(plan.functions)]
+    found = []
+    for backward in (False, True):
+        mine = [i for i, (_, form) in enumerate(plan.functions) if form.backward == backward]
+        work = [len(plan.functions[i][0].nodes) for i in mine]
+        for group in spread([texts[i] for i in mine], work, FILES):
+            found.append(Source("\n".join([head, *group]), fused=backward))
+    names = [f"f{number}" for number in range(len(texts))]
+    declared = "".join(f"void {name}(V *m, V *b, const word *t, word k);\n" for name in names)
+    table = ", ".join(names) or "0"
+    listed = f"{declared}static void (*const FUNCTIONS[])(V *, V *, const word *, word) = {{{table}}};\n"
+    return [*found, Source(head + listed + "".join(map(resource, ("program.h", "driver.c", "phases.c"))))]
+
+
+def spread(texts: Sequence[str], work: Sequence[int], most: int) -> list[list[str]]:
+    """At most so many groups of about equal work: the largest first, each to the group with the least so far."""
+    count = max(1, min(most, len(texts), sum(work) // SHARE))
+    groups: list[list[str]] = [[] for _ in range(count)]
+    loads = [0] * count
+    for i in sorted(range(len(texts)), key=lambda i: -work[i]):
+        least = loads.index(min(loads))
+        groups[least].append(texts[i])
+        loads[least] += work[i]
+    return [group for group in groups if group]
+
+
+def resource(name: str) -> str:
+    """The text of a C file of this room."""
+    return files(ROOM).joinpath(name).read_text(encoding="utf-8")

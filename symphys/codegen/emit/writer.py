@@ -1,0 +1,148 @@
+"""From graphs to C functions, cut where a compiler's register allocation would take too long."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+from symphys.codegen.emit.dialect import VECTORS, Dialect
+from symphys.codegen.graph.graph import Graph
+from symphys.codegen.graph.operations import MASKS
+
+LONGEST = 500
+"""Statements in one C function, and copies of what is given: a compiler's time grows faster than its length."""
+
+
+@dataclass(frozen=True)
+class Form:
+    """How a graph meets the memory.
+
+    Attributes:
+        primal: how many of its arguments are places of the memory; the others are places of the adjoint memory.
+        adds: results are added to what is there.
+        backward: results go to the adjoint memory.
+        clears: the adjoint arguments are zeroed when they have been read.
+    """
+
+    primal: int
+    adds: bool
+    backward: bool = False
+    clears: bool = False
+
+
+def write(name: str, graph: Graph, form: Form, dialect: Dialect = VECTORS) -> str:
+    """The C function ``name(m, b, t, k)``: memory, adjoint memory, places as (offset, stride) pairs, step."""
+    pieces = _cut(graph, dialect)
+    pointers = _pointers(graph, form, dialect)
+    parameters = ", ".join(f"{kind}{pointer}" for kind, pointer, _ in pointers) + ", V *restrict w"
+    text = []
+    for i, piece in enumerate(pieces):
+        lines = piece.statements(graph, form.adds)
+        if piece is pieces[-1] and form.clears:
+            lines += [
+                f"for (int j = 0; j < {graph.sizes[a]}; j++) {dialect.word.format(f'i{a}', 'j')} = S(0.0);"
+                for a in range(form.primal, len(graph.sizes))
+            ]
+        head = f"{dialect.inline if len(pieces) == 1 else dialect.apart} {name}_{i}({parameters})"
+        text.append("\n  ".join([f"{head} {{", "(void)w;", *lines]) + "\n}\n")
+    return "".join([*text, _entry(name, pointers, len(pieces), len(pieces[0].slots), dialect)])
+
+
+@dataclass
+class _Piece:
+    """A run of nodes that becomes one C function.
+
+    Attributes:
+        nodes: what it computes, in order.
+        slots: the values that a later piece than their own reads, and their words in the buffer between pieces.
+        dialect: how it is written.
+        targets: for a node, the words of results that it is.
+    """
+
+    nodes: list[int]
+    slots: dict[int, int]
+    dialect: Dialect
+    targets: dict[int, list[str]] = field(default_factory=dict)
+
+    def statements(self, graph: Graph, adds: bool) -> list[str]:
+        """Its C statements."""
+        names: dict[int, str] = {}
+        lines: list[str] = []
+        for x in self.nodes:
+            node = graph.nodes[x]
+            operands = [self._use(graph, y, names, lines) for y in node.operands]
+            lines.append(f"const {_type(node.op)} v{x} = {self.dialect.forms[node.op].format(*operands)};")
+            names[x] = f"v{x}"
+            if x in self.slots:
+                lines.append(f"w[{self.slots[x]}] = (V)v{x};")
+            lines += self._stores(graph, x, names[x], adds)
+        for x in set(self.targets) - set(self.nodes):
+            value = self._use(graph, x, names, lines)
+            lines += self._stores(graph, x, value, adds)
+        return lines
+
+    def _use(self, graph: Graph, x: int, names: dict[int, str], lines: list[str]) -> str:
+        """How a value is called here; what comes from elsewhere is loaded first."""
+        node = graph.nodes[x]
+        if node.op == "const":
+            return literal(node.value)
+        if x not in names:
+            given = node.op == "input"
+            source = self.dialect.word.format(f"i{node.at[0]}", node.at[1]) if given else f"w[{self.slots[x]}]"
+            names[x] = f"v{x}"
+            lines.append(f"const {_type(node.op)} v{x} = ({_type(node.op)}){source};")
+        return names[x]
+
+    def _stores(self, graph: Graph, x: int, value: str, adds: bool) -> Iterator[str]:
+        node = graph.nodes[x]
+        if adds and node.op == "const" and float.fromhex(node.value) == 0:
+            return
+        for target in self.targets.get(x, ()):
+            yield f"{target} {'+=' if adds else '='} {value};"
+
+
+def _cut(graph: Graph, dialect: Dialect) -> list[_Piece]:
+    order = [x for x in graph.needed() if graph.nodes[x].op not in ("const", "input")]
+    runs = [order[i : i + LONGEST] for i in range(0, len(order), LONGEST)] or [[]]
+    home = {x: i for i, run in enumerate(runs) for x in run}
+    crossing = sorted({y for x in order for y in graph.nodes[x].operands if home.get(y, home[x]) != home[x]})
+    slots = {x: slot for slot, x in enumerate(crossing)}
+    pieces = [_Piece(run, slots, dialect) for run in runs]
+    copied = 0
+    for r, result in enumerate(graph.results):
+        for word, x in enumerate(result):
+            if x not in home and (copied := copied + 1) % LONGEST == 0:
+                pieces.append(_Piece([], slots, dialect))
+            pieces[home.get(x, -1)].targets.setdefault(x, []).append(dialect.word.format(f"o{r}", word))
+    return pieces
+
+
+def _type(op: str) -> str:
+    return "I" if op in MASKS else "V"
+
+
+def _pointers(graph: Graph, form: Form, dialect: Dialect) -> list[tuple[str, str, str]]:
+    """(type, name, memory) of every argument and result; adjoints of arguments may coincide, all others may not."""
+    primal = [(dialect.reads, f"i{i}", "m") for i in range(form.primal)]
+    seeds = [(dialect.writes, f"i{i}", "b") for i in range(form.primal, len(graph.sizes))]
+    kind, memory = (dialect.shares, "b") if form.backward else (dialect.writes, "m")
+    return [*primal, *seeds, *((kind, f"o{i}", memory) for i in range(len(graph.results)))]
+
+
+def _entry(name: str, pointers: Sequence[tuple[str, str, str]], pieces: int, slots: int, dialect: Dialect) -> str:
+    places = [f"{memory} + t[{2 * i}] + k * t[{2 * i + 1}]" for i, (_, _, memory) in enumerate(pointers)]
+    arguments = ", ".join([*places, "w" if slots else "0"])
+    lines = [f"V w[{slots}];"] if slots else []
+    lines += [f"{name}_{i}({arguments});" for i in range(pieces)]
+    head = f"{dialect.entry} {name}(V *m, V *b, const word *t, word k) {{"
+    return "\n  ".join([head, "(void)b;", *lines]) + "\n}\n"
+
+
+def literal(value: str) -> str:
+    """A constant in all lanes."""
+    number = float.fromhex(value)
+    if number != number:
+        return "S(NAN)"
+    if number in (float("inf"), float("-inf")):
+        return "S(-INFINITY)" if number < 0 else "S(INFINITY)"
+    return f"S({number!r})"

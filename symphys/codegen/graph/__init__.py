@@ -1,0 +1,1 @@
+"""Expression graphs of small functions: instructions, adjoints, rewriting."""

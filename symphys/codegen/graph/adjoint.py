@@ -1,0 +1,30 @@
+"""The adjoint of one call: from its arguments and the adjoints of its results to what is added to its arguments'."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from symphys.codegen.graph.graph import Graph
+from symphys.codegen.graph.instructions import graph_of
+from symphys.codegen.graph.rewrite import with_reciprocals
+from symphys.codegen.program.program import Function
+
+Mask = tuple[bool, ...]
+
+
+def adjoint_graph(function: Function, forward: Graph, inputs: Mask, outputs: Mask) -> Graph:
+    """Graph with the arguments, then the adjoints of the marked results; it gives one result a marked argument.
+
+    ``forward`` is the function's own graph.
+    """
+    arguments = [ca.SX.sym("x", function.numel_in(i)) for i in range(function.n_in())]
+    results = function.call(arguments, True, False)
+    seeds = [ca.SX.sym("s", r.numel()) for r, on in zip(results, outputs, strict=True) if on]
+    wanted = [x for x, on in zip(arguments, inputs, strict=True) if on]
+    values = ca.vertcat(*(r for r, on in zip(results, outputs, strict=True) if on))
+    adjoint = ca.jtimes(values, ca.vertcat(*wanted), ca.vertcat(*seeds), True)
+    ends = [0]
+    for x in wanted:
+        ends.append(ends[-1] + x.numel())
+    pieces = [ca.densify(piece) for piece in ca.vertsplit(ca.densify(adjoint), ends)]
+    return with_reciprocals(graph_of(ca.Function("adjoint", [*arguments, *seeds], pieces)), forward)

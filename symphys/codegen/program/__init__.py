@@ -1,0 +1,1 @@
+"""Programs: a rollout as calls of small functions on a flat memory."""

@@ -1,0 +1,52 @@
+"""The reference: a program run call by call by casadi, in numpy. Slow, needs no compiler, and is what tests compare."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from symphys.codegen.program.program import Call, Place, Program
+
+Array = NDArray[np.float64]
+
+
+def interpret(program: Program, z: ArrayLike, knob: ArrayLike = ()) -> dict[str, Array]:
+    """The outputs of one rollout."""
+    memory = remember(program, z, knob)
+    return {name: at(memory, place, 0).copy() for name, place in program.outputs.items()}
+
+
+def remember(program: Program, z: ArrayLike, knob: ArrayLike = ()) -> Array:
+    """(size,) the memory after one rollout: trajectories lie in it."""
+    memory = np.full(program.size, np.nan)
+    for place in program.zeroed:
+        at(memory, place, 0)[:] = 0
+    for place, values in program.constants:
+        at(memory, place, 0)[:] = values
+    at(memory, program.z, 0)[:] = z
+    at(memory, program.knob, 0)[:] = knob
+    for call, k in _order(program):
+        _perform(call, memory, k)
+    return memory
+
+
+def at(memory: Array, place: Place, k: int) -> Array:
+    """A view of the words of a place at step k."""
+    start = place.offset + k * place.stride
+    return memory[start : start + place.size]
+
+
+def _order(program: Program) -> Iterator[tuple[Call, int]]:
+    yield from ((call, 0) for call in program.prologue)
+    for k in range(program.steps):
+        yield from ((call, k) for call in program.body)
+    yield from ((call, 0) for call in program.epilogue)
+
+
+def _perform(call: Call, memory: Array, k: int) -> None:
+    results = call.function.call([at(memory, place, k) for place in call.inputs])
+    for place, result in zip(call.outputs, results, strict=True):
+        target = at(memory, place, k)
+        target[:] = result.full().ravel() + (target if call.accumulate else 0)

@@ -1,0 +1,1 @@
+"""A compiled kernel on the processor: batches, threads, memory."""

@@ -1,0 +1,80 @@
+"""Arguments and results of a batch of rollouts, checked, and cut into parts for threads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from symphys.codegen.errors import ProgramError
+from symphys.codegen.program.program import Place
+from symphys.codegen.runtime.library import BatchData, Source
+
+Array = NDArray[np.float64]
+CHUNKS = 4
+"""Parts for each thread: small enough that one slow processor does not keep the others waiting."""
+
+
+class Batch:
+    """One call's arrays; those of one row serve all lanes.
+
+    Attributes:
+        inputs: by the names "z", "knob" and "seed", (rows, words), or (words,) for all.
+        results: by the names "outputs", "gradient" and "trajectory", rows first.
+        place, count: of the trajectory.
+        loss, spared: see ``Kernel.gradient``.
+        rows: how many.
+    """
+
+    def __init__(self, inputs: Mapping[str, tuple[ArrayLike, int]]) -> None:
+        """Check name -> (values, words in a row); ProgramError says which shape was wanted."""
+        self.inputs: dict[str, Array] = {}
+        self.results: dict[str, Array] = {}
+        self.place, self.count, self.loss, self.spared = Place(0, 0), 0, 0.0, 0
+        for name, (values, size) in inputs.items():
+            array = np.ascontiguousarray(values, dtype=np.float64)
+            if array.ndim not in (1, 2) or array.shape[-1] != size:
+                raise ProgramError(f"{name} has the shape {array.shape}; wanted is (batch, {size}) or ({size},)")
+            self.inputs[name] = array
+        lengths = {len(array) for array in self.inputs.values() if array.ndim == 2}
+        if len(lengths) > 1:
+            raise ProgramError(f"the batch sizes {sorted(lengths)} of {', '.join(self.inputs)} differ")
+        self.rows = lengths.pop() if lengths else 1
+
+    def outputs(self, width: int) -> Array:
+        """Ask for the outputs; returns the array that they will be written to."""
+        return self._result("outputs", (self.rows, width))
+
+    def gradient(self, width: int) -> Array:
+        """Ask for the gradient."""
+        return self._result("gradient", (self.rows, width))
+
+    def trajectory(self, place: Place, count: int) -> Array:
+        """Ask for the words of a place at ``count`` steps."""
+        self.place, self.count = place, count
+        return self._result("trajectory", (self.rows, count, place.size))
+
+    def _result(self, name: str, shape: tuple[int, ...]) -> Array:
+        self.results[name] = np.empty(shape)
+        return self.results[name]
+
+    def parts(self, lanes: int, threads: int) -> list[BatchData]:
+        """The batch in parts of whole blocks, a few for each thread."""
+        blocks = -(-self.rows // lanes)
+        count = 1 if threads == 1 else min(blocks, CHUNKS * threads)
+        ends = [lanes * (blocks * i // count) for i in range(count)] if count else []
+        return [self.part(a, min(b, self.rows)) for a, b in zip(ends, [*ends[1:], self.rows], strict=True)]
+
+    def part(self, start: int, end: int) -> BatchData:
+        """The rows from start to end; the arrays must outlive it."""
+        data = BatchData(end - start)
+        for name, array in self.inputs.items():
+            stride = array.shape[1] if array.ndim == 2 else 0
+            setattr(data, name, Source(array.ctypes.data + 8 * start * stride, stride))
+        for name, array in self.results.items():
+            setattr(data, name, array.ctypes.data + start * array[:1].nbytes)
+        place = self.place
+        data.offset, data.size, data.stride, data.count = place.offset, place.size, place.stride, self.count
+        data.loss, data.spared = self.loss, self.spared
+        return data

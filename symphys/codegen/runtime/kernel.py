@@ -1,0 +1,138 @@
+"""A compiled program: batches of rollouts, their gradients and trajectories."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from symphys.codegen.errors import ProgramError
+from symphys.codegen.program.nan_location import Bad, first_bad
+from symphys.codegen.program.program import Place, Program
+from symphys.codegen.runtime.batch import Array, Batch
+from symphys.codegen.runtime.fixed_addresses import Fixed
+from symphys.codegen.runtime.library import Loaded
+from symphys.codegen.runtime.thread_pool import Pool
+from symphys.codegen.toolchain.compiler import processors
+from symphys.codegen.toolchain.report import Report
+
+Outputs = dict[str, NDArray[np.float64]]
+"""name -> (batch, size)"""
+
+
+class Kernel(ABC):
+    """A compiled program. A row's result does not depend on the other rows."""
+
+    threads = 1
+
+    def __init__(self, program: Program, report: Report, seeded: Sequence[str]) -> None:
+        """``seeded``: names of the outputs that are differentiated."""
+        self.program, self.report, self.seeded = program, report, tuple(seeded)
+
+    def forward(self, Z: ArrayLike, knob: ArrayLike = ()) -> Outputs:
+        """The outputs of rollouts.
+
+        Args:
+            Z: (batch, n) decision vectors, or one (n,).
+            knob: (batch, p) or one (p,) for all.
+        """
+        batch = self._batch(Z, knob)
+        outputs = batch.outputs(self._width())
+        self._run(batch)
+        return self._named(outputs)
+
+    def gradient(
+        self, Z: ArrayLike, seed: ArrayLike, knob: ArrayLike = (), loss: float = 0.0, spared: int = 0
+    ) -> tuple[Outputs, Array]:
+        """Outputs, and (batch, n): the derivative of seed . outputs with respect to z, row by row.
+
+        Args:
+            Z: (batch, n), or one (n,) for all seeds.
+            seed: (batch, s) or one (s,) for all; s words of the seeded outputs, in their order.
+            knob: (batch, p) or one (p,) for all.
+            loss: the share of its adjoint that ``program.fading.state`` loses in each step back; above 0, adjoints also
+                end where ``kept`` is 0. What comes out is no derivative then.
+            spared: steps at the end that are not computed: ``program.fading.state`` stays as it is, and what else these
+                steps would write is 0.
+        """
+        if spared and (self.program.fading is None or not 0 <= spared <= self.program.steps):
+            raise ProgramError(f"{spared} of {self.program.steps} steps cannot be spared, or no state is told")
+        batch = self._batch(Z, knob, seed)
+        batch.loss, batch.spared = loss, spared
+        outputs, gradient = batch.outputs(self._width()), batch.gradient(self.program.z.size)
+        self._run(batch)
+        return self._named(outputs), gradient
+
+    def jacobian(self, z: ArrayLike, name: str, knob: ArrayLike = ()) -> Array:
+        """(size, n) the derivative of an output at one z: a lane for each of its words."""
+        start = 0
+        for other in self.seeded:
+            size = self.program.outputs[other].size
+            if other == name:
+                seeds = np.zeros((size, self._seeds()))
+                seeds[:, start : start + size] = np.eye(size)
+                return self.gradient(np.ravel(z), seeds, knob)[1]
+            start += size
+        raise ProgramError(f"no seeded output is called {name!r}; there are {', '.join(self.seeded)}")
+
+    def trajectory(self, Z: ArrayLike, place: Place, count: int, knob: ArrayLike = ()) -> Array:
+        """(batch, count, size) the words of a place at steps 0 .. count - 1."""
+        last = place.offset + place.stride * max(count - 1, 0)
+        if min(place.offset, last) < 0 or max(place.offset, last) + place.size > self.program.size:
+            raise ProgramError(f"{count} steps of {place} do not lie in the memory of {self.program.size} words")
+        batch = self._batch(Z, knob)
+        trajectory = batch.trajectory(place, count)
+        self._run(batch)
+        return trajectory
+
+    def _batch(self, Z: ArrayLike, knob: ArrayLike, seed: ArrayLike | None = None) -> Batch:
+        rows = {"z": (Z, self.program.z.size), "knob": (knob, self.program.knob.size)}
+        return Batch(rows if seed is None else rows | {"seed": (seed, self._seeds())})
+
+    def _seeds(self) -> int:
+        return sum(self.program.outputs[name].size for name in self.seeded)
+
+    def _width(self) -> int:
+        return sum(place.size for place in self.program.outputs.values())
+
+    def _named(self, outputs: Array) -> Outputs:
+        return {name: outputs[:, part] for name, part in self.program.output_slices().items()}
+
+    @abstractmethod
+    def _run(self, batch: Batch) -> None:
+        """Compute what a batch asks for."""
+
+
+class ProcessorKernel(Kernel):
+    """Blocks of lanes, spread over threads, on whose number results do not depend."""
+
+    def __init__(
+        self, program: Program, loaded: Loaded, report: Report, seeded: Sequence[str], threads: int | None
+    ) -> None:
+        """Use ``compile_program``."""
+        super().__init__(program, report, seeded)
+        self.loaded = loaded
+        self.threads = processors() if threads is None else threads
+        real = np.dtype(np.float32 if report.precision == "single" else np.float64)
+        self._pool = Pool(report.bytes_per_lane // real.itemsize, report.lanes, real)
+
+    def fixed(self, seed: ArrayLike = ()) -> Fixed:
+        """An evaluation of one z at fixed addresses, with a row for each seed (rows, s), or one row without any."""
+        seeds, z, knob = np.array(seed, float), np.zeros(self.program.z.size), np.zeros(self.program.knob.size)
+        batch = self._batch(z, knob, seeds if seeds.size else None)
+        outputs = batch.outputs(self._width())
+        gradient = batch.gradient(len(z)) if seeds.size else np.zeros((0, len(z)))
+        return Fixed(self.loaded, batch.part(0, batch.rows), self._pool.new(), z, knob, outputs, gradient, seeds)
+
+    def first_bad(self, z: ArrayLike, knob: ArrayLike = ()) -> Bad | None:
+        """The first call of one rollout that gives a value that is not finite; None if all are finite."""
+        batch = self._batch(np.ravel(z), np.ravel(knob))
+        return self._pool.lend(lambda memory: first_bad(self.program, self.loaded, batch, memory))
+
+    def _run(self, batch: Batch) -> None:
+        """Spread blocks over the threads."""
+        parts = batch.parts(self.report.lanes, self.threads)
+        self._pool.run([partial(self.loaded.evaluate, part) for part in parts], self.threads)

@@ -1,0 +1,141 @@
+"""The driver's data as ctypes, and a loaded kernel."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from symphys.codegen.emit.plan import Plan
+from symphys.codegen.errors import KernelUnavailable
+from symphys.codegen.program.program import Place, Program
+
+TABLES = ("prologue", "body", "epilogue", "again", "back_body", "back_prologue", "back_epilogue")
+WORD = ctypes.c_int64
+Memory = Any
+"""(words, lanes) float64 or float32, aligned: the values, the tape and the adjoints"""
+
+
+class List(ctypes.Structure):
+    """A count and int64 words: the driver's ``ranges`` and ``table``."""
+
+    _fields_ = (("count", WORD), ("words", ctypes.c_void_p))
+
+
+class Source(ctypes.Structure):
+    """Rows of doubles; stride 0 means one row for all lanes."""
+
+    _fields_ = (("rows", ctypes.c_void_p), ("stride", WORD))
+
+
+def program_fields(phase: type) -> Any:
+    """Of a driver's ``program``, whose phases are of this type."""
+    return (
+        ("size", WORD),
+        ("tape", WORD),
+        ("steps", WORD),
+        *((name, List) for name in ("z", "knob", "zeroed", "constants", "outputs", "seeded")),
+        ("values", ctypes.c_void_p),
+        *((name, phase) for name in TABLES),
+        ("fading", WORD * 3),
+        ("kept", WORD * 2),
+        ("written", List),
+    )
+
+
+class ProgramData(ctypes.Structure):
+    """The driver's ``program``."""
+
+    _fields_ = program_fields(List)
+
+
+class BatchData(ctypes.Structure):
+    """The driver's ``batch``."""
+
+    _fields_ = (
+        ("rows", WORD),
+        *((name, Source) for name in ("z", "knob", "seed")),
+        *((name, ctypes.c_void_p) for name in ("outputs", "gradient", "trajectory")),
+        *((name, WORD) for name in ("offset", "size", "stride", "count")),
+        ("loss", ctypes.c_double),
+        ("spared", WORD),
+    )
+
+
+class Loaded:
+    """A kernel's library with the program that it runs."""
+
+    def __init__(self, path: Path, program: Program, plan: Plan, seeded: Sequence[str]) -> None:
+        """Load the library; KernelUnavailable if the system refuses."""
+        try:
+            library = ctypes.CDLL(str(path))
+        except OSError as error:
+            raise KernelUnavailable(f"the compiled kernel cannot be loaded: {error}") from error
+        self._evaluate = _prepared(library.evaluate, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
+        self._begin = _prepared(library.begin, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
+        self._perform = _prepared(library.perform, ctypes.c_void_p, ctypes.c_void_p, WORD)
+        self._kept: list[Any] = []
+        self.data = ProgramData(program.size, plan.tape, program.steps)
+        values = np.array([x for _, row in program.constants for x in row] or [0], dtype=np.float64)
+        self._kept.append(values)
+        self.data.values = values.ctypes.data
+        for name, listed in data_places(program, seeded).items():
+            setattr(self.data, name, self._list(len(listed), _ranges(listed)))
+        for name in TABLES:
+            setattr(self.data, name, self._list(*plan.tables[name]))
+        written = [place for call in program.body for place in call.outputs if place.stride]
+        self.data.written = self._list(len(written), strided(written))
+        if program.fading is not None:
+            state, kept = program.fading.state, program.fading.kept
+            self.data.fading = (WORD * 3)(state.offset, state.size, state.stride)
+            self.data.kept = (WORD * 2)(*((kept.offset, kept.stride) if kept else (0, 0)))
+
+    def _list(self, count: int, words: Any) -> List:
+        self._kept.append(words)
+        return List(count, words.ctypes.data)
+
+    @property
+    def addresses(self) -> tuple[int, int]:
+        """Of the driver's ``evaluate`` and of the program that it wants."""
+        return ctypes.cast(self._evaluate, ctypes.c_void_p).value or 0, ctypes.addressof(self.data)
+
+    def evaluate(self, batch: BatchData, memory: Memory) -> None:
+        """Run a batch in this memory; the interpreter is free meanwhile."""
+        self._evaluate(ctypes.byref(self.data), ctypes.byref(batch), memory.ctypes.data)
+
+    def begin(self, batch: BatchData, memory: Memory) -> None:
+        """Put the inputs of the batch's first row into the memory."""
+        self._begin(ctypes.byref(self.data), ctypes.byref(batch), memory.ctypes.data)
+
+    def perform(self, name: str, memory: Memory, k: int) -> None:
+        """Run the calls of one table at step k."""
+        self._perform(ctypes.byref(getattr(self.data, name)), memory.ctypes.data, k)
+
+
+def _prepared(function: Any, *types: Any) -> Any:
+    function.argtypes, function.restype = types, None
+    return function
+
+
+def data_places(program: Program, seeded: Sequence[str]) -> dict[str, Sequence[Place]]:
+    """The places that the drivers know by name."""
+    return {
+        "z": [program.z],
+        "knob": [program.knob],
+        "zeroed": program.zeroed,
+        "constants": [place for place, _ in program.constants],
+        "outputs": list(program.outputs.values()),
+        "seeded": [program.outputs[name] for name in seeded],
+    }
+
+
+def strided(places: Sequence[Place]) -> Any:
+    """Offset, size and stride of each, one after the other."""
+    return np.array([x for place in places for x in (place.offset, place.size, place.stride)] or [0], dtype=np.int64)
+
+
+def _ranges(places: Sequence[Place]) -> Any:
+    return np.array([x for place in places for x in (place.offset, place.size)] or [0], dtype=np.int64)

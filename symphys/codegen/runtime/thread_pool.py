@@ -1,0 +1,59 @@
+"""Threads for blocks of lanes, and the memory in which they work."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from typing import Any, TypeVar
+
+import numpy as np
+
+from symphys.codegen.runtime.library import Memory
+
+ALIGNMENT = 64
+"""Bytes of the widest vector."""
+T = TypeVar("T")
+
+
+class Pool:
+    """Memories of one shape, kept from call to call; a task has one for itself while it runs."""
+
+    def __init__(self, words: int, lanes: int, real: Any) -> None:
+        """Memories of (words, lanes) numbers of this type."""
+        self._shape, self._real = (words, lanes), np.dtype(real)
+        self._free: list[Memory] = []
+
+    def run(self, tasks: Sequence[Callable[[Memory], None]], threads: int) -> None:
+        """Run all tasks, at most ``threads`` at once."""
+        if threads == 1 or len(tasks) < 2:
+            for task in tasks:
+                self.lend(task)
+        else:
+            list(_executor(os.getpid(), threads).map(self.lend, tasks))
+
+    def lend(self, task: Callable[[Memory], T]) -> T:
+        """Run one task here, in a memory of its own."""
+        try:
+            memory = self._free.pop()
+        except IndexError:
+            memory = self.new()
+        try:
+            return task(memory)
+        finally:
+            self._free.append(memory)
+
+    def new(self) -> Memory:
+        """A memory that is the caller's."""
+        alignment = max(ALIGNMENT, self._shape[1] * self._real.itemsize)
+        size = int(np.prod(self._shape)) * self._real.itemsize
+        raw = np.empty(size + alignment, dtype=np.uint8)
+        start = -raw.ctypes.data % alignment
+        return raw[start : start + size].view(self._real).reshape(self._shape)
+
+
+@cache
+def _executor(process: int, threads: int) -> ThreadPoolExecutor:
+    """The threads of this process: those of a parent do not live on in a child."""
+    return ThreadPoolExecutor(threads, thread_name_prefix="symphys-kernel")

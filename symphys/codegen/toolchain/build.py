@@ -1,0 +1,125 @@
+"""From a program to a kernel: plan, source, key, then the cache or the compiler."""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from symphys.codegen.emit.plan import plan
+from symphys.codegen.emit.source import Source, sources
+from symphys.codegen.errors import KernelUnavailable, ProgramError
+from symphys.codegen.program.program import Program
+from symphys.codegen.runtime.kernel import ProcessorKernel
+from symphys.codegen.runtime.library import Loaded
+from symphys.codegen.toolchain.cache import Cache, default_cache
+from symphys.codegen.toolchain.compiler import Compiler, find_compiler
+from symphys.codegen.toolchain.processor import processor
+from symphys.codegen.toolchain.report import Report
+
+
+def compile_program(
+    program: Program,
+    lanes: int | Literal["auto"] = "auto",
+    precision: Literal["double", "single"] = "double",
+    cache: Cache | None = None,
+    seeded: Sequence[str] | None = None,
+    threads: int | None = None,
+) -> ProcessorKernel:
+    """Build the kernel of a program, or take it from the cache.
+
+    Args:
+        program: what to compile.
+        lanes: rollouts in one block, a power of two; "auto": what fills a vector register.
+        precision: of the arithmetic; arguments and results are double always.
+        cache: where kernels are kept; None: the user's.
+        seeded: names of the outputs that can be differentiated; None: all.
+        threads: how many blocks are computed at once; None: one for each processor.
+
+    Raises:
+        KernelUnavailable: with one line that says why; the caller falls back.
+    """
+    started = time.perf_counter()
+    single = precision == "single"
+    names, width = names_of(program, seeded), _width(lanes, single)
+    planned = plan(program, names, width * (4 if single else 8))
+    with shared_library(sources(planned, width, single), cache or default_cache()) as built:
+        loaded = Loaded(built.path, program, planned, names)
+    report = Report(
+        compiler=built.compiler.version,
+        flags=built.flags,
+        lanes=width,
+        precision=precision,
+        functions=len(planned.functions),
+        operations=sum(len(graph.nodes) for graph, _ in planned.functions),
+        bytes_per_lane=(2 * program.size + planned.tape) * (4 if single else 8),
+        cached=built.cached,
+        seconds=time.perf_counter() - started,
+        note=built.note,
+    )
+    return ProcessorKernel(program, loaded, report, names, threads)
+
+
+def names_of(program: Program, seeded: Sequence[str] | None) -> tuple[str, ...]:
+    """The outputs that can be differentiated; None: all. ProgramError names one that does not exist."""
+    names = tuple(program.outputs if seeded is None else seeded)
+    if unknown := [name for name in names if name not in program.outputs]:
+        raise ProgramError(f"no output is called {unknown[0]!r}; there are {', '.join(program.outputs)}")
+    return names
+
+
+def _width(lanes: int | Literal["auto"], single: bool) -> int:
+    if lanes == "auto":
+        return processor().lanes(single)
+    if lanes not in range(1, 65) or lanes & (lanes - 1):
+        raise ProgramError(f"lanes must be a power of two from 1 to 64, not {lanes}")
+    return lanes
+
+
+@dataclass(frozen=True)
+class Built:
+    """A library on disk, and how it came there."""
+
+    path: Path
+    compiler: Compiler
+    flags: tuple[str, ...]
+    cached: bool
+    note: str = ""
+
+
+@contextmanager
+def shared_library(parts: Sequence[Source], cache: Cache) -> Iterator[Built]:
+    """The library of these sources; what does not go into the cache lasts as long as the context."""
+    compiler = find_compiler()
+    flags = compiler.flags(processor())
+    texts = [f"{part.fused} {part.text}" for part in parts]
+    key = hashlib.sha256("\0".join([*texts, *compiler.command, compiler.version, *flags]).encode()).hexdigest()[:32]
+    if (path := cache.find(key)) is not None:
+        yield Built(path, compiler, flags, cached=True)
+        return
+    with _folder() as folder:
+        with cache.building(key):
+            found = cache.find(key)  # another process may have built it meanwhile
+            path, note = (found, "") if found else _kept(cache, key, compiler.build(parts, flags, Path(folder)))
+        yield Built(path, compiler, flags, found is not None, note)
+
+
+def _kept(cache: Cache, key: str, path: Path) -> tuple[Path, str]:
+    """The library in the cache, or where it is and why."""
+    try:
+        return cache.store(key, path), ""
+    except OSError as error:
+        why = f"the kernel was not kept in {cache.folder} ({error.strerror}); it will be compiled again next time"
+        return path, why
+
+
+def _folder() -> tempfile.TemporaryDirectory[str]:
+    try:
+        return tempfile.TemporaryDirectory(prefix="symphys-kernel-", ignore_cleanup_errors=True)
+    except OSError as error:
+        raise KernelUnavailable(f"no temporary folder to compile a kernel in: {error.strerror}; set TMPDIR") from error

@@ -1,0 +1,154 @@
+"""Compiled kernels on disk, one file each: ``<key>-<checksum of the content>.so``, or ``.cubin`` for a device.
+
+A file appears whole under its name or not at all, so that readers need no lock; a file whose content is not that of
+its name is removed and built again. Processes that want the same kernel wait for the first one to build it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from symphys.codegen.errors import KernelUnavailable
+
+LIMIT = 512 * 2**20
+"""Bytes that the kernels may take together; those not used for longest go first."""
+KINDS = (".so", ".cubin")
+"""Endings of kernels for processors and for devices."""
+LEFT = 3600.0
+"""Seconds after which an unfinished file belongs to a process that was killed."""
+
+
+@dataclass(frozen=True)
+class CacheInfo:
+    """What a cache holds: its folder, the number of kernels, their bytes and how many it may hold."""
+
+    folder: Path
+    kernels: int
+    bytes: int
+    limit: int
+
+
+@dataclass(frozen=True)
+class Cache:
+    """A folder of kernels, of at most ``limit`` bytes; finds and stores those of one of KINDS, its ``suffix``."""
+
+    folder: Path
+    limit: int = LIMIT
+    suffix: str = KINDS[0]
+
+    def find(self, key: str) -> Path | None:
+        """The kernel of this key; None if there is none or if it is damaged."""
+        for path in self._files(f"{key}-*{self.suffix}"):
+            with contextlib.suppress(OSError):
+                if path.stem.split("-")[1] == _checksum(path):
+                    with contextlib.suppress(OSError):
+                        os.utime(path)
+                    return path
+            with contextlib.suppress(OSError):
+                path.unlink()
+        return None
+
+    def store(self, key: str, built: Path) -> Path:
+        """Take over a library; OSError if the folder does not take it."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        target = self.folder / f"{key}-{_checksum(built)}{self.suffix}"
+        handle, name = tempfile.mkstemp(prefix=".new-", dir=self.folder)
+        os.close(handle)
+        try:
+            shutil.copyfile(built, name)
+            Path(name).replace(target)
+        finally:
+            Path(name).unlink(missing_ok=True)
+        self._shrink(target)
+        return target
+
+    @contextlib.contextmanager
+    def building(self, key: str) -> Iterator[None]:
+        """Hold the right to build a kernel; where files cannot be locked, several may build at once, which is safe."""
+        try:
+            import fcntl
+
+            self.folder.mkdir(parents=True, exist_ok=True)
+            lock = (self.folder / f".{key}.lock").open("w")
+        except (ImportError, OSError):
+            yield
+            return
+        with lock:
+            with contextlib.suppress(OSError):
+                fcntl.flock(lock, fcntl.LOCK_EX)
+            try:
+                yield
+            finally:
+                with contextlib.suppress(OSError):
+                    Path(lock.name).unlink()
+
+    def info(self) -> CacheInfo:
+        """Count the kernels."""
+        sizes = [size for _, size, _ in self._entries()]
+        return CacheInfo(self.folder, len(sizes), sum(sizes), self.limit)
+
+    def clear(self) -> int:
+        """Remove all kernels; returns how many went. Programs that use one go on."""
+        gone = 0
+        for _, _, path in self._entries():
+            with contextlib.suppress(OSError):
+                path.unlink()
+                gone += 1
+        self._sweep(time.time())
+        return gone
+
+    def _sweep(self, before: float) -> None:
+        """Remove what processes that were killed have left unfinished, if it is older than this."""
+        for path in self._files(".new-*"):
+            with contextlib.suppress(OSError):
+                if path.stat().st_mtime <= before:
+                    path.unlink()
+
+    def _files(self, pattern: str) -> list[Path]:
+        try:
+            return sorted(self.folder.glob(pattern))
+        except OSError:
+            return []
+
+    def _entries(self) -> list[tuple[float, int, Path]]:
+        """(time of last use, bytes, path) of each kernel, oldest first."""
+        found = []
+        for path in (path for kind in KINDS for path in self._files(f"*{kind}")):
+            with contextlib.suppress(OSError):
+                status = path.stat()
+                found.append((status.st_mtime, status.st_size, path))
+        return sorted(found)
+
+    def _shrink(self, keep: Path) -> None:
+        self._sweep(time.time() - LEFT)
+        entries = self._entries()
+        total = sum(size for _, size, _ in entries)
+        for _, size, path in entries:
+            if total > self.limit and path != keep:
+                with contextlib.suppress(OSError):
+                    path.unlink()
+                    total -= size
+
+
+def default_cache() -> Cache:
+    """The cache in $SYMPHYS_CACHE, else in the user's cache folder; KernelUnavailable if the user has none."""
+    wanted = os.environ.get("SYMPHYS_CACHE")
+    if wanted:
+        return Cache(Path(wanted))
+    base = os.environ.get("XDG_CACHE_HOME")
+    try:
+        return Cache((Path(base) if base else Path.home() / ".cache") / "symphys" / "kernels")
+    except RuntimeError as error:
+        raise KernelUnavailable("no home folder in which to keep kernels; set SYMPHYS_CACHE to a folder") from error
+
+
+def _checksum(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:32]

@@ -1,0 +1,96 @@
+"""C compilers: found, asked for their version, run in parallel; every way to fail is one clear line."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shlex
+import shutil
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from symphys.codegen.emit.source import Source
+from symphys.codegen.errors import KernelUnavailable
+from symphys.codegen.toolchain.processes import ADVICE, run, run_all
+from symphys.codegen.toolchain.processor import Processor
+
+FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-fvisibility=hidden", "-fno-math-errno", "-fno-trapping-math", "-w")
+"""No -ffast-math: a NaN stays one, and sums keep their order."""
+LIMIT = 600.0
+"""Seconds that a compiler may take for one file: far more than any kernel needs; one that hangs is stopped."""
+ANSWER = 60.0
+"""Seconds in which it must say its version; ziglang unpacks itself on its first call."""
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """A C compiler.
+
+    Attributes:
+        command: how it is called.
+        version: first line of what it says of itself; where it lies is in the command.
+    """
+
+    command: tuple[str, ...]
+    version: str
+
+    def flags(self, processor: Processor) -> tuple[str, ...]:
+        """The flags of every C file: they are part of what a kernel is."""
+        if "ziglang" in self.command and processor.features:  # its default is the machine's own processor
+            return (*FLAGS, f"-mcpu={processor.architecture.replace('-', '_')}", "-mprefer-vector-width=512")
+        return (*FLAGS, *processor.flags())
+
+    def build(self, sources: Sequence[Source], flags: Sequence[str], folder: Path) -> Path:
+        """Compile each source in a process of its own, link them, and return the shared library."""
+        objects = [folder / f"part{i}.o" for i in range(len(sources))]
+        commands = []
+        for source, target in zip(sources, objects, strict=True):
+            file = target.with_suffix(".c")
+            _write(file, source.text)
+            fusing = f"-ffp-contract={'fast' if source.fused else 'off'}"
+            commands.append([*self.command, *flags, fusing, "-c", str(file), "-o", str(target)])
+        run_all(commands, LIMIT, processors())
+        library = folder / "kernel.so"
+        run([*self.command, *flags, "-shared", *map(str, objects), "-o", str(library), "-lm"], LIMIT)
+        return library
+
+
+def processors() -> int:
+    """How many processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def find_compiler() -> Compiler:
+    """The compiler of $CC, else gcc, clang, cc or the ziglang package; KernelUnavailable if there is none."""
+    wanted = os.environ.get("CC", "").strip()
+    if wanted:
+        return _asked(tuple(shlex.split(wanted)), named=True)
+    for name in ("gcc", "clang", "cc"):
+        path = shutil.which(name)
+        if path:
+            return _asked((path,), named=False)
+    if importlib.util.find_spec("ziglang"):
+        return _asked((sys.executable, "-m", "ziglang", "cc"), named=False)
+    raise KernelUnavailable(f"no C compiler was found: {ADVICE}")
+
+
+@cache
+def _asked(command: tuple[str, ...], named: bool) -> Compiler:
+    path = shutil.which(command[0])
+    if path is None:
+        raise KernelUnavailable(f"the compiler {command[0]!r} that CC names was not found: {ADVICE}")
+    command = (path, *command[1:])
+    lines = run([*command, "--version"], ANSWER).splitlines()
+    return Compiler(command, lines[0] if lines else "unknown version")
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise KernelUnavailable(f"cannot write the sources of a kernel to {path.parent}: {error.strerror}") from error

@@ -1,0 +1,33 @@
+"""One time step, as a branch-free casadi expression."""
+
+from symphys.dynamics.functions import Recording, record_step, report_function, step_function
+from symphys.dynamics.joints.warm_start import components
+from symphys.dynamics.observation.felt import accelerometer_bodies, accelerometers, body_quantities, felt_names
+from symphys.dynamics.observation.joint_coordinates import (
+    joint_quantities,
+    joint_quantity_names,
+    reading_function,
+    readings,
+)
+from symphys.dynamics.observation.queries import gap_function, slip_function
+from symphys.dynamics.tracing.recording import Piece, Slot
+
+__all__ = [
+    "Piece",
+    "Recording",
+    "Slot",
+    "accelerometer_bodies",
+    "accelerometers",
+    "body_quantities",
+    "components",
+    "felt_names",
+    "gap_function",
+    "joint_quantities",
+    "joint_quantity_names",
+    "reading_function",
+    "readings",
+    "record_step",
+    "report_function",
+    "slip_function",
+    "step_function",
+]

@@ -1,0 +1,135 @@
+"""Where the bodies of a tree come to: from joint to joint, so that all joints fit whatever the coordinates are.
+
+Rotations are quaternions from the start of the stretch to its end, world frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from symphys.dynamics.articulated import spatial as screws
+from symphys.dynamics.collision.predicted_points import Course
+from symphys.dynamics.joints.joint_frames import errors, locked, sockets_on
+from symphys.dynamics.tracing.trace import Pieces
+from symphys.maths import rotation
+from symphys.model.joints import Joint, Linkage
+
+Expr = Any
+"""casadi SX"""
+
+
+@dataclass(frozen=True)
+class Arrived:
+    """Where a body comes to: (3,) its centre of mass, (4,) how it has turned since the start."""
+
+    position: Expr
+    turn: Expr
+
+
+@dataclass(frozen=True)
+class Seat:
+    """A joint at the start of a stretch, world frame, as seen from the parent of its link.
+
+    Attributes:
+        arms: (3,) from the centres of mass of the parent, or the world's origin, and of the link's body.
+        apart: (3,) from the second socket to the first, as far as it is free.
+        axes: (3, count) about or along which coordinates move the first side.
+        righting: (4,) the rotation of the first side that brings back what is locked, to second order in its error.
+    """
+
+    arms: tuple[Expr, Expr]
+    apart: Expr
+    axes: Expr
+    righting: Expr
+
+
+HERE = Arrived(ca.SX.zeros(3), ca.SX([1, 0, 0, 0]))
+"""The world."""
+
+
+def seats_of(
+    pieces: Pieces, linkage: Linkage, joints: screws.Joints, courses: Sequence[Course]
+) -> tuple[Seat | None, ...]:
+    """Of each link; None for a root that floats."""
+    place, found = {link.body: k for k, link in enumerate(linkage.links)}, list[Seat | None]()
+    for link, joint, course in zip(linkage.links, joints, courses, strict=True):
+        own = (course,) if link.parent is None else (course, courses[place[link.parent]])
+        found.append(None if joint is None else pieces.do(_seat, joint, link.sign, own))
+    return tuple(found)
+
+
+def arrive(
+    pieces: Pieces,
+    linkage: Linkage,
+    joints: screws.Joints,
+    seats: Sequence[Seat | None],
+    positions: Sequence[Expr],
+    along: Sequence[Expr],
+) -> tuple[Arrived, ...]:
+    """Of each link's body, by how far its coordinates go; those of a floating root are (6,) along the world's axes."""
+    place, found = {link.body: k for k, link in enumerate(linkage.links)}, list[Arrived]()
+    for link, joint, seat, position, moved in zip(linkage.links, joints, seats, positions, along, strict=True):
+        if joint is None or seat is None:
+            found.append(pieces.do(_floated, position, moved))
+        else:
+            parent = HERE if link.parent is None else found[place[link.parent]]
+            found.append(pieces.do(_carried, joint, link.sign, seat, parent, moved))
+    return tuple(found)
+
+
+def _seat(joint: Joint, sign: int, courses: tuple[Course, ...]) -> Seat:
+    now, sockets = ca.SX(0), sockets_on(joint, courses if sign > 0 else courses[::-1])
+    placed, arms = sockets.placed(now), tuple(arm.at(now) for arm in sockets.arms)
+    directions, slides = locked(joint, placed), joint.kind.slides
+    held = 3 if slides is None else len(slides)
+    wrong: Expr = errors(joint, placed)
+    back = -ca.mtimes(directions.turns.T, wrong[held:, 0]) if joint.kind.turns else ca.SX(3, 1)
+    apart = ca.SX(3, 1) if directions.slides is None else placed.apart - ca.mtimes(directions.slides.T, wrong[:held, 0])
+    free = screws.free_motions_of(joint, placed)
+    axes = ca.horzcat(ca.SX(3, 0), *(turn if _turns(joint, k) else slide for k, (slide, turn) in enumerate(free)))
+    first = rotation.unit(ca.vertcat(1, back / 2)) if joint.kind.turns else HERE.turn
+    return Seat((arms[1], arms[0]) if sign > 0 else (arms[0], arms[1]), apart, axes, first)
+
+
+def _turns(joint: Joint, k: int) -> bool:
+    """Whether free motion ``k`` of a joint is a rotation."""
+    return not joint.kind.coordinates or joint.kind.coordinates[k].turns
+
+
+def _floated(position: Expr, moved: Expr) -> Arrived:
+    return Arrived(position + moved[:3], rotation.exponential(moved[3:]))
+
+
+def _carried(joint: Joint, sign: int, seat: Seat, parent: Arrived, moved: Expr) -> Arrived:
+    apart, turned = seat.apart, _turned(joint, seat, moved)
+    for k, coordinate in enumerate(joint.kind.coordinates):
+        if not coordinate.turns:
+            apart = apart + moved[k] * seat.axes[:, k]
+    relative = turned if sign > 0 else ca.vertcat(turned[0], -turned[1:])
+    turn = rotation.multiply(parent.turn, relative)
+    above, own = seat.arms
+    # what slides goes along axes of the second side
+    above, own = (above + apart, own) if sign > 0 else (above, own + apart)
+    return Arrived(parent.position + rotation.rotate(parent.turn, above) - rotation.rotate(turn, own), turn)
+
+
+def _turned(joint: Joint, seat: Seat, moved: Expr) -> Expr:
+    """(4,): of the first side against the second, since the start."""
+    if not joint.kind.coordinates:
+        free = rotation.exponential(ca.mtimes(seat.axes, moved)) if seat.axes.size2() else HERE.turn
+        return rotation.multiply(free, seat.righting)
+    order = sorted(range(len(joint.kind.coordinates)), key=lambda k: joint.kind.coordinates[k].fixed_in_first)
+    found = HERE.turn
+    for k in order:
+        if joint.kind.coordinates[k].turns:
+            found = rotation.multiply(found, _about(seat.axes[:, k], moved[k]))
+    return rotation.multiply(found, seat.righting)
+
+
+def _about(axis: Expr, angle: Expr) -> Expr:
+    """(4,): the rotation about a unit axis."""
+    return ca.vertcat(ca.cos(angle / 2), ca.sin(angle / 2) * axis)

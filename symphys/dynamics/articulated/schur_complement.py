@@ -1,0 +1,190 @@
+"""A tree's mass matrix with the limbs that hang on its root taken apart: what is done with each limb, and at the root.
+
+The rates of a limb are z + T r, with r those of the root and T = -M_ll^-1 M_lr: what it does as the root moves and
+nothing acts on it. In (r, z) limbs do not know of each other: an impulse b on one limb changes its z by M_ll^-1 b_l and
+r by S^-1 (b_r - M_rl z), S = M_rr + sum M_rl T, and no other limb. So what sweeps visit stays small however many limbs
+there are, and equal limbs share their functions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from symphys.dynamics.articulated.factorisation import Eliminated, Sparse, eliminated
+
+Expr = Any
+"""casadi SX"""
+Above = tuple[int | None, ...]
+"""For each link of a limb the place of its parent among them; None: the root of the tree."""
+Columns = tuple[Expr, ...]
+"""For each link the screws of its coordinates (6, count)."""
+
+
+@dataclass(frozen=True)
+class Axes:
+    """The screws of a limb's links and of the root (6, count): how coordinates move them.
+
+    Attributes:
+        seen, root_seen: at the time of the velocities.
+        given, root_given: at the time of the impulses; None if that is the same.
+    """
+
+    seen: Columns
+    root_seen: Expr
+    given: Columns | None = None
+    root_given: Expr | None = None
+
+    @property
+    def impulses(self) -> tuple[Columns, Expr]:
+        """The screws along which impulses count, of the links and of the root."""
+        if self.given is None or self.root_given is None:
+            return self.seen, self.root_seen
+        return self.given, self.root_given
+
+
+@dataclass(frozen=True)
+class LimbMatrix:
+    """What a limb of n coordinates does on a root of m.
+
+    Attributes:
+        block: its own mass matrix.
+        follows: T (n, m).
+        pushes: M_rl (m, n).
+        at_root: (m, m) what it adds to the mass matrix of the root.
+    """
+
+    block: Eliminated
+    follows: Expr
+    pushes: Expr
+    at_root: Expr
+
+
+@dataclass(frozen=True)
+class Screw:
+    """(6,): a velocity or a momentum about the origin, see ``screws``."""
+
+    parts: Expr
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """(6, 6): momentum for a screw."""
+
+    matrix: Expr
+
+
+def paths(above: Above, axes: Columns) -> list[list[int]]:
+    """For each link of a limb the limb's coordinates that move it."""
+    found: list[list[int]] = []
+    start = 0
+    for parent, columns in zip(above, axes, strict=True):
+        count = columns.size2()
+        found.append([*([] if parent is None else found[parent]), *range(start, start + count)])
+        start += count
+    return found
+
+
+def limb_matrix(above: Above, inertias: Sequence[Inertia], axes: Axes) -> LimbMatrix:
+    """Of a limb, its bodies' inertias given."""
+    symmetric, (given, root_given) = axes.given is None, axes.impulses
+    total, base = summed_up(above, [inertia.matrix for inertia in inertias])
+    seen_of: Expr = ca.horzcat(*axes.seen)
+    given_of: Expr = ca.horzcat(*given)
+    n, m = seen_of.size2(), axes.root_seen.size2()
+    rows: list[Sparse] = [{} for _ in range(n)]
+    pushes, pulls = ca.SX(m, n), ca.SX(n, m)
+    for path, columns, inertia in zip(paths(above, axes.seen), axes.seen, total, strict=True):
+        for k in path[len(path) - columns.size2() :]:
+            momentum, reaction = ca.mtimes(inertia, seen_of[:, k]), ca.mtimes(inertia.T, given_of[:, k])
+            pushes[:, k] = ca.mtimes(root_given.T, momentum)
+            pulls[k, :] = pushes[:, k].T if symmetric else ca.mtimes(axes.root_seen.T, reaction).T
+            for i in [i for i in path if i <= k]:
+                rows[i][k] = ca.dot(momentum, given_of[:, i])
+                rows[k][i] = rows[i][k] if symmetric or i == k else ca.dot(reaction, seen_of[:, i])
+    block = eliminated(rows, symmetric)
+    follows = ca.SX(n, m)
+    for j in range(m):
+        for k, value in block.solve({k: -pulls[k, j] for k in range(n)}).items():
+            follows[k, j] = value
+    at_root = ca.mtimes(root_given.T, ca.mtimes(base, axes.root_seen)) + ca.mtimes(pushes, follows)
+    return LimbMatrix(block, follows, pushes, mirrored(at_root) if symmetric else at_root)
+
+
+def root_matrix(inertia: Inertia, axes: tuple[Expr, Expr | None], limbs: tuple[Expr, ...]) -> Eliminated:
+    """S, from the root's inertia, its screws as they are seen and given, and what limbs add."""
+    seen, given = axes
+    whole = ca.mtimes((seen if given is None else given).T, ca.mtimes(inertia.matrix, seen))
+    for each in limbs:
+        whole += each
+    m = seen.size2()
+    return eliminated([{j: whole[i, j] for j in range(m)} for i in range(m)], given is None)
+
+
+def limb_load(
+    above: Above, matrix: LimbMatrix, given: Columns, root: Expr, momenta: Sequence[Screw]
+) -> tuple[Expr, Expr]:
+    """(z (n,), what reaches the root (m,)) of momenta, or forces, of a limb's bodies."""
+    total, base = summed_up(above, [momentum.parts for momentum in momenta])
+    right, start = dict[int, Expr](), 0
+    for columns, screw in zip(given, total, strict=True):
+        along = ca.mtimes(columns.T, screw)
+        right |= {start + k: along[k] for k in range(columns.size2())}
+        start += columns.size2()
+    z = dense(matrix.block.solve(right), start)
+    return z, ca.mtimes(root.T, base) - ca.mtimes(matrix.pushes, z)
+
+
+def root_rates(matrix: Eliminated, given: Expr, momentum: Screw, limbs: tuple[Expr, ...]) -> Expr:
+    """r (m,): of the root's own momentum and what limbs pass on."""
+    right = ca.mtimes(given.T, momentum.parts)
+    for each in limbs:
+        right += each
+    return solved(matrix, right)
+
+
+def solved(matrix: Eliminated, right: Expr) -> Expr:
+    """(n,) for a right hand side (n,)."""
+    n = right.size1()
+    return dense(matrix.solve({k: right[k] for k in range(n) if right.has_nz(k, 0)}), n)
+
+
+def limb_rates(matrix: LimbMatrix, z: Expr, r: Expr) -> Expr:
+    """(n,) of a limb's coordinates."""
+    return z + ca.mtimes(matrix.follows, r)
+
+
+def summed_up(above: Above, parts: Sequence[Expr]) -> tuple[list[Expr], Expr]:
+    """For each link of a limb the sum over all that hangs on it, and the sum of all."""
+    total = list(parts)
+    for k, parent in reversed(list(enumerate(above))):
+        if parent is not None:
+            total[parent] = total[parent] + total[k]
+    return total, sum(total[k] for k, parent in enumerate(above) if parent is None)
+
+
+def summed_down(above: Above, axes: Columns, rates: Expr, root: Expr) -> list[Expr]:
+    """(6,) for each link of a limb: its screw, from the rates of the limb's coordinates and the root's screw."""
+    found: list[Expr] = []
+    start = 0
+    for parent, columns in zip(above, axes, strict=True):
+        end = start + columns.size2()
+        found.append((root if parent is None else found[parent]) + ca.mtimes(columns, rates[start:end, 0]))
+        start = end
+    return found
+
+
+def mirrored(matrix: Expr) -> Expr:
+    """A symmetric matrix whose halves are the same expressions."""
+    return ca.triu2symm(ca.triu(ca.densify(matrix)))
+
+
+def dense(entries: Mapping[int, Expr], n: int) -> Expr:
+    """(n,) of a sparse vector, zeros left out."""
+    found = ca.SX(n, 1)
+    for k, value in entries.items():
+        found[k] = value
+    return found

@@ -1,0 +1,77 @@
+"""Trees of bodies in screws: pairs (w, v) of an angular velocity and the velocity of the body's point at an origin.
+
+The origin is where the root's centre of mass is at the start of a stretch. Momenta about it are pairs (l, p) likewise,
+(6,) columns both. A coordinate's screw is how all that hangs on it moves for a unit rate, one for the whole subtree.
+Featherstone, Rigid Body Dynamics Algorithms (2008), chapters 2 and 6; deviation: where velocities are seen at one time
+and momenta counted at another, inertias are not symmetric.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import casadi as ca
+
+from symphys.dynamics.collision.predicted_points import Course
+from symphys.dynamics.joints.joint_frames import Sockets, sockets_on
+from symphys.maths.rotation import cross_matrix
+from symphys.model.joints import Joint, Placed
+
+Expr = Any
+"""casadi SX"""
+Joints = Sequence[Joint | None]
+"""The joint of each link; None for a root that floats."""
+
+
+def axes_of(joint: Joint | None, sign: int, courses: tuple[Course, ...], t: Expr, origin: Expr) -> Expr:
+    """(6, count): the screws of a link's coordinates at time t; ``courses`` of the link's body and of its parent's."""
+    if joint is None:
+        return floating(courses[0].centre().at(t) - origin)
+    sockets = sockets_on(joint, courses if sign > 0 else courses[::-1])
+    point = joint_point(sockets, t) - origin
+    motions = free_motions_of(joint, sockets.placed(t))
+    return ca.horzcat(ca.SX(6, 0), *(sign * ca.vertcat(turn, slide + ca.cross(point, turn)) for slide, turn in motions))
+
+
+def floating(place: Expr) -> Expr:
+    """Of a root whose centre of mass is at ``place``: its velocity and angular velocity, along the world's axes."""
+    unit, zero = ca.SX.eye(3), ca.SX(3, 3)
+    return ca.horzcat(ca.vertcat(zero, unit), ca.vertcat(unit, cross_matrix(place)))
+
+
+def joint_point(sockets: Sockets, t: Expr) -> Expr:
+    """(3,): midway between both sockets; at the first one's for what slides."""
+    first, second = (c + a for c, a in zip(sockets.centres, sockets.arms, strict=True))
+    if sockets.joint.kind.slides is not None:
+        return first.at(t)
+    return (first.at(t) + second.at(t)) / 2
+
+
+def free_motions_of(joint: Joint, placed: Placed) -> list[tuple[Expr, Expr]]:
+    """(displacement, rotation) (3,) each of the first side against the second, that a joint leaves free."""
+    zero = ca.SX.zeros(3)
+    if joint.kind.coordinates:
+        axes = [(c.turns, c.axis(placed)) for c in joint.kind.coordinates]
+        return [(zero, axis) if turns else (axis, zero) for turns, axis in axes]
+    return [(zero, placed.b[:, k]) for k in range(6 - joint.locked)]
+
+
+def inertia_of(mass: Expr, inertia: Expr, counted: Expr, seen: Expr) -> Expr:
+    """(6, 6): the momentum of a body about the origin for a screw, its centre of mass counted and seen at two places.
+
+    ``inertia``: (3, 3) about the centre of mass, world frame.
+    """
+    here, there = cross_matrix(counted), cross_matrix(seen)
+    upper = ca.horzcat(inertia - mass * ca.mtimes(here, there), mass * here)
+    return ca.vertcat(upper, ca.horzcat(-mass * there, mass * ca.SX.eye(3)))
+
+
+def about_origin(place: Expr, linear: Expr, angular: Expr) -> Expr:
+    """(6,): a momentum or force about the origin, from that about ``place``."""
+    return ca.vertcat(angular + ca.cross(place, linear), linear)
+
+
+def at_place(screw: Expr, place: Expr) -> tuple[Expr, Expr]:
+    """Velocity of the body's point at ``place``, and angular velocity."""
+    return screw[3:] + ca.cross(screw[:3], place), screw[:3]

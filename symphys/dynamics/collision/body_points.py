@@ -1,0 +1,50 @@
+"""Shapes on bodies: their ends and corners in the body's frame, their axes over the step."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Any
+
+import casadi as ca
+
+from symphys.dynamics.collision.predicted_points import Course, Parabola
+from symphys.maths import rotation
+from symphys.model.shapes import UPRIGHT, Box, Capsule, Shape, Sphere
+from symphys.model.world import is_zero
+
+Expr = Any
+"""casadi SX or a float"""
+Offset = tuple[Expr, Expr, Expr]
+SIGNS = (-1.0, 1.0)
+
+
+def ends(capsule: Capsule) -> list[Offset]:
+    """The centres of a capsule's round ends, body frame."""
+    return [placed(capsule, (0.0, 0.0, sign * capsule.half_length)) for sign in SIGNS]
+
+
+def corners(box: Box) -> list[Offset]:
+    """The eight corners of a box, body frame."""
+    x, y, z = box.half_sizes
+    return [placed(box, (a * x, b * y, c * z)) for a, b, c in product(SIGNS, repeat=3)]
+
+
+def placed(shape: Capsule | Box, point: Offset) -> Offset:
+    """A point given in the shape's own frame, body frame."""
+    turned = turned_by(shape.orientation, point)
+    return (turned[0] + shape.centre[0], turned[1] + shape.centre[1], turned[2] + shape.centre[2])
+
+
+def turned_by(orientation: tuple[Any, ...], vector: Offset) -> Offset:
+    """A vector after a rotation; unchanged, and without arithmetic, where that is none."""
+    if all(is_zero(c - unit) for c, unit in zip(orientation, UPRIGHT, strict=True)):
+        return vector
+    x, y, z = ca.vertsplit(rotation.rotate(ca.vertcat(*map(ca.SX, orientation)), ca.vertcat(*map(ca.SX, vector))))
+    return (x, y, z)
+
+
+def axes(course: Course, shape: Shape) -> tuple[Parabola, Parabola, Parabola]:
+    """The courses of a shape's own axes, world frame."""
+    turn = UPRIGHT if isinstance(shape, Sphere) else shape.orientation
+    x, y, z = (course.arm(turned_by(turn, unit)) for unit in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+    return x, y, z

@@ -1,0 +1,58 @@
+"""A ball, or a point, that a body carries, against a static plane: what all shapes do on planes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from symphys.dynamics.collision.contact_geometry import Contact, Expr, Frame, Shift
+from symphys.dynamics.collision.predicted_points import Course, Parabola
+from symphys.dynamics.collision.time_of_impact import first_root
+from symphys.model.shapes import Plane
+
+
+@dataclass(frozen=True)
+class OnPlane:
+    """A ball against a plane.
+
+    Attributes:
+        normal: (3,).
+        offset: [m].
+        radius: [m].
+        arm: from the body's centre of mass to the ball's centre.
+        centre: (3,) of the ball at t_k [m].
+    """
+
+    normal: Expr
+    offset: Expr
+    radius: Expr
+    arm: Parabola
+    centre: Expr
+
+    def frame(self, t: Expr) -> Frame:
+        """See ``Meeting``."""
+        return Frame(self.normal, (self.arm.at(t) - self.radius * self.normal, ca.SX.zeros(3)))
+
+    def gap_after(self, first: Shift, second: Shift) -> Expr:
+        """See ``Meeting``."""
+        return ca.dot(self.normal, first.moved(self.centre, self.arm.start)) - self.offset - self.radius
+
+
+def ball_on_plane(course: Course, offset: Sequence[Any], radius: Expr, plane: Plane) -> Contact:
+    """The contact of a ball at body-frame ``offset`` with ``plane``."""
+    normal, path, dt = ca.vertcat(*plane.normal), course.path(offset), course.dt
+    gap = ca.dot(normal, path.start) - plane.offset - radius
+    rate = ca.dot(normal, path.velocity)
+    bend = ca.dot(normal, path.acceleration)
+    end = gap + dt * rate + dt * dt / 2 * bend
+    return Contact(
+        gap=gap,
+        rate=rate,
+        hit=end < 0,
+        time=first_root(gap, rate, bend, dt),
+        end=end,
+        meeting=OnPlane(normal, plane.offset, radius, course.arm(offset), path.start),
+    )

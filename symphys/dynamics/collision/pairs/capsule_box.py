@@ -1,0 +1,32 @@
+"""A capsule on one body against a box on another, or a static one.
+
+The round ends touch the box anywhere, the side between them touches corners of the box, and its edges where they cross
+the capsule.
+"""
+
+from __future__ import annotations
+
+from symphys.dynamics.collision.body_points import axes, ends
+from symphys.dynamics.collision.box_geometry import Block, block, facing, nearing
+from symphys.dynamics.collision.contact_geometry import Contact, flipped
+from symphys.dynamics.collision.pairs.box_box import approach_of, edges_across
+from symphys.dynamics.collision.pairs.sphere_box import BoxField
+from symphys.dynamics.collision.pairs.sphere_capsule import CapsuleField
+from symphys.dynamics.collision.predicted_points import Course
+from symphys.dynamics.collision.signed_distance import ball_in_field
+from symphys.model.shapes import Box, Capsule
+
+
+def capsule_box(capsule: Capsule, box: Box, a: Course, b: Course) -> list[Contact]:
+    """Eight points: the round ends, the side across the box's face, the corners of that face."""
+    field, tips = BoxField(box.half_sizes), ends(capsule)
+    found = [ball_in_field(a.path(end), a.arm(end), capsule.radius, box, field, b) for end in tips]
+    rod, other = Block(a.path(capsule.centre), axes(a, capsule), (0.0, 0.0, capsule.half_length)), block(box, b)
+    edges = [rod.axes[2].cross(edge) for edge in other.axes]
+    near = nearing(rod, other, list(other.axes), edges, a.dt, capsule.radius)
+    approach = approach_of(near, (a, b), capsule.half_length + sum(box.half_sizes))
+    ground = facing(other, near.direction.at(near.time), near.time)
+    found += edges_across([a.path(end) for end in tips], ground, approach, capsule.radius)
+    side = CapsuleField(capsule.radius, capsule.half_length)
+    corners = [ball_in_field(c, c - b.centre(), 0.0, capsule, side, a) for c in ground.corners()]
+    return found + [flipped(contact) for contact in corners]

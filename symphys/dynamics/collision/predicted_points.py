@@ -1,0 +1,111 @@
+"""Known courses inside a step: where a body and its points are, as parabolas of the time t in [0, dt]."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from symphys.model.world import is_zero
+
+Expr = Any
+"""casadi SX, MX or DM"""
+
+
+@dataclass(frozen=True)
+class Parabola:
+    """A vector's course over the step: start + t velocity + t^2/2 acceleration, (3,) each."""
+
+    start: Expr
+    velocity: Expr
+    acceleration: Expr
+
+    def at(self, t: Expr) -> Expr:
+        """(3,): the vector at time t."""
+        return self.start + t * self.velocity + t * t / 2 * self.acceleration
+
+    def velocity_at(self, t: Expr) -> Expr:
+        """(3,): its rate at time t."""
+        return self.velocity + t * self.acceleration
+
+    def __add__(self, other: Parabola) -> Parabola:
+        """The course of the sum."""
+        return Parabola(
+            self.start + other.start, self.velocity + other.velocity, self.acceleration + other.acceleration
+        )
+
+    def __sub__(self, other: Parabola) -> Parabola:
+        """The course of the difference."""
+        return self + -1 * other
+
+    def __rmul__(self, factor: Expr) -> Parabola:
+        """The course of a multiple."""
+        return Parabola(factor * self.start, factor * self.velocity, factor * self.acceleration)
+
+    def cross(self, other: Parabola) -> Parabola:
+        """The course of the cross product, to second order."""
+        bend = ca.cross(self.acceleration, other.start) + ca.cross(self.start, other.acceleration)
+        return Parabola(
+            ca.cross(self.start, other.start),
+            ca.cross(self.velocity, other.start) + ca.cross(self.start, other.velocity),
+            bend + 2 * ca.cross(self.velocity, other.velocity),
+        )
+
+
+STAYS = Parabola(ca.SX.zeros(3), ca.SX.zeros(3), ca.SX.zeros(3))
+"""The course of a vector that is zero."""
+
+
+def chosen(condition: Expr, one: Parabola, other: Parabola) -> Parabola:
+    """The first course where the condition is 1, else the other."""
+    return Parabola(
+        ca.if_else(condition, one.start, other.start),
+        ca.if_else(condition, one.velocity, other.velocity),
+        ca.if_else(condition, one.acceleration, other.acceleration),
+    )
+
+
+@dataclass(frozen=True)
+class Course:
+    """A body's pose over the step.
+
+    Attributes:
+        position: (3,) at t_k [m].
+        rotation: (3, 3) R_wb at t_k.
+        velocity, acceleration: (3,) [m/s], [m/s^2] at t_k.
+        angular_velocity, angular_acceleration: (3,) [rad/s], [rad/s^2] at t_k.
+        dt: length of the step [s].
+    """
+
+    position: Expr
+    rotation: Expr
+    velocity: Expr
+    acceleration: Expr
+    angular_velocity: Expr
+    angular_acceleration: Expr
+    dt: Expr
+
+    def arm(self, offset: Sequence[Any]) -> Parabola:
+        """The course of the body-frame vector ``offset``, in world coordinates."""
+        if all(is_zero(c) for c in offset):
+            return STAYS
+        arm = ca.mtimes(self.rotation, ca.vertcat(*offset))
+        swing = ca.cross(self.angular_velocity, arm)
+        bend = ca.cross(self.angular_velocity, swing) + ca.cross(self.angular_acceleration, arm)
+        return Parabola(arm, swing, bend)
+
+    def centre(self) -> Parabola:
+        """The course of the centre of mass."""
+        return Parabola(self.position, self.velocity, self.acceleration)
+
+    def path(self, offset: Sequence[Any]) -> Parabola:
+        """The course of the body's point at body-frame ``offset`` from the centre of mass."""
+        return self.centre() + self.arm(offset)
+
+
+def at_rest(dt: Expr) -> Course:
+    """The course of what is static: its frame is the world's."""
+    zero = ca.SX.zeros(3)
+    return Course(zero, ca.SX.eye(3), zero, zero, zero, zero, dt)

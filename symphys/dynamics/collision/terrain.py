@@ -1,0 +1,126 @@
+"""A ball, or a point, that a body carries, against terrain: what all shapes do there.
+
+The surface is replaced by its osculating paraboloid below the place where the ball is expected to touch, so that it
+is evaluated a few times a step only. Within a step that is right to third order in the distance covered. A ball that
+fits into a valley at one place touches there; one that is too large for it touches at the nearest point that Newton's
+method finds. Shapes with several balls or points (capsules, boxes) do not see a peak between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from symphys.dynamics.collision.contact_geometry import Contact, Expr
+from symphys.dynamics.collision.predicted_points import STAYS, Course, at_rest
+from symphys.dynamics.collision.signed_distance import InField
+from symphys.dynamics.collision.time_of_impact import contact_along
+from symphys.model.shapes import Terrain
+
+FOOT_STEPS = 3
+"""Newton steps towards the foot of a perpendicular."""
+CONVEX = 0.1
+"""Least determinant of the squared distance's Hessian for Newton's method; else Gauss-Newton."""
+FOUND = 0.1
+"""How far from perpendicular a line to the surface may be, as a share of its length, and count as a distance."""
+TINY_AREA = 1e-12
+"""[m^2] below which squares of lengths count as zero there."""
+Surface = Callable[[Expr], tuple[Expr, Expr, Expr]]
+"""Of (2,) x, y: the height, its gradient (2,) and its Hessian (2, 2)."""
+
+
+@dataclass(frozen=True)
+class Paraboloid:
+    """Distances from the graph z = height + slope . d + d . bend d / 2, d = (x, y) - place; (2,), (2, 2)."""
+
+    place: Expr
+    height: Expr
+    slope: Expr
+    bend: Expr
+
+    def surface(self, xy: Expr) -> tuple[Expr, Expr, Expr]:
+        """See ``Surface``."""
+        d = xy - self.place
+        turn = ca.mtimes(self.bend, d)
+        return self.height + ca.dot(self.slope, d) + ca.dot(d, turn) / 2, self.slope + turn, self.bend
+
+    def distance(self, point: Expr) -> Expr:
+        """See ``Field``."""
+        xy = nearest(self.surface, point)
+        height, slope, _ = self.surface(xy)
+        line = point - ca.vertcat(xy, height)
+        return ca.dot(line, upwards(slope))
+
+    def normal(self, point: Expr) -> Expr:
+        """See ``Field``."""
+        return upwards(self.surface(nearest(self.surface, point))[1])
+
+
+def upwards(slope: Expr) -> Expr:
+    """(3,): the unit normal of a surface with this gradient."""
+    return ca.vertcat(-slope, 1) / ca.sqrt(1 + ca.dot(slope, slope))
+
+
+def foot(surface: Surface, point: Expr) -> Expr:
+    """(2,): x, y of the surface's point that is nearest to ``point``, searched from straight below it."""
+    xy = point[:2]
+    for _ in range(FOOT_STEPS):
+        height, slope, bend = surface(xy)
+        over = point[2] - height
+        residual = xy - point[:2] - over * slope
+        rough = ca.SX.eye(2) + ca.mtimes(slope, slope.T)
+        exact = rough - over * bend
+        convex = ca.logic_and(exact[0, 0] > CONVEX, determinant(exact) > CONVEX)
+        xy = xy - solved(ca.if_else(convex, exact, rough), residual)
+    return xy
+
+
+def nearest(surface: Surface, point: Expr) -> Expr:
+    """(2,): x, y of the foot; of the place straight below where what was found is none, as far from a bent surface."""
+    xy = foot(surface, point)
+    height, slope, _ = surface(xy)
+    line, normal = point - ca.vertcat(xy, height), upwards(slope)
+    along = ca.dot(line, normal)
+    aside = line - along * normal
+    perpendicular = ca.dot(aside, aside) <= FOUND**2 * ca.dot(line, line) + TINY_AREA
+    same_side = along * (point[2] - surface(point[:2])[0]) >= -TINY_AREA
+    return ca.if_else(ca.logic_and(perpendicular, same_side), xy, point[:2])
+
+
+def determinant(m: Expr) -> Expr:
+    """Of a (2, 2) matrix."""
+    return m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]
+
+
+def solved(m: Expr, b: Expr) -> Expr:
+    """(2,): m^-1 b."""
+    return ca.vertcat(m[1, 1] * b[0] - m[0, 1] * b[1], m[0, 0] * b[1] - m[1, 0] * b[0]) / determinant(m)
+
+
+def ball_on_terrain(offset: Sequence[Any], radius: Expr, terrain: Terrain, a: Course) -> Contact:
+    """The contact of a ball at body-frame ``offset`` with terrain."""
+    path, world = a.path(offset), at_rest(a.dt)
+    axes = world.arm((1.0, 0.0, 0.0)), world.arm((0.0, 1.0, 0.0)), world.arm((0.0, 0.0, 1.0))
+    surface = surface_of(terrain)
+    contact, centre = None, path.start
+    for _ in range(2):
+        xy = nearest(surface, centre)
+        meeting = InField(
+            Paraboloid(xy, *surface(xy)), radius, path, (a.arm(offset), STAYS), (path.start, STAYS.start), axes
+        )
+        contact = contact_along(meeting, a.dt)
+        centre = path.at(contact.time)
+    assert contact is not None
+    return contact
+
+
+def surface_of(terrain: Terrain) -> Surface:
+    """Height, gradient and Hessian of terrain."""
+    xy = ca.SX.sym("xy", 2)
+    height = ca.SX(terrain.height(xy[0], xy[1]))
+    bend, slope = ca.hessian(height, xy)
+    function = ca.Function("surface", [xy], [height, ca.densify(slope), ca.densify(bend)])
+    return lambda place: tuple(function.call([place]))  # type: ignore[return-value]

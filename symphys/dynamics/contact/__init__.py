@@ -1,0 +1,1 @@
+"""Contact constraints: their preparation, the projection of their impulses, the distribution of loads."""

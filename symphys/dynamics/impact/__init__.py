@@ -1,0 +1,1 @@
+"""Impacts: no time passes, only velocities change."""

@@ -1,0 +1,106 @@
+"""Restitution that adds no energy.
+
+Newton's law, a rebound speed of e times the speed of approach, can add energy where friction acts on a body off its
+centre (Kane's paradox; Stronge, Rigid body collisions with friction, Proc. R. Soc. A 431, 1990). A plastic impact never
+does: with impulse P and velocities u after it, the change of energy is P . u - P . K P / 2, where P . u <= 0 since
+friction opposes slip and nothing parts. What lies between the two is admissible, as cones are convex and the normal
+velocities lie in between; of that the impulse nearest to Newton's that does not raise the kinetic energy is taken.
+(Deviation from Stronge: his law bounds the work of the normal force alone.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+
+from symphys.dynamics.contact.constraint import ContactRow
+from symphys.dynamics.context import Scene
+from symphys.dynamics.joints.assembly import Trees, momenta_of
+from symphys.dynamics.momentum import Momentum, Moved, Rates
+from symphys.dynamics.motion import Motion, apply, inverse_inertia
+from symphys.dynamics.pgs import Given, Row, Solution, relax
+from symphys.maths.smoothing import TINY_SQUARE
+from symphys.model.shapes import Sphere
+from symphys.model.world import World, is_zero
+
+Expr = Any
+"""casadi SX, MX or DM"""
+
+
+def eccentric_bodies(world: World) -> set[int]:
+    """The bodies on which contacts may act off the centre: on others friction cannot make a rebound add energy."""
+    held = {index for joint in world.joints for index in joint.bodies}
+    return held | {
+        index
+        for index, body in enumerate(world.bodies)
+        if any(not isinstance(s, Sphere) or not all(is_zero(c) for c in s.centre) for s in body.shapes)
+    }
+
+
+def rebound(scene: Scene, rows: tuple[Row, ...], start: Solution, motions: Sequence[Motion], trees: Trees) -> Solution:
+    """The impulses of an impact, and the momenta after it."""
+    pieces, scheme = scene.pieces, scene.setting.scheme
+    if not (scheme.energy_cap and eccentric_bodies(scene.world)):
+        return relax(pieces, scene.world, scheme.sweeps, rows, start, motions)
+    dead = tuple(replace(each, row=pieces.do(_without_rebound, each.row)) for each in rows)
+    plastic = relax(pieces, scene.world, scheme.sweeps, dead, start, motions)
+    newton = relax(pieces, scene.world, scheme.sweeps, rows, plastic, motions)
+    sums: tuple[Expr, Expr, Expr] = (ca.SX(0), ca.SX(0), ca.SX(0))
+    bodies = (momenta_of(scene, trees, solution.momenta) for solution in (start, plastic, newton))
+    for motion, *momenta in zip(motions, *bodies, strict=True):
+        sums = pieces.do(_energies, motion, momenta, sums)
+    share = pieces.do(_largest_share, sums)
+    return Solution(
+        tuple(pieces.do(_between_states, share, a, b) for a, b in zip(plastic.momenta, newton.momenta, strict=True)),
+        tuple(pieces.do(_between, share, a, b) for a, b in zip(plastic.impulses, newton.impulses, strict=True)),
+        tuple(pieces.do(_between, share, a, b) for a, b in zip(plastic.last, newton.last, strict=True)),
+    )
+
+
+def _without_rebound(row: Any) -> Any:
+    if not isinstance(row, ContactRow):
+        return row
+    return replace(row, target=ca.fmin(row.target, 0))
+
+
+def _energies(motion: Motion, momenta: list[Momentum], sums: tuple[Expr, Expr, Expr]) -> tuple[Expr, Expr, Expr]:
+    """Coefficients of the change of kinetic energy, a s^2 + b s + c, at share s of the way to Newton's impulse."""
+    before, plastic, newton = momenta
+    turning = inverse_inertia(motion.inertia, motion.rotation)
+
+    def product(one: Momentum, other: Momentum) -> Expr:
+        turn = ca.dot(one.angular, apply(turning, other.angular))
+        return (motion.mass * ca.dot(one.velocity, other.velocity) + turn) / 2
+
+    way = Momentum(newton.velocity - plastic.velocity, newton.angular - plastic.angular)
+    a, b, c = sums
+    change = product(plastic, plastic) - product(before, before)
+    return a + product(way, way), b + 2 * product(way, plastic), c + change
+
+
+def _largest_share(sums: tuple[Expr, Expr, Expr]) -> Expr:
+    """The largest s in [0, 1] with a s^2 + b s + c <= 0, where c <= 0 up to rounding."""
+    a, b, c = sums[0], sums[1], ca.fmin(sums[2], 0)
+    root = ca.sqrt(ca.fmax(b * b - 4 * a * c, 0) + TINY_SQUARE)
+    share = ca.if_else(b >= 0, -2 * c / (ca.fmax(b, 0) + root), (root - b) / (2 * a + TINY_SQUARE))
+    return ca.if_else(a + b + c > 0, ca.fmin(share, 1), 1)
+
+
+def _between_states(share: Expr, plastic: Moved, newton: Moved) -> Moved:
+    if plastic is None or newton is None:
+        return None
+    if isinstance(plastic, Rates):
+        assert isinstance(newton, Rates)
+        return Rates(plastic.numbers + share * (newton.numbers - plastic.numbers))
+    assert isinstance(newton, Momentum)
+    return Momentum(
+        plastic.velocity + share * (newton.velocity - plastic.velocity),
+        plastic.angular + share * (newton.angular - plastic.angular),
+    )
+
+
+def _between(share: Expr, plastic: Given, newton: Given) -> Given:
+    return plastic.plus(newton.minus(plastic).times(share))

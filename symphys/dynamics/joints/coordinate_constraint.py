@@ -1,0 +1,110 @@
+"""The row of one thing that acts along a coordinate of a joint: a motor, a limit, a spring.
+
+A sweep gives  impulse <- clip(keep impulse - slope rate - offset, low, high).  A velocity that is asked for with
+impulse bounds: keep 1, slope m, offset -m target, with m the effective mass. A law a + b rate of the force, solved for
+the rate after it: keep b K/(1 + b K), slope b/(1 + b K), offset a/(1 + b K), with K = 1/m.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from symphys.dynamics.contact.constraint import Side
+from symphys.dynamics.joints.joint_impulse import Along, Directions, kicked, speeds
+from symphys.dynamics.momentum import Rates
+from symphys.maths.smoothing import at_least, at_most
+
+Expr = Any
+"""casadi SX"""
+
+
+@dataclass(frozen=True)
+class OfTree:
+    """A coordinate of a tree: its rate (1, n) by what sweeps know, and what a unit impulse does to that (n,)."""
+
+    see: Expr
+    gain: Expr
+
+
+@dataclass(frozen=True)
+class AxisRow:
+    """What acts along one coordinate, as the sweeps see it; impulses in [N m s], or [N s] where it slides.
+
+    Attributes:
+        sides: arms at the row's instant, and to the common point for impulses.
+        seen, given_along: the one direction at the row's instant, and of the impulse.
+        keep, slope, offset: see the module.
+        low, high: bounds of the impulse; None where there is none.
+        width: of the smoothed bounds [N m s].
+        same: whether both sides are of one tree of joints.
+        of_tree: where the coordinate is one of a tree's.
+        left: how far a limit is away at the start [rad], [m]; None for what is none.
+        inverse_mobility: effective mass.
+        landing: 1 for a limit that is struck: its impulse is an impact, not a force.
+    """
+
+    sides: tuple[Side, ...]
+    seen: Directions
+    given_along: Directions
+    keep: Expr
+    slope: Expr
+    offset: Expr
+    low: Expr | None
+    high: Expr | None
+    width: Expr
+    same: bool
+    of_tree: OfTree | None
+    left: Expr | None
+    inverse_mobility: Expr
+    landing: Expr
+
+    def fitting(self, moved: Expr) -> Expr:
+        """(1,): the impulse times a time that takes a limit back to where it is kept; see ``LockRow``."""
+        sign = 1 if self.low is not None else -1
+        beyond = self.left + sign * moved
+        return -sign * self.inverse_mobility * ca.fmin(beyond, 0)
+
+    def rate(self, momenta: tuple[Any, ...]) -> Expr:
+        """Of the coordinate."""
+        if self.of_tree is None:
+            return speeds(self.sides, self.seen, momenta)
+        return momenta[0].along(self.of_tree.see)
+
+    def carried(self, impulse: Along) -> Expr:
+        """(1,): what is stored of an impulse; also of a force."""
+        return impulse.numbers
+
+    def taken_up(self, stored: Expr) -> Along:
+        """The impulse that is stored so."""
+        return Along(stored)
+
+    def visit(self, momenta: tuple[Any, ...], old: Along) -> tuple[tuple[Any, ...], Along]:
+        """See ``pgs.Solvable``."""
+        rate = self.rate(momenta)
+        new = self.keep * old.numbers - self.slope * rate - self.offset
+        if self.low is not None:
+            new = at_least(new, self.low, self.width)
+        if self.high is not None:
+            new = at_most(new, self.high, self.width)
+        return self.given(momenta, Along(new - old.numbers)), Along(new)
+
+    def given(self, momenta: tuple[Any, ...], impulse: Along) -> tuple[Any, ...]:
+        """See ``pgs.Solvable``."""
+        if self.of_tree is None:
+            return kicked(self.sides, self.given_along, momenta, impulse.numbers, self.same)
+        after = Rates(momenta[0].numbers + ca.mtimes(self.of_tree.gain, impulse.numbers))
+        return tuple(after for _ in self.sides)
+
+
+def towards(target: Expr, mobility: Expr) -> dict[str, Expr]:
+    """The coefficients of a row that asks for a velocity."""
+    return {"keep": ca.SX(1), "slope": 1 / mobility, "offset": -target / mobility}
+
+
+def by_law(a: Expr, b: Expr, mobility: Expr) -> dict[str, Expr]:
+    """The coefficients of a row whose impulse is -(a + b rate)."""
+    share = 1 / (1 + b * mobility)
+    return {"keep": b * mobility * share, "slope": b * share, "offset": a * share}

@@ -1,0 +1,109 @@
+"""Where the sockets of a joint are during a stretch, and the directions that follow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from symphys.dynamics.collision.predicted_points import Course, Parabola, at_rest
+from symphys.dynamics.contact.constraint import Moving, Side, reach_of
+from symphys.dynamics.joints.joint_impulse import Directions
+from symphys.maths import rotation
+from symphys.model.joints import Coordinate, Joint, Placed
+
+Expr = Any
+"""casadi SX"""
+
+
+@dataclass(frozen=True)
+class Sockets:
+    """The courses of both sockets' points and axes; arms from the centres of mass, the world's from its origin."""
+
+    joint: Joint
+    centres: tuple[Parabola, Parabola]
+    arms: tuple[Parabola, Parabola]
+    axes: tuple[tuple[Parabola, ...], tuple[Parabola, ...]]
+
+    def placed(self, t: Expr) -> Placed:
+        """Both sockets at time t."""
+        a, b = (ca.horzcat(*(axis.at(t) for axis in axes)) for axes in self.axes)
+        first, second = (centre + arm for centre, arm in zip(self.centres, self.arms, strict=True))
+        return Placed(a, b, (first - second).at(t))
+
+    def lever_arms(self, t: Expr) -> tuple[Expr, Expr]:
+        """(3,) each: from the centres of mass to the sockets; to the first one's for what slides."""
+        first, second = self.arms[0].at(t), self.arms[1].at(t)
+        if self.joint.kind.slides is not None:
+            second += self.placed(t).apart
+        return first, second
+
+    def common_arms(self, t: Expr) -> tuple[Expr, Expr]:
+        """(3,) each: to one point for both, midway between the sockets, so that impulses make no spin."""
+        first, second = self.lever_arms(t)
+        if self.joint.kind.slides is not None:
+            return first, second
+        half = self.placed(t).apart / 2
+        return first - half, second + half
+
+    def sides(self, motions: Moving, seen: Expr, given: Expr) -> tuple[Side, ...]:
+        """The moving sides of rows that see the sockets at one time and give impulses at another."""
+        arms, impulse_arms = self.lever_arms(seen), self.common_arms(given)
+        return tuple(
+            Side(
+                1 - 2 * k,
+                1 / motion.mass,
+                motion.inverse_inertia(seen),
+                arms[k],
+                impulse_arms[k],
+                reach_of(motion, seen, arms[k], impulse_arms[k]),
+            )
+            for k, motion in enumerate(motions)
+        )
+
+
+def sockets_of(joint: Joint, motions: Moving) -> Sockets:
+    """The sockets of a joint whose moving sides have these motions."""
+    return sockets_on(joint, [motion.course() for motion in motions])
+
+
+def sockets_on(joint: Joint, courses: Sequence[Course]) -> Sockets:
+    """The sockets of a joint whose moving sides have these courses."""
+    courses = [*courses, *([at_rest(courses[0].dt)] if joint.second is None else [])]
+    axes = []
+    for course, socket in zip(courses, joint.sockets, strict=True):
+        turned = rotation.matrix(ca.SX(ca.vertcat(*socket.orientation)))
+        axes.append(tuple(course.arm(tuple(turned[i, j] for i in range(3))) for j in range(3)))
+    centres = courses[0].centre(), courses[1].centre()
+    arms = courses[0].arm(joint.sockets[0].point), courses[1].arm(joint.sockets[1].point)
+    return Sockets(joint, centres, arms, (axes[0], axes[1]))
+
+
+def sockets_at(joint: Joint, poses: tuple[tuple[Expr, Expr], ...]) -> Sockets:
+    """The sockets of a joint whose moving sides are at these positions and orientations."""
+    zero = ca.SX.zeros(3)
+    return sockets_on(joint, [Course(p, rotation.matrix(q), zero, zero, zero, zero, ca.SX(0)) for p, q in poses])
+
+
+def locked(joint: Joint, placed: Placed) -> Directions:
+    """The directions that a joint locks."""
+    slides, turns = joint.kind.slides, joint.kind.turns
+    return Directions(
+        None if slides is None else ca.vertcat(*(placed.b[:, j].T for j in slides)),
+        ca.vertcat(ca.SX(0, 3), *(ca.cross(placed.a[:, i], placed.b[:, j]).T for i, j in turns)),
+    )
+
+
+def errors(joint: Joint, placed: Placed) -> Expr:
+    """(n,): how far the joint is from what it locks [m], [rad]."""
+    slides, turns = joint.kind.slides, joint.kind.turns
+    off = placed.apart if slides is None else ca.vertcat(*(ca.dot(placed.b[:, j], placed.apart) for j in slides))
+    return ca.vertcat(off, *(ca.dot(placed.a[:, i], placed.b[:, j]) for i, j in turns))
+
+
+def free(coordinate: Coordinate, placed: Placed) -> Directions:
+    """The direction of a coordinate."""
+    axis = coordinate.axis(placed).T
+    return Directions(ca.SX(0, 3), axis) if coordinate.turns else Directions(axis, ca.SX(0, 3))

@@ -1,0 +1,79 @@
+"""The row of what a joint locks: all of its directions at once, by the inverse of their effective mass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from symphys.dynamics.articulated.factorisation import eliminated
+from symphys.dynamics.contact.constraint import Side
+from symphys.dynamics.joints.joint_impulse import Along, Directions, kicked, speeds
+
+Expr = Any
+"""casadi SX"""
+
+
+@dataclass(frozen=True)
+class LockRow:
+    """What a joint locks, as the sweeps see it.
+
+    Attributes:
+        sides: arms at the row's instant, and to the common point for impulses.
+        seen, given_along: directions at the row's instant, and of impulses.
+        mass: (n, n) inverse of mobility and softness.
+        softness: (n,) gamma of a joint that gives way, 0 if rigid.
+        target: (n,) velocities that the row asks for [m/s], [rad/s].
+        error: (n,) [m], [rad] at the start of the stretch.
+        axes: (3, 3) of the first socket at the start. Forces on a point are stored along these, so that they turn with
+            the body: a rod's pull stays along the rod.
+        same: whether both sides are of one tree of joints.
+    """
+
+    sides: tuple[Side, ...]
+    seen: Directions
+    given_along: Directions
+    mass: Expr
+    softness: Expr
+    target: Expr
+    error: Expr
+    axes: Expr
+    same: bool
+
+    def fitting(self, moved: Expr) -> Expr:
+        """(n,): displacements by the directions moved to impulses times a time that close what is then left open."""
+        return -ca.mtimes(self.mass, self.error + moved)
+
+    def carried(self, impulse: Along) -> Expr:
+        """(n,): what is stored of an impulse; also of a force."""
+        if self.given_along.slides is not None:
+            return impulse.numbers
+        return ca.vertcat(ca.mtimes(self.axes.T, impulse.numbers[:3, 0]), impulse.numbers[3:, 0])
+
+    def taken_up(self, stored: Expr) -> Along:
+        """The impulse that is stored so."""
+        return Along(stored if self.given_along.slides is not None else in_world(self.axes, stored))
+
+    def visit(self, momenta: tuple[Any, ...], old: Along) -> tuple[tuple[Any, ...], Along]:
+        """See ``pgs.Solvable``."""
+        miss = speeds(self.sides, self.seen, momenta) - self.target + self.softness * old.numbers
+        change = Along(-ca.mtimes(self.mass, miss))
+        return self.given(momenta, change), old.plus(change)
+
+    def given(self, momenta: tuple[Any, ...], impulse: Along) -> tuple[Any, ...]:
+        """See ``pgs.Solvable``."""
+        return kicked(self.sides, self.given_along, momenta, impulse.numbers, self.same)
+
+
+def in_world(axes: Expr, stored: Expr) -> Expr:
+    """(n,): numbers whose first three are along axes (3, 3), along the world's instead."""
+    return ca.vertcat(ca.mtimes(axes, stored[:3, 0]), stored[3:, 0])
+
+
+def inverse(k: Expr) -> Expr:
+    """(n, n): of a mobility, which is not symmetric where impulses are given with other arms than seen."""
+    n = k.size1()
+    matrix = eliminated([{j: k[i, j] for j in range(n)} for i in range(n)])
+    columns = (matrix.solve({j: ca.SX(1)}) for j in range(n))
+    return ca.horzcat(*(ca.vertcat(*(column[i] for i in range(n))) for column in columns))

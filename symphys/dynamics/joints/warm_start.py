@@ -1,0 +1,182 @@
+"""What joints gave in a stretch: what is kept of it, and what it does to bodies where the next one begins."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import casadi as ca
+
+from symphys.dynamics.articulated.configuration_update import Made
+from symphys.dynamics.articulated.forward_dynamics import consistent
+from symphys.dynamics.contact.constraint import ContactRow
+from symphys.dynamics.context import Scene, State
+from symphys.dynamics.joints.assembly import LIMITS, JointRow, own
+from symphys.dynamics.joints.coordinate_constraint import AxisRow
+from symphys.dynamics.joints.joint_frames import free, locked, sockets_at
+from symphys.dynamics.joints.joint_impulse import Along
+from symphys.dynamics.joints.locked_directions import LockRow, in_world
+from symphys.dynamics.momentum import Momenta, Momentum
+from symphys.dynamics.pgs import Row
+from symphys.model.joints import Joint, linkages, tree_joints
+from symphys.model.world import World
+
+Expr = Any
+"""casadi SX"""
+Struck = Mapping[frozenset[int], Expr]
+"""Of bodies that hang together: 1 if one of their contacts is an impact."""
+Total = list[tuple[Expr, Expr]]
+"""Force and torque on each body."""
+Poses = Sequence[tuple[Expr, Expr]]
+"""Positions and orientations."""
+
+
+def components(world: World) -> list[frozenset[int]]:
+    """The bodies that hang together by joints."""
+    found = [frozenset((i,)) for i in range(len(world.bodies))]
+    for joint in world.joints:
+        touched = [group for group in found if group & set(joint.bodies)]
+        found = [group for group in found if group not in touched] + [frozenset().union(*touched)]
+    return found
+
+
+def kept(
+    scene: Scene, contacts: Sequence[Row], joints: Sequence[JointRow], given: Sequence[Along], x: State, kick: Expr
+) -> tuple[Struck, State]:
+    """Which components an impact struck; and the forces of ``joints``, which gave ``given``, that last."""
+    struck = _struck(scene, contacts, joints, given)
+    return struck, _lasting_forces(scene, joints, given, struck, x, kick)
+
+
+def _struck(scene: Scene, contacts: Sequence[Row], joints: Sequence[JointRow], given: Sequence[Along]) -> Struck:
+    """Of each component: 1 if a contact or a limit of it is an impact, whose share of joint forces does not last."""
+    found = {}
+    for group in components(scene.world):
+        meeting = tuple(each.row for each in contacts if group & set(each.bodies))
+        limits = tuple(
+            (each.row.row, impulse)
+            for each, impulse in zip(joints, given, strict=True)
+            if group & set(each.row.bodies) and each.name.rpartition(".")[2] in LIMITS
+        )
+        found[group] = scene.pieces.do(_any_struck, meeting, limits)
+    return found
+
+
+def _any_struck(rows: tuple[ContactRow, ...], limits: tuple[tuple[AxisRow, Along], ...]) -> Expr:
+    struck = [ca.fmax(row.struck, row.leaving > 0) for row in rows]
+    struck += [ca.logic_and(row.landing, impulse.numbers != 0) for row, impulse in limits]
+    return ca.mmax(ca.vertcat(ca.SX(0), *struck))
+
+
+def _lasting_forces(
+    scene: Scene, rows: Sequence[JointRow], given: Sequence[Along], struck: Struck, x: State, kick: Expr
+) -> State:
+    """Persistent forces of rows that sweeps visit.
+
+    In a stretch with an impact those of the last one stay: what held the impact is not to be told from them.
+    """
+    kept = dict[str, list[Expr]]()
+    for each, impulse in zip(rows, given, strict=True):
+        row, impact, old = each.row.row, of_body(struck, each.row.bodies[0]), x[each.name]
+        force = scene.pieces.do(_lasting, row, impulse, old, each.k, impact, kick, scene.shortest_kick)
+        kept.setdefault(each.name, []).append(force)
+    return {name: scene.pieces.do(_stacked, tuple(parts)) for name, parts in kept.items()}
+
+
+def of_body(struck: Struck, body: int) -> Expr:
+    """Whether what hangs on a body is struck."""
+    return next(impact for group, impact in struck.items() if body in group)
+
+
+def _lasting(
+    row: LockRow | AxisRow, impulse: Along, old: Expr, k: int | None, struck: Expr, kick: Expr, shortest: float
+) -> Expr:
+    return ca.if_else(struck, own(old, k), row.carried(impulse) / ca.fmax(kick, shortest))
+
+
+def _stacked(parts: tuple[Expr, ...]) -> Expr:
+    return ca.vertcat(*parts)
+
+
+def hold(scene: Scene, forces: State, poses: Poses, total: Total) -> None:
+    """Adds to ``total`` what joint forces do to bodies at these poses: those at which the next step begins.
+
+    What the joints of trees lock is left out: it does nothing along the free motions of the tree.
+    """
+    exact = tree_joints(scene.world.joints)
+    for index, joint in enumerate(scene.world.joints):
+        held = tuple(poses[i] for i in joint.bodies)
+        names = joint.acting if index in exact else ("lock", *joint.acting)
+        if not names:
+            continue
+        parts = tuple((part, forces[f"{joint.name}.{part}"]) for part in names)
+        found = scene.pieces.do(_on_bodies, joint, held, parts)
+        for body, wrench in zip(joint.bodies, found, strict=True):
+            total[body] = scene.pieces.do(_added, total[body], wrench)
+
+
+def _on_bodies(
+    joint: Joint, poses: tuple[tuple[Expr, Expr], ...], parts: tuple[tuple[str, Expr], ...]
+) -> tuple[tuple[Expr, Expr], ...]:
+    """Force and torque on each moving side."""
+    sockets, now = sockets_at(joint, poses), ca.SX(0)
+    placed, arms = sockets.placed(now), sockets.common_arms(now)
+    linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
+    for part, numbers in parts:
+        if part == "lock" and joint.kind.slides is None:
+            numbers = in_world(placed.a, numbers)
+        along = [locked(joint, placed)] if part == "lock" else [free(c, placed) for c in joint.kind.coordinates]
+        columns = [numbers] if part == "lock" else ca.vertsplit(numbers)
+        for directions, values in zip(along, columns, strict=True):
+            force, torque = directions.split(values)
+            linear, angular = linear + force, angular + torque
+    first = linear, ca.cross(arms[0], linear) + angular
+    second = -linear, -ca.cross(arms[1], linear) - angular
+    return (first, second)[: len(poses)]
+
+
+def _added(total: tuple[Expr, Expr], wrench: tuple[Expr, Expr]) -> tuple[Expr, Expr]:
+    return total[0] + wrench[0], total[1] + wrench[1]
+
+
+def keep_up(scene: Scene, momenta: Momenta, made: Mapping[int, Made], struck: Struck, duration: Expr) -> Momenta:
+    """The momenta, with those that the displacements by joints stand for (as SHAKE has it), so that spin is kept.
+
+    Not those by loops in a stretch with an impact, where they make up for impulses that act late. They are no part of
+    the forces that the next sweeps start from.
+    """
+    found, dt = list(momenta), scene.setting.scheme.dt
+    for i, more in made.items():
+        found[i] = scene.pieces.do(_kept_up, momenta[i], more, of_body(struck, i), duration, dt)
+    return tuple(found)
+
+
+def _kept_up(momentum: Momentum, made: Made, impact: Expr, duration: Expr, dt: float) -> Momentum:
+    velocity, angular = made.by_tree.velocity, made.by_tree.angular
+    if made.by_loops is not None:
+        velocity += ca.if_else(impact, 0, made.by_loops.velocity)
+        angular += ca.if_else(impact, 0, made.by_loops.angular)
+    share = duration / dt**2
+    return Momentum(momentum.velocity + share * velocity, momentum.angular + share * angular)
+
+
+def fitting(
+    scene: Scene, momenta: Sequence[Momentum], poses: Poses, velocities: Sequence[tuple[Expr, Expr]]
+) -> list[tuple[Expr, Expr]]:
+    """Velocities and angular velocities; those of trees as they fit their joints at these poses.
+
+    Args:
+        scene: what is simulated.
+        momenta: of the bodies.
+        poses: of the bodies.
+        velocities: of bodies that are not part of a tree.
+    """
+    found, joints = list(velocities), scene.world.joints
+    for tree in linkages(joints):
+        along = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
+        bodies = [scene.world.bodies[i] for i in tree.bodies]
+        inertials = tuple((body.mass, body.inertia) for body in bodies)
+        parts = tuple(poses[i] for i in tree.bodies), tuple(momenta[i] for i in tree.bodies)
+        for i, fits in zip(tree.bodies, consistent(scene.pieces, tree, along, inertials, *parts), strict=True):
+            found[i] = fits
+    return found

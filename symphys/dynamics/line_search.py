@@ -1,0 +1,134 @@
+"""Longer steps of the sweeps, where a heavy body rests on a light one.
+
+Gauss-Seidel goes to the answer by steps of a geometric series, of ratio 1 - m/M where a mass M rests on m: a thousand
+sweeps where the masses are a thousand to one. All of the series points one way. So now and then the change of the last
+sweep is repeated as often as lowers the kinetic energy most (less the work that targets ask for), which the answer
+minimises: an exact line search along the last change, as in the conjugate gradients of Renouf and Alart, Conjugate
+gradient type algorithms for frictional multi-contact problems (Comput. Methods Appl. Mech. Engrg. 194, 2005). No normal
+impulse may become negative on the way. Deviation: plain sweeps in between, which project and go round less.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import casadi as ca
+
+from symphys.dynamics.contact.constraint import ContactRow
+from symphys.dynamics.contact.projection import Impulse
+from symphys.dynamics.momentum import Momentum
+from symphys.dynamics.motion import Motion, apply
+from symphys.model.world import World
+
+if TYPE_CHECKING:
+    from symphys.dynamics.pgs import Row, Solution
+    from symphys.dynamics.tracing.trace import Pieces
+
+Expr = Any
+"""casadi SX"""
+
+UNEQUAL = 20.0
+"""Ratio of masses from which on plain sweeps are too slow."""
+EVERY = 4
+"""Sweeps between two longer steps."""
+LONGEST = 1e4
+"""Times the last change."""
+TINY = 1e-100
+"""[N s] whose inverse square is still a number: slopes are finite where nothing falls."""
+SETTLED = 1e-10
+"""[m/s] changes of velocity below which nothing is repeated."""
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """Bodies without joints that may lean on each other, and their rows, by index."""
+
+    bodies: tuple[int, ...]
+    rows: tuple[int, ...]
+
+
+def clusters(world: World, rows: Sequence[Row]) -> list[Cluster]:
+    """Those of bodies that differ much in mass, or may: where a symbol decides it."""
+    roots = list(range(len(world.bodies)))
+    for bodies in [row.bodies for row in rows] + [joint.bodies for joint in world.joints]:
+        for k in bodies[1:]:
+            roots[_root(roots, k)] = _root(roots, bodies[0])
+    groups: dict[int, set[int]] = {}
+    for k in range(len(roots)):
+        groups.setdefault(_root(roots, k), set()).add(k)
+    held = {k for joint in world.joints for k in joint.bodies}
+    apart = [group for group in groups.values() if _unequal(world, group) and not group & held]
+    return [
+        Cluster(tuple(sorted(group)), tuple(k for k, row in enumerate(rows) if group & set(row.bodies)))
+        for group in apart
+    ]
+
+
+def _root(roots: list[int], k: int) -> int:
+    """The representative of a body's group."""
+    while roots[k] != k:
+        roots[k] = roots[roots[k]]
+        k = roots[k]
+    return k
+
+
+def _unequal(world: World, group: set[int]) -> bool:
+    masses = [ca.SX(world.bodies[k].mass) for k in group]
+    if len(group) > 1 and not all(mass.is_constant() for mass in masses):
+        return True
+    return max(map(float, masses)) > UNEQUAL * min(map(float, masses)) if len(group) > 1 else False
+
+
+def lengthened(
+    pieces: Pieces, cluster: Cluster, rows: Sequence[Row], motions: Sequence[Motion], before: Solution, now: Solution
+) -> Solution:
+    """The solution after the change of the last sweep, from ``before`` to ``now``, is repeated in part."""
+    sums: tuple[Expr, Expr] = (ca.SX(0), ca.SX(0))
+    longest: Expr = ca.SX(LONGEST)
+    for k in cluster.bodies:
+        sums = pieces.do(_of_body, sums, motions[k], now.momenta[k], before.momenta[k])
+    for k in cluster.rows:
+        sums, longest = pieces.do(_of_row, sums, longest, rows[k].row, now.impulses[k], now.last[k])
+    share = pieces.do(_share, sums, longest)
+    momenta, impulses = list(now.momenta), list(now.impulses)
+    for k in cluster.bodies:
+        momenta[k] = pieces.do(_repeated, share, now.momenta[k], before.momenta[k])
+    for k in cluster.rows:
+        impulses[k] = pieces.do(_given_again, share, now.impulses[k], now.last[k])
+    return replace(now, momenta=tuple(momenta), impulses=tuple(impulses))
+
+
+def _of_body(sums: tuple[Expr, Expr], motion: Motion, now: Momentum, before: Momentum) -> tuple[Expr, Expr]:
+    """(what the energy gains along the change, its curvature), with a body's share."""
+    moved, turned = now.velocity - before.velocity, now.angular - before.angular
+    spun = apply(motion.inverse_mid, turned)
+    slope = motion.mass * ca.dot(now.velocity, moved) + ca.dot(now.angular, spun)
+    settled = motion.mass * SETTLED**2
+    return sums[0] + slope, sums[1] + motion.mass * ca.dot(moved, moved) + ca.dot(turned, spun) + settled
+
+
+def _of_row(
+    sums: tuple[Expr, Expr], longest: Expr, row: ContactRow, now: Impulse, before: Impulse
+) -> tuple[tuple[Expr, Expr], Expr]:
+    """The same less what the row's targets ask for; how often the change can be repeated."""
+    press = now.normal - before.normal
+    asked = row.target * press + ca.dot(row.slip_target, now.tangent - before.tangent)
+    slope = sums[0] - asked + row.softness * now.normal * press
+    falls = ca.if_else(press < 0, now.normal / ca.fmax(-press, TINY), LONGEST)
+    return (slope, sums[1] + row.softness * press * press), ca.fmin(longest, falls)
+
+
+def _share(sums: tuple[Expr, Expr], longest: Expr) -> Expr:
+    return ca.fmin(ca.fmax(-sums[0] / sums[1], 0), longest)
+
+
+def _repeated(share: Expr, now: Momentum, before: Momentum) -> Momentum:
+    return Momentum(
+        now.velocity + share * (now.velocity - before.velocity), now.angular + share * (now.angular - before.angular)
+    )
+
+
+def _given_again(share: Expr, now: Impulse, before: Impulse) -> Impulse:
+    return now.plus(now.minus(before).times(share))

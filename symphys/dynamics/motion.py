@@ -1,0 +1,207 @@
+"""The free motion of one body inside a step: known parabolas, in which impacts find their instant.
+
+Time inside the step is t in [0, dt]; t = 0 is t_k. Velocities carried over lag half a step behind, so that the
+step reads as leapfrog; see ARCHITECTURE.md, "The time step".
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import casadi as ca
+
+from symphys.dynamics import free_rotation
+from symphys.dynamics.collision.predicted_points import Course
+from symphys.maths import rotation
+from symphys.maths.rotation import turn
+
+Expr = Any
+"""casadi SX, MX or DM"""
+
+
+@dataclass(frozen=True)
+class BodyState:
+    """What a body brings into a step: (3,) or (4,) each, world frame, velocities without persistent forces."""
+
+    position: Expr
+    orientation: Expr
+    velocity: Expr
+    angular_momentum: Expr
+    force: Expr
+    torque: Expr
+
+
+@dataclass(frozen=True)
+class Held:
+    """A body of a tree of joints: how it moves with the tree's n coordinates; see ``step.chart``.
+
+    Attributes:
+        see: (6, n) velocity and angular velocity at mid-step for unit rates.
+        inertia: (3, 3) world frame, at mid-step [kg m^2].
+        push, twist: (n, 3) what unit impulses at the centre of mass, and unit torque impulses, do to the rates.
+    """
+
+    see: Expr
+    inertia: Expr
+    push: Expr
+    twist: Expr
+
+
+@dataclass(frozen=True)
+class Motion(Course):
+    """A body's free motion over the step and the inertia that impulses meet.
+
+    Attributes:
+        mass, inertia: see ``world.Body``.
+        orientation: (4,) at t_k.
+        momentum_k: (3,) angular momentum at t_k [N m s].
+        torque: (3,) [N m].
+        mid_velocity, mid_momentum: (3,) velocity and angular momentum at t_k + dt/2.
+        inverse_mid: inverse inertia at t_k + dt/2, world frame: scalar if isotropic, else (3, 3) [1/(kg m^2)].
+        inverse_rate: its time derivative; None if isotropic.
+        inertia_mid: (3, 3) inertia at t_k + dt/2, world frame [kg m^2].
+        held: if the body is part of a tree of joints.
+    """
+
+    mass: Expr
+    inertia: Expr
+    orientation: Expr
+    momentum_k: Expr
+    torque: Expr
+    mid_velocity: Expr
+    mid_momentum: Expr
+    inverse_mid: Expr
+    inverse_rate: Expr | None
+    inertia_mid: Expr
+    held: Held | None = None
+
+    def course(self) -> Course:
+        """The motion without its inertia."""
+        return Course(**{field.name: getattr(self, field.name) for field in fields(Course)})
+
+    def inverse_inertia(self, t: Expr) -> Expr:
+        """World-frame inverse inertia at time t in the step, to first order; scalar if isotropic."""
+        if self.inverse_rate is None:
+            return self.inverse_mid
+        return self.inverse_mid + (t - self.dt / 2) * self.inverse_rate
+
+    def at_start(self) -> Motion:
+        """The same with the inertia of t = 0 at any time: for impulses there."""
+        if self.inverse_rate is None:
+            return self
+        inverse = inverse_inertia(self.inertia, self.rotation)
+        now = in_world(inertia_matrix(self.inertia), self.rotation)
+        return replace(self, inverse_mid=inverse, inverse_rate=None, inertia_mid=now)
+
+    def inertia_at(self, t: Expr) -> Expr:
+        """(3, 3), world frame: the inverse of what ``inverse_inertia`` gives."""
+        if self.inverse_rate is None or ca.SX(t - self.dt / 2).is_zero():
+            return self.inertia_mid
+        return ca.inv_minor(self.inverse_inertia(t))
+
+
+def isotropic(inertia: Expr) -> bool:
+    """Whether the inertia is one number."""
+    return not isinstance(inertia, (tuple, list)) and ca.SX(inertia).is_scalar()
+
+
+def inertia_matrix(inertia: Expr) -> Expr:
+    """(3, 3): inertia in the body frame, from a scalar, three principal moments or a tensor."""
+    if isotropic(inertia):
+        return inertia * ca.SX.eye(3)
+    rows = [ca.vertcat(*row) if isinstance(row, (tuple, list)) else row for row in inertia]
+    return ca.diag(ca.vertcat(*rows)) if ca.SX(rows[0]).is_scalar() else ca.horzcat(*rows)
+
+
+def apply(operator: Expr, vector: Expr) -> Expr:
+    """A scalar or (3, 3) operator times a vector."""
+    return ca.mtimes(operator, vector)
+
+
+def momentum(inertia: Expr, orientation: Expr, angular_velocity: Expr) -> Expr:
+    """(3,): angular momentum I(q) w, world frame [N m s]."""
+    if isotropic(inertia):
+        return inertia * angular_velocity
+    r = rotation.matrix(orientation)
+    return ca.mtimes(r, ca.mtimes(inertia_matrix(inertia), ca.mtimes(r.T, angular_velocity)))
+
+
+def angular_velocity(inertia: Expr, orientation: Expr, angular_momentum: Expr) -> Expr:
+    """(3,): I(q)^-1 L, world frame [rad/s]."""
+    return apply(inverse_inertia(inertia, rotation.matrix(orientation)), angular_momentum)
+
+
+def inverse_inertia(inertia: Expr, r_wb: Expr) -> Expr:
+    """World-frame inverse inertia: a scalar if isotropic, else (3, 3)."""
+    if isotropic(inertia):
+        return 1 / inertia
+    return in_world(ca.inv_minor(inertia_matrix(inertia)), r_wb)
+
+
+def in_world(tensor: Expr, r_wb: Expr) -> Expr:
+    """(3, 3): a symmetric tensor of the body's frame in the world's; both halves are the same expressions."""
+    return ca.triu2symm(ca.triu(ca.densify(ca.mtimes(r_wb, ca.mtimes(tensor, r_wb.T)))))
+
+
+def free_motion(mass: Expr, inertia: Expr, state: BodyState, gravity: Expr, dt: Expr, jointed: bool = False) -> Motion:
+    """The motion from ``state`` under gravity, force and torque, all constant over the step.
+
+    ``jointed``: whether joints hold the body, so that it does not turn freely.
+    """
+    turned = rotation.matrix(state.orientation)
+    w = apply(inverse_inertia(inertia, turned), state.angular_momentum)
+    return motion_from(mass, inertia, state, (turned, w), gravity, dt, jointed)
+
+
+def motion_from(
+    mass: Expr,
+    inertia: Expr,
+    state: BodyState,
+    turning: tuple[Expr, Expr],
+    gravity: Expr,
+    dt: Expr,
+    jointed: bool = True,
+) -> Motion:
+    """The same from what ``state`` stands for, ``turning``: its rotation (3, 3) and angular velocity."""
+    turned, w = turning
+    acceleration = gravity + state.force / mass
+    mid_momentum = state.angular_momentum + dt / 2 * state.torque
+    middle = _middle(inertia, state.orientation, w if jointed else None, mid_momentum, dt / 2)
+    inverse_mid, inertia_mid, inverse_rate = _inertias(inertia, middle, mid_momentum)
+    return Motion(
+        position=state.position,
+        rotation=turned,
+        velocity=state.velocity,
+        acceleration=acceleration,
+        angular_velocity=w,
+        angular_acceleration=(apply(inverse_mid, mid_momentum) - w) * (2 / dt),
+        dt=dt,
+        mass=mass,
+        inertia=inertia,
+        orientation=state.orientation,
+        momentum_k=state.angular_momentum,
+        torque=state.torque,
+        mid_velocity=state.velocity + dt / 2 * acceleration,
+        mid_momentum=mid_momentum,
+        inverse_mid=inverse_mid,
+        inverse_rate=inverse_rate,
+        inertia_mid=inertia_mid,
+    )
+
+
+def _middle(inertia: Expr, q: Expr, w: Expr | None, momentum: Expr, t: Expr) -> Expr:
+    """(4,): orientation ``q`` after half a step ``t`` [s], at the angular velocity ``w`` or, for None, freely."""
+    if isotropic(inertia):
+        return q
+    return free_rotation.turned(inertia, q, momentum, t, free_rotation.SECOND_ORDER) if w is None else turn(q, t * w)
+
+
+def _inertias(inertia: Expr, middle: Expr, momentum: Expr) -> tuple[Expr, Expr, Expr | None]:
+    """At the orientation ``middle``: inverse inertia, inertia, and the rate of the inverse, None if isotropic."""
+    if isotropic(inertia):
+        return 1 / inertia, inertia_matrix(inertia), None
+    turned = rotation.matrix(middle)
+    inverse = inverse_inertia(inertia, turned)
+    changing: Expr = ca.mtimes(rotation.cross_matrix(apply(inverse, momentum)), inverse)
+    return inverse, in_world(inertia_matrix(inertia), turned), changing + changing.T

@@ -1,0 +1,115 @@
+"""How bodies move within a stretch before its impulses, and the contacts on their ways."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import groupby
+from typing import Any
+
+import casadi as ca
+
+from symphys.dynamics.articulated.forward_dynamics import accelerations, world_inertia
+from symphys.dynamics.collision import Contact, collide
+from symphys.dynamics.collision.predicted_points import at_rest
+from symphys.dynamics.context import Scene, State
+from symphys.dynamics.motion import BodyState, Motion, free_motion, momentum, motion_from
+from symphys.model.joints import linkages
+from symphys.model.state_layout import BODY_FIELDS
+from symphys.model.world import Pair, World
+
+Expr = Any
+"""casadi SX, MX or DM"""
+
+
+def look(scene: Scene, motions: Sequence[Motion], duration: Expr) -> list[Contact]:
+    """The contacts on the way: one for each pair."""
+    found: list[Contact] = []
+    for (first, second), _ in groupby(scene.world.pairs, key=lambda pair: (pair.first, pair.second)):
+        surfaces = scene.world.surface(first), scene.world.surface(second)
+        a = motions[_index(first.body)].course()
+        b = at_rest(duration) if second.body is None else motions[second.body].course()
+        found += scene.pieces.do(collide, *surfaces, a, b)
+    return found
+
+
+def jointed_bodies(world: World) -> set[int]:
+    """The indices of the bodies that joints hold."""
+    return {index for joint in world.joints for index in joint.bodies}
+
+
+def bodies_of(pair: Pair) -> tuple[int, ...]:
+    """The indices of the bodies on the sides that can move."""
+    return tuple(side.body for side in (pair.first, pair.second) if side.body is not None)
+
+
+def free_motions(scene: Scene, x: State, duration: Expr) -> list[Motion]:
+    """Each body's free motion; the stored velocities are freed from the last half step's persistent forces."""
+    return _motions(scene, x, duration, -1, 0)
+
+
+def expected_motions(scene: Scene, x: State, duration: Expr) -> list[Motion]:
+    """Each body's motion from its true velocity under the persistent forces of the last step, as joints let it."""
+    found, joints = _motions(scene, x, duration, 0, 1), scene.world.joints
+    gravity = scene.setting.gravity
+    for tree in linkages(joints):
+        own = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
+        motions = tuple(found[i] for i in tree.bodies)
+        wrenches = tuple(scene.pieces.do(_wrench, motion) for motion in motions)
+        for i, change in zip(tree.bodies, accelerations(scene.pieces, tree, own, motions, wrenches), strict=True):
+            tensor = scene.pieces.do(world_inertia, found[i].inertia, found[i].rotation)
+            found[i] = scene.pieces.do(_as_held, found[i], tensor, change, gravity)
+    return found
+
+
+def _wrench(motion: Motion) -> tuple[Expr, Expr]:
+    return motion.mass * motion.acceleration, motion.torque
+
+
+def _as_held(motion: Motion, tensor: Expr, change: tuple[Expr, Expr], gravity: Expr) -> Motion:
+    """The motion with the accelerations that joints leave."""
+    w = motion.angular_velocity
+    torque = ca.mtimes(tensor, change[1]) + ca.cross(w, ca.mtimes(tensor, w))
+    force = motion.mass * (change[0] - gravity)
+    state = BodyState(motion.position, motion.orientation, motion.velocity, motion.momentum_k, force, torque)
+    return motion_from(motion.mass, motion.inertia, state, (motion.rotation, w), gravity, motion.dt)
+
+
+def _motions(scene: Scene, x: State, duration: Expr, freed: int, share: int) -> list[Motion]:
+    """Motions with ``freed`` lags of the persistent forces in the velocities and ``share`` of them acting."""
+    zero, lag = ca.SX.zeros(3), x["lag"]
+    motions, jointed = [], jointed_bodies(scene.world)
+    for index, body in enumerate(scene.world.bodies):
+        part = {name: x[f"{body.name}.{name}"] for name, _ in BODY_FIELDS}
+        given = (scene.given(f"{body.name}.{name}") for name in ("force", "torque"))
+        push = tuple(zero if each is None else each for each in given)
+        inertial, times = (body.mass, body.inertia), (freed, lag, share, duration)
+        motions.append(scene.pieces.do(_motion, inertial, part, push, scene.setting.gravity, times, index in jointed))
+    return motions
+
+
+def _motion(
+    inertial: tuple[Expr, Expr],
+    part: dict[str, Expr],
+    push: tuple[Expr, ...],
+    gravity: Expr,
+    times: tuple[int, Expr, int, Expr],
+    jointed: bool,
+) -> Motion:
+    (mass, inertia), (freed, lag, share, duration) = inertial, times
+    turning = momentum(inertia, part["orientation"], part["angular_velocity"])
+    kick = freed * lag
+    state = BodyState(
+        position=part["position"],
+        orientation=part["orientation"],
+        velocity=part["velocity"] + kick * part["reaction_force"] / mass,
+        angular_momentum=turning + kick * part["reaction_torque"],
+        force=push[0] + share * part["reaction_force"],
+        torque=push[1] + share * part["reaction_torque"],
+    )
+    return free_motion(mass, inertia, state, gravity, duration, jointed)
+
+
+def _index(body: int | None) -> int:
+    if body is None:
+        raise ValueError("the first side of a pair must belong to a body")
+    return body

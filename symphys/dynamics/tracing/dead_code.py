@@ -1,0 +1,87 @@
+"""Pieces without the numbers that nobody reads: parts give all that somebody may want, each world reads some of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+
+from symphys.dynamics.tracing.recording import Piece, Slot
+
+Expr = Any
+"""casadi SX"""
+Words = tuple[int, ...]
+"""Places in a slot, in order."""
+
+
+def trimmed(pieces: Sequence[Piece]) -> tuple[Piece, ...]:
+    """Pieces that give the same named slots; what lies in the others lies closer together."""
+    return _Trimming(pieces).pieces()
+
+
+class _Trimming:
+    """Which words of each slot are read, and the functions that are left."""
+
+    def __init__(self, pieces: Sequence[Piece]) -> None:
+        self._pieces = pieces
+        self._read: dict[Slot, set[int]] = {}
+        self._needs: dict[tuple[int, tuple[Words, ...]], list[set[int]]] = {}
+        self._functions: dict[Any, ca.Function] = {}
+        for piece in reversed(pieces):
+            for slot, words in zip(piece.inputs, self._needed(piece), strict=True):
+                self._read.setdefault(slot, set()).update(words)
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """Those of which something is read."""
+        return tuple(self._trimmed(piece) for piece in self._pieces if any(map(self._kept, piece.outputs)))
+
+    def _kept(self, slot: Slot) -> Words:
+        return tuple(range(slot.size)) if slot.name else tuple(sorted(self._read.get(slot, ())))
+
+    def _needed(self, piece: Piece) -> list[set[int]]:
+        """The words of its inputs that a piece needs for what is read of it."""
+        key = piece.function.__hash__(), tuple(map(self._kept, piece.outputs))
+        if key not in self._needs:
+            symbols: list[Expr] = [ca.SX.sym("a", slot.size) for slot in piece.inputs]
+            found = _symbols_of(_results(piece.function, symbols, key[1]))
+            self._needs[key] = [
+                {k for k, entry in enumerate(column.nonzeros()) if entry.element_hash() in found} for column in symbols
+            ]
+        return self._needs[key]
+
+    def _trimmed(self, piece: Piece) -> Piece:
+        inputs = [slot for slot, words in zip(piece.inputs, self._needed(piece), strict=True) if words]
+        outputs = [slot for slot in piece.outputs if self._kept(slot)]
+        return Piece(self._function(piece), tuple(map(self._closer, inputs)), tuple(map(self._closer, outputs)))
+
+    def _closer(self, slot: Slot) -> Slot:
+        return slot if slot.name else replace(slot, size=len(self._kept(slot)))
+
+    def _function(self, piece: Piece) -> ca.Function:
+        """The function from what is kept of the inputs to what is kept of the outputs."""
+        kept, given = tuple(map(self._kept, piece.inputs)), tuple(map(self._kept, piece.outputs))
+        key = piece.function.__hash__(), kept, given
+        if key not in self._functions:
+            symbols, columns = [], []
+            for slot, words, needed in zip(piece.inputs, kept, self._needed(piece), strict=True):
+                column = ca.SX(slot.size, 1)
+                if needed:
+                    symbols.append(ca.SX.sym("a", len(words)))
+                    column[list(words)] = symbols[-1]
+                columns.append(ca.densify(column))
+            results = [result for result in _results(piece.function, columns, given) if result.numel()]
+            self._functions[key] = ca.Function("piece", symbols, results)
+        return self._functions[key]
+
+
+def _symbols_of(columns: list[Expr]) -> set[int]:
+    symbols: list[Expr] = ca.symvar(ca.vertcat(ca.SX(0, 1), *columns))
+    return {symbol.element_hash() for symbol in symbols}
+
+
+def _results(function: ca.Function, arguments: Sequence[Expr], kept: Sequence[Words]) -> list[Expr]:
+    """The words that are kept of what a function gives."""
+    results = function.call(list(arguments), True, False)
+    return [ca.densify(result)[list(words)] for result, words in zip(results, kept, strict=True)]

@@ -1,0 +1,149 @@
+"""A step as a list of small functions instead of one expression: each part that the step does is a piece.
+
+What a piece gives becomes fresh symbols, so that what follows depends on these and not on how they came about. Pieces
+of equal bodies, pairs and sweeps are equal functions, which a compiler then sees once. What is asked for twice, of the
+same numbers, is computed once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import casadi as ca
+
+from symphys.dynamics.tracing.pytree import Code, Numbers, dismantle, outline, rebuild
+from symphys.dynamics.tracing.trace import Once, Pieces
+
+T = TypeVar("T")
+Expr = Any
+"""casadi SX"""
+
+
+@dataclass(frozen=True)
+class Slot:
+    """Numbers that lie side by side: a named part of the state or an argument of the step, or what a piece gave.
+
+    Attributes:
+        name: of an argument, or of a part of the next state; "" for what a piece gave.
+        size: how many.
+        number: tells slots apart.
+    """
+
+    name: str
+    size: int
+    number: int
+
+
+@dataclass(frozen=True)
+class Piece:
+    """An SX function from slots to slots."""
+
+    function: ca.Function
+    inputs: tuple[Slot, ...]
+    outputs: tuple[Slot, ...]
+
+
+class Recorder(Pieces):
+    """Collects the pieces of a step."""
+
+    def __init__(self) -> None:
+        """Nothing yet."""
+        super().__init__()
+        self.pieces: list[Piece] = []
+        self._slots: list[Slot] = []
+        self._adopted: list[Expr] = []
+        self._given: dict[tuple[int, tuple[int, ...]], Sequence[int]] = {}
+
+    def argument(self, name: str, symbols: Expr) -> None:
+        """A slot for an argument of the step."""
+        self._slots.append(Slot(name, symbols.numel(), self.take(symbols)))
+
+    def give(self, name: str, values: Sequence[Expr]) -> Slot:
+        """A piece that puts values side by side."""
+        tree = self.do(_side_by_side, tuple(values))
+        slots: dict[int, int] = {}
+        codes = [(slots.setdefault(c[0], len(slots)), c[1]) if isinstance(c, tuple) else c for c in tree.codes]
+        symbols = [ca.SX.sym("a", self._slots[k].size) for k in slots]
+        entries = [ca.SX(c) if isinstance(c, float) else symbols[c[0]][c[1]] for c in codes]
+        function = self.shared(ca.Function("piece", symbols, [ca.vertcat(*entries)]))
+        (given,) = self._add(name, function, list(slots))
+        return self._slots[given]
+
+    def repeat(self, count: int, once: Once[T], context: Any, state: T) -> T:
+        """See ``Pieces``; as soon as it repeats itself its pieces are copied."""
+        before, template = state, list[Piece]()
+        for _ in range(count):
+            slots = self._alike(before, state)
+            if template and slots is not None:
+                before, state = state, self._copy(template, slots, state)
+                template = self.pieces[-len(template) :]
+            else:
+                first = len(self.pieces)
+                before, state = state, once(self, context, state)
+                template = self.pieces[first:]
+        return state
+
+    def _adopt(self, column: Expr) -> None:
+        homes = {symbol.element_hash(): self._homes[symbol.element_hash()][0] for symbol in ca.symvar(column)}
+        slots = list(dict.fromkeys(homes.values()))
+        symbols = [self._columns[slot] for slot in slots]
+        (given,) = self._add("", self.shared(ca.Function("piece", symbols, [column])), slots)
+        self._adopted.append(column)
+        self._homes |= {entry.element_hash(): (given, k) for k, entry in enumerate(column.nonzeros())}
+
+    def _apply(self, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
+        key = function.__hash__(), tuple(slots)
+        if key not in self._given:
+            self._given[key] = self._add("", function, slots)
+        return self._given[key]
+
+    def _alike(self, before: Any, after: Any) -> dict[int, int] | None:
+        """Which slot of ``after`` stands where one of ``before`` stood; None if they do not lie alike."""
+        old, new = self._codes_of(before), self._codes_of(after)
+        slots: dict[int, int] = {}
+        for a, b in zip(old, new, strict=False):
+            if isinstance(a, float) or isinstance(b, float):
+                if a != b:
+                    return None
+            elif a[1] != b[1] or self._size(a) != self._size(b) or slots.setdefault(a[0], b[0]) != b[0]:
+                return None
+        return slots if len(old) == len(new) else None
+
+    def _copy(self, template: list[Piece], slots: dict[int, int], after: T) -> T:
+        """The state one time later: as ``template`` led to ``after``, its copy leads on from there."""
+        for piece in template:
+            inputs = [slots.get(slot.number, slot.number) for slot in piece.inputs]
+            given = self._add("", piece.function, inputs)
+            slots |= dict(zip((slot.number for slot in piece.outputs), given, strict=True))
+        leaves: list[Expr] = []
+        shape = dismantle(after, leaves)
+        renamed: T = rebuild(shape, (self._renamed(leaf, slots) for leaf in leaves))
+        return renamed
+
+    def _renamed(self, leaf: Expr, slots: dict[int, int]) -> Numbers:
+        codes = leaf.codes if isinstance(leaf, Numbers) else self._codes(leaf)
+        new = [c if isinstance(c, float) else (slots.get(c[0], c[0]), c[1]) for c in codes]
+        return Numbers(leaf.leaf if isinstance(leaf, Numbers) else outline(leaf), tuple(new))
+
+    def _codes_of(self, tree: Any) -> list[Code]:
+        """The codes of all entries of a tree, in order."""
+        leaves: list[Expr] = []
+        dismantle(tree, leaves)
+        return [c for leaf in leaves for c in (leaf.codes if isinstance(leaf, Numbers) else self._codes(leaf))]
+
+    def _size(self, code: tuple[int, int]) -> int:
+        return self._slots[code[0]].size
+
+    def _add(self, name: str, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
+        first = len(self._slots)
+        for k in range(function.n_out()):
+            symbols = ca.SX.sym("kept", function.numel_out(k))
+            self._slots.append(Slot(name, symbols.numel(), self.take(symbols)))
+        self.pieces.append(Piece(function, tuple(self._slots[k] for k in slots), tuple(self._slots[first:])))
+        return range(first, len(self._slots))
+
+
+def _side_by_side(values: tuple[Expr, ...]) -> Expr:
+    return ca.vertcat(*(ca.densify(ca.vec(value)) for value in values))

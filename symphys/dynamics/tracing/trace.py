@@ -1,0 +1,199 @@
+"""The step's parts as functions that are built once: equal parts of equal structure share one casadi function.
+
+The step says ``pieces.do(part, *arguments)`` where ``part`` is a Python function of trees of expressions. The first
+time it is called with symbols in place of all that varies, and what it gives becomes a casadi function. From then on
+that function is called: by ``Inline`` within one expression, by a ``Recorder`` as a piece of its own. Numbers that are
+constants stay constants, so that what is zero costs nothing. A part must depend on its arguments alone.
+
+What parts give lies in slots, columns of numbers; members of a tuple that are trees themselves have slots of their own,
+so that what comes next sees each of them alike. Between parts a tree's matrices are ``Numbers``, which say where
+their entries lie; only inside a part they are expressions. Arithmetic therefore belongs into parts.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import casadi as ca
+
+from symphys.dynamics.tracing.pytree import (
+    Code,
+    Leaf,
+    Numbers,
+    dismantle,
+    leaves_of,
+    matrix,
+    outline,
+    rebuild,
+    slots_of,
+)
+
+T = TypeVar("T")
+Expr = Any
+"""casadi SX"""
+Once = Callable[["Pieces", Any, T], T]
+
+
+@dataclass(frozen=True)
+class Template:
+    """A part as a casadi function.
+
+    Attributes:
+        function: of the slots in ``used``, gives columns of what has to be computed; None if that is nothing.
+        used: which of the slots that the arguments lie in.
+        shape: of the tree that the part gives.
+        matrices: of that tree, in order. A code's slot is one of those that the arguments lie in, or -1, -2 .. for the
+            first, the second .. that the function gives.
+    """
+
+    function: ca.Function | None
+    used: tuple[int, ...]
+    shape: Any
+    matrices: tuple[Numbers, ...]
+
+
+class Pieces(ABC):
+    """How the parts of a step are put together."""
+
+    def __init__(self) -> None:
+        """Nothing yet."""
+        self._columns: list[Expr] = []
+        self._entries: list[list[Expr]] = []
+        self._homes: dict[int, tuple[int, int]] = {}
+        self._templates: dict[Hashable, Template] = {}
+        self._functions: dict[str, ca.Function] = {}
+
+    @abstractmethod
+    def repeat(self, count: int, once: Once[T], context: Any, state: T) -> T:
+        """The state after ``count`` times ``state = once(pieces, context, state)``."""
+
+    @abstractmethod
+    def _apply(self, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
+        """The slots that take what the function gives."""
+
+    @abstractmethod
+    def _adopt(self, column: Expr) -> None:
+        """Find a home for expressions that come from no part, such as a mass that follows from a radius."""
+
+    def take(self, column: Expr) -> int:
+        """A slot for a column of symbols or expressions."""
+        self._columns.append(column)
+        self._entries.append(column.nonzeros())
+        for place, entry in enumerate(self._entries[-1]):
+            self._homes.setdefault(entry.element_hash(), (len(self._columns) - 1, place))
+        return len(self._columns) - 1
+
+    def value(self, leaf: Expr) -> Expr:
+        """A leaf of a tree as an expression."""
+        if not isinstance(leaf, Numbers):
+            return leaf
+        entries = [ca.SX(c) if isinstance(c, float) else self._entries[c[0]][c[1]] for c in leaf.codes]
+        return matrix(leaf.leaf, entries)
+
+    def do(self, part: Callable[..., T], *arguments: Any) -> T:
+        """``part(*arguments)``."""
+        leaves: list[Expr] = []
+        shape = dismantle(arguments, leaves)
+        slots: dict[int, int] = {}
+        known: list[tuple[Code, ...]] = []
+        for leaf in leaves:
+            codes = leaf.codes if isinstance(leaf, Numbers) else self._codes(leaf)
+            known.append(
+                tuple([c if isinstance(c, float) else (slots.setdefault(c[0], len(slots)), c[1]) for c in codes])
+            )
+        key = (part, shape, tuple(known), tuple([self._columns[slot].numel() for slot in slots]))
+        template = self._templates.get(key)
+        if template is None:
+            template = self._templates[key] = self._build(part, shape, known, [self._columns[slot] for slot in slots])
+        tree: T = self._fill(template, list(slots))
+        return tree
+
+    def _codes(self, expression: Expr) -> tuple[Code, ...]:
+        """Where the entries of an expression lie; those that lie nowhere get a slot."""
+        entries = expression.nonzeros()
+        fresh = [e for e in entries if not e.is_constant() and e.element_hash() not in self._homes]
+        if fresh:
+            self._adopt(ca.vertcat(*fresh))
+        return tuple(float(e) if e.is_constant() else self._homes[e.element_hash()] for e in entries)
+
+    def _build(self, part: Callable[..., Any], shape: Any, known: Sequence[Any], columns: Sequence[Expr]) -> Template:
+        """The template of a part for arguments of this structure."""
+        symbols = [ca.SX.sym("a", column.numel()) for column in columns]
+        entries: list[list[Expr]] = [symbol.nonzeros() for symbol in symbols]
+        outlines: list[Leaf] = []
+        leaves_of(shape, outlines)
+        arguments = (
+            matrix(leaf, [ca.SX(c) if isinstance(c, float) else entries[c[0]][c[1]] for c in codes])
+            for leaf, codes in zip(outlines, known, strict=True)
+        )
+        results: list[Expr] = []
+        result_shape = dismantle(part(*rebuild(shape, arguments)), results)
+        given = _Given(entries)
+        leaves = zip(map(self.value, results), slots_of(result_shape), strict=True)
+        matrices = tuple(given.placed(leaf, slot) for leaf, slot in leaves)
+        if not given.columns:
+            return Template(None, (), result_shape, matrices)
+        columns = ca.cse([ca.vertcat(*column) for column in given.columns.values()])
+        needed = {symbol.element_hash() for symbol in ca.symvar(ca.vertcat(*columns))}
+        used = [k for k, column in enumerate(entries) if any(e.element_hash() in needed for e in column)]
+        function = self.shared(ca.Function("piece", [symbols[k] for k in used], columns))
+        return Template(function, tuple(used), result_shape, matrices)
+
+    def shared(self, function: ca.Function) -> ca.Function:
+        """A function, or an equal one that was there before."""
+        return self._functions.setdefault(function.serialize(), function)
+
+    def _fill(self, template: Template, slots: list[int]) -> Any:
+        """The tree that a template stands for, given the slots that its arguments lie in."""
+        if template.function is not None:
+            slots = [*slots, *reversed(self._apply(template.function, [slots[k] for k in template.used]))]
+        filled = (
+            Numbers(m.leaf, tuple([c if isinstance(c, float) else (slots[c[0]], c[1]) for c in m.codes]))
+            for m in template.matrices
+        )
+        return rebuild(template.shape, filled)
+
+
+class Inline(Pieces):
+    """All parts in one expression."""
+
+    def repeat(self, count: int, once: Once[T], context: Any, state: T) -> T:
+        """See ``Pieces``."""
+        for _ in range(count):
+            state = once(self, context, state)
+        return state
+
+    def _adopt(self, column: Expr) -> None:
+        self.take(column)
+
+    def _apply(self, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
+        first, columns = len(self._columns), function.call([self._columns[slot] for slot in slots])
+        self._columns += columns
+        self._entries += [column.nonzeros() for column in columns]
+        return range(first, len(self._columns))
+
+
+class _Given:
+    """What a part gives, column by column, and where each of its numbers lies."""
+
+    def __init__(self, entries: Sequence[Sequence[Expr]]) -> None:
+        """``entries`` of the slots that the arguments lie in: what is one of them need not be given."""
+        self.columns: dict[int, list[Expr]] = {}
+        self._homes = {e.element_hash(): (k, j) for k, column in enumerate(entries) for j, e in enumerate(column)}
+
+    def placed(self, matrix: Expr, slot: int) -> Numbers:
+        """The codes of a matrix, whose numbers go to a slot if they lie nowhere yet."""
+        return Numbers(outline(matrix), tuple([self._code(number, slot) for number in matrix.nonzeros()]))
+
+    def _code(self, number: Expr, slot: int) -> Code:
+        if number.is_constant():
+            return float(number)
+        code = number.element_hash()
+        if code not in self._homes:
+            column = self.columns.setdefault(slot, [])
+            self._homes[code] = (-1 - list(self.columns).index(slot), len(column))
+            column.append(number)
+        return self._homes[code]

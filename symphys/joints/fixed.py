@@ -1,7 +1,0 @@
-"""A fixed joint: both sockets stay together, point and axes."""
-
-from __future__ import annotations
-
-from symphys.joints.kind import Kind
-
-FIXED = Kind("fixed", turns=((0, 1), (1, 2), (2, 0)))

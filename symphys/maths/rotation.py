@@ -1,0 +1,81 @@
+"""Rotations for casadi types (SX, MX, DM): unit quaternions (w, x, y, z) that turn body into world coordinates."""
+
+from __future__ import annotations
+
+from math import factorial
+from typing import Any
+
+import casadi as ca
+
+from symphys.maths.smoothing import length
+
+Expr = Any
+"""casadi SX, MX or DM"""
+
+SERIES_TERMS = 9
+"""Terms of the series of cos and sinc: full double precision up to 2 rad, 1e-12 at half a turn."""
+
+
+def cross_matrix(a: Expr) -> Expr:
+    """(3, 3): the matrix A with A b = a x b."""
+    return ca.skew(a)
+
+
+def multiply(p: Expr, q: Expr) -> Expr:
+    """(4,): the quaternion product p q, which turns by q first."""
+    scalar = p[0] * q[0] - ca.dot(p[1:4], q[1:4])
+    return ca.vertcat(scalar, p[0] * q[1:4] + q[0] * p[1:4] + ca.cross(p[1:4], q[1:4]))
+
+
+def matrix(q: Expr) -> Expr:
+    """(3, 3): the rotation matrix R_wb of a unit quaternion."""
+    w, x, y, z = (q[i] for i in range(4))
+    return ca.vertcat(
+        ca.horzcat(1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        ca.horzcat(2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        ca.horzcat(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+
+
+def exponential(r: Expr) -> Expr:
+    """(4,): the quaternion that turns by |r| [rad] about r, world frame.
+
+    cos(|r|/2) and sin(|r|/2)/|r| as polynomials in |r|^2, so every derivative is finite at r = 0. Whole turns are taken
+    off first: with them the polynomials would not give a rotation.
+    """
+    angle = length(r)
+    r = r * (1 - 2 * ca.pi * ca.floor(angle / (2 * ca.pi) + 0.5) / angle)
+    h2 = ca.dot(r, r) / 4
+    cos, sinc = 0.0, 0.0
+    for k in reversed(range(SERIES_TERMS)):
+        sign = (-1) ** k
+        cos = cos * h2 + sign / factorial(2 * k)
+        sinc = sinc * h2 + sign / factorial(2 * k + 1)
+    return ca.vertcat(cos, sinc * r / 2)
+
+
+def logarithm(q: Expr) -> Expr:
+    """(3,): the rotation vector [rad] of a unit quaternion, of length pi at most; the inverse of ``exponential``."""
+    q = ca.if_else(q[0] < 0, -q, q)
+    sine = length(q[1:4])
+    return 2 * ca.atan2(sine, q[0]) / sine * q[1:4]
+
+
+def between(p: Expr, q: Expr) -> Expr:
+    """(3,): the rotation vector [rad] that turns orientation ``p`` into ``q``, world frame."""
+    return logarithm(multiply(q, ca.vertcat(p[0], -p[1:4])))
+
+
+def turn(q: Expr, r: Expr) -> Expr:
+    """(4,): orientation ``q`` after a rotation by the vector ``r`` [rad], world frame; of length 1 up to rounding."""
+    return unit(multiply(exponential(r), q))
+
+
+def unit(q: Expr) -> Expr:
+    """(4,): a quaternion of almost length 1 nearer to it: a step of Newton's method."""
+    return q * (3 - ca.dot(q, q)) / 2
+
+
+def rotate(q: Expr, a: Expr) -> Expr:
+    """(3,): the body-frame vector ``a`` in world coordinates."""
+    return ca.mtimes(matrix(q), a)

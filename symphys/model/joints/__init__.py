@@ -1,0 +1,38 @@
+"""What joints are: which motions of one body against another they lock, and what acts along those that they leave."""
+
+from symphys.model.joints.ball import BALL
+from symphys.model.joints.fixed import FIXED
+from symphys.model.joints.hinge import HINGE
+from symphys.model.joints.joint import Joint, Limits, Socket, Spring
+from symphys.model.joints.kind import Coordinate, Kind, Placed
+from symphys.model.joints.kinematic_tree import Link, Linkage, carriers, linkages, tree_joints
+from symphys.model.joints.motor import Motor, Servo, TorqueMotor, VelocityMotor
+from symphys.model.joints.slider import SLIDER
+from symphys.model.joints.universal import UNIVERSAL
+
+KINDS: dict[str, Kind] = {kind.name: kind for kind in (BALL, FIXED, HINGE, SLIDER, UNIVERSAL)}
+
+__all__ = [
+    "BALL",
+    "FIXED",
+    "HINGE",
+    "KINDS",
+    "SLIDER",
+    "UNIVERSAL",
+    "Coordinate",
+    "Joint",
+    "Kind",
+    "Limits",
+    "Link",
+    "Linkage",
+    "Motor",
+    "Placed",
+    "Servo",
+    "Socket",
+    "Spring",
+    "TorqueMotor",
+    "VelocityMotor",
+    "carriers",
+    "linkages",
+    "tree_joints",
+]

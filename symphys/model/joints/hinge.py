@@ -1,0 +1,28 @@
+"""A hinge: the first side turns about the x axis of the sockets."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+
+from symphys.model.joints.kind import Coordinate, Kind, Placed
+
+Expr = Any
+"""casadi SX, MX or DM"""
+
+
+def angle(placed: Placed) -> Expr:
+    """In [-pi, pi] [rad]: of the first side's y and z against the second's, about x."""
+    a, b = placed.a, placed.b
+    cos = ca.dot(a[:, 1], b[:, 1]) + ca.dot(a[:, 2], b[:, 2])
+    sin = ca.dot(a[:, 1], b[:, 2]) - ca.dot(a[:, 2], b[:, 1])
+    return ca.atan2(sin, cos)
+
+
+def axis(placed: Placed) -> Expr:
+    """X of the second side."""
+    return placed.b[:, 0]
+
+
+HINGE = Kind("hinge", turns=((0, 1), (0, 2)), coordinates=(Coordinate("angle", True, angle, axis),))

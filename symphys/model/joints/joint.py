@@ -1,0 +1,98 @@
+"""A joint of a world: two bodies, or a body and the world, and what acts between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from symphys.model.joints.kind import Kind
+from symphys.model.joints.motor import Motor
+from symphys.model.shapes import Scalar
+
+PARTS = ("motor", "lower", "upper", "spring")
+Vector = Sequence[Any]
+"""three of them"""
+
+
+@dataclass(frozen=True)
+class Socket:
+    """A point with axes on one side of a joint.
+
+    Attributes:
+        point: (3,) [m] from the centre of mass, body frame; of the world: world frame.
+        orientation: (4,) unit quaternion w x y z from the socket's axes to the body's, or the world's.
+    """
+
+    point: Vector = (0.0, 0.0, 0.0)
+    orientation: Vector = (1.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Bounds of a coordinate [rad] or [m]; None where there is none."""
+
+    lower: Scalar | None = None
+    upper: Scalar | None = None
+
+
+@dataclass(frozen=True)
+class Spring:
+    """Along a coordinate: torque = -stiffness (angle - rest) - damping rate; SI units, forces where it slides."""
+
+    stiffness: Scalar = 0.0
+    damping: Scalar = 0.0
+    rest: Scalar = 0.0
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Holds the first body to the second, or to the world.
+
+    Attributes:
+        name: how states, commands and formulas refer to it.
+        kind: what it locks.
+        first, second: indices of bodies; second None: the world. Coordinates are those of the first against the second.
+        sockets: of the first and of the second.
+        motor, limits, spring: along every coordinate.
+        frequency, damping: [Hz] and damping ratio of a joint that gives way (Catto, GDC 2011); 0 is a rigid one.
+    """
+
+    name: str
+    kind: Kind
+    first: int
+    second: int | None
+    sockets: tuple[Socket, Socket]
+    motor: Motor | None = None
+    limits: Limits = Limits()
+    spring: Spring | None = None
+    frequency: Scalar = 0.0
+    damping: Scalar = 1.0
+
+    @property
+    def bodies(self) -> tuple[int, ...]:
+        """The indices of those that can move."""
+        return (self.first,) if self.second is None else (self.first, self.second)
+
+    @property
+    def soft(self) -> bool:
+        """Whether it gives way; a matter of structure, so never a symbol's value."""
+        return not (isinstance(self.frequency, int | float) and self.frequency == 0)
+
+    @property
+    def driven(self) -> bool:
+        """Whether it has a command."""
+        return self.motor is not None and bool(self.kind.coordinates)
+
+    @property
+    def acting(self) -> tuple[str, ...]:
+        """Which of motor, lower, upper and spring act along its coordinates."""
+        if not self.kind.coordinates:
+            return ()
+        present = (self.motor, self.limits.lower, self.limits.upper, self.spring)
+        return tuple(part for part, what in zip(PARTS, present, strict=True) if what is not None)
+
+    @property
+    def locked(self) -> int:
+        """How many rows it locks."""
+        return (3 if self.kind.slides is None else len(self.kind.slides)) + len(self.kind.turns)

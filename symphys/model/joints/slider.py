@@ -1,0 +1,25 @@
+"""A slider: the first side moves along the x axis of the sockets and does not turn."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+
+from symphys.model.joints.kind import Coordinate, Kind, Placed
+
+Expr = Any
+"""casadi SX, MX or DM"""
+
+
+def position(placed: Placed) -> Expr:
+    """[m] along x."""
+    return ca.dot(placed.apart, placed.b[:, 0])
+
+
+def axis(placed: Placed) -> Expr:
+    """X of the second side."""
+    return placed.b[:, 0]
+
+
+SLIDER = Kind("slider", (1, 2), ((0, 1), (1, 2), (2, 0)), (Coordinate("position", False, position, axis),))

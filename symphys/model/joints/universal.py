@@ -1,0 +1,34 @@
+"""A universal joint (Cardan): the first side turns about its own x, and that about the y of the second side."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+
+from symphys.model.joints.kind import Coordinate, Kind, Placed
+
+Expr = Any
+"""casadi SX, MX or DM"""
+
+
+def swing(placed: Placed) -> Expr:
+    """In [-pi, pi] [rad]: of the first side's x about the second side's y."""
+    a, b = placed.a, placed.b
+    return ca.atan2(-ca.dot(a[:, 0], b[:, 2]), ca.dot(a[:, 0], b[:, 0]))
+
+
+def twist(placed: Placed) -> Expr:
+    """In [-pi, pi] [rad]: of the first side about its own x, against the second side's y."""
+    a, b = placed.a, placed.b
+    return ca.atan2(-ca.dot(a[:, 2], b[:, 1]), ca.dot(a[:, 1], b[:, 1]))
+
+
+UNIVERSAL = Kind(
+    "universal",
+    turns=((0, 1),),
+    coordinates=(
+        Coordinate("angle1", True, swing, lambda placed: placed.b[:, 1]),
+        Coordinate("angle2", True, twist, lambda placed: placed.a[:, 0], fixed_in_first=True),
+    ),
+)

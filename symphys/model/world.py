@@ -1,0 +1,215 @@
+"""What the physics is about: bodies, static surfaces, and which of their surfaces meet under which law.
+
+Everything here is frozen. A number may be a float or a casadi symbol: a symbol makes the step a function of it,
+so a mass, a radius or a coefficient of friction becomes a parameter with exact derivatives.
+SI units; vectors are in world coordinates unless a field says "body frame".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from symphys.model.joints import Joint
+from symphys.model.shapes import Scalar, Shape, Sphere, Static, Surface, contact_points, surface
+
+Vector = Sequence[Any]
+"""three of them"""
+
+GRAVITY = (0.0, 0.0, -9.81)
+SOLID_SPHERE = 2 / 5
+HOLLOW_SPHERE = 2 / 3
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body.
+
+    Attributes:
+        name: how states, inputs and parameters refer to it.
+        mass: [kg].
+        inertia: about the centre of mass [kg m^2]: a scalar (the same about every axis),
+            (3,) principal moments along the body's axes, or a symmetric (3, 3) tensor, body frame.
+        shapes: the parts of its surface.
+    """
+
+    name: str
+    mass: Scalar
+    inertia: Scalar
+    shapes: tuple[Shape, ...] = ()
+
+    @classmethod
+    def ball(cls, name: str, radius: Scalar, mass: Scalar, hollow: bool = False) -> Body:
+        """A uniform solid sphere, or a thin hollow one: I = 2/5 m r^2 or 2/3 m r^2."""
+        share = HOLLOW_SPHERE if hollow else SOLID_SPHERE
+        return cls(name, mass, share * mass * radius * radius, (Sphere(radius),))
+
+
+@dataclass(frozen=True)
+class Law:
+    """How two surfaces act on each other.
+
+    Attributes:
+        friction: Coulomb's coefficient mu; |tangential impulse| <= mu * normal impulse, on the exact disc.
+        restitution: Newton's e in [0, 1].
+        torsion: radius [m] of the torque about the normal: |torque| <= torsion * normal force.
+        rolling: radius [m] of the torque across the normal: |torque| <= rolling * normal force.
+        frequency: [Hz] of a soft contact (Catto, GDC 2011); 0 is a rigid contact. A soft contact has no restitution.
+        damping: damping ratio of a soft contact.
+    """
+
+    friction: Scalar = 0.5
+    restitution: Scalar = 0.0
+    torsion: Scalar = 0.0
+    rolling: Scalar = 0.0
+    frequency: Scalar = 0.0
+    damping: Scalar = 1.0
+
+    @property
+    def soft(self) -> bool:
+        """Whether the contact is a spring and damper; a matter of structure, so never a symbol's value."""
+        return not is_zero(self.frequency)
+
+    @property
+    def spins(self) -> bool:
+        """Whether the contact resists spinning or rolling."""
+        return not (is_zero(self.torsion) and is_zero(self.rolling))
+
+
+@dataclass(frozen=True)
+class Side:
+    """One side of a pair: a body's shape, or (``body`` None) the static surface with index ``shape``."""
+
+    body: int | None
+    shape: int
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A point where two surfaces may touch.
+
+    Attributes:
+        name: unique; surfaces that may touch in several points add its number: ``box-ground:3``.
+        first: always belongs to a body.
+        second: a later body, or static.
+        law: how they act on each other.
+        point: which of the points of the two.
+    """
+
+    name: str
+    first: Side
+    second: Side
+    law: Law
+    point: int = 0
+
+
+@dataclass(frozen=True)
+class World:
+    """Bodies, static surfaces, the pairs that may touch, and gravity.
+
+    Attributes:
+        bodies: the order gives the state's columns.
+        statics: planes, fixtures, terrain.
+        pairs: every point of contact that is looked at, those of two surfaces one after the other; ``all_pairs``.
+        gravity: (3,) [m/s^2].
+        joints: what holds bodies together.
+    """
+
+    bodies: tuple[Body, ...]
+    statics: tuple[Static, ...] = ()
+    pairs: tuple[Pair, ...] = ()
+    gravity: tuple[Scalar, ...] = GRAVITY
+    joints: tuple[Joint, ...] = ()
+
+    def body_index(self, name: str) -> int:
+        """The index of the body called ``name``; KeyError if there is none."""
+        for index, body in enumerate(self.bodies):
+            if body.name == name:
+                return index
+        raise KeyError(f"no body is called {name!r}; there are {', '.join(b.name for b in self.bodies)}")
+
+    def surface(self, side: Side) -> Surface:
+        """The surface on one side of a pair."""
+        return surface_of(self.bodies, self.statics, side)
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """How a step is taken; the switches exist so that a study can show what each trick buys.
+
+    Attributes:
+        dt: time step [s].
+        sweeps: projected Gauss-Seidel sweeps over the velocity rows.
+        position_sweeps: sweeps of the position pass, which removes penetration without adding velocity.
+        push_out: share of a penetration that one step removes.
+        warm_start: start each step from the contact forces of the last one.
+        time_of_impact: resolve the instant of each impact inside the step; without it gradients through bounces
+            are wrong at any step size.
+        cuts: where a body is part of several pairs, how often a step is cut at an impact, so that impacts are taken
+            one after the other and a blow changes the forces of lasting contacts from its instant on. Each cut adds
+            up to 2.4 times the work of a step without any; without any, gradients of a ball that rolls into a cushion
+            are wrong at any step size. None: 2 where a body may be hit off its centre, as boxes are, else 1.
+        energy_cap: no impact raises the kinetic energy, which Newton's restitution with friction can.
+        load_sharing: points of one body that lie in a plane share their load linearly, as on an elastic foundation;
+            without it the share of four corners depends on all that was before, and so does friction as they turn.
+        impact_friction: let friction at an impact aim at the velocity at the instant of impact.
+    """
+
+    dt: float = 0.01
+    sweeps: int = 10
+    position_sweeps: int = 2
+    push_out: float = 1.0
+    warm_start: bool = True
+    time_of_impact: bool = True
+    impact_friction: bool = True
+    cuts: int | None = None
+    energy_cap: bool = True
+    load_sharing: bool = True
+
+
+def make_world(
+    bodies: Sequence[Body],
+    statics: Sequence[Static] = (),
+    law: Law | None = None,
+    gravity: Vector = GRAVITY,
+) -> World:
+    """A world where everything may touch everything under one law; change ``pairs`` for anything finer."""
+    bodies, statics = tuple(bodies), tuple(statics)
+    return World(bodies, statics, all_pairs(bodies, statics, law or Law()), tuple(gravity))
+
+
+def all_pairs(bodies: Sequence[Body], statics: Sequence[Static], law: Law) -> tuple[Pair, ...]:
+    """Every shape of every body against every static surface, then against every shape of every later body.
+
+    Surfaces that no rule covers (``shapes.contact_points`` is 0) are left out.
+    """
+    sides = [Side(i, j) for i, body in enumerate(bodies) for j in range(len(body.shapes))]
+    both = [(a, Side(None, k)) for a in sides for k in range(len(statics))]
+    both += [(a, b) for i, a in enumerate(sides) for b in sides[i + 1 :] if a.body != b.body]
+    return tuple(pair for a, b in both for pair in points_of(bodies, statics, a, b, law))
+
+
+def points_of(bodies: Sequence[Body], statics: Sequence[Static], a: Side, b: Side, law: Law) -> list[Pair]:
+    """The points where two surfaces may touch."""
+    count = contact_points(surface_of(bodies, statics, a), surface_of(bodies, statics, b))
+    name = f"{side_name(bodies, statics, a)}-{side_name(bodies, statics, b)}"
+    return [Pair(f"{name}:{k}" if count > 1 else name, a, b, law, k) for k in range(count)]
+
+
+def surface_of(bodies: Sequence[Body], statics: Sequence[Static], side: Side) -> Surface:
+    """The surface on one side of a pair."""
+    return surface(statics[side.shape]) if side.body is None else bodies[side.body].shapes[side.shape]
+
+
+def side_name(bodies: Sequence[Body], statics: Sequence[Static], side: Side) -> str:
+    """``ball``; a body with several shapes adds the index of the shape: ``dumbbell[1]``."""
+    if side.body is None:
+        return statics[side.shape].name
+    body = bodies[side.body]
+    return f"{body.name}[{side.shape}]" if len(body.shapes) > 1 else body.name
+
+
+def is_zero(value: Scalar) -> bool:
+    """Whether a number is structurally zero: a plain 0, or a casadi expression that is the constant 0."""
+    return bool(value.is_zero()) if hasattr(value, "is_zero") else value == 0

@@ -1,0 +1,62 @@
+"""Whether a world has no more candidates for contact than a time step can carry, and none that nobody computes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from symphys.model.shapes import Box, Capsule, Sphere
+from symphys.problem.parametric.collision_filter import Census, Kin, Meetings
+from symphys.problem.parametric.parts import BlockPlan, BodyPlan, PlanePlan
+from symphys.problem.reading.faults import Faults
+
+MOST_POINTS = 2000
+"""Points of contact that are looked at in every step."""
+LISTED = 3
+WORDS = {Sphere: "spheres", Capsule: "capsules", Box: "boxes"}
+
+
+def check_crowd(meetings: Meetings, faults: Faults) -> None:
+    """Every point where two surfaces may touch is looked at in every step, so there must not be too many."""
+    census = meetings.census(MOST_POINTS)
+    if census.points > MOST_POINTS:
+        faults.stop(("body",), too_many(meetings, census))
+    if census.uncovered:
+        listed = ", ".join(f"{a} and {b}" for a, b in census.uncovered[:LISTED])
+        more = f" and {len(census.uncovered) - LISTED} more" if len(census.uncovered) > LISTED else ""
+        faults.stop(
+            ("body",),
+            f"contact of such shapes is not known: {listed}{more}; let them pass through each other, by collides_with "
+            "or by a [[pair]] with collide = false",
+        )
+
+
+def too_many(meetings: Meetings, census: Census) -> str:
+    """How many points there are, where most come from, and what to do."""
+    sets = list(meetings.sets.values())
+    largest = census.shares.most_common(LISTED)
+    listed = ", ".join(f"{between(sets[a], sets[b], a == b)}: {count}" for (a, b), count in largest)
+    count = f"{census.points}" if census.whole else f"more than {census.points}"
+    remedy = (
+        "let fewer of them meet: give them a group, and say who touches whom by collides_with or by a [[pair]] with "
+        "collide = false"
+    )
+    if any(isinstance(surface, Box | Capsule) for a, _ in census.shares for surface in sets[a][0].part.surfaces):
+        remedy += "; or take spheres in place of boxes and capsules"
+    return f"{count} points of contact in every step are too many, {MOST_POINTS} are allowed ({listed}); {remedy}"
+
+
+def between(a: Sequence[Kin], b: Sequence[Kin], same: bool) -> str:
+    """``40 boxes against each other``, ``40 boxes against ground``."""
+    return f"{called(a)} against {'each other' if same else called(b)}"
+
+
+def called(members: Sequence[Kin]) -> str:
+    """A part by its name, several by their number and kind."""
+    count, part = sum(len(kin.members) for kin in members), members[0].part
+    if count == 1:
+        return part.name
+    if isinstance(part, BodyPlan):
+        word = WORDS[type(part.shapes[0])] if len(part.shapes) == 1 else "compounds"
+    else:
+        word = "planes" if isinstance(part, PlanePlan) else "blocks" if isinstance(part, BlockPlan) else "terrains"
+    return f"{count} {word} of {part.group}" if part.group else f"{count} {word}"

@@ -1,0 +1,1 @@
+"""Included files: found, renamed, merged, placed."""

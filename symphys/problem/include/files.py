@@ -1,0 +1,162 @@
+"""The files that a problem includes: found, read, and checked for what they may hold."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar, get_origin
+
+from pydantic import ValidationError
+
+from symphys.problem.include.merge import Merged, Source, merge
+from symphys.problem.include.prefix import prefixed
+from symphys.problem.reading.faults import Faults, Origin
+from symphys.problem.reading.messages import report
+from symphys.problem.reading.source import MAX_BYTES, parse_toml, read_source, refuse
+from symphys.problem.reading.value_texts import shown
+from symphys.problem.schema import Document, Table
+from symphys.problem.schema.include import MOST_INCLUDES, IncludedTable, IncludeTable
+from symphys.problems import parts
+from symphys.suggest import hint, quote
+
+OF_THE_PROBLEM = ("simulation", "fall", "objective", "solver", "solvers")
+FURTHER = ("include", "included")
+OWN = ("title", "description")
+"""What an included file says about itself alone."""
+LISTS = [name for name, field in Document.model_fields.items() if get_origin(field.annotation) is list]
+Model = TypeVar("Model", bound=Table)
+
+
+def with_included(path: Path, text: str, data: dict[str, Any]) -> Merged:
+    """A problem file together with what it includes.
+
+    Args:
+        path: the problem file.
+        text: what is in it.
+        data: its tables.
+
+    Raises:
+        ProblemError: names the file in which something is wrong, table and key.
+    """
+    if not data.get("include"):
+        return Merged(data, text)
+    faults = Faults(str(path), data)
+    tables = read_tables(data, "include", IncludeTable, faults)
+    kept = {table.file: table.text for table in read_tables(data, "included", IncludedTable, faults)}
+    faults.stop_if_any()
+    texts: dict[str, str] = {}
+    sources = []
+    for index, table in enumerate(tables):
+        file, content = find(path, index, table, kept, faults)
+        texts[table.file] = content
+        sources.append(source(file, content, table, faults))
+    check_twice(sources, faults)
+    faults.stop_if_any()
+    whole = text if kept else text + appendix(texts)
+    if len(whole.encode()) > MAX_BYTES:
+        raise refuse(path, f"with the files that it includes, it is larger than {MAX_BYTES // 1_000_000} MB")
+    return merge([*sources, Source(str(path), data, data)], LISTS, whole, faults)
+
+
+def read_tables(data: Mapping[str, Any], key: str, model: type[Model], faults: Faults) -> list[Model]:
+    """The tables of a list that is needed before all others."""
+    if key not in data:
+        return []
+    entries, found = data[key], []
+    if not isinstance(entries, list) or not 0 < len(entries) <= MOST_INCLUDES:
+        faults.add((key,), f"must be a list of 1 to {MOST_INCLUDES} tables, [[{key}]], not {shown(entries)}")
+        return []
+    for index, entry in enumerate(entries):
+        try:
+            found.append(model.model_validate(entry))
+        except ValidationError as error:
+            report(error, model, faults, (key, index))
+    return found
+
+
+def find(path: Path, index: int, table: IncludeTable, kept: Mapping[str, str], faults: Faults) -> tuple[str, str]:
+    """The name and the text of a file: as kept in the problem, beside it, or shipped."""
+    place = ("include", index, "file")
+    if kept:
+        if table.file not in kept:
+            faults.stop(place, f"{quote(table.file)} is not among the files kept in [[included]]: {hint('', kept)}")
+        return table.file, kept[table.file]
+    file = path.parent / table.file
+    if not exists(file):
+        shipped = parts()
+        if table.file not in shipped:
+            text = f"there is no file {quote(table.file)}, and no shipped robot of that path"
+            faults.stop(place, f"{text}; {hint(table.file, shipped)}")
+        file = shipped[table.file]
+    if file.samefile(path):
+        faults.stop(place, "the file includes itself")
+    return str(file), read_source(file)
+
+
+def exists(file: Path) -> bool:
+    """Whether there is something of that name, which may be none."""
+    try:
+        return file.exists()
+    except OSError:
+        return False
+
+
+def source(file: str, text: str, table: IncludeTable, faults: Faults) -> Source:
+    """The tables of an included file; notes those that it may not have."""
+    written = parse_toml(Path(file), text)
+    found = dict[str, Any]()
+    for key, value in written.items():
+        reason = complaint(key, value, faults.file)
+        if reason:
+            faults.add_at(Origin(file, written, (key,)), reason)
+        elif key not in OWN:
+            found[key] = value
+    return Source(file, written, prefixed(found, table.prefix) if table.prefix else found, table)
+
+
+def complaint(key: str, value: object, problem: str) -> str:
+    """What is wrong with a table or key at the top of an included file; empty if nothing."""
+    if key in OF_THE_PROBLEM:
+        return f"belongs to a whole problem; move it to {problem}, which includes this file"
+    if key in FURTHER:
+        return f"an included file includes no others; include them from {problem} too"
+    if key not in Document.model_fields:
+        valid = [name for name in Document.model_fields if name not in (*OF_THE_PROBLEM, *FURTHER)]
+        return f"unknown key; {hint(key, valid)}"
+    if key in LISTS:
+        return "" if isinstance(value, list) else f"must be a list, not {shown(value)}; write [[{key}]]"
+    if key in OWN and not isinstance(value, str):
+        return f"must be text, not {shown(value)}"
+    if key not in OWN and not isinstance(value, dict):
+        return f"must be a table, not {shown(value)}"
+    return ""
+
+
+def check_twice(sources: list[Source], faults: Faults) -> None:
+    """A file that is included twice needs different prefixes."""
+    seen: dict[tuple[str, str], int] = {}
+    for index, one in enumerate(sources):
+        assert one.table is not None
+        before = seen.setdefault((os.path.realpath(one.file), one.table.prefix), index)
+        if before != index:
+            text = f"include[{before}] includes this file with the same names; give one of them another prefix"
+            faults.add(("include", index, "file"), text)
+
+
+def appendix(texts: Mapping[str, str]) -> str:
+    """What makes a problem's text whole without its files: their texts, as [[included]] tables."""
+    return "".join(f"\n[[included]]\nfile = {basic(file)}\ntext = {lines(text)}\n" for file, text in texts.items())
+
+
+def basic(text: str) -> str:
+    """A TOML string on one line."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def lines(text: str) -> str:
+    """A TOML string of several lines, which the parser has let pass before: it has no control characters."""
+    escaped = re.sub(r'"(?="")|"\Z', r"\"", text.replace("\\", "\\\\"))
+    return f'"""\n{escaped}"""'

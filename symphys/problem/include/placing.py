@@ -1,0 +1,129 @@
+"""Included files in their places: what they bring is turned about the z axis, then shifted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.problem.include.merge import Merged
+from symphys.problem.parametric.joints import WORLD
+from symphys.problem.reading.faults import Faults, Place
+from symphys.problem.schema import Document, Table
+from symphys.problem.schema.include import IncludeTable
+from symphys.problem.schema.joints import JointTable
+from symphys.problem.schema.physics import BlockTable, BodyTable, PlaneTable, TerrainTable
+from symphys.problem.tables.shapes import read_orientation, turned
+
+Array = NDArray[np.float64]
+
+
+def placed(document: Document, merged: Merged, faults: Faults) -> Document:
+    """The document with the tables of included files where these were put.
+
+    Bodies, joints, planes and blocks move. The ground stays, and so does what variables set and formulas say. Terrain
+    cannot move; a fault says so.
+    """
+    changed = {key: list(getattr(document, key)) for key in MOVES}
+    for include, ranges in merged.moves:
+        shift = Shift(include, faults)
+        if not shift.moves:
+            continue
+        for key, move in MOVES.items():
+            for index in ranges.get(key, ()):
+                changed[key][index] = move(shift, (key, index), changed[key][index])
+    return document.model_copy(update=changed)
+
+
+@dataclass(frozen=True)
+class Shift:
+    """A turn about the z axis of the world, then a shift."""
+
+    include: IncludeTable
+    faults: Faults
+
+    @property
+    def moves(self) -> bool:
+        """Whether anything changes."""
+        return any(self.include.position) or self.include.yaw_deg != 0
+
+    def direction(self, vector: Sequence[float]) -> list[float]:
+        """(3,) turned."""
+        angle = np.deg2rad(self.include.yaw_deg)
+        cos, sin = float(np.cos(angle)), float(np.sin(angle))
+        x, y, z = vector
+        return [cos * x - sin * y, sin * x + cos * y, z]
+
+    def point(self, vector: Sequence[float]) -> list[float]:
+        """(3,) turned and shifted."""
+        return [a + b for a, b in zip(self.direction(vector), self.include.position, strict=True)]
+
+    def orientation(self, place: Place, given: Any) -> Any:
+        """As the file gives it, turned."""
+        if not self.include.yaw_deg:
+            return given
+        return turned(read_orientation((*place, "orientation"), given, self.faults), 2, self.include.yaw_deg).tolist()
+
+    def body(self, place: Place, table: BodyTable) -> Table:
+        """A body, with its velocities."""
+        update = {
+            "position": self.point(table.position),
+            "orientation": self.orientation(place, table.orientation),
+            "velocity": self.direction(table.velocity),
+            "angular_velocity": self.direction(table.angular_velocity),
+        }
+        return table.model_copy(update=update)
+
+    def block(self, place: Place, table: BlockTable) -> Table:
+        """A static solid."""
+        update = {
+            "position": self.point(table.position),
+            "orientation": self.orientation(place, table.orientation),
+        }
+        return table.model_copy(update=update)
+
+    def plane(self, place: Place, table: PlaneTable) -> Table:
+        """A static wall."""
+        update: dict[str, Any] = {"normal": self.direction(table.normal)}
+        if table.point is not None:
+            update["point"] = self.point(table.point)
+        if table.offset is not None:
+            length = float(np.linalg.norm(table.normal)) or 1.0
+            along = float(np.dot(update["normal"], self.include.position)) / length
+            update["offset"] = table.offset + along
+        return table.model_copy(update=update)
+
+    def joint(self, place: Place, table: JointTable) -> Table:
+        """A joint: its point, axes, and an anchor on the world."""
+        update: dict[str, Any] = {}
+        if table.point is not None:
+            update["point"] = self.point(table.point)
+        if table.anchors is not None:
+            sides = zip(table.between, table.anchors, strict=True)
+            update["anchors"] = [self.point(anchor) if name == WORLD else anchor for name, anchor in sides]
+        for key in ("hinge", "slider"):
+            kind = getattr(table, key)
+            if kind is not None:
+                update[key] = kind.model_copy(update={"axis": self.direction(kind.axis)})
+        if table.universal is not None:
+            axes = [self.direction(axis) for axis in table.universal.axes]
+            update["universal"] = table.universal.model_copy(update={"axes": axes})
+        return table.model_copy(update=update)
+
+    def terrain(self, place: Place, table: TerrainTable) -> Table:
+        """Terrain stays."""
+        text = "terrain cannot be moved; include this file without position and yaw_deg, or take the terrain out of it"
+        self.faults.add(place, text)
+        return table
+
+
+MOVES: dict[str, Callable[[Shift, Place, Any], Table]] = {
+    "body": Shift.body,
+    "joint": Shift.joint,
+    "plane": Shift.plane,
+    "block": Shift.block,
+    "terrain": Shift.terrain,
+}

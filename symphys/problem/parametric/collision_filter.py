@@ -1,0 +1,208 @@
+"""Who may meet whom: counted and listed by kin, parts of the world that no rule of the file tells apart.
+
+Tens of thousands of bodies are few kin, so that their pairs are counted without being looked at one by one.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.model.shapes import Box, Capsule, Plane, Sphere, Surface, Terrain, contact_points
+from symphys.problem.parametric.parts import BodyPlan, PairPlan, Part
+
+Ints = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+KINDS: tuple[Surface, ...] = (
+    Sphere(1.0),
+    Capsule(1.0, 1.0),
+    Box((1.0, 1.0, 1.0)),
+    Plane("plane"),
+    Terrain("terrain", max),
+)
+"""One of each kind of surface."""
+TYPES = tuple(type(kind) for kind in KINDS)
+ENOUGH_ROWS = 256
+"""Where there are more kin than this and already too many points, the rest need not be counted."""
+
+
+@dataclass(frozen=True)
+class Kin:
+    """Parts that meet the same others, with the same shapes.
+
+    Attributes:
+        part: the first of them.
+        members: their places among all parts.
+        surfaces: (kinds,) how many surfaces of each kind one of them has.
+    """
+
+    part: Part
+    members: list[int]
+    surfaces: Ints
+
+    @property
+    def moves(self) -> bool:
+        """Whether they are bodies."""
+        return isinstance(self.part, BodyPlan)
+
+
+@dataclass
+class Census:
+    """The candidates for contact.
+
+    Attributes:
+        points: how many are to be looked at in every step.
+        whole: whether all were counted.
+        shares: points by the two sets of parts that they are between, as places in ``Meetings.sets``.
+        uncovered: (a, b) examples of parts that may meet with surfaces that no rule covers.
+    """
+
+    points: int = 0
+    whole: bool = True
+    shares: Counter[tuple[int, int]] = field(default_factory=Counter)
+    uncovered: list[tuple[str, str]] = field(default_factory=list)
+
+    def add(self, one: int, others: Ints, counts: Ints) -> None:
+        """Add points to the shares of a set with others."""
+        sums = np.bincount(others, weights=counts)
+        self.shares.update({(one, other): int(sums[other]) for other in np.flatnonzero(sums).tolist()})
+
+
+class Meetings:
+    """The parts of a world, bodies first, and which of them may meet."""
+
+    def __init__(self, parts: Sequence[Part], tables: Sequence[PairPlan]) -> None:
+        """Sort the parts into kin."""
+        self.parts, self.tables = parts, tables
+        mentioned = {name for part in parts for name in part.mates or ()}
+        mentioned |= {name for table in tables for name in table.between}
+        found: dict[object, list[int]] = {}
+        for index, part in enumerate(parts):
+            own = part.name if part.name in mentioned else None
+            found.setdefault((kinds(part), isinstance(part, BodyPlan), part.group, part.mates, own), []).append(index)
+        self.kin = [Kin(parts[m[0]], m, np.array(kinds(parts[m[0]]), np.int64)) for m in found.values()]
+        self.sets: dict[object, list[Kin]] = {}
+        for kin in self.kin:
+            self.sets.setdefault((kinds(kin.part), kin.moves, kin.part.group), []).append(kin)
+
+    def census(self, most: int) -> Census:
+        """Count the points; beyond ``most`` the count may stop early."""
+        found = Census()
+        numbers = np.array([len(kin.members) for kin in self.kin])
+        surfaces = np.array([kin.surfaces for kin in self.kin])
+        points = np.array([[contact_points(a, b) for b in KINDS] for a in KINDS])
+        missing = (points == 0).astype(np.int64)
+        places = {id(kin): place for place, members in enumerate(self.sets.values()) for kin in members}
+        place = np.array([places[id(kin)] for kin in self.kin])
+        for c, met in self._rows():
+            pairs = numbers[c] * numbers[met]
+            pairs[met == c] = numbers[c] * (numbers[c] - 1) // 2
+            counts = pairs * (surfaces[met] @ (points @ surfaces[c]))
+            found.points += int(counts.sum())
+            found.add(int(place[c]), place[met], counts)
+            bare = (pairs > 0) & (surfaces[met] @ (missing @ surfaces[c]) > 0)
+            found.uncovered += [self._example(c, int(d)) for d in met[bare]]
+            if found.points > most and c >= ENOUGH_ROWS:
+                found.whole = False
+                break
+        return found
+
+    def pairs(self) -> list[tuple[int, int]]:
+        """Every two parts that may meet and have surfaces, as places among the parts, in their order."""
+        found = []
+        for c, met in self._rows():
+            for d in met.tolist():
+                if not (self.kin[c].surfaces.any() and self.kin[d].surfaces.any()):
+                    continue
+                both = ((i, j) for i in self.kin[c].members for j in self.kin[d].members)
+                found += [(min(i, j), max(i, j)) for i, j in both if d != c or i < j]
+        return sorted(found)
+
+    def _example(self, c: int, d: int) -> tuple[str, str]:
+        return self.kin[c].part.name, self.parts[self.kin[d].members[-1]].name
+
+    def _rows(self) -> Iterator[tuple[int, Ints]]:
+        """For each kin of bodies, what it may meet of itself and later kin, among which are all static ones."""
+        for c, kin in enumerate(self.kin):
+            if kin.moves:
+                met = np.flatnonzero(self._lets(c) & self._let(c) & self._collide(c))
+                yield c, met[met >= c]
+
+    def _lets(self, c: int) -> Mask:
+        """Whom ``c`` lets touch it."""
+        mates = self.kin[c].part.mates
+        if mates is None:
+            return np.ones(len(self.kin), bool)
+        mask = np.zeros(len(self.kin), bool)
+        for name in mates:
+            mask[self._named.get(name, [])] = True
+        return mask
+
+    def _let(self, c: int) -> Mask:
+        """Who lets ``c`` touch it."""
+        mask = self._free.copy()
+        for name in own_names(self.kin[c].part):
+            mask[self._wanted.get(name, [])] = True
+        return mask
+
+    def _collide(self, c: int) -> Mask:
+        """With whom the [[pair]] tables let ``c`` collide; those that name more surfaces hold."""
+        mask = np.ones(len(self.kin), bool)
+        own = own_names(self.kin[c].part)
+        for place in sorted({place for name in own for place in self._stated.get(name, [])}):
+            _, a, b, collide = self._ranked[place]
+            for mine, other in ((a, b), (b, a)):
+                if mine in own:
+                    mask[self._named.get(other, [])] = collide
+        return mask
+
+    @cached_property
+    def _ranked(self) -> list[tuple[int, str, str, bool]]:
+        """(how many surfaces it names, the two names, collide) of each [[pair]] table, by the first."""
+        names = {part.name for part in self.parts}
+        rows = [(len(names & table.between), min(table.between), max(table.between), table) for table in self.tables]
+        return [(rank, a, b, table.collide) for rank, a, b, table in sorted(rows, key=lambda row: row[0])]
+
+    @cached_property
+    def _stated(self) -> dict[str, list[int]]:
+        """The tables, as places in ``_ranked``, that have a name or a group."""
+        return gather((name, place) for place, (_, a, b, _) in enumerate(self._ranked) for name in {a, b})
+
+    @cached_property
+    def _named(self) -> dict[str, list[int]]:
+        """The kin that a name or a group means."""
+        return gather((name, c) for c, kin in enumerate(self.kin) for name in own_names(kin.part))
+
+    @cached_property
+    def _wanted(self) -> dict[str, list[int]]:
+        """The kin that list a name or group in collides_with."""
+        return gather((name, c) for c, kin in enumerate(self.kin) for name in kin.part.mates or ())
+
+    @cached_property
+    def _free(self) -> Mask:
+        return np.array([kin.part.mates is None for kin in self.kin])
+
+
+def kinds(part: Part) -> tuple[int, ...]:
+    """(kinds,) how many surfaces of each kind a part has."""
+    counts = Counter(type(surface) for surface in part.surfaces)
+    return tuple(counts[kind] for kind in TYPES)
+
+
+def own_names(part: Part) -> tuple[str, ...]:
+    """What a part is called in collides_with and [[pair]]: its name, and its group's."""
+    return (part.name,) if part.group is None else (part.name, part.group)
+
+
+def gather(entries: Iterable[tuple[str, int]]) -> dict[str, list[int]]:
+    """The numbers that belong to each name."""
+    found: dict[str, list[int]] = {}
+    for name, number in entries:
+        found.setdefault(name, []).append(number)
+    return found

@@ -1,0 +1,139 @@
+"""Joints that do not start at 0: bodies are carried from where they lie in the file to where the start puts them."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.maths import rotation
+from symphys.model.joints import Placed
+from symphys.problem.parametric.joints import WORLD, JointPlan
+from symphys.problem.reading.faults import Faults
+from symphys.problem.tables.joint_frames import pose
+
+Array = NDArray[np.float64]
+State = dict[str, Array]
+Tree = Mapping[str, Mapping[str, str]]
+"""What rigid joints that close no loop hold to each body, and to the world: by the names of the joints."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A turn about a pivot (3,) [m] by a unit quaternion (4,), then a shift (3,) [m]; world frame."""
+
+    pivot: Array
+    shift: Array
+    turn: Array
+
+
+def carry(plans: Sequence[JointPlan], initial: Mapping[str, Array], faults: Faults) -> State:
+    """The state at the start with every joint at its ``start``; see ``Problem.initial``.
+
+    Sockets are where the bodies lie in the file. A joint with a start moves its second body in the table, and all that
+    hangs on it, as one; if the world holds that side, it moves the other side, the other way. Since a joint changes
+    nothing within either side, the order of joints does not matter.
+
+    Velocities are those of the file, carried too: the motion against the side that stays is turned along, so that rates
+    of joints are what they were, and what moves or spins as a whole goes on doing so. Zero stays zero.
+
+    Args:
+        plans: all joints.
+        initial: the state as the file has it.
+        faults: gets a start of a joint that gives way, or closes a loop of joints with a start.
+    """
+    state = {name: value.copy() for name, value in initial.items()}
+    if not any(plan.start for plan in plans):
+        return state
+    tree = spanning(plans)
+    for index, plan in enumerate(plans):
+        if plan.start and plan.name not in tree[plan.first]:
+            reason = "gives way" if plan.frequency else "closes a loop"
+            key = "start" if faults.data["joint"][index].get("start") is not None else "start_deg"
+            text = f"this joint {reason}, so it begins where the other joints put it; leave this out"
+            faults.add(("joint", index, key), text)
+        elif plan.start:
+            move(plan, tree, state)
+    return state
+
+
+def spanning(plans: Sequence[JointPlan]) -> Tree:
+    """As many rigid joints as close no loop, those with a start first."""
+    roots: dict[str, str] = {}
+
+    def root(name: str) -> str:
+        while name in roots:
+            name = roots[name]
+        return name
+
+    found: dict[str, dict[str, str]] = defaultdict(dict)
+    for plan in sorted(plans, key=lambda plan: not plan.start):
+        a, b = root(plan.first), root(plan.second or WORLD)
+        if a != b and not plan.frequency:
+            roots[a] = b
+            first, second = plan.first, plan.second or WORLD
+            found[first][plan.name], found[second][plan.name] = second, first
+    return found
+
+
+def move(plan: JointPlan, tree: Tree, state: State) -> None:
+    """Carry one side of a joint to its start, in place."""
+    moved, base, sign = side(plan.first, plan, tree), plan.second or WORLD, 1.0
+    if WORLD in moved:
+        moved, base, sign = side(base, plan, tree), plan.first, -1.0
+    for coordinate, value in zip(plan.kind.coordinates, plan.start, strict=True):
+        placed, pivot = sockets(plan, state)
+        axis, angle = np.asarray(coordinate.axis(placed), float), sign * value * coordinate.turns
+        motion = Motion(
+            pivot=pivot,
+            shift=(sign * value - angle) * axis,
+            turn=np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * axis]),
+        )
+        for name in moved:
+            carry_body(name, base, motion, state)
+
+
+def side(start: str, cut: JointPlan, tree: Tree) -> list[str]:
+    """The bodies that hang together with one, were the joint ``cut`` not there; with the world if that holds them."""
+    found, queue = {start: None}, [start]
+    while queue:
+        for joint, other in tree[queue.pop()].items():
+            if joint != cut.name and other not in found:
+                found[other] = None
+                if other != WORLD:
+                    queue.append(other)
+    return list(found)
+
+
+def sockets(plan: JointPlan, state: State) -> tuple[Placed, Array]:
+    """Both sockets in the world, and (3,) [m] where the second is."""
+    axes, points = [], []
+    for name, socket in zip((plan.first, plan.second or WORLD), plan.sockets, strict=True):
+        lies = pose(name, state)
+        axes.append(lies.axes @ np.array(rotation.matrix(np.array(socket.orientation)), float))
+        points.append(lies.to_world(np.array(socket.point)))
+    return Placed(axes[0], axes[1], points[0] - points[1]), points[1]
+
+
+def carry_body(name: str, base: str, motion: Motion, state: State) -> None:
+    """Carry a body, in place; ``base`` is what it moves against."""
+    axes = np.array(rotation.matrix(motion.turn), float)
+    before = state[f"{name}.position"]
+    after = motion.pivot + axes @ (before - motion.pivot) + motion.shift
+    velocity, spin, centre = drift(base, state)
+    own = state[f"{name}.velocity"] - velocity - np.cross(spin, before - centre)
+    state[f"{name}.velocity"] = velocity + np.cross(spin, after - centre) + axes @ own
+    state[f"{name}.angular_velocity"] = spin + axes @ (state[f"{name}.angular_velocity"] - spin)
+    state[f"{name}.position"] = after
+    orientation = np.array(rotation.multiply(motion.turn, state[f"{name}.orientation"]), float).ravel()
+    state[f"{name}.orientation"] = orientation / np.linalg.norm(orientation)
+
+
+def drift(name: str, state: State) -> tuple[Array, Array, Array]:
+    """(3,) [m/s], (3,) [rad/s] and (3,) [m]: velocity, angular velocity and place of a body, or of the world."""
+    if name == WORLD:
+        return np.zeros(3), np.zeros(3), np.zeros(3)
+    return state[f"{name}.velocity"], state[f"{name}.angular_velocity"], state[f"{name}.position"]

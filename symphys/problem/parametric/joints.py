@@ -1,0 +1,85 @@
+"""The plan of a joint, with numbers that may be replaced."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import TypeVar
+
+from symphys.model.joints import Joint, Kind, Limits, Motor, Socket, Spring
+from symphys.problem.parametric.parts import Numbers, PairPlan, Value
+
+WORLD = "world"
+Part = TypeVar("Part", bound=Motor | Spring)
+
+
+@dataclass(frozen=True)
+class JointPlan:
+    """A joint.
+
+    Attributes:
+        name: unique among bodies, static surfaces, joints and variables.
+        kind: what it locks.
+        first, second: names of the body whose coordinates count and of what they are measured against; None: the world.
+        sockets: of the first and of the second.
+        motor, limits, spring: along every coordinate.
+        frequency: [Hz] of a joint that gives way; 0: rigid.
+        damping: its damping ratio.
+        collide: whether the two bodies may touch each other.
+        start: the coordinates at the start; empty: all 0, as the bodies lie in the file.
+    """
+
+    name: str
+    kind: Kind
+    first: str
+    second: str | None
+    sockets: tuple[Socket, Socket]
+    motor: Motor | None
+    limits: Limits
+    spring: Spring | None
+    frequency: float = 0.0
+    damping: float = 1.0
+    collide: bool = False
+    start: tuple[float, ...] = ()
+
+    @property
+    def apart(self) -> PairPlan | None:
+        """That its bodies do not touch each other, as a [[pair]] table would say it; None where they may."""
+        if self.collide or self.second is None:
+            return None
+        return PairPlan(f"{self.second}-{self.first}", frozenset((self.first, self.second)), False, {})
+
+    @property
+    def anchor(self) -> str:
+        """The parameter that says where the joint is on its second side, (3,) [m]: body frame, or the world's."""
+        return f"{self.name}.anchor"
+
+    def parameters(self) -> dict[str, Numbers]:
+        """Parameter names and values: those of motor and spring, and the anchor."""
+        parts = [part for part in (self.motor, self.spring) if part is not None]
+        found = {f"{self.name}.{key}": getattr(part, key) for part in parts for key in given(part)}
+        return found | {self.anchor: self.sockets[1].point}
+
+    def joint(self, places: Mapping[str, int], value: Value) -> Joint:
+        """The joint with its parameters' values; ``places`` has the indices of bodies."""
+        return Joint(
+            name=self.name,
+            kind=self.kind,
+            first=places[self.first],
+            second=None if self.second is None else places[self.second],
+            sockets=(self.sockets[0], replace(self.sockets[1], point=value(self.anchor))),
+            motor=None if self.motor is None else self._valued(self.motor, value),
+            limits=self.limits,
+            spring=None if self.spring is None else self._valued(self.spring, value),
+            frequency=self.frequency,
+            damping=self.damping,
+        )
+
+    def _valued(self, part: Part, value: Value) -> Part:
+        """Motor or spring with its parameters' values."""
+        return replace(part, **{key: value(f"{self.name}.{key}") for key in given(part)})
+
+
+def given(part: Motor | Spring) -> list[str]:
+    """The numbers that there are."""
+    return [field.name for field in fields(part) if getattr(part, field.name) is not None]

@@ -1,0 +1,147 @@
+"""The plan of a world: bodies, statics and who touches whom under which law, with numbers that may be replaced.
+
+The rule for a pair of surfaces: what its [[pair]] table states holds. Else friction and restitution are the product
+of what the two surfaces state, torsion and rolling (lengths) their sum. Where neither states it, [contact] holds.
+A [[pair]] of two surfaces goes before one of a surface and a group, and that one before one of groups.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.model.shapes import Scalar, Static
+from symphys.model.world import Body, Law, Pair, Side, World, points_of
+from symphys.problem.parametric.collision_filter import Meetings
+from symphys.problem.parametric.joints import JointPlan
+from symphys.problem.parametric.parts import COMBINE, VARIABLE, BodyPlan, PairPlan, Part, StaticPlan, Value
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class WorldPlan:
+    """Everything that a world is built from.
+
+    Attributes:
+        bodies, statics, pairs: in the file's order; of the statics first the ground, then planes, blocks, terrain.
+        contact: the law where nothing else is stated.
+        gravity: (3,) [m/s^2].
+        joints: in the file's order.
+    """
+
+    bodies: tuple[BodyPlan, ...]
+    statics: tuple[StaticPlan, ...]
+    pairs: tuple[PairPlan, ...]
+    contact: Law
+    gravity: tuple[float, float, float]
+    joints: tuple[JointPlan, ...] = ()
+
+    def parameters(self) -> dict[str, Array]:
+        """Every parameter with its value: (1,), or (3,) for gravity, the size of a box and the place of a block."""
+        found = {"gravity": np.array(self.gravity)}
+        parts: tuple[Part | PairPlan | JointPlan, ...] = (*self.parts, *self.pairs, *self.joints)
+        for part in parts:
+            found |= {name: np.atleast_1d(np.array(numbers, float)) for name, numbers in part.parameters().items()}
+        return found
+
+    def world(self, overrides: Mapping[str, Any]) -> World:
+        """The world with some parameters replaced; KeyError for a name that is none."""
+        nominal = self.parameters()
+        for name in overrides:
+            if name not in nominal:
+                raise KeyError(f"{name!r} is no parameter; there are {', '.join(nominal)}")
+
+        def value(name: str) -> Any:
+            count = nominal[name].size
+            if name not in overrides:
+                return float(nominal[name][0]) if count == 1 else tuple(nominal[name].tolist())
+            return overrides[name] if count == 1 else tuple(overrides[name][i] for i in range(count))
+
+        bodies = tuple(plan.body(overrides, value) for plan in self.bodies)
+        statics = tuple(plan.static(value) for plan in self.statics)
+        places = {body.name: index for index, body in enumerate(bodies)}
+        joints = tuple(plan.joint(places, value) for plan in self.joints)
+        return World(bodies, statics, self._pairs(bodies, statics, value), value("gravity"), joints)
+
+    @cached_property
+    def parts(self) -> tuple[Part, ...]:
+        """Bodies, then statics."""
+        return (*self.bodies, *self.statics)
+
+    @cached_property
+    def meetings(self) -> tuple[tuple[int, int], ...]:
+        """Every two parts that may touch, as places in ``parts``: each lets the other, and nothing forbids it."""
+        return tuple(Meetings(self.parts, (*self.pairs, *self.jointed)).pairs())
+
+    @cached_property
+    def jointed(self) -> tuple[PairPlan, ...]:
+        """As [[pair]] tables: the bodies that joints hold together do not touch each other."""
+        return tuple(joint.apart for joint in self.joints if joint.apart is not None)
+
+    def _pairs(self, bodies: tuple[Body, ...], statics: tuple[Static, ...], value: Value) -> tuple[Pair, ...]:
+        """As ``world.all_pairs`` has them: first what is against statics, then what is against later bodies."""
+        laws = {(i, j): self.law(self.parts[i].name, self.parts[j].name, value) for i, j in self.meetings}
+        sides = [[Side(i, k) for k in range(len(body.shapes))] for i, body in enumerate(bodies)]
+        sides += [[Side(None, k)] for k in range(len(statics))]
+        both = [(a, b, laws[i, j]) for i, j in self.meetings for a in sides[i] for b in sides[j]]
+
+        def place(entry: tuple[Side, Side, Law]) -> tuple[int, ...]:
+            a, b, _ = entry
+            return (
+                (0, a.body or 0, a.shape, 0, b.shape) if b.body is None else (1, a.body or 0, a.shape, b.body, b.shape)
+            )
+
+        both.sort(key=place)
+        return tuple(pair for a, b, law in both for pair in points_of(bodies, statics, a, b, law))
+
+    def owners(self, pair: Pair) -> tuple[str, str]:
+        """The names of the two bodies, or of the body and the static surface."""
+        sides = (pair.first, pair.second)
+        first, second = (
+            self.statics[side.shape].name if side.body is None else self.bodies[side.body].name for side in sides
+        )
+        return first, second
+
+    def lets(self, a: str, b: str) -> bool:
+        """Whether ``a`` lets ``b`` touch it, as far as collides_with goes."""
+        mates, other = self._named[a].mates, self._named[b]
+        return mates is None or b in mates or other.group in mates
+
+    def pair(self, a: str, b: str) -> PairPlan | None:
+        """The [[pair]] table that holds for the two surfaces, if there is one."""
+        g, h = self._named[a].group, self._named[b].group
+        for names in ((a, b), (a, h), (g, b), (g, h)):
+            found = self._tables.get(frozenset(names))
+            if found is not None:
+                return found
+        return None
+
+    @cached_property
+    def _named(self) -> dict[str, Part]:
+        return {part.name: part for part in self.parts}
+
+    @cached_property
+    def _tables(self) -> dict[frozenset[str | None], PairPlan]:
+        return {frozenset(pair.between): pair for pair in self.pairs}
+
+    def law(self, a: str, b: str, value: Value) -> Law:
+        """The contact law of the two by the rule above; friction and restitution with their parameters' values."""
+        pair = self.pair(a, b)
+        own = pair.states if pair else {}
+        states = {name: self._named[name].states for name in (a, b)}
+        found: dict[str, Scalar] = {}
+        for key, combine in COMBINE.items():
+            if pair and key in own:
+                found[key] = value(f"{pair.name}.{key}") if key in VARIABLE else own[key]
+                continue
+            sides = [value(f"{x}.{key}") if key in VARIABLE else states[x][key] for x in (a, b) if key in states[x]]
+            if sides:
+                found[key] = combine(sides)
+        found |= {key: own[key] for key in ("frequency", "damping") if key in own}
+        return replace(self.contact, **found)

@@ -1,0 +1,1 @@
+"""From a path to parsed tables, and how faults of a file are collected and worded."""

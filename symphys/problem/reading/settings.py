@@ -1,0 +1,92 @@
+"""Settings such as ``simulation.dt = 0.005`` or ``body.ball.mass = 2``, put into the parsed file before validation."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+from symphys.errors import Issue, ProblemError
+from symphys.problem.reading.value_texts import shown
+from symphys.problem.schema import Document
+from symphys.suggest import hint, quote
+
+OPENED = ("simulation", "world", "contact", "objective", "solver")
+"""Tables that a setting may open; it adds no body, surface, variable or aim."""
+
+
+class SettingError(Exception):
+    """Why a setting has no place."""
+
+
+def apply_settings(
+    data: dict[str, Any], settings: Mapping[str, object], file: str, shared: Collection[str] = ()
+) -> None:
+    """Change ``data`` in place; ProblemError names every setting that has no place in the file.
+
+    ``shared``: lists with tables of included files, which are not replaced as a whole.
+    """
+    issues = []
+    for path, value in settings.items():
+        try:
+            if path in shared:
+                raise SettingError("included files have tables in this list; set what is in them by name")
+            assign(data, path, value)
+        except SettingError as error:
+            issues.append(Issue(f"setting {quote(path)}", str(error)))
+    if issues:
+        raise ProblemError(file, issues)
+
+
+def assign(data: dict[str, Any], path: str, value: object) -> None:
+    """Walk down the dotted path, in which names may hold dots themselves, and set what is at its end."""
+    node: Any = data
+    open_below, rest = False, path
+    while True:
+        key, remainder = step(node, rest, top=node is data)
+        if remainder is None:
+            node[key] = value
+            return
+        if isinstance(node, dict) and key not in node:
+            if not (open_below or (node is data and key in OPENED)):
+                raise SettingError(unopened(node, str(key), node is data))
+            node[key] = {}
+        open_below = open_below or (node is data and key == "solver")
+        node, rest = node[key], remainder
+
+
+def step(node: Any, rest: str, top: bool) -> tuple[str | int, str | None]:
+    """The next key or index of the path, and what is left of it; None at its end."""
+    if isinstance(node, dict):
+        names: dict[str, str | int] = {key: key for key in node}
+    elif isinstance(node, list):
+        names = {name: index for index, entry in enumerate(node) for name in entry_names(entry, index)}
+    else:
+        raise SettingError(f"{shown(node)} has no {quote(rest)} in it")
+    found = max((name for name in names if rest == name or rest.startswith(f"{name}.")), key=len, default=None)
+    if found is not None:
+        return names[found], (rest[len(found) + 1 :] if len(rest) > len(found) else None)
+    head, _, remainder = rest.partition(".")
+    if isinstance(node, list):
+        raise SettingError(f"there is no {quote(head)}; {hint(head, names)}")
+    if not remainder and top and head not in Document.model_fields:
+        raise SettingError(unopened(node, head, top))
+    return head, remainder or None
+
+
+def entry_names(entry: object, index: int) -> Sequence[str]:
+    """What a table of a list may be called: its name, for a pair ``a-b``, and always its index."""
+    names = [str(index)]
+    if isinstance(entry, dict):
+        between = entry.get("between")
+        if isinstance(entry.get("name"), str):
+            names.append(entry["name"])
+        if isinstance(between, list):
+            names.append("-".join(str(name) for name in between))
+    return names
+
+
+def unopened(node: Mapping[str, Any], key: str, top: bool) -> str:
+    """Why a missing table is not made."""
+    if top and key in Document.model_fields:
+        return f"the file has no {quote(key)}, and a setting cannot add one"
+    return f"there is no {quote(key)}; {hint(key, [*node, *(OPENED if top else ())])}"

@@ -1,0 +1,86 @@
+"""Solver options: raw [solver.NAME] tables checked against a solver's frozen dataclass, which the caller brings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import MISSING, Field, fields
+from math import isnan
+from typing import Any, TypeVar, get_type_hints
+
+from pydantic import BaseModel, ConfigDict, ValidationError, create_model
+from pydantic_core import to_json
+
+from symphys.errors import Issue, ProblemError, SymphysError
+from symphys.problem.reading.faults import Faults
+from symphys.problem.reading.messages import report
+from symphys.suggest import hint, quote
+
+Options = TypeVar("Options")
+
+
+def validate_options(cls: type[Options], table: Mapping[str, object], file: str, where: str) -> Options:
+    """An instance of the dataclass ``cls`` with the values of a table; what the table leaves out keeps its default.
+
+    Args:
+        cls: a frozen dataclass; its annotations say what is valid.
+        table: raw values, as TOML gives them.
+        file: for messages.
+        where: the table's place in the file, for instance ``solver.gradient``.
+
+    Raises:
+        ProblemError: names unknown keys with the nearest valid ones, and values of the wrong kind.
+    """
+    faults = Faults(file, {where: table})
+    given = read_options(options_model(cls), table, where, faults)
+    faults.stop_if_any()
+    try:
+        return cls(**given)
+    except (ValueError, SymphysError) as error:
+        raise ProblemError(file, [Issue(where, str(error))]) from None
+
+
+def read_options(model: type[BaseModel], table: Mapping[str, object], where: str, faults: Faults) -> dict[str, Any]:
+    """The values that the table gives, in the kinds of the model; empty after a complaint."""
+    for key, value in table.items():
+        if any(isinstance(item, float) and isnan(item) for item in (value if isinstance(value, list) else [value])):
+            faults.add((where, key), "must be a number, not nan")
+    try:
+        # as JSON, a list may become a tuple and a text an enum, and nothing else is converted
+        given = model.model_validate_json(to_json(table, inf_nan_mode="constants"))
+    except ValidationError as error:
+        report(error, model, faults, (where,))
+    except (ValueError, RecursionError) as error:
+        faults.add((where,), f"cannot be used: {error}")
+    else:
+        return {key: getattr(given, key) for key in given.model_fields_set}
+    return {}
+
+
+def require_solvers(tables: Iterable[str], asked: Iterable[str], known: Iterable[str], file: str) -> None:
+    """ProblemError if a [solver.NAME] table, or a name that the file's ``solvers`` asks for, is that of no solver."""
+    names = list(known)
+    told = [(f"solver.{name}", name) for name in tables]
+    told += [(f"solvers[{k}]", name) for k, name in enumerate(asked)]
+    issues = [
+        Issue(where, f"there is no solver {quote(name)}; {hint(name, names)}")
+        for where, name in told
+        if name not in names
+    ]
+    if issues:
+        raise ProblemError(file, issues)
+
+
+def options_model(cls: type[Any]) -> type[BaseModel]:
+    """The pydantic model of a dataclass: the same keys, kinds and defaults, strict and without others."""
+    kinds = get_type_hints(cls, include_extras=True)
+    entries: dict[str, Any] = {field.name: (kinds[field.name], default(field)) for field in fields(cls) if field.init}
+    return create_model(
+        cls.__name__, __config__=ConfigDict(extra="forbid", strict=True), __doc__=cls.__doc__, **entries
+    )
+
+
+def default(field: Field[Any]) -> Any:
+    """The default of a dataclass field; ``...`` for none."""
+    if field.default is not MISSING:
+        return field.default
+    return ... if field.default_factory is MISSING else field.default_factory()

@@ -1,0 +1,105 @@
+"""The [[body]] tables: mass, inertia and state at the start."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import hypot
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.model.shapes import Shape
+from symphys.problem.checks.inertia import centre_of_mass, complaint, volume
+from symphys.problem.checks.magnitude import check_magnitudes
+from symphys.problem.parametric.parts import COMBINE, BodyPlan
+from symphys.problem.parametric.sizes import extent
+from symphys.problem.reading.faults import Faults
+from symphys.problem.schema.physics import BodyTable, SurfaceTable
+from symphys.problem.tables.shapes import read_orientation, read_shape
+
+Array = NDArray[np.float64]
+OFF_CENTRE = 1e-6
+"""How far a compound's centre of mass may be from the body's origin, relative to the size of the compound."""
+
+
+def read_body(index: int, table: BodyTable, faults: Faults) -> BodyPlan:
+    """The plan of one body; notes a mass or inertia that is missing, doubled or impossible."""
+    place = ("body", index)
+    before = len(faults.issues)
+    shapes = read_shape(place, table.shape, faults)
+    single = table.shape.sphere if table.shape else None
+    hollow = single is not None and single.hollow
+    density = read_density(place, table, hollow, faults)
+    check_inertia(place, table, shapes, faults)
+    mass = table.mass or (density or 0.0) * sum(volume(shape) for shape in shapes)
+    plan = BodyPlan(
+        name=table.name,
+        mass=mass,
+        density=density if len(shapes) == 1 else None,
+        shapes=shapes,
+        hollow=hollow,
+        inertia=frozen(table.inertia),
+        states=states(table),
+        mates=None if table.collides_with is None else frozenset(table.collides_with),
+        group=table.group,
+    )
+    if len(faults.issues) == before:
+        check_magnitudes(place, table, plan, faults)
+    return plan
+
+
+def read_density(place: tuple[str, int], table: BodyTable, hollow: bool, faults: Faults) -> float | None:
+    """The density, where the mass is given by it."""
+    if (table.mass is None) == (table.density is None):
+        faults.add((*place, "mass"), "give either mass [kg] or density [kg/m^3]")
+    elif table.density is not None and table.shape is None:
+        faults.add((*place, "density"), "a body without a shape has no volume; give mass and inertia")
+    elif table.density is not None and hollow:
+        faults.add((*place, "density"), "a hollow sphere is a thin shell without volume; give mass")
+    return table.density
+
+
+def check_inertia(place: tuple[str, int], table: BodyTable, shapes: Sequence[Shape], faults: Faults) -> None:
+    """A given inertia must be possible; one that is not given must follow from the shape."""
+    if table.inertia is not None:
+        reason = complaint(table.inertia)
+        if reason:
+            faults.add((*place, "inertia"), reason)
+    elif table.shape is None:
+        faults.add((*place, "inertia"), "this key is required for a body without a shape")
+    elif shapes:
+        centre = centre_of_mass(shapes)
+        off = float(np.linalg.norm(centre))
+        size = max(hypot(*shape.centre) + extent(shape) for shape in shapes)
+        if not off <= OFF_CENTRE * size:
+            key = "spheres" if table.shape.spheres else "parts"
+            listed = ", ".join(f"{c:.6g}" for c in centre)
+            faults.add(
+                (*place, "shape", key),
+                f"the centre of mass of these {key} is {off:.4g} m from the body's origin, at [{listed}]; "
+                "subtract that from every centre, or give inertia",
+            )
+
+
+def read_state(table: BodyTable, index: int, faults: Faults) -> dict[str, Array]:
+    """The state at the start by name."""
+    given = {
+        "position": np.array(table.position),
+        "orientation": read_orientation(("body", index, "orientation"), table.orientation, faults),
+        "velocity": np.array(table.velocity),
+        "angular_velocity": np.array(table.angular_velocity),
+    }
+    return {f"{table.name}.{key}": value for key, value in given.items()}
+
+
+def states(table: SurfaceTable) -> dict[str, float]:
+    """The coefficients that a table states."""
+    given = {key: getattr(table, key) for key in COMBINE}
+    return {key: value for key, value in given.items() if value is not None}
+
+
+def frozen(inertia: object) -> object:
+    """Lists as tuples, numbers as floats."""
+    if isinstance(inertia, list):
+        return tuple(frozen(item) for item in inertia)
+    return float(inertia) if isinstance(inertia, int | float) else None

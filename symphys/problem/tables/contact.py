@@ -1,0 +1,171 @@
+"""Contact and pairs: who may touch whom, and under which law."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from symphys.model.world import Law
+from symphys.problem.model import Variable
+from symphys.problem.parametric.parts import BodyPlan, PairPlan
+from symphys.problem.parametric.world import WorldPlan
+from symphys.problem.reading.faults import Faults, Place
+from symphys.problem.schema import Document
+from symphys.problem.schema.physics import ContactTable, PairTable
+from symphys.problem.tables.bodies import states
+from symphys.suggest import hint, quote
+
+
+def read_contact(table: ContactTable) -> Law:
+    """The law where nothing else is stated."""
+    given = table.model_dump(exclude={"damping"})
+    return Law(**given) if table.damping is None else Law(**given, damping=table.damping)
+
+
+def read_pairs(
+    tables: Sequence[PairTable], names: Sequence[str], groups: Sequence[str], faults: Faults
+) -> tuple[PairPlan, ...]:
+    """The [[pair]] tables; notes names that do not exist and pairs that are stated twice."""
+    pairs: list[PairPlan] = []
+    first: dict[frozenset[str], int] = {}
+    for index, table in enumerate(tables):
+        place = ("pair", index)
+        a, b = table.between
+        for name in dict.fromkeys(table.between):
+            if name not in names and name not in groups:
+                known = [*names, *groups]
+                faults.add((*place, "between"), f"no surface or group is called {quote(name)}; {hint(name, known)}")
+        between = frozenset((a, b))
+        if a == b and a in names:
+            faults.add((*place, "between"), "names the same surface twice")
+        if first.setdefault(between, index) != index:
+            other = faults.elsewhere(place, ("pair", first[between]))
+            faults.add((*place, "between"), f"{a} and {b} already have a [[pair]] table{other}")
+        own = states(table) | {
+            key: value for key in ("frequency", "damping") if (value := getattr(table, key)) is not None
+        }
+        if own and not table.collide:
+            faults.add((*place, "collide"), f"with false, {', '.join(own)} would have no effect; leave one out")
+        pairs.append(PairPlan(f"{a}-{b}", between, table.collide, own))
+    return tuple(pairs)
+
+
+def check_mates(
+    bodies: Sequence[BodyPlan], names: Sequence[str], groups: Sequence[str], document: Document, faults: Faults
+) -> None:
+    """Every name in collides_with must be another body's, a static surface's or a group's."""
+    known = {*names, *groups}
+    for index, body in enumerate(bodies):
+        for name in document.body[index].collides_with or ():
+            if name not in known or name == body.name:
+                others = [other for other in (*names, *groups) if other != body.name]
+                message = f"no other body, no static surface and no group is called {quote(name)}; {hint(name, others)}"
+                faults.add(("body", index, "collides_with"), message)
+
+
+def check_ranks(plan: WorldPlan, faults: Faults) -> None:
+    """Where two [[pair]] tables of a surface and a group both hold for two surfaces, they must say the same."""
+    groups = {part.name: part.group for part in plan.parts}
+    found: dict[tuple[str | None, str | None], Rivals] = {}
+    for index, pair in enumerate(plan.pairs):
+        own = {name for name in pair.between if name in groups}
+        others = pair.between - own
+        if len(own) == 1 and others:
+            (name,), (group,) = own, others
+            found.setdefault((group, groups[name]), {}).setdefault(statement(pair), []).append((index, name))
+    for (shared, home), rivals in found.items():
+        for index, name in (entry for entries in rivals.values() for entry in entries):
+            rival = rival_of(plan, index, name, found.get((home, shared), {}))
+            if rival is not None and rival[0] < index:
+                other, place = rival[1], ("pair", index)
+                text = (
+                    f"for {name} and {other}, this table and {faults.called(('pair', rival[0]), place)} say different "
+                    "things; add a [[pair]] "
+                    f'between = ["{name}", "{other}"], which goes before both'
+                )
+                faults.add((*place, "between"), text)
+
+
+Statement = tuple[object, ...]
+Rivals = dict[Statement, list[tuple[int, str]]]
+"""[[pair]] tables by what they say: (index, the surface that it names)."""
+
+
+def statement(pair: PairPlan) -> Statement:
+    """What a table says."""
+    return (pair.collide, *sorted(pair.states.items()))
+
+
+def rival_of(plan: WorldPlan, index: int, name: str, rivals: Rivals) -> tuple[int, str] | None:
+    """The first of other tables, with its surface, that contradicts a table for the surface called ``name``."""
+    bodies = {body.name for body in plan.bodies}
+    mine = statement(plan.pairs[index])
+    for place, other in (entry for said, entries in rivals.items() if said != mine for entry in entries):
+        table = plan.pair(name, other)
+        settled = table is not None and table.between == {name, other}
+        meet = bodies & {name, other} and plan.lets(name, other) and plan.lets(other, name)
+        if other != name and meet and not settled:
+            return place, other
+    return None
+
+
+def check_laws(plan: WorldPlan, faults: Faults) -> None:
+    """A contact is either soft or has restitution; a [[pair]] table must belong to surfaces that may touch."""
+    check_ranks(plan, faults)
+    laws = {plan.owners(pair): pair.law for pair in plan.world({}).pairs}
+    used = set()
+    for owners, law in laws.items():
+        table = plan.pair(*owners)
+        used.add(table and table.name)
+        if law.soft and law.restitution:
+            faults.add(law_place(plan, table), f"{' and '.join(sorted(owners))}: {either(law)}")
+    for index, pair in enumerate(plan.pairs):
+        if pair.collide and pair.name not in used:
+            faults.add(("pair", index, "between"), unused(plan, pair))
+    check_damping(plan, faults)
+
+
+def check_varied(plan: WorldPlan, variables: Sequence[Variable | None], faults: Faults) -> None:
+    """A variable must not give restitution to soft contacts."""
+    soft = {name for pair in plan.world({}).pairs if pair.law.soft for name in plan.owners(pair)}
+    soft |= {pair.name for pair in plan.pairs if pair.states.get("frequency", plan.contact.frequency)}
+    for index, variable in enumerate(variables):
+        for slot in variable.slots if variable else ():
+            owner, _, key = slot.name.rpartition(".")
+            if key == "restitution" and owner in soft:
+                text = f"{slot.name} cannot vary: {owner} has soft contacts, which have no restitution"
+                faults.add(("variable", index, "sets"), text)
+
+
+def either(law: Law) -> str:
+    """The message for a contact that is both."""
+    return (
+        f"a contact is either soft (frequency {law.frequency:g} Hz) or has restitution ({law.restitution:g}); "
+        "leave one out, or make one of them 0 for these two in a [[pair]] table"
+    )
+
+
+def unused(plan: WorldPlan, pair: PairPlan) -> str:
+    """The message for a [[pair]] table that holds for no two surfaces."""
+    if any(pair.between == jointed.between for jointed in plan.jointed):
+        return "a joint holds these two, which do not touch unless it says collide = true"
+    if pair.between <= {part.name for part in plan.parts}:
+        return "these two never touch, so that nothing can be stated about them"
+    return "no two of these ever touch, or tables that name them more closely go before this one: it has no effect"
+
+
+def law_place(plan: WorldPlan, table: PairPlan | None) -> Place:
+    """Where the frequency of a pair is stated."""
+    if table and "frequency" in table.states:
+        return ("pair", plan.pairs.index(table), "frequency")
+    return ("contact", "frequency")
+
+
+def check_damping(plan: WorldPlan, faults: Faults) -> None:
+    """Damping without softness would have no effect."""
+    stated = faults.data.get("contact", {})
+    soft = plan.contact.soft or any(pair.states.get("frequency") for pair in plan.pairs)
+    if "damping" in stated and not soft:
+        faults.add(("contact", "damping"), "has no effect on rigid contacts; give frequency too")
+    for index, pair in enumerate(plan.pairs):
+        if "damping" in pair.states and not pair.states.get("frequency", plan.contact.frequency):
+            faults.add(("pair", index, "damping"), "has no effect on a rigid contact; give frequency too")

@@ -1,0 +1,185 @@
+"""The [[controller]] tables: what they drive, what they sense, and their numbers at the start."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.model.controllers import Given, Law, Linear, Net, Periodic
+from symphys.problem.checks.memory import check_net
+from symphys.problem.feedback import Controller, Sensor
+from symphys.problem.quantities import Quantity, SlotError, read_slot
+from symphys.problem.reading.faults import Faults, Place
+from symphys.problem.schema.control import ControllerTable, NetTable
+from symphys.problem.tables.weights import random_weights, read_weights
+from symphys.suggest import hint, quote
+
+Array = NDArray[np.float64]
+KINDS = {
+    "linear": "linear = {}",
+    "periodic": "periodic = { frequency = 1.5 }",
+    "net": "net = { hidden = [32, 32] }",
+    "function": "function = {}",
+}
+
+
+def read_controllers(
+    tables: Sequence[ControllerTable],
+    sensors: Sequence[Sensor],
+    known: Mapping[str, Quantity],
+    functions: Mapping[str, ca.Function],
+    faults: Faults,
+    varied: Collection[str] = (),
+) -> tuple[Controller, ...]:
+    """Every controller that is clear.
+
+    Args:
+        tables: as they are in the file.
+        sensors: that they may use.
+        known: every quantity; those of kind "control" can be driven.
+        functions: by name, those that Python gives.
+        faults: gets what is wrong.
+        varied: names of quantities that variables set.
+    """
+    widths = {sensor.name: sensor.size for sensor in sensors}
+    readers = [Reader(index, table, widths, known, functions, faults, varied) for index, table in enumerate(tables)]
+    found = [reader.read() for reader in readers]
+    for name in functions.keys() - {table.name for table in tables if table.function is not None}:
+        faults.add(("controller",), f'Python gives a function {quote(name)}, but no controller "{name}" has function')
+    return tuple(controller for controller in found if controller)
+
+
+class Reader:
+    """Reads one table; every complaint lands below its place."""
+
+    def __init__(
+        self,
+        index: int,
+        table: ControllerTable,
+        widths: Mapping[str, int],
+        known: Mapping[str, Quantity],
+        functions: Mapping[str, ca.Function],
+        faults: Faults,
+        varied: Collection[str] = (),
+    ) -> None:
+        """Keep what all steps need."""
+        self.place: Place = ("controller", index)
+        self.table, self.widths, self.known, self.functions, self.faults = table, widths, known, functions, faults
+        self.varied = f"{table.name}.weights" in varied
+
+    def add(self, key: str, message: str) -> None:
+        """Note a fault of one key, or of a key of a table within."""
+        self.faults.add((*self.place, *key.split(".")), message)
+
+    def read(self) -> Controller | None:
+        """The controller; None if it is unclear what it is."""
+        before = len(self.faults.issues)
+        drives, senses = self.drives(), self.senses()
+        kind = self.kind()
+        if len(self.faults.issues) > before or kind is None:
+            return None
+        law = self.law(kind, senses, len(drives))
+        if law is None:
+            return None
+        numbers = {key: self.numbers(kind, key, size, law) for key, size in law.sizes.items()}
+        scale = self.spread_out("scale", self.table.scale, len(drives))
+        return Controller(self.table.name, law, tuple(self.table.senses), drives, scale, numbers)
+
+    def drives(self) -> tuple[tuple[str, int], ...]:
+        """Every input and component."""
+        found: list[tuple[str, int]] = []
+        inputs = {name: quantity for name, quantity in self.known.items() if quantity.kind == "control"}
+        for text in self.table.drives:
+            try:
+                slot = read_slot(text, inputs)
+            except SlotError as error:
+                self.add("drives", f"{error}; what can be driven are forces, torques and commands of motors")
+                continue
+            found += [(slot.name, component) for component in slot.components]
+        if len(set(found)) < len(found):
+            self.add("drives", "names the same input twice")
+        return tuple(found)
+
+    def senses(self) -> int:
+        """How many numbers are sensed."""
+        total = 0
+        for name in self.table.senses:
+            if name not in self.widths:
+                near = hint(name, self.widths) if self.widths else "there is none; add a [[sensor]]"
+                self.add("senses", f"no sensor is called {quote(name)}; {near}")
+            total += self.widths.get(name, 0)
+        return total
+
+    def kind(self) -> str | None:
+        """The one that is given."""
+        given = [name for name in KINDS if getattr(self.table, name) is not None]
+        if len(given) == 1:
+            return given[0]
+        start = f"has {' and '.join(given)}; give only" if given else "give"
+        self.faults.add(self.place, f"{start} one of {', '.join(KINDS.values())}")
+        return None
+
+    def law(self, kind: str, senses: int, outputs: int) -> Law | None:
+        """How outputs follow; None where it cannot be."""
+        table = self.table
+        if kind == "function":
+            return self.function(senses, outputs)
+        if table.periodic is not None:
+            if senses:
+                self.add("senses", "a periodic controller senses nothing; leave this out, or add another controller")
+            return Periodic(outputs, table.periodic.harmonics)
+        if not senses:
+            self.add("senses", f"a {kind} controller needs what it senses: names of sensors")
+            return None
+        if table.net is None:
+            return Linear(senses, outputs)
+        net = table.net
+        law = Net(senses, outputs, tuple(net.hidden), net.activation, net.output, net.biases, net.skip)
+        fits = check_net((*self.place, "net", "hidden"), law.sizes["weights"], self.varied, self.faults)
+        return law if fits else None
+
+    def function(self, senses: int, outputs: int) -> Law | None:
+        """The function that Python gives, if its sizes fit."""
+        given = self.functions.get(self.table.name)
+        if given is None:
+            text = f"comes from Python: load_problem(file, functions={{{quote(self.table.name)}: function}})"
+            self.add("function", f"{text}; the command line knows none")
+            return None
+        if given.n_in() != 3 or given.n_out() != 1:
+            self.add("function", f"takes {given.n_in()} arguments; it must be one of (sensed, time, weights)")
+            return None
+        for what, has, needs in (
+            ("arguments for what is sensed", given.numel_in(0), senses),
+            ("arguments for the time", given.numel_in(1), 1),
+            ("outputs", given.numel_out(0), outputs),
+        ):
+            if has != needs:
+                self.add("function", f"has {has} {what}; {needs} are needed")
+                return None
+        return Given(given)
+
+    def numbers(self, kind: str, key: str, size: int, law: Law) -> Array:
+        """(size,) the law's numbers at the start."""
+        table = getattr(self.table, kind)
+        if isinstance(table, NetTable) and isinstance(law, Net):
+            if table.weights is None:
+                return random_weights(law, table.spread, table.seed)
+            return read_weights(self.faults, (*self.place, "net", "weights"), table.weights, law)
+        return self.spread_out(f"{kind}.{key}", getattr(table, key, None) or 0.0, size)
+
+    def spread_out(self, key: str, value: object, size: int) -> Array:
+        """(size,): a number for all, or one for each."""
+        array = np.array(value, float) if regular(value) else np.zeros((0, 0))
+        if array.ndim and array.size != size:
+            self.add(key, f"must be a number, or {size} of them; it has {array.size}")
+            return np.zeros(size)
+        return np.broadcast_to(array.ravel() if array.ndim else array, (size,)).copy()
+
+
+def regular(value: Any) -> bool:
+    """Whether lists of lists are equally long."""
+    return not isinstance(value, list) or len({len(row) if isinstance(row, list) else 0 for row in value}) == 1

@@ -1,0 +1,206 @@
+"""The [[joint]] tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.model.joints import KINDS, Kind, Limits, Motor, Servo, Spring, TorqueMotor, VelocityMotor
+from symphys.problem.parametric.joints import WORLD, JointPlan
+from symphys.problem.reading.faults import Faults, Place
+from symphys.problem.schema.joints import JointTable, MotorTable, SpringTable
+from symphys.problem.tables.joint_frames import read_sockets
+from symphys.suggest import hint, quote
+
+Array = NDArray[np.float64]
+EXAMPLES = {
+    "ball": "ball = {}",
+    "hinge": "hinge = { axis = [0, 1, 0] }",
+    "slider": "slider = { axis = [1, 0, 0] }",
+    "universal": "universal = { axes = [[0, 1, 0], [1, 0, 0]] }",
+    "fixed": "fixed = {}",
+}
+
+
+def read_joints(
+    tables: Sequence[JointTable], bodies: Sequence[str], initial: Mapping[str, Array], faults: Faults
+) -> tuple[JointPlan, ...]:
+    """The [[joint]] tables; notes what is impossible, and loops in which nothing can move.
+
+    Args:
+        tables: as they are in the file.
+        bodies: the names of the bodies.
+        initial: their state at the start; see ``Problem.initial``.
+        faults: gets what is wrong.
+    """
+    found = [Reader(index, table, bodies, initial, faults).read() for index, table in enumerate(tables)]
+    check_loops(found, faults)
+    return tuple(plan for plan in found if plan)
+
+
+def check_loops(plans: Sequence[JointPlan | None], faults: Faults) -> None:
+    """Rigid fixed joints must not close a loop: what each of them carries would not be determined."""
+    whole: dict[str, str] = {}
+
+    def root(name: str) -> str:
+        while name in whole:
+            name = whole[name]
+        return name
+
+    for index, plan in enumerate(plans):
+        if plan is None or plan.kind.name != "fixed" or plan.frequency:
+            continue
+        a, b = root(plan.first), root(plan.second or WORLD)
+        if a == b:
+            text = (
+                f"{plan.second or WORLD} and {plan.first} are held together by other fixed joints already; leave this "
+                "one out, or let one of them give way with a frequency"
+            )
+            faults.add(("joint", index, "fixed"), text)
+        else:
+            whole[a] = b
+
+
+class Reader:
+    """Reads one table; every complaint lands below its place."""
+
+    def __init__(
+        self, index: int, table: JointTable, bodies: Sequence[str], initial: Mapping[str, Array], faults: Faults
+    ) -> None:
+        """Keep what all steps need."""
+        self.place: Place = ("joint", index)
+        self.table, self.bodies, self.initial, self.faults = table, bodies, initial, faults
+
+    def add(self, key: str, message: str) -> None:
+        """Note a fault of one key, or of a key of a table within."""
+        self.faults.add((*self.place, *key.split(".")), message)
+
+    def read(self) -> JointPlan | None:
+        """The joint; None if it is unclear what it holds together, or how."""
+        before, table = len(self.faults.issues), self.table
+        self.check_between()
+        kind = self.kind()
+        if len(self.faults.issues) > before or kind is None:
+            return None
+        self.check_acting(kind)
+        self.check_damping()
+        second, first = (None if name == WORLD else name for name in table.between)
+        assert first is not None
+        limits = self.limits(kind)
+        return JointPlan(
+            name=table.name,
+            kind=kind,
+            first=first,
+            second=second,
+            sockets=read_sockets(self.place, table, self.initial, self.faults),
+            motor=self.motor(table.motor),
+            limits=limits,
+            spring=read_spring(table.spring),
+            frequency=table.frequency,
+            damping=1.0 if table.damping is None else table.damping,
+            collide=table.collide,
+            start=self.start(kind, limits),
+        )
+
+    def check_between(self) -> None:
+        """Two bodies, or the world and a body."""
+        a, b = self.table.between
+        if WORLD in self.bodies:
+            text = f'a body is called "{WORLD}", which here means what stands still; give it another name'
+            self.add("between", text)
+            return
+        if a == b:
+            self.add("between", "names the same body twice" if a != WORLD else "needs a body")
+        elif b == WORLD:
+            self.add("between", f'the second must be a body, which moves against the first: ["{WORLD}", "{a}"]')
+        for name in dict.fromkeys(self.table.between):
+            if name not in self.bodies and name != WORLD:
+                known = [WORLD, *self.bodies]
+                self.add("between", f"no body is called {quote(name)}; {hint(name, known)}")
+
+    def kind(self) -> Kind | None:
+        """The one that is given."""
+        given = [name for name in EXAMPLES if getattr(self.table, name) is not None]
+        if len(given) == 1:
+            return KINDS[given[0]]
+        start = f"has {' and '.join(given)}; give only" if given else "give"
+        self.faults.add(self.place, f"{start} one of {', '.join(EXAMPLES.values())}")
+        return None
+
+    def check_acting(self, kind: Kind) -> None:
+        """What acts along coordinates needs some."""
+        if kind.coordinates:
+            return
+        for key in ("motor", "limits", "limits_deg", "start", "start_deg", "spring"):
+            if getattr(self.table, key) is not None:
+                which = f"a {kind.name} joint has no coordinate along which it could act"
+                self.add(key, f"{which}; leave it out, or take a hinge, a slider or a universal joint")
+
+    def check_damping(self) -> None:
+        """Damping without softness would have no effect."""
+        if self.table.damping is not None and not self.table.frequency:
+            self.add("damping", "has no effect on a rigid joint; give frequency too, or damping of a spring")
+
+    def motor(self, table: MotorTable | None) -> Motor | None:
+        """The one that is given."""
+        if table is None:
+            return None
+        given = [key for key in type(table).model_fields if getattr(table, key) is not None]
+        if len(given) != 1:
+            start = f"has {' and '.join(given)}; give only" if given else "give"
+            text = "servo = { gain = 20, torque = 30, velocity = 8 }, velocity = { torque = 30, velocity = 8 }, "
+            self.add("motor", f"{start} one of {text}torque = {{ torque = 30 }}")
+            return None
+        if table.servo is not None:
+            return Servo(table.servo.gain, table.servo.torque, table.servo.velocity, table.servo.range)
+        if table.velocity is not None:
+            return VelocityMotor(table.velocity.torque, table.velocity.velocity)
+        assert table.torque is not None
+        return TorqueMotor(table.torque.torque)
+
+    def limits(self, kind: Kind) -> Limits:
+        """In rad or m."""
+        table = self.table
+        if table.limits is not None and table.limits_deg is not None:
+            self.add("limits_deg", "limits are given too; leave one out")
+        slides = any(not coordinate.turns for coordinate in kind.coordinates)
+        if table.limits_deg is not None and slides:
+            self.add("limits_deg", f"a {kind.name} has no angle; give limits [m]")
+        degrees = [] if table.limits_deg is None else np.deg2rad(table.limits_deg).tolist()
+        ends = degrees if table.limits is None else table.limits
+        low, high = (end if isfinite(end) else None for end in ends or (np.inf, np.inf))
+        if not slides and any(end is not None and abs(end) > np.pi for end in (low, high)):
+            text = "an angle lies between -180 and 180 degrees (-pi and pi); -inf and inf are no bounds"
+            self.add("limits" if table.limits is not None else "limits_deg", text)
+        return Limits(low, high)
+
+    def start(self, kind: Kind, limits: Limits) -> tuple[float, ...]:
+        """In rad or m, within the limits; empty if none is given."""
+        table = self.table
+        key, given = ("start", table.start) if table.start_deg is None else ("start_deg", table.start_deg)
+        if given is None or not kind.coordinates:
+            return ()
+        count, turns = len(kind.coordinates), kind.coordinates[0].turns
+        if table.start is not None and table.start_deg is not None:
+            self.add("start_deg", "start is given too; leave one out")
+        if key == "start_deg" and not turns:
+            self.add(key, f"a {kind.name} has no angle; give start [m]")
+        if len(given) != count:
+            self.add(key, f"a {kind.name} has {count} coordinate{'s' * (count > 1)}, but {len(given)} are given")
+        values = tuple(np.deg2rad(given).tolist() if key == "start_deg" else given)
+        for value, written in zip(values, given, strict=True):
+            if turns and abs(value) > np.pi:
+                self.add(key, "an angle lies between -180 and 180 degrees (-pi and pi)")
+            elif (limits.lower is not None and value < limits.lower) or (
+                limits.upper is not None and value > limits.upper
+            ):
+                self.add(key, f"{written:g} is beyond the limits of this joint")
+        return values
+
+
+def read_spring(table: SpringTable | None) -> Spring | None:
+    """The spring along every coordinate."""
+    return None if table is None else Spring(table.stiffness, table.damping, table.rest)

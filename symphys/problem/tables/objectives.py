@@ -1,0 +1,128 @@
+"""The [[cost]], [[target]], [[constraint]] and [[output]] tables: formulas, tried once on the start of the guess."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.expression import Formula, FormulaError, parse
+from symphys.problem.model import Constraint, Cost, Output, Simulation, Target
+from symphys.problem.reading.faults import Faults, Place
+from symphys.problem.schema import Document
+from symphys.problem.schema.objectives import ConstraintTable, CostTable, OutputTable, TargetTable
+from symphys.problem.tables.simulation import check_moment
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Aims:
+    """All that should come out."""
+
+    costs: tuple[Cost, ...]
+    targets: tuple[Target, ...]
+    constraints: tuple[Constraint, ...]
+    outputs: tuple[Output, ...]
+
+
+def read_aims(document: Document, simulation: Simulation, sample: Mapping[str, Any], faults: Faults) -> Aims:
+    """Every aim; ``sample`` has a value for each name that a formula may use."""
+    reader = Reader(simulation, sample, faults)
+    costs = [reader.cost(index, table) for index, table in enumerate(document.cost)]
+    targets = [reader.target(index, table) for index, table in enumerate(document.target)]
+    constraints = [reader.constraint(index, table) for index, table in enumerate(document.constraint)]
+    outputs = [reader.output(index, table) for index, table in enumerate(document.output)]
+    return Aims(
+        tuple(cost for cost in costs if cost),
+        tuple(target for target in targets if target),
+        tuple(constraint for constraint in constraints if constraint),
+        tuple(output for output in outputs if output),
+    )
+
+
+class Reader:
+    """Reads one table at a time; None stands for one with a faulty formula."""
+
+    def __init__(self, simulation: Simulation, sample: Mapping[str, Any], faults: Faults) -> None:
+        """Keep what every table needs."""
+        self.simulation = simulation
+        self.sample = sample
+        self.faults = faults
+
+    def formula(self, place: Place, text: str, at: str | float) -> tuple[Formula, int] | None:
+        """The formula and the length of its value; notes why there is none."""
+        try:
+            formula = parse(text)
+            value = formula.evaluate(self.sample)
+        except FormulaError as error:
+            self.faults.add(place, str(error))
+            return None
+        if at in ("always", 0) and not ca.DM(value).is_regular():
+            self.faults.add(place, "is not a finite number at the start of the guess")
+        return formula, int(value.shape[0])
+
+    def cost(self, index: int, table: CostTable) -> Cost | None:
+        """One cost."""
+        place = ("cost", index)
+        check_moment(table.at, self.simulation, (*place, "at"), self.faults)
+        if (table.value is None) == (table.squares is None):
+            self.faults.add((*place, "value"), "give either value (a number) or squares (a vector)")
+            return None
+        squares = table.squares is not None
+        key = "squares" if squares else "value"
+        found = self.formula((*place, key), table.squares or table.value or "", table.at)
+        if found and not squares and found[1] != 1:
+            text = f"must be a number, but is a vector of {found[1]}; use squares instead of value, or sumsqr(...)"
+            self.faults.add((*place, key), text)
+        if squares and table.weight < 0:
+            self.faults.add((*place, "weight"), "a sum of squares needs a weight of at least 0; use value to maximise")
+        return found and Cost(table.name, found[0], table.at, table.weight, squares)
+
+    def target(self, index: int, table: TargetTable) -> Target | None:
+        """One target."""
+        place = ("target", index)
+        check_moment(table.at, self.simulation, (*place, "at"), self.faults)
+        found = self.formula((*place, "value"), table.value, table.at)
+        return found and Target(table.name, found[0], table.at, table.tolerance, table.weight)
+
+    def output(self, index: int, table: OutputTable) -> Output | None:
+        """One number that is told."""
+        place = ("output", index)
+        check_moment(table.at, self.simulation, (*place, "at"), self.faults)
+        found = self.formula((*place, "value"), table.value, table.at)
+        if found and found[1] != 1:
+            self.faults.add((*place, "value"), f"must be a number, but is a vector of {found[1]}; give one for each")
+        return found and Output(table.name, found[0], table.at, table.unit or "")
+
+    def constraint(self, index: int, table: ConstraintTable) -> Constraint | None:
+        """One constraint."""
+        place = ("constraint", index)
+        check_moment(table.at, self.simulation, (*place, "at"), self.faults)
+        found = self.formula((*place, "value"), table.value, table.at)
+        if table.equals is not None and (table.lower is not None or table.upper is not None):
+            self.faults.add((*place, "equals"), "stands instead of lower and upper; leave them out")
+        if table.equals is None and table.lower is None and table.upper is None:
+            self.faults.add((*place, "lower"), "give lower, upper or both, or equals")
+        if not found:
+            return None
+        ends = {"lower": -np.inf, "upper": np.inf}
+        lower, upper = (self.bound(place, table, key, default, found[1]) for key, default in ends.items())
+        if lower.shape == upper.shape and np.any(lower > upper):
+            self.faults.add((*place, "lower"), "exceeds upper")
+        return Constraint(table.name, found[0], table.at, lower, upper, table.tolerance, table.penalty)
+
+    def bound(self, place: Place, table: ConstraintTable, key: str, default: float, length: int) -> Array:
+        """(length,): one of the two bounds."""
+        key = key if table.equals is None else "equals"
+        given = getattr(table, key)
+        bound = np.atleast_1d(np.array(default if given is None else given, float))
+        if bound.ndim > 1 or bound.size not in (1, length):
+            wanted = f"a number or {length} numbers, as the value is a vector of {length}" if length > 1 else "a number"
+            self.faults.add((*place, key), f"must be {wanted}")
+            return np.full(length, default)
+        return np.broadcast_to(bound, length).copy()

@@ -1,0 +1,1 @@
+"""Figures of one quantity each, as SVG by matplotlib."""

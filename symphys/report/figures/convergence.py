@@ -1,0 +1,131 @@
+"""How solvers came to their results: objective and errors against work and time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from symphys.report.figures import style
+from symphys.report.figures.curves import QUANTITIES, Curve, Quantity, curve, median_curve, miss_so_far, told
+from symphys.results.discovery import Study
+from symphys.results.records import Array
+
+WORK, SECONDS = "equivalents", "seconds"
+AXIS_TITLES = {WORK: "work [rollout equivalents]", SECONDS: "time of the solve [s]"}
+MISS_FLOOR = 1e-3
+"""Errors below this share of the tolerance are drawn as this: nothing is gained below it."""
+
+
+def draw_convergence(study: Study) -> Figure | None:
+    """All solvers on one axis: objective, errors and what is told against rollout equivalents and against time."""
+    outputs = dict.fromkeys(name for run in study.runs for name in run.outputs)
+    asked = [*QUANTITIES, *((f"{name[:1].upper()}{name[1:]}, of the best so far", told(name)) for name in outputs)]
+    rows = [quantity for quantity in asked if any(curve(run, WORK, quantity[1]) for run in study.runs)]
+    columns = [x for x in (WORK, SECONDS) if any(np.isfinite(run.trace[x]).any() for run in study.runs)]
+    if not rows or not columns:
+        return None
+    figure = Figure(figsize=(style.WIDTH, 0.9 + 2.45 * len(rows)), layout="constrained")
+    grid = figure.subplots(len(rows), len(columns), sharex="col", sharey="row", squeeze=False)
+    for row, (title, quantity) in enumerate(rows):
+        for column, along in enumerate(columns):
+            draw_panel(grid[row, column], study, along, quantity)
+            grid[row, column].set_xlabel(AXIS_TITLES[along] if row == len(rows) - 1 else "")
+        grid[row, 0].set_title(title)
+        if quantity is miss_so_far:
+            mark_tolerance(list(grid[row]))
+    add_legend(figure, study)
+    return figure
+
+
+def draw_panel(axes: Axes, study: Study, along: str, quantity: Quantity) -> None:
+    """Thin lines for seeds, a strong one for their median, a mark at each end."""
+    marks = style.solver_marks(entry.solver for entry in study.entries)
+    floor = MISS_FLOOR if quantity is miss_so_far else -np.inf
+    seen_x, seen_y = [], []
+    for entry in study.entries:
+        colour, marker = marks[entry.solver]
+        pairs = [(run, curve(run, along, quantity)) for run in entry.runs]
+        curves = [raise_to(c, floor) for _, c in pairs if c is not None]
+        if not curves:
+            continue
+        if len(curves) > 1:
+            for single in curves:
+                draw_steps(axes, single, color=colour, linewidth=0.7, alpha=0.35)
+        middle = median_curve(curves)
+        draw_steps(axes, middle, color=colour, linewidth=1.9, zorder=3)
+        met = entry.solved * 2 > len(entry.runs)
+        face = colour if met else "white"
+        axes.plot(middle.x[-1], middle.y[-1], marker, color=colour, markerfacecolor=face, markersize=6, zorder=4)
+        seen_x += [c.x for c in curves]
+        seen_y += [c.y for c in curves]
+    if seen_x:
+        scale_panel(axes, np.concatenate(seen_x), np.concatenate(seen_y), quantity is miss_so_far)
+
+
+def raise_to(source: Curve, floor: float) -> Curve:
+    """The curve with all that lies below ``floor`` drawn at it."""
+    return Curve(source.x, np.maximum(source.y, floor))
+
+
+def scale_panel(axes: Axes, x: Array, y: Array, relative: bool) -> None:
+    """Logarithmic work and relative errors; an objective on the scale that fits it."""
+    fit_values(axes, y, relative)
+    positive = x[x > 0]
+    if positive.size:
+        style.set_log(axes, "x", positive)
+        axes.set_xlim(left=float(positive.min()) * 0.8)
+
+
+def fit_values(axes: Axes, values: Array, relative: bool) -> None:
+    """Logarithmic for errors relative to a tolerance, whatever fits for other values."""
+    positive = values[np.isfinite(values) & (values > 0)]
+    if relative and positive.size:
+        style.set_log(axes, "y", np.append(positive, 1.0))
+    else:
+        style.fit_scale(axes, "y", values)
+
+
+def draw_steps(axes: Axes, source: Curve, **look: object) -> None:
+    """A step function, thinned; x = 0 is drawn just left of the first positive x."""
+    x, y = style.thin(source.x, source.y[:, None], 400)
+    positive = x[x > 0]
+    first = float(positive.min()) * 0.8 if positive.size else 1.0
+    axes.plot(np.where(x > 0, x, first), y[:, 0], drawstyle="steps-post", **look)  # type: ignore[arg-type]
+
+
+def mark_tolerance(panels: Sequence[Axes]) -> None:
+    """The line at 1, and the region where everything is met."""
+    low, high = panels[0].get_ylim()
+    for axes in panels:
+        axes.axhspan(min(low, 0.5), 1, color=style.MET, linewidth=0, zorder=0.5)
+        axes.axhline(1, color=style.GREEN, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
+        axes.set_ylim(min(low, 0.5), max(high, 2))
+    panels[0].annotate(
+        "met below",
+        (0, 1),
+        xycoords=("axes fraction", "data"),
+        xytext=(5, -3),
+        textcoords="offset points",
+        ha="left",
+        va="top",
+        color="#00775a",
+        fontsize=8,
+    )
+
+
+def add_legend(figure: Figure, study: Study) -> None:
+    """Solvers by colour and mark, and what a hollow mark means."""
+    marks = style.solver_marks(entry.solver for entry in study.entries)
+    handles = [Line2D([], [], color=c, marker=m, markersize=6, linewidth=1.9) for c, m in marks.values()]
+    labels = [style.short(name, 20) for name in marks]
+    if any(entry.solved * 2 <= len(entry.runs) for entry in study.entries):
+        handles.append(Line2D([], [], color=style.GREY, marker="o", markerfacecolor="white", linestyle="none"))
+        labels.append("hollow: ended unsolved")
+    if any(len(entry.runs) > 1 for entry in study.entries):
+        handles.append(Line2D([], [], color=style.GREY, linewidth=0.7, alpha=0.6))
+        labels.append("thin: single seeds")
+    style.legend_above(figure, handles, labels)

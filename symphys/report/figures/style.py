@@ -1,0 +1,215 @@
+"""The look of every figure: palette, fonts, axes. Figures are made by matplotlib's object interface, as SVG."""
+
+from __future__ import annotations
+
+import io
+import re
+import warnings
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator, SymmetricalLogLocator
+
+from symphys.findings import writing
+from symphys.results.records import Array
+
+WIDTH = 10.0
+"""[in] of every figure"""
+
+INK, SOFT, FAINT, GRID = "#1f2d3a", "#5c6b78", "#b4bec8", "#e6ebef"
+GROUND, GROUND_EDGE = "#eceff2", "#8795a3"
+MET = "#e9f5f0"
+
+# Okabe and Ito, Color Universal Design (2008); its yellow is too light for lines on white.
+BLUE, VERMILION, GREEN, PURPLE = "#0072b2", "#d55e00", "#009e73", "#cc79a7"
+ORANGE, SKY, GREY = "#e69f00", "#56b4e9", "#4d4d4d"
+CYCLE = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, GREY)
+AXES = (VERMILION, GREEN, BLUE)
+"""x, y, z"""
+AXIS_WIDTHS = (2.4, 1.6, 1.0)
+"""Thinner and thinner, so that lines that lie on each other are all seen."""
+
+BODIES = ("#34506b", ORANGE, SKY, "#8a6fae", GREEN, VERMILION, "#7a7f85")
+"""Unlike the solvers' first colours, so that no body is taken for a solver."""
+
+KNOWN_SOLVERS = {
+    "gradient": (BLUE, "o"),
+    "least_squares": (VERMILION, "s"),
+    "ipopt": (GREEN, "^"),
+    "cma": (PURPLE, "D"),
+}
+OTHER_SOLVERS = ((ORANGE, "v"), (SKY, "P"), (GREY, "X"), (BLUE, "X"), (VERMILION, "v"), (GREEN, "P"))
+
+FONTS = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', 'Liberation Sans', Arial, sans-serif"
+
+SETTINGS: Any = {
+    "font.family": "DejaVu Sans",
+    "font.size": 8.5,
+    "text.parse_math": False,
+    "text.color": INK,
+    "axes.edgecolor": FAINT,
+    "axes.linewidth": 0.7,
+    "axes.labelcolor": SOFT,
+    "axes.labelsize": 8.5,
+    "axes.titlesize": 9,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.titlepad": 7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.unicode_minus": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.7,
+    "xtick.color": SOFT,
+    "ytick.color": SOFT,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "xtick.major.size": 0,
+    "ytick.major.size": 0,
+    "xtick.major.pad": 5,
+    "ytick.major.pad": 5,
+    "lines.linewidth": 1.5,
+    "lines.solid_capstyle": "round",
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "legend.handlelength": 1.6,
+    "legend.columnspacing": 1.8,
+    "figure.facecolor": "white",
+    "svg.fonttype": "none",
+    "svg.hashsalt": "symphys",
+    "path.simplify": True,
+    "figure.constrained_layout.h_pad": 0.06,
+    "figure.constrained_layout.w_pad": 0.06,
+}
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A finished figure: ``name`` is its file's stem, ``alt`` says what it shows."""
+
+    name: str
+    alt: str
+    svg: str
+
+
+@contextmanager
+def paper() -> Iterator[None]:
+    """The settings under which figures are made and saved; all others are matplotlib's defaults."""
+    with warnings.catch_warnings(), matplotlib.rc_context():
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(SETTINGS)
+        yield
+
+
+def picture(name: str, alt: str, figure: Figure | None) -> list[Picture]:
+    """Save a figure as SVG text that depends on its content alone; nothing for no figure."""
+    if figure is None:
+        return []
+    buffer = io.StringIO()
+    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    svg = re.sub(r"<!DOCTYPE[^>]*>\s*|<metadata>.*?</metadata>\s*", "", buffer.getvalue(), flags=re.DOTALL)
+    svg = svg.replace("'DejaVu Sans'", FONTS).replace("font-weight: 700", "font-weight: 600")
+    return [Picture(name, alt, re.sub(r" +\n|\n+", "\n", svg))]
+
+
+def solver_marks(solvers: Iterable[str]) -> dict[str, tuple[str, str]]:
+    """Colour and marker of each solver: the same on every page for those that are known."""
+    names = sorted(set(solvers))
+    others = [name for name in names if name not in KNOWN_SOLVERS]
+    spare = {name: OTHER_SOLVERS[i % len(OTHER_SOLVERS)] for i, name in enumerate(others)}
+    return {name: KNOWN_SOLVERS.get(name) or spare[name] for name in names}
+
+
+def short(text: str, length: int = 38) -> str:
+    """A name cut to what a figure has room for."""
+    return text if len(text) <= length else text[: length - 1] + "\N{HORIZONTAL ELLIPSIS}"
+
+
+def number_label(value: float, _position: int = 0) -> str:
+    """A tick's label: powers of ten only where they are shorter."""
+    return writing.show(value, 4).replace("1 × 10", "10") if value else "0"  # noqa: RUF001
+
+
+def use_numbers(axes: Axes) -> None:
+    """Round tick labels without offsets on both axes."""
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(FuncFormatter(number_label))
+
+
+def fit_scale(axes: Axes, which: str, values: Array) -> None:
+    """Linear where the numbers are of one size, logarithmic where not, symmetric-logarithmic where some are <= 0."""
+    known = values[np.isfinite(values)]
+    sizes = np.abs(known[known != 0])
+    if sizes.size == 0 or sizes.max() < 30 * sizes.min():
+        set_linear(axes, which)
+    elif (known > 0).all():
+        set_log(axes, which, known)
+    else:
+        linear = float(max(np.quantile(sizes, 0.1), sizes.max() * 1e-6))
+        set_symlog(axes, which, linear)
+
+
+def axis_of(axes: Axes, which: str) -> matplotlib.axis.Axis:
+    """The x or y axis."""
+    return axes.xaxis if which == "x" else axes.yaxis
+
+
+def set_linear(axes: Axes, which: str, ticks: int = 5) -> None:
+    """A linear axis with at most about ``ticks`` ticks, at round numbers."""
+    axis = axis_of(axes, which)
+    axis.set_major_locator(MaxNLocator(ticks, steps=[1, 2, 5, 10]))
+    axis.set_major_formatter(FuncFormatter(number_label))
+
+
+def set_log(axes: Axes, which: str, values: Array) -> None:
+    """A logarithmic axis whose ticks suit the decades that it covers."""
+    axes.set(**{f"{which}scale": "log"})
+    axis = axis_of(axes, which)
+    positive = values[values > 0]
+    decades = np.log10(positive.max() / positive.min()) if positive.size else 1
+    axis.set_major_locator(LogLocator(10, subs=(1.0, 2.0, 5.0) if decades < 2.3 else (1.0,), numticks=9))
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter(FuncFormatter(number_label))
+
+
+def set_symlog(axes: Axes, which: str, linear: float) -> None:
+    """A symmetric logarithmic axis, linear up to a power of ten near ``linear``."""
+    threshold = 10.0 ** np.ceil(np.log10(linear))
+    transform = {"value": "symlog", "linthresh": threshold, "linscale": 0.5}
+    (axes.set_xscale if which == "x" else axes.set_yscale)(**transform)
+    axis = axis_of(axes, which)
+    locator = SymmetricalLogLocator(base=10, linthresh=threshold)
+    locator.set_params(numticks=7)
+    axis.set_major_locator(locator)
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter(FuncFormatter(number_label))
+
+
+def thin(time: Array, columns: Array, points: int = 700) -> tuple[Array, Array]:
+    """At most about ``points`` samples of (rows, k) that keep the lowest and highest value of every stretch."""
+    rows = len(time)
+    if rows <= points:
+        return time, columns
+    stretches = np.array_split(np.arange(rows), max(points // (2 * columns.shape[1]), 30))
+    filled = np.nan_to_num(columns, nan=0.0, posinf=0.0, neginf=0.0)
+    keep = {0, rows - 1}
+    for stretch in stretches:
+        part = filled[stretch]
+        keep.update(int(i) for i in stretch[np.concatenate([part.argmin(axis=0), part.argmax(axis=0)])])
+    chosen = np.array(sorted(keep))
+    return time[chosen], columns[chosen]
+
+
+def legend_above(figure: Figure, handles: Sequence[Artist], labels: Sequence[str]) -> None:
+    """One legend for all panels, in a row above them."""
+    figure.legend(handles, labels, loc="outside upper left", ncols=min(len(labels), 8), borderaxespad=0.2)

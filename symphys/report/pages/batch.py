@@ -1,0 +1,171 @@
+"""The page of a batch: all run folders below a folder, by problem and solver."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from symphys import files
+from symphys.findings import writing
+from symphys.findings.verdict import ACCEPTED
+from symphys.report.figures import style
+from symphys.report.figures.convergence import draw_convergence
+from symphys.report.figures.drawable import OVERSIZED, drawable, oversized
+from symphys.report.figures.output import slug, write_figures
+from symphys.report.figures.style import Picture
+from symphys.report.pages import comparison
+from symphys.report.pages.checks import MOST_CHECKS, draw_checks, ratios
+from symphys.report.pages.markup import Html, card, facts, figures, join, page, table, tag
+from symphys.report.robots.strip import draw_strip
+from symphys.report.scene.animation import NUMBERS, animation
+from symphys.report.scene.motion import draw_motion
+from symphys.results.discovery import Study, read_all, studies
+from symphys.results.records import ReportError, Run, Trajectory
+from symphys.results.scene_reading import SCENE, read_scene
+from symphys.results.scene_records import Scene
+from symphys.results.trajectories import GUESS, TRAJECTORY, read_trajectory
+
+PAGE = "index.html"
+CLOSEST = "run that came closest"
+
+
+def write_batch_report(batch_dir: Path) -> Path:
+    """Write index.html and figures/*.svg for all run folders found at or below a folder.
+
+    Args:
+        batch_dir: what ``symphys solve --out`` has written, or any folder above it. Links go to the pages of the
+            runs as far as they exist, so write those first.
+
+    Returns:
+        The page's path.
+
+    Raises:
+        ReportError: there is no such folder, it holds no run folder, or it cannot be written to.
+    """
+    runs, broken = read_all(batch_dir)
+    if not runs and not broken:
+        raise ReportError(f"{batch_dir}: no run folder at or below it; `symphys solve --out` writes them")
+    found = studies(runs)
+    title = found[0].title if len(found) == 1 else f"{writing.several(len(found), 'problem')} in “{name_of(batch_dir)}”"
+    parts = [
+        tag("p", "Batch report", class_="kicker"),
+        tag("h1", title),
+        tag("p", comparison.summary(found, broken), class_="lead"),
+        *build_studies(found, batch_dir),
+        comparison.broken_card(broken),
+        provenance(runs),
+        tag("footer", "Made by symphys from the run folders alone; make it again with “symphys report”."),
+    ]
+    files.write_text(batch_dir / PAGE, page(title, join(parts), animated=any("<canvas" in part for part in parts)))
+    return batch_dir / PAGE
+
+
+def build_studies(found: Sequence[Study], root: Path) -> list[Html]:
+    """The problems one after the other; with links to each and headings where there are several."""
+    names = anchors(found)
+    links = [tag("a", study.title, href=f"#{anchor}") for study, anchor in zip(found, names, strict=True)]
+    several = len(found) > 1
+    parts = [build_study(s, root, NUMBERS // len(found), name, several) for s, name in zip(found, names, strict=True)]
+    return [tag("nav", *links, aria_label="Problems"), *parts] if several else parts
+
+
+def name_of(folder: Path) -> str:
+    """The folder's own name, whatever path it was given by."""
+    return folder.resolve().name or "this folder"
+
+
+def anchors(found: Sequence[Study]) -> list[str]:
+    """A file-name stem and anchor for each study, all different."""
+    names: list[str] = []
+    for study in found:
+        name, count = slug(study.problem), 1
+        while name in names:
+            count += 1
+            name = f"{slug(study.problem)}-{count}"
+        names.append(name)
+    return names
+
+
+def build_study(study: Study, root: Path, numbers: int, anchor: str, titled: bool) -> Html:
+    """Everything about one problem; ``titled`` where the page has several."""
+    motion, guess, scene, why = best_motion(study.best)
+    with style.paper():
+        converged = style.picture(f"{anchor}-convergence", "Objective and errors", draw_convergence(drawable(study)))
+        checked = style.picture(f"{anchor}-checks", "Errors against tolerances", draw_checks(study))
+        strip = draw_strip(motion, scene) if motion else None
+        drawn = draw_motion(motion, scene, guess) if motion else None
+        moved = style.picture(f"{anchor}-strip", "The motion at even times", strip)
+        moved += style.picture(f"{anchor}-motion", "Path and snapshots", drawn)
+    write_figures(root, converged + checked + moved)
+    played = animation(motion, scene, guess, numbers) if motion else tag("p", f"There is no motion to draw: {why}.")
+    best = study.best
+    kind = "best run" if best.verdict in ACCEPTED else "run with the lowest objective" if best.met else CLOSEST
+    which = f"The {kind}: {best.solver}, seed {best.seed}."
+    place = f" in {study.place}" if study.place and study.place != study.problem else ""
+    return tag(
+        "section",
+        tag("h2", study.title) if titled else "",
+        tag("p", f"{study.problem}{place}", class_="kicker") if titled else "",
+        comparison.study_verdict(study),
+        tag("p", OVERSIZED, class_="note") if oversized(study) else "",
+        card("Solvers", comparison.solver_table(study), note=comparison.table_note(study)),
+        card("Convergence", figures(converged, comparison.convergence_note(study))),
+        card("The motion", played, figures(moved), note=which),
+        targets(study, checked),
+        class_="study" if titled else None,
+        id=anchor,
+    )
+
+
+def best_motion(run: Run) -> tuple[Trajectory | None, Trajectory | None, Scene, str]:
+    """Motion, guess and scene of a run, and why there is no motion if there is none."""
+    try:
+        motion = read_trajectory(run.folder / TRAJECTORY)
+    except ReportError as error:
+        return None, None, Scene(), str(error)
+    try:
+        scene = read_scene(run.folder / SCENE)
+    except ReportError:
+        scene = Scene()
+    try:
+        guess = read_trajectory(run.folder / GUESS)
+    except ReportError:
+        guess = None
+    return motion, guess, scene, ""
+
+
+def targets(study: Study, pictures: list[Picture]) -> Html:
+    """Targets met or missed by name, for every solver."""
+    found = ratios(study)
+    hidden = len(found) - MOST_CHECKS
+    caption = "Dots: single seeds; marks: their median, hollow where it misses; arrows go on beyond the axis."
+    if hidden > 0:
+        caption += f" Shown: the {MOST_CHECKS} of {len(found)} checks with the largest errors."
+    solvers = [entry.solver for entry in study.entries]
+    rows = [[name, *(comparison.check_cell(study, name, solver) for solver in solvers)] for name in found]
+    content = table(["error, median over seeds", *solvers], rows, "t" + "n" * len(solvers), "Errors by name")
+    return card("Targets and constraints", figures(pictures, caption), content if rows else "")
+
+
+def provenance(runs: Sequence[Run]) -> Html:
+    """Versions, machines, times and commands of all runs, each once."""
+
+    def once(texts: Sequence[str], most: int = 6) -> str:
+        known = list(dict.fromkeys(text for text in texts if text))
+        return "; ".join(known[:most]) + (f"; and {len(known) - most} more" if len(known) > most else "")
+
+    when = sorted(run.origin.when for run in runs if run.origin.when)
+    span = when[0] if len(set(when)) == 1 else f"{when[0]} to {when[-1]}" if when else ""
+    named = ("symphys", "python", "casadi", "numpy", "scipy", "cma")
+    versions = [", ".join(f"{n} {run.origin.versions[n]}" for n in named if run.origin.versions.get(n)) for run in runs]
+    commands = once([run.origin.command for run in runs])
+    content = facts(
+        [
+            ("Command", tag("code", commands) if commands else ""),
+            ("When", span),
+            ("Machine", once([run.origin.versions.get("platform", "") for run in runs])),
+            ("Versions", once(versions)),
+            ("Evaluated by", once([run.origin.backend for run in runs])),
+        ]
+    )
+    return card("Where this comes from", content)

@@ -1,0 +1,234 @@
+"""The words and tables that compare solvers on a batch page."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+from urllib.parse import quote
+
+from symphys.findings import writing
+from symphys.findings.verdict import BEST_FOUND, DOUBTED
+from symphys.findings.writing import show
+from symphys.report.figures import style
+from symphys.report.pages import words
+from symphys.report.pages.markup import ICONS, Html, banner, card, dot, join, pill, table, tag
+from symphys.results.discovery import Entry, Study, middle
+from symphys.results.records import Run
+from symphys.results.stage_record import smoothed
+
+RUN_PAGE = "report.html"
+MOST_BROKEN = 50
+MOST_NAMED = 4
+NOTHING_TO_MEET = (
+    "The problem states nothing to meet, and no solver converged: what was found is the best of what was tried."
+)
+
+Column = tuple[str, Callable[[Run], float], Callable[[float], str]]
+
+
+def summary(found: Sequence[Study], broken: Sequence[Run]) -> str:
+    """How many runs of how many are solved."""
+    runs = [run for study in found for run in study.runs]
+    solved = sum(run.solved for run in runs)
+    text = f"{solved} of {writing.several(len(runs), 'run')} solved"
+    for word, meaning in ((DOUBTED, "met, but not to be trusted"), (BEST_FOUND, "the best found with nothing to meet")):
+        number = sum(run.verdict == word for run in runs)
+        text += f"; {number} {meaning}" if number else ""
+    if len(found) > 1:
+        whole = sum(all(entry.solved for entry in study.entries) for study in found)
+        text += f"; {whole} of {len(found)} problems by every solver that was tried"
+    if broken:
+        text += f"; {writing.several(len(broken), 'folder')} without a readable result"
+    return text + "."
+
+
+def study_verdict(study: Study) -> Html:
+    """A banner: who solved it, and who did with the least work and time."""
+    entries = [entry for entry in study.entries if any(run.status != "not_applicable" for run in entry.runs)]
+    full = [entry for entry in entries if entry.solved == len(entry.runs)]
+    none = [entry for entry in entries if entry.solved == 0]
+    if study.runs and all(run.verdict == BEST_FOUND for run in study.runs):
+        return banner("fair", "Best found", NOTHING_TO_MEET)
+    level = "good" if entries and len(full) == len(entries) else "bad" if len(none) == len(entries) else "fair"
+    title = {"good": "Solved", "fair": "Solved in part", "bad": "Not solved"}[level]
+    doubtful = [run for run in study.runs if run.verdict == DOUBTED]
+    if level == "bad" and doubtful:
+        title = "Met, but not to be trusted" if any(run.checks for run in doubtful) else "Found, but not to be trusted"
+    return banner(level, title, tally(entries, full, none), doubted(doubtful), thrift(study))
+
+
+def doubted(runs: Sequence[Run]) -> str:
+    """Which runs met everything by a motion that is not to be relied on, and why the first of them is not."""
+    if not runs:
+        return ""
+    why = "; ".join(runs[0].doubts)
+    if len(runs) == 1:
+        return f"{runs[0].solver}, seed {runs[0].seed}, is not to be relied on: {why}."
+    named = writing.listed([f"{run.solver} seed {run.seed}" for run in runs[:MOST_NAMED]])
+    more = f" and {len(runs) - MOST_NAMED} more" if len(runs) > MOST_NAMED else ""
+    return f"Not to be relied on: {named}{more}. Of the first: {why}."
+
+
+def tally(entries: Sequence[Entry], full: Sequence[Entry], none: Sequence[Entry]) -> str:
+    """Solvers by how many of their seeds are solved."""
+    seeds = max((len(entry.runs) for entry in entries), default=0)
+    if len(entries) == len(full):
+        some = {1: entries[0].solver if entries else "", 2: "Both solvers"}
+        everyone = some.get(len(full), f"All {len(full)} solvers")
+        return f"{everyone} solved it" + (" from every seed." if seeds > 1 else ".")
+    partial = [entry for entry in entries if entry not in full and entry not in none]
+    parts = [f"{writing.listed([entry.solver for entry in full])} solved it"] if full else []
+    parts += [f"{entry.solver} solved it in {entry.solved} of {len(entry.runs)} runs" for entry in partial]
+    if none:
+        names = writing.listed([entry.solver for entry in none])
+        parts.append(f"{names} never did" if parts else f"{names} did not solve it")
+    return "; ".join(parts) + "."
+
+
+def thrift(study: Study) -> str:
+    """The solver with the least work and the one with the least time, among those that solved every run."""
+    full = [entry for entry in study.entries if entry.solved == len(entry.runs)]
+    work = {e.solver: e.median([run.effort.equivalents for run in e.runs]) for e in full}
+    time = {e.solver: e.median([run.effort.seconds.get("solve", math.nan) for run in e.runs]) for e in full}
+    work, time = ({k: v for k, v in numbers.items() if math.isfinite(v)} for numbers in (work, time))
+    if len(full) < 2 or not work or not time:
+        return ""
+    thrifty, quick = min(work, key=lambda k: work[k]), min(time, key=lambda k: time[k])
+    least = f"Least work: {thrifty}, worth {words.count(round(work[thrifty], 1))} rollouts"
+    return f"{least}; fastest: {quick}, {words.seconds(time[quick])}."
+
+
+def columns(study: Study) -> list[Column]:
+    """The numeric columns; those that no run uses are left out."""
+    fixed: list[Column] = [
+        ("objective", lambda run: run.objective, lambda v: show(v, 4)),
+        ("largest error / tolerance", lambda run: run.worst, lambda v: show(v, 3)),
+        ("rollouts", lambda run: run.effort.counts.get("rollouts", math.nan), words.count),
+        ("gradients", lambda run: run.effort.counts.get("gradients", math.nan), words.count),
+    ]
+    for kind in ("jacobians", "hessians"):
+        if any(run.effort.counts.get(kind, 0) > 0 for run in study.runs):
+            fixed.append((kind, lambda run, kind=kind: run.effort.counts.get(kind, math.nan), words.count))  # type: ignore[misc]
+    return [
+        *fixed,
+        ("work in rollouts", lambda run: run.effort.equivalents, lambda v: words.count(round(v, 1))),
+        ("solve", lambda run: run.effort.seconds.get("solve", math.nan), words.seconds),
+        ("build", built, words.seconds),
+    ]
+
+
+def built(run: Run) -> float:
+    """[s] before the solve: build and compile."""
+    return run.effort.seconds.get("build", math.nan) + run.effort.seconds.get("compile", 0.0)
+
+
+LEAST_IS_BEST = ("work in rollouts", "solve")
+
+
+def solver_table(study: Study) -> Html:
+    """A row for each solver, medians over its seeds."""
+    marks = style.solver_marks(entry.solver for entry in study.entries)
+    shown = columns(study)
+    medians = [[entry.median([read(run) for run in entry.runs]) for _, read, _ in shown] for entry in study.entries]
+    leasts = [least(study, [row[i] for row in medians]) for i in range(len(shown))]
+    rows = []
+    for entry, numbers in zip(study.entries, medians, strict=True):
+        cells: list[Html | str] = []
+        for (title, _, write), number, best in zip(shown, numbers, leasts, strict=True):
+            text = write(number)
+            cells.append(tag("b", text, class_="best") if title in LEAST_IS_BEST and number == best else text)
+        name = tag("span", dot(marks[entry.solver][0]), entry.solver, class_="nowrap")
+        rows.append([name, seeds(entry), f"{entry.solved} of {len(entry.runs)}", statuses(entry), *cells])
+    header = ["solver", "runs by seed", "solved", "ended as", *(title for title, _, _ in shown)]
+    return table(header, rows, "ttnt" + "n" * len(shown), "Solvers")
+
+
+def least(study: Study, numbers: Sequence[float]) -> float:
+    """The smallest number among solvers that solved every run, if there are two to compare."""
+    full = [n for entry, n in zip(study.entries, numbers, strict=True) if entry.solved == len(entry.runs)]
+    known = [n for n in full if math.isfinite(n)]
+    return min(known) if len(known) > 1 else math.nan
+
+
+def seeds(entry: Entry) -> Html:
+    """A chip for each run, linked to its page if there is one."""
+    return tag("span", *map(seed_chip, entry.runs), class_="seeds", style=f"min-width:{42 * min(len(entry.runs), 5)}px")
+
+
+def seed_chip(run: Run) -> Html:
+    """A seed with the sign of how its run ended."""
+    level = words.level(run)
+    content = join([tag("i", ICONS[level], aria_hidden="true"), str(run.seed)])
+    label = f"{run.solver}, seed {run.seed}: {words.headline(run).lower()}"
+    if not (run.folder / RUN_PAGE).is_file():
+        return tag("span", content, class_=f"pill {level}", title=label)
+    place = f"{run.place}/{RUN_PAGE}" if run.place not in ("", ".") else RUN_PAGE
+    return tag("a", content, class_=f"pill {level}", href=quote(f"./{place}"), title=label)
+
+
+def statuses(entry: Entry) -> Html:
+    """How the runs ended; with counts where they differ."""
+    counted = Counter(words.came_to(run) for run in entry.runs)
+    if len(counted) == 1:
+        return join(list(counted))
+    return join([writing.listed([f"{text} ({number})" for text, number in counted.most_common()])])
+
+
+def table_note(study: Study) -> str:
+    """How the table is read."""
+    text = "Work counts a rollout as 1 and each derivative by its measured price. Build includes compiling."
+    if any(len(entry.runs) > 1 for entry in study.entries):
+        text = "Medians over seeds that gave a number. " + text
+    return f"{text} {smoothing_note(study)}".rstrip()
+
+
+def smoothing_note(study: Study) -> str:
+    """Which runs used stages of smoothing, and which; nothing where none did."""
+    used: dict[str, list[str]] = {}
+    for entry in study.entries:
+        for knobs in dict.fromkeys(stages_of(run) for run in entry.runs if smoothed(run.stages)):
+            used.setdefault(knobs, []).append(entry.solver)
+    told = [f"{knobs} m/s: {writing.listed(list(dict.fromkeys(names)))}" for knobs, names in used.items()]
+    return f"Solved in stages of smoothing, {'; '.join(told)}. All that is told here is exact." if told else ""
+
+
+def stages_of(run: Run) -> str:
+    """The knobs of its stages."""
+    return writing.listed([show(stage.smoothing) for stage in run.stages])
+
+
+def convergence_note(study: Study) -> str:
+    """What the figure does not say by itself."""
+    marked = any(len(entry.runs) > 1 for entry in study.entries)
+    text = "Strong: the median over seeds; a run that has ended keeps its last value. " if marked else ""
+    text += "Errors below a thousandth of the tolerance are drawn there."
+    if any(smoothed(run.stages) for run in study.runs):
+        text += " Of a stage with smoothing only start and end are drawn, where they stand exactly."
+    return text
+
+
+def check_cell(study: Study, name: str, solver: str) -> Html:
+    """The median error of one check for one solver, and how many seeds met it."""
+    found = [check for run in study.runs if run.solver == solver for check in run.checks if check.name == name]
+    if not found:
+        return Html(writing.DASH)
+    met = sum(check.met for check in found)
+    level = "good" if met == len(found) else "fair" if met else "bad"
+    text = {"good": "met", "bad": "missed"}.get(level, f"{met} of {len(found)}")
+    errors = [check.error for check in found if math.isfinite(check.error)]
+    median = middle(errors) if errors else math.nan
+    return tag("span", f"{show(median, 2)} ", pill(level, text), class_="nowrap")
+
+
+def broken_card(broken: Sequence[Run]) -> Html:
+    """Folders that look like run folders but hold no result."""
+    rows = [[tag("code", run.place), "; ".join(run.faults) or "no result"] for run in broken[:MOST_BROKEN]]
+    if not rows:
+        return Html("")
+    more = f" The first {MOST_BROKEN} of {len(broken)}." if len(broken) > MOST_BROKEN else ""
+    return card(
+        "Folders without a readable result",
+        table(["folder", "why"], rows, "tt", "Broken folders"),
+        note=f"Started and not finished, half written, or made by something else.{more}",
+    )

@@ -1,0 +1,125 @@
+"""HTML from small parts: every text is escaped unless it was made here."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from symphys.report.figures.style import Picture
+
+VOID = frozenset({"br", "img", "input", "link", "meta"})
+HERE = Path(__file__).parents[1] / "static"
+SCRIPTS = ("geometry.js", "solids.js", "terrain.js", "painter.js", "joints.js", "animation.js")
+ICONS = {"good": "✓", "fair": "!", "bad": "✕", "unknown": "?"}
+
+
+class Html(str):
+    """A text that is HTML already; any other text is escaped before it enters a page."""
+
+    __slots__ = ()
+
+
+Part = str | Html
+
+
+def safe(part: Part) -> Html:
+    """Escape a text; leave HTML as it is."""
+    return part if isinstance(part, Html) else Html(html.escape(part))
+
+
+def join(parts: Iterable[Part]) -> Html:
+    """Parts one after the other."""
+    return Html("".join(safe(part) for part in parts))
+
+
+def tag(name: str, /, *children: Part, **attributes: str | None) -> Html:
+    """An element. ``class_`` stands for class, ``_`` for a hyphen; an attribute that is None is left out."""
+    pairs = [(key.rstrip("_").replace("_", "-"), value) for key, value in attributes.items() if value is not None]
+    opening = "".join([name, *(f' {key}="{html.escape(value)}"' for key, value in pairs)])
+    return Html(f"<{opening}>" if name in VOID else f"<{opening}>{join(children)}</{name}>")
+
+
+def card(title: str, *children: Part, anchor: str | None = None, note: Part = "") -> Html:
+    """A section with a heading; nothing if there is nothing in it."""
+    body = [child for child in children if child]
+    if not body:
+        return Html("")
+    lead = [tag("p", note, class_="note")] if note else []
+    return tag("section", tag("h2", title), *lead, *body, class_="card", id=anchor)
+
+
+def table(header: Sequence[Part], rows: Iterable[Sequence[Part]], kinds: str, label: str = "") -> Html:
+    """A table; ``kinds`` has one letter a column: ``t`` for text, ``n`` for a number."""
+    classes = ["number" if kind == "n" else None for kind in kinds]
+    head = [tag("th", cell, class_=kind, scope="col") for cell, kind in zip(header, classes, strict=True)]
+    body = [tag("tr", *(tag("td", cell, class_=kind) for cell, kind in zip(row, classes, strict=True))) for row in rows]
+    content = tag("table", tag("thead", tag("tr", *head)), tag("tbody", *body), aria_label=label or None)
+    return tag("div", content, class_="scroll")
+
+
+def pill(level: str, text: str) -> Html:
+    """A short coloured word with a sign, so that colour is never alone."""
+    return tag("span", tag("i", ICONS[level], aria_hidden="true"), text, class_=f"pill {level}")
+
+
+def banner(level: str, title: str, *sentences: str) -> Html:
+    """A coloured box with a sign, a title and what there is to say."""
+    lines = [tag("p", sentence) for sentence in sentences if sentence]
+    sign = tag("span", ICONS[level], class_="sign", aria_hidden="true")
+    return tag("div", sign, tag("div", tag("b", title), *lines), class_=f"verdict {level}")
+
+
+def dot(colour: str) -> Html:
+    """A spot of a solver's or body's colour."""
+    return tag("span", class_="dot", style=f"background:{colour}", aria_hidden="true")
+
+
+def figures(pictures: Iterable[Picture], caption: Part = "") -> Html:
+    """Pictures embedded in the page, with one caption."""
+    parts = [figure(picture) for picture in pictures]
+    if parts and caption:
+        parts.append(tag("p", caption, class_="caption"))
+    return join(parts)
+
+
+def figure(picture: Picture) -> Html:
+    """A picture embedded in the page."""
+    code = base64.b64encode(picture.svg.encode()).decode("ascii")
+    return tag("figure", tag("img", alt=picture.alt, src=f"data:image/svg+xml;base64,{code}"))
+
+
+def stats(pairs: Iterable[tuple[str, str]]) -> Html:
+    """Key numbers side by side."""
+    return tag("dl", *(tag("div", tag("dt", key), tag("dd", value)) for key, value in pairs), class_="stats")
+
+
+def facts(pairs: Iterable[tuple[str, Part]]) -> Html:
+    """Names and values below each other; those without a value are left out."""
+    rows = [join([tag("dt", key), tag("dd", value)]) for key, value in pairs if value]
+    return tag("dl", *rows, class_="facts") if rows else Html("")
+
+
+def fold(title: str, text: str) -> Html:
+    """A long text behind a line that opens it; nothing for an empty one."""
+    return tag("details", tag("summary", title), tag("pre", text)) if text.strip() else Html("")
+
+
+def page(title: str, body: Part, animated: bool = False) -> str:
+    """The whole document: no part of it is loaded from elsewhere, and no script but our own may run."""
+    script = "".join((HERE / name).read_text(encoding="utf-8") for name in SCRIPTS) if animated else ""
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
+    allowed = f"'sha256-{digest}'" if animated else "'none'"
+    policy = f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src {allowed}"
+    head = tag(
+        "head",
+        tag("meta", charset="utf-8"),
+        tag("meta", http_equiv="Content-Security-Policy", content=policy),
+        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        tag("title", title),
+        tag("style", Html((HERE / "page.css").read_text(encoding="utf-8"))),
+    )
+    scripts = tag("script", Html(script)) if animated else Html("")
+    return "<!doctype html>\n" + tag("html", head, tag("body", tag("main", body), scripts), lang="en") + "\n"

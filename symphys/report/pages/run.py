@@ -1,0 +1,194 @@
+"""The page of one run, made from its folder alone."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from symphys import files
+from symphys.findings import writing
+from symphys.report.figures import style
+from symphys.report.figures.contacts import by_surfaces, draw_contacts, shown_pairs
+from symphys.report.figures.drawable import OVERSIZED, drawable, oversized
+from symphys.report.figures.history import draw_run
+from symphys.report.figures.output import write_figures
+from symphys.report.figures.states import MOST_BODIES, controlled_bodies, draw_controls, draw_states, shown_bodies
+from symphys.report.figures.style import Picture
+from symphys.report.figures.variables import draw_variables
+from symphys.report.figures.verification import draw_energy, draw_growth
+from symphys.report.pages import sections
+from symphys.report.pages.joints import gait_card, joint_card, joint_pictures
+from symphys.report.pages.markup import Html, card, figures, join, page, tag
+from symphys.report.pages.stages import stage_card
+from symphys.report.pages.verification import trusted
+from symphys.report.scene.motion import draw_motion
+from symphys.results import text_files as tables
+from symphys.results.discovery import is_run
+from symphys.results.reading import CONFIG, PROBLEM, read_run
+from symphys.results.records import ReportError, Run, Trajectory
+from symphys.results.scene_reading import SCENE, read_scene
+from symphys.results.scene_records import Scene
+from symphys.results.stage_record import smoothed
+from symphys.results.trajectories import GUESS, TRAJECTORY, read_trajectory
+
+PAGE = "report.html"
+LOG = "log.txt"
+
+
+@dataclass(frozen=True)
+class Recording:
+    """The motion of a run, as far as it could be read; ``faults`` says what could not."""
+
+    trajectory: Trajectory | None
+    guess: Trajectory | None
+    scene: Scene
+    faults: tuple[str, ...]
+
+
+def write_run_report(run_dir: Path) -> Path:
+    """Write report.html and figures/*.svg into a run folder, from its files alone.
+
+    Args:
+        run_dir: a run folder, finished or not; what is missing is said in the page.
+
+    Returns:
+        The page's path.
+
+    Raises:
+        ReportError: there is no such folder, it is no run folder, or it cannot be written to.
+    """
+    if not run_dir.is_dir():
+        raise ReportError(f"{run_dir}: there is no such folder")
+    if not is_run([path.name for path in run_dir.iterdir()]):
+        raise ReportError(f"{run_dir}: no run folder; one holds result.json, or config.json and problem.toml")
+    run = read_run(run_dir, run_dir)
+    recording = read_recording(run_dir)
+    with style.paper():
+        pictures = draw(drawable(run), recording)
+    write_figures(run_dir, pictures.values())
+    body = build(run, recording, pictures)
+    title = f"{run.title}: {run.solver}, seed {run.seed}"
+    files.write_text(run_dir / PAGE, page(title, body, animated=recording.trajectory is not None))
+    return run_dir / PAGE
+
+
+def read_recording(folder: Path) -> Recording:
+    """Read what there is; the guess is no loss where it is missing."""
+    faults: list[str] = []
+    trajectory = read_or_note(folder / TRAJECTORY, faults)
+    guess = read_or_note(folder / GUESS, faults)
+    try:
+        scene = read_scene(folder / SCENE)
+    except ReportError as error:
+        scene = Scene()
+        faults.append(str(error))
+    return Recording(trajectory, guess, scene, tuple(faults))
+
+
+def read_or_note(path: Path, faults: list[str]) -> Trajectory | None:
+    """A recorded motion; None, with a sentence in ``faults``, if there is none."""
+    try:
+        return read_trajectory(path)
+    except ReportError as error:
+        faults.append(str(error))
+        return None
+
+
+def draw(run: Run, recording: Recording) -> dict[str, Picture]:
+    """Every figure of the page by name; those that have nothing to show are left out."""
+    made = style.picture("convergence", "Convergence of this run", draw_run(run))
+    made += style.picture("variables", "Variables against their knots", draw_variables(run))
+    motion = recording.trajectory
+    if motion is not None:
+        made += style.picture("motion", "Path and snapshots", draw_motion(motion, recording.scene, recording.guess))
+        made += joint_pictures(motion, recording.scene)
+        made += style.picture("states", "Position, velocity and angular velocity over time", draw_states(motion))
+        made += style.picture("controls", "Forces and torques over time", draw_controls(motion))
+        made += style.picture("contacts", "Contact forces and gaps over time", draw_contacts(motion, recording.scene))
+    made += style.picture("growth", "How changes grow until the end", draw_growth(run.trust.growth, motion))
+    made += style.picture("energy", "Energy over time", draw_energy(run.trust.energy))
+    return {picture.name: picture for picture in made}
+
+
+def build(run: Run, recording: Recording, pictures: dict[str, Picture]) -> Html:
+    """The page, from the verdict to the sources."""
+    cards = [
+        sections.checks(run),
+        motion_card(run, recording, pictures),
+        sections.found(run, pictures),
+        trusted(run, pictures),
+        stage_card(run),
+        card(
+            "Convergence",
+            figures(only(pictures, "convergence"), how_drawn(run)),
+            anchor="convergence",
+        ),
+        *motion_cards(recording, pictures),
+        sections.time_split(run),
+        sources(run),
+    ]
+    header = sections.header(run, cards)
+    note = [tag("p", OVERSIZED, class_="note")] if oversized(run) else []
+    return join([header, *note, sections.key_numbers(run), *cards, sections.FOOTER])
+
+
+def how_drawn(run: Run) -> str:
+    """What the figure of the convergence does not say by itself."""
+    return f"Pale: the lowest so far{' in its stage' * smoothed(run.stages)}. Work counts one rollout as 1."
+
+
+def motion_card(run: Run, recording: Recording, pictures: dict[str, Picture]) -> Html:
+    """The motion; nothing where there is neither a result nor a motion."""
+    if recording.trajectory is None and not run.readable:
+        return Html("")
+    return sections.motion(recording.trajectory, recording.scene, recording.guess, pictures, recording.faults)
+
+
+def only(pictures: dict[str, Picture], name: str) -> list[Picture]:
+    """The picture of that name, if it was made."""
+    return [pictures[name]] if name in pictures else []
+
+
+def motion_cards(recording: Recording, pictures: dict[str, Picture]) -> list[Html]:
+    """Joints, gait, states, controls and contacts over time."""
+    motion = recording.trajectory
+    if motion is None:
+        return []
+    bodies, touching = len(motion.body_names), by_surfaces(motion)
+    states = shortened(len(shown_bodies(motion)), bodies, "bodies", "that move most")
+    controlled = len(controlled_bodies(motion))
+    acting = shortened(min(controlled, MOST_BODIES), controlled, "bodies", "that come first")
+    contacts = shortened(len(shown_pairs(touching)), len(touching.contact_names), "pairs", "with the largest impulses")
+    force = "A force is the step's impulse over its duration, so an impact is a spike whose height grows as dt shrinks."
+    return [
+        joint_card(motion, recording.scene, pictures),
+        gait_card(motion, recording.scene, pictures),
+        card("States over time", figures(only(pictures, "states"), states), anchor="states"),
+        card("Controls", figures(only(pictures, "controls"), acting), anchor="controls"),
+        card("Contacts", figures(only(pictures, "contacts"), f"{force} {contacts}"), anchor="contacts"),
+    ]
+
+
+def shortened(shown: int, total: int, noun: str, which: str) -> str:
+    """What a figure leaves out; empty if nothing."""
+    return f"Shown are {shown} of {total} {noun}: those {which}." if shown < total else ""
+
+
+def sources(run: Run) -> Html:
+    """Provenance: versions, command, and the files that the run was made from."""
+    texts = [("Resolved configuration", CONFIG), ("Problem file", PROBLEM), ("Log of the solver", LOG)]
+    folds = [sections.source(title, read_text(run.folder / name)) for title, name in texts]
+    faults = [tag("p", f"Not read: {'; '.join(run.faults)}.", class_="note")] if run.faults else []
+    return card("Where this comes from", sections.provenance(run), *faults, *folds, anchor="provenance")
+
+
+def read_text(path: Path) -> str:
+    """A file's text, JSON set out in lines; empty if it cannot be read."""
+    try:
+        text = tables.read_words(path)
+        return json.dumps(json.loads(text), indent=2, ensure_ascii=False) if path.suffix == ".json" else text
+    except (ReportError, RecursionError):
+        return ""
+    except ValueError:
+        return writing.several(len(text), "character") + " that are no JSON:\n" + text

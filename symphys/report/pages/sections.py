@@ -1,0 +1,250 @@
+"""The parts of a run's page."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from symphys.findings import writing
+from symphys.findings.writing import show
+from symphys.report.figures import style
+from symphys.report.figures.style import Picture
+from symphys.report.figures.variables import component_names, knotted
+from symphys.report.pages import words
+from symphys.report.pages.markup import Html, banner, card, facts, figures, fold, join, pill, stats, table, tag
+from symphys.report.robots.branches import is_large
+from symphys.report.scene.animation import animation
+from symphys.results.records import TOLD, Array, Check, Run, Trajectory, Variable
+from symphys.results.scene_records import Scene
+
+FOOTER = tag("footer", "Made by symphys from the files of the run folder; make it again with “symphys report”.")
+MOST_ROWS = 60
+LOG_TAIL = 20_000
+HOW_JUDGED = (
+    "Judged by an exact rollout of the result, without smoothing. The bar ends at the error, the line is the tolerance."
+)
+HOW_DRAWN = (
+    "Snapshots at even times, the later the darker, fewer where a body hardly moves; spokes and edges turn with it."
+)
+HOW_ROBOTS_DRAWN = (
+    "The whole where it has moved on by most of its length, the later the stronger; lines are paths of trunks and feet."
+)
+HOW_JOINTS_DRAWN = "Dots are joints, squares those that slide or hold fast; bars are the axes."
+HOW_STRIP_DRAWN = "At even times; the window goes with what travels far."
+CHAPTERS = (
+    ("checks", "Checks"),
+    ("motion", "Motion"),
+    ("found", "Found"),
+    ("trust", "Trust"),
+    ("stages", "Stages"),
+    ("convergence", "Convergence"),
+    ("joints", "Joints"),
+    ("gait", "Gait"),
+    ("states", "States"),
+    ("contacts", "Contacts"),
+    ("provenance", "Provenance"),
+)
+
+
+def header(run: Run, cards: Sequence[Html]) -> Html:
+    """Title, description, verdict, and links to those cards that there are."""
+    there = [(anchor, title) for anchor, title in CHAPTERS if any(f'id="{anchor}"' in card[:80] for card in cards)]
+    links = [tag("a", title, href=f"#{anchor}") for anchor, title in there]
+    unread = () if run.readable else run.faults
+    return join(
+        [
+            tag("p", f"Run report · {run.problem} · {run.solver} · seed {run.seed}", class_="kicker"),
+            tag("h1", run.title),
+            *(tag("p", part, class_="lead") for part in re.split(r"\n\s*\n", run.description.strip()) if part),
+            banner(words.level(run), words.headline(run), words.verdict(run), run.advice, *unread),
+            tag("nav", *links, aria_label="Sections") if run.readable else "",
+        ]
+    )
+
+
+def key_numbers(run: Run) -> Html:
+    """The strip of numbers below the verdict."""
+    if not run.readable:
+        return Html("")
+    derivatives = [(kind, run.effort.counts.get(kind, 0.0)) for kind in ("gradients", "jacobians", "hessians")]
+    used = [(kind.capitalize(), words.count(number)) for kind, number in derivatives if number > 0]
+    return stats(
+        [
+            ("Objective", show(run.objective)),
+            ("Error / tolerance", show(run.worst)),
+            *((name[:1].upper() + name[1:], show(value)) for name, value in run.outputs.items()),
+            ("Rollouts", words.count(run.effort.counts.get("rollouts", math.nan))),
+            *used,
+            ("Work, in rollouts", words.count(round(run.effort.equivalents, 1))),
+            ("Time of the solve", words.seconds(run.effort.seconds.get("solve", math.nan))),
+        ]
+    )
+
+
+def checks(run: Run) -> Html:
+    """Targets, constraints and goals by name, each with a gauge whose middle is the tolerance."""
+    rows = [
+        [
+            join([check.name, Html(" "), tag("small", check.kind)]),
+            show(check.error),
+            show(check.tolerance),
+            show(check.ratio),
+            gauge(check),
+            pill("good", "met") if check.met else pill("bad", "missed"),
+        ]
+        for check in run.checks
+    ]
+    costs = facts([(name, show(value, 4)) for name, value in run.costs.items()])
+    return card(
+        "Targets and constraints",
+        table(["name", "error", "tolerance", "ratio", "", ""], rows, "tnnntt", "Checks") if rows else "",
+        tag("h3", "Costs, weighted") if costs else "",
+        costs,
+        tag("h3", "Told") if run.outputs else "",
+        facts([(name, told(run, name)) for name in run.outputs]),
+        anchor="checks",
+        note=HOW_JUDGED,
+    )
+
+
+def told(run: Run, name: str) -> str:
+    """A number of the result, and what it was at the guess."""
+    return f"{show(run.outputs[name], 4)} (at the guess {show(run.guess.get(TOLD + name, math.nan), 4)})"
+
+
+def gauge(check: Check) -> Html:
+    """Error against tolerance: the middle of the bar is 1, its end 2 and more."""
+    share = min(check.ratio / 2, 1.0) if math.isfinite(check.ratio) else 1.0
+    bar = tag("span", style=f"width:{100 * max(share, 0):.1f}%")
+    return tag("span", bar, class_=f"gauge {'good' if check.met else 'bad'}", aria_hidden="true")
+
+
+def motion(
+    trajectory: Trajectory | None,
+    scene: Scene,
+    guess: Trajectory | None,
+    pictures: dict[str, Picture],
+    faults: Sequence[str],
+) -> Html:
+    """The motion played and drawn, or why there is none."""
+    notes = tag("p", "Not read: " + "; ".join(faults) + ".", class_="note") if faults else Html("")
+    if trajectory is None:
+        return card("The motion", tag("p", "This run recorded no motion."), notes, anchor="motion")
+    how = HOW_ROBOTS_DRAWN if is_large(trajectory, scene) else HOW_DRAWN
+    drawn = figures([pictures["motion"]], f"{how} {HOW_JOINTS_DRAWN}" if scene.joints else how)
+    strip = figures([pictures["strip"]], HOW_STRIP_DRAWN) if "strip" in pictures else Html("")
+    return card("The motion", animation(trajectory, scene, guess), strip, drawn, notes, anchor="motion")
+
+
+def found(run: Run, pictures: dict[str, Picture]) -> Html:
+    """Variables with one knot as a table, those with many as curves."""
+    rows = [row for variable in run.variables if variable.value.shape[1] == 1 for row in variable_rows(variable)]
+    more = tag("p", f"and {len(rows) - MOST_ROWS} more, in result.json", class_="note") if len(rows) > MOST_ROWS else ""
+    header = ["variable", "guess", "found", "lower bound", "upper bound", "between bounds"]
+    curves = [
+        f"{v.name}: {writing.several(v.value.shape[1], 'knot')} of {writing.several(v.value.shape[0], 'component')}"
+        for v in knotted(run)
+    ]
+    return card(
+        "What was found",
+        table(header, rows[:MOST_ROWS], "tnnnnt", "Variables") if rows else "",
+        more,
+        figures([pictures["variables"]] if "variables" in pictures else [], "; ".join(curves)),
+        anchor="found",
+    )
+
+
+def variable_rows(variable: Variable) -> list[list[str]]:
+    """One row for each component; one for all of a variable with very many, such as the weights of a net."""
+    if len(variable.value) > MOST_ROWS:
+        return [many_row(variable)]
+    rows: list[list[str]] = []
+    for index, name in enumerate(component_names(variable)):
+        value, guess = variable.value[index, 0], variable.guess[index, 0]
+        low, high = variable.lower[index, 0], variable.upper[index, 0]
+        sets = tag("small", ", ".join(variable.sets)) if index == 0 else Html("")
+        label = join([tag("b", variable.name) if index == 0 else "", f" {name} " if name else " ", sets])
+        numbers = [show(guess), tag("b", show(value, 4)), show(low), show(high)]
+        rows.append([label, *numbers, between(value, guess, low, high)])
+    return rows
+
+
+def many_row(variable: Variable) -> list[str]:
+    """The range of very many components, and how far they are from the guess."""
+    guess, value = variable.guess[:, 0], variable.value[:, 0]
+    label = join([tag("b", variable.name), f" {len(value)} numbers ", tag("small", ", ".join(variable.sets))])
+    ranges = [f"{show(float(of.min()))} to {show(float(of.max()))}" for of in (guess, value)]
+    bounds = [show(float(variable.lower[:, 0].min())), show(float(variable.upper[:, 0].max()))]
+    change = root_mean_square(value / 2 - guess / 2) * 2
+    return [label, ranges[0], tag("b", ranges[1]), *bounds, f"changed by {show(change)} (rms)"]
+
+
+def root_mean_square(numbers: Array) -> float:
+    """Of numbers whose squares may be beyond the largest double; nan if one is."""
+    size = float(np.max(np.abs(numbers)))
+    return size * math.sqrt(float(((numbers / size) ** 2).mean())) if 0 < size < math.inf else size
+
+
+def between(value: float, guess: float, low: float, high: float) -> Html:
+    """Where value and guess lie between finite bounds; says so where a bound is active."""
+    if not (math.isfinite(low) and math.isfinite(high) and high > low and math.isfinite(value)):
+        return tag("small", "free" if math.isinf(low) and math.isinf(high) else "")
+    value, guess, low, high = (number / 2 for number in (value, guess, low, high))  # differences may overflow else
+    spots = [
+        tag("i", class_=kind, style=f"left:{100 * np.clip((at - low) / (high - low), 0, 1):.1f}%")
+        for at, kind in ((guess, "guess"), (value, "value"))
+        if math.isfinite(at)
+    ]
+    bar = tag("span", *spots, class_="range", aria_hidden="true")
+    edge = min(value - low, high - value) <= 1e-6 * (high - low)
+    return join([bar, tag("small", "at a bound")]) if edge else bar
+
+
+def time_split(run: Run) -> Html:
+    """Build, compile and solve as one bar."""
+    colours = {"build": style.SKY, "compile": style.ORANGE, "solve": style.BODIES[0]}
+    parts = [(name, run.effort.seconds.get(name, math.nan), colour) for name, colour in colours.items()]
+    known = [(name, took, colour) for name, took, colour in parts if math.isfinite(took) and took >= 0]
+    total = sum(took for _, took, _ in known)
+    if total <= 0:
+        return Html("")
+    bars = [tag("span", style=f"flex:{took / total:.4f};background:{c}") for _, took, c in known if took > 0]
+    keys = [
+        tag("li", tag("span", class_="dot", style=f"background:{c}"), f"{name} {words.seconds(took)}")
+        for name, took, c in known
+    ]
+    prices = [f"{name} {show(price, 2)}" for name, price in run.effort.price.items() if math.isfinite(price)]
+    priced = f"Measured price in rollouts: {writing.listed(prices)}." if prices else ""
+    return card(
+        "Where the time went",
+        tag("div", *bars, class_="split", aria_hidden="true"),
+        tag("ul", *keys, class_="keys"),
+        tag("p", priced, class_="caption") if priced else "",
+        anchor="time",
+    )
+
+
+def provenance(run: Run) -> Html:
+    """When, with what and by which command."""
+    versions = ", ".join(f"{name} {version}" for name, version in run.origin.versions.items() if name != "platform")
+    return facts(
+        [
+            ("Command", tag("code", run.origin.command) if run.origin.command else ""),
+            ("When", run.origin.when),
+            ("Machine", run.origin.versions.get("platform", "")),
+            ("Versions", versions),
+            ("Evaluated by", run.origin.backend),
+            ("Ended as", words.status(run.status)),
+            ("Iterations", words.count(run.effort.iterations) if math.isfinite(run.effort.iterations) else ""),
+        ]
+    )
+
+
+def source(title: str, text: str) -> Html:
+    """A file behind a line that opens it; of a long log the end."""
+    if len(text) > LOG_TAIL and title.startswith("Log"):
+        text = "…\n" + text[-LOG_TAIL:]
+    return fold(title, text)

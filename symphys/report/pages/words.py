@@ -1,0 +1,129 @@
+"""Numbers and states in plain words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from symphys.findings.verdict import BEST_FOUND, DOUBTED, SOLVED, told
+from symphys.findings.writing import listed, plain, show
+from symphys.results.records import Check, Run
+
+STATUS = {
+    "met": "everything met",
+    "converged": "converged",
+    "budget": "budget spent",
+    "stalled": "no more progress",
+    "not_finite": "a number was not finite",
+    "not_applicable": "not applicable",
+    "failed": "failed",
+    "interrupted": "interrupted",
+    "unreadable": "no readable result",
+}
+
+STOPPED = {
+    "converged": "The solver converged.",
+    "budget": "The solver's budget was spent.",
+    "stalled": "The solver could make no more progress.",
+    "not_finite": "A number in the simulation was not finite.",
+    "failed": "The solver failed.",
+}
+
+
+def count(value: float) -> str:
+    """A count in full; medians of an even number of counts may end in a half."""
+    return plain(value, 1) if math.isfinite(value) else show(value)
+
+
+def seconds(value: float) -> str:
+    """A duration with a unit that suits it."""
+    if math.isnan(value) or math.isinf(value):
+        return show(value)
+    if value < 0.0995:
+        return f"{show(1000 * value, 2)} ms"
+    return f"{show(value, 3)} s" if value < 600 else f"{show(value / 60, 3)} min"
+
+
+def status(code: str) -> str:
+    """A status in plain words; one that is not known is told as it stands."""
+    return STATUS.get(code, code.replace("_", " ") or "no status")
+
+
+def ended(code: str) -> str:
+    """A status in two words at most, for tables."""
+    return {"met": "met", "not_finite": "not finite"}.get(code, status(code))
+
+
+def came_to(run: Run) -> str:
+    """How a run ended, in a few words for tables: as its solver did, or its verdict, where that says more."""
+    if run.verdict in (DOUBTED, BEST_FOUND):
+        return told(run.verdict, run.status, bool(run.checks))
+    return ended(run.status)
+
+
+def level(run: Run) -> str:
+    """``good``, ``fair`` (nothing went wrong, but not solved) or ``bad``."""
+    if run.solved:
+        return "good"
+    if run.verdict == DOUBTED:
+        return "bad"
+    return "bad" if run.status in ("failed", "not_finite", "unreadable", "") else "fair"
+
+
+def headline(run: Run) -> str:
+    """A few words for a run."""
+    if run.verdict in (SOLVED, DOUBTED, BEST_FOUND):
+        words = told(run.verdict, run.status, bool(run.checks))
+        return words[:1].upper() + words[1:]
+    known = {"interrupted": "Interrupted", "not_applicable": "Not applicable", "failed": "Failed"}
+    return known.get(run.status, "Not solved" if run.readable else "No result")
+
+
+def verdict(run: Run) -> str:
+    """What came out, in one or two sentences; the solver's own advice is told apart."""
+    if not run.readable:
+        return "No result could be read from this folder."
+    missed = [check for check in run.checks if not check.met]
+    if run.status == "not_applicable":
+        return f"{run.solver} does not apply to this problem."
+    if run.status == "interrupted":
+        return "The run was interrupted; the same command goes on from where it stopped."
+    if not run.checks and run.status in STOPPED and math.isnan(run.objective):
+        return f"{STOPPED[run.status]} There is nothing to judge."
+    if not run.checks:
+        text = (
+            f"The problem states nothing to meet; the objective is {show(run.objective)}. {STOPPED.get(run.status, '')}"
+        )
+    elif run.verdict in (SOLVED, DOUBTED):
+        total = "The only check is" if len(run.checks) == 1 else f"All {len(run.checks)} checks are"
+        text = f"{total} met; the largest error is {show(run.worst, 2)} of its tolerance{work(run)}."
+    else:
+        text = f"{misses(missed, len(run.checks))} {STOPPED.get(run.status, '')}"
+    return f"{text.strip()} {doubted(run)}".strip()
+
+
+def doubted(run: Run) -> str:
+    """Why a run is not to be relied on, in a sentence; empty where it is, or where it came to nothing anyway."""
+    return f"But it is not to be relied on: {'; '.join(run.doubts)}." if run.verdict == DOUBTED else ""
+
+
+def misses(missed: Sequence[Check], total: int) -> str:
+    """How many checks are missed, and the worst by name."""
+    if not missed:
+        return "The run did not end as solved, though no check is missed."
+    worst = max(missed, key=lambda check: math.inf if math.isnan(check.ratio) else check.ratio)
+    many = (
+        "The only check is" if total == 1 else f"{len(missed)} of {total} checks {'is' if len(missed) == 1 else 'are'}"
+    )
+    if not math.isfinite(worst.ratio):
+        return f"{many} missed; the error of “{worst.name}” is not a finite number."
+    return f"{many} missed; the worst is “{worst.name}” at {show(worst.ratio, 2)} times its tolerance."
+
+
+def work(run: Run) -> str:
+    """What a solve took."""
+    counts = [(kind, run.effort.counts.get(kind, 0.0)) for kind in ("rollouts", "gradients")]
+    parts = [f"{count(number)} {kind}" for kind, number in counts if number > 0]
+    took = run.effort.seconds.get("solve", math.nan)
+    spent = f" in {seconds(took)}" if math.isfinite(took) else ""
+    return f", after {listed(parts)}{spent}" if parts else ""

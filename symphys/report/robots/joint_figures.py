@@ -1,0 +1,180 @@
+"""Angles of joints with their limits and targets, torques of motors with their bounds: small multiples."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from symphys.findings.writing import percent
+from symphys.report.figures import style
+from symphys.report.figures.spans import spans
+from symphys.report.robots.joint_grid import FEW, Grid, colour_of, make_grid, shown
+from symphys.report.robots.joint_use import Channel, channels
+from symphys.results.records import Array, Trajectory
+from symphys.results.scene_records import Scene
+
+BEYOND = "#e9edf0"
+FULL = style.VERMILION
+TARGET = style.INK
+DASHES, DOTS = (0, (3, 1.6)), (0, (1, 1.5))
+NEAR = 16
+"""Limits are shown unless they are farther away than so many times what is drawn."""
+LEAST_TURN, LEAST_SLIDE, LEAST_TORQUE = 0.1, 0.02, 1e-3
+"""[rad], [m], [N m] or [N]: what an axis shows at least."""
+Draw = Callable[[Axes, Array, Channel, str], None]
+
+
+def draw_joints(trajectory: Trajectory, scene: Scene) -> tuple[Figure | None, Figure | None]:
+    """The angles, and the torques; of few joints one figure with both."""
+    every = shown(channels(trajectory, scene))
+    if not every or len(trajectory.time) < 2:
+        return None, None
+    if len(every) <= FEW:
+        return draw_rows(every, trajectory, scene), None
+    angles = draw_grid(make_grid(every, trajectory, scene), draw_value, trajectory, scene)
+    add_keys(angles, value_keys(every))
+    driven = [channel for channel in every if channel.driven]
+    if not driven:
+        return angles, None
+    torques = draw_grid(make_grid(driven, trajectory, scene), draw_torque, trajectory, scene)
+    add_keys(torques, torque_keys(driven))
+    return angles, torques
+
+
+def draw_rows(every: list[Channel], trajectory: Trajectory, scene: Scene) -> Figure:
+    """A row for each coordinate, its torque beside it if any has a motor."""
+    driven = [channel for channel in every if channel.driven]
+    columns = 2 if driven else 1
+    figure = Figure(figsize=(style.WIDTH, 0.8 + 1.7 * len(every)), layout="constrained")
+    grid = figure.subplots(len(every), columns, sharex=True, squeeze=False)
+    for row, channel in enumerate(every):
+        colour = colour_of(channel, trajectory, scene)
+        draw_value(grid[row, 0], trajectory.time, channel, colour)
+        if columns == 2 and channel.driven:
+            draw_torque(grid[row, 1], trajectory.time, channel, colour)
+        elif columns == 2:
+            grid[row, 1].set_axis_off()
+        grid[row, 0].set_title(style.short(f"{channel.name}: {channel.quantity} [{channel.unit}]"))
+        if channel.driven:
+            grid[row, 1].set_title(style.short(f"{channel.name}: {channel.effort} [{channel.torque_unit}]"))
+        for axes in grid[row]:
+            axes.tick_params(labelbottom=row == len(every) - 1 or not every[row + 1].driven)
+    for axes in grid[-1]:
+        axes.set_xlabel("time [s]")
+    add_keys(figure, [*value_keys(every), *torque_keys(driven)])
+    return figure
+
+
+def draw_grid(grid: Grid, draw: Draw, trajectory: Trajectory, scene: Scene) -> Figure:
+    """A small picture for each coordinate."""
+    rows, columns = len(grid), len(grid[0])
+    figure = Figure(figsize=(style.WIDTH, 0.7 + 1.25 * rows), layout="constrained")
+    places = figure.subplots(rows, columns, sharex=True, squeeze=False)
+    for row, channels_of_row in enumerate(grid):
+        for column, channel in enumerate(channels_of_row):
+            axes = places[row, column]
+            if channel is None:
+                axes.set_axis_off()
+                continue
+            draw(axes, trajectory.time, channel, colour_of(channel, trajectory, scene))
+            lowest = row == rows - 1 or grid[row + 1][column] is None
+            axes.tick_params(labelbottom=lowest)
+            axes.set_xlabel("time [s]" if lowest else "")
+    return figure
+
+
+def draw_value(axes: Axes, time: Array, channel: Channel, colour: str) -> None:
+    """The coordinate, what is beyond its limits, and a servo's target, dashed."""
+    told = channel.value if channel.target is None else np.concatenate([channel.value, channel.target])
+    low, high = window(told, [channel.joint.lower, channel.joint.upper], LEAST_TURN if channel.turns else LEAST_SLIDE)
+    for edge, beyond in ((channel.joint.lower, low), (channel.joint.upper, high)):
+        if low <= edge <= high:
+            axes.axhspan(min(edge, beyond), max(edge, beyond), color=BEYOND, linewidth=0, zorder=0.5)
+            axes.axhline(edge, color=style.GROUND_EDGE, linewidth=0.8, zorder=1.5)
+    axes.plot(time, unwound(channel.value) if channel.turns else channel.value, color=colour, linewidth=1.5, zorder=3)
+    if channel.target is not None:
+        target = np.append(channel.target, channel.target[-1])
+        axes.plot(time, target, color=TARGET, linestyle=DASHES, linewidth=1.0, drawstyle="steps-post", zorder=3.5)
+    dress(axes, f"{channel.name} [{channel.unit}]", low, high)
+
+
+def draw_torque(axes: Axes, time: Array, channel: Channel, colour: str) -> None:
+    """What the motor gives, its bounds, and where it is at them."""
+    bounds = [-channel.bound, channel.bound] if np.isfinite(channel.bound) else [0.0]
+    low, high = window(np.append(channel.torque, bounds), [], LEAST_TORQUE)
+    for edge in bounds:
+        axes.axhline(edge, color=style.GROUND_EDGE, linewidth=0.9, linestyle=DOTS, zorder=1.5)
+    steps = np.append(channel.torque, channel.torque[-1:])
+    axes.plot(time, steps, color=colour, drawstyle="steps-post", linewidth=1.2, zorder=3)
+    for sign in (-1, 1):
+        for start, stop in spans(channel.saturated & (sign * channel.torque > 0)):
+            ends = [time[start], time[stop]]
+            axes.plot(ends, [sign * channel.bound] * 2, color=FULL, linewidth=2.4, zorder=3.2, solid_capstyle="butt")
+            axes.fill_between(ends, 0, sign * channel.bound, color=FULL, alpha=0.16, linewidth=0, zorder=2)
+    dress(axes, f"{channel.name} [{channel.torque_unit}]", low, high)
+    if channel.share > 0:
+        axes.set_title(percent(channel.share), loc="right", color=FULL)
+
+
+def window(told: Array, edges: list[float], least: float) -> tuple[float, float]:
+    """What an axis shows: all that is told, ``least`` at least, and the edges unless they make that too small."""
+    known = told[np.isfinite(told)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
+    lack = max(least - (high - low), 0.0) / 2
+    low, high = low - lack, high + lack
+    far = NEAR * (high - low)
+    for edge in [edge for edge in edges if low - far <= edge <= high + far]:
+        low, high = min(low, edge), max(high, edge)
+    margin = 0.1 * (high - low)
+    return low - margin, high + margin
+
+
+def unwound(angle: Array) -> Array:
+    """The angle with a gap where it goes on at the other end of the circle."""
+    jumps = np.append(np.abs(np.diff(angle)) > np.pi, False)
+    return np.where(jumps, np.nan, angle)
+
+
+def dress(axes: Axes, title: str, low: float, high: float) -> None:
+    """Name, unit and scale."""
+    axes.set_title(style.short(title, 26))
+    style.set_linear(axes, "x", 4)
+    style.set_linear(axes, "y", 4)
+    axes.margins(x=0.01)
+    axes.set_ylim(low, high)
+
+
+Key = tuple[Artist, str]
+"""What is drawn, and what it means."""
+
+
+def value_keys(every: list[Channel]) -> list[Key]:
+    """Of pictures of coordinates, those that there are."""
+    keys: list[Key] = [(Line2D([], [], color=style.BODIES[0]), "angle or position")]
+    if any(channel.target is not None for channel in every):
+        keys.append((Line2D([], [], color=TARGET, linewidth=1.0, linestyle=DASHES), "what the servo was told"))
+    if any(np.isfinite([channel.joint.lower, channel.joint.upper]).any() for channel in every):
+        keys.append((Patch(facecolor=BEYOND, edgecolor=style.GROUND_EDGE, linewidth=0.8), "beyond a limit"))
+    return keys
+
+
+def torque_keys(driven: list[Channel]) -> list[Key]:
+    """Of pictures of torques, those that there are."""
+    keys: list[Key] = []
+    if any(channel.bound > 0 for channel in driven):
+        keys.append((Line2D([], [], color=style.GROUND_EDGE, linestyle=DOTS), "most that a motor can give"))
+    if any(channel.share > 0 for channel in driven):
+        keys.append((Line2D([], [], color=FULL, linewidth=2.4), "saturated: it gives the most, and for how long"))
+    return keys
+
+
+def add_keys(figure: Figure, keys: list[Key]) -> None:
+    """A row above all."""
+    if keys:
+        style.legend_above(figure, [artist for artist, _ in keys], [label for _, label in keys])

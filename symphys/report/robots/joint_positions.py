@@ -1,0 +1,86 @@
+"""Where joints are in a motion, and their marks in a panel: a dot at the pivot, a bar along the axis."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from symphys.report.figures import style
+from symphys.report.robots.branches import linked
+from symphys.report.scene.views import View, centres, turn
+from symphys.results.joint_records import SceneJoint
+from symphys.results.records import Array, Trajectory
+from symphys.results.scene_records import Scene
+
+AXES = {"hinge": ((0, 0),), "slider": ((1, 0),), "universal": ((1, 1), (0, 0))}
+"""Which axes of a joint are drawn: (side, axis of that side's socket)."""
+SQUARE = ("slider", "fixed")
+"""Kinds whose mark is a square."""
+BAR = 0.065
+"""[in] half length of the bar along an axis"""
+
+
+def on_side(trajectory: Trajectory, joint: SceneJoint, side: int, vector: Array, shot: int, is_point: bool) -> Array:
+    """(3,): a point or direction that one side of a joint carries, in the world."""
+    name = joint.bodies[side] if side < len(joint.bodies) else ""
+    if not name:
+        return vector
+    body = trajectory.body_names.index(name)
+    turned = turn(trajectory.orientation[shot, body], vector)
+    return trajectory.position[shot, body] + turned if is_point else turned
+
+
+def drawable(trajectory: Trajectory, scene: Scene) -> list[SceneJoint]:
+    """The joints whose bodies the motion knows."""
+    return [joint for joint in scene.joints if set(joint.bodies) <= set(trajectory.body_names)]
+
+
+def pivot(trajectory: Trajectory, joint: SceneJoint, shot: int) -> Array:
+    """(3,) [m]: the point of the first side."""
+    return on_side(trajectory, joint, 0, joint.sockets[0].point, shot, True)
+
+
+def axes_of(joint: SceneJoint) -> list[tuple[int, Array]]:
+    """The axes that are drawn: the side that carries each, and its direction (3,) in that side's frame."""
+    return [(side, turn(joint.sockets[side].orientation, np.eye(3)[k])) for side, k in AXES.get(joint.kind, ())]
+
+
+def bones(trajectory: Trajectory, scene: Scene, shot: int) -> Iterator[tuple[int, Array]]:
+    """Lines (2, 3) [m] from the centres of bodies to their joints, and to solids beside them, each with its body."""
+    for joint in drawable(trajectory, scene):
+        for side, name in enumerate(joint.bodies):
+            body = trajectory.body_names.index(name)
+            end = on_side(trajectory, joint, side, joint.sockets[side].point, shot, True)
+            yield body, np.array([trajectory.position[shot, body], end])
+    for body in linked(trajectory, scene):
+        for solid in scene.solids(trajectory.body_names[body]):
+            if np.linalg.norm(solid.centre) > solid.girth:
+                yield body, np.array([trajectory.position[shot, body], centres(trajectory, body, solid)[shot]])
+
+
+def draw_pivots(axes: Axes, view: View, trajectory: Trajectory, scene: Scene, shot: int, scale: float) -> None:
+    """The marks of all joints at one time, on top of all; ``scale`` [in/m]."""
+    joints = drawable(trajectory, scene)
+    bars = []
+    for joint in joints:
+        place = view.flat(pivot(trajectory, joint, shot))
+        for side, direction in axes_of(joint):
+            half = BAR / scale * view.flat(on_side(trajectory, joint, side, direction, shot, False))
+            bars += [place - half, place + half]
+    draw_lines(axes, np.array(bars), style.INK, 0.8, 7)
+    for shape, square in (("o", False), ("s", True)):
+        chosen = [pivot(trajectory, joint, shot) for joint in joints if (joint.kind in SQUARE) == square]
+        if chosen:
+            (mark,) = axes.plot(*view.flat(np.array(chosen)).T, shape, color="white", markersize=2.5, zorder=7.1)
+            mark.set(markeredgecolor=style.INK, markeredgewidth=0.7)
+
+
+def draw_lines(axes: Axes, ends: Array, colour: Any, width: float, zorder: float) -> None:
+    """Lines between each two of these points, as one path; ``ends`` holds (2,) points, in any shape."""
+    if ends.size:
+        pairs = ends.reshape(-1, 2, 2)
+        parts = np.concatenate([pairs, np.full((len(pairs), 1, 2), np.nan)], axis=1).reshape(-1, 2)
+        axes.plot(*parts.T, color=colour, linewidth=width, zorder=zorder)

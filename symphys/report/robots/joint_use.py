@@ -1,0 +1,137 @@
+"""What the joints of a motion did, in numbers: how far they went, what their motors gave, how well they held."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from symphys.results.joint_records import SceneJoint
+from symphys.results.records import Array, Mask, Trajectory
+from symphys.results.scene_records import Scene
+
+FULL = 1 - 1e-3
+"""A motor is saturated from this share of its largest torque on."""
+AT_LIMIT = 1e-3
+"""[rad] or [m]: how near to a limit a coordinate counts as there."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One coordinate of a joint over N steps.
+
+    Attributes:
+        name: the joint's, with a number where it has several coordinates.
+        turns: whether it is an angle.
+        value: (N + 1,) [rad] or [m].
+        torque: (N,) [N m] or [N] of its motor.
+        command: (N,) what the motor was told; nan in records that do not say.
+    """
+
+    name: str
+    joint: SceneJoint
+    turns: bool
+    value: Array
+    torque: Array
+    command: Array
+
+    @property
+    def quantity(self) -> str:
+        """What its value is."""
+        return "angle" if self.turns else "position"
+
+    @property
+    def effort(self) -> str:
+        """What its motor gives."""
+        return "torque" if self.turns else "force"
+
+    @property
+    def unit(self) -> str:
+        """Of its value."""
+        return "rad" if self.turns else "m"
+
+    @property
+    def torque_unit(self) -> str:
+        """Of what its motor gives."""
+        return "N m" if self.turns else "N"
+
+    @property
+    def driven(self) -> bool:
+        """Whether it has a motor."""
+        return self.joint.motor is not None
+
+    @property
+    def bound(self) -> float:
+        """The most that its motor can give; nan without one."""
+        return np.nan if self.joint.motor is None else self.joint.motor.torque
+
+    @property
+    def saturated(self) -> Mask:
+        """(N,): whether its motor gives the most that it can."""
+        found: Mask = (np.abs(self.torque) >= FULL * self.bound) & (self.bound > 0)
+        return found
+
+    @property
+    def share(self) -> float:
+        """Of the time in saturation; nan without a bound."""
+        return float(self.saturated.mean()) if self.saturated.size and self.bound > 0 else np.nan
+
+    @property
+    def target(self) -> Array | None:
+        """(N,): the angle, or place, that a servo was told; None for anything else."""
+        if self.joint.motor is None or self.joint.motor.kind != "servo" or not np.isfinite(self.command).all():
+            return None
+        return self.command
+
+    @property
+    def at_limit(self) -> bool:
+        """Whether it came to one of its limits."""
+        near = (self.value <= self.joint.lower + AT_LIMIT) | (self.value >= self.joint.upper - AT_LIMIT)
+        return bool(near.any())
+
+
+@dataclass(frozen=True)
+class Separation:
+    """How far the sides of joints came apart [m], where they should not: over all joints and times, and the worst."""
+
+    rms: float
+    most: float
+    joint: str
+    time: float
+
+
+def channels(trajectory: Trajectory, scene: Scene) -> list[Channel]:
+    """All coordinates of all joints, in the file's order."""
+    known = {joint.name: joint for joint in scene.joints}
+    found = []
+    for index, name in enumerate(trajectory.joint_names):
+        joint = known.get(name, SceneJoint(name))
+        columns = [
+            k for k in range(trajectory.joint_value.shape[2]) if np.isfinite(trajectory.joint_value[:, index, k]).any()
+        ]
+        for k in columns:
+            found.append(
+                Channel(
+                    name=name if len(columns) == 1 else f"{name} {k + 1}",
+                    joint=joint,
+                    turns=joint.turns[k] if k < len(joint.turns) else True,
+                    value=trajectory.joint_value[:, index, k],
+                    torque=trajectory.joint_torque[:, index, k],
+                    command=trajectory.joint_command[:, index, k],
+                )
+            )
+    return found
+
+
+def separation(trajectory: Trajectory) -> Separation | None:
+    """Of all joints; None without any that is known."""
+    apart = trajectory.joint_separation
+    if not np.isfinite(apart).any():
+        return None
+    step, joint = np.unravel_index(int(np.nanargmax(apart)), apart.shape)
+    return Separation(
+        rms=float(np.sqrt(np.nanmean(apart**2))),
+        most=float(apart[step, joint]),
+        joint=trajectory.joint_names[joint],
+        time=float(trajectory.time[step]),
+    )

@@ -1,0 +1,118 @@
+"""Many bodies that hang together, drawn whole: what is nearer hides what is behind, so that legs stay apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.patches import Circle, Polygon
+
+from symphys.report.figures import style
+from symphys.report.robots.branches import colours, linked, traced
+from symphys.report.robots.joint_positions import bones, draw_lines, draw_pivots
+from symphys.report.scene.outlines import inner_edges, outline
+from symphys.report.scene.panel import Panel
+from symphys.report.scene.views import View, centres, half_axes, solids_of, turn
+from symphys.results.records import Array, Trajectory
+from symphys.results.scene_records import Scene, Solid
+
+APART = 0.75
+"""Snapshots in one picture are apart by this share of the robot's length at least."""
+MOST = 8
+
+
+def draw_robots(axes: Axes, panel: Panel, trajectory: Trajectory, scene: Scene, scale: float) -> None:
+    """Paths of trunks and feet, and whole snapshots that hardly cover each other, the later the stronger."""
+    draw_paths(axes, panel.view, trajectory, scene)
+    shots = spaced(trajectory, scene, panel.view)
+    for order, shot in enumerate(shots):
+        strength = 1.0 if shot == shots[-1] else 0.3 + 0.35 * shot / max(shots[-1], 1)
+        Whole(axes, panel.view, trajectory, scene, shot).draw(strength, order)
+    draw_pivots(axes, panel.view, trajectory, scene, shots[-1], scale)
+
+
+def spaced(trajectory: Trajectory, scene: Scene, view: View) -> list[int]:
+    """The snapshots: first, last and between at even distances, if linked bodies go far enough; else the last."""
+    low, high = extents(trajectory, scene, view, linked(trajectory, scene))
+    gone = ((low + high) / 2 - (low[0] + high[0]) / 2) / (high - low).max(axis=0)
+    along = gone[:, np.abs(gone[-1]).argmax()]
+    parts = min(int(abs(along[-1]) / APART), MOST)
+    return sorted({int(np.abs(along - along[-1] * part / parts).argmin()) for part in range(parts)} | {len(along) - 1})
+
+
+def extents(trajectory: Trajectory, scene: Scene, view: View, bodies: Sequence[int]) -> tuple[Array, Array]:
+    """(N+1, 2) [m] each: the lowest and highest seen coordinates of these bodies at each time."""
+    low, high = [], []
+    for body in bodies:
+        for solid in solids_of(trajectory, scene, body):
+            middle = view.flat(centres(trajectory, body, solid))
+            half = view.flat(np.abs(half_axes(trajectory.orientation[:, body], solid)).sum(axis=1)) + solid.radius
+            low.append(middle - half)
+            high.append(middle + half)
+    return np.min(low, axis=0), np.max(high, axis=0)
+
+
+def draw_paths(axes: Axes, view: View, trajectory: Trajectory, scene: Scene) -> None:
+    """The paths of trunks and of the bodies at the ends of limbs."""
+    kept = traced(trajectory, scene)
+    for body, colour in enumerate(colours(trajectory, scene)):
+        if trajectory.body_names[body] in kept:
+            _, path = style.thin(trajectory.time, view.flat(trajectory.position[:, body]), 500)
+            axes.plot(*path.T, color=colour, linewidth=0.8, alpha=0.6, zorder=2.2)
+
+
+@dataclass(frozen=True)
+class Whole:
+    """All bodies of a scene at one time."""
+
+    axes: Axes
+    view: View
+    trajectory: Trajectory
+    scene: Scene
+    shot: int
+
+    def draw(self, strength: float = 1.0, order: int = 0) -> None:
+        """From the back to the front; paler with less ``strength``, over snapshots of a lower ``order``."""
+        colour = colours(self.trajectory, self.scene)
+        base = 2.5 + 0.25 * order / MOST
+        lines = list(bones(self.trajectory, self.scene, self.shot))
+        for each in dict.fromkeys(colour[body] for body, _ in lines):
+            ends = [self.view.flat(line) for body, line in lines if colour[body] == each]
+            draw_lines(self.axes, np.array(ends), tuple(mixed(each, strength)), 1.6, base)
+        solids = sorted(self.solids(), key=lambda entry: entry[0])
+        for rank, (_, body, solid) in enumerate(solids):
+            self.draw_solid(body, solid, mixed(colour[body], strength), base + 0.02 * (1 + rank) / (1 + len(solids)))
+
+    def solids(self) -> list[tuple[float, int, Solid]]:
+        """Each with its body, and with how near it is to the viewer; a point for what is free and has no surface."""
+        held = linked(self.trajectory, self.scene)
+        return [
+            (float(centres(self.trajectory, body, solid)[self.shot] @ self.view.front), body, solid)
+            for body, name in enumerate(self.trajectory.body_names)
+            for solid in self.scene.solids(name) or (() if body in held else (Solid(),))
+        ]
+
+    def draw_solid(self, body: int, solid: Solid, colour: Array, zorder: float) -> None:
+        """Its outline, filled, and the edges of a box."""
+        turned = self.trajectory.orientation[self.shot, body]
+        centre = self.view.flat(self.trajectory.position[self.shot, body] + turn(turned, solid.centre))
+        if solid.radius == 0 and solid.is_ball:
+            self.axes.plot(*centre, "o", color=tuple(colour), markersize=3, zorder=zorder)
+            return
+        half = half_axes(turned, solid)
+        around = centre + outline(self.view.flat(half), solid.radius)
+        patch = Circle((centre[0], centre[1]), solid.radius) if solid.is_ball else Polygon(around)
+        patch.set(facecolor=tuple(mixed(colour, 0.42)), edgecolor=tuple(colour), linewidth=0.8, zorder=zorder)
+        self.axes.add_patch(patch)
+        if solid.radius == 0:
+            edges = centre + self.view.flat(inner_edges(half, self.view.front))
+            draw_lines(self.axes, edges, tuple(colour), 0.6, zorder)
+
+
+def mixed(colour: str | Array, strength: float) -> Array:
+    """(3,): a colour on white."""
+    own = np.array(to_rgb(colour if isinstance(colour, str) else tuple(colour)))
+    return 1 - strength * (1 - own)

@@ -1,0 +1,141 @@
+"""A motion of bodies that hang together as a strip of pictures at even times: side view above, top view below.
+
+The window goes with bodies that travel far to the right or the left; up and down it stands still.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from symphys.report.figures import style
+from symphys.report.robots.branches import linked
+from symphys.report.robots.joint_positions import draw_pivots
+from symphys.report.robots.snapshots import Whole, extents
+from symphys.report.scene.ground import draw_ground
+from symphys.report.scene.panel import Panel, include
+from symphys.report.scene.views import NAMES, View, choose_views
+from symphys.results.records import Array, Trajectory
+from symphys.results.scene_records import Scene
+
+LEFT, RIGHT, BOTTOM, TOP, GAP, BETWEEN = 0.72, 0.1, 0.42, 0.3, 0.1, 0.18
+"""[in] margins, and gaps between columns and rows"""
+TALLEST, LOWEST = 2.4, 0.75
+"""[in] a picture is at most and at least"""
+FAR, FAR_ON_RAILS = 2.0, 6.0
+"""A window stands still where all fits into so many sizes of the bodies: of free ones, and of those the world holds."""
+MARGIN = 0.06
+EDGE = 0.14
+"""[in] Numbers are at least so far from the sides of a picture, so that those of neighbours do not meet."""
+
+
+@dataclass(frozen=True)
+class Strip:
+    """Windows that are equally large: ``low`` (shots, 2) [m] are their corners, ``size`` (2,) [m]."""
+
+    view: View
+    low: Array
+    size: Array
+
+
+def draw_strip(trajectory: Trajectory, scene: Scene) -> Figure | None:
+    """The strip; None where no joint holds bodies that move."""
+    if not linked(trajectory, scene) or len(trajectory.time) < 2:
+        return None
+    views = choose_views(trajectory, scene)
+    every = list(range(len(trajectory.time)))
+    shots = even_shots(len(every), make_strip(views[0], trajectory, scene, every).size)
+    strips = [make_strip(view, trajectory, scene, shots) for view in views]
+    width = (style.WIDTH - LEFT - RIGHT - GAP * (len(shots) - 1)) / len(shots)
+    scale = min(width / max(strip.size[0] for strip in strips), *(TALLEST / strip.size[1] for strip in strips))
+    strips = [widened(strip, width / scale, LOWEST / scale) for strip in strips]
+    figure, places = lay_out(strips, width, scale)
+    for row, strip in enumerate(strips):
+        for column, shot in enumerate(shots):
+            axes = figure.add_axes(places[row][column])
+            panel = Panel(strip.view, strip.low[column], strip.low[column] + strip.size)
+            draw_frame(axes, panel, trajectory, scene, shot, scale)
+            dress_frame(axes, panel, scale, column == 0, row == len(strips) - 1)
+            axes.set_title(f"{trajectory.time[shot]:.2f} s" if row == 0 else "")
+    return figure
+
+
+Place = tuple[float, float, float, float]
+"""(left, bottom, width, height) in shares of a figure."""
+
+
+def lay_out(strips: Sequence[Strip], width: float, scale: float) -> tuple[Figure, list[list[Place]]]:
+    """The figure, and the places of its pictures, each ``width`` [in] wide, strip by strip."""
+    heights = [float(strip.size[1]) * scale for strip in strips]
+    total = TOP + BOTTOM + sum(heights) + BETWEEN * (len(strips) - 1)
+    places: list[list[Place]] = []
+    top = total - TOP
+    for strip, height in zip(strips, heights, strict=True):
+        lefts = [LEFT + column * (width + GAP) for column in range(len(strip.low))]
+        shares = width / style.WIDTH, height / total
+        places.append([(left / style.WIDTH, (top - height) / total, *shares) for left in lefts])
+        top -= height + BETWEEN
+    return Figure(figsize=(style.WIDTH, total)), places
+
+
+def even_shots(count: int, size: Array) -> list[int]:
+    """Even times, more of them the slimmer the window is."""
+    number = int(np.clip(round(8 * size[1] / size[0]), 4, 8))
+    return [int(shot) for shot in np.unique(np.linspace(0, count - 1, number).round())]
+
+
+def make_strip(view: View, trajectory: Trajectory, scene: Scene, shots: Sequence[int]) -> Strip:
+    """The windows of these shots, and the ground where it is near."""
+    low, high = (part[list(shots)] for part in extents(trajectory, scene, view, linked(trajectory, scene)))
+    size, union = (high - low).max(axis=0), high.max(axis=0) - low.min(axis=0)
+    middle = (low + high) / 2
+    far = FAR if all(joint.second for joint in scene.joints) else FAR_ON_RAILS
+    still = np.array([union[0] <= far * size[0], True])
+    size = np.where(still, union, size)
+    corner = np.where(still, low.min(axis=0), middle - size / 2)
+    room = float(size.max())
+    bottom, top = corner.min(axis=0), (corner + size).max(axis=0)
+    for plane in scene.planes:
+        bottom, top = include(plane, view, bottom, top, 0.25 * room)
+    below = np.where(still, corner.min(axis=0) - bottom, 0)
+    size = size + np.where(still, top - bottom - size, 0)
+    return Strip(view, corner - below - MARGIN * room, size + 2 * MARGIN * room)
+
+
+def widened(strip: Strip, width: float, height: float) -> Strip:
+    """As wide as its column, and of a least height [m]."""
+    lack = np.array([width - strip.size[0], max(height - strip.size[1], 0.0)])
+    return Strip(strip.view, strip.low - lack / 2, strip.size + lack)
+
+
+def draw_frame(axes: Axes, panel: Panel, trajectory: Trajectory, scene: Scene, shot: int, scale: float) -> None:
+    """What stands still, the bodies at one time, and their joints."""
+    draw_ground(axes, panel, trajectory, scene)
+    axes.set_title("")
+    Whole(axes, panel.view, trajectory, scene, shot).draw()
+    draw_pivots(axes, panel.view, trajectory, scene, shot, scale)
+
+
+def dress_frame(axes: Axes, panel: Panel, scale: float, first: bool, bottom: bool) -> None:
+    """Axes to scale; numbers along the left and below only."""
+    view = panel.view
+    vertical = [panel.low[1], panel.high[1]]
+    axes.set(xlim=(panel.low[0], panel.high[0]), ylim=vertical[::-1] if view.down else vertical, aspect="equal")
+    width, height = panel.span * scale
+    style.set_linear(axes, "x", int(np.clip(3.2 * width, 2, 6)))
+    style.set_linear(axes, "y", int(np.clip(2.2 * height, 2, 5)))
+    axes.set_xticks(inside(axes.get_xticks(), panel.low[0], panel.high[0], EDGE / scale))
+    axes.spines[["left", "bottom"]].set_visible(False)
+    axes.patch.set_facecolor("#fafbfc")
+    axes.tick_params(labelleft=first, labelbottom=bottom)
+    axes.set_ylabel(f"{view.title}\n{NAMES[view.up]} [m]" if first else "", labelpad=3)
+    axes.set_xlabel(f"{NAMES[view.right]} [m]" if bottom and first else "", labelpad=2, loc="left")
+
+
+def inside(ticks: Array, low: float, high: float, edge: float) -> Array:
+    """The ticks that are well within a window."""
+    return ticks[(ticks > low + edge) & (ticks < high - edge)]

@@ -1,0 +1,1 @@
+"""Pictures of a motion: what moves, what stands around it, from which side it is seen."""

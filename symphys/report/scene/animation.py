@@ -1,0 +1,131 @@
+"""The motion as it is played in the page: decimated, rounded, and the element that plays it."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+
+from symphys.report.figures import style
+from symphys.report.pages.markup import Html, dot, join, tag
+from symphys.report.robots.branches import colours, keys, traced
+from symphys.report.robots.played_joints import follow_data, joint_data
+from symphys.report.scene.views import SIDE_YZ, TOP, choose_views, solids_of
+from symphys.results.records import Array, Trajectory
+from symphys.results.scene_records import Scene, SceneTerrain, Solid
+
+NUMBERS = 60_000
+"""How many numbers a page carries at most for one motion, about 400 kB."""
+MOST_FRAMES = 600
+GUESS_POINTS = 120
+SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
+LEAST_PLAY = 3.0
+"""[s] a motion plays at least, slowed down if need be."""
+
+
+def animation(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = None, numbers: int = NUMBERS) -> Html:
+    """A canvas with play, time and view controls, and its data; works without any network."""
+    data = json.dumps(motion_data(trajectory, scene, guess, numbers), separators=(",", ":"), allow_nan=False)
+    inert = data.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
+    legend = [join([dot(colour), style.short(name, 24)]) for name, colour in keys(trajectory, scene)]
+    return tag(
+        "div",
+        tag("canvas", tabindex="0", role="img", aria_label="The motion, played; drag to turn"),
+        tag("div", *(tag("span", part) for part in legend), class_="legend") if legend else "",
+        controls(float(trajectory.time[-1] - trajectory.time[0]), follow_data(trajectory, scene) is not None),
+        tag("noscript", "The motion plays only with JavaScript; the figure below shows it without."),
+        tag("script", Html(inert), type="application/json"),
+        class_="animation",
+    )
+
+
+def controls(duration: float, follows: bool) -> Html:
+    """Play button, slider, time, speed and views, and whether the camera goes along where it can."""
+    fitting = [speed for speed in SPEEDS if speed <= 1 and duration / speed >= LEAST_PLAY]
+    chosen = max(fitting, default=SPEEDS[0])
+    speeds = [tag("option", f"{s:g}×", value=f"{s:g}", selected="" if s == chosen else None) for s in SPEEDS]  # noqa: RUF001
+    views = [tag("button", title, type="button", data_view=key) for key, title in VIEW_TITLES]
+    return tag(
+        "div",
+        tag("button", "▶", type="button", class_="play", aria_label="Play or pause"),
+        tag("input", type="range", min="0", max="1000", value="0", step="1", aria_label="Time"),
+        tag("output", ""),
+        tag("select", *speeds, aria_label="Speed"),
+        tag("span", *views, class_="views"),
+        tag("span", tag("button", "Follow", **FOLLOW), class_="views") if follows else "",
+        class_="controls",
+    )
+
+
+FOLLOW = {"type": "button", "data_follow": "", "aria_pressed": "true"}
+VIEW_TITLES = (("space", "3D"), ("side", "Side"), ("top", "Top"))
+
+
+def motion_data(trajectory: Trajectory, scene: Scene, guess: Trajectory | None, numbers: int) -> dict[str, object]:
+    """What animation.js and joints.js read; lists are flat, frame after frame, body after body."""
+    bodies = len(trajectory.body_names)
+    frames = int(np.clip(numbers // (7 * bodies), 40, MOST_FRAMES))
+    chosen = even(len(trajectory.time), frames)
+    views = choose_views(trajectory, scene)
+    return {
+        "time": rounded(trajectory.time[chosen], 1e-6),
+        "bodies": body_data(trajectory, scene),
+        "position": rounded(trajectory.position[chosen], 1e-5),
+        "orientation": rounded(trajectory.orientation[chosen], 1e-4),
+        "guess": [] if guess is None else guess_data(guess, scene),
+        "planes": [{"normal": rounded(p.normal, 1e-9), "offset": float(p.offset)} for p in scene.planes],
+        "fixtures": [solid_data(fixture.solid) for fixture in scene.fixtures],
+        "terrain": [terrain_data(ground) for ground in scene.terrain],
+        "flat": views[0] == TOP,
+        "along": "y" if views[0] == SIDE_YZ else "x",
+        "axes": list(style.AXES),
+        "joints": joint_data(trajectory, scene),
+        "follow": follow_data(trajectory, scene),
+    }
+
+
+def body_data(trajectory: Trajectory, scene: Scene) -> list[dict[str, object]]:
+    """Colour and solids of each body, and whether its path is drawn."""
+    names, kept = trajectory.body_names, traced(trajectory, scene)
+    return [
+        {
+            "colour": colour,
+            "solids": list(map(solid_data, solids_of(trajectory, scene, body))),
+            "path": names[body] in kept,
+        }
+        for body, colour in enumerate(colours(trajectory, scene))
+    ]
+
+
+def solid_data(solid: Solid) -> dict[str, object]:
+    """Radius, half sizes of the inner box, centre and orientation; what is usual is left out."""
+    data: dict[str, object] = {"radius": solid.radius, "centre": rounded(solid.centre, 1e-6)}
+    if not solid.is_ball:
+        data |= {"half": rounded(solid.half, 1e-6), "q": rounded(solid.orientation, 1e-7)}
+    return data
+
+
+def terrain_data(ground: SceneTerrain) -> dict[str, object]:
+    """Rising x and y, and heights row after row; null where there is none."""
+    z = rounded(np.nan_to_num(ground.z), 1e-5)
+    holes = np.isnan(ground.z).ravel()
+    heights = [None if hole else height for height, hole in zip(z, holes, strict=True)]
+    return {"x": rounded(ground.x, 1e-6), "y": rounded(ground.y, 1e-6), "z": heights}
+
+
+def guess_data(guess: Trajectory, scene: Scene) -> list[list[float]]:
+    """The guess's paths, flat, of the bodies whose path is drawn."""
+    kept, shots = traced(guess, scene), even(len(guess.time), GUESS_POINTS)
+    return [rounded(guess.position[shots, body], 1e-4) for body, name in enumerate(guess.body_names) if name in kept]
+
+
+def even(count: int, most: int) -> Array:
+    """At most ``most`` indices below ``count``, evenly apart, the first and the last among them."""
+    return np.linspace(0, count - 1, min(count, most)).round().astype(int)
+
+
+def rounded(values: Array, share: float) -> list[float]:
+    """Flat, rounded to decimals that are ``share`` of the largest number."""
+    largest = float(np.abs(values).max(initial=0.0))
+    decimals = int(np.ceil(-np.log10(share * largest))) if largest > 0 else 0
+    return [entry + 0.0 for entry in np.round(values.ravel(), max(decimals, 0)).tolist()]

@@ -1,0 +1,95 @@
+"""What stands around a motion, in a panel: planes, fixtures and terrain."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.patches import Polygon
+from matplotlib.ticker import MaxNLocator
+
+from symphys.findings import writing
+from symphys.report.figures import style
+from symphys.report.scene.outlines import inner_edges, outline
+from symphys.report.scene.panel import Panel
+from symphys.report.scene.views import View, half_axes
+from symphys.results.records import Trajectory
+from symphys.results.scene_records import UPRIGHT, Scene, SceneTerrain, Solid
+
+SHADES = LinearSegmentedColormap.from_list("heights", ["#ffffff", "#d8dfe6"])
+HATCH: dict[str, Any] = {"facecolor": style.GROUND, "edgecolor": "#d5dbe1", "hatch": "////", "linewidth": 0}
+BEHIND = "#f6f8f9"
+LINES = 8
+"""Lines of height in a view from above, at most about."""
+
+
+def draw_ground(axes: Axes, panel: Panel, trajectory: Trajectory, scene: Scene) -> None:
+    """All that stands still; planes and terrain hide what is below them."""
+    for ground in scene.terrain:
+        if panel.view.depth == 2:
+            draw_heights(axes, panel, ground)
+        else:
+            draw_profile(axes, panel, trajectory, ground)
+    for fixture in scene.fixtures:
+        draw_fixture(axes, panel.view, fixture.solid)
+    draw_planes(axes, panel, trajectory, scene)
+
+
+def draw_fixture(axes: Axes, view: View, solid: Solid) -> None:
+    """The outline of a static solid, and the edges that are seen in it."""
+    half = half_axes(np.array(UPRIGHT), solid)
+    around = view.flat(solid.centre) + outline(view.flat(half), solid.radius)
+    axes.add_patch(Polygon(around, **HATCH, zorder=1.55))
+    axes.add_patch(Polygon(around, fill=False, edgecolor=style.GROUND_EDGE, linewidth=1.3, zorder=1.56))
+    if solid.radius == 0:
+        for edge in view.flat(solid.centre + inner_edges(half, view.front)):
+            axes.plot(*edge.T, color=style.GROUND_EDGE, linewidth=0.8, zorder=1.56)
+
+
+def draw_profile(axes: Axes, panel: Panel, trajectory: Trajectory, ground: SceneTerrain) -> None:
+    """A cut through terrain in the middle of the motion's depth; palely, how high it is behind and in front."""
+    along_x = panel.view.right == 0
+    along, across, z = (ground.x, ground.y, ground.z) if along_x else (ground.y, ground.x, ground.z.T)
+    places = trajectory.position[..., panel.view.depth]
+    cut = np.array([np.interp(np.median(places), across, column) for column in z.T])
+    near = (across >= places.min()) & (across <= places.max())
+    bottom = min(panel.low[1], float(np.nanmin(cut, initial=np.inf))) - float(panel.span[1])
+    if near.any():
+        highest = np.fmax.reduce(z[near], axis=0)
+        axes.fill_between(along, highest, bottom, facecolor=BEHIND, edgecolor=style.FAINT, linewidth=0.8, zorder=1.4)
+    axes.fill_between(along, cut, bottom, **HATCH, zorder=1.57)
+    axes.plot(along, cut, color=style.GROUND_EDGE, linewidth=1.6, zorder=1.58)
+
+
+def draw_heights(axes: Axes, panel: Panel, ground: SceneTerrain) -> None:
+    """Lines of height, and in the title how far apart they are."""
+    low, high = np.nanmin(ground.z, initial=np.inf), np.nanmax(ground.z, initial=-np.inf)
+    if not high - low > 1e-9 * max(abs(high), abs(low)):
+        return
+    levels = MaxNLocator(LINES, steps=[1, 2, 5, 10]).tick_values(low, high)
+    turned = panel.view.right == 1
+    x, y, z = (ground.y, ground.x, ground.z.T) if turned else (ground.x, ground.y, ground.z)
+    axes.contourf(x, y, z, levels=levels, cmap=SHADES, zorder=1.4)
+    axes.contour(x, y, z, levels=levels, colors=style.FAINT, linewidths=0.8, linestyles="solid", zorder=1.5)
+    axes.set_title(f"{panel.view.title}; a line of height every {writing.show(levels[1] - levels[0], 3)} m")
+
+
+def draw_planes(axes: Axes, panel: Panel, trajectory: Trajectory, scene: Scene) -> None:
+    """The solid side of every plane that is seen from its edge, cut at the middle of the motion's depth."""
+    depth = float(np.median(trajectory.position[..., panel.view.depth]))
+    middle, size = (panel.low + panel.high) / 2, float(np.linalg.norm(panel.span))
+    for plane in scene.planes:
+        normal = panel.view.flat(plane.normal)
+        length = float(np.linalg.norm(normal))
+        if length < 0.3:
+            continue
+        offset = (plane.offset - plane.normal[panel.view.depth] * depth) / length
+        normal = normal / length
+        foot = middle + (offset - normal @ middle) * normal
+        along = size * np.array([-normal[1], normal[0]])
+        corners = np.array([foot - along, foot + along, foot + along - size * normal, foot - along - size * normal])
+        # The line lies under every solid, so that it ends where another plane's solid begins.
+        axes.plot(*corners[:2].T, color=style.GROUND_EDGE, linewidth=2.2, zorder=1.5)
+        axes.add_patch(Polygon(corners, **HATCH, zorder=1.6))

@@ -1,0 +1,113 @@
+"""Run folders below a folder, grouped by problem and solver."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from symphys.findings.verdict import BEST_FOUND, DOUBTED, SOLVED
+from symphys.results.reading import CONFIG, PROBLEM, RESULT, read_run
+from symphys.results.records import ReportError, Run
+
+FIGURES = "figures"
+RANKS = {word: rank for rank, word in enumerate((SOLVED, BEST_FOUND, DOUBTED))}
+"""Of verdicts; what is not named comes last."""
+
+
+def middle(numbers: Sequence[float]) -> float:
+    """The median; the sum of two may be beyond the largest double, that of their halves is not."""
+    return 2 * float(np.median(np.asarray(numbers, float) / 2))
+
+
+@dataclass(frozen=True)
+class Entry:
+    """All runs of one solver on one problem, by seed."""
+
+    solver: str
+    runs: tuple[Run, ...]
+
+    @property
+    def solved(self) -> int:
+        """How many runs are solved."""
+        return sum(run.solved for run in self.runs)
+
+    def median(self, numbers: list[float]) -> float:
+        """The median of those that are finite; nan if none is."""
+        finite = [number for number in numbers if np.isfinite(number)]
+        return middle(finite) if finite else np.nan
+
+
+@dataclass(frozen=True)
+class Study:
+    """All runs of one problem in one place."""
+
+    problem: str
+    place: str
+    entries: tuple[Entry, ...]
+
+    @property
+    def runs(self) -> tuple[Run, ...]:
+        """Every run."""
+        return tuple(run for entry in self.entries for run in entry.runs)
+
+    @property
+    def title(self) -> str:
+        """The problem's title."""
+        return self.runs[0].title
+
+    @property
+    def best(self) -> Run:
+        """The best by its verdict, then the lowest objective, then the least work."""
+
+        def merit(run: Run) -> tuple[int, float, float]:
+            known = [np.inf if np.isnan(number) else number for number in (run.objective, run.effort.equivalents)]
+            return RANKS.get(run.verdict, len(RANKS)), known[0], known[1]
+
+        return min(self.runs, key=merit)
+
+
+def run_folders(root: Path) -> list[Path]:
+    """Every folder at or below ``root`` that looks like a run folder, in order of name. Raises ReportError."""
+    if not root.is_dir():
+        raise ReportError(f"{root}: there is no such folder; give one that `symphys solve --out` has written")
+    found = []
+    for folder, below, files in os.walk(root):
+        below[:] = sorted(name for name in below if name != FIGURES and not name.startswith("."))
+        if is_run(files):
+            found.append(Path(folder))
+    return found
+
+
+def is_run(files: list[str]) -> bool:
+    """Whether a folder with these files is a run folder, finished or not."""
+    return RESULT in files or (CONFIG in files and PROBLEM in files)
+
+
+def read_all(root: Path) -> tuple[list[Run], list[Run]]:
+    """Runs with a result, and folders without a readable one."""
+    runs = [read_run(folder, root) for folder in run_folders(root)]
+    return [run for run in runs if run.readable], [run for run in runs if not run.readable]
+
+
+def studies(runs: list[Run]) -> list[Study]:
+    """Group runs: same problem and same parent folder make one study."""
+    keys = sorted({(run.problem, parent(run)) for run in runs})
+    return [make_study(problem, place, runs) for problem, place in keys]
+
+
+def make_study(problem: str, place: str, runs: list[Run]) -> Study:
+    """The study of one problem in one place; its solvers in order of name, seeds in order."""
+    own = [run for run in runs if (run.problem, parent(run)) == (problem, place)]
+    own.sort(key=lambda run: (run.solver, run.seed, run.place))
+    solvers = sorted({run.solver for run in own})
+    entries = tuple(Entry(solver, tuple(run for run in own if run.solver == solver)) for solver in solvers)
+    return Study(problem, place, entries)
+
+
+def parent(run: Run) -> str:
+    """The folder that holds the run folder, below the report's folder."""
+    return run.place.rpartition("/")[0]

@@ -1,0 +1,107 @@
+"""From the decision vector z to what the rollout starts from: initial state, inputs of every step, parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from symphys.model.state_layout import initial_state, input_columns, inputs_size
+from symphys.model.world import World
+from symphys.problem import Problem, Variable, follow
+from symphys.shooting import Block
+from symphys.transcription.formula_names import Parameters, spans
+
+Expr = Any
+"""casadi MX"""
+
+
+MIDDLE, START = 0.5, 0.0
+"""When a linear control is looked at in a step: forces act over it, motors as an impulse at its start (leapfrog)."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """x0 (nx,) without memory, u (nu, N) as variables give it and p (np,), as expressions of z."""
+
+    x0: Expr
+    u: Expr
+    p: Expr
+
+
+def blocks(problem: Problem) -> tuple[Block, ...]:
+    """The blocks of z: one a variable."""
+    return tuple(
+        Block(v.name, start, (v.guess.size // v.knots, v.knots), v.guess, v.lower, v.upper, v.scale, v.spread)
+        for v, (start, _) in zip(problem.variables, spans(problem.variables), strict=True)
+    )
+
+
+def start_of(problem: Problem, world: World, inputs: Sequence[str], parameters: Parameters, z: Expr) -> Start:
+    """The rollout's start as a function of z."""
+    initial = {name: ca.MX(ca.DM(value)) for name, value in problem.initial.items()}
+    physical = {name: ca.MX(value) for name, value in zip(parameters.names, parameters.nominal, strict=True)}
+    u = ca.MX.zeros(inputs_size(world, inputs), problem.simulation.steps)
+    for variable, (first, last) in zip(problem.variables, spans(problem.variables), strict=True):
+        part = z[first:last]
+        if variable.kind == "control":
+            u = u + _spread_inputs(problem, variable, input_columns(world, inputs), part)
+            continue
+        values = initial if variable.kind == "initial" else physical
+        for slot in variable.slots:
+            values[slot.name] = _replace(values[slot.name], slot.components, part)
+    varied = {slot.name for variable in problem.variables for slot in variable.slots}
+    initial |= {name: _unit(initial[name]) for name in varied if name.endswith(".orientation")}
+    anchors = {name: physical[name] for name in sorted(varied & physical.keys()) if name.endswith(".anchor")}
+    initial = follow(problem.plan, anchors, initial)
+    return Start(initial_state(world, initial), u, ca.vertcat(ca.MX(0, 1), *physical.values()))
+
+
+def _replace(value: Expr, components: Sequence[int], part: Expr) -> Expr:
+    """``value`` with the named components taken from ``part``."""
+    if list(components) == list(range(value.shape[0])):
+        return part
+    rows = [value[i] for i in range(value.shape[0])]
+    for k, component in enumerate(components):
+        rows[component] = part[k]
+    return ca.vertcat(*rows)
+
+
+def _unit(q: Expr) -> Expr:
+    """A varied quaternion at length 1: solvers move its four numbers freely, a rotation needs a unit one."""
+    return q / ca.norm_2(q)
+
+
+def _spread_inputs(problem: Problem, variable: Variable, columns: Mapping[str, slice], part: Expr) -> Expr:
+    """(nu, N): a control's knots as inputs of every step, in the rows that its slots name."""
+    count = variable.guess.size // variable.knots
+    place = ca.DM(max(column.stop for column in columns.values()), count)
+    for slot in variable.slots:
+        for k, component in enumerate(slot.components):
+            place[columns[slot.name].start + component, k] = 1
+    knots = ca.reshape(part, count, variable.knots)
+    when = START if all(slot.name.endswith(".command") for slot in variable.slots) else MIDDLE
+    weights = knot_weights(variable.knots, problem.simulation.steps, variable.interpolation, when)
+    return ca.mtimes(ca.mtimes(place, knots), weights)
+
+
+def knot_weights(knots: int, steps: int, interpolation: str, when: float = MIDDLE) -> Expr:
+    """(knots, steps) sparse: the share of each knot in each step, at this part of it.
+
+    "constant": the horizon is cut into equal parts, one a knot. "linear": knots lie at equal distances from the
+    start to the end of the horizon, values between them are interpolated.
+    """
+    middle, at = ((np.arange(steps) + part) / steps for part in (MIDDLE, when))
+    columns = np.arange(steps)
+    if interpolation == "constant" or knots == 1:
+        rows = np.minimum((middle * knots).astype(int), knots - 1)
+        return ca.DM.triplet(rows.tolist(), columns.tolist(), ca.DM.ones(steps), knots, steps)
+    place = at * (knots - 1)
+    left = np.minimum(place.astype(int), knots - 2)
+    share = place - left
+    rows = np.concatenate([left, left + 1])
+    values = ca.DM(np.concatenate([1 - share, share]))
+    return ca.DM.triplet(rows.tolist(), np.tile(columns, 2).tolist(), values, knots, steps)

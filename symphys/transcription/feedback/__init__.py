@@ -1,0 +1,1 @@
+"""Sensors and controllers along a rollout."""

@@ -1,0 +1,89 @@
+"""What sensors need to know of the step before: commands and velocities, carried along behind the world's state."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+
+from symphys.dynamics import accelerometer_bodies
+from symphys.model.state_layout import Layout, input_columns, input_sizes
+from symphys.model.world import World
+from symphys.problem import ALIVE, Constraint, Cost, Output, Problem, Target
+
+Expr = Any
+"""casadi SX or MX"""
+
+
+@dataclass(frozen=True)
+class Memory:
+    """Columns after those of the world's state (``Layout``).
+
+    Attributes:
+        world: what is simulated.
+        inputs: names of the inputs that are remembered.
+        bodies: names of the bodies whose velocity is remembered.
+        falls: whether there is ``alive`` at the end: 1 until a fall, 0 from then on; ``after`` leaves it out.
+    """
+
+    world: World
+    inputs: tuple[str, ...] = ()
+    bodies: tuple[str, ...] = ()
+    falls: bool = False
+
+    @cached_property
+    def columns(self) -> dict[str, slice]:
+        """Where each lies in the whole state: inputs by their names, velocities as ``torso.velocity``."""
+        sizes, start, found = input_sizes(self.world), Layout(self.world).size, dict[str, slice]()
+        lengths = [(name, sizes[name]) for name in self.inputs] + [(f"{body}.velocity", 3) for body in self.bodies]
+        lengths += [(ALIVE, 1)] * self.falls
+        for name, length in lengths:
+            found[name] = slice(start, start + length)
+            start += length
+        return found
+
+    @cached_property
+    def size(self) -> int:
+        """Of the whole state."""
+        return max((part.stop for part in self.columns.values()), default=Layout(self.world).size)
+
+    def start(self, x: Expr) -> Expr:
+        """The whole state at t = 0, when no command has been given and nothing has been accelerated."""
+        layout = Layout(self.world)
+        commands = [type(x).zeros(input_sizes(self.world)[name]) for name in self.inputs]
+        velocities = [x[layout[f"{body}.velocity"]] for body in self.bodies]
+        return ca.vertcat(x, *commands, *velocities, *([type(x)(1)] if self.falls else []))
+
+    def after(self, x: Expr, u: Expr, inputs: Sequence[str]) -> Expr:
+        """(memory,) what is remembered of a step from state x with the inputs u, which stacks ``inputs``."""
+        layout, columns = Layout(self.world), input_columns(self.world, inputs)
+        sizes = input_sizes(self.world)
+        given = [u[columns[name]] if name in columns else type(x).zeros(sizes[name]) for name in self.inputs]
+        return ca.vertcat(type(x)(0, 1), *given, *(x[layout[f"{body}.velocity"]] for body in self.bodies))
+
+    def velocities(self, x: Expr) -> dict[str, Expr]:
+        """By body, its velocity one step before."""
+        return {body: x[self.columns[f"{body}.velocity"]] for body in self.bodies}
+
+    def commands(self, x: Expr) -> dict[str, Expr]:
+        """By name, the inputs of the step before."""
+        return {name: x[self.columns[name]] for name in self.inputs}
+
+
+def memory_of(problem: Problem, world: World) -> Memory:
+    """What the sensors of a problem, and its accelerometers, make necessary."""
+    sensed = frozenset[str]().union(*(formula.names for sensor in problem.sensors for formula in sensor.formulas))
+    aims: list[Cost | Target | Constraint | Output] = [
+        *problem.costs,
+        *problem.targets,
+        *problem.constraints,
+        *problem.outputs,
+    ]
+    asked = frozenset[str]().union(*(aim.formula.names for aim in aims))
+    inputs = tuple(name for name in input_sizes(world) if name in sensed)
+    margin = problem.fall.margin.names if problem.fall else frozenset[str]()
+    bodies = accelerometer_bodies(world, sensed | asked | margin)
+    return Memory(world, inputs, bodies, problem.fall is not None)

@@ -1,0 +1,146 @@
+"""What a formula's names mean at one instant of a rollout, and the symbols that stand for them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from symphys.dynamics import accelerometers, body_quantities, felt_names, joint_quantities, joint_quantity_names
+from symphys.expression import Formula
+from symphys.model.state_layout import GIVEN, Layout, input_columns, input_sizes, inputs_size
+from symphys.model.world import World
+from symphys.problem import ALIVE, Problem, Variable
+from symphys.transcription.feedback.sensor_memory import Memory
+
+Expr = Any
+"""casadi SX or MX"""
+
+
+@dataclass(frozen=True)
+class Instant:
+    """The arguments that a formula may depend on, SX: state, inputs, parameters, time, the whole of z."""
+
+    x: Expr
+    u: Expr
+    p: Expr
+    time: Expr
+    z: Expr
+
+    def arguments(self) -> list[Expr]:
+        """In the order in which compiled formulas take them."""
+        return [self.x, self.u, self.p, self.time, self.z]
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """What p stacks: the physical parameters that variables set, then the numbers of controllers.
+
+    Attributes:
+        names: in the order of p.
+        symbols: SX, one column each.
+        nominal: their values in the file.
+        physical: how many of them are physical.
+    """
+
+    names: tuple[str, ...]
+    symbols: tuple[Expr, ...]
+    nominal: tuple[Expr, ...]
+    physical: int
+
+    @cached_property
+    def columns(self) -> dict[str, slice]:
+        """Where each lies in p."""
+        ends = np.cumsum([0, *(symbol.shape[0] for symbol in self.symbols)]).tolist()
+        return {name: slice(*part) for name, part in zip(self.names, pairwise(ends), strict=True)}
+
+    def overrides(self) -> dict[str, Expr]:
+        """The physical ones, by name."""
+        return dict(zip(self.names[: self.physical], self.symbols, strict=False))
+
+
+def varied_parameters(problem: Problem) -> Parameters:
+    """The parameters that some variable sets, in the order of first mention, and all numbers of controllers."""
+    names = tuple(dict.fromkeys(slot.name for v in problem.variables if v.kind == "parameter" for slot in v.slots))
+    values = {name: problem.parameters[name] for name in names} | problem.weights
+    nominal = tuple(ca.DM(value) for value in values.values())
+    symbols = tuple(ca.SX.sym(name, value.shape[0]) for name, value in zip(values, nominal, strict=True))
+    return Parameters(tuple(values), symbols, nominal, len(names))
+
+
+def input_names(problem: Problem) -> tuple[str, ...]:
+    """The forces, torques and commands that some variable sets or some controller drives, in that order."""
+    set_ = [slot.name for v in problem.variables if v.kind == "control" for slot in v.slots]
+    driven = [name for controller in problem.controllers for name, _ in controller.drives]
+    return tuple(dict.fromkeys([*set_, *driven]))
+
+
+def instant(world: World, inputs: Sequence[str], parameters: Parameters, memory: Memory, n: int) -> Instant:
+    """Symbols for all that may be looked at; ``n``: length of z."""
+    return Instant(
+        ca.SX.sym("x", memory.size),
+        ca.SX.sym("u", inputs_size(world, inputs)),
+        ca.vertcat(ca.SX(0, 1), *parameters.symbols),
+        ca.SX.sym("time"),
+        ca.SX.sym("z", n),
+    )
+
+
+def compile_formula(
+    problem: Problem, world: World, inputs: Sequence[str], parameters: Parameters, memory: Memory, formula: Formula
+) -> ca.Function:
+    """A formula as a casadi function of (x, u, p, time, z); x with its memory."""
+    at = instant(world, inputs, parameters, memory, sum(v.guess.size for v in problem.variables))
+    names = namespace(problem, world, inputs, parameters, memory, at, formula.names)
+    for variable, (start, stop) in zip(problem.variables, spans(problem.variables), strict=True):
+        names[variable.name] = at.z[start:stop]
+    value = formula.evaluate({name: names[name] for name in formula.names})
+    return ca.Function("formula", at.arguments(), [ca.SX(value)])
+
+
+def namespace(
+    problem: Problem,
+    world: World,
+    inputs: Sequence[str],
+    parameters: Parameters,
+    memory: Memory,
+    at: Instant,
+    wanted: frozenset[str],
+) -> dict[str, Expr]:
+    """What names mean at an instant, variables aside; of what takes work to express only what is wanted."""
+    layout = Layout(world)
+    names: dict[str, Expr] = {"time": at.time}
+    if memory.falls:
+        names[ALIVE] = at.x[memory.columns[ALIVE]]
+    for body in world.bodies:
+        names.update({f"{body.name}.{field}": at.x[layout[f"{body.name}.{field}"]] for field in GIVEN})
+    names.update({name: ca.SX.zeros(size) for name, size in input_sizes(world).items()})
+    names.update({name: at.u[part] for name, part in input_columns(world, inputs).items()})
+    names.update({name: ca.DM(value) for name, value in problem.parameters.items()})
+    names.update(zip(parameters.names, parameters.symbols, strict=True))
+    if not wanted.isdisjoint(joint_quantity_names(world)):
+        names.update(joint_quantities(world, at.x))
+    if not wanted.isdisjoint(felt_names(world)):
+        names.update(body_quantities(world, at.x))
+    names.update(accelerometers(world, at.x, memory.velocities(at.x), problem.simulation.dt))
+    return names
+
+
+def moving_names(world: World) -> frozenset[str]:
+    """The names that change within a step."""
+    states = {f"{body.name}.{field}" for body in world.bodies for field in (*GIVEN, "accelerometer")}
+    return frozenset({"time", ALIVE, *states, *joint_quantity_names(world), *felt_names(world)})
+
+
+def spans(variables: Sequence[Variable]) -> list[tuple[int, int]]:
+    """(start, stop) of each variable in z."""
+    result, start = [], 0
+    for variable in variables:
+        result.append((start, start + variable.guess.size))
+        start += variable.guess.size
+    return result

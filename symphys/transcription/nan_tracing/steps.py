@@ -1,0 +1,177 @@
+"""Where the first number that is not finite comes from: the start, a step, a formula, or a derivative of these."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.model.state_layout import Layout, input_columns
+from symphys.problem import Constraint, Cost, Output, Target
+from symphys.transcription.nan_tracing.operations import Blame, blame
+from symphys.transcription.rollout import Rollout
+
+Array = NDArray[np.float64]
+Asked = Cost | Target | Constraint | Output
+Columns = Sequence[str]
+"""A name for each element of a vector."""
+
+MOST_NAMES = 4
+
+
+@dataclass(frozen=True)
+class Course:
+    """All that a rollout went through.
+
+    Attributes:
+        z: (n,) decision vector.
+        smoothing: [m/s].
+        x: (N + 1, nx) states, with all memory.
+        u: (N, nu) inputs.
+        given: (N, nu) inputs as variables give them, to which controllers add.
+        p: (np,) parameters.
+    """
+
+    z: Array
+    smoothing: float
+    x: Array
+    u: Array
+    given: Array
+    p: Array
+
+    def step_arguments(self, k: int) -> list[Array]:
+        """Of the step function at step k."""
+        return [self.x[k], self.u[k], self.p, np.array([self.smoothing])]
+
+    def control_arguments(self, k: int, dt: float) -> list[Array]:
+        """Of the controllers at step k."""
+        return [self.x[k], self.given[k], self.p, np.array([k * dt])]
+
+    def closed_arguments(self, k: int, rollout: Rollout) -> list[Array]:
+        """Of the step with its controllers."""
+        time = [] if rollout.feedback is None else [k * rollout.dt]
+        return [self.x[k], np.array([*self.given[k], *time]), self.p, np.array([self.smoothing])]
+
+
+def first_fault(rollout: Rollout, course: Course) -> str:
+    """A clause that says where the rollout, or what is asked of it, first is not finite; empty if it is nowhere."""
+    return _in_start(rollout, course) or _in_steps(rollout, course) or _in_formulas(rollout, course)
+
+
+def first_derivative_fault(rollout: Rollout, course: Course) -> str:
+    """The same for derivatives: of the formulas, then of the steps, from the last one back."""
+    formulas = (_derivative_clause(rollout, course, *case) for case in _instants(rollout))
+    return next(filter(None, formulas), "") or _in_steps_back(rollout, course)
+
+
+def _in_start(rollout: Rollout, course: Course) -> str:
+    names = _argument_names(rollout)
+    for values, columns in ((course.x[0], names[0]), (course.p, names[2]), (course.given.T, names[1])):
+        bad = [name for name, value in zip(columns, values, strict=True) if not np.isfinite(value).all()]
+        if bad:
+            return f"it begins with {_listed(list(dict.fromkeys(bad)))}, as the variables set it"
+    return ""
+
+
+def _in_steps(rollout: Rollout, course: Course) -> str:
+    bad = ~(np.isfinite(course.x[1:]).all(axis=1) & np.isfinite(course.u).all(axis=1))
+    if not bad.any():
+        return ""
+    k = int(np.argmax(bad))
+    if rollout.feedback is not None and not np.isfinite(course.u[k]).all():
+        known = [*_argument_names(rollout), ("time",)]
+        found = blame(rollout.feedback, course.control_arguments(k, rollout.dt))
+        return f"it begins in what controllers give at t = {k * rollout.dt:g} s{_cause(found, known, known[1:2])}"
+    found = blame(rollout.step, course.step_arguments(k))
+    names = _argument_names(rollout)
+    return f"it begins in the step from t = {k * rollout.dt:g} s{_cause(found, names, names[:1])}"
+
+
+def _in_formulas(rollout: Rollout, course: Course) -> str:
+    names = _argument_names(rollout)
+    for kind, asked, k, row in _instants(rollout):
+        found = blame(rollout.compiled(asked.formula), _formula_arguments(rollout, course, k, row))
+        if found is not None:
+            return f"{kind} {asked.name!r} is not finite at t = {k * rollout.dt:g} s{_cause(found, names)}"
+    return ""
+
+
+def _derivative_clause(rollout: Rollout, course: Course, kind: str, asked: Asked, k: int, row: int) -> str:
+    formula = rollout.compiled(asked.formula)
+    arguments = _formula_arguments(rollout, course, k, row)
+    seeds = [np.zeros(formula.numel_out(0)), np.ones(formula.numel_out(0))]
+    found = blame(formula.reverse(1), [*arguments, *seeds])
+    if found is None:
+        return ""
+    names = _argument_names(rollout)
+    return f"the derivative of {kind} {asked.name!r} is not finite at t = {k * rollout.dt:g} s{_cause(found, names)}"
+
+
+def _in_steps_back(rollout: Rollout, course: Course) -> str:
+    backward = rollout.closed.expand().reverse(1)
+    adjoint, results = np.ones(course.x.shape[1]), [np.zeros(course.x.shape[1])]
+    if rollout.feedback is not None:
+        results.append(np.zeros(course.u.shape[1]))
+    for k in reversed(range(rollout.steps)):
+        seeds = [adjoint, *(np.zeros(result.size) for result in results[1:])]
+        arguments = [*course.closed_arguments(k, rollout), *results, *seeds]
+        adjoint = np.array(backward(*arguments)[0]).ravel()
+        if not np.isfinite(adjoint).all():
+            names, found = _argument_names(rollout), blame(backward, arguments)
+            when = f"t = {k * rollout.dt:g} s to {(k + 1) * rollout.dt:g} s"
+            return f"the derivative of the step from {when} is not finite{_cause(found, names, names)}"
+    return ""
+
+
+def _cause(found: Blame | None, names: Sequence[Columns], results: Sequence[Columns] = ()) -> str:
+    """Such as ``: 1 / 0, made from ball.mass, on the way to ball.velocity``; arguments without a name are left out."""
+    if found is None:
+        return ""
+    origins = dict.fromkeys(names[i][j] for i, j in found.arguments if i < len(names))
+    made = f", made from {_listed(list(origins))}" if origins else ""
+    output, element = found.result
+    leads = f", on the way to {results[output][element]}" if output < len(results) else ""
+    return f": {found.operation}{made}{leads}" if found.operation else f"{made}{leads}"
+
+
+def _instants(rollout: Rollout) -> Iterator[tuple[str, Asked, int, int]]:
+    """(kind, what is asked, number of the state, number of the inputs) of every look at a formula; see ``Rollout``."""
+    problem, steps = rollout.problem, rollout.steps
+    groups = (
+        ("cost", problem.costs),
+        ("target", problem.targets),
+        ("constraint", problem.constraints),
+        ("output", problem.outputs),
+    )
+    for kind, asked in ((kind, asked) for kind, group in groups for asked in group):
+        if asked.at != "always":
+            k = rollout.tick(asked.at)
+            yield kind, asked, k, min(k, steps - 1)
+            continue
+        if kind == "cost":
+            yield from ((kind, asked, k, k) for k in range(steps))
+        if kind == "constraint" or rollout.moves(asked.formula):
+            yield from ((kind, asked, k, k - 1) for k in range(1, steps + 1))
+
+
+def _formula_arguments(rollout: Rollout, course: Course, k: int, row: int) -> list[Array]:
+    return [course.x[k], course.u[row], course.p, np.array([k * rollout.dt]), course.z]
+
+
+def _argument_names(rollout: Rollout) -> tuple[Columns, Columns, Columns]:
+    """Of x, u and p; components of one quantity share its name."""
+    layout = Layout(rollout.world)
+    states = [layout.owner(column) for column in range(layout.size)]
+    states += [name for name, part in rollout.memory.columns.items() for _ in range(part.start, part.stop)]
+    columns = input_columns(rollout.world, rollout.inputs)
+    inputs = [name for name, part in columns.items() for _ in range(part.start, part.stop)]
+    known = rollout.parameters
+    sizes = zip(known.names, known.symbols, strict=True)
+    return states, inputs, [name for name, symbol in sizes for _ in range(symbol.shape[0])]
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = len(names) - MOST_NAMES
+    return ", ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")

@@ -1,0 +1,115 @@
+"""Everything that a problem with large nets is computed with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.codegen import Kernel
+from symphys.codegen.backends import build_kernel
+from symphys.problem import Problem
+from symphys.transcription.network_rollout.partition import Split, split
+from symphys.transcription.network_rollout.step_program import (
+    RESULTS,
+    Aims,
+    sense_function,
+    stage_program,
+    start_function,
+)
+from symphys.transcription.network_rollout.virtual_machine import PlainStage
+from symphys.transcription.rollout import Rollout
+
+Array = NDArray[np.float64]
+
+
+class Stage(Protocol):
+    """Computes one step of many robots.
+
+    Attributes:
+        seeded: names of the results, in their order.
+        sizes: of each.
+    """
+
+    seeded: tuple[str, ...]
+    sizes: Mapping[str, int]
+
+    def forward(self, rows: Array, knob: Sequence[float]) -> Mapping[str, Array]:
+        """(B, m) -> results by name, each (B, size)."""
+
+    def gradient(self, rows: Array, seeds: Array, knob: Sequence[float]) -> tuple[Any, Array]:
+        """(B, m), (B, all sizes) -> something, and the slopes (B, m) of seeds . results."""
+
+
+class KernelStage:
+    """The same by a kernel; see ``Stage``."""
+
+    def __init__(self, kernel: Kernel) -> None:
+        """Of a ``stage_program``."""
+        self.kernel, self.seeded = kernel, kernel.seeded
+        self.sizes: Mapping[str, int] = {name: kernel.program.outputs[name].size for name in kernel.seeded}
+        self.forward, self.gradient = kernel.forward, kernel.gradient
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """A problem with large nets, ready to be rolled out.
+
+    Attributes:
+        split: the problem taken apart.
+        aims: what is asked of a rollout.
+        sensors: names of those that large nets use.
+        columns: for each net, which columns of what they read it takes.
+    """
+
+    split: Split
+    aims: Aims
+    sensors: tuple[str, ...]
+    columns: tuple[NDArray[np.intp], ...]
+
+    @property
+    def rollout(self) -> Rollout:
+        """Of the problem without its large nets."""
+        return self.split.rollout
+
+    @cached_property
+    def start(self) -> ca.Function:
+        """See ``start_function``."""
+        return start_function(self.rollout, self.sensors)
+
+    @cached_property
+    def pull(self) -> ca.Function:
+        """The adjoint of ``start``."""
+        return self.start.reverse(1)
+
+    @cached_property
+    def sense(self) -> ca.Function:
+        """See ``sense_function``."""
+        return sense_function(self.rollout, self.sensors)
+
+    @cached_property
+    def plain(self) -> Stage:
+        """The step on casadi's virtual machine."""
+        return PlainStage(self.rollout, self.aims, self.sensors)
+
+    def compiled(self, exact: bool, backend: str) -> Kernel:
+        """The step as a kernel of a backend, of one thread; KernelUnavailable if that cannot be."""
+        program = stage_program(self.rollout, self.aims, self.sensors, exact)
+        seeded = [name for name in RESULTS if name in program.outputs]
+        return build_kernel(backend, program, seeded, threads=1)
+
+
+def make(problem: Problem) -> Made:
+    """Take a problem apart and say what is asked of it."""
+    parts = split(problem)
+    sensors = tuple(dict.fromkeys(name for controller in parts.nets for name in controller.senses))
+    sizes = {sensor.name: sensor.size for sensor in problem.sensors}
+    ends = np.cumsum([0, *(sizes[name] for name in sensors)])
+    places = {name: np.arange(a, b) for name, a, b in zip(sensors, ends[:-1], ends[1:], strict=True)}
+    columns = tuple(np.concatenate([places[name] for name in controller.senses]) for controller in parts.nets)
+    return Made(parts, Aims(parts.rollout), sensors, columns)

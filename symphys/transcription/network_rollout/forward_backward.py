@@ -1,0 +1,175 @@
+"""Forwards and backwards through time, for robots that share the weights of their nets.
+
+Forwards, states and what is sensed are kept; backwards, a segment of time after the other, the nets' values are
+computed again for a whole segment at once, steps are differentiated one by one, and the gradient of the weights is one
+product a layer and segment. So memory holds states, and the values of a net for one segment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.transcription.network_rollout.context import Made, Stage
+from symphys.transcription.network_rollout.layers import Layers
+
+Array = NDArray[np.float64]
+SEGMENT_WORDS = 24_000_000
+"""About as many numbers are kept of nets for a segment."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """What a pass forwards leaves, for B robots.
+
+    Attributes:
+        z: (B, s) what robots do not share.
+        x: (N + 1, B, nx) states.
+        given: (N, B, nu) inputs before small controllers add to them.
+        p: (B, np).
+        sensed: (N + 1, B, o) what large nets sense.
+        asked: (N, B, a) values of formulas along the way.
+        u: (N, B, nu) inputs.
+    """
+
+    z: Array
+    x: Array
+    given: Array
+    p: Array
+    sensed: Array
+    asked: Array
+    u: Array
+
+
+def forward(made: Made, stage: Stage, nets: Sequence[Layers], Z: Array, smoothing: float) -> Way:
+    """Roll out robots (B, s) that share these nets."""
+    steps, dt = made.rollout.steps, made.rollout.dt
+    starts = [[np.array(part).ravel() for part in made.start(z)] for z in Z]
+    x0, given, p, sensed0 = (np.array([start[i] for start in starts]) for i in range(4))
+    way = Way(
+        z=Z,
+        x=np.empty((steps + 1, *x0.shape)),
+        given=given.reshape(len(Z), steps, -1).swapaxes(0, 1).copy(),
+        p=p,
+        sensed=np.empty((steps + 1, *sensed0.shape)),
+        asked=np.empty((steps, len(Z), stage.sizes.get("asked", 0))),
+        u=np.empty((steps, len(Z), made.rollout.given.shape[0])),
+    )
+    way.x[0], way.sensed[0] = x0, sensed0
+    for k in range(steps):
+        for net, columns, place in zip(nets, made.columns, made.split.places, strict=True):
+            values = net.forward(way.sensed[k][:, columns])
+            way.given[k] += net.outputs(values) @ place.T
+        found = stage.forward(rows(way, k, dt), [smoothing])
+        way.x[k + 1], way.u[k] = found["after"], found["inputs"]
+        way.sensed[k + 1] = found["sensed"]
+        if "asked" in found:
+            way.asked[k] = found["asked"]
+    return way
+
+
+def rows(way: Way, k: int, dt: float) -> Array:
+    """(B, m) what the step from k is computed from."""
+    times = np.broadcast_to([k * dt, (k + 1) * dt], (len(way.z), 2))
+    return np.concatenate([way.x[k], way.given[k], way.p, times, way.z], axis=1)
+
+
+def aim_arguments(made: Made, way: Way, b: int) -> list[Array]:
+    """What ``made.aims`` takes, for one robot."""
+    stages = made.aims.stages
+    moments = [part for k, row in stages.moments for part in (way.x[k, b], way.u[row, b])]
+    series, start = [], 0
+    for symbol in stages.series.values():
+        size = symbol.shape[0]
+        series.append(way.asked[:, b, start : start + size].T)
+        start += size
+    return [way.z[b], way.p[b], *moments, *series]
+
+
+class Backward:
+    """A pass backwards along a ``Way``: the gradient of the sum over robots of what ``slopes`` are the slopes of."""
+
+    def __init__(
+        self, made: Made, stage: Stage, nets: Sequence[Layers], way: Way, smoothing: float, slopes: ca.Function
+    ) -> None:
+        """Begin with what ``slopes``, one of those of ``made.aims``, say of the robots' motions."""
+        self.made, self.stage, self.nets, self.way, self.knob = made, stage, nets, way, [smoothing]
+        self.z, self.p = np.zeros_like(way.z), np.zeros_like(way.p)
+        self.at_x: dict[int, Array] = {}
+        self.at_u: dict[int, Array] = {}
+        self.asked = np.zeros_like(way.asked)
+        self.weights = [np.zeros(net.net.sizes["weights"]) for net in nets]
+        for b in range(len(way.z)):
+            self.aim(b, slopes)
+
+    def aim(self, b: int, slopes: ca.Function) -> None:
+        """Slopes at one robot's motion."""
+        way, stages = self.way, self.made.aims.stages
+        found = [np.array(part) for part in slopes.call(aim_arguments(self.made, way, b))]
+        self.z[b], self.p[b], others = found[0].ravel(), found[1].ravel(), found[2:]
+        for k, row in stages.moments:
+            x, u, *others = others
+            self.at_x.setdefault(k, np.zeros_like(way.x[0]))[b] += x.ravel()
+            self.at_u.setdefault(row, np.zeros_like(way.u[0]))[b] += u.ravel()
+        start = 0
+        for series in others:
+            self.asked[:, b, start : start + len(series)] = series.T
+            start += len(series)
+
+    def run(self) -> tuple[Array, list[Array]]:
+        """(B, s) the gradients of what robots do not share, and for each net that of the shared weights, summed."""
+        steps, robots = len(self.way.given), len(self.way.z)
+        width = sum(layer.outputs for net in self.nets for layer in net.layers)
+        length = max(1, min(steps, SEGMENT_WORDS // max(1, 2 * robots * width)))
+        x, sensed = self.at_x.get(steps, np.zeros_like(self.way.x[0])), np.zeros_like(self.way.sensed[0])
+        given = np.zeros_like(self.way.given)
+        for end in range(steps, 0, -length):
+            x, sensed = self.segment(max(0, end - length), end, x, sensed, given)
+        flat = given.swapaxes(0, 1).reshape(robots, -1)
+        for b in range(robots):
+            parts = [self.way.x[0, b], self.way.given[:, b].ravel(), self.way.p[b], self.way.sensed[0, b]]
+            seeds = [x[b], flat[b], self.p[b], sensed[b]]
+            self.z[b] += np.array(self.made.pull(self.way.z[b], *parts, *seeds)).ravel()
+        return self.z, self.weights
+
+    def segment(self, first: int, end: int, x: Array, sensed: Array, given: Array) -> tuple[Array, Array]:
+        """From step ``end`` back to ``first``: adjoints of the state and of what is sensed there."""
+        kept = [
+            net.forward(self.way.sensed[first:end][:, :, columns])
+            for net, columns in zip(self.nets, self.made.columns, strict=True)
+        ]
+        deltas: list[list[Any]] = [[] for _ in self.nets]
+        adjoints: list[list[Any]] = [[] for _ in self.nets]
+        for k in range(end - 1, first - 1, -1):
+            x, given[k], sensed = self.step(k, x, sensed)
+            for i, (net, columns, place) in enumerate(
+                zip(self.nets, self.made.columns, self.made.split.places, strict=True)
+            ):
+                output = given[k] @ place
+                back, delta = net.pull([value[k - first] for value in kept[i]], output)
+                sensed[:, columns] += back
+                deltas[i].append(delta)
+                adjoints[i].append(output)
+        for i, net in enumerate(self.nets):
+            stacked = [np.stack(layer[::-1]) for layer in zip(*deltas[i], strict=True)]
+            self.weights[i] += net.gradient(kept[i], stacked, np.stack(adjoints[i][::-1]))
+        return x, sensed
+
+    def step(self, k: int, x: Array, sensed: Array) -> tuple[Array, Array, Array]:
+        """One step back: adjoints of the state, of the inputs, and zeros for what is sensed before it."""
+        parts = {"after": x, "sensed": sensed, "asked": self.asked[k]}
+        parts["inputs"] = self.at_u.get(k, np.zeros_like(self.way.u[0]))
+        seeds = np.concatenate([parts[name] for name in self.stage.seeded], axis=1)
+        _, slopes = self.stage.gradient(rows(self.way, k, self.made.rollout.dt), seeds, self.knob)
+        sizes = [self.way.x.shape[2], self.way.given.shape[2], self.way.p.shape[1], 2, self.way.z.shape[1]]
+        before, given, p, _, z = np.split(slopes, np.cumsum(sizes)[:-1], axis=1)
+        self.p += p
+        self.z += z
+        if k in self.at_x:
+            before = before + self.at_x[k]
+        return before, given, np.zeros_like(sensed)

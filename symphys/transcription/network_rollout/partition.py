@@ -1,0 +1,126 @@
+"""A problem with large nets taken apart: what steps compute, and the nets beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.model.controllers import Net
+from symphys.problem import Controller, Problem
+from symphys.transcription.formula_names import input_names, spans
+from symphys.transcription.network_rollout.limits import refuse_formulas, refuse_large
+from symphys.transcription.rollout import Rollout, symbolic_rollout
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+MOST_WEIGHTS = 4096
+"""Of a net that is computed within the compiled step, where every lane holds weights of its own."""
+
+
+def is_large(controller: Controller) -> bool:
+    """Whether a controller is a net that matrix products should compute."""
+    return isinstance(controller.law, Net) and controller.law.sizes["weights"] > MOST_WEIGHTS
+
+
+def has_large_nets(problem: Problem) -> bool:
+    """Whether any is."""
+    return bool(large_nets(problem))
+
+
+def large_nets(problem: Problem) -> tuple[Controller, ...]:
+    """Those that are."""
+    return tuple(controller for controller in problem.controllers if is_large(controller))
+
+
+def require_small_nets(problem: Problem, what: str) -> None:
+    """ProblemError if there are large nets, from what cannot deal with them."""
+    refuse_large(problem, large_nets(problem), MOST_WEIGHTS, what)
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Where the weights of one net come from.
+
+    Attributes:
+        nominal: (w,) as the file has them.
+        of_z, of_net: (k,) which entries of z are which weights; an entry of z may be several weights.
+    """
+
+    nominal: Array
+    of_z: Indices
+    of_net: Indices
+
+    def at(self, z: Array) -> Array:
+        """(w,) at a decision vector."""
+        weights = self.nominal.copy()
+        weights[self.of_net] = z[self.of_z]
+        return weights
+
+    def add(self, gradient: Array, of_weights: Array) -> None:
+        """Add the gradient of the weights to that of z."""
+        np.add.at(gradient, self.of_z, of_weights[self.of_net])
+
+
+@dataclass(frozen=True)
+class Split:
+    """A problem taken apart.
+
+    Attributes:
+        rollout: of the problem without its large nets, whose inputs they add to.
+        small: (s,) the entries of z that it depends on.
+        n: the length of z.
+        nets, laws: the controllers that are large nets, and the nets.
+        places: for each (nu, m) which input an output is added to, scaled.
+        weights: for each.
+    """
+
+    rollout: Rollout
+    small: Indices
+    n: int
+    nets: tuple[Controller, ...]
+    laws: tuple[Net, ...]
+    places: tuple[Array, ...]
+    weights: tuple[Weights, ...]
+
+    def joined(self, small: Array, weights: Sequence[Array]) -> Array:
+        """(n,) a gradient from those of what is small and of the weights of each net."""
+        gradient = np.zeros(self.n)
+        gradient[self.small] = small
+        for own, slope in zip(self.weights, weights, strict=True):
+            own.add(gradient, slope)
+        return gradient
+
+
+def split(problem: Problem) -> Split:
+    """Take a problem apart; ProblemError if its formulas look at the weights of large nets."""
+    nets = large_nets(problem)
+    names = {name for controller in nets for name in controller.weights}
+    parts = list(zip(problem.variables, spans(problem.variables), strict=True))
+    kept = [(v, span) for v, span in parts if not any(slot.name in names for slot in v.slots)]
+    refuse_formulas(problem, [*names, *(v.name for v, span in parts if (v, span) not in kept)])
+    others = tuple(controller for controller in problem.controllers if controller not in nets)
+    rest = replace(problem, variables=tuple(v for v, _ in kept), controllers=others)
+    rollout = symbolic_rollout(rest, input_names(problem))
+    return Split(
+        rollout=rollout,
+        small=np.concatenate([np.zeros(0, int), *(np.arange(*span) for _, span in kept)]),
+        n=sum(v.guess.size for v in problem.variables),
+        nets=nets,
+        laws=tuple(controller.law for controller in nets if isinstance(controller.law, Net)),
+        places=tuple(np.array(ca.DM(rollout.control.place(controller)).full()) for controller in nets),
+        weights=tuple(_weights(problem, controller) for controller in nets),
+    )
+
+
+def _weights(problem: Problem, controller: Controller) -> Weights:
+    name, of_z, of_net = f"{controller.name}.weights", [np.zeros(0, int)], [np.zeros(0, int)]
+    for variable, (first, last) in zip(problem.variables, spans(problem.variables), strict=True):
+        for slot in variable.slots:
+            if slot.name == name:
+                of_z.append(np.arange(first, last))
+                of_net.append(np.array(slot.components, int))
+    return Weights(controller.numbers["weights"], np.concatenate(of_z), np.concatenate(of_net))

@@ -1,0 +1,143 @@
+"""The transcription of a problem with large nets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.codegen import KernelUnavailable, ProgramError, processors
+from symphys.codegen.backends import BEST, PRECISIONS, Description, described
+from symphys.codegen.cuda import DeviceKernel
+from symphys.dynamics import report_function
+from symphys.problem import Problem
+from symphys.shooting import Nlp, ShootingProblem
+from symphys.transcription.decision_variables import blocks
+from symphys.transcription.functions import ExpressionFunctions
+from symphys.transcription.gradient_probe import Probe
+from symphys.transcription.judge import Verdict, verdict
+from symphys.transcription.network_rollout.context import KernelStage, Made, make
+from symphys.transcription.network_rollout.evaluator import LargeEvaluator
+from symphys.transcription.network_rollout.forward_backward import Way, aim_arguments
+from symphys.transcription.network_rollout.gradient_probe import LargeProbe
+from symphys.transcription.network_rollout.sensitivity import back
+from symphys.transcription.objective import limits
+from symphys.transcription.simulation import Record, simulate
+from symphys.transcription.transcription import Transcription, fastest
+
+Array = NDArray[np.float64]
+PLAIN = ("casadi", "c")
+REALS = {"double": np.float64, "single": np.float32}
+STEPPING = {BEST: "simd", "simd": "simd", "simd32": "simd", "cuda": "cuda", "cuda32": "cuda"}
+"""What computes steps."""
+
+
+@dataclass(frozen=True, eq=False)
+class LargeTranscription(Transcription):
+    """See ``Transcription``; ``rollout`` is that of the problem without its large nets.
+
+    Attributes:
+        made: what it is computed with.
+    """
+
+    made: Made
+
+    def judge(self, z: Array, smoothing: float = 0.0) -> Verdict:
+        """See ``Transcription``."""
+        way = self._plain.way(z, smoothing)
+        _, objective, errors, costs, outputs = (
+            np.array(part).ravel() for part in self.made.aims.value.call(aim_arguments(self.made, way, 0))
+        )
+        return verdict(self.problem, float(objective[0]), costs, errors, outputs)
+
+    def record(self, z: Array, smoothing: float = 0.0) -> Record:
+        """See ``Transcription``."""
+        way = self._plain.way(z, smoothing)
+        found = simulate(self.rollout, lambda *_: self._happened(way, smoothing), way.z[0], smoothing)
+        return replace(found, z=np.asarray(z, float))
+
+    def prices(self, kinds: Iterable[str] = ("gradient",)) -> dict[str, float]:
+        """See ``Transcription``."""
+        z, evaluator = self.shooting.start(0)[None], self.shooting.evaluator
+        one = fastest(lambda: evaluator.value(z, 0.0))
+        return {kind: fastest(lambda: evaluator.gradient(z, 0.0)) / one for kind in kinds if kind == "gradient"}
+
+    @cached_property
+    def probe(self) -> Probe:
+        """See ``Transcription``."""
+        return LargeProbe(self._plain)
+
+    def back(self, record: Record, ends: Array) -> Iterator[Array]:
+        """See ``Transcription``."""
+        plain, smoothing = self._plain, record.course.smoothing
+        way = plain.way(record.z, smoothing)
+        return back(self.made, plain.stage, plain.nets_at(record.z), way, smoothing, ends)
+
+    def pull(self, record: Record, states: Mapping[int, Array], parameters: Array) -> Array | None:
+        """See ``Transcription``."""
+        return None
+
+    @cached_property
+    def _plain(self) -> LargeEvaluator:
+        """The judge's: casadi's virtual machine."""
+        return LargeEvaluator(self.made, self.made.plain, 1)
+
+    def _happened(self, way: Way, smoothing: float) -> list[Any]:
+        """What ``recorder`` gives, of the first robot."""
+        rollout, steps = self.rollout, self.rollout.steps
+        scheme = rollout.problem.simulation.scheme()
+        step = rollout.remembering(report_function(rollout.world, scheme, rollout.inputs, rollout.parameters.symbols))
+        x, u, given, p = way.x[:, 0].T, way.u[:, 0].T, way.given[:, 0].T, way.p[0]
+        _, *happened = step.map(steps)(x[:, :-1], u, np.tile(p[:, None], steps), smoothing)
+        return [x, u, given, p[:, None], *happened]
+
+
+def transcribe_large(
+    problem: Problem, exact: bool = False, backend: str = BEST, threads: int | None = None
+) -> LargeTranscription:
+    """See ``transcribe``: "simd32" has nets in single precision, and steps in double all the same."""
+    began = perf_counter()
+    made = make(problem)
+    built = perf_counter() - began
+    evaluator, description = _evaluator(made, exact, backend, processors() if threads is None else threads)
+    shooting = ShootingProblem(
+        name=problem.name,
+        blocks=blocks(problem),
+        evaluator=evaluator,
+        nlp=Nlp(None),
+        squares=False,
+        constraint_names=made.aims.terms.names,
+        constraint_lower=made.aims.terms.lower,
+        constraint_upper=made.aims.terms.upper,
+        limits=limits(problem),
+        smoothing=problem.simulation.smoothing,
+        stop_when_met=problem.stop_when_met,
+        output_names=tuple(output.label for output in problem.outputs),
+    )
+    functions = ExpressionFunctions(made.rollout, made.aims.terms)
+    return LargeTranscription(
+        problem, made.rollout, made.aims.terms, functions, shooting, description, built, made=made
+    )
+
+
+def _evaluator(made: Made, exact: bool, backend: str, threads: int) -> tuple[LargeEvaluator, Description]:
+    """The evaluator that is asked for, or casadi's with a note. Steps are in double precision always."""
+    began = perf_counter()
+    if backend in PLAIN:
+        return LargeEvaluator(made, made.plain, threads), Description("casadi", threads=threads)
+    try:
+        kernel = made.compiled(exact, STEPPING[backend])
+    except (KernelUnavailable, ProgramError) as error:
+        note = f"casadi's virtual machine evaluates, which is slower: {error}"
+        return LargeEvaluator(made, made.plain, threads), Description("casadi", threads=threads, note=note)
+    precision, device = PRECISIONS[backend], kernel.device if isinstance(kernel, DeviceKernel) else None
+    shared, nets = threads if device is None else 1, "nets by matrix products"
+    if precision == "single":
+        nets += " in single precision, steps in double"
+    told = replace(described(kernel, perf_counter() - began, precision, nets), threads=shared)
+    return LargeEvaluator(made, KernelStage(kernel), shared, REALS[precision], device), told

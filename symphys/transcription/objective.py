@@ -1,0 +1,171 @@
+"""Costs, targets and constraints along a rollout: the objective, its residuals, and the errors it is judged by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+import casadi as ca
+import numpy as np
+
+from symphys.expression import Formula
+from symphys.maths.smoothing import length
+from symphys.problem import Constraint, Cost, Problem, Target
+
+Expr = Any
+"""casadi MX"""
+
+
+class Sampled(Protocol):
+    """A rollout that can be asked for the values of formulas along it; see ``Rollout``."""
+
+    @property
+    def problem(self) -> Problem:
+        """What is rolled out."""
+
+    @property
+    def steps(self) -> int:
+        """N."""
+
+    @property
+    def dt(self) -> float:
+        """[s]."""
+
+    def at(self, formula: Formula, when: str | float) -> Expr:
+        """(m,) at the end or at a time."""
+
+    def after_steps(self, formula: Formula) -> Expr:
+        """(m, N) at the end of every step."""
+
+    def over_steps(self, formula: Formula) -> Expr:
+        """(m, N or 2N) samples whose mean is the time average."""
+
+
+@dataclass(frozen=True)
+class Terms:
+    """Everything that a problem asks of a rollout, as expressions of z.
+
+    Attributes:
+        costs: (k,) weighted cost of each [[cost]].
+        objective: scalar: costs and weighted squares of targets.
+        residuals: (m,) with objective + penalties = r . r; None where a cost is no sum of squares.
+        penalties: scalar: quadratic penalties of violated constraints.
+        errors: (e,) error / tolerance of each target, constraint and the goal: met where <= 1.
+        constraints: (c,) values, with ``lower`` and ``upper`` (c,) as numbers and ``names`` one an entry.
+        outputs: (o,) what is told.
+        means: (a,) the value of every formula, its mean over time where it is looked at always: what is differentiated
+            to examine a gradient, since it means the same on any time grid and its slope does not vanish at a solution.
+    """
+
+    costs: Expr
+    objective: Expr
+    residuals: Expr | None
+    penalties: Expr
+    errors: Expr
+    constraints: Expr
+    lower: np.ndarray[Any, np.dtype[np.float64]]
+    upper: np.ndarray[Any, np.dtype[np.float64]]
+    names: tuple[str, ...]
+    outputs: Expr
+    means: Expr
+
+
+def terms(rollout: Sampled) -> Terms:
+    """The terms of the rollout's problem."""
+    problem = rollout.problem
+    costs = [_cost(rollout, cost) for cost in problem.costs]
+    targets = [(target, rollout.at(target.formula, target.at)) for target in problem.targets]
+    limits = [_Limit(rollout, constraint) for constraint in problem.constraints]
+    aims = [np.sqrt(target.weight) * value for target, value in targets]
+    objective = sum((cost.value for cost in costs), ca.MX(0)) + sum((ca.sumsqr(aim) for aim in aims), ca.MX(0))
+    errors = [_miss(target, value) for target, value in targets] + [limit.error for limit in limits]
+    if problem.goal is not None:
+        errors.append(goal_error(objective, problem.goal))
+    squares = [cost.residual for cost in costs]
+    penalties = [limit.penalty for limit in limits]
+    whole = None if any(r is None for r in squares) else _stack([*squares, *aims, *penalties])
+    return Terms(
+        costs=_stack([cost.value for cost in costs]),
+        objective=objective,
+        residuals=whole,
+        penalties=sum((ca.sumsqr(penalty) for penalty in penalties), ca.MX(0)),
+        errors=_stack(errors),
+        constraints=_stack([limit.value for limit in limits]),
+        lower=np.concatenate([limit.lower for limit in limits] or [np.zeros(0)]),
+        upper=np.concatenate([limit.upper for limit in limits] or [np.zeros(0)]),
+        names=tuple(limit.name for limit in limits for _ in range(limit.lower.size)),
+        outputs=_stack([rollout.at(output.formula, output.at) for output in problem.outputs]),
+        means=_stack(
+            [cost.mean for cost in costs] + [value for _, value in targets] + [limit.mean for limit in limits]
+        ),
+    )
+
+
+def goal_error(objective: Any, goal: float) -> Any:
+    """Error / tolerance of a goal for the objective: 1 at the goal, below it where the objective is lower."""
+    return 1 + (objective - goal) / max(abs(goal), 1e-9)
+
+
+def limits(problem: Problem) -> range:
+    """Which of the errors are those of constraints."""
+    return range(len(problem.targets), len(problem.targets) + len(problem.constraints))
+
+
+def _stack(parts: list[Expr]) -> Expr:
+    return ca.vertcat(ca.MX(0, 1), *(ca.vec(part) for part in parts))
+
+
+def _mean(samples: Expr) -> Expr:
+    """(m,): the mean of the columns."""
+    return ca.sum2(samples) / samples.shape[1]
+
+
+class _Cost(NamedTuple):
+    """A weighted cost, the residuals whose squares sum to it (or None), the mean of its formula."""
+
+    value: Expr
+    residual: Expr | None
+    mean: Expr
+
+
+def _cost(rollout: Sampled, cost: Cost) -> _Cost:
+    if cost.at == "always":
+        samples = rollout.over_steps(cost.formula)
+        weight = cost.weight * rollout.dt * rollout.steps / samples.shape[1]
+    else:
+        samples, weight = rollout.at(cost.formula, cost.at), cost.weight
+    if cost.squares:
+        residual = np.sqrt(weight) * ca.vec(samples)
+        return _Cost(ca.sumsqr(residual), residual, _mean(samples))
+    return _Cost(weight * ca.sum2(samples), None, _mean(samples))
+
+
+def _miss(target: Target, value: Expr) -> Expr:
+    return length(value) / target.tolerance
+
+
+class _Limit:
+    """One constraint: its values and their mean, bounds, penalty residuals and error."""
+
+    def __init__(self, rollout: Sampled, constraint: Constraint) -> None:
+        always = constraint.at == "always"
+        values = rollout.after_steps(constraint.formula) if always else rollout.at(constraint.formula, constraint.at)
+        count = values.shape[1]
+        self.name = constraint.name
+        self.value, self.mean = ca.vec(values), _mean(values)
+        size = values.shape[0]
+        self.lower = np.tile(np.broadcast_to(constraint.lower, (size,)), count)
+        self.upper = np.tile(np.broadcast_to(constraint.upper, (size,)), count)
+        violation = self._violation()
+        self.penalty = np.sqrt(constraint.penalty * (rollout.dt if always else 1.0)) * violation
+        total: Expr = ca.sum1(violation)
+        self.error = ca.if_else(total >= 0, ca.mmax(violation), total) / constraint.tolerance  # mmax hides a NaN
+
+    def _violation(self) -> Expr:
+        """(c,) >= 0: how far each value lies outside its bounds."""
+        total = ca.MX.zeros(self.value.shape[0])
+        for bound, sign in ((self.lower, -1), (self.upper, 1)):
+            finite = np.isfinite(bound)
+            beyond = sign * (self.value - ca.DM(np.where(finite, bound, 0.0)))
+            total += ca.DM(finite.astype(float)) * (beyond + ca.fabs(beyond)) / 2  # fmax(beyond, 0) hides a NaN
+        return total

@@ -1,0 +1,75 @@
+"""Evaluates points in situations by kernels whose decision vector is z with all that differs behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import exp, inf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.codegen import Kernel
+from symphys.codegen.backends.simd import common, probed
+from symphys.codegen.runtime.kernel import Outputs
+from symphys.shooting import Drawn, Values, WithoutResiduals
+from symphys.transcription.randomization.sampler import Sampler
+
+Array = NDArray[np.float64]
+
+
+class KernelSituations:
+    """See ``Situations``: a sampler and a kernel for each grid."""
+
+    def __init__(self, grids: Sequence[str], samplers: Sequence[Sampler], kernels: Sequence[Kernel]) -> None:
+        """Kernels of the samplers' problems, the merit seeded."""
+        self.grids, self.samplers, self.kernels = tuple(grids), tuple(samplers), tuple(kernels)
+
+    def draw(self, rng: np.random.Generator, count: int, width: float = 1.0, grid: int = 0) -> Drawn:
+        """See ``Situations``."""
+        return Drawn(grid, self.samplers[grid].draw(rng, count, width))
+
+    def nominal(self, count: int) -> Drawn:
+        """The problem's own situation, ``count`` times."""
+        return Drawn(0, np.tile(self.samplers[0].nominal, (count, 1)))
+
+    def value(self, Z: Array, drawn: Drawn, smoothing: float) -> Values:
+        """See ``Situations``."""
+        kernel = self.kernels[drawn.grid]
+        outputs = kernel.forward(joined(Z, drawn), [smoothing])
+        return replace(values(outputs), probe=probed(kernel, outputs))
+
+    def gradient(self, Z: Array, drawn: Drawn, smoothing: float, forget: float = 0.0, horizon: float = inf) -> Values:
+        """See ``Situations``."""
+        simulation = self.samplers[drawn.grid].problem.simulation
+        loss = 1 - exp(-forget * simulation.dt)
+        spared = max(0, simulation.steps - round(min(horizon, simulation.duration) / simulation.dt))
+        outputs, slopes = self.kernels[drawn.grid].gradient(joined(Z, drawn), [1.0], [smoothing], loss, spared)
+        return values(outputs, np.ascontiguousarray(slopes[:, : Z.shape[1]]))
+
+
+class NominalEvaluator(WithoutResiduals):
+    """Evaluates points in the problem's own situation; see ``Evaluator``."""
+
+    def __init__(self, situations: KernelSituations) -> None:
+        """By the same kernels."""
+        self.situations = situations
+
+    def value(self, Z: Array, smoothing: float) -> Values:
+        """See ``Evaluator``."""
+        return self.situations.value(Z, self.situations.nominal(len(Z)), smoothing)
+
+    def gradient(self, Z: Array, smoothing: float) -> Values:
+        """See ``Evaluator``."""
+        return self.situations.gradient(Z, self.situations.nominal(len(Z)), smoothing)
+
+
+def joined(Z: Array, drawn: Drawn) -> Array:
+    """(batch, n + s)."""
+    return np.hstack([np.broadcast_to(Z, (len(drawn.numbers), Z.shape[1])), drawn.numbers])
+
+
+def values(outputs: Outputs, gradient: Array | None = None) -> Values:
+    """From what a kernel gives."""
+    alive = outputs["alive"][:, 0] if "alive" in outputs else None
+    return Values(*common(outputs), gradient=gradient, alive=alive)

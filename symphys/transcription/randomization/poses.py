@@ -1,0 +1,103 @@
+"""The pose of a robot, which differs from situation to situation."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from symphys.dynamics import gap_function
+from symphys.model.state_layout import GIVEN, initial_state
+from symphys.problem import Posed, Problem, Slot
+from symphys.problem.parametric.forward_kinematics import side, sockets, spanning
+from symphys.problem.parametric.joints import JointPlan
+from symphys.transcription.randomization.numbers import hidden
+
+Array = NDArray[np.float64]
+State = dict[str, Array]
+"""By name, (count, k) each."""
+
+
+class Poses:
+    """The draws of one table: turned as a whole, joint by joint, then lifted until nothing overlaps."""
+
+    def __init__(self, problem: Problem, posed: Posed) -> None:
+        """Find what hangs on each joint, and what stands still below the robot."""
+        self.posed, self.problem, self.world = posed, problem, problem.world()
+        self.names = [f"{body}.{field}" for body in posed.bodies for field in GIVEN]
+        initial = problem.initial
+        self.variables = tuple(
+            hidden(f"{posed.name}:{name}", "initial", Slot(name, tuple(range(initial[name].size))), initial[name])
+            for name in self.names
+        )
+        tree = spanning(problem.plan.joints)
+        self.hinges = [Hinge(joint, side(joint.first, joint, tree), initial) for joint in posed.joints]
+        robot = {i for i, body in enumerate(self.world.bodies) if body.name in posed.bodies}
+        below = [k for k, p in enumerate(self.world.pairs) if p.second.body is None and p.first.body in robot]
+        symbols = {name: ca.SX.sym(name, value.size) for name, value in initial.items()}
+        gaps = gap_function(self.world)(initial_state(self.world, symbols))
+        self.gaps = ca.Function("gaps", [ca.vertcat(*symbols.values())], [ca.vertcat(0, *(gaps[k] for k in below))])
+
+    def draw(self, rng: np.random.Generator, count: int, width: float) -> Array:
+        """(count, numbers of the variables)."""
+        posed = self.posed
+        state = {name: np.tile(value, (count, 1)) for name, value in self.problem.initial.items()}
+        turn_all(posed.bodies, width * posed.tilt * rng.uniform(-1, 1, (count, 3)), state)
+        for hinge in self.hinges:
+            hinge.bend(width * posed.bend * rng.uniform(-1, 1, count), state)
+        drift = width * posed.velocity * rng.uniform(-1, 1, (count, 3))
+        lift = self.overlap(state)[:, None] * self.up
+        for body in posed.bodies:
+            state[f"{body}.velocity"] = state[f"{body}.velocity"] + drift
+            state[f"{body}.position"] = state[f"{body}.position"] + lift
+        return np.concatenate([state[name] for name in self.names], axis=1)
+
+    @property
+    def up(self) -> Array:
+        """(3,) against gravity; zero without any."""
+        gravity = np.array(self.world.gravity, float)
+        return -gravity / max(float(np.linalg.norm(gravity)), 1e-12)
+
+    def overlap(self, state: State) -> Array:
+        """(count,) [m] how deep the robot is in what stands still."""
+        gaps = np.array(self.gaps(np.concatenate(list(state.values()), axis=1).T))
+        return np.asarray(-gaps.min(axis=0))
+
+
+class Hinge:
+    """A joint with all that its first body carries."""
+
+    def __init__(self, joint: JointPlan, moved: list[str], initial: State) -> None:
+        """Axis and pivot in the frame of the body that stays."""
+        assert joint.second is not None, "a robot hangs on nothing"
+        self.base, self.moved = joint.second, moved
+        placed, pivot = sockets(joint, initial)
+        still = rotations(initial[f"{self.base}.orientation"]).inv()
+        (coordinate,) = joint.kind.coordinates
+        self.axis = still.apply(np.asarray(coordinate.axis(placed), float).ravel())
+        self.pivot = still.apply(pivot - initial[f"{self.base}.position"])
+
+    def bend(self, angles: Array, state: State) -> None:
+        """Turn the joint by angles (count,) [rad], in place."""
+        lies = rotations(state[f"{self.base}.orientation"])
+        pivot = state[f"{self.base}.position"] + lies.apply(self.pivot)
+        turn(self.moved, pivot, angles[:, None] * lies.apply(self.axis), state)
+
+
+def turn_all(bodies: tuple[str, ...], vectors: Array, state: State) -> None:
+    """Turn a robot about the centre of its first body by rotation vectors (count, 3), in place."""
+    turn(list(bodies), state[f"{bodies[0]}.position"].copy(), vectors, state)
+
+
+def turn(bodies: list[str], pivot: Array, vectors: Array, state: State) -> None:
+    """Turn bodies about points (count, 3), in place."""
+    by = Rotation.from_rotvec(vectors)
+    for body in bodies:
+        state[f"{body}.position"] = pivot + by.apply(state[f"{body}.position"] - pivot)
+        state[f"{body}.orientation"] = np.roll((by * rotations(state[f"{body}.orientation"])).as_quat(), 1, axis=1)
+
+
+def rotations(q: Array) -> Rotation:
+    """From quaternions w x y z."""
+    return Rotation.from_quat(np.roll(q, -1, axis=-1))

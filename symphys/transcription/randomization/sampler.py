@@ -1,0 +1,40 @@
+"""Draws situations: the numbers that differ, one row each."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.problem import Problem
+from symphys.transcription.randomization.numbers import Numbers
+from symphys.transcription.randomization.poses import Poses
+
+Array = NDArray[np.float64]
+
+
+class Sampler:
+    """The situations of a problem, on one grid of time.
+
+    Attributes:
+        problem: with a variable for all that differs, behind its own.
+        nominal: (s,) the numbers of the file.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        """See what differs."""
+        scenarios = problem.scenarios
+        assert scenarios is not None, "nothing differs"
+        self._parts: list[Numbers | Poses] = [Numbers(problem, varied) for varied in scenarios.varied]
+        self._parts += [Poses(problem, posed) for posed in scenarios.posed]
+        own = tuple(variable for part in self._parts for variable in part.variables)
+        self.problem = replace(problem, variables=(*problem.variables, *own), scenarios=None)
+        self.nominal = np.concatenate([np.zeros(0), *(variable.guess for variable in own)])
+
+    def draw(self, rng: np.random.Generator, count: int, width: float) -> Array:
+        """(count, s): the first as the file has it, the others drawn ``width`` times as wide as there."""
+        drawn = [np.zeros((count, 0)), *(part.draw(rng, count, width) for part in self._parts)]
+        rows = np.concatenate(drawn, axis=1)
+        rows[:1] = self.nominal
+        return rows

@@ -1,0 +1,54 @@
+"""The transcription of a problem with scenarios."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from time import perf_counter
+
+from symphys.codegen import Kernel, KernelUnavailable, ProgramError, processors
+from symphys.codegen.backends import PRECISIONS, build_kernel, described
+from symphys.problem import Problem
+from symphys.shooting import Nlp
+from symphys.transcription.program import rollout_program
+from symphys.transcription.randomization.evaluator import KernelSituations, NominalEvaluator
+from symphys.transcription.randomization.sampler import Sampler
+from symphys.transcription.rollout import symbolic_rollout
+from symphys.transcription.transcription import Transcription
+
+WITHOUT = "there is no evaluation in other situations"
+
+
+def with_situations(
+    plain: Transcription, problem: Problem, exact: bool, backend: str, threads: int | None
+) -> Transcription:
+    """``plain``, which is of the problem without its scenarios, with kernels that know them in place of its backend.
+
+    Where there can be no kernels it stays as it is, and its backend's note says so.
+    """
+    began = perf_counter()
+    try:
+        if backend not in PRECISIONS:
+            raise KernelUnavailable(f"the backend {backend} has no situations")
+        situations = _situations(problem, exact, backend, processors() if threads is None else threads)
+    except (KernelUnavailable, ProgramError) as error:
+        told = replace(plain.backend, note=f"{WITHOUT}: {error}")
+        return replace(plain, problem=problem, backend=told)
+    shooting = replace(
+        plain.shooting, evaluator=NominalEvaluator(situations), situations=situations, squares=False, nlp=Nlp(None)
+    )
+    grids = f"{len(situations.kernels)} discretisations" if len(situations.kernels) > 1 else ""
+    told = described(situations.kernels[0], perf_counter() - began, note=grids)
+    cached = all(kernel.report.cached for kernel in situations.kernels)
+    return replace(plain, problem=problem, shooting=shooting, backend=replace(told, cached=cached))
+
+
+def _situations(problem: Problem, exact: bool, backend: str, threads: int) -> KernelSituations:
+    assert problem.scenarios is not None, "nothing differs"
+    grids = {"": problem.simulation, **{grid.name: grid.simulation for grid in problem.scenarios.grids}}
+    samplers = [Sampler(replace(problem, simulation=simulation)) for simulation in grids.values()]
+    return KernelSituations(list(grids), samplers, [_kernel(each, exact, backend, threads) for each in samplers])
+
+
+def _kernel(sampler: Sampler, exact: bool, backend: str, threads: int) -> Kernel:
+    program = rollout_program(symbolic_rollout(sampler.problem), exact)
+    return build_kernel(backend, program, ("merit",), threads)

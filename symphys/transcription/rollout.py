@@ -1,0 +1,205 @@
+"""A rollout as symbols, and formulas evaluated along it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from symphys.dynamics import step_function
+from symphys.dynamics.horizon import roll_out
+from symphys.expression import Formula
+from symphys.model.world import World
+from symphys.problem import Problem
+from symphys.transcription.decision_variables import start_of
+from symphys.transcription.feedback.controllers import Control
+from symphys.transcription.feedback.sensor_memory import Memory, memory_of
+from symphys.transcription.formula_names import (
+    Parameters,
+    compile_formula,
+    input_names,
+    moving_names,
+    varied_parameters,
+)
+from symphys.transcription.termination import freeze_function
+
+Expr = Any
+"""casadi MX"""
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """A problem's rollout as expressions of z and smoothing (MX).
+
+    Attributes:
+        problem: what is rolled out.
+        world: its numbers, with symbols (SX) for the parameters that variables set.
+        inputs: names of the inputs that u stacks.
+        parameters: what p stacks.
+        memory: what states x hold after those of the world.
+        z: (n,) decision vector.
+        smoothing: scalar.
+        x0: (nx,) initial state.
+        given: (nu, N) inputs as variables give them; controllers add to them.
+        p: (np,).
+    """
+
+    problem: Problem
+    world: World
+    inputs: tuple[str, ...]
+    parameters: Parameters
+    memory: Memory
+    z: Expr
+    smoothing: Expr
+    x0: Expr
+    given: Expr
+    p: Expr
+
+    @cached_property
+    def step(self) -> ca.Function:
+        """One step (x, u, p, smoothing) -> x_next; built when first asked for, since one expression takes its time."""
+        scheme = self.problem.simulation.scheme()
+        return self.remembering(step_function(self.world, scheme, self.inputs, self.parameters.symbols))
+
+    def remembering(self, step: ca.Function) -> ca.Function:
+        """A function (x, u, p, smoothing) -> (x_next, ...) of the world's state, for states with memory."""
+        if self.memory.size == step.size1_in(0):
+            return step
+        x, u = ca.MX.sym("x", self.memory.size), ca.MX.sym("u", step.size1_in(1))
+        p, knob = ca.MX.sym("p", step.size1_in(2)), ca.MX.sym("smoothing")
+        after, *others = call(step, x[: step.size1_in(0)], u, p, knob)
+        whole: Expr = ca.vertcat(after, self.memory.after(x, u, self.inputs))
+        if self.freeze is not None:
+            whole = self.freeze(x, whole, p)
+        return ca.Function(step.name(), [x, u, p, knob], [whole, *others]).expand()
+
+    @cached_property
+    def freeze(self) -> ca.Function | None:
+        """See ``freeze_function``; None where nothing falls."""
+        problem = self.problem
+        if problem.fall is None:
+            return None
+        return freeze_function(problem, problem.fall, self.world, self.inputs, self.parameters, self.memory)
+
+    @cached_property
+    def control(self) -> Control:
+        """Sensors and controllers."""
+        return Control(self.problem, self.world, self.inputs, self.parameters, self.memory)
+
+    @cached_property
+    def feedback(self) -> ca.Function | None:
+        """(x, u, p, time) -> the inputs of the step from x; None without controllers."""
+        return self.control.function() if self.problem.controllers else None
+
+    @cached_property
+    def closed(self) -> ca.Function:
+        """``step`` with the controllers in it; see ``close``."""
+        return self.close(self.step)
+
+    def close(self, step: ca.Function) -> ca.Function:
+        """From (x, u, p, smoothing) -> (x_next, ...) to the same of ([u; time] as variables give it) with u at the end.
+
+        Without controllers the second argument is u alone, and u is not among the results.
+        """
+        if self.feedback is None:
+            return step
+        x, given = ca.MX.sym("x", self.memory.size), ca.MX.sym("given", step.size1_in(1) + 1)
+        p, knob = ca.MX.sym("p", step.size1_in(2)), ca.MX.sym("smoothing")
+        u = self.feedback(x, given[:-1], p, given[-1])
+        results = call(step, x, u, p, knob)
+        return ca.Function(f"closed_{step.name()}", [x, given, p, knob], [*results, u])
+
+    def rolled(self, step: ca.Function) -> tuple[Expr, Expr, list[Expr]]:
+        """States (nx, N + 1), inputs (nu, N) and what else a step gives, N columns each; ``step`` is not closed."""
+        given = self.given
+        if self.feedback is not None:
+            given = ca.vertcat(given, ca.DM(np.arange(self.steps) * self.dt).T)
+        x, *others = roll_out(self.close(step), self.steps, self.x0, given, self.p, self.smoothing)
+        return (x, self.given, others) if self.feedback is None else (x, others[-1], others[:-1])
+
+    @cached_property
+    def _motion(self) -> tuple[Expr, Expr]:
+        x, u, _ = self.rolled(self.step)
+        return x, u
+
+    @property
+    def x(self) -> Expr:
+        """(nx, N + 1) states."""
+        return self._motion[0]
+
+    @property
+    def u(self) -> Expr:
+        """(nu, N) inputs."""
+        return self.given if self.feedback is None else self._motion[1]
+
+    @property
+    def steps(self) -> int:
+        """N."""
+        return self.problem.simulation.steps
+
+    @property
+    def dt(self) -> float:
+        """[s]."""
+        return self.problem.simulation.dt
+
+    def compiled(self, formula: Formula) -> ca.Function:
+        """The formula as a casadi function of (x, u, p, time, z)."""
+        return compile_formula(self.problem, self.world, self.inputs, self.parameters, self.memory, formula)
+
+    def tick(self, when: str | float) -> int:
+        """The number of the state at the end, or nearest to a time [s]."""
+        return self.steps if isinstance(when, str) else round(when / self.dt)
+
+    def at(self, formula: Formula, when: str | float) -> Expr:
+        """(m,): the formula's value at the end or at the step nearest to a time; inputs are those of that step."""
+        k = self.tick(when)
+        u = self.u[:, min(k, self.steps - 1)]
+        return self.compiled(formula)(self.x[:, k], u, self.p, k * self.dt, self.z)
+
+    def after_steps(self, formula: Formula) -> Expr:
+        """(m, N): its value at the end of every step, with that step's inputs."""
+        return self._mapped(formula, self.x[:, 1:], np.arange(1, self.steps + 1))
+
+    def over_steps(self, formula: Formula) -> Expr:
+        """(m, N or 2N): samples whose mean is the time average; 2N for what moves (trapezoid)."""
+        before = self._mapped(formula, self.x[:, :-1], np.arange(self.steps))
+        if not self.moves(formula):
+            return before
+        return ca.horzcat(before, self.after_steps(formula))
+
+    def _mapped(self, formula: Formula, x: Expr, ticks: Any) -> Expr:
+        stage = self.compiled(formula).map(self.steps)
+        p, z = ca.repmat(self.p, 1, self.steps), self.z
+        shared = ca.repmat(z, 1, self.steps) if self._uses_z(formula) else ca.DM(z.shape[0], self.steps)
+        return stage(x, self.u, p, ca.DM(ticks * self.dt).T, shared)
+
+    def moves(self, formula: Formula) -> bool:
+        """Whether the formula depends on what changes within a step."""
+        return not self._moving.isdisjoint(formula.names)
+
+    @cached_property
+    def _moving(self) -> frozenset[str]:
+        return moving_names(self.world)
+
+    def _uses_z(self, formula: Formula) -> bool:
+        return any(variable.name in formula.names for variable in self.problem.variables)
+
+
+def symbolic_rollout(problem: Problem, inputs: tuple[str, ...] | None = None) -> Rollout:
+    """The rollout of a problem over its horizon; ``inputs`` may name more than the problem itself makes use of."""
+    parameters = varied_parameters(problem)
+    inputs = input_names(problem) if inputs is None else inputs
+    world = problem.world(parameters.overrides())
+    z = ca.MX.sym("z", sum(v.guess.size for v in problem.variables))
+    smoothing = ca.MX.sym("smoothing")
+    start, memory = start_of(problem, world, inputs, parameters, z), memory_of(problem, world)
+    return Rollout(problem, world, inputs, parameters, memory, z, smoothing, memory.start(start.x0), start.u, start.p)
+
+
+def call(function: ca.Function, *arguments: Expr) -> list[Expr]:
+    """All results of a call."""
+    results = function(*arguments)
+    return list(results) if isinstance(results, tuple) else [results]

@@ -1,0 +1,131 @@
+"""The exact rollout of one z with everything that happened in it, as plain arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.dynamics import reading_function, report_function
+from symphys.model.state_layout import GIVEN, Layout, input_columns
+from symphys.trajectory import NotFinite, Trajectory
+from symphys.transcription.nan_tracing.steps import Course, first_fault
+from symphys.transcription.rollout import Rollout
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Record:
+    """A rollout of ``z`` (n,): all of its states and arguments, and the motion in them."""
+
+    z: Array
+    course: Course
+    motion: Trajectory
+
+
+def recorder(rollout: Rollout) -> ca.Function:
+    """(z, smoothing) -> (x, u, given, p, forces, gaps, residual, crowded, ambiguous, paradox) of the whole horizon."""
+    scheme = rollout.problem.simulation.scheme()
+    step = report_function(rollout.world, scheme, rollout.inputs, rollout.parameters.symbols)
+    x, u, happened = rollout.rolled(rollout.remembering(step))
+    return ca.Function("record", [rollout.z, rollout.smoothing], [x, u, rollout.given, rollout.p, *happened])
+
+
+def simulate(rollout: Rollout, record: Callable[..., Any], z: Array, smoothing: float) -> Record:
+    """The rollout of z; NotFinite, which says where and why, if it has none."""
+    x, u, given, p, *happened = (np.array(part).T for part in record(z, smoothing))
+    z = np.asarray(z, float)
+    course = Course(z, smoothing, x, u, given, p.ravel())
+    motion = _trajectory(rollout, x, u, p.ravel(), *happened)
+    try:
+        return Record(z, course, motion.require_finite())
+    except NotFinite as error:
+        raise NotFinite(f"{error}; {first_fault(rollout, course)}") from None
+
+
+def _trajectory(
+    rollout: Rollout, x: Array, u: Array, p: Array, forces: Array, gaps: Array, residual: Array, *counted: Array
+) -> Trajectory:
+    world, steps = rollout.world, rollout.steps
+    layout = Layout(world)
+    bodies: dict[str, Any] = {
+        field: _stack([x[:, layout[f"{body.name}.{field}"]] for body in world.bodies]) for field in GIVEN
+    }
+    return Trajectory(
+        time=np.arange(steps + 1, dtype=np.float64) * rollout.dt,
+        body_names=tuple(body.name for body in world.bodies),
+        **bodies,
+        force=_applied(rollout, u, "force"),
+        torque=_applied(rollout, u, "torque"),
+        contact_names=tuple(pair.name for pair in world.pairs),
+        contact_force=forces.reshape(steps, len(world.pairs), 3),
+        contact_gap=np.concatenate([gaps, gaps[-1:]]),
+        residual=residual.ravel(),
+        **_counts(*counted),
+        **_joints(rollout, x, u, p),
+    )
+
+
+def _counts(crowded: Array, ambiguous: Array, paradox: Array) -> dict[str, Any]:
+    """The fields that count steps of a kind."""
+    return {"crowded": crowded.ravel(), "ambiguous": ambiguous.ravel(), "paradox": paradox.ravel()}
+
+
+def plain(rollout: Rollout, x: Array) -> Array:
+    """The states without memory."""
+    return x[:, : Layout(rollout.world).size]
+
+
+def _stack(parts: list[Any]) -> Array:
+    return np.stack(parts, axis=1)
+
+
+def _joints(rollout: Rollout, x: Array, u: Array, p: Array) -> dict[str, Any]:
+    """The fields of joints."""
+    joints = rollout.world.joints
+    counts = [len(joint.kind.coordinates) for joint in joints]
+    read = reading_function(rollout.world, rollout.parameters.symbols).map(rollout.steps + 1)
+    *parts, separation = (
+        np.array(part).T for part in read(plain(rollout, x).T, np.tile(p[:, None], rollout.steps + 1))
+    )
+    value, rate, torque = (_split(part, counts) for part in parts)
+    return {
+        "joint_names": tuple(joint.name for joint in joints),
+        "joint_value": value,
+        "joint_rate": rate,
+        "joint_torque": torque[1:],
+        "joint_command": _split(_commands(rollout, u, counts), counts),
+        "joint_separation": separation,
+    }
+
+
+def _commands(rollout: Rollout, u: Array, counts: list[int]) -> Array:
+    """(N, coordinates of all joints): what their motors were told."""
+    columns = input_columns(rollout.world, rollout.inputs)
+    told = [
+        u[:, columns[name]] if (name := f"{joint.name}.command") in columns else np.zeros((rollout.steps, count))
+        for joint, count in zip(rollout.world.joints, counts, strict=True)
+    ]
+    return np.concatenate([np.zeros((rollout.steps, 0)), *told], axis=1)
+
+
+def _split(columns: Array, counts: list[int]) -> Array:
+    """(N, J, K): the coordinates of all joints side by side, by joint."""
+    apart = np.full((len(columns), len(counts), max(counts, default=0)), np.nan)
+    start = 0
+    for j, count in enumerate(counts):
+        apart[:, j, :count] = columns[:, start : start + count]
+        start += count
+    return apart
+
+
+def _applied(rollout: Rollout, u: Array, field: str) -> Array:
+    """(N, B, 3): the inputs of this kind, zero for bodies without any."""
+    zero = np.zeros((rollout.steps, 3))
+    columns = {name: u[:, part] for name, part in input_columns(rollout.world, rollout.inputs).items()}
+    return _stack([columns.get(f"{body.name}.{field}", zero) for body in rollout.world.bodies])

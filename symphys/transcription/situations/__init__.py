@@ -1,5 +1,0 @@
-"""Situations that differ: numbers and poses that are drawn, behind z in the vector of a kernel."""
-
-from symphys.transcription.situations.transcription import with_situations
-
-__all__ = ["with_situations"]

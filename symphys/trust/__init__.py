@@ -1,9 +1,0 @@
-"""How far a gradient and a solution through contact can be trusted: one examination, for ``check`` and for every solve.
-
-Its numbers are told in words by ``symphys.findings``.
-"""
-
-from symphys.trust.examine import examine
-from symphys.trust.survey import survey
-
-__all__ = ["examine", "survey"]

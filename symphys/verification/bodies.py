@@ -1,0 +1,39 @@
+"""What the bodies of a rollout weigh and how large they are, with the parameters that variables set."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.dynamics.motion import inertia_matrix
+from symphys.transcription import Record, Rollout
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """Numbers of the bodies: ``mass`` (B,) [kg], ``size`` (B,) [m] radius of gyration, ``gravity`` (3,) [m/s^2]."""
+
+    mass: Array
+    size: Array
+    gravity: Array
+
+
+def bodies(rollout: Rollout, record: Record) -> Bodies:
+    """Those of a rollout."""
+    world = rollout.world
+    mass = ca.vertcat(*(ca.SX(body.mass) for body in world.bodies))
+    inertia = ca.vertcat(*(ca.trace(inertia_matrix(body.inertia)) / 3 for body in world.bodies))
+    results = [mass, ca.sqrt(inertia / mass), ca.vertcat(*(ca.SX(g) for g in world.gravity))]
+    numbers = ca.Function("bodies", [parameters(rollout)], results)(record.course.p)
+    return Bodies(*(np.array(part).ravel() for part in numbers))
+
+
+def parameters(rollout: Rollout) -> Any:
+    """(np,) the symbols that p stacks."""
+    return ca.vertcat(ca.SX(0, 1), *rollout.parameters.symbols)

@@ -1,0 +1,145 @@
+"""Energy and momentum over a motion: what forces and contacts did, and whether it adds up.
+
+Angular momentum is left out: where surfaces touched is not recorded.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.dynamics.motion import momentum
+from symphys.maths import rotation
+from symphys.model.state_layout import Layout, input_columns, inputs_size
+from symphys.trajectory import Trajectory
+from symphys.transcription import Record, Rollout, plain
+from symphys.verification.bodies import bodies, parameters
+from symphys.verification.contacts import acting, touching
+from symphys.verification.joints import floating, joint_work, uncounted
+from symphys.verification.sensitivity_growth import samples
+
+Array = NDArray[np.float64]
+Expr = Any
+"""casadi SX"""
+
+MOST_SAMPLES = 400
+MOST_GAINS = 5
+GAIN = 1e-6
+"""Of the largest kinetic energy: what a contact must add in a step to be told."""
+
+
+def budget(rollout: Rollout, record: Record) -> dict[str, Any]:
+    """What became of energy and momentum.
+
+    Returns:
+        "energy": at some 400 instants "time" [s], "kinetic" and "potential" [J] (0 at the origin), and up to then
+        "applied", the work of applied forces and torques, motors and springs, and "contact", what contacts, limits of
+        joints and joints that give way gave (negative: took) [J].
+        "gains": the steps in which rigid contacts gave most, each with "step", "time" [s], "energy" [J], "contacts";
+        steps in which a soft contact acts are left out, since it gives back what it has stored. "gained" [J]: the sum
+        of all such steps. "drift" [J]: the largest change in a step that neither forces nor contacts account for.
+        "unexplained" [J]: the largest that is more than twice what servos and springs did in the step, whose work is
+        not known to that precision, in the step from "drift_at" [s]; "drifted" [J]: the largest sum of such changes
+        since the start.
+        "momentum": the largest part of a body's linear momentum that impulses of gravity, forces and contacts leave
+        unexplained in a step, relative to the largest momentum or impulse; rounding, if the engine is right. Bodies
+        that joints hold together count as one; those that are held by the world are left out.
+    """
+    motion = record.motion
+    kinetic, potential, applied = _energies(rollout, record)
+    by_motors, uncertain = joint_work(rollout, record)
+    applied += by_motors
+    surplus = np.diff(kinetic + potential) - applied
+    by_joints = uncounted(rollout, record)
+    touched = (np.abs(motion.contact_force).sum(axis=(1, 2)) > 0) | by_joints
+    contact = np.where(touched, surplus, 0.0)
+    gains = np.where(_rigid_alone(rollout, motion) & ~by_joints, contact, 0.0)
+    floor = GAIN * kinetic.max() + 1e-12 * np.abs(potential).max()
+    gains = np.where(gains > floor, gains, 0.0)
+    first = np.argsort(-gains, kind="stable")[:MOST_GAINS]
+    free = np.where(touched, 0.0, surplus)
+    unknown = np.where(np.abs(free) <= 2 * uncertain, 0.0, free)
+    return {
+        "energy": _thinned(motion.time, kinetic, potential, applied, contact),
+        "gains": [_gain(motion, int(k), float(gains[k])) for k in first if gains[k] > 0],
+        "gained": float(gains.sum()),
+        "drift": float(np.abs(free).max()),
+        "unexplained": float(np.abs(unknown).max()),
+        "drift_at": float(motion.time[int(np.abs(unknown).argmax())]),
+        "drifted": float(np.abs(np.cumsum(unknown)).max()),
+        "momentum": momentum_gap(rollout, record),
+    }
+
+
+def momentum_gap(rollout: Rollout, record: Record) -> float:
+    """The largest unexplained change of momentum in a step, of bodies or what hangs together; see ``budget``.
+
+    Momenta are those of the leapfrog: without what persistent forces, half a step ahead, have done already.
+    """
+    motion, dt, numbers = record.motion, rollout.dt, bodies(rollout, record)
+    layout, x = Layout(rollout.world), record.course.x
+    memory = np.stack([x[:, layout[f"{name}.reaction_force"]] for name in motion.body_names], axis=1)
+    held = numbers.mass[:, None] * motion.velocity - x[:, layout["lag"], None] * memory
+    impulses = dt * (numbers.mass[:, None] * numbers.gravity + motion.force + contact_forces(rollout, motion))
+    groups = floating(rollout)
+    held, impulses = (
+        np.stack([of[:, g].sum(axis=1) for g in groups], axis=1) if groups else of[:, :0] for of in (held, impulses)
+    )
+    gap = np.diff(held, axis=0) - impulses
+    size = max(np.abs(held).max(initial=0.0), np.abs(impulses).max(initial=0.0))
+    return float(np.abs(gap).max() / size) if size > 0 else 0.0
+
+
+def contact_forces(rollout: Rollout, motion: Trajectory) -> Array:
+    """(N, B, 3) [N]: the sum of the contacts on each body."""
+    total = np.zeros_like(motion.force)
+    for c, pair in enumerate(rollout.world.pairs):
+        for side, sign in ((pair.first, 1.0), (pair.second, -1.0)):
+            if side.body is not None:
+                total[:, side.body] += sign * motion.contact_force[:, c]
+    return total
+
+
+def _energies(rollout: Rollout, record: Record) -> tuple[Array, Array, Array]:
+    """Kinetic and potential energy (N + 1,) and the work of applied forces in each step (N,) [J]."""
+    world, layout, p = rollout.world, Layout(rollout.world), parameters(rollout)
+    x, after = ca.SX.sym("x", layout.size), ca.SX.sym("after", layout.size)
+    u = ca.SX.sym("u", inputs_size(world, rollout.inputs))
+    kinetic, potential, work = ca.SX(0), ca.SX(0), ca.SX(0)
+    given = {name: u[part] for name, part in input_columns(world, rollout.inputs).items()}
+    for body in world.bodies:
+        at = {field: x[layout[f"{body.name}.{field}"]] for field in ("position", "orientation", "velocity")}
+        spin = x[layout[f"{body.name}.angular_velocity"]]
+        turning = momentum(body.inertia, at["orientation"], spin)
+        kinetic += (body.mass * ca.sumsqr(at["velocity"]) + ca.dot(spin, turning)) / 2
+        potential -= body.mass * ca.dot(ca.vertcat(*world.gravity), at["position"])
+        moved = after[layout[f"{body.name}.position"]] - at["position"]
+        turned = rotation.between(at["orientation"], after[layout[f"{body.name}.orientation"]])
+        for field, way in (("force", moved), ("torque", turned)):
+            work += ca.dot(given.get(f"{body.name}.{field}", ca.SX.zeros(3)), way)
+    states, course = ca.Function("energies", [x, p], [kinetic, potential]), record.course
+    x_k = plain(rollout, course.x)
+    both = states.map(len(x_k))(x_k.T, np.tile(course.p[:, None], len(course.x)))
+    works = ca.Function("work", [x, after, u], [work]).map(rollout.steps)
+    done = works(x_k[:-1].T, x_k[1:].T, course.u.T)
+    return np.array(both[0]).ravel(), np.array(both[1]).ravel(), np.array(done).ravel()
+
+
+def _rigid_alone(rollout: Rollout, motion: Trajectory) -> NDArray[np.bool_]:
+    """(N,) where no soft contact acts."""
+    soft = np.array([pair.law.soft for pair in rollout.world.pairs], bool)
+    return np.logical_not(acting(motion)[:, soft].any(axis=1))
+
+
+def _gain(motion: Trajectory, k: int, energy: float) -> dict[str, Any]:
+    return {"step": k, "time": float(motion.time[k]), "energy": energy, "contacts": touching(motion, k)}
+
+
+def _thinned(time: Array, kinetic: Array, potential: Array, applied: Array, contact: Array) -> dict[str, list[float]]:
+    keep = samples(len(time), MOST_SAMPLES)
+    given, taken = (np.concatenate([[0.0], np.cumsum(part)]) for part in (applied, contact))
+    columns = {"time": time, "kinetic": kinetic, "potential": potential, "applied": given, "contact": taken}
+    return {name: column[keep].tolist() for name, column in columns.items()}

@@ -1,0 +1,101 @@
+"""How cleanly contacts were resolved, and how surfaces slid on each other."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.dynamics import slip_function
+from symphys.trajectory import Trajectory
+from symphys.transcription import Record, Rollout, plain
+from symphys.verification.bodies import bodies
+
+Array = NDArray[np.float64]
+
+MOST_SLIDES = 5
+
+
+def contacts(rollout: Rollout, record: Record) -> dict[str, Any]:
+    """What is to be said of the contacts.
+
+    Returns:
+        "residual" [N s]: the largest change of an impulse in a last sweep, at "residual_at" [s]; "impulse" [N s]: the
+        largest impulse of a contact in a step. "deepest" [m]: how far rigid surfaces overlapped, with the "contact" and
+        "time" [s] in "deepest_at" (None where they did not); "size" [m]: the smallest radius of gyration of a body.
+        "steps", and in how many of them "multiple_impacts" of a body, "ambiguous_impacts" of several bodies at one
+        instant, and "paradoxes" of friction.
+    """
+    motion = record.motion
+    return {
+        "residual": float(motion.residual.max(initial=0.0)),
+        "residual_at": float(motion.time[int(motion.residual.argmax())]),
+        "impulse": float(np.linalg.norm(motion.contact_force, axis=2).max(initial=0.0) * rollout.dt),
+        "steps": rollout.steps,
+        "multiple_impacts": int(motion.crowded.sum()),
+        "ambiguous_impacts": int(motion.ambiguous.sum()),
+        "paradoxes": int(motion.paradox.sum()),
+        "size": float(bodies(rollout, record).size.min()),
+        **_deepest(rollout, motion),
+    }
+
+
+def surface(contact: str) -> str:
+    """The name of the two surfaces of a contact, without the number of the point in which they touch."""
+    return contact.partition(":")[0]
+
+
+def acting(motion: Trajectory) -> NDArray[np.bool_]:
+    """(N, C): whether a contact gives an impulse in a step."""
+    return np.asarray(np.abs(motion.contact_force).sum(axis=2) > 0)
+
+
+def touching(motion: Trajectory, k: int) -> list[str]:
+    """The surfaces that act on each other in step k."""
+    return list(dict.fromkeys(surface(motion.contact_names[c]) for c in np.flatnonzero(acting(motion)[k])))
+
+
+def slides(rollout: Rollout, record: Record) -> list[dict[str, Any]]:
+    """The contacts that slid furthest; of surfaces that touch in several points the one that slides furthest.
+
+    Returns:
+        Each with its "contact", "distance" [m], largest "speed" [m/s] and when, "time" [s]. Sliding is measured at the
+        start of each step, where a contact bears a load in it and bore one in the step before: the slip of an impact is
+        none.
+    """
+    motion = record.motion
+    if not motion.contact_names:
+        return []
+    loaded = acting(motion)
+    loaded[1:] &= loaded[:-1].copy()
+    loaded[0] = False
+    speeds = np.where(loaded, slip_speeds(rollout, record), 0.0)
+    furthest: dict[str, dict[str, Any]] = {}
+    for c in np.argsort(-speeds.sum(axis=0), kind="stable"):
+        k, name = int(speeds[:, c].argmax()), surface(motion.contact_names[c])
+        distance, speed = float(speeds[:, c].sum() * rollout.dt), float(speeds[k, c])
+        if distance > 0:
+            slide = {"contact": name, "distance": distance, "speed": speed, "time": float(motion.time[k])}
+            furthest.setdefault(name, slide)
+    return list(furthest.values())[:MOST_SLIDES]
+
+
+def slip_speeds(rollout: Rollout, record: Record) -> Array:
+    """(N, C) [m/s]: how fast the surfaces of a contact move across its normal at the start of each step."""
+    scheme = rollout.problem.simulation.scheme()
+    slip = slip_function(rollout.world, scheme, rollout.inputs, rollout.parameters.symbols).map(rollout.steps)
+    course = record.course
+    return np.array(slip(plain(rollout, course.x)[:-1].T, course.u.T, np.tile(course.p[:, None], rollout.steps))).T
+
+
+def _deepest(rollout: Rollout, motion: Trajectory) -> dict[str, Any]:
+    rigid = np.flatnonzero([not pair.law.soft for pair in rollout.world.pairs])
+    gaps = motion.contact_gap[:, rigid]
+    if np.isnan(gaps).any():
+        return {"deepest": float("nan"), "deepest_at": None}
+    if not gaps.size or gaps.min() >= 0:
+        return {"deepest": 0.0, "deepest_at": None}
+    k, c = np.unravel_index(int(gaps.argmin()), gaps.shape)
+    name = surface(motion.contact_names[int(rigid[c])])
+    return {"deepest": float(-gaps[k, c]), "deepest_at": {"contact": name, "time": float(motion.time[k])}}

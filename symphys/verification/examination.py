@@ -1,0 +1,64 @@
+"""The examination: what is measured at one z."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.transcription import Record, Transcription, first_derivative_fault, first_fault
+from symphys.verification import gradient, refinement, smoothing
+from symphys.verification import sensitivity_growth as growth
+from symphys.verification.contacts import slides
+from symphys.verification.near_misses import misses
+from symphys.verification.survey import survey
+
+Array = NDArray[np.float64]
+Tell = Callable[[str], None]
+
+
+@np.errstate(invalid="ignore", over="ignore")  # numbers that are not finite are told as such
+def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: None) -> dict[str, Any]:
+    """The "trust" object of a result, for the exact rollout of ``z`` (n,).
+
+    Each module of this room says what its numbers are. "fault" is a clause on the first number or derivative that is
+    not finite, empty if all are. ``tell`` is called with a few words before each part that takes time.
+
+    Raises:
+        NotFinite: there is no such motion; says where it ends and why.
+    """
+    tell("simulating")
+    record = transcription.record(z)
+    tell("comparing the gradient with differences")
+    compared = gradient.compare_gradient(transcription, z)
+    tell("refining the time step and the sweeps")
+    finer = refinement.refine(transcription, z)
+    tell("sweeping the sensitivity back through time")
+    grown = growth.growth(transcription, record)
+    tell("looking for near misses")
+    near = misses(transcription, record)
+    tell("smoothing, and adding up energy and momentum")
+    motion = survey(transcription, record)
+    return {
+        "gradient": compared,
+        **finer,
+        "growth": grown,
+        "smoothed": smoothing.smoothed(transcription, record),
+        **motion,
+        **refinement.settling(transcription, z, motion["residual"], motion["impulse"]),
+        "misses": near,
+        "slides": slides(transcription.rollout, record),
+        "fault": _fault(transcription, record, compared),
+    }
+
+
+def _fault(transcription: Transcription, record: Record, compared: list[dict[str, Any]]) -> str:
+    verdict = transcription.judge(record.z)
+    told = [verdict.objective, *verdict.costs.values(), *(check.error for check in verdict.checks)]
+    if not np.isfinite([*told, *record.course.x.ravel()]).all():
+        return first_fault(transcription.rollout, record.course)
+    if not np.isfinite([row["scale"] for row in compared]).all():
+        return first_derivative_fault(transcription.rollout, record.course)
+    return ""

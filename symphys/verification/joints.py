@@ -1,0 +1,78 @@
+"""What joints do in the budgets of energy and momentum."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.dynamics import components
+from symphys.model.joints import Joint, TorqueMotor
+from symphys.model.state_layout import Layout
+from symphys.transcription import Record, Rollout
+from symphys.verification.bodies import parameters
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+WORKING = ("motor", "spring")
+AT_LIMIT = 1e-6
+"""How near to a limit a coordinate counts as there [rad] or [m]; what it moves in a step comes on top."""
+
+
+def joint_work(rollout: Rollout, record: Record) -> tuple[Array, Array]:
+    """(N,) [J]: the work of motors and springs in each step, and the sum of its sizes, joint by joint.
+
+    Leapfrog: velocities at the ends of a step hold the persistent forces half a stretch ahead. Of a step that is cut
+    only the last force is known: torque motors act with it all along, others are taken to get there in even steps. Of
+    a servo that goes from one bound to the other within a step that is wrong by up to twice its work.
+    """
+    layout, x = Layout(rollout.world), record.course.x
+    total, gross, lag = np.zeros(rollout.steps), np.zeros(rollout.steps), x[:, layout["lag"]]
+    for joint, _, rate in coordinates(rollout, record):
+        for part in (part for part in WORKING if part in joint.acting):
+            force = x[:, layout[f"{joint.name}.{part}"]]
+            told = part == "motor" and isinstance(joint.motor, TorqueMotor)
+            ahead = lag[:-1] + (rollout.dt if told else rollout.dt / 2 + lag[1:])
+            impulse = rollout.dt * force[:-1] + ahead * (force[1:] - force[:-1])
+            work = impulse * (rate[:-1] + rate[1:]) / 2
+            total += work.sum(axis=1)
+            gross += 0 if told else np.abs(work).sum(axis=1)
+    return total, gross
+
+
+def uncounted(rollout: Rollout, record: Record) -> Mask:
+    """(N,): steps in which a joint may take or store energy otherwise: at a limit, or where one gives way."""
+    found = np.full(rollout.steps, any(joint.soft for joint in rollout.world.joints))
+    for joint, value, rate in coordinates(rollout, record):
+        reach = rollout.dt * np.abs(rate) + AT_LIMIT
+        for sign, limit in ((-1, joint.limits.lower), (1, joint.limits.upper)):
+            if limit is not None:
+                bound = number(rollout, record, limit)
+                there: Mask = np.any(sign * (value - bound) + reach >= 0, axis=1)
+                found |= there[:-1] | there[1:]
+    return found
+
+
+def floating(rollout: Rollout) -> list[list[int]]:
+    """The bodies that hang together by joints, where none of them is held by the world."""
+    world = rollout.world
+    held = {joint.first for joint in world.joints if joint.second is None}
+    return [sorted(group) for group in components(world) if not group & held]
+
+
+def coordinates(rollout: Rollout, record: Record) -> Iterator[tuple[Joint, Array, Array]]:
+    """Joints with coordinates: (N + 1, k) values and rates."""
+    motion = record.motion
+    for j, joint in enumerate(rollout.world.joints):
+        count = len(joint.kind.coordinates)
+        if count:
+            yield joint, motion.joint_value[:, j, :count], motion.joint_rate[:, j, :count]
+
+
+def number(rollout: Rollout, record: Record, value: Any) -> float:
+    """A number of the world, which a parameter may be."""
+    return float(ca.Function("number", [parameters(rollout)], [ca.SX(value)])(record.course.p))

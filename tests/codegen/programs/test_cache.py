@@ -1,0 +1,174 @@
+"""Kernels are kept and found again; a cache that fails is done without."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shlex
+import shutil
+import sys
+import time
+from pathlib import Path
+
+import programs
+import pytest
+from compilers import building, fake, wait_for
+
+from symphys.codegen import Cache, Kernel, KernelUnavailable, compile_program, default_cache
+from symphys.codegen.toolchain.compiler import find_compiler
+
+Patch = pytest.MonkeyPatch
+UNIX = pytest.mark.skipif(sys.platform == "win32", reason="the fake compilers are shell scripts")
+
+
+@UNIX
+def test_a_builder_that_is_killed_holds_up_nobody(tmp_path: Path) -> None:
+    process = building(tmp_path, fake(tmp_path, f"echo $$ > {tmp_path}/started; exec sleep 5"))
+    wait_for(tmp_path / "started")
+    process.kill()
+    process.communicate(timeout=20)
+    kernel = compile_program(programs.pendulum(), cache=Cache(tmp_path / "cache"), threads=1)
+    assert not kernel.report.cached
+    assert compile_program(kernel.program, cache=Cache(tmp_path / "cache")).report.cached
+
+
+def test_the_second_time_it_comes_from_the_cache(chain: Kernel, cache: Cache) -> None:
+    again = compile_program(chain.program, cache=cache)
+    assert again.report.cached
+    assert again.report.seconds < 1
+
+
+def test_time_and_sweeps_are_data(chain: Kernel, cache: Cache, monkeypatch: Patch) -> None:
+    monkeypatch.setattr(programs, "SWEEPS", 7)
+    assert compile_program(programs.chain(), cache=cache).report.cached
+
+
+def test_the_key_holds_flags_and_lanes(pendulum: Kernel, cache: Cache, monkeypatch: Patch) -> None:
+    before = cache.info().kernels
+    assert compile_program(pendulum.program, cache=cache, threads=1).report.cached
+    monkeypatch.setattr("symphys.codegen.toolchain.compiler.FLAGS", ("-O1", "-fPIC"))
+    assert not compile_program(pendulum.program, cache=cache, threads=1).report.cached
+    assert cache.info().kernels == before + 1
+
+
+def test_a_damaged_kernel_is_built_again(pendulum: Kernel, cache: Cache, tmp_path: Path) -> None:
+    own = Cache(tmp_path)
+    shutil.copytree(cache.folder, own.folder, dirs_exist_ok=True)
+    for path in own.folder.glob("*.so"):
+        os.truncate(path, path.stat().st_size // 2)
+    rebuilt = compile_program(pendulum.program, cache=own, threads=1)
+    assert not rebuilt.report.cached
+    assert rebuilt.forward([0.0] * 30, [1.0])["merit"].shape == (1, 1)
+    assert compile_program(pendulum.program, cache=own, threads=1).report.cached
+
+
+def test_a_folder_that_cannot_be_written(pendulum: Kernel, tmp_path: Path) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("in the way", "utf-8")
+    kernel = compile_program(pendulum.program, cache=Cache(blocked / "cache"))
+    assert not kernel.report.cached
+    assert "was not kept" in kernel.report.note
+    kernel.forward([0.0] * 30, [1.0])
+
+
+def test_a_full_disk(pendulum: Kernel, tmp_path: Path, monkeypatch: Patch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("shutil.copyfile", full)
+    kernel = compile_program(pendulum.program, cache=Cache(tmp_path))
+    assert "No space left" in kernel.report.note
+    kernel.forward([0.0] * 30, [1.0])
+    assert [path for path in tmp_path.iterdir() if path.name.startswith(".new")] == []
+
+
+@UNIX
+def test_a_disk_that_becomes_full_while_a_kernel_is_kept(tmp_path: Path) -> None:
+    import resource
+
+    built = tmp_path / "built"
+    built.write_bytes(bytes(100_000))
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, limits[1]))
+    try:
+        with pytest.raises(OSError, match="File too large"):
+            Cache(tmp_path / "cache").store("key", built)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert list((tmp_path / "cache").iterdir()) == []
+
+
+def test_a_cache_that_can_only_be_read_is_used(pendulum: Kernel, cache: Cache, monkeypatch: Patch) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    for name in ("os.utime", "pathlib.Path.mkdir", "pathlib.Path.unlink"):
+        monkeypatch.setattr(name, refuse)
+    monkeypatch.setattr("symphys.codegen.toolchain.cache.tempfile.mkstemp", refuse)
+    assert compile_program(pendulum.program, cache=cache, threads=1).report.cached
+    kernel = compile_program(pendulum.program, lanes=1, cache=cache, threads=1, seeded=["merit"])
+    assert "was not kept" in kernel.report.note
+    assert "Read-only file system" in kernel.report.note
+    kernel.forward([0.0] * 30, [1.0])
+
+
+def test_what_killed_processes_left_is_swept(tmp_path: Path) -> None:
+    built, own = tmp_path / "built", Cache(tmp_path / "cache")
+    built.write_bytes(b"1")
+    own.store("a", built)
+    old, new = own.folder / ".new-old", own.folder / ".new-new"
+    for path, age in ((old, 7200), (new, 0)):
+        path.write_bytes(b"half")
+        os.utime(path, (time.time() - age, time.time() - age))
+    own.store("b", built)
+    assert not old.exists()
+    assert new.exists()
+    own.clear()
+    assert list(own.folder.iterdir()) == []
+
+
+def test_a_user_without_a_home(monkeypatch: Patch) -> None:
+    def homeless() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    for name in ("SYMPHYS_CACHE", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("pathlib.Path.home", homeless)
+    with pytest.raises(KernelUnavailable, match="set SYMPHYS_CACHE to a folder"):
+        default_cache()
+
+
+def test_the_oldest_kernels_go_first(tmp_path: Path) -> None:
+    built = tmp_path / "built"
+    small = Cache(tmp_path / "cache", limit=250)
+    for i, key in enumerate(("a", "b", "c")):
+        built.write_bytes(bytes([i]) * 100)
+        stored = small.store(key, built)
+        os.utime(stored, (1000 + i, 1000 + i))
+        small.find("a")
+    assert small.find("b") is None
+    assert small.find("a") is not None
+    assert small.find("c") is not None
+    assert small.info().bytes == 200
+    assert small.clear() == 2
+    assert small.info().kernels == 0
+
+
+def test_where_the_cache_lies(monkeypatch: Patch) -> None:
+    monkeypatch.setenv("SYMPHYS_CACHE", "there")
+    assert default_cache().folder == Path("there")
+    monkeypatch.delenv("SYMPHYS_CACHE")
+    monkeypatch.setenv("XDG_CACHE_HOME", "base")
+    assert default_cache().folder == Path("base", "symphys", "kernels")
+
+
+@UNIX
+def test_two_processes_build_a_kernel_once(pendulum: Kernel, tmp_path: Path) -> None:
+    real = shlex.join(find_compiler().command)
+    script = f'echo "$@" >> {tmp_path}/log; exec {real} "$@"'
+    started = [building(tmp_path, fake(tmp_path, script)) for _ in range(2)]
+    said = sorted(process.communicate(timeout=60)[0].strip() for process in started)
+    assert said == ["False", "True"]
+    assert (tmp_path / "log").read_text("utf-8").count("-shared") == 1
+    assert len(list((tmp_path / "cache").glob("*.so"))) == 1
+    assert [p.name for p in (tmp_path / "cache").iterdir() if p.suffix != ".so"] == []

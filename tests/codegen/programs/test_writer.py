@@ -1,0 +1,104 @@
+"""Functions written in C give what casadi gives, to the bit, and their adjoints what casadi's reverse mode gives."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from operations import ARGUMENTS, PAIRS, SMOOTH, alone, build, every_operation, long_function
+
+from symphys.codegen import Cache, compile_program
+from symphys.codegen.graph.adjoint import adjoint_graph
+from symphys.codegen.graph.instructions import graph_of
+from symphys.codegen.graph.rewrite import taped
+
+step = st.tuples(st.integers(0, len(SMOOTH) + len(PAIRS) - 1), st.integers(0, 10**6), st.integers(0, 10**6))
+
+
+def compare(functions: list[Any], cache: Cache, z: Any, precision: Any = "double") -> None:
+    kernel = compile_program(alone(functions), cache=cache, threads=1, precision=precision)
+    seed = np.random.default_rng(3).normal(size=sum(p.size for p in kernel.program.outputs.values()))
+    outputs, gradient = kernel.gradient(z, seed)
+    symbol = ca.SX.sym("z", sum(ARGUMENTS))
+    values = ca.vertcat(*(v for f in functions for v in f.call([symbol[:3], symbol[3:]], True, False)))
+    wanted = ca.Function("wanted", [symbol], [values, ca.jtimes(values, symbol, ca.DM(seed), True)])
+    close = {"rtol": 1e-9, "atol": 1e-9} if precision == "double" else {"rtol": 1e-3, "atol": 1e-3}
+    for i, row in enumerate(z):
+        exact, slope = (value.full().ravel() for value in wanted(row))
+        mine = np.concatenate([block[i] for block in outputs.values()])
+        if precision == "double":
+            np.testing.assert_array_equal(mine, exact)
+        else:
+            np.testing.assert_allclose(mine, exact, **close)
+        np.testing.assert_allclose(gradient[i], slope, **close)
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(st.lists(step, min_size=1, max_size=25), min_size=4, max_size=4),
+    st.lists(st.lists(st.floats(-3, 3, width=16), min_size=5, max_size=5), min_size=3, max_size=3),
+)
+def test_random_functions(cache: Cache, steps: list[list[tuple[int, int, int]]], z: list[list[float]]) -> None:
+    compare([build(s) for s in steps], cache, np.array(z))
+
+
+def test_every_operation_alone(cache: Cache) -> None:
+    z = np.array([[-1.5, 0.3, 0.0, 1.0, 0.7], [0.7, -0.3, 2.0, 1.0, 0.7], [0.2, 0.0, -2.0, 0.5, -3.0]])
+    compare(every_operation(), cache, z)
+
+
+def test_every_operation_alone_in_single_precision(cache: Cache) -> None:
+    ops = range(len(SMOOTH) + len(PAIRS))
+    compare([build([(op, 0, 4)]) for op in ops], cache, np.array([[-1.3, 0.3, 0.1, 1.0, 0.7]]), "single")
+
+
+def test_a_long_function_is_cut(cache: Cache) -> None:
+    compare([long_function()], cache, np.array([[0.1, -0.2, 0.3, 0.4, -0.5]]))
+
+
+@pytest.mark.parametrize("pair", [(0, 1), (1, 0)])
+def test_nan_passes_fmin_and_fmax(cache: Cache, pair: tuple[int, int]) -> None:
+    x, y = ca.SX.sym("x", 3), ca.SX.sym("y", 2)
+    i, j = pair
+    extremes = [ca.fmin(x[i], 1), ca.fmin(1, x[i]), ca.fmax(x[i], 1), ca.fmin(x[i], x[j]), ca.fmax(x[i], x[j])]
+    kernel = compile_program(alone([ca.Function("extremes", [x, y], [ca.vertcat(*extremes)])]), cache=cache)
+    z = np.array([[np.nan, 0, 0, 0, 0], [0, np.nan, 0, 0, 0], [2, 3, 0, 0, 0]], dtype=float)
+    values = kernel.forward(z)["f0r0"]
+    assert np.isnan(values[:2, 3:]).all()
+    assert np.isnan(values[i, :3]).all()
+    np.testing.assert_array_equal(values[2], [1, 1, (2, 3)[i], 2, 3])
+
+
+def test_equal_values_are_computed_once() -> None:
+    x = ca.SX.sym("x")
+    doubled = graph_of(ca.Function("f", [x], [ca.sin(x) * ca.cos(x) + ca.cos(x) * ca.sin(x)]))
+    assert [node.op for node in doubled.nodes] == ["input", "sin", "cos", "mul", "add"]
+
+
+def test_divisions_by_powers_of_two_are_products_to_the_last_bit() -> None:
+    """Others are not: 1/3 is rounded, and 2^-1074 has no reciprocal."""
+    x = ca.SX.sym("x")
+    for divisor, op in ((4.0, "mul"), (-0.5, "mul"), (3.0, "div"), (2.0**-1074, "div")):
+        quotient = graph_of(ca.Function("f", [x], [x / divisor]))
+        assert quotient.nodes[quotient.results[0][0]].op == op, divisor
+
+
+def test_adjoints_find_what_the_call_has_computed() -> None:
+    """Of x y / (y + x) the sum and the quotient, though written the other way round; what is new is one reciprocal."""
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    function = ca.Function("f", [x, y], [x * y / (y + x)])
+    forward = graph_of(function)
+    pair = taped(forward, adjoint_graph(function, forward, (True, True), (True,)))
+    assert pair is not None
+    operations = [pair.forward.nodes[k].op for k in pair.forward.needed()]
+    assert (operations.count("add"), operations.count("div")) == (1, 2)
+
+
+def test_a_branch_becomes_one_select() -> None:
+    x = ca.SX.sym("x")
+    branch = graph_of(ca.Function("f", [x], [ca.if_else(x > 0, x, 2 * x)]))
+    assert [branch.nodes[i].op for i in branch.needed()] == ["const", "input", "lt", "add", "select"]

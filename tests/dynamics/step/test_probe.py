@@ -1,0 +1,46 @@
+"""What is asked of a state without a step: bodies alike share what they compute, as in a recorded step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from symphys.dynamics import prediction as paths
+from symphys.dynamics import step_function
+from symphys.dynamics.observation.queries import gap_function
+from symphys.model.shapes import Box, Plane
+from symphys.model.state_layout import initial_state
+from symphys.model.world import Body, Law, World, make_world
+
+
+def boxes(count: int) -> World:
+    """Cubes on the ground, 0.1 m, 0.2 m, ... above it, which meet nothing else."""
+    bodies = [Body(f"b{i}", 1.0, (0.1, 0.1, 0.1), (Box((0.5, 0.5, 0.5)),)) for i in range(count)]
+    world = make_world(bodies, [Plane.ground()], Law(0.5, 0.5))
+    return World(world.bodies, world.statics, tuple(pair for pair in world.pairs if pair.second.body is None))
+
+
+@pytest.mark.parametrize("make", [gap_function, step_function])
+def test_boxes_alike_are_built_once(make: Callable[[World], object], monkeypatch: pytest.MonkeyPatch) -> None:
+    built: list[int] = []
+    collide = paths.collide
+
+    def counted(*arguments: Any) -> Any:
+        built.append(1)
+        return collide(*arguments)
+
+    monkeypatch.setattr(paths, "collide", counted)
+    make(boxes(2))
+    of_two = len(built)
+    make(boxes(9))
+    assert len(built) == 2 * of_two
+
+
+def test_each_of_them_is_where_it_is() -> None:
+    world = boxes(3)
+    x = initial_state(world, {f"b{i}.position": (2.0 * i, 0.0, 0.6 + 0.1 * i) for i in range(3)})
+    gaps = np.asarray(gap_function(world)(x)).reshape(3, -1)
+    assert gaps.min(axis=1) == pytest.approx([0.1, 0.2, 0.3])

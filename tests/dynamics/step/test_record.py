@@ -1,0 +1,197 @@
+"""A step in pieces is the step as one expression; equal parts share their functions; sweeps are copied."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from symphys.dynamics import Piece, Recording, Slot, record_step, step_function
+from symphys.dynamics.tracing.dead_code import trimmed
+from symphys.dynamics.tracing.recording import Recorder
+from symphys.dynamics.tracing.trace import Pieces
+from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain
+from symphys.model.state_layout import Layout, initial_state
+from symphys.model.world import Body, Law, Scheme, World, make_world
+
+INPUTS = ("a.force",)
+
+
+def worlds() -> dict[str, World]:
+    balls = [Body.ball(name, 0.1, 1.0) for name in "abc"]
+    rod = Body("a", 2.0, (0.1, 0.1, 0.02), (Sphere(0.1, (0.2, 0, 0)), Sphere(0.1, (-0.2, 0, 0))))
+    floor, wall = Plane.ground(), Plane("wall", (-1.0, 0, 0), -0.5)
+    return {
+        "one ball": make_world(balls[:1], [floor], Law(0.5, 0.5)),
+        "cut steps": make_world(balls, [floor, wall], Law(0.5, 0.5, torsion=0.01, rolling=0.01)),
+        "compound": make_world([rod, balls[1]], [floor], Law(0.3, 0.2)),
+        "soft": make_world(balls, [floor], Law(0.5, 0.0, frequency=5.0)),
+    }
+
+
+def shapes() -> World:
+    """A box on a static box, a capsule on terrain and on the box."""
+    box = Body("a", 1.0, (0.02, 0.03, 0.04), (Box((0.2, 0.15, 0.1)),))
+    capsule = Body("b", 1.0, (0.02, 0.02, 0.01), (Capsule(0.1, 0.2, (0, 0.02, 0)),))
+    hills = Terrain("hills", lambda x, y: 0.1 * ca.sin(3 * x) * ca.cos(2 * y))
+    world = make_world([box, capsule], [hills, Fixture("slab", Box((1.0, 1.0, 0.2), (0.5, 0, -0.15)))], Law(0.5, 0.3))
+    kept = ("a-slab", "b-hills", "a-b")
+    return World(world.bodies, world.statics, tuple(p for p in world.pairs if p.name.split(":")[0] in kept))
+
+
+def evaluate(piece: Piece, values: dict[Slot, np.ndarray]) -> dict[Slot, np.ndarray]:
+    """What a piece gives."""
+    results = piece.function.call([ca.DM(values[slot]) for slot in piece.inputs])
+    return {slot: np.array(ca.DM(result)).ravel() for slot, result in zip(piece.outputs, results, strict=True)}
+
+
+def run(recording: Recording, layout: Layout, x: np.ndarray, u: np.ndarray, knob: float, p: Any = ()) -> np.ndarray:
+    """The next state, piece by piece."""
+    values: dict[Slot, np.ndarray] = {}
+    after = np.zeros(layout.size)
+    for piece in recording.pieces:
+        for slot in piece.inputs:
+            if slot.name in layout:
+                values[slot] = x[layout[slot.name]]
+            elif slot.name:
+                values[slot] = {"u": u, "p": np.array(p), "smoothing": np.array([knob])}[slot.name]
+        values |= evaluate(piece, values)
+        for slot in recording.results.keys() & set(piece.outputs):
+            after[recording.results[slot]] = values[slot]
+    return after
+
+
+@pytest.mark.parametrize("name", worlds())
+@pytest.mark.parametrize("scheme", [Scheme(sweeps=5), Scheme(sweeps=2, warm_start=False), Scheme(sweeps=1)])
+def test_pieces_give_the_whole_step(name: str, scheme: Scheme) -> None:
+    compare(worlds()[name], scheme)
+
+
+def test_pieces_give_the_whole_step_of_other_shapes() -> None:
+    compare(shapes(), Scheme(sweeps=2, cuts=0))
+
+
+def compare(world: World, scheme: Scheme) -> None:
+    """Twelve steps, pushed about, with and without smoothing."""
+    layout = Layout(world)
+    whole, pieces = step_function(world, scheme, INPUTS), record_step(world, scheme, INPUTS)
+    rng = np.random.default_rng(1)
+    x = np.array(initial_state(world, {f"{b.name}.position": [0.25 * i, 0, 0.1] for i, b in enumerate(world.bodies)}))
+    x = x.ravel()
+    for k in range(12):
+        u = rng.normal(0, 5, 3)
+        expected = np.array(whole(x, u, [], 1e-3 * (k % 2))).ravel()
+        got = run(pieces, layout, x, u, 1e-3 * (k % 2))
+        assert got == pytest.approx(expected, rel=1e-9, abs=1e-9), k
+        x = expected
+        x[layout["a.velocity"]] += rng.normal(0, 0.5, 3)
+
+
+def test_equal_parts_share_their_functions() -> None:
+    """Twenty balls that roll on the ground need no more functions than two, nor do many sweeps."""
+
+    def distinct(count: int, sweeps: int) -> int:
+        balls = [Body.ball(f"ball{i}", 0.1, 1.0) for i in range(count)]
+        ground = make_world(balls, [Plane.ground()], Law(0.5, 0.5))
+        apart = World(ground.bodies, ground.statics, tuple(p for p in ground.pairs if p.second.body is None))
+        return len({piece.function.__hash__() for piece in record_step(apart, Scheme(sweeps=sweeps)).pieces})
+
+    assert distinct(20, 10) == distinct(2, 10) == distinct(2, 40)
+
+
+def test_equal_parts_share_a_function_and_numbers_in_passing_are_no_part_of_it() -> None:
+    recorder = Recorder()
+    x, y = ca.SX.sym("x", 2), ca.SX.sym("y", 2)
+    recorder.argument("x", x)
+    recorder.argument("y", y)
+
+    def part(tree: dict[str, ca.SX]) -> tuple[ca.SX, ca.SX, ca.SX]:
+        return tree["a"] ** 2, tree["b"], ca.SX(3)
+
+    square, passed, constant = recorder.do(part, {"a": x[0], "b": x[1]})
+    again, *_ = recorder.do(part, {"a": y[0], "b": y[1]})
+    first, second = recorder.pieces
+    assert first.function is second.function
+    assert (first.outputs[0].size, first.inputs[0].name, second.inputs[0].name) == (1, "x", "y")
+    assert recorder.value(passed).element_hash() == x[1].element_hash()
+    assert float(recorder.value(constant)) == 3
+    assert recorder.value(square).element_hash() != recorder.value(again).element_hash()
+
+
+def test_members_of_a_tuple_look_alike_to_what_comes_next() -> None:
+    recorder, x = Recorder(), ca.SX.sym("x", 4)
+    recorder.argument("x", x)
+    pairs = recorder.do(lambda x: ((2 * x[0], 3 * x[1]), (4 * x[2], 5 * x[3])), x)
+    for pair in pairs:
+        recorder.do(added, *pair)
+    _, first, second = recorder.pieces
+    assert first.function is second.function
+    assert first.inputs[0] != second.inputs[0]
+
+
+def added(a: ca.SX, b: ca.SX) -> ca.SX:
+    return a + b
+
+
+def test_what_is_asked_for_twice_is_computed_once() -> None:
+    recorder, x = Recorder(), ca.SX.sym("x", 2)
+    recorder.argument("x", x)
+    first, second, other = (recorder.do(added, *pair) for pair in ((x[0], x[1]), (x[0], x[1]), (x[0], 2.0)))
+    assert first == second != other
+    assert len(recorder.pieces) == 2
+
+
+def test_what_nobody_reads_is_left_out() -> None:
+    """Of a record of four words one is read, by way of a part of which one result is read; another part not at all."""
+    recorder, x = Recorder(), ca.SX.sym("x", 4)
+    recorder.argument("x", x)
+    squares = recorder.do(lambda x: x * x, x)
+    recorder.do(lambda squares: ca.sin(squares), squares)
+    root, _ = recorder.do(lambda squares: (ca.sqrt(squares[2]), ca.exp(squares[1])), squares)
+    recorder.give("next", [root])
+    left = trimmed(recorder.pieces)
+    assert [(piece.function.nnz_in(), piece.function.nnz_out()) for piece in left] == [(4, 1), (1, 1), (1, 1)]
+    values = {left[0].inputs[0]: np.array([1.0, 2.0, 3.0, 4.0])}
+    for piece in left:
+        values |= evaluate(piece, values)
+    assert values[left[-1].outputs[0]] == pytest.approx([3.0])
+
+
+def turn(pieces: Pieces, factor: float, state: ca.SX) -> ca.SX:
+    return pieces.do(turned, factor, state)
+
+
+def turned(factor: float, state: ca.SX) -> ca.SX:
+    return ca.vertcat(state[1] + 1, factor * state[0])
+
+
+def test_sweeps_that_change_places_are_right() -> None:
+    """Each number moves to another place every time."""
+    recorder, x = Recorder(), ca.SX.sym("x", 2)
+    recorder.argument("x", x)
+    recorder.give("next", [recorder.repeat(6, turn, 2.0, x)])
+    values = np.array([1.0, 2.0])
+    memory = {slot: values for piece in recorder.pieces for slot in piece.inputs if slot.name == "x"}
+    for piece in recorder.pieces:
+        memory |= evaluate(piece, memory)
+    expected = values
+    for _ in range(6):
+        expected = np.array([expected[1] + 1, 2 * expected[0]])
+    assert memory[recorder.pieces[-1].outputs[0]] == pytest.approx(expected)
+
+
+def test_parameters_in_expressions_have_a_piece() -> None:
+    """A mass that follows from a radius is computed, once a step."""
+    radius = ca.SX.sym("radius")
+    world = make_world([Body.ball("ball", radius, 1000 * radius**3)], [Plane.ground()])
+    recording = record_step(world, parameters=[radius])
+    assert run(recording, Layout(world), *start(world), 0.0, np.array([0.1])) == pytest.approx(
+        np.array(step_function(world, parameters=[radius])(start(world)[0], [], 0.1, 0)).ravel()
+    )
+
+
+def start(world: World) -> tuple[np.ndarray, np.ndarray]:
+    """(x, u) at the start, above the ground."""
+    return np.array(initial_state(world, {"ball.position": [0, 0, 0.1]})).ravel(), np.zeros(0)

@@ -1,0 +1,110 @@
+"""The examination of a solution: right gradients pass, wrong ones do not, coarse answers are told apart from fine."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from symphys.problem import load_problem
+from symphys.problems import find
+from symphys.shooting import Block
+from symphys.transcription import transcribe
+from symphys.verification import examine
+from symphys.verification.gradient import _compare_block, compare_gradient
+from symphys.verification.refinement import order
+
+THROW = np.array([3.0, 0.1, 3.0, 0.0, -9.0, 0.5])
+
+
+@pytest.fixture(scope="module")
+def throw():
+    return transcribe(load_problem(find("ball_throw")), backend="casadi")
+
+
+def test_right_gradients_pass(throw):
+    for row in compare_gradient(throw, THROW):
+        assert row["error"] < 1e-6
+        assert row["scale"] > 0
+
+
+def test_wrong_gradients_are_rejected(throw):
+    """The derivative of another problem (weaker gravity) does not pass as this one's."""
+    other = transcribe(load_problem(find("ball_throw"), {"world.gravity": [0, 0, -8]}))
+    wrong = other.probe.gradient(THROW)
+    errors = [_compare_block(throw.probe.values, block, THROW, wrong)["error"] for block in throw.shooting.blocks]
+    assert max(errors) > 1e-2
+
+
+def test_a_jump_is_told_from_a_wrong_gradient():
+    """The kick of the guess meets the crate after 0.05 s, the very end of a step: either side agrees."""
+    knock = transcribe(load_problem(find("knock")), backend="casadi")
+    kick, side = compare_gradient(knock, np.array([5.0, 0.0, -0.05]))
+    assert kick["error"] < 1e-4
+    assert 0 < kick["jump"] < 1e-4
+    assert (side["error"], side["jump"]) == (pytest.approx(0, abs=1e-6), 0)
+
+
+@pytest.mark.parametrize(("slope", "passes"), [(2.0, True), (1.0, False)])
+def test_a_kink_is_no_jump(slope, passes):
+    """The slope of one side of a kink is not that of both; a jump leaves both as they are."""
+    z = ca.SX.sym("z")
+    values = {True: 2 * z + 1e-6 * (z > 0), False: ca.fabs(z)}
+    value, one = ca.Function("f", [z], [values[passes]]), np.ones(1)
+    block = Block("v", 0, (1, 1), 0 * one, -one, one, one, one)
+    row = _compare_block(lambda Z: np.array(value(Z.T)).ravel(), block, np.zeros(1), np.array([slope]))
+    assert (row["error"] < 1e-6) == passes
+    assert (row["jump"] == pytest.approx(1e-6 / 2, rel=1e-3)) == passes
+
+
+def test_examination_reports_refinements_and_contacts(throw):
+    found = examine(throw, THROW)
+    assert [row["what"] for row in found["refined"]] == ["dt / 2", "dt / 4", "sweeps x 2"]
+    assert found["refined"][0]["objective"] == pytest.approx(throw.judge(THROW).objective, rel=1e-2)
+    assert found["residual"] < 1e-9
+    assert found["deepest"] < 1e-9
+    assert found["multiple_impacts"] == 0
+    assert found["fault"] == ""
+
+
+def test_refined_answers_are_those_of_the_refined_problem():
+    """The same numbers as a file with half the step, or twice the sweeps; on a shot that depends on both."""
+    settings = {"simulation.dt": 0.02, "simulation.duration": 3}
+    shot = transcribe(load_problem(find("bank_shot"), settings))
+    z = shot.shooting.start(1)
+    finer = {"simulation.dt": 0.01}, {"simulation.sweeps": 2 * shot.problem.simulation.sweeps}
+    halved, doubled = (transcribe(load_problem(find("bank_shot"), settings | more)).judge(z) for more in finer)
+    found = examine(shot, z)["refined"]
+    assert [row["objective"] for row in found[::2]] == [halved.objective, doubled.objective]
+    assert [row["worst"] for row in found[::2]] == [halved.worst, doubled.worst]
+    assert halved.objective != pytest.approx(shot.judge(z).objective, rel=1e-6)
+
+
+def test_changes_of_the_gradient_are_those_of_the_refined_problem():
+    """Against the probe of a file with half the step, in the variables' scales."""
+    settings = {"simulation.dt": 0.02, "simulation.duration": 3}
+    shot, finer = (transcribe(load_problem(find("bank_shot"), settings | more), backend="casadi")
+                   for more in ({}, {"simulation.dt": 0.01}))  # fmt: skip
+    z = shot.shooting.start(1)
+    before, after = (np.array(each.probe.gradient(z)).ravel() for each in (shot, finer))
+    found = examine(shot, z)["refined"][0]["gradient"]
+    spin = slice(2, 4)
+    expected = np.linalg.norm((after - before)[spin]) / np.linalg.norm(before[spin])
+    assert found["spin"] == pytest.approx(expected, rel=1e-9)
+    assert expected > 1e-3
+
+
+def test_order_of_convergence():
+    assert order([1 + 0.1**2, 1 + 0.05**2, 1 + 0.025**2]) == pytest.approx(2)
+    assert order([[1.1, 2], [1.05, 2], [1.025, 2]]) == pytest.approx(1)
+    assert order([1.0, 1.0, 1.0]) is None
+    assert order([np.nan, 1.0, 1.0]) is None
+
+
+def test_smoothed_answers_are_those_of_the_smoothed_rollout(throw):
+    rows = examine(throw, THROW)["smoothed"]
+    assert [row["smoothing"] for row in rows] == [1e-3, 1e-2, 1e-1]
+    assert rows[2]["objective"] == float(throw.functions.value(THROW, 0.1)[1])
+    assert rows[2]["objective"] != pytest.approx(throw.judge(THROW).objective, rel=1e-6)
+    own = transcribe(load_problem(find("ball_throw"), {"simulation.smoothing": 0.02}), backend="casadi")
+    assert [(row["smoothing"], row["own"]) for row in examine(own, THROW)["smoothed"]] == [(0.02, True)]
