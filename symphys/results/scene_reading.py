@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from symphys.findings import values
-from symphys.report.figures.drawable import LARGEST, small
 from symphys.results import text_files as tables
+from symphys.results.drawable import LARGEST, small
 from symphys.results.joint_records import make_joints
 from symphys.results.records import Array
 from symphys.results.scene_records import UPRIGHT, Scene, SceneBody, SceneFixture, ScenePlane, SceneTerrain, Solid

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from symphys.findings import values
-from symphys.report.figures.drawable import largest, oversized
+from symphys.results.drawable import largest, oversized
 from symphys.results.records import Array, ReportError, Trajectory
 
 TRAJECTORY = "trajectory.npz"

@@ -50,7 +50,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "solvers": ("errors shooting", "casadi cma numpy scipy", "optimisation methods"),
     "findings": ("", "numpy", "what the numbers of an examination mean"),
     "results": (
-        "errors files findings model problem report shooting trajectory",
+        "errors files findings model problem shooting trajectory",
         "casadi numpy",
         "what a run folder holds",
     ),

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from symphys.report import write_batch_report, write_run_report
-from symphys.report.figures.drawable import LARGEST, OVERSIZED, drawable, oversized
+from symphys.results.drawable import LARGEST, OVERSIZED, drawable, oversized
 from symphys.results.reading import read_run
 
 HUGE = [1e155, 1e299, 1e307]

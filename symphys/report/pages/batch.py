@@ -10,7 +10,6 @@ from symphys.findings import writing
 from symphys.findings.verdict import ACCEPTED
 from symphys.report.figures import style
 from symphys.report.figures.convergence import draw_convergence
-from symphys.report.figures.drawable import OVERSIZED, drawable, oversized
 from symphys.report.figures.output import slug, write_figures
 from symphys.report.figures.style import Picture
 from symphys.report.pages import comparison
@@ -20,6 +19,7 @@ from symphys.report.robots.strip import draw_strip
 from symphys.report.scene.animation import NUMBERS, animation
 from symphys.report.scene.motion import draw_motion
 from symphys.results.discovery import Study, read_all, studies
+from symphys.results.drawable import OVERSIZED, drawable, oversized
 from symphys.results.records import ReportError, Run, Trajectory
 from symphys.results.scene_reading import SCENE, read_scene
 from symphys.results.scene_records import Scene

@@ -10,7 +10,6 @@ from symphys import files
 from symphys.findings import writing
 from symphys.report.figures import style
 from symphys.report.figures.contacts import by_surfaces, draw_contacts, shown_pairs
-from symphys.report.figures.drawable import OVERSIZED, drawable, oversized
 from symphys.report.figures.history import draw_run
 from symphys.report.figures.output import write_figures
 from symphys.report.figures.states import MOST_BODIES, controlled_bodies, draw_controls, draw_states, shown_bodies
@@ -25,6 +24,7 @@ from symphys.report.pages.verification import trusted
 from symphys.report.scene.motion import draw_motion
 from symphys.results import text_files as tables
 from symphys.results.discovery import is_run
+from symphys.results.drawable import OVERSIZED, drawable, oversized
 from symphys.results.reading import CONFIG, PROBLEM, read_run
 from symphys.results.records import ReportError, Run, Trajectory
 from symphys.results.scene_reading import SCENE, read_scene
