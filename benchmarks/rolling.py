@@ -10,9 +10,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.codegen import Call, Kernel, Layout, Place, Program, compile_program
+from symphys.codegen import FunctionCall, Kernel, MemoryLayout, Place, Program, compile_program
 from symphys.dynamics import record_step
-from symphys.model.state_layout import Layout as Columns
+from symphys.model.state_layout import MemoryLayout as Columns
 from symphys.model.world import Scheme, World
 
 Array = NDArray[np.float64]
@@ -63,7 +63,7 @@ class Rolling:
         return self.kernel.jacobian(z, "end", [0.0])
 
     def _program(self) -> Program:
-        layout, columns = Layout(), self.columns
+        layout, columns = MemoryLayout(), self.columns
         z, knob = layout.take(self.size), layout.take(1)
         x = layout.series(columns.size, self.steps + 1)
         body = step_calls(self.world, self.scheme, layout, x, knob)
@@ -78,13 +78,13 @@ class Rolling:
             knob=knob,
             steps=self.steps,
             outputs={"end": end},
-            prologue=(Call(first, (z,), (x.still(),)),),
+            prologue=(FunctionCall(first, (z,), (x.still(),)),),
             body=tuple(body),
-            epilogue=(Call(last, (x.later(self.steps).still(),), (end,)),),
+            epilogue=(FunctionCall(last, (x.later(self.steps).still(),), (end,)),),
         )
 
 
-def step_calls(world: World, scheme: Scheme, layout: Layout, x: Place, knob: Place) -> list[Call]:
+def step_calls(world: World, scheme: Scheme, layout: MemoryLayout, x: Place, knob: Place) -> list[FunctionCall]:
     """The calls of one exact time step, from the states ``x`` to the next ones."""
     columns, recording = Columns(world), record_step(world, scheme, exact=True)
     after, empty = x.later(), Place(0, 0)
@@ -100,7 +100,7 @@ def step_calls(world: World, scheme: Scheme, layout: Layout, x: Place, knob: Pla
         for slot in piece.outputs:
             places.setdefault(slot, layout.take(slot.size))
         inputs, outputs = (tuple(places[slot] for slot in slots) for slots in (piece.inputs, piece.outputs))
-        calls.append(Call(piece.function, inputs, outputs))
+        calls.append(FunctionCall(piece.function, inputs, outputs))
     return calls
 
 

@@ -15,10 +15,10 @@ import numpy as np
 
 from symphys.codegen import (
     Cache,
-    Call,
+    FunctionCall,
     Kernel,
     KernelUnavailable,
-    Layout,
+    MemoryLayout,
     ProcessorKernel,
     Program,
     compile_program,
@@ -170,9 +170,9 @@ def pendulum() -> Program:
     x = ca.SX.sym("x", 2)
     move = ca.Function("move", [x], [ca.vertcat(x[0] + DT * x[1], x[1] - DT * (9.81 * ca.sin(x[0]) + 0.1 * x[1]))])
     cost = ca.Function("cost", [x], [ca.sumsqr(x) + ca.fmax(x[1], 0)])
-    at = Layout()
+    at = MemoryLayout()
     state, total = at.series(2, STEPS + 1), at.take(1)
-    body = (Call(move, (state,), (state.later(),)), Call(cost, (state,), (total,), accumulate=True))
+    body = (FunctionCall(move, (state,), (state.later(),)), FunctionCall(cost, (state,), (total,), accumulate=True))
     return Program(at.size, state.still(), at.take(0), STEPS, {"cost": total}, body=body, zeroed=(total,))
 
 

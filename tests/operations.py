@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from symphys.codegen import Call, Layout, Program
+from symphys.codegen import FunctionCall, MemoryLayout, Program
 
 ARGUMENTS = (3, 2)
 SMOOTH = [
@@ -40,9 +40,9 @@ def build(steps: list[tuple[int, int, int]]) -> Any:
 
 def alone(functions: list[Any]) -> Program:
     """Each function once, on z."""
-    at = Layout()
+    at = MemoryLayout()
     x, y = (at.take(size) for size in ARGUMENTS)
-    calls = [Call(f, (x, y), tuple(at.take(f.numel_out(i)) for i in range(f.n_out()))) for f in functions]
+    calls = [FunctionCall(f, (x, y), tuple(at.take(f.numel_out(i)) for i in range(f.n_out()))) for f in functions]
     results = {f"f{i}r{j}": place for i, call in enumerate(calls) for j, place in enumerate(call.outputs)}
     z = type(x)(x.offset, sum(ARGUMENTS))
     return Program(at.size, z, type(x)(0, 0), 0, results, prologue=tuple(calls))

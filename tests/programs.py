@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from symphys.codegen import Call, Layout, Place, Program
+from symphys.codegen import FunctionCall, MemoryLayout, Place, Program
 
 STEPS, BODIES, SWEEPS, KNOTS = 30, 4, 3, 5
 PENDULUM_STATE = Place(STEPS + 5, 2, 2)
@@ -20,7 +20,7 @@ def pendulum() -> Program:
     cost = ca.Function("cost", [x, u], [ca.fmax(x[0] ** 2 - 0.1, 0) + 0.01 * u**2])
     end = ca.Function("end", [x, a], [a + 10 * ca.sumsqr(x), x - ca.vertcat(1, 0)])
     start = ca.Function("start", [], [ca.SX([1.0, 0.0])])
-    at = Layout()
+    at = MemoryLayout()
     torque, knob, total, merit, residuals = at.series(1, STEPS), at.take(1), at.take(1), at.take(1), at.take(2)
     state = at.series(2, STEPS + 1)
     assert state == PENDULUM_STATE
@@ -30,12 +30,12 @@ def pendulum() -> Program:
         knob=knob,
         steps=STEPS,
         zeroed=(total,),
-        prologue=(Call(start, (), (state.still(),)),),
+        prologue=(FunctionCall(start, (), (state.still(),)),),
         body=(
-            Call(move, (state, torque, knob), (state.later(),)),
-            Call(cost, (state, torque), (total,), accumulate=True),
+            FunctionCall(move, (state, torque, knob), (state.later(),)),
+            FunctionCall(cost, (state, torque), (total,), accumulate=True),
         ),
-        epilogue=(Call(end, (state.later(STEPS), total), (merit, residuals)),),
+        epilogue=(FunctionCall(end, (state.later(STEPS), total), (merit, residuals)),),
         outputs={"merit": merit, "residuals": residuals},
     )
 
@@ -43,21 +43,21 @@ def pendulum() -> Program:
 def chain() -> Program:
     """Masses on a line that push their neighbours away, in sweeps; z are the knots of a force on all of them."""
     f = _chain_functions()
-    at = Layout()
+    at = MemoryLayout()
     z, nothing, merit, errors, work = (at.take(n) for n in (KNOTS, 1, 1, 3, 1))
     force, states = at.series(1, STEPS), [at.series(2, STEPS + 1) for _ in range(BODIES)]
     speeds, pushes, effort = [at.take(1) for _ in states], [nothing] * (BODIES - 1), at.take(1)
-    body = [Call(f["free"], (x, force), (v,)) for x, v in zip(states, speeds, strict=True)]
-    body.append(Call(f["same"], (speeds[0],), (effort,)))
+    body = [FunctionCall(f["free"], (x, force), (v,)) for x, v in zip(states, speeds, strict=True)]
+    body.append(FunctionCall(f["same"], (speeds[0],), (effort,)))
     for _ in range(SWEEPS):
         for i in range(BODIES - 1):
             new = at.take(1), at.take(1), at.take(1)
-            body.append(Call(f["visit"], (*states[i : i + 2], *speeds[i : i + 2], pushes[i]), new))
+            body.append(FunctionCall(f["visit"], (*states[i : i + 2], *speeds[i : i + 2], pushes[i]), new))
             speeds[i], speeds[i + 1], pushes[i] = new
-            body.append(Call(f["same"], (pushes[i],), (effort,), accumulate=True))
-    body += [Call(f["move"], (x, v), (x.later(),)) for x, v in zip(states, speeds, strict=True)]
-    body += [Call(f["cost"], (x.later(), force), (merit,), accumulate=True) for x in states]
-    body.append(Call(f["square"], (effort, effort), (work,), accumulate=True))
+            body.append(FunctionCall(f["same"], (pushes[i],), (effort,), accumulate=True))
+    body += [FunctionCall(f["move"], (x, v), (x.later(),)) for x, v in zip(states, speeds, strict=True)]
+    body += [FunctionCall(f["cost"], (x.later(), force), (merit,), accumulate=True) for x in states]
+    body.append(FunctionCall(f["square"], (effort, effort), (work,), accumulate=True))
     return Program(
         size=at.size,
         z=z,
@@ -66,11 +66,11 @@ def chain() -> Program:
         zeroed=(nothing, work),
         constants=tuple((x.still(), (0.8 * i, 0.1 * i)) for i, x in enumerate(states)),
         prologue=(
-            Call(f["zero"], (), (merit,)),
-            Call(f["forces"], (z,), (Place(force.offset, STEPS),)),
+            FunctionCall(f["zero"], (), (merit,)),
+            FunctionCall(f["forces"], (z,), (Place(force.offset, STEPS),)),
         ),
         body=tuple(body),
-        epilogue=(Call(f["end"], (states[0].later(STEPS), states[-1].later(STEPS)), (errors,)),),
+        epilogue=(FunctionCall(f["end"], (states[0].later(STEPS), states[-1].later(STEPS)), (errors,)),),
         outputs={"merit": merit, "errors": errors, "work": work},
     )
 

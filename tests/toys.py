@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from symphys.codegen import Call, KernelUnavailable, Layout, Program
-from symphys.codegen.backends import Source, choose
+from symphys.codegen import FunctionCall, KernelUnavailable, MemoryLayout, Program
+from symphys.codegen.backends import BackendSource, choose
 from symphys.codegen.toolchain.compiler import find_compiler
 from symphys.shooting import Block, Evaluator, ShootingProblem, Values
 from symphys.solvers import SOLVERS, Outcome, TraceRow, solver
@@ -73,7 +73,7 @@ def toy(
         nlp=ca.Function("nlp", [z, s], [f, c]),
     )
     named = {"merit": merit, "objective": f, "errors": e, "constraints": c, "residuals": rows, "outputs": o}
-    chosen = choose(backend, Source(functions, lambda: program(z, s, named)))
+    chosen = choose(backend, BackendSource(functions, lambda: program(z, s, named)))
     zeros = np.zeros(c.numel())
     return ShootingProblem(
         name="toy",
@@ -101,11 +101,11 @@ def require(backend: str) -> None:
 def program(z: Any, s: Any, named: dict[str, Any]) -> Program:
     """The toy as one call."""
     parts = {name: ca.densify(part) for name, part in named.items() if part is not None and part.numel()}
-    layout = Layout()
+    layout = MemoryLayout()
     inputs = (layout.take(z.numel()), layout.take(1))
     outputs = {name: layout.take(part.numel()) for name, part in parts.items()}
     function = ca.Function("toy", [z, s], list(parts.values())).expand()
-    call = Call(function, inputs, tuple(outputs.values()))
+    call = FunctionCall(function, inputs, tuple(outputs.values()))
     return Program(layout.size, *inputs, steps=0, outputs=outputs, epilogue=(call,))
 
 

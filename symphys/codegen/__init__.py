@@ -1,34 +1,34 @@
 """Rollouts as programs of calls, compiled to C that computes a block of lanes at once, with their gradients."""
 
-from symphys.codegen.emit.source import Source
+from symphys.codegen.emit.source import SourceFile
 from symphys.codegen.errors import KernelUnavailable, ProgramError
 from symphys.codegen.program.interpret import interpret
-from symphys.codegen.program.layout import Layout
+from symphys.codegen.program.layout import MemoryLayout
 from symphys.codegen.program.nan_location import Bad
-from symphys.codegen.program.program import Call, Fading, Place, Program
+from symphys.codegen.program.program import Fading, FunctionCall, Place, Program
 from symphys.codegen.runtime.fixed_addresses import Fixed
 from symphys.codegen.runtime.kernel import Kernel, ProcessorKernel
 from symphys.codegen.toolchain.build import compile_program, shared_library
 from symphys.codegen.toolchain.cache import Cache, CacheInfo, default_cache
 from symphys.codegen.toolchain.compiler import processors
-from symphys.codegen.toolchain.report import Report
+from symphys.codegen.toolchain.report import BuildReport
 
 __all__ = [
     "Bad",
+    "BuildReport",
     "Cache",
     "CacheInfo",
-    "Call",
     "Fading",
     "Fixed",
+    "FunctionCall",
     "Kernel",
     "KernelUnavailable",
-    "Layout",
+    "MemoryLayout",
     "Place",
     "ProcessorKernel",
     "Program",
     "ProgramError",
-    "Report",
-    "Source",
+    "SourceFile",
     "compile_program",
     "default_cache",
     "interpret",

@@ -12,7 +12,7 @@ from string import Template
 import casadi as ca
 import numpy as np
 
-from symphys.codegen import Layout, Program
+from symphys.codegen import MemoryLayout, Program
 from symphys.codegen.emit.plain import plain_source, table
 from symphys.export import words
 from symphys.transcription import Transcription, rollout_program
@@ -97,7 +97,7 @@ def _data(transcription: Transcription, program: Program) -> dict[str, object]:
 
 
 def _places(step: ca.Function) -> str:
-    layout = Layout()
+    layout = MemoryLayout()
     return table([layout.take(step.numel_in(i)) for i in range(4)] + [layout.take(step.numel_out(0))])
 
 

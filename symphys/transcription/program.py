@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from symphys.codegen import Call, Fading, Layout, Place, Program
+from symphys.codegen import Fading, FunctionCall, MemoryLayout, Place, Program
 from symphys.dynamics import Slot, record_step
 from symphys.expression import Formula
 from symphys.model.state_layout import Layout as Columns
@@ -31,14 +31,14 @@ class Samples:
     def __init__(self, rollout: Rollout) -> None:
         """Places for z, knob, times, parameters, inputs and states."""
         self.rollout, self.problem, self.steps, self.dt = rollout, rollout.problem, rollout.steps, rollout.dt
-        self.layout = Layout()
+        self.layout = MemoryLayout()
         nx, nu, np_ = (int(part.shape[0]) for part in (rollout.x0, rollout.given, rollout.p))
         self.z, self.knob = self.layout.take(int(rollout.z.shape[0])), self.layout.take(1)
         self.p, self.given = self.layout.take(np_), self.layout.series(nu, self.steps)
         self.u = self.given if rollout.feedback is None else self.layout.series(nu, self.steps)
         self.x = self.layout.series(nx, self.steps + 1)
         self.time = self.layout.series(1, self.steps + 1)
-        self.calls: list[Call] = []
+        self.calls: list[FunctionCall] = []
         self.symbols: dict[Place, Expr] = {}
 
     def symbol(self, place: Place) -> Expr:
@@ -68,7 +68,7 @@ class Samples:
         size = int(function.size1_out(0))
         out = self.layout.series(size, self.steps)
         places = (self.x.later(shift), self.u, self.p, self.time.later(shift), self.z)
-        self.calls.append(Call(dense(function), places, (out,)))
+        self.calls.append(FunctionCall(dense(function), places, (out,)))
         whole = self.symbol(Place(out.offset, size * self.steps))
         return ca.reshape(whole, size, self.steps)
 
@@ -107,7 +107,7 @@ def rollout_program(rollout: Rollout, exact: bool = False) -> Program:
     )
 
 
-def step_calls(samples: Places, exact: bool) -> list[Call]:
+def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:
     """The calls of one time step, from ``x`` and ``u`` to the ``x`` after."""
     rollout = samples.rollout
     columns = Columns(rollout.world)
@@ -127,11 +127,11 @@ def step_calls(samples: Places, exact: bool) -> list[Call]:
         for slot in piece.outputs:
             places.setdefault(slot, samples.layout.take(slot.size))
         inputs, outputs = (tuple(places[slot] for slot in slots) for slots in (piece.inputs, piece.outputs))
-        calls.append(Call(piece.function, inputs, outputs))
+        calls.append(FunctionCall(piece.function, inputs, outputs))
     if after.size > columns.size:
         calls.append(_remember(samples, _part(after, slice(columns.size, None))))
     if rollout.freeze is not None:
-        calls.append(Call(rollout.freeze, (samples.x, after, samples.p), (samples.x.later(),)))
+        calls.append(FunctionCall(rollout.freeze, (samples.x, after, samples.p), (samples.x.later(),)))
     return calls
 
 
@@ -141,12 +141,12 @@ def _alive(samples: Samples) -> Place | None:
     return _part(samples.x, memory.columns[ALIVE]) if memory.falls else None
 
 
-def _remember(samples: Places, result: Place) -> Call:
+def _remember(samples: Places, result: Place) -> FunctionCall:
     """What the next step's sensors need to know of this one."""
     memory, inputs = samples.rollout.memory, samples.rollout.inputs
     x, u = ca.SX.sym("x", samples.x.size), ca.SX.sym("u", samples.u.size)
     function = ca.Function("remember", [x, u], [ca.densify(memory.after(x, u, inputs))])
-    return Call(function, (samples.x, samples.u), (result,))
+    return FunctionCall(function, (samples.x, samples.u), (result,))
 
 
 def _part(place: Place, columns: slice) -> Place:
@@ -155,16 +155,16 @@ def _part(place: Place, columns: slice) -> Place:
     return Place(place.offset + start, stop - start, place.stride)
 
 
-def _prologue(samples: Samples) -> Call:
+def _prologue(samples: Samples) -> FunctionCall:
     rollout = samples.rollout
     start = start_of(samples.problem, rollout.world, rollout.inputs, rollout.parameters, rollout.z)
     results = [ca.densify(ca.vec(part)) for part in (rollout.memory.start(start.x0), start.u, start.p)]
     function = ca.Function("start", [rollout.z], results).expand()
     u = Place(samples.given.offset, samples.given.size * samples.steps)
-    return Call(function, (samples.z,), (samples.x.still(), u, samples.p))
+    return FunctionCall(function, (samples.z,), (samples.x.still(), u, samples.p))
 
 
-def _epilogue(samples: Samples, asked: Terms) -> tuple[Call, dict[str, Place]]:
+def _epilogue(samples: Samples, asked: Terms) -> tuple[FunctionCall, dict[str, Place]]:
     parts = {
         "merit": asked.objective + asked.penalties,
         "objective": asked.objective,
@@ -179,4 +179,4 @@ def _epilogue(samples: Samples, asked: Terms) -> tuple[Call, dict[str, Place]]:
     parts = {name: ca.densify(part) for name, part in parts.items() if part.shape[0]}
     function = ca.Function("aims", list(samples.symbols.values()), list(parts.values())).expand()
     outputs = {name: samples.layout.take(int(part.shape[0])) for name, part in parts.items()}
-    return Call(function, tuple(samples.symbols), tuple(outputs.values())), outputs
+    return FunctionCall(function, tuple(samples.symbols), tuple(outputs.values())), outputs

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from time import perf_counter
 
-from symphys.codegen.backends import BEST, Source, choose
+from symphys.codegen.backends import BEST, BackendSource, choose
 from symphys.problem import Problem
 from symphys.shooting import ShootingProblem
 from symphys.transcription.decision_variables import blocks
@@ -38,7 +38,7 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
     asked = terms(rollout)
     functions = ExpressionFunctions(rollout, asked)
     built = perf_counter() - began
-    chosen = choose(backend, Source(functions, lambda: rollout_program(rollout, exact), exact), threads)
+    chosen = choose(backend, BackendSource(functions, lambda: rollout_program(rollout, exact), exact), threads)
     shooting = ShootingProblem(
         name=problem.name,
         blocks=blocks(problem),

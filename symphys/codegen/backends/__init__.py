@@ -4,7 +4,7 @@
 """
 
 from symphys.codegen.backends.choose import BACKENDS, NAMES, choose
-from symphys.codegen.backends.interface import Backend, Description, Functions, Source
+from symphys.codegen.backends.interface import Backend, BackendSource, Description, ProblemFunctions
 from symphys.codegen.backends.kernels import BEST, PRECISIONS, build_kernel, described
 
 __all__ = [
@@ -13,9 +13,9 @@ __all__ = [
     "NAMES",
     "PRECISIONS",
     "Backend",
+    "BackendSource",
     "Description",
-    "Functions",
-    "Source",
+    "ProblemFunctions",
     "build_kernel",
     "choose",
     "described",

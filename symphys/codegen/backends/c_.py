@@ -10,27 +10,27 @@ import casadi as ca
 
 from symphys import codegen as kernel
 from symphys.codegen.backends.casadi_ import FunctionEvaluator
-from symphys.codegen.backends.interface import Backend, Description, Function, Functions, Source
+from symphys.codegen.backends.interface import Backend, BackendSource, Description, Function, ProblemFunctions
 from symphys.shooting import Nlp
 
 EVALUATED = ("value", "gradient", "residuals", "jacobian")
 VISIBLE = '#define CASADI_SYMBOL_EXPORT __attribute__((visibility("default")))\n'
 
 
-def c(source: Source, threads: int) -> Backend:
+def c(source: BackendSource, threads: int) -> Backend:
     """Compile all functions; KernelUnavailable without a compiler. ``threads`` share a batch."""
     began = time.perf_counter()
     made = {name: getattr(source.functions, name) for name in EVALUATED}
     made |= parts(source.functions.nlp)
     asked = {name: function for name, function in made.items() if function is not None}
-    texts = [kernel.Source(written(name, function)) for name, function in asked.items()]
+    texts = [kernel.SourceFile(written(name, function)) for name, function in asked.items()]
     with kernel.shared_library(texts, kernel.default_cache()) as built:
         compiled = {name: ca.external(name, str(built.path)) for name in asked}
     functions = SimpleNamespace(**{name: compiled.get(name) for name in EVALUATED})
     nlp = Nlp(source.functions.nlp, *(compiled.get(name) for name in ("nlp", "nlp_gradient", "nlp_jacobian")))
     spent = time.perf_counter() - began
     told = Description("c", 1, threads, "double", built.compiler.version, built.cached, spent, built.note)
-    return Backend(told, FunctionEvaluator(cast(Functions, functions), threads), nlp)
+    return Backend(told, FunctionEvaluator(cast(ProblemFunctions, functions), threads), nlp)
 
 
 def parts(nlp: Function) -> dict[str, Function]:

@@ -9,7 +9,7 @@ from symphys.codegen.backends.interface import Function
 from symphys.shooting import Array
 
 
-class Call:
+class BufferedFunction:
     """A casadi function of (z, smoothing) for a batch of fixed size, with dense numpy arrays."""
 
     def __init__(self, function: Function, batch: int = 1, threads: int = 1) -> None:

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from symphys.codegen.backends.calls import Call
-from symphys.codegen.backends.interface import Backend, Description, Functions, Source
+from symphys.codegen.backends.calls import BufferedFunction
+from symphys.codegen.backends.interface import Backend, BackendSource, Description, ProblemFunctions
 from symphys.shooting import Array, Nlp, Values
 
 
 class FunctionEvaluator:
     """Evaluates casadi functions, a batch in one call; see ``Evaluator``."""
 
-    def __init__(self, functions: Functions, threads: int = 1) -> None:
+    def __init__(self, functions: ProblemFunctions, threads: int = 1) -> None:
         """Nothing is made yet."""
         self.functions, self.threads = functions, threads
-        self._calls: dict[tuple[str, int], Call] = {}
+        self._calls: dict[tuple[str, int], BufferedFunction] = {}
 
     def value(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
@@ -41,7 +41,7 @@ class FunctionEvaluator:
     def _call(self, name: str, Z: Array, smoothing: float) -> list[Array]:
         key = (name, len(Z))
         if key not in self._calls:
-            self._calls[key] = Call(getattr(self.functions, name), len(Z), self.threads)
+            self._calls[key] = BufferedFunction(getattr(self.functions, name), len(Z), self.threads)
         return self._calls[key](Z, smoothing)
 
 
@@ -51,7 +51,7 @@ def squared(r: Array) -> Array:
         return np.array([row @ row for row in r])
 
 
-def casadi(source: Source, threads: int) -> Backend:
+def casadi(source: BackendSource, threads: int) -> Backend:
     """The virtual machine; ``threads`` share a batch."""
     evaluator = FunctionEvaluator(source.functions, threads)
     return Backend(Description("casadi", threads=threads), evaluator, Nlp(source.functions.nlp))

@@ -9,11 +9,11 @@ from functools import partial
 from symphys.codegen import KernelUnavailable, ProgramError, processors
 from symphys.codegen.backends.c_ import c
 from symphys.codegen.backends.casadi_ import casadi
-from symphys.codegen.backends.interface import Backend, Source
+from symphys.codegen.backends.interface import Backend, BackendSource
 from symphys.codegen.backends.kernels import PRECISIONS
 from symphys.codegen.backends.simd import by_kernel
 
-BACKENDS: dict[str, Callable[[Source, int], Backend]] = {
+BACKENDS: dict[str, Callable[[BackendSource, int], Backend]] = {
     **{name: partial(by_kernel, name=name) for name in PRECISIONS},
     "c": c,
     "casadi": casadi,
@@ -21,7 +21,7 @@ BACKENDS: dict[str, Callable[[Source, int], Backend]] = {
 NAMES = tuple(BACKENDS)
 
 
-def choose(name: str, source: Source, threads: int | None = None) -> Backend:
+def choose(name: str, source: BackendSource, threads: int | None = None) -> Backend:
     """The backend of this name for a problem; one that cannot be built here gives way to casadi, and its note says why.
 
     Args:

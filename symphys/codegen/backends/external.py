@@ -70,7 +70,7 @@ def load(sizes: dict[str, int], tasks: Sequence[Task]) -> list[Function]:
     head = "".join(f"#define {name} {size}\n" for name, size in sizes.items())
     text = head + files(ROOM).joinpath("external.c").read_text(encoding="utf-8")
     with (
-        kernel.shared_library([kernel.Source(text)], kernel.default_cache()) as built,
+        kernel.shared_library([kernel.SourceFile(text)], kernel.default_cache()) as built,
         tempfile.TemporaryDirectory(prefix="symphys-external-", ignore_cleanup_errors=True) as folder,
     ):
         copy = Path(folder) / "external.so"

@@ -10,7 +10,7 @@ from time import perf_counter
 from symphys.codegen import KernelUnavailable, ProcessorKernel
 from symphys.codegen.backends.interface import joined
 from symphys.codegen.cuda import DeviceKernel
-from symphys.codegen.runtime.batch import Batch
+from symphys.codegen.runtime.batch import RolloutBatch
 
 LARGE = 512
 """Rows below which no GPU is asked. A rollout there waits for its longest chain of calls, however few robots there are;
@@ -36,7 +36,7 @@ class FastestKernel(ProcessorKernel):
         parts = ", ".join(_told(*each) for each in sorted(self._gains.items()))
         return joined(parts and f"{self._name} against the processor: {parts}", self._refused)
 
-    def _run(self, batch: Batch) -> None:
+    def _run(self, batch: RolloutBatch) -> None:
         kind = "gradient" in batch.results, batch.rows.bit_length() - 1
         device = self._reached() if batch.rows >= self._large and self._gains.get(kind, inf) > 1 else None
         try:
@@ -61,7 +61,7 @@ class FastestKernel(ProcessorKernel):
                 return None  # most machines have no GPU, and nobody asked for it
         return self._device
 
-    def _expected(self, batch: Batch) -> float:
+    def _expected(self, batch: RolloutBatch) -> float:
         """[s] of the processor, from a block for each thread."""
         lanes, rows = self.report.lanes, min(batch.rows, self.threads * self.report.lanes)
         blocks = [batch.part(first, min(first + lanes, rows)) for first in range(0, rows, lanes)]

@@ -13,7 +13,7 @@ Function = Any
 """casadi.Function"""
 
 
-class Functions(Protocol):
+class ProblemFunctions(Protocol):
     """A problem as casadi functions of (z, smoothing); each is made when it is first asked for."""
 
     @property
@@ -38,7 +38,7 @@ class Functions(Protocol):
 
 
 @dataclass(frozen=True)
-class Source:
+class BackendSource:
     """A problem in the forms from which backends are made.
 
     Attributes:
@@ -48,7 +48,7 @@ class Source:
         exact: whether that program is for smoothing 0 only.
     """
 
-    functions: Functions
+    functions: ProblemFunctions
     program: Callable[[], Program] | None = None
     exact: bool = False
 

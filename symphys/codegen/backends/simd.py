@@ -9,7 +9,7 @@ import numpy as np
 from symphys.codegen import Kernel, KernelUnavailable, ProcessorKernel
 from symphys.codegen.backends.casadi_ import squared
 from symphys.codegen.backends.external import external_nlp
-from symphys.codegen.backends.interface import Backend, Source
+from symphys.codegen.backends.interface import Backend, BackendSource
 from symphys.codegen.backends.kernels import build_kernel, described
 from symphys.codegen.backends.seeds import Seeds
 from symphys.codegen.runtime.kernel import Outputs
@@ -73,7 +73,7 @@ def common(outputs: Outputs) -> tuple[Array, Array, Array, Array]:
     return merit[:, 0], outputs["objective"][:, 0], outputs.get("errors", none), outputs.get("outputs", none)
 
 
-def by_kernel(source: Source, threads: int, name: str) -> Backend:
+def by_kernel(source: BackendSource, threads: int, name: str) -> Backend:
     """Compile the problem's program for a backend of ``PRECISIONS``; KernelUnavailable if that cannot be."""
     if source.program is None:
         raise KernelUnavailable("this problem has no program to compile")

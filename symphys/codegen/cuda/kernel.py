@@ -11,15 +11,15 @@ import numpy as np
 from symphys.codegen.cuda.device import Device
 from symphys.codegen.cuda.schedule import schedules
 from symphys.codegen.cuda.source import device_sources
-from symphys.codegen.cuda.tables import Job, Tables
+from symphys.codegen.cuda.tables import DeviceJob, Tables
 from symphys.codegen.emit.plan import FAST_MEMORY, plan
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.program.program import Program
-from symphys.codegen.runtime.batch import Batch
+from symphys.codegen.runtime.batch import RolloutBatch
 from symphys.codegen.runtime.kernel import Kernel
-from symphys.codegen.runtime.library import Source
+from symphys.codegen.runtime.library import RowSource
 from symphys.codegen.toolchain.build import names_of
-from symphys.codegen.toolchain.report import Report
+from symphys.codegen.toolchain.report import BuildReport
 
 WARPS = 4
 """Of a block. The table robot's step has 102 levels, whose dearest shares are 2.2 times less work than all calls with
@@ -32,7 +32,7 @@ class DeviceKernel(Kernel):
     """Waves of blocks, as many as the device's memory takes; states stay there for the way back."""
 
     def __init__(
-        self, program: Program, report: Report, seeded: Sequence[str], device: Device, module: Any, tables: Tables
+        self, program: Program, report: BuildReport, seeded: Sequence[str], device: Device, module: Any, tables: Tables
     ) -> None:
         """Use ``compile_on``."""
         super().__init__(program, report, seeded)
@@ -41,7 +41,7 @@ class DeviceKernel(Kernel):
         self._memory: Any = None
         self._blocks = 0
 
-    def _run(self, batch: Batch) -> None:
+    def _run(self, batch: RolloutBatch) -> None:
         if not batch.rows:
             return
         lanes = self.device.lanes
@@ -64,13 +64,13 @@ class DeviceKernel(Kernel):
             self._memory, self._blocks = device.empty((found * each // self.real.itemsize,), self.real), found
         return min(wanted, self._blocks)
 
-    def _wave(self, batch: Batch, start: int, end: int) -> None:
+    def _wave(self, batch: RolloutBatch, start: int, end: int) -> None:
         """Rows from start to end."""
         device, rows, kept = self.device, end - start, []
-        job = Job(program=self.tables.address, memory=device.address(self._memory), rows=rows)
+        job = DeviceJob(program=self.tables.address, memory=device.address(self._memory), rows=rows)
         for name, array in batch.inputs.items():
             kept.append(device.put(array[start:end] if array.ndim == 2 else array))
-            setattr(job, name, Source(device.address(kept[-1]), array.shape[1] if array.ndim == 2 else 0))
+            setattr(job, name, RowSource(device.address(kept[-1]), array.shape[1] if array.ndim == 2 else 0))
         results = {name: device.empty((rows, *array.shape[1:]), float) for name, array in batch.results.items()}
         for name, array in results.items():
             setattr(job, name, device.address(array))
@@ -97,7 +97,7 @@ class DeviceKernel(Kernel):
             yield from (("retreat", *chunk) for chunk in reversed(chunks))
             yield "collect", 0, 0
 
-    def _launch(self, name: str, blocks: int, job: Job) -> None:
+    def _launch(self, name: str, blocks: int, job: DeviceJob) -> None:
         held = self.device.put(np.frombuffer(bytes(job), np.uint8))
         self.device.launch(self.module, name, blocks, (self.device.lanes, self.tables.warps), held)
         self.device.wait()
@@ -127,7 +127,7 @@ def compile_on(
     planned = plan(program, names, FAST_MEMORY)  # without a tape: memory is what a device waits for
     texts = device_sources(planned, device.lanes, warps, single)
     module, compiler, cached, note = device.load(texts)
-    report = Report(
+    report = BuildReport(
         compiler=compiler,
         flags=(),
         lanes=device.lanes,

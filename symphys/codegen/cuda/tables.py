@@ -12,12 +12,12 @@ from symphys.codegen.cuda.device import Device
 from symphys.codegen.cuda.schedule import Schedule
 from symphys.codegen.emit.plan import Plan
 from symphys.codegen.program.program import Program
-from symphys.codegen.runtime.library import WORD, List, Source, data_places, program_fields, strided
+from symphys.codegen.runtime.library import WORD, List, RowSource, data_places, program_fields, strided
 
 Words = NDArray[np.int64]
 
 
-class Phase(ctypes.Structure):
+class DevicePhase(ctypes.Structure):
     """The driver's ``phase``."""
 
     _fields_ = (("levels", WORD), ("spans", ctypes.c_void_p), ("entries", ctypes.c_void_p))
@@ -26,17 +26,17 @@ class Phase(ctypes.Structure):
 class DeviceProgram(ctypes.Structure):
     """The driver's ``program``."""
 
-    _fields_ = program_fields(Phase)
+    _fields_ = program_fields(DevicePhase)
 
 
-class Job(ctypes.Structure):
+class DeviceJob(ctypes.Structure):
     """The driver's ``job``."""
 
     _fields_ = (
         ("program", ctypes.c_void_p),
         ("memory", ctypes.c_void_p),
         *((name, WORD) for name in ("rows", "first", "end")),
-        *((name, Source) for name in ("z", "knob", "seed")),
+        *((name, RowSource) for name in ("z", "knob", "seed")),
         *((name, ctypes.c_void_p) for name in ("outputs", "gradient", "trajectory")),
         *((name, WORD) for name in ("offset", "size", "stride", "count")),
         ("loss", ctypes.c_double),
@@ -71,7 +71,7 @@ class Tables:
             setattr(data, name, List(len(places), self._put(words)))
         for name, each in phases.items():
             spans, entries = self._put(each.spans.ravel()), self._put(interleaved(each.entries, device.lanes))
-            setattr(data, name, Phase(len(each.spans), spans, entries))
+            setattr(data, name, DevicePhase(len(each.spans), spans, entries))
         written = [place for call in program.body for place in call.outputs if place.stride]
         data.written = List(len(written), self._put(strided(written)))
         if program.fading is not None:

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.codegen.emit.functions import Functions
+from symphys.codegen.emit.functions import FunctionTable
 from symphys.codegen.emit.writer import Form
-from symphys.codegen.graph.activity import Activity, Reach
+from symphys.codegen.graph.activity import Activity, CallActivity
 from symphys.codegen.graph.adjoint import Mask
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.rewrite import Taped
-from symphys.codegen.program.program import Call, Place, Program
+from symphys.codegen.program.program import FunctionCall, Place, Program
 
 Table = NDArray[np.int64]
 Entries = list[list[int]]
@@ -46,7 +46,7 @@ def plan(program: Program, seeded: Sequence[str], word: int = 64) -> Plan:
         seeded: names of the outputs that are differentiated.
         word: bytes of one word of a whole block: lanes times the size of a number.
     """
-    functions = Functions()
+    functions = FunctionTable()
     prologue, body, epilogue = phases = (
         _reaches(program.prologue, 1, functions),
         _reaches(program.body, program.steps, functions),
@@ -77,7 +77,7 @@ class _Tape:
 
 
 @dataclass
-class _Reach(Reach):
+class _Reach(CallActivity):
     """A call and, once that is known, its tape."""
 
     tape: _Tape | None = None
@@ -92,12 +92,12 @@ class _Pull:
     inputs: Mask
     outputs: Mask
 
-    def reads(self, functions: Functions) -> list[NDArray[np.int64]]:
+    def reads(self, functions: FunctionTable) -> list[NDArray[np.int64]]:
         """The words of the memory that it reads."""
         used = functions.arguments(self.graph)
         return [words for i, words in enumerate(self.reach.inputs) if i in used]
 
-    def entry(self, functions: Functions) -> list[int]:
+    def entry(self, functions: FunctionTable) -> list[int]:
         """Its table entry."""
         call, tape = self.reach.call, self.reach.tape
         primal = [*call.inputs, *([tape.place] if tape else [])]
@@ -106,7 +106,7 @@ class _Pull:
         return functions.entry(tape.functions.adjoint if tape else self.graph, form, places)
 
 
-def _reaches(calls: Sequence[Call], steps: int, functions: Functions) -> list[_Reach]:
+def _reaches(calls: Sequence[FunctionCall], steps: int, functions: FunctionTable) -> list[_Reach]:
     return [
         _Reach(
             call,
@@ -118,20 +118,20 @@ def _reaches(calls: Sequence[Call], steps: int, functions: Functions) -> list[_R
     ]
 
 
-def _push(call: Call, functions: Functions, tape: _Tape | None = None) -> list[int]:
+def _push(call: FunctionCall, functions: FunctionTable, tape: _Tape | None = None) -> list[int]:
     form = Form(primal=len(call.inputs), adds=call.accumulate)
     graph = tape.functions.forward if tape else functions.forward(call.function)
     return functions.entry(graph, form, [*call.inputs, *call.outputs, *([tape.place] if tape else [])])
 
 
-def _pull(reach: _Reach, activity: Activity, functions: Functions) -> _Pull | None:
+def _pull(reach: _Reach, activity: Activity, functions: FunctionTable) -> _Pull | None:
     inputs, outputs = activity.marks(reach.inputs), activity.marks(reach.outputs)
     if not any(inputs) or not any(outputs):
         return None
     return _Pull(reach, functions.adjoint(reach.call.function, inputs, outputs), inputs, outputs)
 
 
-def _again(program: Program, body: Sequence[_Reach], pulls: Sequence[_Pull], functions: Functions) -> list[_Reach]:
+def _again(program: Program, body: Sequence[_Reach], pulls: Sequence[_Pull], functions: FunctionTable) -> list[_Reach]:
     """The calls that must be run again before the adjoints of a step: those whose scratch is read."""
     scratch = program.scratch()
     needed = np.zeros(program.size, dtype=bool)
@@ -149,7 +149,7 @@ def _again(program: Program, body: Sequence[_Reach], pulls: Sequence[_Pull], fun
 
 
 def _put_on_tape(
-    program: Program, pulls: Sequence[_Pull], again: Sequence[_Reach], functions: Functions, room: int
+    program: Program, pulls: Sequence[_Pull], again: Sequence[_Reach], functions: FunctionTable, room: int
 ) -> int:
     """Give the calls that are run again a tape if all then still fits into ``room`` words; returns its words."""
     end = program.size

@@ -15,14 +15,14 @@ FILES, SHARE = 4, 400
 
 
 @dataclass(frozen=True)
-class Source:
+class SourceFile:
     """A C file, and whether the compiler may fuse products and sums in it."""
 
     text: str
     fused: bool = False
 
 
-def sources(plan: Plan, lanes: int, single: bool) -> list[Source]:
+def sources(plan: Plan, lanes: int, single: bool) -> list[SourceFile]:
     """The C files; each compiles alone. Adjoints are fused; values are not, so that they are casadi's to the bit."""
     head = f"#define LANES {lanes}\n#define SINGLE {int(single)}\n{resource('vector.h')}"
     texts = [write(f"f{number}", graph, form) for number, (graph, form) in enumerate(plan.functions)]
@@ -31,12 +31,12 @@ def sources(plan: Plan, lanes: int, single: bool) -> list[Source]:
         mine = [i for i, (_, form) in enumerate(plan.functions) if form.backward == backward]
         work = [len(plan.functions[i][0].nodes) for i in mine]
         for group in spread([texts[i] for i in mine], work, FILES):
-            found.append(Source("\n".join([head, *group]), fused=backward))
+            found.append(SourceFile("\n".join([head, *group]), fused=backward))
     names = [f"f{number}" for number in range(len(texts))]
     declared = "".join(f"void {name}(V *m, V *b, const word *t, word k);\n" for name in names)
     table = ", ".join(names) or "0"
     listed = f"{declared}static void (*const FUNCTIONS[])(V *, V *, const word *, word) = {{{table}}};\n"
-    return [*found, Source(head + listed + "".join(map(resource, ("program.h", "driver.c", "phases.c"))))]
+    return [*found, SourceFile(head + listed + "".join(map(resource, ("program.h", "driver.c", "phases.c"))))]
 
 
 def spread(texts: Sequence[str], work: Sequence[int], most: int) -> list[list[str]]:

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.codegen.program.program import Call, Place, Program
+from symphys.codegen.program.program import FunctionCall, Place, Program
 
 Flags = NDArray[np.bool_]
 Words = NDArray[np.int64]
 
 
 @dataclass
-class Reach:
+class CallActivity:
     """One call with the words of its places at all steps.
 
     Attributes:
@@ -25,7 +25,7 @@ class Reach:
         dependence: for each result (size, arguments): whether a word depends on an argument.
     """
 
-    call: Call
+    call: FunctionCall
     inputs: list[Words]
     outputs: list[Words]
     dependence: Sequence[Flags]
@@ -34,7 +34,7 @@ class Reach:
 class Activity:
     """The words that matter, and with them the calls."""
 
-    def __init__(self, program: Program, phases: Sequence[Sequence[Reach]], seeded: Sequence[Place]) -> None:
+    def __init__(self, program: Program, phases: Sequence[Sequence[CallActivity]], seeded: Sequence[Place]) -> None:
         """Spread dependence on z forwards and usefulness backwards, over the body until nothing changes."""
         self.depends = np.zeros(program.size, dtype=bool)
         self.useful = np.zeros(program.size, dtype=bool)
@@ -50,14 +50,14 @@ class Activity:
                 pass
         self.active = self.depends & self.useful
 
-    def _forward(self, reach: Reach) -> bool:
+    def _forward(self, reach: CallActivity) -> bool:
         moving = np.array([self.depends[words].any() for words in reach.inputs], dtype=bool)
         changed = False
         for words, matters in zip(reach.outputs, reach.dependence, strict=True):
             changed |= _raise(self.depends, words, np.asarray(matters[:, moving].any(axis=1)))
         return changed
 
-    def _backward(self, reach: Reach) -> bool:
+    def _backward(self, reach: CallActivity) -> bool:
         changed = False
         for words, matters in zip(reach.outputs, reach.dependence, strict=True):
             wanted = self.useful[words].any(axis=0)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symphys.codegen.program.program import Call, Place, Program
+from symphys.codegen.program.program import FunctionCall, Place, Program
 
 Array = NDArray[np.float64]
 
@@ -38,14 +38,14 @@ def at(memory: Array, place: Place, k: int) -> Array:
     return memory[start : start + place.size]
 
 
-def _order(program: Program) -> Iterator[tuple[Call, int]]:
+def _order(program: Program) -> Iterator[tuple[FunctionCall, int]]:
     yield from ((call, 0) for call in program.prologue)
     for k in range(program.steps):
         yield from ((call, k) for call in program.body)
     yield from ((call, 0) for call in program.epilogue)
 
 
-def _perform(call: Call, memory: Array, k: int) -> None:
+def _perform(call: FunctionCall, memory: Array, k: int) -> None:
     results = call.function.call([at(memory, place, k) for place in call.inputs])
     for place, result in zip(call.outputs, results, strict=True):
         target = at(memory, place, k)

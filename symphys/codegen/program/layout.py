@@ -5,7 +5,7 @@ from __future__ import annotations
 from symphys.codegen.program.program import Place
 
 
-class Layout:
+class MemoryLayout:
     """A memory that grows as places are taken from it."""
 
     def __init__(self) -> None:

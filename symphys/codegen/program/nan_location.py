@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.codegen.program.program import Call, Place, Program
+from symphys.codegen.program.program import FunctionCall, Place, Program
 from symphys.codegen.runtime.library import Loaded, Memory
 
 if TYPE_CHECKING:
-    from symphys.codegen.runtime.batch import Batch
+    from symphys.codegen.runtime.batch import RolloutBatch
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Bad:
         return f"{where}: word {self.word} is {self.value}"
 
 
-def first_bad(program: Program, loaded: Loaded, batch: Batch, memory: Memory) -> Bad | None:
+def first_bad(program: Program, loaded: Loaded, batch: RolloutBatch, memory: Memory) -> Bad | None:
     """Run one rollout phase by phase and step by step, and look at all that each wrote."""
     loaded.begin(batch.part(0, 1), memory)
     lane = memory[:, 0]
@@ -57,7 +57,7 @@ def first_bad(program: Program, loaded: Loaded, batch: Batch, memory: Memory) ->
     return None
 
 
-def _stretches(program: Program) -> Iterator[tuple[str, int, Sequence[Call]]]:
+def _stretches(program: Program) -> Iterator[tuple[str, int, Sequence[FunctionCall]]]:
     if program.prologue:
         yield "prologue", 0, program.prologue
     for k in range(program.steps if program.body else 0):
@@ -66,7 +66,7 @@ def _stretches(program: Program) -> Iterator[tuple[str, int, Sequence[Call]]]:
         yield "epilogue", 0, program.epilogue
 
 
-def _culprit(phase: str, k: int, calls: Sequence[Call], lane: NDArray[np.floating]) -> Bad | None:
+def _culprit(phase: str, k: int, calls: Sequence[FunctionCall], lane: NDArray[np.floating]) -> Bad | None:
     """The first call with such a result; calls that add are asked for what they add."""
     for i, call in enumerate(calls):
         for r, place in enumerate(call.outputs):
@@ -76,7 +76,7 @@ def _culprit(phase: str, k: int, calls: Sequence[Call], lane: NDArray[np.floatin
     return None
 
 
-def _added(call: Call, result: int, k: int, lane: NDArray[np.floating]) -> NDArray[np.float64]:
+def _added(call: FunctionCall, result: int, k: int, lane: NDArray[np.floating]) -> NDArray[np.float64]:
     values = call.function.call([lane[_words(place, k)].astype(float) for place in call.inputs])[result].full()
     return np.asarray(values)
 

@@ -41,7 +41,7 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Call:
+class FunctionCall:
     """One call of a function.
 
     Attributes:
@@ -93,9 +93,9 @@ class Program:
     knob: Place
     steps: int
     outputs: Mapping[str, Place]
-    prologue: tuple[Call, ...] = ()
-    body: tuple[Call, ...] = ()
-    epilogue: tuple[Call, ...] = ()
+    prologue: tuple[FunctionCall, ...] = ()
+    body: tuple[FunctionCall, ...] = ()
+    epilogue: tuple[FunctionCall, ...] = ()
     zeroed: tuple[Place, ...] = ()
     constants: tuple[tuple[Place, tuple[float, ...]], ...] = ()
     fading: Fading | None = None
@@ -109,7 +109,7 @@ class Program:
         verify(self)
 
     @property
-    def calls(self) -> tuple[Call, ...]:
+    def calls(self) -> tuple[FunctionCall, ...]:
         """All calls, each once."""
         return (*self.prologue, *self.body, *self.epilogue)
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from symphys.codegen.errors import ProgramError
 
 if TYPE_CHECKING:
-    from symphys.codegen.program.program import Call, Place, Program
+    from symphys.codegen.program.program import FunctionCall, Place, Program
 
 Words = NDArray[np.int64]
 NEVER = np.iinfo(np.int64).max
@@ -50,7 +50,7 @@ class Verification:
         if words.size and (words.min() < 0 or words.max() >= self.program.size):
             raise ProgramError(f"{who}: {span(words)} lie outside the memory of {self.program.size} words")
 
-    def timed(self) -> Iterator[tuple[str, Call, int, int]]:
+    def timed(self) -> Iterator[tuple[str, FunctionCall, int, int]]:
         """Every call with a description, its time at step 0 and the time from one step to the next (0: no body)."""
         program = self.program
         start, length = len(program.prologue), len(program.body)
@@ -68,7 +68,7 @@ class Verification:
         self.inside(who, words)
         return words
 
-    def write(self, who: str, call: Call, time: int, period: int) -> None:
+    def write(self, who: str, call: FunctionCall, time: int, period: int) -> None:
         """Take note of what a call writes; refuse second writers."""
         for place in call.outputs:
             words = self.cover(who, place, period)
@@ -94,7 +94,7 @@ class Verification:
         last = time + period * max(self.program.steps - 1, 0)
         self.written[words] = np.where(self.scratch[words], time, np.maximum(last, before))
 
-    def read(self, who: str, call: Call, time: int, period: int) -> None:
+    def read(self, who: str, call: FunctionCall, time: int, period: int) -> None:
         """Refuse what is read before it is complete."""
         for place in call.inputs:
             words = self.cover(who, place, period)
@@ -134,7 +134,7 @@ def verify(program: Program) -> Verification:
     return check
 
 
-def _signature(who: str, call: Call) -> None:
+def _signature(who: str, call: FunctionCall) -> None:
     function = call.function
     if not function.is_a("SXFunction"):
         raise ProgramError(f"{who}: is not an SX Function but {function.class_name()}")

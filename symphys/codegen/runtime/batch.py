@@ -9,14 +9,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from symphys.codegen.errors import ProgramError
 from symphys.codegen.program.program import Place
-from symphys.codegen.runtime.library import BatchData, Source
+from symphys.codegen.runtime.library import BatchData, RowSource
 
 Array = NDArray[np.float64]
 CHUNKS = 4
 """Parts for each thread: small enough that one slow processor does not keep the others waiting."""
 
 
-class Batch:
+class RolloutBatch:
     """One call's arrays; those of one row serve all lanes.
 
     Attributes:
@@ -71,7 +71,7 @@ class Batch:
         data = BatchData(end - start)
         for name, array in self.inputs.items():
             stride = array.shape[1] if array.ndim == 2 else 0
-            setattr(data, name, Source(array.ctypes.data + 8 * start * stride, stride))
+            setattr(data, name, RowSource(array.ctypes.data + 8 * start * stride, stride))
         for name, array in self.results.items():
             setattr(data, name, array.ctypes.data + start * array[:1].nbytes)
         place = self.place

@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from symphys.codegen.errors import ProgramError
 from symphys.codegen.program.nan_location import Bad, first_bad
 from symphys.codegen.program.program import Place, Program
-from symphys.codegen.runtime.batch import Array, Batch
+from symphys.codegen.runtime.batch import Array, RolloutBatch
 from symphys.codegen.runtime.fixed_addresses import Fixed
 from symphys.codegen.runtime.library import Loaded
-from symphys.codegen.runtime.thread_pool import Pool
+from symphys.codegen.runtime.thread_pool import MemoryPool
 from symphys.codegen.toolchain.compiler import processors
-from symphys.codegen.toolchain.report import Report
+from symphys.codegen.toolchain.report import BuildReport
 
 Outputs = dict[str, NDArray[np.float64]]
 """name -> (batch, size)"""
@@ -28,7 +28,7 @@ class Kernel(ABC):
 
     threads = 1
 
-    def __init__(self, program: Program, report: Report, seeded: Sequence[str]) -> None:
+    def __init__(self, program: Program, report: BuildReport, seeded: Sequence[str]) -> None:
         """``seeded``: names of the outputs that are differentiated."""
         self.program, self.report, self.seeded = program, report, tuple(seeded)
 
@@ -88,9 +88,9 @@ class Kernel(ABC):
         self._run(batch)
         return trajectory
 
-    def _batch(self, Z: ArrayLike, knob: ArrayLike, seed: ArrayLike | None = None) -> Batch:
+    def _batch(self, Z: ArrayLike, knob: ArrayLike, seed: ArrayLike | None = None) -> RolloutBatch:
         rows = {"z": (Z, self.program.z.size), "knob": (knob, self.program.knob.size)}
-        return Batch(rows if seed is None else rows | {"seed": (seed, self._seeds())})
+        return RolloutBatch(rows if seed is None else rows | {"seed": (seed, self._seeds())})
 
     def _seeds(self) -> int:
         return sum(self.program.outputs[name].size for name in self.seeded)
@@ -102,7 +102,7 @@ class Kernel(ABC):
         return {name: outputs[:, part] for name, part in self.program.output_slices().items()}
 
     @abstractmethod
-    def _run(self, batch: Batch) -> None:
+    def _run(self, batch: RolloutBatch) -> None:
         """Compute what a batch asks for."""
 
 
@@ -110,14 +110,14 @@ class ProcessorKernel(Kernel):
     """Blocks of lanes, spread over threads, on whose number results do not depend."""
 
     def __init__(
-        self, program: Program, loaded: Loaded, report: Report, seeded: Sequence[str], threads: int | None
+        self, program: Program, loaded: Loaded, report: BuildReport, seeded: Sequence[str], threads: int | None
     ) -> None:
         """Use ``compile_program``."""
         super().__init__(program, report, seeded)
         self.loaded = loaded
         self.threads = processors() if threads is None else threads
         real = np.dtype(np.float32 if report.precision == "single" else np.float64)
-        self._pool = Pool(report.bytes_per_lane // real.itemsize, report.lanes, real)
+        self._pool = MemoryPool(report.bytes_per_lane // real.itemsize, report.lanes, real)
 
     def fixed(self, seed: ArrayLike = ()) -> Fixed:
         """An evaluation of one z at fixed addresses, with a row for each seed (rows, s), or one row without any."""
@@ -132,7 +132,7 @@ class ProcessorKernel(Kernel):
         batch = self._batch(np.ravel(z), np.ravel(knob))
         return self._pool.lend(lambda memory: first_bad(self.program, self.loaded, batch, memory))
 
-    def _run(self, batch: Batch) -> None:
+    def _run(self, batch: RolloutBatch) -> None:
         """Spread blocks over the threads."""
         parts = batch.parts(self.report.lanes, self.threads)
         self._pool.run([partial(self.loaded.evaluate, part) for part in parts], self.threads)

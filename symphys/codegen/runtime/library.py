@@ -25,7 +25,7 @@ class List(ctypes.Structure):
     _fields_ = (("count", WORD), ("words", ctypes.c_void_p))
 
 
-class Source(ctypes.Structure):
+class RowSource(ctypes.Structure):
     """Rows of doubles; stride 0 means one row for all lanes."""
 
     _fields_ = (("rows", ctypes.c_void_p), ("stride", WORD))
@@ -57,7 +57,7 @@ class BatchData(ctypes.Structure):
 
     _fields_ = (
         ("rows", WORD),
-        *((name, Source) for name in ("z", "knob", "seed")),
+        *((name, RowSource) for name in ("z", "knob", "seed")),
         *((name, ctypes.c_void_p) for name in ("outputs", "gradient", "trajectory")),
         *((name, WORD) for name in ("offset", "size", "stride", "count")),
         ("loss", ctypes.c_double),

@@ -17,7 +17,7 @@ ALIGNMENT = 64
 T = TypeVar("T")
 
 
-class Pool:
+class MemoryPool:
     """Memories of one shape, kept from call to call; a task has one for itself while it runs."""
 
     def __init__(self, words: int, lanes: int, real: Any) -> None:

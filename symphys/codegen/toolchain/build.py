@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Literal
 
 from symphys.codegen.emit.plan import plan
-from symphys.codegen.emit.source import Source, sources
+from symphys.codegen.emit.source import SourceFile, sources
 from symphys.codegen.errors import KernelUnavailable, ProgramError
 from symphys.codegen.program.program import Program
 from symphys.codegen.runtime.kernel import ProcessorKernel
@@ -20,7 +20,7 @@ from symphys.codegen.runtime.library import Loaded
 from symphys.codegen.toolchain.cache import Cache, default_cache
 from symphys.codegen.toolchain.compiler import Compiler, find_compiler
 from symphys.codegen.toolchain.processor import processor
-from symphys.codegen.toolchain.report import Report
+from symphys.codegen.toolchain.report import BuildReport
 
 
 def compile_program(
@@ -50,7 +50,7 @@ def compile_program(
     planned = plan(program, names, width * (4 if single else 8))
     with shared_library(sources(planned, width, single), cache or default_cache()) as built:
         loaded = Loaded(built.path, program, planned, names)
-    report = Report(
+    report = BuildReport(
         compiler=built.compiler.version,
         flags=built.flags,
         lanes=width,
@@ -93,7 +93,7 @@ class Built:
 
 
 @contextmanager
-def shared_library(parts: Sequence[Source], cache: Cache) -> Iterator[Built]:
+def shared_library(parts: Sequence[SourceFile], cache: Cache) -> Iterator[Built]:
     """The library of these sources; what does not go into the cache lasts as long as the context."""
     compiler = find_compiler()
     flags = compiler.flags(processor())

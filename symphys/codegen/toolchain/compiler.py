@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from symphys.codegen.emit.source import Source
+from symphys.codegen.emit.source import SourceFile
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.toolchain.processes import ADVICE, run, run_all
 from symphys.codegen.toolchain.processor import Processor
@@ -43,7 +43,7 @@ class Compiler:
             return (*FLAGS, f"-mcpu={processor.architecture.replace('-', '_')}", "-mprefer-vector-width=512")
         return (*FLAGS, *processor.flags())
 
-    def build(self, sources: Sequence[Source], flags: Sequence[str], folder: Path) -> Path:
+    def build(self, sources: Sequence[SourceFile], flags: Sequence[str], folder: Path) -> Path:
         """Compile each source in a process of its own, link them, and return the shared library."""
         objects = [folder / f"part{i}.o" for i in range(len(sources))]
         commands = []

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Report:
+class BuildReport:
     """How a kernel was built.
 
     Attributes:

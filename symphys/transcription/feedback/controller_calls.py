@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import casadi as ca
 
-from symphys.codegen import Call, Layout, Place
+from symphys.codegen import FunctionCall, MemoryLayout, Place
 from symphys.model.controllers import Net
 from symphys.model.controllers.net import Activation, Layer, activated
 from symphys.model.state_layout import input_columns
@@ -22,7 +22,7 @@ class Places(Protocol):
     """Where a program keeps a rollout."""
 
     rollout: Rollout
-    layout: Layout
+    layout: MemoryLayout
     knob: Place
     x: Place
     given: Place
@@ -31,7 +31,7 @@ class Places(Protocol):
     time: Place
 
 
-def control_calls(rollout: Rollout, places: Places) -> list[Call]:
+def control_calls(rollout: Rollout, places: Places) -> list[FunctionCall]:
     """The calls that come before those of a step: from ``x`` and ``given`` to ``u``; none without controllers."""
     if rollout.feedback is None:
         return []
@@ -44,7 +44,7 @@ class Writer:
     def __init__(self, rollout: Rollout, places: Places) -> None:
         """Write all of them."""
         self.rollout, self.places = rollout, places
-        self.calls: list[Call] = []
+        self.calls: list[FunctionCall] = []
         sensed = {name: self.sense(name) for name in self.used()}
         outputs = [self.outputs(c, [sensed[name] for name in c.senses]) for c in rollout.problem.controllers]
         self.add_up(outputs)
@@ -62,7 +62,7 @@ class Writer:
     def call(self, function: ca.Function, *inputs: Place) -> Place:
         """A call with one result; where that lies."""
         result = self.places.layout.take(int(function.numel_out(0)))
-        self.calls.append(Call(function, inputs, (result,)))
+        self.calls.append(FunctionCall(function, inputs, (result,)))
         return result
 
     def outputs(self, controller: Controller, senses: Sequence[Place]) -> list[Place]:
@@ -90,7 +90,7 @@ class Writer:
             straight = part(weights, net.straight) if net.skip and layer == layers[-1] else None
             for k in range(layer.outputs):
                 function, inputs = self.row(layer, k, weights, values, straight, senses)
-                self.calls.append(Call(function, inputs, (part(result, slice(k, k + 1)),)))
+                self.calls.append(FunctionCall(function, inputs, (part(result, slice(k, k + 1)),)))
             values = [result]
         return values
 
@@ -130,7 +130,7 @@ class Writer:
                 total[columns[name].start + component] += scale * value
         function = ca.Function("inputs", [given, *symbols], [ca.densify(total)])
         flat = [place for parts in outputs for place in parts]
-        self.calls.append(Call(function, (self.places.given, *flat), (self.places.u,)))
+        self.calls.append(FunctionCall(function, (self.places.given, *flat), (self.places.u,)))
 
 
 def part(place: Place, columns: slice) -> Place:

@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.codegen import Call, Layout, Place, Program
+from symphys.codegen import FunctionCall, MemoryLayout, Place, Program
 from symphys.expression import Formula
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.feedback.controller_calls import control_calls
@@ -94,7 +94,7 @@ class StagePlaces:
 
     def __init__(self, rollout: Rollout) -> None:
         """Places for (x, inputs, p, time, time after, z), and for all that comes of it."""
-        self.rollout, self.layout = rollout, Layout()
+        self.rollout, self.layout = rollout, MemoryLayout()
         sizes = (int(part.shape[0]) for part in (rollout.x0, rollout.given, rollout.p))
         self.nx, self.nu, self.np = sizes
         n = int(rollout.z.shape[0])
@@ -119,7 +119,7 @@ def stage_program(rollout: Rollout, aims: Aims, sensors: Sequence[str], exact: b
     places = StagePlaces(rollout)
     body = [*control_calls(rollout, places), *step_calls(places, exact)]
     outputs = {"after": places.x.later().still(), "inputs": places.u.still()}
-    last: list[Call] = []
+    last: list[FunctionCall] = []
     sensed = [_sense(places, name, last) for name in sensors]
     asked = [_asked(places, formula, shift, last) for formula, shift in aims.stages.series]
     for name, found in (("sensed", sensed), ("asked", asked)):
@@ -134,35 +134,37 @@ def stage_program(rollout: Rollout, aims: Aims, sensors: Sequence[str], exact: b
         knob=places.knob,
         steps=1,
         outputs={name: outputs[name] for name in RESULTS if name in outputs},
-        prologue=(Call(first, (places.all,), places.written),),
+        prologue=(FunctionCall(first, (places.all,), places.written),),
         body=tuple(body),
         epilogue=tuple(last),
     )
 
 
-def _sense(places: StagePlaces, name: str, calls: list[Call]) -> Place:
+def _sense(places: StagePlaces, name: str, calls: list[FunctionCall]) -> Place:
     """What a sensor reads in the next state."""
     sensor = next(s for s in places.rollout.problem.sensors if s.name == name)
     result = places.layout.take(sensor.size)
     time = places.time.later().still()
-    calls.append(Call(places.rollout.control.sensor(sensor), (places.x.later().still(), places.p, time), (result,)))
+    calls.append(
+        FunctionCall(places.rollout.control.sensor(sensor), (places.x.later().still(), places.p, time), (result,))
+    )
     return result
 
 
-def _asked(places: StagePlaces, formula: Formula, shift: int, calls: list[Call]) -> Place:
+def _asked(places: StagePlaces, formula: Formula, shift: int, calls: list[FunctionCall]) -> Place:
     """The value of a formula at the start or at the end of the step."""
     function = dense(places.rollout.compiled(formula))
     result = places.layout.take(int(function.size1_out(0)))
     x, time = places.x.later(shift).still(), places.time.later(shift).still()
-    calls.append(Call(function, (x, places.u.still(), places.p, time, places.z), (result,)))
+    calls.append(FunctionCall(function, (x, places.u.still(), places.p, time, places.z), (result,)))
     return result
 
 
-def _joined(places: StagePlaces, parts: list[Place], calls: list[Call]) -> Place:
+def _joined(places: StagePlaces, parts: list[Place], calls: list[FunctionCall]) -> Place:
     """The parts one after the other."""
     symbols = [ca.SX.sym("part", part.size) for part in parts]
     result = places.layout.take(sum(part.size for part in parts))
-    calls.append(Call(ca.Function("joined", symbols, [ca.vertcat(*symbols)]), tuple(parts), (result,)))
+    calls.append(FunctionCall(ca.Function("joined", symbols, [ca.vertcat(*symbols)]), tuple(parts), (result,)))
     return result
 
 

@@ -15,7 +15,7 @@ from symphys.codegen.backends import BEST, build_kernel
 from symphys.codegen.backends.fastest import FastestKernel
 from symphys.codegen.backends.kernels import described
 from symphys.codegen.cuda import DeviceKernel, compile_on
-from symphys.codegen.runtime.batch import Batch
+from symphys.codegen.runtime.batch import RolloutBatch
 from symphys.problem import load_problem
 from symphys.problems import find
 from symphys.runs.provenance import evaluated
@@ -41,10 +41,10 @@ def there(here: ProcessorKernel, tmp_path_factory: pytest.TempPathFactory) -> De
 class Slowed:
     """A kernel's ``_run`` that takes its time, and counts."""
 
-    def __init__(self, run: Callable[[Batch], None], seconds: float) -> None:
+    def __init__(self, run: Callable[[RolloutBatch], None], seconds: float) -> None:
         self.run, self.seconds, self.rows = run, seconds, list[int]()
 
-    def __call__(self, batch: Batch) -> None:
+    def __call__(self, batch: RolloutBatch) -> None:
         self.rows.append(batch.rows)
         time.sleep(self.seconds)
         self.run(batch)
@@ -104,7 +104,7 @@ def test_without_a_gpu_it_is_looked_for_once(here: ProcessorKernel) -> None:
 def test_a_gpu_that_fails_gives_way_to_the_processor_and_is_told(
     here: ProcessorKernel, there: DeviceKernel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(batch: Batch) -> None:
+    def fail(batch: RolloutBatch) -> None:
         raise KernelUnavailable("no memory is left")
 
     monkeypatch.setattr(there, "_run", fail)

@@ -6,7 +6,16 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symphys.codegen import Cache, Call, Kernel, KernelUnavailable, Layout, Program, compile_program, interpret
+from symphys.codegen import (
+    Cache,
+    FunctionCall,
+    Kernel,
+    KernelUnavailable,
+    MemoryLayout,
+    Program,
+    compile_program,
+    interpret,
+)
 from symphys.dynamics.functions import step_function
 from symphys.problem import load_problem
 from symphys.problems import find
@@ -20,7 +29,7 @@ def throw(cache: Cache) -> Kernel:
     problem = load_problem(find("ball_throw"))
     rollout = symbolic_rollout(problem)
     step = step_function(rollout.world, problem.simulation.scheme(), rollout.inputs, rollout.parameters.symbols)
-    z, at = ca.SX.sym("z", rollout.z.numel()), Layout()
+    z, at = ca.SX.sym("z", rollout.z.numel()), MemoryLayout()
     start = ca.Function("start", [rollout.z], [rollout.x[:, 0]]).expand()
     begin = ca.Function("begin", [z], [ca.densify(start(z))])
     x = ca.SX.sym("x", step.numel_in(0))
@@ -32,9 +41,9 @@ def throw(cache: Cache) -> Kernel:
         z=decision,
         knob=smoothing,
         steps=STEPS,
-        prologue=(Call(begin, (decision,), (states,)),),
-        body=(Call(step, (states, none, none, smoothing), (states.later(),)),),
-        epilogue=(Call(end, (states.later(STEPS),), (last,)),),
+        prologue=(FunctionCall(begin, (decision,), (states,)),),
+        body=(FunctionCall(step, (states, none, none, smoothing), (states.later(),)),),
+        epilogue=(FunctionCall(end, (states.later(STEPS),), (last,)),),
         outputs={"state": last},
     )
     try:

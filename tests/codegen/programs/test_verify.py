@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import pytest
 
-from symphys.codegen import Call, Place, Program, ProgramError
+from symphys.codegen import FunctionCall, Place, Program, ProgramError
 
 X = ca.SX.sym("x", 2)
 TWICE = ca.Function("twice", [X], [2 * X])
@@ -20,8 +20,8 @@ def make(**parts: Any) -> Program:
     return Program(**{**whole, "outputs": {"sum": SUM}, **parts})
 
 
-def call(a: Place, b: Place, accumulate: bool = False) -> Call:
-    return Call(TWICE, (a,), (b,), accumulate)
+def call(a: Place, b: Place, accumulate: bool = False) -> FunctionCall:
+    return FunctionCall(TWICE, (a,), (b,), accumulate)
 
 
 START = call(Z, STATE)
@@ -40,7 +40,7 @@ START = call(Z, STATE)
         ({"prologue": (call(A, B),)}, "reads words 4 to 5, which nobody writes"),
         ({"prologue": (call(Z, A, True),)}, "adds to words 4 to 5, which nobody wrote or zeroed before"),
         ({"prologue": (call(Z, Place(4, 3)),)}, "result 0 has 2 words, its place 3"),
-        ({"prologue": (Call(TWICE, (Z, Z), (A,)),)}, "has 1 arguments but 2 places"),
+        ({"prologue": (FunctionCall(TWICE, (Z, Z), (A,)),)}, "has 1 arguments but 2 places"),
         ({"body": (call(B, A), call(Z, B))}, r"body call 0 \(twice\): reads words 6 to 7, before they are complete"),
         ({"body": (call(Z, A),), "epilogue": (call(A, B),)}, "reads words 4 to 5, which are scratch of the body"),
         ({"body": (call(Z, A),), "outputs": {"a": A}}, "output a: reads words 4 to 5, which are scratch"),
@@ -69,7 +69,7 @@ def test_functions_must_be_dense_columns_of_sx() -> None:
         (sparse, "result 0 is not a dense column"),
     ):
         with pytest.raises(ProgramError, match=message):
-            make(prologue=(Call(function, (Z,), (A,)),))
+            make(prologue=(FunctionCall(function, (Z,), (A,)),))
 
 
 def test_sound_programs_pass() -> None:
