@@ -47,7 +47,7 @@ class Notes:
 
     def new(self, result: Result, skipped: bool) -> list[str]:
         """The lines to tell; none for a run that was done before."""
-        note = "" if skipped else result.backend.get("note", "")
+        note = "" if skipped else result.backend.note
         if not note or note in self.told:
             return []
         self.told.add(note)

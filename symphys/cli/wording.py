@@ -56,8 +56,8 @@ def brief(job: Job, result: Result, skipped: bool) -> str:
         return f"failed: {first_line(result.advice)}"
     if skipped:
         return f"done before ({verdict(result)})"
-    seconds = (result.seconds or {}).get("solve")
-    words = f"{verdict(result)}, objective {number(result.objective)}, {result.iterations} iterations"
+    seconds = result.seconds.get("solve")
+    words = f"{verdict(result)}, objective {number(result.objective)}, {result.iterations:.0f} iterations"
     return f"{words}, {duration(seconds)} s"
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from symphys.findings.examination import Trust
+from symphys.findings.examination import Examination
 from symphys.findings.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN, Finding, Judged, worst_of
 from symphys.findings.nearby import miss_findings
 from symphys.findings.numerics import (
@@ -35,7 +35,7 @@ VERDICTS = {GOOD: "agrees", FAIR: "agrees roughly", BAD: "disagrees", UNKNOWN: "
 """Of a gradient with differences."""
 
 
-def findings(trust: Trust, judged: Judged) -> list[Finding]:
+def findings(trust: Examination, judged: Judged) -> list[Finding]:
     """Every line for which there is a number."""
     lines = [Finding(FAULT, BAD, "A number that is not finite", "", f"{sentence(trust.fault)}")] if trust.fault else []
     lines += [gradient_finding(check) for check in trust.gradient]
@@ -49,7 +49,7 @@ def findings(trust: Trust, judged: Judged) -> list[Finding]:
     return lines + contact_findings(trust)
 
 
-def slopes(trust: Trust) -> tuple[list[str], list[list[str]]]:
+def slopes(trust: Examination) -> tuple[list[str], list[list[str]]]:
     """Header and rows of a table of gradients: against differences, and by how much refinements change them."""
     header = ["gradient of", "norm", "differs by", "", *(row.what for row in trust.refined)]
     rows = []
@@ -60,7 +60,7 @@ def slopes(trust: Trust) -> tuple[list[str], list[list[str]]]:
     return header, rows
 
 
-def answers(trust: Trust, judged: Judged) -> tuple[list[str], list[list[str]]]:
+def answers(trust: Examination, judged: Judged) -> tuple[list[str], list[list[str]]]:
     """Header and rows of a table of objective and worst error / tolerance by discretisation and smoothing."""
     rows = [["as asked", show(judged.objective, 4), show(judged.worst, 4), ""]]
     for row in trust.refined:
@@ -71,7 +71,7 @@ def answers(trust: Trust, judged: Judged) -> tuple[list[str], list[list[str]]]:
     return ["simulated", "objective", "worst / tolerance", ""], rows
 
 
-def advice(trust: Trust, judged: Judged) -> str:
+def advice(trust: Examination, judged: Judged) -> str:
     """One paragraph: what the findings say together."""
     lines = findings(trust, judged)
     if trust.fault:
@@ -89,7 +89,7 @@ def advice(trust: Trust, judged: Judged) -> str:
     return " ".join(part for part in parts if part)
 
 
-def of_influence(trust: Trust) -> str:
+def of_influence(trust: Examination) -> str:
     """What to say of variables that change nothing."""
     none = [check.variable for check in trust.gradient if unfelt(check)]
     if not none:
@@ -101,7 +101,7 @@ def of_influence(trust: Trust) -> str:
     )
 
 
-def of_misses(trust: Trust) -> str:
+def of_misses(trust: Examination) -> str:
     """What near misses and glancing touches advise."""
     line = next(iter(miss_findings(trust)), None)
     return f"Close by the motion is another one. {line.meaning}" if line else ""
@@ -118,7 +118,7 @@ def of_gradient(level: str, growth: str) -> str:
     }.get(level, "")
 
 
-def of_growth(trust: Trust, level: str) -> str:
+def of_growth(trust: Examination, level: str) -> str:
     """What the growth of changes advises."""
     far = reach(trust.growth)
     if not math.isnan(far.lost):
@@ -136,7 +136,7 @@ def of_growth(trust: Trust, level: str) -> str:
     }.get(level, "")
 
 
-def of_grid(trust: Trust, level: str, judged: Judged) -> str:
+def of_grid(trust: Examination, level: str, judged: Judged) -> str:
     """What refinement advises."""
     if level == GOOD:
         held = "still meets every check" if judged.met and judged.checked else "changes little"
@@ -147,7 +147,7 @@ def of_grid(trust: Trust, level: str, judged: Judged) -> str:
     }.get(level, "")
 
 
-def finer(trust: Trust, judged: Judged) -> str:
+def finer(trust: Examination, judged: Judged) -> str:
     """What to refine: that by which the answer changes most."""
     bad = [row for row in trust.refined if refined_finding(row, judged).level == BAD or row.change > SLOPE_LIMITS[1]]
     by_sweeps = bad and all(row.what == "sweeps x 2" for row in bad)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from symphys.findings.examination import Miss, Trust
+from symphys.findings.examination import Examination, Miss
 from symphys.findings.levels import FAIR, Finding
 from symphys.findings.writing import show
 
@@ -14,7 +14,7 @@ SPREAD = 1.0
 """Of their spreads: where seeds begin."""
 
 
-def miss_findings(trust: Trust) -> list[Finding]:
+def miss_findings(trust: Examination) -> list[Finding]:
     """A line for each that lies within a small step or within the spread of seeds."""
     return [miss_finding(miss) for miss in trust.misses if miss.steps <= STEP or miss.spreads <= SPREAD]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symphys.findings.examination import GradientCheck, Growth, Refined, Smoothed, Trust
+from symphys.findings.examination import Examination, GradientCheck, Growth, Refined, Smoothed
 from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Finding, Judged, graded, relative_change, worst_of
 from symphys.findings.writing import listed, percent, show
 
@@ -88,7 +88,7 @@ def refined_finding(refined: Refined, judged: Judged) -> Finding:
     return Finding(GRID, level, what, number, meaning)
 
 
-def slope_finding(trust: Trust) -> list[Finding]:
+def slope_finding(trust: Examination) -> list[Finding]:
     """What refinement does to the gradient; nothing where that was not measured."""
     changes = [(unbroken(refined.what), refined.change) for refined in trust.refined]
     known = [(what, change) for what, change in changes if not math.isnan(change)]

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from symphys.findings.examination import Trust
+from symphys.findings.examination import Examination
 from symphys.findings.examined import findings
 from symphys.findings.levels import FAIR, GOOD, Judged
 from symphys.findings.numerics import GROWTH, refined_finding
-from symphys.findings.reading import make_trust
 
 SOLVED = "solved"
 """Everything is met, or the point is stationary where there is nothing to meet; nothing speaks against it."""
@@ -43,11 +42,11 @@ class Ruling:
 
 def rule(status: str, judged: Judged, trust: Mapping[str, object] | None) -> Ruling:
     """The ruling on a run that ended with ``status``; ``trust`` as in result.json, None where nothing was measured."""
-    found = doubts(make_trust(dict(trust or {})), judged)
+    found = doubts(Examination.from_json(dict(trust or {})), judged)
     return Ruling(verdict(status, judged, bool(found)), found)
 
 
-def doubts(trust: Trust, judged: Judged) -> tuple[str, ...]:
+def doubts(trust: Examination, judged: Judged) -> tuple[str, ...]:
     """Why a result is not to be relied on, one clause for each finding that refutes it; empty if none does.
 
     That changes grow beyond use spoils gradients. It refutes a result unless finer simulations come to the same: a walk
@@ -57,7 +56,7 @@ def doubts(trust: Trust, judged: Judged) -> tuple[str, ...]:
     return tuple(line.doubt for line in found if line.about != GROWTH or not holds(trust, judged))
 
 
-def holds(trust: Trust, judged: Judged) -> bool:
+def holds(trust: Examination, judged: Judged) -> bool:
     """Whether finer simulations were done, and none of them is far from the result."""
     return bool(trust.refined) and all(refined_finding(row, judged).level in (GOOD, FAIR) for row in trust.refined)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from symphys.model.shapes import Terrain
 from symphys.model.world import Body, World
 from symphys.problem.parametric.sizes import extent
+from symphys.results.scene import SceneTerrain
 from symphys.shooting import Array
 
 MOST = 49
@@ -22,14 +22,14 @@ MARGIN = 0.15
 
 
 @dataclass(frozen=True)
-class Window:
+class TerrainCrop:
     """A rectangle of the x-y plane: ``low`` and ``high`` (2,) [m]."""
 
     low: Array
     high: Array
 
 
-def window(world: World, places: Array) -> Window:
+def crop(world: World, places: Array) -> TerrainCrop:
     """Where bodies at (n, 3) places may touch the ground, with room around."""
     flat = places[np.isfinite(places).all(axis=1), :2]
     flat = flat if len(flat) else np.zeros((1, 2))
@@ -39,7 +39,7 @@ def window(world: World, places: Array) -> Window:
     side = side if side > 0 else 1.0
     room = np.maximum(high - low + 2 * reach, LEAST_SHARE * side) / 2 + MARGIN * side
     middle = (low + high) / 2
-    return Window(middle - room, middle + room)
+    return TerrainCrop(middle - room, middle + room)
 
 
 def size(body: Body) -> float:
@@ -47,8 +47,8 @@ def size(body: Body) -> float:
     return max((float(np.linalg.norm(shape.centre)) + extent(shape) for shape in body.shapes), default=0.0)
 
 
-def sample(terrain: Terrain, near: Window) -> dict[str, Any]:
-    """``x`` (columns,) and ``y`` (rows,) [m], and ``z`` (rows, columns): the heights there [m]."""
+def sample(terrain: Terrain, near: TerrainCrop) -> SceneTerrain:
+    """The heights there."""
     sides = near.high - near.low
     columns, rows = (int(count) for count in np.maximum(np.round(MOST * sides / sides.max()), 2))
     x, y = (np.linspace(near.low[k], near.high[k], count) for k, count in enumerate((columns, rows)))
@@ -56,9 +56,9 @@ def sample(terrain: Terrain, near: Window) -> dict[str, Any]:
     height = ca.Function("height", [a, b], [terrain.height(a, b)])
     found = height(np.tile(x, rows)[None, :], np.repeat(y, columns)[None, :])
     z = np.array(found, float).reshape(rows, columns)
-    return {"x": short(x), "y": short(y), "z": [short(row) for row in z]}
+    return SceneTerrain(terrain.name, short(x), short(y), np.array([short(row) for row in z]))
 
 
-def short(numbers: Array) -> list[float]:
+def short(numbers: Array) -> Array:
     """Numbers with no more digits than a picture can show."""
-    return [float(f"{number:.7g}") for number in numbers.tolist()]
+    return np.array([float(f"{number:.7g}") for number in numbers.tolist()])

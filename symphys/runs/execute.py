@@ -6,10 +6,11 @@ import traceback
 
 from symphys import files
 from symphys.errors import SymphysError
+from symphys.results.file_names import CHECKPOINT, LOG, RESULT
 from symphys.results.result import Result
-from symphys.runs.folder import CHECKPOINT, LOG, RESULT, FolderBusy
+from symphys.runs.folder import FolderBusy
 from symphys.runs.job import Job
-from symphys.runs.provenance import stamp
+from symphys.runs.record import failure
 from symphys.runs.solving import solve
 from symphys.runs.transcription_cache import Workshop
 from symphys.solvers import Monitor, Outcome
@@ -85,8 +86,3 @@ def give_up(job: Job, message: str) -> Result:
     result = failure(job, message)
     finish(job, result)
     return result
-
-
-def failure(job: Job, message: str) -> Result:
-    """The result of a run that could not be done."""
-    return Result(**stamp(job), solved=False, status="failed", advice=message)

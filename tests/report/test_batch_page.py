@@ -11,7 +11,7 @@ import pytest
 
 from symphys.report import write_batch_report, write_run_report
 from symphys.results.discovery import run_folders
-from symphys.results.records import ReportError
+from symphys.results.text_files import ReportError
 
 
 def read(folder: Path) -> str:

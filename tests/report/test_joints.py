@@ -20,8 +20,8 @@ from symphys.report.pages.joints import limits_told, motors_told, separation_tol
 from symphys.report.robots.joint_figures import BEYOND, FULL, TARGET, draw_joints, unwound, window
 from symphys.report.robots.joint_grid import make_grid, shown
 from symphys.report.robots.joint_use import channels, separation
-from symphys.results.records import Trajectory
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene
+from symphys.trajectory import Trajectory
 
 Load = Callable[..., tuple[Trajectory, Scene]]
 KNEE = 3

@@ -13,7 +13,7 @@ import pytest
 
 from symphys.report import write_batch_report, write_run_report
 from symphys.results.drawable import LARGEST, OVERSIZED, drawable, oversized
-from symphys.results.reading import read_run
+from symphys.results.run import read_run
 
 HUGE = [1e155, 1e299, 1e307]
 RECORDED = ("objective", "best", "miss", "gradient_norm", "step")

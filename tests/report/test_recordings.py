@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from symphys.results.records import ReportError
+from symphys.results.text_files import ReportError
 from symphys.results.trajectories import read_trajectory
 
 BODIES = {"time": np.linspace(0, 0.3, 4), "body_names": np.array(["arm"]), "position": np.zeros((4, 1, 3))}

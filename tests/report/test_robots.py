@@ -23,8 +23,8 @@ from symphys.report.robots.strip import draw_strip, make_strip
 from symphys.report.scene.animation import NUMBERS, motion_data
 from symphys.report.scene.motion import draw_motion
 from symphys.report.scene.views import SIDE_XZ, TOP
-from symphys.results.records import Trajectory
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene
+from symphys.trajectory import Trajectory
 
 Load = Callable[..., tuple[Trajectory, Scene]]
 

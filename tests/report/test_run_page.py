@@ -14,7 +14,7 @@ import pytest
 
 from symphys.report import write_run_report
 from symphys.report.pages.verification import NOT_EXAMINED
-from symphys.results.records import ReportError
+from symphys.results.text_files import ReportError
 
 LARGEST = 3_000_000
 SLOWEST = 10.0

@@ -11,7 +11,7 @@ from page_scripts import NODE, run_script
 from yard import area
 
 from symphys.report.scene.outlines import outline
-from symphys.results.scene_records import Solid
+from symphys.results.scene import Solid
 
 pytestmark = NODE
 

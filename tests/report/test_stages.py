@@ -16,8 +16,7 @@ from symphys.report import write_batch_report, write_run_report
 from symphys.report.figures.curves import Curve, best_so_far, curve, miss_so_far
 from symphys.report.figures.history import draw_run
 from symphys.report.pages.stages import exact_ends, segments
-from symphys.results.reading import read_run
-from symphys.results.records import Run
+from symphys.results.run import Run, read_run
 
 Edit = Callable[..., None]
 KNOBS = (0.1, 0.01, 0.0)
@@ -102,7 +101,7 @@ def test_only_exact_numbers_are_compared(staged: Path) -> None:
     exact = run.trace["best"][ENDS[1] + 1 :]
     expected = np.concatenate([np.full(20, 7.0), np.full(10, 0.5), [0.02], np.minimum(exact, 0.02)])
     np.testing.assert_allclose(best_so_far(run), expected)
-    miss = np.fmin.accumulate(np.append(2.0, run.trace["miss"][ENDS[1] + 1 :]))
+    miss = np.fmin.accumulate(np.append(2.0, run.trace["max_violation"][ENDS[1] + 1 :]))
     np.testing.assert_allclose(miss_so_far(run), [*np.full(20, 700), *np.full(10, 50), *miss])
 
 

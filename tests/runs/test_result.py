@@ -19,7 +19,7 @@ GAIN = {"step": 1, "time": 0.1, "energy": 9.0, "contacts": ["a-b"]}
 
 
 def result(*errors: float) -> Result:
-    checks = [CheckRecord(kind="target", name="inf", error=e, tolerance=0.5, ratio=2 * e, met=e <= 0.5) for e in errors]
+    checks = tuple(CheckRecord("target", "inf", error=e, tolerance=0.5, ratio=2 * e, met=e <= 0.5) for e in errors)
     return Result("p", "nan", "gradient", 0, False, "budget", "", objective=NAN, checks=checks)
 
 

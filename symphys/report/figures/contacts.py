@@ -14,8 +14,8 @@ from matplotlib.lines import Line2D
 
 from symphys.report.figures import style
 from symphys.report.scene.views import centres
-from symphys.results.records import Array, Trajectory
-from symphys.results.scene_records import Scene, Solid
+from symphys.results.scene import Scene, Solid
+from symphys.trajectory import Array, Trajectory
 
 MOST_PAIRS = 6
 NORMAL, TANGENTIAL, WHOLE, GAP = style.BODIES[0], style.ORANGE, style.GREEN, style.GREY

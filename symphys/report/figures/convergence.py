@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from symphys.report.figures import style
 from symphys.report.figures.curves import QUANTITIES, Curve, Quantity, curve, median_curve, miss_so_far, told
 from symphys.results.discovery import Study
-from symphys.results.records import Array
+from symphys.trajectory import Array
 
 WORK, SECONDS = "equivalents", "seconds"
 AXIS_TITLES = {WORK: "work [rollout equivalents]", SECONDS: "time of the solve [s]"}

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symphys.results.records import TOLD, Array, Run
-from symphys.results.stage_record import Stage, smoothed
+from symphys.results.result import StageRecord, smoothed
+from symphys.results.run import Run
+from symphys.results.trace import OUTPUT
+from symphys.trajectory import Array
 
 GRID = 300
 
@@ -30,12 +32,12 @@ def best_so_far(run: Run) -> Array:
 
 def miss_so_far(run: Run) -> Array:
     """(rows,): the smallest largest error / tolerance up to each iteration."""
-    return falling(run, run.trace["miss"], "worst", lambda stage: stage.exact_worst)
+    return falling(run, run.trace["max_violation"], "worst", lambda stage: stage.exact_worst)
 
 
 def told(name: str) -> Quantity:
     """(rows,): what the problem tells of the best point so far."""
-    return lambda run: np.where(run.trace["smoothing"] > 0, np.nan, run.trace[TOLD + name])
+    return lambda run: np.where(run.trace["smoothing"] > 0, np.nan, run.trace[OUTPUT + name])
 
 
 Quantity = Callable[[Run], Array]
@@ -45,7 +47,7 @@ QUANTITIES: tuple[tuple[str, Quantity], ...] = (
 )
 
 
-def falling(run: Run, recorded: Array, name: str, exact: Callable[[Stage], float]) -> Array:
+def falling(run: Run, recorded: Array, name: str, exact: Callable[[StageRecord], float]) -> Array:
     """(rows,): the lowest of what is known to hold exactly.
 
     A row of a stage of smoothing tells of another problem: of such a stage only its start and its end count, judged

@@ -13,8 +13,10 @@ from matplotlib.figure import Figure
 from symphys.report.figures import style
 from symphys.report.figures.convergence import AXIS_TITLES, MISS_FLOOR, WORK, fit_values, mark_tolerance
 from symphys.report.pages import stages
-from symphys.results.records import TOLD, Array, Run
-from symphys.results.stage_record import Stage, smoothed
+from symphys.results.result import StageRecord, smoothed
+from symphys.results.run import Run
+from symphys.results.trace import OUTPUT
+from symphys.trajectory import Array
 
 HEADROOM = 0.16
 """Above and below the curves where names of stages stand over them, as a share of the axis."""
@@ -35,7 +37,7 @@ class Panel:
     title: str
     values: Array
     best: Array | None = None
-    exact: Callable[[Stage], float] | None = None
+    exact: Callable[[StageRecord], float] | None = None
     relative: bool = False
 
 
@@ -71,13 +73,13 @@ def panels_of(run: Run) -> list[Panel]:
         Panel("Objective", trace["objective"], stage_best(run), lambda stage: stage.exact_objective),
         Panel(
             "Largest error / tolerance",
-            np.maximum(trace["miss"], MISS_FLOOR),
+            np.maximum(trace["max_violation"], MISS_FLOOR),
             exact=lambda stage: max(stage.exact_worst, MISS_FLOOR),
             relative=True,
         ),
         Panel("Norm of the gradient", trace["gradient_norm"]),
         Panel("Step" if not run.solver.startswith("cma") else "Step size σ", trace["step"]),  # noqa: RUF001
-        *(Panel(name[:1].upper() + name[1:], trace[TOLD + name]) for name in trace.told),
+        *(Panel(name[:1].upper() + name[1:], trace[OUTPUT + name]) for name in trace.outputs),
     ]
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from symphys import files
 from symphys.report.figures.style import Picture
-from symphys.results.discovery import FIGURES
+from symphys.results.file_names import FIGURES
 
 
 def write_figures(folder: Path, pictures: Iterable[Picture]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from symphys.results.records import Mask
+from symphys.trajectory import Mask
 
 
 def spans(holds: Mask) -> list[tuple[int, int]]:

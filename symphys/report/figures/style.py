@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator, SymmetricalLogLocator
 
 from symphys.findings import writing
-from symphys.results.records import Array
+from symphys.trajectory import Array
 
 WIDTH = 10.0
 """[in] of every figure"""

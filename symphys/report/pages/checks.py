@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 
 from symphys.report.figures import style
 from symphys.results.discovery import Study
-from symphys.results.records import Array
+from symphys.trajectory import Array
 
 MOST_CHECKS = 16
 LOWEST, HIGHEST = 1e-3, 1e4

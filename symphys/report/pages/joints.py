@@ -16,9 +16,9 @@ from symphys.report.robots.joint_figures import draw_joints
 from symphys.report.robots.joint_grid import shown
 from symphys.report.robots.joint_use import Channel, channels, separation
 from symphys.report.robots.strip import draw_strip
-from symphys.results.joint_records import SceneMotor
-from symphys.results.records import Trajectory
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene
+from symphys.results.scene_joints import SceneMotor
+from symphys.trajectory import Trajectory
 
 OFTEN = 0.25
 """A motor that is saturated for this share of the time is marked in the table."""

@@ -13,10 +13,9 @@ from symphys.report.pages import sections
 from symphys.report.pages.joints import gait_card, joint_card, joint_pictures
 from symphys.report.pages.markup import card, figures, join, page, tag
 from symphys.report.scene.motion import draw_motion
-from symphys.results.records import Trajectory
-from symphys.results.scene_reading import read_scene
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene, read_scene
 from symphys.results.trajectories import read_trajectory
+from symphys.trajectory import Trajectory
 
 
 def write_motion(trajectory_npz: Path, scene_json: Path, out: Path, title: str = "Motion") -> Path:

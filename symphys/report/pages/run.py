@@ -25,12 +25,13 @@ from symphys.report.scene.motion import draw_motion
 from symphys.results import text_files as tables
 from symphys.results.discovery import is_run
 from symphys.results.drawable import OVERSIZED, drawable, oversized
-from symphys.results.reading import CONFIG, PROBLEM, read_run
-from symphys.results.records import ReportError, Run, Trajectory
-from symphys.results.scene_reading import SCENE, read_scene
-from symphys.results.scene_records import Scene
-from symphys.results.stage_record import smoothed
-from symphys.results.trajectories import GUESS, TRAJECTORY, read_trajectory
+from symphys.results.file_names import CONFIG, GUESS, PROBLEM, SCENE, TRAJECTORY
+from symphys.results.result import smoothed
+from symphys.results.run import Run, read_run
+from symphys.results.scene import Scene, read_scene
+from symphys.results.text_files import ReportError
+from symphys.results.trajectories import read_trajectory
+from symphys.trajectory import Trajectory
 
 PAGE = "report.html"
 LOG = "log.txt"
@@ -106,8 +107,8 @@ def draw(run: Run, recording: Recording) -> dict[str, Picture]:
         made += style.picture("states", "Position, velocity and angular velocity over time", draw_states(motion))
         made += style.picture("controls", "Forces and torques over time", draw_controls(motion))
         made += style.picture("contacts", "Contact forces and gaps over time", draw_contacts(motion, recording.scene))
-    made += style.picture("growth", "How changes grow until the end", draw_growth(run.trust.growth, motion))
-    made += style.picture("energy", "Energy over time", draw_energy(run.trust.energy))
+    made += style.picture("growth", "How changes grow until the end", draw_growth(run.examination.growth, motion))
+    made += style.picture("energy", "Energy over time", draw_energy(run.examination.energy))
     return {picture.name: picture for picture in made}
 
 

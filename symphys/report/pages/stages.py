@@ -14,8 +14,9 @@ from symphys.findings.writing import show
 from symphys.report.figures import style
 from symphys.report.pages import words
 from symphys.report.pages.markup import Html, card, pill, table, tag
-from symphys.results.records import Array, Run
-from symphys.results.stage_record import Stage, smoothed
+from symphys.results.result import StageRecord, smoothed
+from symphys.results.run import Run
+from symphys.trajectory import Array
 
 NARROWEST = 0.09
 """A stage that takes less of the axis has no room for its name."""
@@ -40,12 +41,12 @@ def stage_card(run: Run) -> Html:
     return card("Stages of smoothing", content, remark(run), anchor="stages", note=HOW_READ)
 
 
-def used(stages: Sequence[Stage], kind: str) -> bool:
+def used(stages: Sequence[StageRecord], kind: str) -> bool:
     """Whether any stage did an evaluation of this kind."""
     return any(stage.counts.get(kind, 0) > 0 for stage in stages)
 
 
-def row(stage: Stage, kinds: Sequence[str], checked: bool) -> list[Html | str]:
+def row(stage: StageRecord, kinds: Sequence[str], checked: bool) -> list[Html | str]:
     """The cells of one stage."""
     cells: list[Html | str] = [f"{show(stage.smoothing)} m/s" if stage.smoothing else "0, exact"]
     cells += [words.ended(stage.status), show(stage.objective), tag("b", show(stage.exact_objective))]
@@ -69,7 +70,7 @@ def remark(run: Run) -> Html:
     return tag("p", f"{text}: what the last stages gained, they gained for another problem.", class_="caption")
 
 
-def rank(stage: Stage) -> tuple[bool, float]:
+def rank(stage: StageRecord) -> tuple[bool, float]:
     """What comes closest in the exact rollout is lowest."""
     return not stage.solved, stage.exact_objective if math.isfinite(stage.exact_objective) else math.inf
 
@@ -105,7 +106,7 @@ def draw_bands(axes: Axes, run: Run, x: Array, named: bool) -> None:
             )
 
 
-def exact_ends(run: Run, x: Array, of: Callable[[Stage], float]) -> list[tuple[float, float, bool]]:
+def exact_ends(run: Run, x: Array, of: Callable[[StageRecord], float]) -> list[tuple[float, float, bool]]:
     """(x, exact number, whether met) at the end of each stage that the trace tells of."""
     ends = {run.trace["smoothing"][part.start]: x[part.stop - 1] for part in segments(run)}
     told = [(ends[s.smoothing], of(s), s.solved) for s in run.stages if s.smoothing in ends]

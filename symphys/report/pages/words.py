@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 from symphys.findings.verdict import BEST_FOUND, DOUBTED, SOLVED, told
 from symphys.findings.writing import listed, plain, show
-from symphys.results.records import Check, Run
+from symphys.results.result import CheckRecord
+from symphys.results.run import Run
 
 STATUS = {
     "met": "everything met",
@@ -96,7 +97,7 @@ def verdict(run: Run) -> str:
         )
     elif run.verdict in (SOLVED, DOUBTED):
         total = "The only check is" if len(run.checks) == 1 else f"All {len(run.checks)} checks are"
-        text = f"{total} met; the largest error is {show(run.worst, 2)} of its tolerance{work(run)}."
+        text = f"{total} met; the largest error is {show(run.worst_ratio, 2)} of its tolerance{work(run)}."
     else:
         text = f"{misses(missed, len(run.checks))} {STOPPED.get(run.status, '')}"
     return f"{text.strip()} {doubted(run)}".strip()
@@ -107,7 +108,7 @@ def doubted(run: Run) -> str:
     return f"But it is not to be relied on: {'; '.join(run.doubts)}." if run.verdict == DOUBTED else ""
 
 
-def misses(missed: Sequence[Check], total: int) -> str:
+def misses(missed: Sequence[CheckRecord], total: int) -> str:
     """How many checks are missed, and the worst by name."""
     if not missed:
         return "The run did not end as solved, though no check is missed."
@@ -122,8 +123,8 @@ def misses(missed: Sequence[Check], total: int) -> str:
 
 def work(run: Run) -> str:
     """What a solve took."""
-    counts = [(kind, run.effort.counts.get(kind, 0.0)) for kind in ("rollouts", "gradients")]
+    counts = [(kind, run.counts.get(kind, 0.0)) for kind in ("rollouts", "gradients")]
     parts = [f"{count(number)} {kind}" for kind, number in counts if number > 0]
-    took = run.effort.seconds.get("solve", math.nan)
+    took = run.seconds.get("solve", math.nan)
     spent = f" in {seconds(took)}" if math.isfinite(took) else ""
     return f", after {listed(parts)}{spent}" if parts else ""

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from symphys.report.figures import style
-from symphys.results.records import Trajectory
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene
+from symphys.trajectory import Trajectory
 
 
 @dataclass(frozen=True)

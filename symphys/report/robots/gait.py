@@ -8,8 +8,8 @@ import numpy as np
 
 from symphys.report.figures.contacts import labels, pair_of
 from symphys.report.robots.branches import linked
-from symphys.results.records import Array, Mask, Trajectory
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene
+from symphys.trajectory import Array, Mask, Trajectory
 
 LOADED = 0.02
 """A body stands where it carries more than this share of the weight of all that joints hold."""
@@ -31,7 +31,7 @@ class Stance:
 def weight(trajectory: Trajectory, scene: Scene) -> float:
     """[N] of all bodies that joints hold; nan where a mass or gravity is not known."""
     names = {trajectory.body_names[body] for body in linked(trajectory, scene)}
-    return scene.gravity * sum(body.mass for body in scene.bodies if body.name in names)
+    return scene.weight_per_mass * sum(body.mass for body in scene.bodies if body.name in names)
 
 
 def stances(trajectory: Trajectory, scene: Scene) -> list[Stance]:

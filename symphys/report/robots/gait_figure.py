@@ -10,8 +10,8 @@ from symphys.report.figures import style
 from symphys.report.figures.spans import spans
 from symphys.report.robots.branches import colours
 from symphys.report.robots.gait import Stance, has_gait, stances
-from symphys.results.records import Array, Trajectory
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene
+from symphys.trajectory import Array, Trajectory
 
 MOST_ROWS = 24
 ROW = 0.3

@@ -16,8 +16,8 @@ from symphys.report.figures import style
 from symphys.report.figures.spans import spans
 from symphys.report.robots.joint_grid import FEW, Grid, colour_of, make_grid, shown
 from symphys.report.robots.joint_use import Channel, channels
-from symphys.results.records import Array, Trajectory
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene
+from symphys.trajectory import Array, Trajectory
 
 BEYOND = "#e9edf0"
 FULL = style.VERMILION

@@ -10,8 +10,8 @@ import numpy as np
 from symphys.report.figures import style
 from symphys.report.robots.branches import colours, limbs
 from symphys.report.robots.joint_use import Channel
-from symphys.results.records import Trajectory
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene
+from symphys.trajectory import Trajectory
 
 MOST = 24
 """Coordinates in a figure at most."""

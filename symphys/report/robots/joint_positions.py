@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from symphys.report.figures import style
 from symphys.report.robots.branches import linked
 from symphys.report.scene.views import View, centres, turn
-from symphys.results.joint_records import SceneJoint
-from symphys.results.records import Array, Trajectory
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene
+from symphys.results.scene_joints import SceneJoint
+from symphys.trajectory import Array, Trajectory
 
 AXES = {"hinge": ((0, 0),), "slider": ((1, 0),), "universal": ((1, 1), (0, 0))}
 """Which axes of a joint are drawn: (side, axis of that side's socket)."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symphys.results.joint_records import SceneJoint
-from symphys.results.records import Array, Mask, Trajectory
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene
+from symphys.results.scene_joints import SceneJoint
+from symphys.trajectory import Array, Mask, Trajectory
 
 FULL = 1 - 1e-3
 """A motor is saturated from this share of its largest torque on."""

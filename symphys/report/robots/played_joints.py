@@ -7,8 +7,8 @@ import numpy as np
 from symphys.report.robots.branches import linked
 from symphys.report.robots.joint_positions import SQUARE, axes_of, drawable
 from symphys.report.scene.views import reach
-from symphys.results.records import Trajectory
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene
+from symphys.trajectory import Trajectory
 
 FAR = 2.5
 """The camera goes along where bodies that hang together travel farther than so many times their size."""

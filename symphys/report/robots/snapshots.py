@@ -16,8 +16,8 @@ from symphys.report.robots.joint_positions import bones, draw_lines, draw_pivots
 from symphys.report.scene.outlines import inner_edges, outline
 from symphys.report.scene.panel import Panel
 from symphys.report.scene.views import View, centres, half_axes, solids_of, turn
-from symphys.results.records import Array, Trajectory
-from symphys.results.scene_records import Scene, Solid
+from symphys.results.scene import Scene, Solid
+from symphys.trajectory import Array, Trajectory
 
 APART = 0.75
 """Snapshots in one picture are apart by this share of the robot's length at least."""

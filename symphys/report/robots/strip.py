@@ -19,8 +19,8 @@ from symphys.report.robots.snapshots import Whole, extents
 from symphys.report.scene.ground import draw_ground
 from symphys.report.scene.panel import Panel, include
 from symphys.report.scene.views import NAMES, View, choose_views
-from symphys.results.records import Array, Trajectory
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene
+from symphys.trajectory import Array, Trajectory
 
 LEFT, RIGHT, BOTTOM, TOP, GAP, BETWEEN = 0.72, 0.1, 0.42, 0.3, 0.1, 0.18
 """[in] margins, and gaps between columns and rows"""

@@ -11,8 +11,8 @@ from symphys.report.pages.markup import Html, dot, join, tag
 from symphys.report.robots.branches import colours, keys, traced
 from symphys.report.robots.played_joints import follow_data, joint_data
 from symphys.report.scene.views import SIDE_YZ, TOP, choose_views, solids_of
-from symphys.results.records import Array, Trajectory
-from symphys.results.scene_records import Scene, SceneTerrain, Solid
+from symphys.results.scene import Scene, SceneTerrain, Solid
+from symphys.trajectory import Array, Trajectory
 
 NUMBERS = 60_000
 """How many numbers a page carries at most for one motion, about 400 kB."""

@@ -15,8 +15,8 @@ from symphys.report.figures import style
 from symphys.report.scene.outlines import inner_edges, outline
 from symphys.report.scene.panel import Panel
 from symphys.report.scene.views import View, half_axes
-from symphys.results.records import Trajectory
-from symphys.results.scene_records import UPRIGHT, Scene, SceneTerrain, Solid
+from symphys.results.scene import UPRIGHT, Scene, SceneTerrain, Solid
+from symphys.trajectory import Trajectory
 
 SHADES = LinearSegmentedColormap.from_list("heights", ["#ffffff", "#d8dfe6"])
 HATCH: dict[str, Any] = {"facecolor": style.GROUND, "edgecolor": "#d5dbe1", "hatch": "////", "linewidth": 0}

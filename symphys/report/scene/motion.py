@@ -16,8 +16,8 @@ from symphys.report.scene.ground import draw_ground
 from symphys.report.scene.panel import RIGHT, Panel, arrange, dress, lay_out, make_panel, widen
 from symphys.report.scene.snapshots import draw_bodies
 from symphys.report.scene.views import choose_views
-from symphys.results.records import Trajectory
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene
+from symphys.trajectory import Trajectory
 
 
 def draw_motion(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = None) -> Figure:

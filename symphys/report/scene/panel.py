@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from symphys.report.figures import style
 from symphys.report.scene.views import NAMES, View, half_axes, reach
-from symphys.results.records import Array, Trajectory
-from symphys.results.scene_records import UPRIGHT, Scene, SceneFixture, ScenePlane, SceneTerrain
+from symphys.results.scene import UPRIGHT, Scene, SceneFixture, ScenePlane, SceneTerrain
+from symphys.trajectory import Array, Trajectory
 
 LEFT, RIGHT, BOTTOM, TOP, GAP = 0.62, 0.15, 0.5, 0.5, 0.62
 """[in] margins of the figure and between its panels"""

@@ -14,8 +14,8 @@ from symphys.report.figures import style
 from symphys.report.scene.outlines import inner_edges, outline
 from symphys.report.scene.panel import Panel
 from symphys.report.scene.views import View, centres, half_axes, reach, solids_of, turn
-from symphys.results.records import Array, Trajectory
-from symphys.results.scene_records import Scene, Solid
+from symphys.results.scene import Scene, Solid
+from symphys.trajectory import Array, Trajectory
 
 MOST_LABELLED = 3
 SHAPES = 220
