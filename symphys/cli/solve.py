@@ -23,7 +23,7 @@ from symphys.cli.arguments import (
 from symphys.cli.wording import many_pairs
 
 if TYPE_CHECKING:
-    from symphys.runs import Batch, Job
+    from symphys.runs import BatchResult, Job
 
 MOST_SEEDS = 10_000
 MOST_JOBS = 256
@@ -98,7 +98,7 @@ def solve(
     return conclude(asked, batch, out)
 
 
-def conclude(jobs: list[Job], batch: Batch, out: Path) -> int:
+def conclude(jobs: list[Job], batch: BatchResult, out: Path) -> int:
     """Show what came of it; the exit code."""
     from symphys.cli.summary import print_summary
 
@@ -110,7 +110,7 @@ def conclude(jobs: list[Job], batch: Batch, out: Path) -> int:
     return 0 if batch.accepted else 1
 
 
-def last_words(batch: Batch, out: Path) -> str:
+def last_words(batch: BatchResult, out: Path) -> str:
     """What an interruption has left, and how to go on."""
     over = sum(result is not None and not result.interrupted for result in batch.results)
     halfway = sum(result is not None and result.interrupted for result in batch.results)

@@ -16,13 +16,13 @@ from symphys.cli.wording import duration, first_line, number, verdict, whole
 from symphys.findings.verdict import BEST_FOUND, DOUBTED
 
 if TYPE_CHECKING:
-    from symphys.runs import Batch, Job, Result
+    from symphys.runs import BatchResult, Job, Result
 
 NARROWEST = 120
 """Columns of the table where the output is no terminal."""
 
 
-def print_summary(jobs: list[Job], batch: Batch) -> None:
+def print_summary(jobs: list[Job], batch: BatchResult) -> None:
     """Print the table, and the advice of what is not solved."""
     groups: dict[tuple[str, str], list[Result]] = {}
     for job, result in zip(jobs, batch.results, strict=True):

@@ -63,9 +63,9 @@ def brief(job: Job, result: Result, skipped: bool) -> str:
 
 def verdict(result: Result) -> str:
     """Solved, or why not."""
-    from symphys.findings.verdict import told
+    from symphys.findings.verdict import verdict_words
 
-    return told(result.verdict, result.status, bool(result.checks))
+    return verdict_words(result.verdict, result.status, bool(result.checks))
 
 
 def first_line(text: str) -> str:

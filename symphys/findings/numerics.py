@@ -113,7 +113,7 @@ def unbroken(text: str) -> str:
 
 
 @dataclass(frozen=True)
-class Reach:
+class GradientReach:
     """What a growth curve says.
 
     Attributes:
@@ -131,7 +131,7 @@ class Reach:
     lost: float
 
 
-def reach(growth: Growth) -> Reach:
+def reach(growth: Growth) -> GradientReach:
     """How far a gradient reaches.
 
     |dx_T/dx_s| <= |dx_T/dx_t| |dx_t/dx_s|: what the curve has fallen from s to t, a change has at least grown. So a
@@ -142,7 +142,7 @@ def reach(growth: Growth) -> Reach:
     time, factor = growth.time[finite], growth.factor[finite]
     lost = np.nan if finite.all() or not finite.any() else float(time[0])
     if not factor.size:
-        return Reach(np.nan, np.nan, np.inf, np.inf, np.nan)
+        return GradientReach(np.nan, np.nan, np.inf, np.inf, np.nan)
     first = int(factor.argmax())
     grown = factor[first] / np.maximum(factor[first:], 1e-300)
     beyond, half = grown > GROWTH_LIMITS[1], grown > np.sqrt(factor[first])
@@ -150,7 +150,7 @@ def reach(growth: Growth) -> Reach:
     end = float(since[beyond.argmax()]) if beyond.any() else np.inf
     doublings = np.log2(factor[first]) / 2
     doubling = float(since[half.argmax()] - since[0]) / doublings if half.any() and doublings > 0 else np.inf
-    return Reach(float(factor[first]), float(time[first]), end, doubling, lost)
+    return GradientReach(float(factor[first]), float(time[first]), end, doubling, lost)
 
 
 def growth_finding(growth: Growth) -> Finding:
@@ -171,7 +171,7 @@ def growth_finding(growth: Growth) -> Finding:
     return Finding(GROWTH, level, what, f"× {show(far.total, 2)}", meaning, doubt * (level == BAD))  # noqa: RUF001
 
 
-def too_far(far: Reach) -> str:
+def too_far(far: GradientReach) -> str:
     """Where a gradient ends, as a clause."""
     if not math.isfinite(far.end):
         return ""

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from symphys.findings.advice import findings
+from symphys.findings.endings import ending
 from symphys.findings.examination import Examination
-from symphys.findings.examined import findings
 from symphys.findings.levels import FAIR, GOOD, Judged
 from symphys.findings.numerics import GROWTH, refined_finding
 
@@ -22,9 +23,6 @@ INTERRUPTED = "interrupted"
 
 ACCEPTED = (SOLVED, BEST_FOUND)
 """What a run was asked for, it did."""
-ENDED_BADLY = ("not_finite", "not_applicable", "failed")
-STATIONARY = ("met", "converged")
-"""Of the ways in which solvers end."""
 
 
 @dataclass(frozen=True)
@@ -71,16 +69,16 @@ def verdict(status: str, judged: Judged, doubted: bool) -> str:
     """
     if status == INTERRUPTED:
         return INTERRUPTED
-    if not judged.met or not (judged.checked or status not in ENDED_BADLY):
+    if not judged.met or not (judged.checked or ending(status).usable):
         return NOT_SOLVED
     if doubted:
         return DOUBTED
-    return SOLVED if judged.checked or status in STATIONARY else BEST_FOUND
+    return SOLVED if judged.checked or ending(status).stationary else BEST_FOUND
 
 
-def told(word: str, status: str, checked: bool) -> str:
+def verdict_words(word: str, status: str, checked: bool) -> str:
     """A verdict in a few words, such as "best found, budget ended"."""
-    how = {"budget": "budget ended", "stalled": "no more progress"}.get(status, status.replace("_", " "))
+    how = ending(status).brief
     return {
         SOLVED: "solved",
         DOUBTED: "met, but not to be trusted" if checked else "found, but not to be trusted",

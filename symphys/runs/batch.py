@@ -11,7 +11,7 @@ from symphys.runs.execute import execute
 from symphys.runs.job import Job
 from symphys.runs.multi_start import groups, solve_group
 from symphys.runs.stopping import Interrupts, Stop
-from symphys.runs.transcription_cache import Transcribe, Workshop
+from symphys.runs.transcription_cache import Transcribe, TranscriptionCache
 from symphys.runs.workers import side_by_side
 from symphys.solvers import Monitor, TraceRow
 
@@ -30,7 +30,7 @@ class Observer(Protocol):
 
 
 @dataclass(frozen=True)
-class Batch:
+class BatchResult:
     """What came of the jobs.
 
     Attributes:
@@ -49,7 +49,7 @@ class Batch:
 
 def run_batch(
     jobs: Sequence[Job], processes: int, observer: Observer, transcribe: Transcribe, together: bool = False
-) -> Batch:
+) -> BatchResult:
     """Run what is not done yet, here or in ``processes`` workers, until all is done or Ctrl-C is pressed.
 
     ``together``: here, solve the seeds of a problem and solver side by side where the solver can.
@@ -61,12 +61,12 @@ def run_batch(
             side_by_side(waiting, processes, transcribe, ledger, stop)
         else:
             one_by_one(waiting, transcribe, ledger, stop, together)
-    return Batch(tuple(ledger.results), stop.requested)
+    return BatchResult(tuple(ledger.results), stop.requested)
 
 
 def one_by_one(jobs: Mapping[int, Job], transcribe: Transcribe, ledger: Ledger, stop: Stop, together: bool) -> None:
     """Run all jobs in this process."""
-    workshop = Workshop(transcribe)
+    transcriptions = TranscriptionCache(transcribe)
 
     def watch(index: int) -> Monitor:
         def monitor(row: TraceRow) -> None:
@@ -82,9 +82,9 @@ def one_by_one(jobs: Mapping[int, Job], transcribe: Transcribe, ledger: Ledger, 
         for index in group:
             ledger.started(index)
         here = {index: jobs[index] for index in group}
-        solved = solve_group(here, workshop, watch) if len(group) > 1 else {}
+        solved = solve_group(here, transcriptions, watch) if len(group) > 1 else {}
         for index, job in here.items():
-            ledger.ended(index, execute(job, watch(index), workshop, solved.get(index)))
+            ledger.ended(index, execute(job, watch(index), transcriptions, solved.get(index)))
 
 
 @dataclass

@@ -12,11 +12,11 @@ from symphys.runs.folder import FolderBusy
 from symphys.runs.job import Job
 from symphys.runs.record import failure
 from symphys.runs.solving import solve
-from symphys.runs.transcription_cache import Workshop
+from symphys.runs.transcription_cache import TranscriptionCache
 from symphys.solvers import Monitor, Outcome
 
 
-def execute(job: Job, monitor: Monitor, workshop: Workshop, solved: Outcome | None = None) -> Result:
+def execute(job: Job, monitor: Monitor, transcriptions: TranscriptionCache, solved: Outcome | None = None) -> Result:
     """Do the run, or go on with it, unless it is done; write its folder; tell what it found.
 
     ``monitor`` sees each iteration and may raise KeyboardInterrupt, which ends the run so that it can go on later.
@@ -28,13 +28,17 @@ def execute(job: Job, monitor: Monitor, workshop: Workshop, solved: Outcome | No
             earlier = job.folder.earlier(job.config)
             if earlier and not earlier.interrupted:
                 return earlier
-            return proceed(job, monitor, workshop, earlier, solved)
+            return proceed(job, monitor, transcriptions, earlier, solved)
     except FolderBusy as error:
         return failure(job, str(error))
 
 
 def proceed(
-    job: Job, monitor: Monitor, workshop: Workshop, earlier: Result | None, solved: Outcome | None = None
+    job: Job,
+    monitor: Monitor,
+    transcriptions: TranscriptionCache,
+    earlier: Result | None,
+    solved: Outcome | None = None,
 ) -> Result:
     """Solve and write down what came of it; ``earlier`` is the interrupted run to go on with."""
     checkpoint = job.folder.checkpoint() if earlier else None
@@ -43,7 +47,7 @@ def proceed(
         job.folder.begin(job.config, job.problem.text)
     log = Log(job)
     try:
-        result = solve(job, workshop(job), monitor, log, checkpoint, earlier, solved)
+        result = solve(job, transcriptions(job), monitor, log, checkpoint, earlier, solved)
     except files.FileError:
         raise
     except SymphysError as error:

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Collection, Mapping
 
 from symphys.runs.job import Job
-from symphys.runs.transcription_cache import Workshop
+from symphys.runs.transcription_cache import TranscriptionCache
 from symphys.solvers import Monitor, Outcome, TraceRow, solve_together, solver
 
 
@@ -27,7 +27,9 @@ def alike(one: Job, other: Job) -> bool:
     return same and solver(one.config.solver).threaded
 
 
-def solve_group(jobs: Mapping[int, Job], workshop: Workshop, watch: Callable[[int], Monitor]) -> dict[int, Outcome]:
+def solve_group(
+    jobs: Mapping[int, Job], transcriptions: TranscriptionCache, watch: Callable[[int], Monitor]
+) -> dict[int, Outcome]:
     """The outcomes of a group, each as if solved alone; none where something fails: each then has to show by itself."""
     first = next(iter(jobs.values()))
     lock = threading.Lock()
@@ -43,7 +45,7 @@ def solve_group(jobs: Mapping[int, Job], workshop: Workshop, watch: Callable[[in
 
     seeds = [job.config.seed for job in jobs.values()]
     try:
-        shooting = workshop(first).shooting
+        shooting = transcriptions(first).shooting
         starts = [shooting.start(seed) for seed in seeds]
         monitors = [monitored(index) for index in jobs]
         chosen = solver(first.config.solver)

@@ -20,7 +20,7 @@ from symphys.results.result import Result
 from symphys.runs.execute import execute, give_up
 from symphys.runs.job import Job
 from symphys.runs.stopping import Stop, deaf
-from symphys.runs.transcription_cache import Transcribe, Workshop
+from symphys.runs.transcription_cache import Transcribe, TranscriptionCache
 from symphys.solvers import TraceRow
 
 TICK = 0.1
@@ -53,14 +53,14 @@ def side_by_side(jobs: Mapping[int, Job], count: int, transcribe: Transcribe, li
     threads.limit()
     waiting = dict(jobs)
     while waiting and not stop():
-        pool = Pool(waiting, count, transcribe, listener, stop)
+        pool = WorkerPool(waiting, count, transcribe, listener, stop)
         pool.run()
         if pool.broken and not pool.begun:
             raise SymphysError("worker processes cannot be started here; leave --jobs out")
         for index in pool.suspects:
             if stop():
                 return
-            alone = Pool({index: waiting[index]}, 1, transcribe, listener, stop)
+            alone = WorkerPool({index: waiting[index]}, 1, transcribe, listener, stop)
             alone.run()
             if alone.suspects:
                 listener.ended(index, give_up(waiting[index], CRASHED))
@@ -68,7 +68,7 @@ def side_by_side(jobs: Mapping[int, Job], count: int, transcribe: Transcribe, li
 
 
 @dataclass
-class Pool:
+class WorkerPool:
     """One set of worker processes and what became of its jobs.
 
     Attributes:
@@ -160,13 +160,13 @@ class Worker:
 
     mailbox: SimpleQueue[Message]
     halt: Event
-    workshop: Workshop
+    transcriptions: TranscriptionCache
     told: float = 0.0
 
     def work(self, index: int, job: Job) -> Result:
         """Do one job."""
         self.mailbox.put((index, None))
-        return execute(job, lambda row: self.watch(index, row), self.workshop)
+        return execute(job, lambda row: self.watch(index, row), self.transcriptions)
 
     def watch(self, index: int, row: TraceRow) -> None:
         """Tell the parent now and then; stop the solver when asked to."""
@@ -184,7 +184,7 @@ here: list[Worker] = []
 
 def prepare(mailbox: SimpleQueue[Message], halt: Event, transcribe: Transcribe) -> None:
     """Set a worker process up, and let it end with its parent."""
-    here[:] = [Worker(mailbox, halt, Workshop(transcribe))]
+    here[:] = [Worker(mailbox, halt, TranscriptionCache(transcribe))]
     threading.Thread(target=end_with_parent, daemon=True).start()
 
 

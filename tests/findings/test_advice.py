@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from symphys.findings.advice import advice, findings, slopes
+from symphys.findings.contacts import IN_TIME, impact_findings, miss_findings, residual_finding
+from symphys.findings.energy import balance_finding
 from symphys.findings.examination import Energy, Examination, GradientCheck, Growth, Miss, Refined, Smoothed
-from symphys.findings.examined import advice, findings, slopes
 from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Judged
-from symphys.findings.nearby import miss_findings
 from symphys.findings.numerics import smoothed_findings
-from symphys.findings.physics import balance_finding
-from symphys.findings.touching import IN_TIME, impact_findings, residual_finding
 
 MET = Judged(1.0, 0.5, True, True, 1.0)
 NO_CHECKS = Judged(1.0, math.nan, True, False, 1.0)

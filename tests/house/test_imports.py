@@ -60,7 +60,11 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "numpy",
         "solve, judge, examine, write",
     ),
-    "report": ("files findings results trajectory", "matplotlib numpy", "pages and figures, made from run folders alone"),
+    "report": (
+        "files findings results trajectory",
+        "matplotlib numpy",
+        "pages and figures, made from run folders alone",
+    ),
     "doctor": ("codegen", "casadi numpy", "what there is on this machine"),
     "cli": (
         "codegen doctor errors export files findings problem problems report results runs solvers suggest threads "

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from symphys.report.figures import style
+from symphys.report.figures.checks import limits, ratios
 from symphys.report.figures.contacts import pair_normals, shown_pairs
-from symphys.report.figures.curves import Curve, best_so_far, median_curve, miss_so_far
-from symphys.report.pages.checks import limits, ratios
+from symphys.report.figures.convergence import Curve, best_so_far, median_curve, violation_so_far
 from symphys.report.scene.motion import draw_motion
 from symphys.report.scene.views import SIDE_XZ, SIDE_YZ, TOP, TOP_TURNED, choose_views, turn
 from symphys.results.discovery import read_all, studies
@@ -42,7 +42,7 @@ def test_best_and_miss_only_fall(made: Path) -> None:
     trace = Trace({"objective": np.array([3.0, np.nan, 4, 1]), "max_violation": np.array([9.0, 2, 5, np.nan])}, 4)
     run = replace(read_run(made / "ball_throw" / "gradient-seed0", made), trace=trace)
     assert best_so_far(run).tolist() == [3, 3, 3, 1]
-    assert miss_so_far(run).tolist() == [9, 2, 2, 2]
+    assert violation_so_far(run).tolist() == [9, 2, 2, 2]
 
 
 def test_thinning_keeps_spikes() -> None:

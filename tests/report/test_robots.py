@@ -12,13 +12,11 @@ from page_scripts import NODE, plays_to_the_end, run_script
 from walker import DT, LEGS, NAMES, SCENE, STEPS, TURNED, hinge, motion
 
 from symphys.report.figures import style
-from symphys.report.figures.spans import spans
-from symphys.report.pages.joints import steps_told
+from symphys.report.pages.joints import steps_sentence
 from symphys.report.robots.branches import colours, keys, limbs, traced
-from symphys.report.robots.gait import stances, weight
-from symphys.report.robots.gait_figure import draw_gait
+from symphys.report.robots.gait import draw_gait, spans, stances, weight
 from symphys.report.robots.joint_positions import axes_of, bones, on_side, pivot
-from symphys.report.robots.snapshots import extents, spaced
+from symphys.report.robots.poses import extents, spaced
 from symphys.report.robots.strip import draw_strip, make_strip
 from symphys.report.scene.animation import NUMBERS, motion_data
 from symphys.report.scene.motion import draw_motion
@@ -53,7 +51,7 @@ def test_a_body_stands_while_it_carries_a_share_of_the_weight(load: Load) -> Non
     assert list(found) == ["fl_shin", "hl_shin", "hr_shin"]
     assert spans(found["fl_shin"].stands) == [(0, 10), (20, 30)]
     assert [found[name].duty for name in found] == [0.5, 0.125, 0.5]
-    assert steps_told(trajectory, scene) == (
+    assert steps_sentence(trajectory, scene) == (
         "2 bodies at most stand at once, 1.1 on average; for 38 % of the time none does."
     )
 

@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 
 from symphys.report import write_batch_report, write_run_report
-from symphys.report.figures.curves import Curve, best_so_far, curve, miss_so_far
-from symphys.report.figures.history import draw_run
-from symphys.report.pages.stages import exact_ends, segments
+from symphys.report.figures.convergence import Curve, best_so_far, curve, violation_so_far
+from symphys.report.figures.history import draw_run, exact_ends, segments
 from symphys.results.run import Run, read_run
 
 Edit = Callable[..., None]
@@ -102,7 +101,7 @@ def test_only_exact_numbers_are_compared(staged: Path) -> None:
     expected = np.concatenate([np.full(20, 7.0), np.full(10, 0.5), [0.02], np.minimum(exact, 0.02)])
     np.testing.assert_allclose(best_so_far(run), expected)
     miss = np.fmin.accumulate(np.append(2.0, run.trace["max_violation"][ENDS[1] + 1 :]))
-    np.testing.assert_allclose(miss_so_far(run), [*np.full(20, 700), *np.full(10, 50), *miss])
+    np.testing.assert_allclose(violation_so_far(run), [*np.full(20, 700), *np.full(10, 50), *miss])
 
 
 def test_a_curve_of_constant_smoothing_is_its_start_and_end(staged: Path, edit: Edit) -> None:

@@ -12,13 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from symphys import json_values as values
+from symphys.findings.advice import advice, answers, findings, slopes
+from symphys.findings.contacts import depth_finding, residual_finding
 from symphys.findings.examination import Energy, Examination, Gain, GradientCheck, Growth, Refined, Smoothed
-from symphys.findings.examined import advice, answers, findings, slopes
 from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Judged, graded
 from symphys.findings.numerics import slope_finding, smoothed_findings
-from symphys.findings.touching import depth_finding, residual_finding
-from symphys.report.figures.output import slug
-from symphys.report.pages.markup import Html, tag
+from symphys.report.pages.markup import Html, slug, tag
 from symphys.report.pages.sections import variable_rows
 from symphys.report.pages.words import count, listed, seconds, show
 from symphys.results.result import VariableRecord

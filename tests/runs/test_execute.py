@@ -15,7 +15,7 @@ import pytest
 from symphys import files, solvers
 from symphys.problem import load_problem
 from symphys.runs import Job, Result, execute, make_jobs
-from symphys.runs.transcription_cache import Workshop
+from symphys.runs.transcription_cache import TranscriptionCache
 from symphys.solvers import Outcome, Status, TraceRow
 from symphys.transcription import transcribe
 
@@ -27,7 +27,7 @@ def silent(row: TraceRow) -> None:
 
 
 def run(job: Job, monitor: Callable[[TraceRow], None] = silent) -> Result:
-    return execute(job, monitor, Workshop(transcribe))
+    return execute(job, monitor, TranscriptionCache(transcribe))
 
 
 def interrupt_at(iteration: int) -> Callable[[TraceRow], None]:

@@ -15,7 +15,7 @@ from symphys.problem import Problem, load_problem
 from symphys.problems import find
 from symphys.results.result import StageRecord
 from symphys.runs import Job, Result, execute, make_jobs, read_result, run_batch
-from symphys.runs.transcription_cache import Workshop
+from symphys.runs.transcription_cache import TranscriptionCache
 from symphys.solvers import TraceRow
 from symphys.transcription import Transcription, transcribe
 
@@ -40,7 +40,7 @@ def job(out: Path, knobs: Any = (0.1, 0.01, 0.0), solver: str = "least_squares",
 
 
 def run(asked: Job, monitor: Callable[[TraceRow], None] = lambda row: None) -> Result:
-    return execute(asked, monitor, Workshop(once))
+    return execute(asked, monitor, TranscriptionCache(once))
 
 
 def without_times(result: Result) -> list[StageRecord]:

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from symphys.findings.energy import balance_finding, gains_finding
 from symphys.findings.examination import Energy, Examination, Gain
 from symphys.findings.levels import BAD, GOOD
-from symphys.findings.physics import balance_finding, gains_finding
 from symphys.problem import load_problem
 from symphys.problems import find
 from symphys.transcription import transcribe

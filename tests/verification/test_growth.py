@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from symphys.findings.advice import advice
 from symphys.findings.examination import Examination, Growth
-from symphys.findings.examined import advice
 from symphys.findings.levels import BAD, GOOD, Judged
 from symphys.findings.numerics import GROWTH_LIMITS, growth_finding, reach
 from symphys.verification.sensitivity_growth import backwards, growth, state_columns

@@ -9,12 +9,11 @@ from symphys import files
 from symphys.findings import writing
 from symphys.findings.verdict import ACCEPTED
 from symphys.report.figures import style
+from symphys.report.figures.checks import MOST_CHECKS, draw_checks, ratios
 from symphys.report.figures.convergence import draw_convergence
-from symphys.report.figures.output import slug, write_figures
-from symphys.report.figures.style import Picture
+from symphys.report.figures.style import Picture, write_figures
 from symphys.report.pages import comparison
-from symphys.report.pages.checks import MOST_CHECKS, draw_checks, ratios
-from symphys.report.pages.markup import Html, card, facts, figures, join, page, table, tag
+from symphys.report.pages.markup import Html, card, facts, figures, join, page, slug, table, tag
 from symphys.report.robots.strip import draw_strip
 from symphys.report.scene.animation import NUMBERS, animation
 from symphys.report.scene.motion import draw_motion

@@ -11,9 +11,8 @@ from symphys.findings import writing
 from symphys.report.figures import style
 from symphys.report.figures.contacts import by_surfaces, draw_contacts, shown_pairs
 from symphys.report.figures.history import draw_run
-from symphys.report.figures.output import write_figures
 from symphys.report.figures.states import MOST_BODIES, controlled_bodies, draw_controls, draw_states, shown_bodies
-from symphys.report.figures.style import Picture
+from symphys.report.figures.style import Picture, write_figures
 from symphys.report.figures.variables import draw_variables
 from symphys.report.figures.verification import draw_energy, draw_growth
 from symphys.report.pages import sections
@@ -38,7 +37,7 @@ LOG = "log.txt"
 
 
 @dataclass(frozen=True)
-class Recording:
+class RecordedMotion:
     """The motion of a run, as far as it could be read; ``faults`` says what could not."""
 
     trajectory: Trajectory | None
@@ -64,7 +63,7 @@ def write_run_report(run_dir: Path) -> Path:
     if not is_run([path.name for path in run_dir.iterdir()]):
         raise ReportError(f"{run_dir}: no run folder; one holds result.json, or config.json and problem.toml")
     run = read_run(run_dir, run_dir)
-    recording = read_recording(run_dir)
+    recording = read_motions(run_dir)
     with style.paper():
         pictures = draw(drawable(run), recording)
     write_figures(run_dir, pictures.values())
@@ -74,7 +73,7 @@ def write_run_report(run_dir: Path) -> Path:
     return run_dir / PAGE
 
 
-def read_recording(folder: Path) -> Recording:
+def read_motions(folder: Path) -> RecordedMotion:
     """Read what there is; the guess is no loss where it is missing."""
     faults: list[str] = []
     trajectory = read_or_note(folder / TRAJECTORY, faults)
@@ -84,7 +83,7 @@ def read_recording(folder: Path) -> Recording:
     except ReportError as error:
         scene = Scene()
         faults.append(str(error))
-    return Recording(trajectory, guess, scene, tuple(faults))
+    return RecordedMotion(trajectory, guess, scene, tuple(faults))
 
 
 def read_or_note(path: Path, faults: list[str]) -> Trajectory | None:
@@ -96,7 +95,7 @@ def read_or_note(path: Path, faults: list[str]) -> Trajectory | None:
         return None
 
 
-def draw(run: Run, recording: Recording) -> dict[str, Picture]:
+def draw(run: Run, recording: RecordedMotion) -> dict[str, Picture]:
     """Every figure of the page by name; those that have nothing to show are left out."""
     made = style.picture("convergence", "Convergence of this run", draw_run(run))
     made += style.picture("variables", "Variables against their knots", draw_variables(run))
@@ -112,7 +111,7 @@ def draw(run: Run, recording: Recording) -> dict[str, Picture]:
     return {picture.name: picture for picture in made}
 
 
-def build(run: Run, recording: Recording, pictures: dict[str, Picture]) -> Html:
+def build(run: Run, recording: RecordedMotion, pictures: dict[str, Picture]) -> Html:
     """The page, from the verdict to the sources."""
     cards = [
         sections.checks(run),
@@ -139,7 +138,7 @@ def how_drawn(run: Run) -> str:
     return f"Pale: the lowest so far{' in its stage' * smoothed(run.stages)}. Work counts one rollout as 1."
 
 
-def motion_card(run: Run, recording: Recording, pictures: dict[str, Picture]) -> Html:
+def motion_card(run: Run, recording: RecordedMotion, pictures: dict[str, Picture]) -> Html:
     """The motion; nothing where there is neither a result nor a motion."""
     if recording.trajectory is None and not run.readable:
         return Html("")
@@ -151,7 +150,7 @@ def only(pictures: dict[str, Picture], name: str) -> list[Picture]:
     return [pictures[name]] if name in pictures else []
 
 
-def motion_cards(recording: Recording, pictures: dict[str, Picture]) -> list[Html]:
+def motion_cards(recording: RecordedMotion, pictures: dict[str, Picture]) -> list[Html]:
     """Joints, gait, states, controls and contacts over time."""
     motion = recording.trajectory
     if motion is None:

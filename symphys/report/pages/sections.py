@@ -107,13 +107,13 @@ def checks(run: Run) -> Html:
         tag("h3", "Costs, weighted") if costs else "",
         costs,
         tag("h3", "Told") if run.outputs else "",
-        facts([(name, told(run, name)) for name in run.outputs]),
+        facts([(name, output_line(run, name)) for name in run.outputs]),
         anchor="checks",
         note=HOW_JUDGED,
     )
 
 
-def told(run: Run, name: str) -> str:
+def output_line(run: Run, name: str) -> str:
     """A number of the result, and what it was at the guess."""
     return f"{show(run.outputs[name], 4)} (at the guess {show(run.guess.get(OUTPUT + name, math.nan), 4)})"
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from symphys.findings.advice import advice, answers, findings, slopes
+from symphys.findings.contacts import sliding
 from symphys.findings.examination import Examination
-from symphys.findings.examined import advice, answers, findings, slopes
 from symphys.findings.levels import MARKS, Judged
-from symphys.findings.touching import sliding
 from symphys.findings.writing import show
 from symphys.report.figures.style import Picture
 from symphys.report.pages.markup import Html, Part, card, figures, pill, table, tag

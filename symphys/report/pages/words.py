@@ -5,30 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from symphys.findings.verdict import BEST_FOUND, DOUBTED, SOLVED, told
+from symphys.findings.endings import ending
+from symphys.findings.verdict import BEST_FOUND, DOUBTED, SOLVED, verdict_words
 from symphys.findings.writing import listed, plain, show
 from symphys.results.result import CheckRecord
 from symphys.results.run import Run
-
-STATUS = {
-    "met": "everything met",
-    "converged": "converged",
-    "budget": "budget spent",
-    "stalled": "no more progress",
-    "not_finite": "a number was not finite",
-    "not_applicable": "not applicable",
-    "failed": "failed",
-    "interrupted": "interrupted",
-    "unreadable": "no readable result",
-}
-
-STOPPED = {
-    "converged": "The solver converged.",
-    "budget": "The solver's budget was spent.",
-    "stalled": "The solver could make no more progress.",
-    "not_finite": "A number in the simulation was not finite.",
-    "failed": "The solver failed.",
-}
 
 
 def count(value: float) -> str:
@@ -47,18 +28,18 @@ def seconds(value: float) -> str:
 
 def status(code: str) -> str:
     """A status in plain words; one that is not known is told as it stands."""
-    return STATUS.get(code, code.replace("_", " ") or "no status")
+    return ending(code).words
 
 
 def ended(code: str) -> str:
     """A status in two words at most, for tables."""
-    return {"met": "met", "not_finite": "not finite"}.get(code, status(code))
+    return ending(code).in_table or ending(code).words
 
 
 def came_to(run: Run) -> str:
     """How a run ended, in a few words for tables: as its solver did, or its verdict, where that says more."""
     if run.verdict in (DOUBTED, BEST_FOUND):
-        return told(run.verdict, run.status, bool(run.checks))
+        return verdict_words(run.verdict, run.status, bool(run.checks))
     return ended(run.status)
 
 
@@ -68,16 +49,15 @@ def level(run: Run) -> str:
         return "good"
     if run.verdict == DOUBTED:
         return "bad"
-    return "bad" if run.status in ("failed", "not_finite", "unreadable", "") else "fair"
+    return "bad" if ending(run.status).faulty else "fair"
 
 
 def headline(run: Run) -> str:
     """A few words for a run."""
     if run.verdict in (SOLVED, DOUBTED, BEST_FOUND):
-        words = told(run.verdict, run.status, bool(run.checks))
+        words = verdict_words(run.verdict, run.status, bool(run.checks))
         return words[:1].upper() + words[1:]
-    known = {"interrupted": "Interrupted", "not_applicable": "Not applicable", "failed": "Failed"}
-    return known.get(run.status, "Not solved" if run.readable else "No result")
+    return ending(run.status).headline
 
 
 def verdict(run: Run) -> str:
@@ -89,17 +69,17 @@ def verdict(run: Run) -> str:
         return f"{run.solver} does not apply to this problem."
     if run.status == "interrupted":
         return "The run was interrupted; the same command goes on from where it stopped."
-    if not run.checks and run.status in STOPPED and math.isnan(run.objective):
-        return f"{STOPPED[run.status]} There is nothing to judge."
+    if not run.checks and ending(run.status).sentence and math.isnan(run.objective):
+        return f"{ending(run.status).sentence} There is nothing to judge."
     if not run.checks:
         text = (
-            f"The problem states nothing to meet; the objective is {show(run.objective)}. {STOPPED.get(run.status, '')}"
+            f"The problem states nothing to meet; the objective is {show(run.objective)}. {ending(run.status).sentence}"
         )
     elif run.verdict in (SOLVED, DOUBTED):
         total = "The only check is" if len(run.checks) == 1 else f"All {len(run.checks)} checks are"
         text = f"{total} met; the largest error is {show(run.worst_ratio, 2)} of its tolerance{work(run)}."
     else:
-        text = f"{misses(missed, len(run.checks))} {STOPPED.get(run.status, '')}"
+        text = f"{misses(missed, len(run.checks))} {ending(run.status).sentence}"
     return f"{text.strip()} {doubted(run)}".strip()
 
 

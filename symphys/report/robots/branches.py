@@ -12,7 +12,7 @@ from symphys.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
-class Limb:
+class KinematicBranch:
     """Indices of bodies that hang together once the trunk is taken away; a trunk is one of its own."""
 
     name: str
@@ -37,14 +37,14 @@ def colours(trajectory: Trajectory, scene: Scene) -> tuple[str, ...]:
     names = trajectory.body_names
     if not is_large(trajectory, scene):
         return tuple(style.BODIES[index % len(style.BODIES)] for index in range(len(names)))
-    of_limb = {body: limb.colour for limb in limbs(trajectory, scene) for body in limb.bodies}
-    return tuple(of_limb.get(index, style.FAINT) for index in range(len(names)))
+    of_branch = {body: branch.colour for branch in branches(trajectory, scene) for body in branch.bodies}
+    return tuple(of_branch.get(index, style.FAINT) for index in range(len(names)))
 
 
 def keys(trajectory: Trajectory, scene: Scene) -> list[tuple[str, str]]:
     """What colours mean: (name, colour) of bodies, of limbs where many hang together; none where that is plain."""
     if is_large(trajectory, scene):
-        found = [(limb.name, limb.colour) for limb in limbs(trajectory, scene)]
+        found = [(branch.name, branch.colour) for branch in branches(trajectory, scene)]
     else:
         found = list(zip(trajectory.body_names, colours(trajectory, scene), strict=True))
     return found if 1 < len(found) <= len(style.BODIES) else []
@@ -56,21 +56,21 @@ def traced(trajectory: Trajectory, scene: Scene) -> tuple[str, ...]:
     if not is_large(trajectory, scene):
         return names
     edges, held = edges_of(trajectory, scene), linked(trajectory, scene)
-    trunks = {limb.bodies[0] for limb in limbs(trajectory, scene) if limb.is_trunk}
+    trunks = {branch.bodies[0] for branch in branches(trajectory, scene) if branch.is_trunk}
     ends = {body for body in held if sum(body in edge for edge in edges) == 1}
     return tuple(name for body, name in enumerate(names) if body in trunks | ends or body not in held)
 
 
-def limbs(trajectory: Trajectory, scene: Scene) -> list[Limb]:
+def branches(trajectory: Trajectory, scene: Scene) -> list[KinematicBranch]:
     """Trunks, each followed by the limbs that joints hold to it, in the order of the bodies."""
-    found: list[Limb] = []
+    found: list[KinematicBranch] = []
     edges = edges_of(trajectory, scene)
     for group in components(linked(trajectory, scene), edges):
         trunk = trunk_of(group, edges, trajectory, scene)
-        found.append(Limb(trajectory.body_names[trunk], (trunk,), style.BODIES[0], True))
+        found.append(KinematicBranch(trajectory.body_names[trunk], (trunk,), style.BODIES[0], True))
         for number, bodies in enumerate(components([body for body in group if body != trunk], edges)):
-            name = limb_name([trajectory.body_names[body] for body in bodies])
-            found.append(Limb(name, bodies, style.BODIES[1 + number % (len(style.BODIES) - 1)], False))
+            name = branch_name([trajectory.body_names[body] for body in bodies])
+            found.append(KinematicBranch(name, bodies, style.BODIES[1 + number % (len(style.BODIES) - 1)], False))
     return found
 
 
@@ -102,7 +102,7 @@ def trunk_of(group: Sequence[int], edges: set[frozenset[int]], trajectory: Traje
     return held[0] if held else max(group, key=lambda body: sum(body in edge for edge in edges))
 
 
-def limb_name(names: Sequence[str]) -> str:
+def branch_name(names: Sequence[str]) -> str:
     """What the names of its bodies begin with, else the first of them."""
     same = itertools.takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
     return "".join(letters[0] for letters in same).rstrip("_-. ") or names[0]

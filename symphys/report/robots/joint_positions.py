@@ -61,7 +61,7 @@ def bones(trajectory: Trajectory, scene: Scene, shot: int) -> Iterator[tuple[int
                 yield body, np.array([trajectory.position[shot, body], centres(trajectory, body, solid)[shot]])
 
 
-def draw_pivots(axes: Axes, view: View, trajectory: Trajectory, scene: Scene, shot: int, scale: float) -> None:
+def draw_joint_positions(axes: Axes, view: View, trajectory: Trajectory, scene: Scene, shot: int, scale: float) -> None:
     """The marks of all joints at one time, on top of all; ``scale`` [in/m]."""
     joints = drawable(trajectory, scene)
     bars = []

@@ -14,10 +14,10 @@ from matplotlib.figure import Figure
 
 from symphys.report.figures import style
 from symphys.report.robots.branches import linked
-from symphys.report.robots.joint_positions import draw_pivots
-from symphys.report.robots.snapshots import Whole, extents
+from symphys.report.robots.joint_positions import draw_joint_positions
+from symphys.report.robots.poses import RobotDrawing, extents
 from symphys.report.scene.ground import draw_ground
-from symphys.report.scene.panel import Panel, include
+from symphys.report.scene.panel import ViewPanel, include
 from symphys.report.scene.views import NAMES, View, choose_views
 from symphys.results.scene import Scene
 from symphys.trajectory import Array, Trajectory
@@ -57,7 +57,7 @@ def draw_strip(trajectory: Trajectory, scene: Scene) -> Figure | None:
     for row, strip in enumerate(strips):
         for column, shot in enumerate(shots):
             axes = figure.add_axes(places[row][column])
-            panel = Panel(strip.view, strip.low[column], strip.low[column] + strip.size)
+            panel = ViewPanel(strip.view, strip.low[column], strip.low[column] + strip.size)
             draw_frame(axes, panel, trajectory, scene, shot, scale)
             dress_frame(axes, panel, scale, column == 0, row == len(strips) - 1)
             axes.set_title(f"{trajectory.time[shot]:.2f} s" if row == 0 else "")
@@ -112,15 +112,15 @@ def widened(strip: Strip, width: float, height: float) -> Strip:
     return Strip(strip.view, strip.low - lack / 2, strip.size + lack)
 
 
-def draw_frame(axes: Axes, panel: Panel, trajectory: Trajectory, scene: Scene, shot: int, scale: float) -> None:
+def draw_frame(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Scene, shot: int, scale: float) -> None:
     """What stands still, the bodies at one time, and their joints."""
     draw_ground(axes, panel, trajectory, scene)
     axes.set_title("")
-    Whole(axes, panel.view, trajectory, scene, shot).draw()
-    draw_pivots(axes, panel.view, trajectory, scene, shot, scale)
+    RobotDrawing(axes, panel.view, trajectory, scene, shot).draw()
+    draw_joint_positions(axes, panel.view, trajectory, scene, shot, scale)
 
 
-def dress_frame(axes: Axes, panel: Panel, scale: float, first: bool, bottom: bool) -> None:
+def dress_frame(axes: Axes, panel: ViewPanel, scale: float, first: bool, bottom: bool) -> None:
     """Axes to scale; numbers along the left and below only."""
     view = panel.view
     vertical = [panel.low[1], panel.high[1]]

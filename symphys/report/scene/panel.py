@@ -20,7 +20,7 @@ LEAST = 1.1
 
 
 @dataclass(frozen=True)
-class Panel:
+class ViewPanel:
     """A view and the window (low, high) x (right, up) [m] that it shows."""
 
     view: View
@@ -33,7 +33,7 @@ class Panel:
         return self.high - self.low
 
 
-def make_panel(view: View, trajectory: Trajectory, scene: Scene, guess: Trajectory | None) -> Panel:
+def make_panel(view: View, trajectory: Trajectory, scene: Scene, guess: Trajectory | None) -> ViewPanel:
     """The window that holds every body, what stands close by, and the guess unless it goes far away."""
     sizes = np.array([reach(trajectory, scene, body) for body in range(len(trajectory.body_names))])[:, None]
     flat = view.flat(trajectory.position)
@@ -48,7 +48,7 @@ def make_panel(view: View, trajectory: Trajectory, scene: Scene, guess: Trajecto
     for box in (*map(of_fixture, scene.fixtures), *map(of_terrain, scene.terrain)):
         low, high = take_in(view.flat(box), low, high, 0.25 * room)
     margin = 0.05 * room
-    return Panel(view, low - margin, high + margin)
+    return ViewPanel(view, low - margin, high + margin)
 
 
 def include(plane: ScenePlane, view: View, low: Array, high: Array, room: float) -> tuple[Array, Array]:
@@ -84,7 +84,7 @@ def take_in(box: Array, low: Array, high: Array, room: float) -> tuple[Array, Ar
     return np.maximum(np.minimum(low, box[0]), low - room), np.minimum(np.maximum(high, box[1]), high + room)
 
 
-def arrange(panels: list[Panel]) -> tuple[bool, float]:
+def arrange(panels: list[ViewPanel]) -> tuple[bool, float]:
     """Whether the panels stand above each other, and the scale [in/m]: the arrangement that shows more."""
     spans = np.array([panel.span for panel in panels])
     width = style.WIDTH - LEFT - RIGHT
@@ -93,13 +93,15 @@ def arrange(panels: list[Panel]) -> tuple[bool, float]:
     return (True, float(stacked)) if stacked >= beside else (False, float(beside))
 
 
-def widen(panel: Panel, scale: float) -> Panel:
+def widen(panel: ViewPanel, scale: float) -> ViewPanel:
     """Make room on both sides where a panel would be too thin to read."""
     lack = np.maximum(LEAST / scale - panel.span, 0) / 2
-    return Panel(panel.view, panel.low - lack, panel.high + lack)
+    return ViewPanel(panel.view, panel.low - lack, panel.high + lack)
 
 
-def lay_out(panels: list[Panel], stacked: bool, scale: float) -> tuple[Figure, list[tuple[float, float, float, float]]]:
+def lay_out(
+    panels: list[ViewPanel], stacked: bool, scale: float
+) -> tuple[Figure, list[tuple[float, float, float, float]]]:
     """The figure, and (left, bottom, width, height) of each panel in shares of it."""
     sizes = [panel.span * scale for panel in panels]
     gaps = GAP * (len(panels) - 1)
@@ -116,7 +118,7 @@ def lay_out(panels: list[Panel], stacked: bool, scale: float) -> tuple[Figure, l
     return figure, places
 
 
-def dress(axes: Axes, panel: Panel, scale: float) -> None:
+def dress(axes: Axes, panel: ViewPanel, scale: float) -> None:
     """Axes to scale with names and units."""
     view = panel.view
     vertical = [panel.low[1], panel.high[1]]

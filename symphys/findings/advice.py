@@ -8,9 +8,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from symphys.findings.contacts import CONTACTS, contact_findings, miss_findings
+from symphys.findings.energy import ENERGY, balance_finding, gains_finding
 from symphys.findings.examination import Examination
 from symphys.findings.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN, Finding, Judged, worst_of
-from symphys.findings.nearby import miss_findings
 from symphys.findings.numerics import (
     GRADIENT,
     GRID,
@@ -25,8 +26,6 @@ from symphys.findings.numerics import (
     smoothed_findings,
     unfelt,
 )
-from symphys.findings.physics import ENERGY, balance_finding, gains_finding
-from symphys.findings.touching import CONTACTS, contact_findings
 from symphys.findings.writing import listed, percent, show
 
 FAULT, NO_SLOPE = "fault", "zero"

@@ -12,9 +12,9 @@ from matplotlib.patches import Circle, Polygon
 
 from symphys.report.figures import style
 from symphys.report.robots.branches import colours, linked, traced
-from symphys.report.robots.joint_positions import bones, draw_lines, draw_pivots
+from symphys.report.robots.joint_positions import bones, draw_joint_positions, draw_lines
 from symphys.report.scene.outlines import inner_edges, outline
-from symphys.report.scene.panel import Panel
+from symphys.report.scene.panel import ViewPanel
 from symphys.report.scene.views import View, centres, half_axes, solids_of, turn
 from symphys.results.scene import Scene, Solid
 from symphys.trajectory import Array, Trajectory
@@ -24,14 +24,14 @@ APART = 0.75
 MOST = 8
 
 
-def draw_robots(axes: Axes, panel: Panel, trajectory: Trajectory, scene: Scene, scale: float) -> None:
+def draw_robots(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Scene, scale: float) -> None:
     """Paths of trunks and feet, and whole snapshots that hardly cover each other, the later the stronger."""
     draw_paths(axes, panel.view, trajectory, scene)
     shots = spaced(trajectory, scene, panel.view)
     for order, shot in enumerate(shots):
         strength = 1.0 if shot == shots[-1] else 0.3 + 0.35 * shot / max(shots[-1], 1)
-        Whole(axes, panel.view, trajectory, scene, shot).draw(strength, order)
-    draw_pivots(axes, panel.view, trajectory, scene, shots[-1], scale)
+        RobotDrawing(axes, panel.view, trajectory, scene, shot).draw(strength, order)
+    draw_joint_positions(axes, panel.view, trajectory, scene, shots[-1], scale)
 
 
 def spaced(trajectory: Trajectory, scene: Scene, view: View) -> list[int]:
@@ -65,7 +65,7 @@ def draw_paths(axes: Axes, view: View, trajectory: Trajectory, scene: Scene) -> 
 
 
 @dataclass(frozen=True)
-class Whole:
+class RobotDrawing:
     """All bodies of a scene at one time."""
 
     axes: Axes
