@@ -25,7 +25,7 @@ SOLVED, UNSOLVED, WRONG, INTERRUPTED = 0, 1, 2, 130
 
 
 class Commands(click.Group):
-    """A group that knows what an unknown command may have meant."""
+    """A group that suggests what an unknown command may have meant."""
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

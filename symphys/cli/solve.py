@@ -50,7 +50,9 @@ MOST_JOBS = 256
     help="How many runs go on at once.",
 )
 @click.option(
+    "--multi-start",
     "--together",
+    "multi_start",
     is_flag=True,
     help="Solve the seeds of gradient and least_squares side by side, their evaluations in batches. Sooner done, but "
     "the seconds of each run are those of all.",
@@ -59,7 +61,7 @@ MOST_JOBS = 256
     "--unexamined",
     is_flag=True,
     help="Leave out how far solutions can be trusted, which for long motions takes as long as solving them; "
-    "`symphys check --at RUN_FOLDER` tells later.",
+    "`symphys check --at RUN_FOLDER` does it later.",
 )
 @backend_option
 @out_option
@@ -69,7 +71,7 @@ def solve(
     seeds: int,
     assignments: tuple[str, ...],
     jobs: int,
-    together: bool,
+    multi_start: bool,
     unexamined: bool,
     backend: str,
     out: Path,
@@ -94,7 +96,7 @@ def solve(
             click.echo(note, err=True)
     made = partial(transcribe, backend=backend, threads=1 if jobs > 1 else None)
     with watch(len(asked)) as observer:
-        batch = run_batch(asked, jobs, observer, made, together)
+        batch = run_batch(asked, jobs, observer, made, multi_start)
     return conclude(asked, batch, out)
 
 

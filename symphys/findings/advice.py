@@ -1,6 +1,6 @@
 """How far a solution can be trusted: every finding of an examination, and one paragraph of advice from them.
 
-``symphys check`` at a guess and the pages of runs tell it in these words.
+``symphys check`` at a guess and the pages of runs use these words.
 """
 
 from __future__ import annotations
@@ -65,8 +65,8 @@ def answers(trust: Examination, judged: Judged) -> tuple[list[str], list[list[st
     for row in trust.refined:
         verdict = MARKS[refined_finding(row, judged).level]
         rows.append([row.what, show(row.objective, 4), show(row.worst, 4), verdict])
-    for knob in trust.smoothed:
-        rows.append([f"smoothed {show(knob.smoothing)} m/s", show(knob.objective, 4), show(knob.worst, 4), ""])
+    for smooth in trust.smoothed:
+        rows.append([f"smoothed {show(smooth.smoothing)} m/s", show(smooth.objective, 4), show(smooth.worst, 4), ""])
     return ["simulated", "objective", "worst / tolerance", ""], rows
 
 

@@ -1,4 +1,4 @@
-"""Whether contacts are resolved: settled, not too deep, nobody through anybody, every impact in time."""
+"""Whether contacts are resolved: settled, not too deep, no tunnelling, every impact in time, no near misses."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def passage_finding(trust: Examination) -> Finding:
     what, level = "Passing through between two instants", graded(trust.passed, PASSED_LIMITS)
     where = f"{trust.passed_contact} at t = {show(trust.passed_time)} s, {show(trust.passed_depth, 2)} m deep"
     meaning = {
-        GOOD: "Nobody went through anybody.",
+        GOOD: "No body went through another.",
         FAIR: f"{where}: on the straight way between two instants; a smaller time step shows whether it was so.",
         BAD: f"{where}: a body was on one side before the step and beyond after it; use a smaller time step.",
     }[level]
@@ -136,8 +136,10 @@ def sliding(trust: Examination) -> str:
     """A sentence on how far surfaces slid; empty where none did."""
     if not trust.slides:
         return ""
-    told = [f"{slide.contact} {show(slide.distance, 2)} m (up to {show(slide.speed, 2)} m/s)" for slide in trust.slides]
-    return f"Under load these surfaces slid: {listed(told)}; the slip of impacts is not counted."
+    slides = [
+        f"{slide.contact} {show(slide.distance, 2)} m (up to {show(slide.speed, 2)} m/s)" for slide in trust.slides
+    ]
+    return f"Under load these surfaces slid: {listed(slides)}; the slip of impacts is not counted."
 
 
 NEARBY = "nearby"

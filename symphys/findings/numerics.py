@@ -36,7 +36,7 @@ SLOPE_LIMITS = (0.1, 0.5)
 GROWTH_LIMITS = (1e2, 1e4)
 """Of a change, from one time to another. At the second 0.1 mm become 1 m: what is linear ends there."""
 ORDERS = (0.3, 5.0)
-"""Orders of convergence between these are told; others are none."""
+"""Orders of convergence between these are shown; others are none."""
 
 
 def gradient_finding(check: GradientCheck) -> Finding:
@@ -103,8 +103,8 @@ def slope_finding(trust: Examination) -> list[Finding]:
     order = trust.order.get("gradient", math.nan)
     if ORDERS[0] <= order <= ORDERS[1]:
         meaning += f" Its error shrinks like dt to the power {show(order, 2)}."
-    told = ", ".join(f"{percent(change)} with {what}" for what, change in known)
-    return [Finding(GRID, level, "Change of the gradient", told, meaning)]
+    number = ", ".join(f"{percent(change)} with {what}" for what, change in known)
+    return [Finding(GRID, level, "Change of the gradient", number, meaning)]
 
 
 def unbroken(text: str) -> str:

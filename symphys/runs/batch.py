@@ -17,7 +17,7 @@ from symphys.solvers import Monitor, TraceRow
 
 
 class Observer(Protocol):
-    """Is told what happens to the runs of a batch."""
+    """Receives what happens to the runs of a batch."""
 
     def started(self, job: Job, resumed: bool) -> None:
         """The run begins, or goes on."""
@@ -48,11 +48,11 @@ class BatchResult:
 
 
 def run_batch(
-    jobs: Sequence[Job], processes: int, observer: Observer, transcribe: Transcribe, together: bool = False
+    jobs: Sequence[Job], processes: int, observer: Observer, transcribe: Transcribe, multi_start: bool = False
 ) -> BatchResult:
     """Run what is not done yet, here or in ``processes`` workers, until all is done or Ctrl-C is pressed.
 
-    ``together``: here, solve the seeds of a problem and solver side by side where the solver can.
+    ``multi_start``: here, solve the seeds of a problem and solver side by side where the solver can.
     """
     ledger = Ledger(jobs, observer)
     waiting = {index: job for index, job in enumerate(jobs) if not ledger.skip(index)}
@@ -60,11 +60,11 @@ def run_batch(
         if processes > 1 and len(waiting) > 1:
             side_by_side(waiting, processes, transcribe, ledger, stop)
         else:
-            one_by_one(waiting, transcribe, ledger, stop, together)
+            one_by_one(waiting, transcribe, ledger, stop, multi_start)
     return BatchResult(tuple(ledger.results), stop.requested)
 
 
-def one_by_one(jobs: Mapping[int, Job], transcribe: Transcribe, ledger: Ledger, stop: Stop, together: bool) -> None:
+def one_by_one(jobs: Mapping[int, Job], transcribe: Transcribe, ledger: Ledger, stop: Stop, multi_start: bool) -> None:
     """Run all jobs in this process."""
     transcriptions = TranscriptionCache(transcribe)
 
@@ -76,7 +76,7 @@ def one_by_one(jobs: Mapping[int, Job], transcribe: Transcribe, ledger: Ledger, 
 
         return monitor
 
-    for group in groups(jobs, ledger.halfway) if together else [[index] for index in jobs]:
+    for group in groups(jobs, ledger.halfway) if multi_start else [[index] for index in jobs]:
         if stop():
             return
         for index in group:
@@ -118,14 +118,14 @@ class Ledger:
         return True
 
     def started(self, index: int) -> None:
-        """Tell that a run begins, or goes on."""
+        """Report that a run begins, or goes on."""
         self.observer.started(self.jobs[index], resumed=index in self.halfway)
 
     def advanced(self, index: int, row: TraceRow) -> None:
-        """Tell of an iteration."""
+        """Report an iteration."""
         self.observer.advanced(self.jobs[index], row)
 
     def ended(self, index: int, result: Result) -> None:
-        """Keep a result and tell of it."""
+        """Keep a result and report it."""
         self.results[index] = result
         self.observer.ended(self.jobs[index], result, skipped=False)

@@ -17,7 +17,7 @@ from symphys.solvers import Monitor, Outcome
 
 
 def execute(job: Job, monitor: Monitor, transcriptions: TranscriptionCache, solved: Outcome | None = None) -> Result:
-    """Do the run, or go on with it, unless it is done; write its folder; tell what it found.
+    """Do the run, or go on with it, unless it is done; write its folder; return what it found.
 
     ``monitor`` sees each iteration and may raise KeyboardInterrupt, which ends the run so that it can go on later.
     ``solved``: what its solver has found already, side by side with other seeds.
@@ -79,7 +79,7 @@ class Log:
 
 
 def finish(job: Job, result: Result) -> None:
-    """Write the result, last of all files, as it tells that the others are whole."""
+    """Write the result, last of all files, so that it exists only where the others are whole."""
     files.write_json(job.folder.path / RESULT, result.to_json())
     if not result.interrupted:
         files.remove(job.folder.path / CHECKPOINT)

@@ -1,4 +1,4 @@
-"""Seeds of one problem and solver solved side by side, so that their evaluations go to the backend in batches."""
+"""Multi-start: seeds of one problem and solver solved side by side, their evaluations in batches."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ def solve_group(
     lock = threading.Lock()
 
     def monitored(index: int) -> Monitor:
-        tell = watch(index)
+        report = watch(index)
 
         def monitor(row: TraceRow) -> None:
             with lock:
-                tell(row)
+                report(row)
 
         return monitor
 
@@ -50,6 +50,6 @@ def solve_group(
         monitors = [monitored(index) for index in jobs]
         chosen = solver(first.config.solver)
         found = solve_together(chosen, shooting, starts, first.options, seeds, monitors)
-    except Exception:  # what it was, the run that it belongs to will tell
+    except Exception:  # the run that it belongs to reports it when it is solved alone
         return {}
     return dict(zip(jobs, found, strict=True))

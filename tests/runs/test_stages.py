@@ -106,7 +106,7 @@ def test_interrupted_in_any_stage_it_goes_on_to_the_same_end(tmp_path: Path, kno
 
 def test_side_by_side(tmp_path: Path, recorder: Any) -> None:
     alone = run_batch(job(tmp_path / "a", seeds=3), 1, recorder, once)
-    beside = run_batch(job(tmp_path / "b", seeds=3), 1, recorder, once, together=True)
+    beside = run_batch(job(tmp_path / "b", seeds=3), 1, recorder, once, multi_start=True)
     assert alone.accepted and beside.accepted
     for one, other in zip(alone.results, beside.results, strict=True):
         assert one is not None and other is not None

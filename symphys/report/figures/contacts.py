@@ -125,7 +125,7 @@ def draw_gap(axes: Axes, trajectory: Trajectory, pair: int) -> None:
 def pair_normals(trajectory: Trajectory, scene: Scene) -> Iterator[tuple[str, Array]]:
     """The names that pairs of surfaces have, each with its unit normal (N, 3) or (3,) at the start of a step.
 
-    Only planes, and balls against each other, have one normal that the shapes alone tell.
+    Only planes, and balls against each other, have a normal that the shapes alone determine.
     """
     solids = list(labels(trajectory, scene))
     for (label, _, _), plane in itertools.product(solids, scene.planes):

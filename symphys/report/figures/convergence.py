@@ -41,7 +41,7 @@ def violation_so_far(run: Run) -> Array:
 
 
 def best_output(name: str) -> Quantity:
-    """(rows,): what the problem tells of the best point so far."""
+    """(rows,): a reported quantity of the best point so far."""
     return lambda run: np.where(run.trace["smoothing"] > 0, np.nan, run.trace[OUTPUT + name])
 
 
@@ -55,8 +55,8 @@ QUANTITIES: tuple[tuple[str, Quantity], ...] = (
 def falling(run: Run, recorded: Array, name: str, exact: Callable[[StageRecord], float]) -> Array:
     """(rows,): the lowest of what is known to hold exactly.
 
-    A row of a stage of smoothing tells of another problem: of such a stage only its start and its end count, judged
-    exactly. ``name``: the quantity among those of the guess; ``exact``: that of a stage.
+    A row of a stage with smoothing belongs to another problem: of such a stage only its start and its end count,
+    judged exactly. ``name``: the quantity among those of the guess; ``exact``: that of a stage.
     """
     smoothing = run.trace["smoothing"]
     known = np.where(smoothing > 0, np.nan, recorded)
@@ -95,7 +95,7 @@ VIOLATION_FLOOR = 1e-3
 
 
 def draw_convergence(study: Study) -> Figure | None:
-    """All solvers on one axis: objective, errors and what is told against rollout equivalents and against time."""
+    """All solvers on one axis: objective, errors and reported quantities against rollout equivalents and time."""
     outputs = dict.fromkeys(name for run in study.runs for name in run.outputs)
     asked = [
         *QUANTITIES,

@@ -46,7 +46,7 @@ class HistoryPanel:
 
 
 def draw_run(run: Run) -> Figure | None:
-    """Objective, errors, gradient norm, step, what is told; what was not recorded is left out."""
+    """Objective, errors, gradient norm, step, reported quantities; what was not recorded is left out."""
     x = run.trace[WORK]
     x = x if np.isfinite(x).any() else run.trace["iteration"]
     shown = [panel for panel in panels_of(run) if np.isfinite(panel.values).any()]
@@ -131,7 +131,7 @@ def segments(run: Run) -> list[slice]:
 
 
 def draw_bands(axes: Axes, run: Run, x: Array, named: bool) -> None:
-    """A pale band behind every other stage; ``named`` writes the knob on those that have room."""
+    """A pale band behind every other stage; ``named`` writes the smoothing on those that have room."""
     parts = segments(run)
     edges = [x[0], *(0.5 * (x[part.start - 1] + x[part.start]) for part in parts[1:]), x[-1]]
     for index, (part, left, right) in enumerate(zip(parts, edges, edges[1:], strict=False)):
@@ -140,9 +140,9 @@ def draw_bands(axes: Axes, run: Run, x: Array, named: bool) -> None:
         if index:
             axes.axvline(left, color=style.FAINT, linewidth=0.8, zorder=0.4)
         if named and right - left >= NARROWEST * (x[-1] - x[0]):
-            knob = run.trace["smoothing"][part.start]
+            value = run.trace["smoothing"][part.start]
             axes.annotate(
-                f"smoothing {show(knob)}" if knob else "exact",
+                f"smoothing {show(value)}" if value else "exact",
                 (0.5 * (left + right), 1),
                 xycoords=("data", "axes fraction"),
                 xytext=(0, -3),
@@ -155,10 +155,10 @@ def draw_bands(axes: Axes, run: Run, x: Array, named: bool) -> None:
 
 
 def exact_ends(run: Run, x: Array, of: Callable[[StageRecord], float]) -> list[tuple[float, float, bool]]:
-    """(x, exact number, whether met) at the end of each stage that the trace tells of."""
+    """(x, exact number, whether met) at the end of each stage that is in the trace."""
     ends = {run.trace["smoothing"][part.start]: x[part.stop - 1] for part in segments(run)}
-    told = [(ends[s.smoothing], of(s), s.solved) for s in run.stages if s.smoothing in ends]
-    return [end for end in told if math.isfinite(end[0]) and math.isfinite(end[1])]
+    found = [(ends[s.smoothing], of(s), s.solved) for s in run.stages if s.smoothing in ends]
+    return [end for end in found if math.isfinite(end[0]) and math.isfinite(end[1])]
 
 
 def draw_exact(axes: Axes, ends: Sequence[tuple[float, float, bool]]) -> None:

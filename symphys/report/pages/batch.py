@@ -96,7 +96,7 @@ def build_study(study: Study, root: Path, numbers: int, anchor: str, titled: boo
         strip = draw_strip(motion, scene) if motion else None
         drawn = draw_motion(motion, scene, guess) if motion else None
         moved = style.picture(f"{anchor}-strip", "The motion at even times", strip)
-        moved += style.picture(f"{anchor}-motion", "Path and snapshots", drawn)
+        moved += style.picture(f"{anchor}-motion", "Path and poses over time", drawn)
     write_figures(root, converged + checked + moved)
     played = animation(motion, scene, guess, numbers) if motion else tag("p", f"There is no motion to draw: {why}.")
     best = study.best

@@ -187,14 +187,18 @@ def smoothing_note(study: Study) -> str:
     """Which runs used stages of smoothing, and which; nothing where none did."""
     used: dict[str, list[str]] = {}
     for entry in study.entries:
-        for knobs in dict.fromkeys(stages_of(run) for run in entry.runs if smoothed(run.stages)):
-            used.setdefault(knobs, []).append(entry.solver)
-    told = [f"{knobs} m/s: {writing.listed(list(dict.fromkeys(names)))}" for knobs, names in used.items()]
-    return f"Solved in stages of smoothing, {'; '.join(told)}. All that is told here is exact." if told else ""
+        for widths in dict.fromkeys(stages_of(run) for run in entry.runs if smoothed(run.stages)):
+            used.setdefault(widths, []).append(entry.solver)
+    stages = [f"{widths} m/s: {writing.listed(list(dict.fromkeys(names)))}" for widths, names in used.items()]
+    return (
+        f"Solved in stages of smoothing, {'; '.join(stages)}. All numbers here are of the exact rollout."
+        if stages
+        else ""
+    )
 
 
 def stages_of(run: Run) -> str:
-    """The knobs of its stages."""
+    """The smoothing of its stages."""
     return writing.listed([show(stage.smoothing) for stage in run.stages])
 
 

@@ -80,7 +80,7 @@ def limits_sentence(every: Sequence[Channel]) -> str:
 
 
 def separation_sentence(trajectory: Trajectory) -> str:
-    """How well joints hold together."""
+    """How far joints separate."""
     found = separation(trajectory)
     if found is None:
         return ""
@@ -131,8 +131,10 @@ def gait_card(trajectory: Trajectory, scene: Scene, pictures: Mapping[str, Pictu
     if "gait" not in pictures:
         return Html("")
     least = f"{percent(LOADED)} of the weight of {show(weight(trajectory, scene))} N"
-    told = f"A bar: the body carries more than {least}. The duty factor is the share of the time that it does."
-    return card("Gait", tag("p", steps_sentence(trajectory, scene)), figures([pictures["gait"]], told), anchor="gait")
+    caption = f"A bar: the body carries more than {least}. The duty factor is the share of the time that it does."
+    return card(
+        "Gait", tag("p", steps_sentence(trajectory, scene)), figures([pictures["gait"]], caption), anchor="gait"
+    )
 
 
 def steps_sentence(trajectory: Trajectory, scene: Scene) -> str:

@@ -56,7 +56,7 @@ CARDS = (("states", "States over time"), ("controls", "Controls"), ("contacts", 
 
 def draw(trajectory: Trajectory, scene: Scene) -> dict[str, style.Picture]:
     """Every figure by name."""
-    made = style.picture("motion", "Path and snapshots", draw_motion(trajectory, scene))
+    made = style.picture("motion", "Path and poses over time", draw_motion(trajectory, scene))
     made += joint_pictures(trajectory, scene)
     made += style.picture("states", "Position, velocity and angular velocity over time", draw_states(trajectory))
     made += style.picture("controls", "Forces and torques over time", draw_controls(trajectory))

@@ -101,12 +101,14 @@ def draw(run: Run, recording: RecordedMotion) -> dict[str, Picture]:
     made += style.picture("variables", "Variables against their knots", draw_variables(run))
     motion = recording.trajectory
     if motion is not None:
-        made += style.picture("motion", "Path and snapshots", draw_motion(motion, recording.scene, recording.guess))
+        made += style.picture(
+            "motion", "Path and poses over time", draw_motion(motion, recording.scene, recording.guess)
+        )
         made += joint_pictures(motion, recording.scene)
         made += style.picture("states", "Position, velocity and angular velocity over time", draw_states(motion))
         made += style.picture("controls", "Forces and torques over time", draw_controls(motion))
         made += style.picture("contacts", "Contact forces and gaps over time", draw_contacts(motion, recording.scene))
-    made += style.picture("growth", "How changes grow until the end", draw_growth(run.examination.growth, motion))
+    made += style.picture("growth", "Growth of changes until the end", draw_growth(run.examination.growth, motion))
     made += style.picture("energy", "Energy over time", draw_energy(run.examination.energy))
     return {picture.name: picture for picture in made}
 

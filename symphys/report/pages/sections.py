@@ -29,14 +29,12 @@ LOG_TAIL = 20_000
 HOW_JUDGED = (
     "Judged by an exact rollout of the result, without smoothing. The bar ends at the error, the line is the tolerance."
 )
-HOW_DRAWN = (
-    "Snapshots at even times, the later the darker, fewer where a body hardly moves; spokes and edges turn with it."
-)
+HOW_DRAWN = "Poses at even times, the later the darker, fewer where a body hardly moves; spokes and edges turn with it."
 HOW_ROBOTS_DRAWN = (
-    "The whole where it has moved on by most of its length, the later the stronger; lines are paths of trunks and feet."
+    "Whole poses, each most of a length further on, the later the stronger; lines are paths of base bodies and feet."
 )
 HOW_JOINTS_DRAWN = "Dots are joints, squares those that slide or hold fast; bars are the axes."
-HOW_STRIP_DRAWN = "At even times; the window goes with what travels far."
+HOW_STRIP_DRAWN = "At even times; the section shown follows what travels far."
 CHAPTERS = (
     ("checks", "Checks"),
     ("motion", "Motion"),
@@ -106,7 +104,7 @@ def checks(run: Run) -> Html:
         table(["name", "error", "tolerance", "ratio", "", ""], rows, "tnnntt", "Checks") if rows else "",
         tag("h3", "Costs, weighted") if costs else "",
         costs,
-        tag("h3", "Told") if run.outputs else "",
+        tag("h3", "Reported quantities") if run.outputs else "",
         facts([(name, output_line(run, name)) for name in run.outputs]),
         anchor="checks",
         note=HOW_JUDGED,

@@ -1,4 +1,4 @@
-"""The panel "how far to trust this" of a run's page."""
+"""Verification of a solution: the panel "how far to trust this" of a run's page."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from symphys.report.figures.style import Picture
 from symphys.report.pages.markup import Html, Part, card, figures, pill, table, tag
 from symphys.results.run import Run
 
-NOT_EXAMINED = "This run was not examined; “symphys check --at” its folder tells how far to trust it."
+NOT_EXAMINED = "This run was not examined; “symphys check --at” its folder examines how far to trust it."
 ONLY_MOTION = (
-    "Only the motion was looked at. “symphys check --at” this folder also tells of its gradient, finer time steps and "
+    "Only the motion was examined. “symphys check --at” this folder also examines its gradient, finer time steps and "
     "the growth of changes."
 )
 TITLE = "How far to trust this"

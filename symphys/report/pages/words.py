@@ -27,7 +27,7 @@ def seconds(value: float) -> str:
 
 
 def status(code: str) -> str:
-    """A status in plain words; one that is not known is told as it stands."""
+    """A status in plain words; one that is not known stands as it is."""
     return ending(code).words
 
 
@@ -61,7 +61,7 @@ def headline(run: Run) -> str:
 
 
 def verdict(run: Run) -> str:
-    """What came out, in one or two sentences; the solver's own advice is told apart."""
+    """What came out, in one or two sentences; the solver's own advice is separate."""
     if not run.readable:
         return "No result could be read from this folder."
     missed = [check for check in run.checks if not check.met]

@@ -1,4 +1,4 @@
-"""Where joints are in a motion, and their marks in a panel: a dot at the pivot, a bar along the axis."""
+"""Where joints are in a motion, and their marks in a panel: a dot at the position, a bar along the axis."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ def on_side(trajectory: Trajectory, joint: SceneJoint, side: int, vector: Array,
 
 
 def drawable(trajectory: Trajectory, scene: Scene) -> list[SceneJoint]:
-    """The joints whose bodies the motion knows."""
+    """The joints whose bodies are in the motion."""
     return [joint for joint in scene.joints if set(joint.bodies) <= set(trajectory.body_names)]
 
 
-def pivot(trajectory: Trajectory, joint: SceneJoint, shot: int) -> Array:
+def position(trajectory: Trajectory, joint: SceneJoint, shot: int) -> Array:
     """(3,) [m]: the point of the first side."""
     return on_side(trajectory, joint, 0, joint.sockets[0].point, shot, True)
 
@@ -66,13 +66,13 @@ def draw_joint_positions(axes: Axes, view: View, trajectory: Trajectory, scene: 
     joints = drawable(trajectory, scene)
     bars = []
     for joint in joints:
-        place = view.flat(pivot(trajectory, joint, shot))
+        place = view.flat(position(trajectory, joint, shot))
         for side, direction in axes_of(joint):
             half = BAR / scale * view.flat(on_side(trajectory, joint, side, direction, shot, False))
             bars += [place - half, place + half]
     draw_lines(axes, np.array(bars), style.INK, 0.8, 7)
     for shape, square in (("o", False), ("s", True)):
-        chosen = [pivot(trajectory, joint, shot) for joint in joints if (joint.kind in SQUARE) == square]
+        chosen = [position(trajectory, joint, shot) for joint in joints if (joint.kind in SQUARE) == square]
         if chosen:
             (mark,) = axes.plot(*view.flat(np.array(chosen)).T, shape, color="white", markersize=2.5, zorder=7.1)
             mark.set(markeredgecolor=style.INK, markeredgewidth=0.7)

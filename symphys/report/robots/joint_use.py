@@ -25,7 +25,7 @@ class Channel:
         turns: whether it is an angle.
         value: (N + 1,) [rad] or [m].
         torque: (N,) [N m] or [N] of its motor.
-        command: (N,) what the motor was told; nan in records that do not say.
+        command: (N,) command of the motor; nan in files that do not have it.
     """
 
     name: str
@@ -78,7 +78,7 @@ class Channel:
 
     @property
     def target(self) -> Array | None:
-        """(N,): the angle, or place, that a servo was told; None for anything else."""
+        """(N,): the commanded angle, or place, of a servo; None for anything else."""
         if self.joint.motor is None or self.joint.motor.kind != "servo" or not np.isfinite(self.command).all():
             return None
         return self.command

@@ -1,4 +1,4 @@
-"""Many bodies that hang together, drawn whole: what is nearer hides what is behind, so that legs stay apart."""
+"""Poses over time of robots, drawn whole: nearer solids hide those behind, so that legs can be told apart."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from symphys.results.scene import Scene, Solid
 from symphys.trajectory import Array, Trajectory
 
 APART = 0.75
-"""Snapshots in one picture are apart by this share of the robot's length at least."""
+"""Poses in one picture are apart by this share of the robot's length at least."""
 MOST = 8
 
 
 def draw_robots(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Scene, scale: float) -> None:
-    """Paths of trunks and feet, and whole snapshots that hardly cover each other, the later the stronger."""
+    """Paths of base bodies and feet, and whole poses that hardly cover each other, the later the stronger."""
     draw_paths(axes, panel.view, trajectory, scene)
     shots = spaced(trajectory, scene, panel.view)
     for order, shot in enumerate(shots):
@@ -35,7 +35,7 @@ def draw_robots(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Sce
 
 
 def spaced(trajectory: Trajectory, scene: Scene, view: View) -> list[int]:
-    """The snapshots: first, last and between at even distances, if linked bodies go far enough; else the last."""
+    """The poses: first, last and between at even distances, if linked bodies go far enough; else the last."""
     low, high = extents(trajectory, scene, view, linked(trajectory, scene))
     gone = ((low + high) / 2 - (low[0] + high[0]) / 2) / (high - low).max(axis=0)
     along = gone[:, np.abs(gone[-1]).argmax()]
@@ -56,7 +56,7 @@ def extents(trajectory: Trajectory, scene: Scene, view: View, bodies: Sequence[i
 
 
 def draw_paths(axes: Axes, view: View, trajectory: Trajectory, scene: Scene) -> None:
-    """The paths of trunks and of the bodies at the ends of limbs."""
+    """The paths of base bodies and of the bodies at the ends of branches."""
     kept = traced(trajectory, scene)
     for body, colour in enumerate(colours(trajectory, scene)):
         if trajectory.body_names[body] in kept:
@@ -75,7 +75,7 @@ class RobotDrawing:
     shot: int
 
     def draw(self, strength: float = 1.0, order: int = 0) -> None:
-        """From the back to the front; paler with less ``strength``, over snapshots of a lower ``order``."""
+        """From the back to the front; paler with less ``strength``, over poses of a lower ``order``."""
         colour = colours(self.trajectory, self.scene)
         base = 2.5 + 0.25 * order / MOST
         lines = list(bones(self.trajectory, self.scene, self.shot))

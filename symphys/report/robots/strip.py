@@ -1,6 +1,6 @@
-"""A motion of bodies that hang together as a strip of pictures at even times: side view above, top view below.
+"""A motion of bodies connected by joints as a strip of pictures at even times: side view above, top view below.
 
-The window goes with bodies that travel far to the right or the left; up and down it stands still.
+The section shown follows bodies that travel far to the right or the left; up and down it is fixed.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ LEFT, RIGHT, BOTTOM, TOP, GAP, BETWEEN = 0.72, 0.1, 0.42, 0.3, 0.1, 0.18
 TALLEST, LOWEST = 2.4, 0.75
 """[in] a picture is at most and at least"""
 FAR, FAR_ON_RAILS = 2.0, 6.0
-"""A window stands still where all fits into so many sizes of the bodies: of free ones, and of those the world holds."""
+"""The section shown is fixed where all fits into so many sizes of the bodies: free ones, and those on the world."""
 MARGIN = 0.06
 EDGE = 0.14
 """[in] Numbers are at least so far from the sides of a picture, so that those of neighbours do not meet."""
@@ -35,7 +35,7 @@ EDGE = 0.14
 
 @dataclass(frozen=True)
 class Strip:
-    """Windows that are equally large: ``low`` (shots, 2) [m] are their corners, ``size`` (2,) [m]."""
+    """Sections that are equally large: ``low`` (shots, 2) [m] are their corners, ``size`` (2,) [m]."""
 
     view: View
     low: Array
@@ -83,13 +83,13 @@ def lay_out(strips: Sequence[Strip], width: float, scale: float) -> tuple[Figure
 
 
 def even_shots(count: int, size: Array) -> list[int]:
-    """Even times, more of them the slimmer the window is."""
+    """Even times, more of them the slimmer the section is."""
     number = int(np.clip(round(8 * size[1] / size[0]), 4, 8))
     return [int(shot) for shot in np.unique(np.linspace(0, count - 1, number).round())]
 
 
 def make_strip(view: View, trajectory: Trajectory, scene: Scene, shots: Sequence[int]) -> Strip:
-    """The windows of these shots, and the ground where it is near."""
+    """The sections of these shots, and the ground where it is near."""
     low, high = (part[list(shots)] for part in extents(trajectory, scene, view, linked(trajectory, scene)))
     size, union = (high - low).max(axis=0), high.max(axis=0) - low.min(axis=0)
     middle = (low + high) / 2
@@ -113,7 +113,7 @@ def widened(strip: Strip, width: float, height: float) -> Strip:
 
 
 def draw_frame(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Scene, shot: int, scale: float) -> None:
-    """What stands still, the bodies at one time, and their joints."""
+    """Static surfaces, the bodies at one time, and their joints."""
     draw_ground(axes, panel, trajectory, scene)
     axes.set_title("")
     RobotDrawing(axes, panel.view, trajectory, scene, shot).draw()
@@ -137,5 +137,5 @@ def dress_frame(axes: Axes, panel: ViewPanel, scale: float, first: bool, bottom:
 
 
 def inside(ticks: Array, low: float, high: float, edge: float) -> Array:
-    """The ticks that are well within a window."""
+    """The ticks that are well within a section."""
     return ticks[(ticks > low + edge) & (ticks < high - edge)]

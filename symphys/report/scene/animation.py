@@ -40,7 +40,7 @@ def animation(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = N
 
 
 def controls(duration: float, follows: bool) -> Html:
-    """Play button, slider, time, speed and views, and whether the camera goes along where it can."""
+    """Play button, slider, time, speed and views, and whether the camera can follow."""
     fitting = [speed for speed in SPEEDS if speed <= 1 and duration / speed >= LEAST_PLAY]
     chosen = max(fitting, default=SPEEDS[0])
     speeds = [tag("option", f"{s:g}×", value=f"{s:g}", selected="" if s == chosen else None) for s in SPEEDS]  # noqa: RUF001
@@ -132,7 +132,7 @@ def rounded(values: Array, share: float) -> list[float]:
 
 
 FAR = 2.5
-"""The camera goes along where bodies that hang together travel farther than so many times their size."""
+"""The camera follows where bodies connected by joints travel farther than so many times their size."""
 
 
 def joint_data(trajectory: Trajectory, scene: Scene) -> list[dict[str, object]]:
@@ -152,7 +152,7 @@ def joint_data(trajectory: Trajectory, scene: Scene) -> list[dict[str, object]]:
 
 
 def follow_data(trajectory: Trajectory, scene: Scene) -> dict[str, object] | None:
-    """The bodies that hang together, how high they are on average, and how far they reach [m]; None if they stay."""
+    """The bodies connected by joints, how high they are on average, and how far they reach [m]; None if they stay."""
     bodies = list(linked(trajectory, scene))
     if not bodies:
         return None

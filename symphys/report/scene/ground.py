@@ -1,4 +1,4 @@
-"""What stands around a motion, in a panel: planes, fixtures and terrain."""
+"""Static surfaces in a panel: planes, fixtures and terrain."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ LINES = 8
 
 
 def draw_ground(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Scene) -> None:
-    """All that stands still; planes and terrain hide what is below them."""
+    """All static surfaces; planes and terrain hide what is below them."""
     for ground in scene.terrain:
         if panel.view.depth == 2:
             draw_heights(axes, panel, ground)

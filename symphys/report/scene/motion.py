@@ -1,4 +1,4 @@
-"""The motion seen from the side and from above: path, snapshots at even times, what stands around, the guess."""
+"""The motion seen from the side and from above: path, poses at even times, static surfaces, the guess."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def draw_guess(axes: Axes, panel: ViewPanel, guess: Trajectory, names: Sequence[
 
 
 def add_legend(figure: Figure, trajectory: Trajectory, scene: Scene, guessed: bool) -> None:
-    """Bodies or limbs by colour, and the guess; nothing where the picture explains itself."""
+    """Bodies or kinematic branches by colour, and the guess; nothing where the picture explains itself."""
     handles = [Line2D([], [], color=colour, label=style.short(name, 20)) for name, colour in keys(trajectory, scene)]
     if guessed:
         handles.append(Line2D([], [], color="#98a4af", linewidth=0.9, linestyle=(0, (4, 2.5)), label="guess"))

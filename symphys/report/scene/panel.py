@@ -21,7 +21,7 @@ LEAST = 1.1
 
 @dataclass(frozen=True)
 class ViewPanel:
-    """A view and the window (low, high) x (right, up) [m] that it shows."""
+    """A view and the rectangle (low, high) x (right, up) [m] that it shows."""
 
     view: View
     low: Array
@@ -34,7 +34,7 @@ class ViewPanel:
 
 
 def make_panel(view: View, trajectory: Trajectory, scene: Scene, guess: Trajectory | None) -> ViewPanel:
-    """The window that holds every body, what stands close by, and the guess unless it goes far away."""
+    """The rectangle that holds every body, nearby static surfaces, and the guess unless it goes far away."""
     sizes = np.array([reach(trajectory, scene, body) for body in range(len(trajectory.body_names))])[:, None]
     flat = view.flat(trajectory.position)
     low, high = (flat - sizes).min(axis=(0, 1)), (flat + sizes).max(axis=(0, 1))
@@ -52,7 +52,7 @@ def make_panel(view: View, trajectory: Trajectory, scene: Scene, guess: Trajecto
 
 
 def include(plane: ScenePlane, view: View, low: Array, high: Array, room: float) -> tuple[Array, Array]:
-    """Widen a window by at most ``room`` to take in a plane that stands along one of its edges."""
+    """Widen a rectangle by at most ``room`` to take in a plane that stands along one of its edges."""
     normal = view.flat(plane.normal)
     for axis in range(2):
         if abs(normal[axis]) > 0.99:
@@ -77,7 +77,7 @@ def of_terrain(ground: SceneTerrain) -> Array:
 
 
 def take_in(box: Array, low: Array, high: Array, room: float) -> tuple[Array, Array]:
-    """Widen a window by at most ``room`` on each side to take in a box (2, 2) that reaches into it or close to it."""
+    """Widen a rectangle by at most ``room`` on each side to take in a box (2, 2) that reaches into it or near it."""
     near = (box[0] < high + room).all() and (box[1] > low - room).all()
     if not near:
         return low, high

@@ -1,4 +1,4 @@
-"""Bodies in a panel: their paths, and what they look like at even times."""
+"""Poses over time of single bodies in a panel: their paths, and their solids at even times."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SHAPES = 220
 
 
 def draw_bodies(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Scene, scale: float) -> None:
-    """Path and snapshots of every body; the first and last one of few, which no joint holds, are named."""
+    """Path and poses of every body; the first and last one of few, which no joint holds, are named."""
     bodies = range(len(trajectory.body_names))
     total = sum(len(solids_of(trajectory, scene, body)) for body in bodies)
     shots = np.linspace(0, len(trajectory.time) - 1, int(np.clip(SHAPES // total, 3, 10))).round().astype(int)
@@ -41,7 +41,7 @@ def draw_bodies(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Sce
 
 
 def apart(trajectory: Trajectory, view: View, body: int, solids: Sequence[Solid], shots: Array) -> list[int]:
-    """The snapshots in which some solid lies well off its place in the one kept after them; the last is kept."""
+    """The poses in which some solid lies well off its place in the one kept after them; the last is kept."""
     marks = np.stack([marked(trajectory, view, body, solid) for solid in solids], axis=1)
     least = np.array([0.35 * (solid.radius + solid.half.max()) for solid in solids])
     kept = [int(shots[-1])]
