@@ -3,7 +3,7 @@
 | file | holds |
 |---|---|
 | problem.toml | the problem file as it was read, includes resolved |
-| config.json | what was asked for: ``symphys.runs.config`` |
+| config.json | what was asked for: ``symphys.results.config`` |
 | result.json | what was found: ``symphys.results.result`` |
 | trace.csv | a row for each iteration: ``symphys.results.trace`` |
 | trajectory.npz, guess.npz | the motion of the result and of the guess: ``symphys.trajectory`` |

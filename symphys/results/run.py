@@ -10,6 +10,7 @@ from typing import Any
 from symphys import json_values as values
 from symphys.findings.examination import Examination
 from symphys.findings.levels import Judged
+from symphys.results.config import Config
 from symphys.results.file_names import CONFIG, PROBLEM, RESULT, TRACE
 from symphys.results.result import FORMAT, Result, VariableRecord, everything_met
 from symphys.results.text_files import ReportError, read_table, read_words
@@ -61,16 +62,16 @@ def read_run(folder: Path, root: Path) -> Run:
     elif readable and result.get("format") != FORMAT:
         faults.append(f"{RESULT}: format {values.name(result.get('format')) or 'unknown'}, this report reads {FORMAT}")
     config = read_or_note(folder / CONFIG, faults)
-    named = {**config, **result} if readable else config
+    asked = Config.from_json({**config, **result} if readable else config)
     result = result if readable else {}
     trace = read_trace(folder / TRACE, faults)
-    problem = values.name(named.get("problem")) or folder.resolve().parent.name
+    problem = asked.problem or folder.resolve().parent.name
     written = read_problem(folder / PROBLEM)
     given: dict[str, Any] = {
         "problem": problem,
         "title": values.name(result.get("title")) or problem,
-        "solver": values.name(named.get("solver")) or folder.resolve().name,
-        "seed": values.whole(named.get("seed")),
+        "solver": asked.solver or folder.resolve().name,
+        "seed": asked.seed,
         "folder": folder,
         "place": folder.relative_to(root).as_posix(),
         "readable": readable,

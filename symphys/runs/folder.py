@@ -9,10 +9,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from symphys import files
+from symphys import json_values as values
+from symphys.results.config import Config
 from symphys.results.file_names import CHECKPOINT, CONFIG, GUESS, LOG, PROBLEM, RESULT, SCENE, TRACE, TRAJECTORY
 from symphys.results.result import Result, read_result
 from symphys.results.trace import trace_text
-from symphys.runs.config import Config
 
 try:
     import fcntl
@@ -40,10 +41,9 @@ class RunFolder:
     def earlier(self, config: Config) -> Result | None:
         """The result of the very run that ``config`` asks for, interrupted or finished; None if there is none."""
         try:
-            if files.read_json(self.path / CONFIG)["key"] != config.key:
-                return None
-            return read_result(self.path / RESULT)
-        except (files.FileError, KeyError, TypeError):
+            asked = Config.from_json(files.read_json(self.path / CONFIG), values.verbatim)
+            return read_result(self.path / RESULT) if asked.key == config.key else None
+        except files.FileError:
             return None
 
     def checkpoint(self) -> dict[str, object] | None:

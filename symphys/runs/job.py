@@ -10,7 +10,7 @@ from typing import Any
 
 from symphys.codegen.backends import BEST
 from symphys.problem import Problem, require_solvable, require_solvers, validate_options
-from symphys.runs.config import Config, make_config
+from symphys.results.config import Config, make_config
 from symphys.runs.folder import RunFolder
 from symphys.solvers import SOLVERS, solver
 

@@ -1,4 +1,4 @@
-"""What the figures show: medians, thinning, views, contact forces, ratios."""
+"""Figures show the recorded numbers: medians, thinning, views, contact forces and ratios are what they are called."""
 
 from __future__ import annotations
 

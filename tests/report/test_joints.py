@@ -1,4 +1,4 @@
-"""What a page tells of joints: angles, limits, targets, torques, saturation, how well they hold."""
+"""Figures and tables of joints agree with the recorded angles, limits, commands, torques and separations."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from walker import DT, SCENE, STEPS, hinge, motion, write_walker
 from symphys.report import write_motion, write_run_report
 from symphys.report.figures import style
 from symphys.report.pages.joints import limits_sentence, motors_sentence, separation_sentence
-from symphys.report.robots.joint_figures import BEYOND, FULL, TARGET, draw_joints, make_grid, shown, unwound, window
+from symphys.report.robots.joint_figures import BEYOND, FULL, TARGET, axis_range, draw_joints, make_grid, shown, unwound
 from symphys.report.robots.joint_use import channels, separation
 from symphys.results.scene import Scene
 from symphys.trajectory import Trajectory
@@ -152,10 +152,10 @@ def test_an_angle_that_goes_round_has_a_gap() -> None:
 
 
 def test_an_axis_shows_limits_that_are_near_and_no_noise_at_large() -> None:
-    low, high = window(np.array([-1e-6, 1e-6]), [-np.inf, 0.6], 0.1)
+    low, high = axis_range(np.array([-1e-6, 1e-6]), [-np.inf, 0.6], 0.1)
     assert low < -0.05
     assert 0.6 < high < 0.8
-    assert window(np.array([0.0, 1.0]), [100.0], 0.1)[1] < 1.2
+    assert axis_range(np.array([0.0, 1.0]), [100.0], 0.1)[1] < 1.2
 
 
 def test_the_page_has_joints_gait_and_strip(run_dir: Path) -> None:

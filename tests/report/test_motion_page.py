@@ -1,4 +1,4 @@
-"""The page of a motion alone, and the animation in it."""
+"""The page of a motion alone is complete, and its animation carries the recorded states."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Recorded joints are read; records from before there were any are read too."""
+"""Trajectories on disk are read with the shapes of their fields; older files without some arrays are read too."""
 
 from __future__ import annotations
 

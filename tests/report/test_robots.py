@@ -1,4 +1,4 @@
-"""Robots as they are drawn: kinematic branches, joint positions, poses over time, strips, the gait, the camera."""
+"""Kinematic branches, joint positions, poses over time and gaits are those of the recorded motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What scene.json says of shapes, fixtures and terrain: read, or left out."""
+"""scene.json is read as it is written; a shape, fixture or terrain that is damaged is left out."""
 
 from __future__ import annotations
 

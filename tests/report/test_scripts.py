@@ -1,4 +1,4 @@
-"""The geometry of the page's scripts, run by node."""
+"""The geometry of the page's scripts is that of the figures; run by node."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Boxes, capsules, compounds, fixtures and terrain: how they are seen and drawn."""
+"""Every shape is drawn with its outline: boxes, capsules, compounds, fixtures and terrain."""
 
 from __future__ import annotations
 

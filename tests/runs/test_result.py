@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from symphys import files
+from symphys.results.config import make_config
 from symphys.results.result import CheckRecord
 from symphys.runs import Result, read_result
-from symphys.runs.config import make_config
 
 NAN = float("nan")
 GROWN = {"time": [0, 1], "factor": [1e5, 1]}
