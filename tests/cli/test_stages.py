@@ -1,4 +1,4 @@
-"""Stages of smoothing from the command line."""
+"""Stages of smoothing set on the command line are solved one after the other, each judged exactly."""
 
 from __future__ import annotations
 

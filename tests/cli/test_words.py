@@ -1,4 +1,4 @@
-"""What is typed is read as meant, and what is found is said briefly."""
+"""Values typed are read as TOML means them; results are worded in one line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page of a batch: every solver, every target, every broken folder by name."""
+"""The page of a batch has every solver, every target and every broken folder by name."""
 
 from __future__ import annotations
 

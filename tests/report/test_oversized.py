@@ -1,4 +1,4 @@
-"""Numbers far beyond any that can be drawn: pages are made all the same, and say what they leave out."""
+"""Numbers far beyond any that can be drawn leave a page that says what it leaves out."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page of one run: complete, alone, harmless, and the same again."""
+"""The page of one run is complete, self-contained, harmless, and the same when it is made again."""
 
 from __future__ import annotations
 

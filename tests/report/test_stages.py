@@ -1,4 +1,4 @@
-"""Runs in stages of smoothing: told with exact numbers, marked in the figures, and never mixed with smoothed ones."""
+"""Stages of smoothing are shown with exact numbers, marked in figures, and never mixed with smoothed ones."""
 
 from __future__ import annotations
 

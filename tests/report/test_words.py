@@ -1,4 +1,4 @@
-"""Numbers in plain words, HTML from parts, levels from numbers."""
+"""Numbers, durations and lists are worded to their precision; text is escaped once; levels follow the numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One run: what is written, what is skipped, what goes on, and what a failure leaves."""
+"""One run writes every file, is skipped when done, goes on when interrupted, and leaves no remains of another."""
 
 from __future__ import annotations
 

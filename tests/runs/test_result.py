@@ -1,4 +1,4 @@
-"""Results survive their file; errors against tolerances are told apart."""
+"""A result survives its file, and a file older than verdicts is ruled on as a new one is."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What scene.json says of a world."""
+"""scene.json has the sizes, places and joints that the variables set, in SI units."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs in stages of smoothing: each stage is judged exactly, and a run goes on in whatever stage it stopped."""
+"""Each stage of smoothing is judged exactly, and a run goes on in whatever stage it stopped."""
 
 from __future__ import annotations
 
