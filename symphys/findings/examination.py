@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Self
 
 import numpy as np
 
@@ -73,7 +73,7 @@ class Columns:
     """Lists of one length, (k,) each; all are empty where their lengths differ."""
 
     @classmethod
-    def from_json(cls, value: object, text: Text = name) -> Any:
+    def from_json(cls, value: object, text: Text = name) -> Self:
         """Read the lists by the names of the fields."""
         read = record(cls, value, text)
         return read if len({getattr(read, each.name).size for each in fields(cls)}) == 1 else cls()

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -167,7 +167,8 @@ class BackendRecord:
 class Result:
     """One solve, judged by the exact rollout at smoothing 0; nan or empty is what is not known.
 
-    Two are equal if their files are.
+    Two are equal if their files are. A number whose field has a ``label`` is shown under it at the top of the page,
+    rounded to so many ``decimals`` if the field says so; a new one needs nothing else but to be filled in.
 
     Attributes:
         problem, title: the file's stem and its title.
@@ -215,7 +216,7 @@ class Result:
     iterations: float = np.nan
     counts: Mapping[str, float] = field(default_factory=dict)
     price: Mapping[str, float] = field(default_factory=dict)
-    equivalents: float = np.nan
+    equivalents: float = field(default=np.nan, metadata={"label": "Work, in rollouts", "decimals": 1})
     seconds: Mapping[str, float] = field(default_factory=dict)
     trust: Mapping[str, Any] = field(default_factory=dict)
     guess: Mapping[str, float] = field(default_factory=dict)
@@ -274,13 +275,13 @@ class Result:
         return found | dict.fromkeys(self.absent)
 
     @classmethod
-    def from_json(cls, value: object, text: Text = values.name, **given: Any) -> Any:
+    def from_json(cls, value: object, text: Text = values.name, **given: Any) -> Self:
         """The result in an object of result.json, as far as it can be read; ``given``: fields that are known already.
 
         A file that is older than verdicts, whose ``solved`` means that everything is met, is ruled on anew.
         """
         entry = values.table(value)
-        read: Any = values.record(
+        read = values.record(
             cls,
             value,
             text,
@@ -317,8 +318,7 @@ def read_result(path: Path) -> Result:
             raise files.FileError(f"a result without {', '.join(sorted(missing))}")
     except files.FileError as error:
         raise files.FileError(f"{path}: {error}") from error
-    result: Result = Result.from_json(value, values.verbatim)
-    return result
+    return Result.from_json(value, values.verbatim)
 
 
 def smoothed(stages: Iterable[StageRecord]) -> bool:

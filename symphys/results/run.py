@@ -81,7 +81,7 @@ def read_run(folder: Path, root: Path) -> Run:
         "met": False,
         "faults": tuple(faults),
     }
-    run: Run = Run.from_json(result, **given)
+    run = Run.from_json(result, **given)
     return replace(
         run,
         status=run.status if readable else "unreadable",

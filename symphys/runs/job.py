@@ -60,7 +60,7 @@ def make_jobs(
 
     ``solvers`` None: those that each problem names, or those that fit it.
 
-    ProblemError for a problem without variables or aims, and for bad solver options.
+    ProblemError for a problem without variables or objectives, and for bad solver options.
     """
     seeds = tuple(seeds)
     jobs = []

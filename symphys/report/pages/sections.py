@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 from collections.abc import Sequence
@@ -17,7 +18,7 @@ from symphys.report.pages import words
 from symphys.report.pages.markup import Html, banner, card, facts, figures, fold, join, pill, stats, table, tag
 from symphys.report.robots.branches import is_large
 from symphys.report.scene.animation import animation
-from symphys.results.result import CheckRecord, VariableRecord
+from symphys.results.result import CheckRecord, Result, VariableRecord
 from symphys.results.run import Run
 from symphys.results.scene import Scene
 from symphys.results.trace import OUTPUT
@@ -79,10 +80,22 @@ def key_numbers(run: Run) -> Html:
             *((name[:1].upper() + name[1:], show(value)) for name, value in run.outputs.items()),
             ("Rollouts", words.count(run.counts.get("rollouts", math.nan))),
             *used,
-            ("Work, in rollouts", words.count(round(run.equivalents, 1))),
+            *labelled(run),
             ("Time of the solve", words.seconds(run.seconds.get("solve", math.nan))),
         ]
     )
+
+
+def labelled(run: Run) -> list[tuple[str, str]]:
+    """The numbers of a result whose definition has a label."""
+    found = []
+    for each in dataclasses.fields(Result):
+        if "label" in each.metadata:
+            value, decimals = getattr(run, each.name), each.metadata.get("decimals")
+            found.append(
+                (each.metadata["label"], show(value) if decimals is None else words.count(round(value, decimals)))
+            )
+    return found
 
 
 def checks(run: Run) -> Html:
