@@ -75,6 +75,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def close_quietly() -> int:
-    """Who read our output has gone: say nothing more, not even at exit."""
+    """The reader of the output has gone: print nothing more, not even at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return UNSOLVED

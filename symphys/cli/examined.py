@@ -28,7 +28,7 @@ WORDS = {text: COLOURS[level] for words in (MARKS, VERDICTS) for level, text in 
 WIDTH = 110
 """Characters of a line that goes to no terminal."""
 IN_TABLES = (GRADIENT, GRID)
-"""What the tables above the findings say already."""
+"""Subjects that the tables above the findings show already."""
 
 
 @dataclass(frozen=True)

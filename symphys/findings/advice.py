@@ -71,7 +71,7 @@ def answers(trust: Examination, judged: Judged) -> tuple[list[str], list[list[st
 
 
 def advice(trust: Examination, judged: Judged) -> str:
-    """One paragraph: what the findings say together."""
+    """One paragraph: what follows from the findings."""
     lines = findings(trust, judged)
     if trust.fault:
         return f"Mend this first, since solvers cannot pass it: {trust.fault}."
@@ -89,7 +89,7 @@ def advice(trust: Examination, judged: Judged) -> str:
 
 
 def of_influence(trust: Examination) -> str:
-    """What to say of variables that change nothing."""
+    """What follows where variables change nothing."""
     none = [check.variable for check in trust.gradient if unfelt(check)]
     if not none:
         return ""

@@ -1,4 +1,4 @@
-"""The object "trust" of a result: what was measured to say how far a solution can be trusted.
+"""The object "trust" of a result: verification of a solution, as numbers.
 
 The fields are the keys that ``symphys.verification`` writes; ``nan`` is a number that is not known.
 """
@@ -138,7 +138,7 @@ class Slide:
 
 @dataclass(frozen=True)
 class Examination:
-    """How far a solution can be trusted.
+    """How far a solution can be trusted: the measurements of one examination.
 
     Attributes:
         gradient: one per variable.

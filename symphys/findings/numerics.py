@@ -114,7 +114,7 @@ def unbroken(text: str) -> str:
 
 @dataclass(frozen=True)
 class GradientReach:
-    """What a growth curve says.
+    """How far gradients reach along a growth curve.
 
     Attributes:
         total: the largest magnification of a change by the end.
@@ -154,7 +154,7 @@ def reach(growth: Growth) -> GradientReach:
 
 
 def growth_finding(growth: Growth) -> Finding:
-    """How changes grow along the horizon."""
+    """The growth of changes along the horizon."""
     what, far = "Growth of a change until the end", reach(growth)
     if not math.isnan(far.lost):
         meaning = f"The derivatives are not finite before t = {show(far.lost)} s: nothing before can be optimised."

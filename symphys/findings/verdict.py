@@ -1,4 +1,4 @@
-"""What a run came to, in one word: whether everything is met, and whether the motion that meets it can be relied on."""
+"""The verdict on a run, in one word: whether everything is met, by a motion that can be relied on."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ ACCEPTED = (SOLVED, BEST_FOUND)
 
 @dataclass(frozen=True)
 class Ruling:
-    """What a run came to, and why it is not to be relied on, where it is not."""
+    """The verdict on a run, and why it is not to be relied on, where it is not."""
 
     verdict: str
     doubts: tuple[str, ...]

@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 from symphys import __version__, files
@@ -43,6 +44,11 @@ class Config:
     def from_json(cls, value: object, text: Text = values.name) -> Config:
         """The object of config.json; empty texts for what it does not have."""
         return values.record(cls, value, text)
+
+
+def read_config(path: Path) -> Config:
+    """The configuration in a file of this program's own; FileError if there is none."""
+    return Config.from_json(files.read_json(path), values.verbatim)
 
 
 def make_config(

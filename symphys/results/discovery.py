@@ -61,7 +61,7 @@ class Study:
 
     @property
     def best(self) -> Run:
-        """The best by its verdict, then the lowest objective, then the least work."""
+        """The best by its verdict, then the lowest objective, then the lowest cost."""
 
         def merit(run: Run) -> tuple[int, float, float]:
             known = [np.inf if np.isnan(number) else number for number in (run.objective, run.equivalents)]

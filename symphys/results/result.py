@@ -256,7 +256,7 @@ class Result:
         return math.inf if self.checks and math.isnan(worst) else worst
 
     def judge(self, met: bool) -> Judged:
-        """What the exact rollout says; ``met``: whether nothing is missed."""
+        """The judgement of the exact rollout; ``met``: whether nothing is missed."""
         goal = any(check.kind == "goal" for check in self.checks)
         costs = np.nan if goal else sum(self.costs.values())
         return Judged(self.objective, self.worst_ratio, met, bool(self.checks), costs)
@@ -303,7 +303,7 @@ def everything_met(entry: Mapping[str, object], result: Result) -> bool:
 
 
 def ruled(ruling: Ruling) -> dict[str, Any]:
-    """The fields of a result that say what was ruled."""
+    """The fields of a result that hold a ruling."""
     return {"solved": ruling.solved, "verdict": ruling.verdict, "doubts": ruling.doubts}
 
 

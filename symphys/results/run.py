@@ -1,4 +1,4 @@
-"""A run folder read into a Run: never fails, but says what was missing."""
+"""A run folder read into a Run: reading never fails; what is missing is listed in ``faults``."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from symphys.results.trace import Trace, read_trace
 
 @dataclass(frozen=True, eq=False)
 class Run(Result):
-    """One run folder: its result, and what else it says.
+    """One run folder: its result, and the rest of its files.
 
     Attributes:
         folder: where it is.

@@ -24,7 +24,7 @@ MOTORS: dict[type[Motor], str] = {Servo: "servo", VelocityMotor: "velocity", Tor
 
 
 def make_scene(problem: Problem, z: Mapping[str, Array], motion: Trajectory | None = None) -> Scene:
-    """Gravity, bodies, what stands still, and joints, in SI units, with the parameters that ``z`` (by variable) sets.
+    """Gravity, bodies, static surfaces, and joints, in SI units, with the parameters that ``z`` (by variable) sets.
 
     Terrain is sampled where ``motion`` goes; without one, around the bodies at the start.
     """

@@ -62,7 +62,7 @@ def proceed(
 
 
 class Log:
-    """The text of log.txt: what the solver says, line by line; a continued run adds to what is there."""
+    """The text of log.txt: messages of the solver, line by line; a continued run adds to what is there."""
 
     def __init__(self, job: Job) -> None:
         """Start from what an interrupted run wrote."""

@@ -1,4 +1,4 @@
-"""A run's folder: where its files are, what they say about being done, and who may write to them."""
+"""A run's folder: where its files are, whether the run is done, and its lock."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from symphys import files
-from symphys import json_values as values
-from symphys.results.config import Config
+from symphys.results.config import Config, read_config
 from symphys.results.file_names import CHECKPOINT, CONFIG, GUESS, LOG, PROBLEM, RESULT, SCENE, TRACE, TRAJECTORY
 from symphys.results.result import Result, read_result
 from symphys.results.trace import trace_text
@@ -27,7 +26,7 @@ class FolderBusy(files.FileError):
 
 @dataclasses.dataclass(frozen=True)
 class RunFolder:
-    """The files of one run; ``symphys.results.file_names`` says what each holds."""
+    """The files of one run; ``symphys.results.file_names`` lists what each holds."""
 
     path: Path
 
@@ -41,8 +40,8 @@ class RunFolder:
     def earlier(self, config: Config) -> Result | None:
         """The result of the very run that ``config`` asks for, interrupted or finished; None if there is none."""
         try:
-            asked = Config.from_json(files.read_json(self.path / CONFIG), values.verbatim)
-            return read_result(self.path / RESULT) if asked.key == config.key else None
+            same = read_config(self.path / CONFIG).key == config.key
+            return read_result(self.path / RESULT) if same else None
         except files.FileError:
             return None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import platform
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from importlib.metadata import version
 from typing import Any
 
@@ -37,7 +37,7 @@ JUDGED = frozenset(("objective", "costs", "outputs", "checks"))
 
 @dataclass(frozen=True)
 class Judgement:
-    """What the exact rollout of the solution says; all None where it cannot be simulated.
+    """The exact rollout of the solution; all None where it cannot be simulated.
 
     Attributes:
         verdict: costs and checks.
@@ -61,7 +61,7 @@ def make_result(
     price: dict[str, float],
     seconds: dict[str, float],
 ) -> Result:
-    """Everything that result.json says of a run that its solver ended."""
+    """The result of a run that its solver ended."""
     verdict = judgement.verdict
     found: dict[str, Any] = {}
     if verdict:
@@ -120,7 +120,7 @@ def variables(transcription: Transcription, z: Array) -> dict[str, VariableRecor
 
 
 def guess_values(transcription: Transcription, seed: int) -> dict[str, float]:
-    """What the start of a seed is worth exactly."""
+    """The exact rollout of the start of a seed."""
     exact = transcription.judge(transcription.shooting.start(seed))
     outputs = {OUTPUT + name: value for name, value in exact.outputs.items()}
     return {"objective": exact.objective, "worst": exact.worst, **outputs}
@@ -145,8 +145,9 @@ def stage_record(transcription: Transcription, stage: StageResult, price: Mappin
 
 def trace_row(row: TraceRow, price: Mapping[str, float]) -> dict[str, object]:
     """An iteration as a line of trace.csv."""
-    numbers = asdict(row)
-    outputs = {OUTPUT + name: value for name, value in numbers.pop("told").items()}
+    values = {each.name: getattr(row, each.name) for each in fields(row)}
+    numbers = {name: value for name, value in values.items() if not isinstance(value, Mapping)}
+    outputs = {OUTPUT + name: value for name, value in row.told.items()}
     return {**numbers, "equivalents": equivalents(row, price), **outputs}
 
 

@@ -1,4 +1,4 @@
-"""The heart of a run: solve, judge by the exact rollout, examine, and write all but the result itself."""
+"""One solve: solve, judge by the exact rollout, examine, and write all but the result itself."""
 
 from __future__ import annotations
 

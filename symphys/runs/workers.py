@@ -1,4 +1,4 @@
-"""Runs side by side in worker processes, which a crash of one of them or Ctrl-C leaves in good order."""
+"""Runs side by side in worker processes, robust against the crash of one of them and Ctrl-C."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Listener(Protocol):
 def side_by_side(jobs: Mapping[int, Job], count: int, transcribe: Transcribe, listener: Listener, stop: Stop) -> None:
     """Run all jobs in ``count`` processes; a process that dies fails the run that killed it and no other.
 
-    Which of the runs in work did it shows when each of them is tried again alone.
+    Which of the running ones did it shows when each of them is tried again alone.
     """
     threads.limit()
     waiting = dict(jobs)
@@ -69,7 +69,7 @@ def side_by_side(jobs: Mapping[int, Job], count: int, transcribe: Transcribe, li
 
 @dataclass
 class WorkerPool:
-    """One set of worker processes and what became of its jobs.
+    """One set of worker processes and the outcome of its jobs.
 
     Attributes:
         begun, ended: indices of jobs.
@@ -87,7 +87,7 @@ class WorkerPool:
 
     @property
     def suspects(self) -> list[int]:
-        """The jobs that were in work when a worker died."""
+        """The jobs that were running when a worker died."""
         return sorted(self.begun - self.ended) if self.broken else []
 
     @property
@@ -118,7 +118,7 @@ class WorkerPool:
                 raise
 
     def follow(self, futures: dict[Future[Result], int], messages: SimpleQueue[Message], halt: Event) -> None:
-        """Pass on what the workers say until all is done."""
+        """Pass on the messages of the workers until all is done."""
         while futures:
             done, _ = wait(futures, timeout=TICK, return_when=FIRST_COMPLETED)
             if self.stop() and not halt.is_set():
@@ -148,7 +148,7 @@ class WorkerPool:
 
 
 def cancel_waiting(futures: Iterable[Future[Result]], halt: Event) -> None:
-    """Start nothing more, and let the runs in work stop where they can go on later."""
+    """Start nothing more, and let the running ones stop where they can go on later."""
     halt.set()
     for future in futures:
         future.cancel()

@@ -212,7 +212,7 @@ def test_run_without_motion_says_so(batch: Path) -> None:
         ({"checks": [], "status": "budget"}, "Best found, budget ended"),
         ({"checks": [], "status": "stalled"}, "Best found, no more progress"),
         ({"checks": [], "status": "converged"}, "Solved"),
-        ({"trust": {"deepest": 0.0, "size": 0.1}}, "Only the motion was looked at."),
+        ({"trust": {"deepest": 0.0, "size": 0.1}}, "Only the motion was examined."),
         ({"format": 2}, "this report reads 1"),
     ],
 )

@@ -36,7 +36,7 @@ def unread(kind: Any, value: Any, path: str = "") -> Iterator[str]:
     tables = {key.partition(".")[0] for key in keys if "." in key}
     for key, entry in value.items():
         if key in tables:
-            yield from (f"{path}{key}.{each}" for each in entry if f"{key}.{each}" not in keys)
+            yield from (f"{path}{key}.{each}" for each in entry or () if f"{key}.{each}" not in keys)
         elif key not in keys:
             yield f"{path}{key}"
         else:

@@ -1,4 +1,4 @@
-"""How solvers came to their results: objective and errors against work and time."""
+"""Convergence of solvers: objective and errors against work and time."""
 
 from __future__ import annotations
 

@@ -124,7 +124,7 @@ def draw_history(axes: Axes, x: Array, values: Array, best: Array | None, colour
 
 
 def segments(run: Run) -> list[slice]:
-    """The rows of the trace, cut where the smoothing changes."""
+    """The rows of the trace, split where the smoothing changes."""
     smoothing = np.nan_to_num(run.trace["smoothing"])
     cuts = [0, *(np.flatnonzero(np.diff(smoothing)) + 1).tolist(), len(smoothing)]
     return [slice(first, last) for first, last in pairwise(cuts) if last > first]

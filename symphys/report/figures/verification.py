@@ -1,4 +1,4 @@
-"""How changes grow along the horizon, and what becomes of the energy."""
+"""Sensitivity growth and energy along the horizon."""
 
 from __future__ import annotations
 

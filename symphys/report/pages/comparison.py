@@ -44,7 +44,7 @@ def summary(found: Sequence[Study], broken: Sequence[Run]) -> str:
 
 
 def study_verdict(study: Study) -> Html:
-    """A banner: who solved it, and who did with the least work and time."""
+    """A banner: which solvers solved it, and which with the least work and time."""
     entries = [entry for entry in study.entries if any(run.status != "not_applicable" for run in entry.runs)]
     full = [entry for entry in entries if entry.solved == len(entry.runs)]
     none = [entry for entry in entries if entry.solved == 0]
@@ -203,7 +203,7 @@ def stages_of(run: Run) -> str:
 
 
 def convergence_note(study: Study) -> str:
-    """What the figure does not say by itself."""
+    """The caption: what the figure does not show."""
     marked = any(len(entry.runs) > 1 for entry in study.entries)
     text = "Strong: the median over seeds; a run that has ended keeps its last value. " if marked else ""
     text += "Errors below a thousandth of the tolerance are drawn there."

@@ -71,7 +71,7 @@ def motors_sentence(every: Sequence[Channel]) -> str:
 
 
 def limits_sentence(every: Sequence[Channel]) -> str:
-    """Which joints come to their limits."""
+    """Which joints reach their limits."""
     names = [channel.name for channel in every if channel.at_limit]
     if not names:
         return ""

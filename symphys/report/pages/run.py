@@ -38,7 +38,7 @@ LOG = "log.txt"
 
 @dataclass(frozen=True)
 class RecordedMotion:
-    """The motion of a run, as far as it could be read; ``faults`` says what could not."""
+    """The motion of a run, as far as it could be read; ``faults`` names what could not."""
 
     trajectory: Trajectory | None
     guess: Trajectory | None
@@ -136,7 +136,7 @@ def build(run: Run, recording: RecordedMotion, pictures: dict[str, Picture]) -> 
 
 
 def how_drawn(run: Run) -> str:
-    """What the figure of the convergence does not say by itself."""
+    """The caption of the convergence: what the figure does not show."""
     return f"Pale: the lowest so far{' in its stage' * smoothed(run.stages)}. Work counts one rollout as 1."
 
 

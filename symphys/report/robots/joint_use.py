@@ -85,7 +85,7 @@ class Channel:
 
     @property
     def at_limit(self) -> bool:
-        """Whether it came to one of its limits."""
+        """Whether it reached one of its limits."""
         near = (self.value <= self.joint.lower + AT_LIMIT) | (self.value >= self.joint.upper - AT_LIMIT)
         return bool(near.any())
 
