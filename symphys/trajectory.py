@@ -23,6 +23,8 @@ class NotFinite(SymphysError):
 class Trajectory:
     """N steps of B bodies with C pairs and J joints; world frame, SI units, velocities true at their time.
 
+    The types of the fields hold the shapes.
+
     Attributes:
         time: (N + 1,) [s].
         body_names: (B,).
@@ -33,8 +35,8 @@ class Trajectory:
         force: applied at the centre of mass [N].
         torque: applied [N m].
         contact_names: (C,).
-        contact_force: on the pair's first body, impulse over the step / dt [N]. Leapfrog gives half of a
-            stretch's impulse in the next one: a contact that begins shows up to a quarter less in its first step.
+        contact_force: on the pair's first body, impulse over the step / dt [N]. Leapfrog applies half of a
+            substep's impulse in the next one: a contact that begins shows up to a quarter less in its first step.
         contact_gap: [m]; the last row repeats the one before it.
         residual: largest change of an impulse in the last sweep [N s].
         crowded: 1 where a body had two or more impacts at once, or impacts of a chain come late.
@@ -44,8 +46,8 @@ class Trajectory:
         joint_value, joint_rate: coordinates [rad] or [m] and their rates; K is that of the joint that has
             most, NaN where another has fewer.
         joint_torque: of motors [N m] or [N]; 0 without one.
-        joint_command: what motors were told, in the unit of their kind; 0 where nothing tells them.
-        joint_separation: how far apart the sockets are, as far as a joint holds them together [m].
+        joint_command: commands of motors, in the unit of their kind; 0 without one.
+        joint_separation: distance of the sockets along the directions that a joint locks [m].
     """
 
     time: Array

@@ -1,4 +1,4 @@
-"""Runs: solve problems, and keep what was found in folders that can be read, skipped and continued."""
+"""Runs: solve problems, and write run folders that can be read, skipped and continued."""
 
 from symphys.results.file_names import RESULT, SCENE, TRAJECTORY
 from symphys.results.result import Result, read_result
