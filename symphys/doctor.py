@@ -41,7 +41,7 @@ State = Literal["ok", "missing", "failed"]
 
 
 @dataclass(frozen=True)
-class Finding:
+class Capability:
     """One thing that was tried.
 
     Attributes:
@@ -57,9 +57,9 @@ class Finding:
     required: bool = False
 
 
-def examine() -> Iterator[Finding]:
+def examine() -> Iterator[Capability]:
     """Everything, one after the other."""
-    yield Finding("python", "ok", f"{platform.python_version()} on {platform.system()} {platform.machine()}")
+    yield Capability("python", "ok", f"{platform.python_version()} on {platform.system()} {platform.machine()}")
     yield _tried("packages", _packages, required=True)
     yield _tried("ipopt", _ipopt, required=True)
     yield _tried("linear solvers", _linear_solvers)
@@ -71,10 +71,10 @@ def examine() -> Iterator[Finding]:
     if compiler.state == "ok":
         yield from _kernels()
     else:
-        yield Finding("kernels", "missing", f"not tried without a compiler; {WITHOUT}")
+        yield Capability("kernels", "missing", f"not tried without a compiler; {WITHOUT}")
 
 
-def healthy(findings: list[Finding]) -> bool:
+def healthy(findings: list[Capability]) -> bool:
     """Whether all that symphys needs works."""
     return all(finding.state == "ok" for finding in findings if finding.required)
 
@@ -83,15 +83,15 @@ class _Missing(Exception):
     """Something that is not there, with what to do."""
 
 
-def _tried(name: str, work: Callable[[], str], required: bool = False) -> Finding:
+def _tried(name: str, work: Callable[[], str], required: bool = False) -> Capability:
     """What came of it, whatever it was."""
     try:
-        return Finding(name, "ok", work(), required)
+        return Capability(name, "ok", work(), required)
     except _Missing as error:
-        return Finding(name, "missing", str(error), required)
+        return Capability(name, "missing", str(error), required)
     except Exception as error:
         text = str(error) or type(error).__name__
-        return Finding(name, "failed", " ".join(text.split()), required)
+        return Capability(name, "failed", " ".join(text.split()), required)
 
 
 def _packages() -> str:
@@ -152,7 +152,7 @@ def _compiler() -> str:
     return f"{' '.join(found.command)}: {found.version}"
 
 
-def _kernels() -> Iterator[Finding]:
+def _kernels() -> Iterator[Capability]:
     """A tiny kernel, cold into an empty cache, then right, on two threads, and warm."""
     with tempfile.TemporaryDirectory(prefix="symphys-doctor-", ignore_cleanup_errors=True) as folder:
         cache, program, built = Cache(Path(folder)), pendulum(), list[ProcessorKernel]()

@@ -1,8 +1,10 @@
-"""A simulated motion as plain arrays: what is recorded, drawn and examined."""
+"""A simulated motion as plain arrays: what is recorded, drawn and examined. The fields are those of trajectory.npz."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import cache
+from typing import Annotated, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +12,7 @@ from numpy.typing import NDArray
 from symphys.errors import SymphysError
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 class NotFinite(SymphysError):
@@ -20,52 +23,54 @@ class NotFinite(SymphysError):
 class Trajectory:
     """N steps of B bodies with C pairs and J joints; world frame, SI units, velocities true at their time.
 
+    The types of the fields hold the shapes.
+
     Attributes:
         time: (N + 1,) [s].
         body_names: (B,).
-        position: (N + 1, B, 3) [m].
-        orientation: (N + 1, B, 4) unit quaternions w x y z.
-        velocity: (N + 1, B, 3) [m/s].
-        angular_velocity: (N + 1, B, 3) [rad/s].
-        force: (N, B, 3) applied at the centre of mass [N].
-        torque: (N, B, 3) applied [N m].
+        position: [m].
+        orientation: unit quaternions w x y z.
+        velocity: [m/s].
+        angular_velocity: [rad/s].
+        force: applied at the centre of mass [N].
+        torque: applied [N m].
         contact_names: (C,).
-        contact_force: (N, C, 3) on the pair's first body, impulse over the step / dt [N]. Leapfrog gives half of a
-            stretch's impulse in the next one: a contact that begins shows up to a quarter less in its first step.
-        contact_gap: (N + 1, C) [m]; the last row repeats the one before it.
-        residual: (N,) largest change of an impulse in the last sweep [N s].
-        crowded: (N,) 1 where a body had two or more impacts at once, or impacts of a chain come late.
-        ambiguous: (N,) 1 where several bodies met at one instant and rebounded.
-        paradox: (N,) 1 where friction pulled a sliding contact together.
+        contact_force: on the pair's first body, impulse over the step / dt [N]. Leapfrog applies half of a
+            substep's impulse in the next one: a contact that begins shows up to a quarter less in its first step.
+        contact_gap: [m]; the last row repeats the one before it.
+        residual: largest change of an impulse in the last sweep [N s].
+        crowded: 1 where a body had two or more impacts at once, or impacts of a chain come late.
+        ambiguous: 1 where several bodies met at one instant and rebounded.
+        paradox: 1 where friction pulled a sliding contact together.
         joint_names: (J,).
-        joint_value, joint_rate: (N + 1, J, K) coordinates [rad] or [m] and their rates; K is that of the joint that has
+        joint_value, joint_rate: coordinates [rad] or [m] and their rates; K is that of the joint that has
             most, NaN where another has fewer.
-        joint_torque: (N, J, K) of motors [N m] or [N]; 0 without one.
-        joint_command: (N, J, K) what motors were told, in the unit of their kind; 0 where nothing tells them.
-        joint_separation: (N + 1, J) how far apart the sockets are, as far as a joint holds them together [m].
+        joint_torque: of motors [N m] or [N]; 0 without one.
+        joint_command: commands of motors, in the unit of their kind; 0 without one.
+        joint_separation: distance of the sockets along the directions that a joint locks [m].
     """
 
     time: Array
     body_names: tuple[str, ...]
-    position: Array
-    orientation: Array
-    velocity: Array
-    angular_velocity: Array
-    force: Array
-    torque: Array
+    position: Annotated[Array, "N + 1, B, 3"]
+    orientation: Annotated[Array, "N + 1, B, 4"]
+    velocity: Annotated[Array, "N + 1, B, 3"]
+    angular_velocity: Annotated[Array, "N + 1, B, 3"]
+    force: Annotated[Array, "N, B, 3"]
+    torque: Annotated[Array, "N, B, 3"]
     contact_names: tuple[str, ...]
-    contact_force: Array
-    contact_gap: Array
-    residual: Array
-    crowded: Array
-    ambiguous: Array
-    paradox: Array
+    contact_force: Annotated[Array, "N, C, 3"]
+    contact_gap: Annotated[Array, "N + 1, C"]
+    residual: Annotated[Array, "N"]
+    crowded: Annotated[Array, "N"]
+    ambiguous: Annotated[Array, "N"]
+    paradox: Annotated[Array, "N"]
     joint_names: tuple[str, ...]
-    joint_value: Array
-    joint_rate: Array
-    joint_torque: Array
-    joint_command: Array
-    joint_separation: Array
+    joint_value: Annotated[Array, "N + 1, J, K"]
+    joint_rate: Annotated[Array, "N + 1, J, K"]
+    joint_torque: Annotated[Array, "N, J, K"]
+    joint_command: Annotated[Array, "N, J, K"]
+    joint_separation: Annotated[Array, "N + 1, J"]
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
         """Every field as an array, ready for ``numpy.savez``."""
@@ -80,3 +85,12 @@ class Trajectory:
             names = ", ".join(repr(self.body_names[i]) for i in np.flatnonzero(bad[step]))
             raise NotFinite(f"the simulation is not finite from step {step} (t = {self.time[step]:g} s) on: {names}")
         return self
+
+
+@cache
+def shapes() -> dict[str, tuple[str, ...]]:
+    """The sizes of every array over states or steps by their letters: ``{"position": ("N + 1", "B", "3"), ...}``."""
+    hints = get_type_hints(Trajectory, include_extras=True)
+    return {
+        name: tuple(hint.__metadata__[0].split(", ")) for name, hint in hints.items() if hasattr(hint, "__metadata__")
+    }

@@ -25,7 +25,7 @@ SOLVED, UNSOLVED, WRONG, INTERRUPTED = 0, 1, 2, 130
 
 
 class Commands(click.Group):
-    """A group that knows what an unknown command may have meant."""
+    """A group that suggests what an unknown command may have meant."""
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -75,6 +75,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def close_quietly() -> int:
-    """Who read our output has gone: say nothing more, not even at exit."""
+    """The reader of the output has gone: print nothing more, not even at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return UNSOLVED

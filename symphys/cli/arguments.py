@@ -79,7 +79,7 @@ def read_settings(assignments: Iterable[str]) -> dict[str, object]:
 
 
 def read_value(text: str) -> object:
-    """A TOML value that JSON knows too, else the text itself."""
+    """A TOML value that JSON has too, else the text itself."""
     try:
         table = tomllib.loads(f"value = {text}")
         files.strict(table)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from symphys import files
 from symphys.cli.arguments import UsageFault, read_problems, read_settings, settings_option
 
 if TYPE_CHECKING:
@@ -81,16 +80,16 @@ def found(folder: Path, transcription: Transcription) -> NDArray[Any]:
 
     from symphys.runs import read_result
 
-    known, parts = read_result(folder / "result.json").z or {}, []
+    known, parts = read_result(folder / "result.json").z, []
     for block in transcription.shooting.blocks:
         size = block.stop - block.start
-        values = known[block.name]["value"] if block.name in known else []
-        if len(values) != size:
+        values = known[block.name].value.T.ravel() if block.name in known else np.zeros(0)
+        if values.size != size:
             raise UsageFault(
-                f"--at {folder}: this run found {len(values)} numbers for variable {block.name!r}, the problem has "
+                f"--at {folder}: this run found {values.size} numbers for variable {block.name!r}, the problem has "
                 f"{size}; give a folder that `symphys solve` wrote for this file, and the same --set"
             )
-        parts.append(np.array(files.numbers(values), float))
+        parts.append(values)
     return np.concatenate(parts)
 
 

@@ -14,12 +14,11 @@ from rich.table import Table
 from rich.text import Text
 
 from symphys import files
-from symphys.findings.examination import Trust
-from symphys.findings.examined import FAULT, NO_SLOPE, VERDICTS, advice, answers, findings, of_influence, slopes
+from symphys.findings.advice import FAULT, NO_SLOPE, VERDICTS, advice, answers, findings, of_influence, slopes
+from symphys.findings.contacts import sliding
+from symphys.findings.examination import Examination
 from symphys.findings.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN, Judged
 from symphys.findings.numerics import GRADIENT, GRID, reach
-from symphys.findings.reading import make_trust
-from symphys.findings.touching import sliding
 from symphys.transcription import Verdict
 
 COLOURS = {GOOD: "green", FAIR: "yellow", BAD: "red", UNKNOWN: "dim"}
@@ -29,7 +28,7 @@ WORDS = {text: COLOURS[level] for words in (MARKS, VERDICTS) for level, text in 
 WIDTH = 110
 """Characters of a line that goes to no terminal."""
 IN_TABLES = (GRADIENT, GRID)
-"""What the tables above the findings say already."""
+"""Subjects that the tables above the findings show already."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +36,7 @@ class Examined:
     """How something was judged, and how far that can be trusted."""
 
     judged: Judged
-    trust: Trust
+    trust: Examination
 
     @classmethod
     def of(cls, verdict: Verdict, trust: Mapping[str, Any]) -> Examined:
@@ -45,7 +44,7 @@ class Examined:
         goal = any(check.kind == "goal" for check in verdict.checks)
         costs = math.nan if goal else sum(verdict.costs.values())
         judged = Judged(verdict.objective, verdict.worst, verdict.solved, bool(verdict.checks), costs)
-        return cls(judged, make_trust(files.strict(trust)))
+        return cls(judged, Examination.from_json(files.strict(trust)))
 
     @property
     def wrong(self) -> bool:

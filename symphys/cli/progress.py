@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 def at(row: TraceRow) -> str:
     """Where a run is; the smoothing only where there is some, as its numbers are not the exact ones then."""
     smoothed = f" at smoothing {row.smoothing:g}" if row.smoothing > 0 else ""
-    told = "".join(f", {labelled(name, value)}" for name, value in row.told.items())
-    return f"iteration {row.iteration}, objective {number(row.best)}, worst {number(row.miss)}{told}{smoothed}"
+    outputs = "".join(f", {labelled(name, value)}" for name, value in row.told.items())
+    return f"iteration {row.iteration}, objective {number(row.best)}, worst {number(row.miss)}{outputs}{smoothed}"
 
 
 @contextmanager
@@ -39,18 +39,18 @@ def watch(runs: int) -> Iterator[Observer]:
 
 
 class Notes:
-    """What backends have to say, each note once."""
+    """Notes of backends, each once."""
 
     def __init__(self) -> None:
-        """Nothing is told."""
-        self.told: set[str] = set()
+        """None is shown yet."""
+        self.shown: set[str] = set()
 
     def new(self, result: Result, skipped: bool) -> list[str]:
-        """The lines to tell; none for a run that was done before."""
-        note = "" if skipped else result.backend.get("note", "")
-        if not note or note in self.told:
+        """The lines to print; none for a run that was done before."""
+        note = "" if skipped else result.backend.note
+        if not note or note in self.shown:
             return []
-        self.told.add(note)
+        self.shown.add(note)
         return [f"symphys: {note}"]
 
 
@@ -58,7 +58,7 @@ class Plain:
     """One line when a run begins, one when it ends, and some while it goes on; nothing is redrawn."""
 
     def __init__(self, every: float = 30.0) -> None:
-        """Nothing is told; ``every``: seconds between lines while a run goes on."""
+        """Nothing is shown yet; ``every``: seconds between lines while a run goes on."""
         self.notes = Notes()
         self.every, self.last = every, monotonic()
 

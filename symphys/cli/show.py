@@ -17,7 +17,7 @@ from symphys.cli.arguments import out_option, read_problems, read_settings, sett
 def show(source: str, assignments: tuple[str, ...], out: Path) -> None:
     """Simulate the guess of a problem, and draw the motion."""
     from symphys.report import write_motion
-    from symphys.runs import SCENE, TRAJECTORY, scene
+    from symphys.runs import SCENE, TRAJECTORY, make_scene
     from symphys.transcription import transcribe
 
     (problem,) = read_problems([source], read_settings(assignments))
@@ -26,5 +26,5 @@ def show(source: str, assignments: tuple[str, ...], out: Path) -> None:
     folder = out / problem.name / "guess"
     motion = transcription.simulate(guess)
     files.write_npz(folder / TRAJECTORY, motion.arrays())
-    files.write_json(folder / SCENE, scene(problem, transcription.shooting.by_block(guess), motion))
+    files.write_json(folder / SCENE, make_scene(problem, transcription.shooting.by_block(guess), motion).to_json())
     click.echo(write_motion(folder / TRAJECTORY, folder / SCENE, folder / "motion.html", title=problem.title))

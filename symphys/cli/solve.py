@@ -23,7 +23,7 @@ from symphys.cli.arguments import (
 from symphys.cli.wording import many_pairs
 
 if TYPE_CHECKING:
-    from symphys.runs import Batch, Job
+    from symphys.runs import BatchResult, Job
 
 MOST_SEEDS = 10_000
 MOST_JOBS = 256
@@ -50,7 +50,9 @@ MOST_JOBS = 256
     help="How many runs go on at once.",
 )
 @click.option(
+    "--multi-start",
     "--together",
+    "multi_start",
     is_flag=True,
     help="Solve the seeds of gradient and least_squares side by side, their evaluations in batches. Sooner done, but "
     "the seconds of each run are those of all.",
@@ -59,7 +61,7 @@ MOST_JOBS = 256
     "--unexamined",
     is_flag=True,
     help="Leave out how far solutions can be trusted, which for long motions takes as long as solving them; "
-    "`symphys check --at RUN_FOLDER` tells later.",
+    "`symphys check --at RUN_FOLDER` does it later.",
 )
 @backend_option
 @out_option
@@ -69,7 +71,7 @@ def solve(
     seeds: int,
     assignments: tuple[str, ...],
     jobs: int,
-    together: bool,
+    multi_start: bool,
     unexamined: bool,
     backend: str,
     out: Path,
@@ -94,11 +96,11 @@ def solve(
             click.echo(note, err=True)
     made = partial(transcribe, backend=backend, threads=1 if jobs > 1 else None)
     with watch(len(asked)) as observer:
-        batch = run_batch(asked, jobs, observer, made, together)
+        batch = run_batch(asked, jobs, observer, made, multi_start)
     return conclude(asked, batch, out)
 
 
-def conclude(jobs: list[Job], batch: Batch, out: Path) -> int:
+def conclude(jobs: list[Job], batch: BatchResult, out: Path) -> int:
     """Show what came of it; the exit code."""
     from symphys.cli.summary import print_summary
 
@@ -110,7 +112,7 @@ def conclude(jobs: list[Job], batch: Batch, out: Path) -> int:
     return 0 if batch.accepted else 1
 
 
-def last_words(batch: Batch, out: Path) -> str:
+def last_words(batch: BatchResult, out: Path) -> str:
     """What an interruption has left, and how to go on."""
     over = sum(result is not None and not result.interrupted for result in batch.results)
     halfway = sum(result is not None and result.interrupted for result in batch.results)

@@ -16,13 +16,13 @@ from symphys.cli.wording import duration, first_line, number, verdict, whole
 from symphys.findings.verdict import BEST_FOUND, DOUBTED
 
 if TYPE_CHECKING:
-    from symphys.runs import Batch, Job, Result
+    from symphys.runs import BatchResult, Job, Result
 
 NARROWEST = 120
 """Columns of the table where the output is no terminal."""
 
 
-def print_summary(jobs: list[Job], batch: Batch) -> None:
+def print_summary(jobs: list[Job], batch: BatchResult) -> None:
     """Print the table, and the advice of what is not solved."""
     groups: dict[tuple[str, str], list[Result]] = {}
     for job, result in zip(jobs, batch.results, strict=True):
@@ -57,16 +57,21 @@ def cells(group: list[Result]) -> list[Text]:
     solved = sum(result.solved for result in group)
     ends = Counter(ended(result) for result in group)
     texts = [
-        number(median(result.objective for result in group)),
+        number(median(known(result, "objective") for result in group)),
         number(median(result.worst for result in group)),
-        whole(median(result.iterations for result in group)),
-        whole(median(result.equivalents for result in group)),
-        duration(median((result.seconds or {}).get("solve") for result in group)),
+        whole(median(known(result, "iterations") for result in group)),
+        whole(median(known(result, "equivalents") for result in group)),
+        duration(median(result.seconds.get("solve") for result in group)),
         ", ".join(status if count == len(group) else f"{status} {count}" for status, count in ends.items()),
     ]
     fine = group and all(result.accepted for result in group)
     style = "red" if not fine else "green" if solved == len(group) else "yellow"
     return [Text(f"{solved}/{len(group)}", style=style), *map(Text, texts)]
+
+
+def known(result: Result, name: str) -> float | None:
+    """A number of a result; None where the run did not reach it."""
+    return None if name in result.absent else getattr(result, name)
 
 
 def ended(result: Result) -> str:
@@ -76,8 +81,8 @@ def ended(result: Result) -> str:
 
 def median(values: Iterable[float | None]) -> float | None:
     """The median of what is known; None if nothing is."""
-    known = [value for value in values if value is not None]
-    return statistics.median(known) if known else None
+    found = [value for value in values if value is not None]
+    return statistics.median(found) if found else None
 
 
 def advice(groups: dict[tuple[str, str], list[Result]]) -> list[str]:

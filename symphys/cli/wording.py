@@ -56,16 +56,16 @@ def brief(job: Job, result: Result, skipped: bool) -> str:
         return f"failed: {first_line(result.advice)}"
     if skipped:
         return f"done before ({verdict(result)})"
-    seconds = (result.seconds or {}).get("solve")
-    words = f"{verdict(result)}, objective {number(result.objective)}, {result.iterations} iterations"
+    seconds = result.seconds.get("solve")
+    words = f"{verdict(result)}, objective {number(result.objective)}, {result.iterations:.0f} iterations"
     return f"{words}, {duration(seconds)} s"
 
 
 def verdict(result: Result) -> str:
     """Solved, or why not."""
-    from symphys.findings.verdict import told
+    from symphys.findings.verdict import verdict_words
 
-    return told(result.verdict, result.status, bool(result.checks))
+    return verdict_words(result.verdict, result.status, bool(result.checks))
 
 
 def first_line(text: str) -> str:

@@ -1,14 +1,17 @@
-"""What was measured to say how far a solution can be trusted, as frozen records; ``nan`` is a number not known."""
+"""The object "trust" of a result: verification of a solution, as numbers.
+
+The fields are the keys that ``symphys.verification`` writes; ``nan`` is a number that is not known.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from symphys.json_values import Array, Text, name, record
 
 
 def nothing() -> Array:
@@ -20,8 +23,9 @@ def nothing() -> Array:
 class GradientCheck:
     """|adjoint - difference| of one variable, relative to ``scale``, the norm of its gradient.
 
-    ``felt``: what a change by the variable's scale changes, as a share of the value; 0 where nothing depends on it.
     ``jump``: where only differences of either side agree, what is between them, as a change of the variable.
+    ``felt``: what a change by the variable's scale changes, as a share of the value; 0 where nothing depends on it.
+    ``step``: of the central differences, in units of the variable's scale.
     """
 
     variable: str
@@ -29,6 +33,7 @@ class GradientCheck:
     scale: float
     jump: float = 0.0
     felt: float = np.nan
+    step: float = np.nan
 
 
 @dataclass(frozen=True)
@@ -64,7 +69,18 @@ class Smoothed:
 
 
 @dataclass(frozen=True)
-class Growth:
+class Columns:
+    """Lists of one length, (k,) each; all are empty where their lengths differ."""
+
+    @classmethod
+    def from_json(cls, value: object, text: Text = name) -> Self:
+        """Read the lists by the names of the fields."""
+        read = record(cls, value, text)
+        return read if len({getattr(read, each.name).size for each in fields(cls)}) == 1 else cls()
+
+
+@dataclass(frozen=True)
+class Growth(Columns):
     """``factor`` (k,): how much a change of the state at ``time`` (k,) [s] is magnified by the end; 1 at the end."""
 
     time: Array = field(default_factory=nothing)
@@ -72,7 +88,7 @@ class Growth:
 
 
 @dataclass(frozen=True)
-class Energy:
+class Energy(Columns):
     """At ``time`` [s]: energies, and what forces and contacts have given by then [J]; (k,) each."""
 
     time: Array = field(default_factory=nothing)
@@ -121,12 +137,11 @@ class Slide:
 
 
 @dataclass(frozen=True)
-class Trust:
-    """How far a solution can be trusted.
+class Examination:
+    """How far a solution can be trusted: the measurements of one examination.
 
     Attributes:
         gradient: one per variable.
-        step: of the central differences, in units of each variable's scale.
         refined: one per refinement.
         order: of convergence in dt, of "objective" and "gradient".
         smoothed: one per smoothing tried.
@@ -151,7 +166,6 @@ class Trust:
     """
 
     gradient: tuple[GradientCheck, ...] = ()
-    step: float = np.nan
     refined: tuple[Refined, ...] = ()
     order: Mapping[str, float] = field(default_factory=dict)
     smoothed: tuple[Smoothed, ...] = ()
@@ -169,13 +183,13 @@ class Trust:
     residual_finer: float = np.nan
     impulse: float = np.nan
     deepest: float = np.nan
-    depth_contact: str = ""
-    depth_time: float = np.nan
+    depth_contact: str = field(default="", metadata={"key": "deepest_at.contact"})
+    depth_time: float = field(default=np.nan, metadata={"key": "deepest_at.time"})
     size: float = np.nan
     passed: float = np.nan
-    passed_contact: str = ""
-    passed_time: float = np.nan
-    passed_depth: float = np.nan
+    passed_contact: str = field(default="", metadata={"key": "passed_at.contact"})
+    passed_time: float = field(default=np.nan, metadata={"key": "passed_at.time"})
+    passed_depth: float = field(default=np.nan, metadata={"key": "passed_at.depth"})
     multiple_impacts: float = np.nan
     ambiguous_impacts: float = np.nan
     paradoxes: float = np.nan
@@ -183,3 +197,13 @@ class Trust:
     slides: tuple[Slide, ...] = ()
     misses: tuple[Miss, ...] = ()
     fault: str = ""
+
+    @classmethod
+    def from_json(cls, value: object, text: Text = name) -> Examination:
+        """The record; what is absent or no number becomes nan."""
+        return record(cls, value, text)
+
+    @property
+    def step(self) -> float:
+        """Of the central differences, in units of each variable's scale; nan without any."""
+        return self.gradient[0].step if self.gradient else np.nan

@@ -1,4 +1,4 @@
-"""Levels: how much a number worries."""
+"""Findings of a verification, graded by levels."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symphys.findings.examination import GradientCheck, Growth, Refined, Smoothed, Trust
+from symphys.findings.examination import Examination, GradientCheck, Growth, Refined, Smoothed
 from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Finding, Judged, graded, relative_change, worst_of
 from symphys.findings.writing import listed, percent, show
 
@@ -36,7 +36,7 @@ SLOPE_LIMITS = (0.1, 0.5)
 GROWTH_LIMITS = (1e2, 1e4)
 """Of a change, from one time to another. At the second 0.1 mm become 1 m: what is linear ends there."""
 ORDERS = (0.3, 5.0)
-"""Orders of convergence between these are told; others are none."""
+"""Orders of convergence between these are shown; others are none."""
 
 
 def gradient_finding(check: GradientCheck) -> Finding:
@@ -88,7 +88,7 @@ def refined_finding(refined: Refined, judged: Judged) -> Finding:
     return Finding(GRID, level, what, number, meaning)
 
 
-def slope_finding(trust: Trust) -> list[Finding]:
+def slope_finding(trust: Examination) -> list[Finding]:
     """What refinement does to the gradient; nothing where that was not measured."""
     changes = [(unbroken(refined.what), refined.change) for refined in trust.refined]
     known = [(what, change) for what, change in changes if not math.isnan(change)]
@@ -103,8 +103,8 @@ def slope_finding(trust: Trust) -> list[Finding]:
     order = trust.order.get("gradient", math.nan)
     if ORDERS[0] <= order <= ORDERS[1]:
         meaning += f" Its error shrinks like dt to the power {show(order, 2)}."
-    told = ", ".join(f"{percent(change)} with {what}" for what, change in known)
-    return [Finding(GRID, level, "Change of the gradient", told, meaning)]
+    number = ", ".join(f"{percent(change)} with {what}" for what, change in known)
+    return [Finding(GRID, level, "Change of the gradient", number, meaning)]
 
 
 def unbroken(text: str) -> str:
@@ -113,8 +113,8 @@ def unbroken(text: str) -> str:
 
 
 @dataclass(frozen=True)
-class Reach:
-    """What a growth curve says.
+class GradientReach:
+    """How far gradients reach along a growth curve.
 
     Attributes:
         total: the largest magnification of a change by the end.
@@ -131,7 +131,7 @@ class Reach:
     lost: float
 
 
-def reach(growth: Growth) -> Reach:
+def reach(growth: Growth) -> GradientReach:
     """How far a gradient reaches.
 
     |dx_T/dx_s| <= |dx_T/dx_t| |dx_t/dx_s|: what the curve has fallen from s to t, a change has at least grown. So a
@@ -142,7 +142,7 @@ def reach(growth: Growth) -> Reach:
     time, factor = growth.time[finite], growth.factor[finite]
     lost = np.nan if finite.all() or not finite.any() else float(time[0])
     if not factor.size:
-        return Reach(np.nan, np.nan, np.inf, np.inf, np.nan)
+        return GradientReach(np.nan, np.nan, np.inf, np.inf, np.nan)
     first = int(factor.argmax())
     grown = factor[first] / np.maximum(factor[first:], 1e-300)
     beyond, half = grown > GROWTH_LIMITS[1], grown > np.sqrt(factor[first])
@@ -150,11 +150,11 @@ def reach(growth: Growth) -> Reach:
     end = float(since[beyond.argmax()]) if beyond.any() else np.inf
     doublings = np.log2(factor[first]) / 2
     doubling = float(since[half.argmax()] - since[0]) / doublings if half.any() and doublings > 0 else np.inf
-    return Reach(float(factor[first]), float(time[first]), end, doubling, lost)
+    return GradientReach(float(factor[first]), float(time[first]), end, doubling, lost)
 
 
 def growth_finding(growth: Growth) -> Finding:
-    """How changes grow along the horizon."""
+    """The growth of changes along the horizon."""
     what, far = "Growth of a change until the end", reach(growth)
     if not math.isnan(far.lost):
         meaning = f"The derivatives are not finite before t = {show(far.lost)} s: nothing before can be optimised."
@@ -171,7 +171,7 @@ def growth_finding(growth: Growth) -> Finding:
     return Finding(GROWTH, level, what, f"× {show(far.total, 2)}", meaning, doubt * (level == BAD))  # noqa: RUF001
 
 
-def too_far(far: Reach) -> str:
+def too_far(far: GradientReach) -> str:
     """Where a gradient ends, as a clause."""
     if not math.isfinite(far.end):
         return ""

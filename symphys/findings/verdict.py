@@ -1,15 +1,15 @@
-"""What a run came to, in one word: whether everything is met, and whether the motion that meets it can be relied on."""
+"""The verdict on a run, in one word: whether everything is met, by a motion that can be relied on."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from symphys.findings.examination import Trust
-from symphys.findings.examined import findings
+from symphys.findings.advice import findings
+from symphys.findings.endings import ending
+from symphys.findings.examination import Examination
 from symphys.findings.levels import FAIR, GOOD, Judged
 from symphys.findings.numerics import GROWTH, refined_finding
-from symphys.findings.reading import make_trust
 
 SOLVED = "solved"
 """Everything is met, or the point is stationary where there is nothing to meet; nothing speaks against it."""
@@ -23,14 +23,11 @@ INTERRUPTED = "interrupted"
 
 ACCEPTED = (SOLVED, BEST_FOUND)
 """What a run was asked for, it did."""
-ENDED_BADLY = ("not_finite", "not_applicable", "failed")
-STATIONARY = ("met", "converged")
-"""Of the ways in which solvers end."""
 
 
 @dataclass(frozen=True)
 class Ruling:
-    """What a run came to, and why it is not to be relied on, where it is not."""
+    """The verdict on a run, and why it is not to be relied on, where it is not."""
 
     verdict: str
     doubts: tuple[str, ...]
@@ -43,11 +40,11 @@ class Ruling:
 
 def rule(status: str, judged: Judged, trust: Mapping[str, object] | None) -> Ruling:
     """The ruling on a run that ended with ``status``; ``trust`` as in result.json, None where nothing was measured."""
-    found = doubts(make_trust(dict(trust or {})), judged)
+    found = doubts(Examination.from_json(dict(trust or {})), judged)
     return Ruling(verdict(status, judged, bool(found)), found)
 
 
-def doubts(trust: Trust, judged: Judged) -> tuple[str, ...]:
+def doubts(trust: Examination, judged: Judged) -> tuple[str, ...]:
     """Why a result is not to be relied on, one clause for each finding that refutes it; empty if none does.
 
     That changes grow beyond use spoils gradients. It refutes a result unless finer simulations come to the same: a walk
@@ -57,7 +54,7 @@ def doubts(trust: Trust, judged: Judged) -> tuple[str, ...]:
     return tuple(line.doubt for line in found if line.about != GROWTH or not holds(trust, judged))
 
 
-def holds(trust: Trust, judged: Judged) -> bool:
+def holds(trust: Examination, judged: Judged) -> bool:
     """Whether finer simulations were done, and none of them is far from the result."""
     return bool(trust.refined) and all(refined_finding(row, judged).level in (GOOD, FAIR) for row in trust.refined)
 
@@ -72,16 +69,16 @@ def verdict(status: str, judged: Judged, doubted: bool) -> str:
     """
     if status == INTERRUPTED:
         return INTERRUPTED
-    if not judged.met or not (judged.checked or status not in ENDED_BADLY):
+    if not judged.met or not (judged.checked or ending(status).usable):
         return NOT_SOLVED
     if doubted:
         return DOUBTED
-    return SOLVED if judged.checked or status in STATIONARY else BEST_FOUND
+    return SOLVED if judged.checked or ending(status).stationary else BEST_FOUND
 
 
-def told(word: str, status: str, checked: bool) -> str:
+def verdict_words(word: str, status: str, checked: bool) -> str:
     """A verdict in a few words, such as "best found, budget ended"."""
-    how = {"budget": "budget ended", "stalled": "no more progress"}.get(status, status.replace("_", " "))
+    how = ending(status).brief
     return {
         SOLVED: "solved",
         DOUBTED: "met, but not to be trusted" if checked else "found, but not to be trusted",

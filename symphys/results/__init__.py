@@ -1,1 +1,1 @@
-"""What a run folder holds: the fields of its files, as they are written and as they are read."""
+"""What a run folder holds: one definition of each of its files, which writers and readers import."""

@@ -1,4 +1,4 @@
-"""Run folders below a folder, grouped by problem and solver."""
+"""Discovery of run folders below a folder, grouped by problem and solver."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from symphys.findings.verdict import BEST_FOUND, DOUBTED, SOLVED
-from symphys.results.reading import CONFIG, PROBLEM, RESULT, read_run
-from symphys.results.records import ReportError, Run
+from symphys.results.file_names import CONFIG, FIGURES, PROBLEM, RESULT
+from symphys.results.run import Run, read_run
+from symphys.results.text_files import ReportError
 
-FIGURES = "figures"
 RANKS = {word: rank for rank, word in enumerate((SOLVED, BEST_FOUND, DOUBTED))}
 """Of verdicts; what is not named comes last."""
 
@@ -61,10 +61,10 @@ class Study:
 
     @property
     def best(self) -> Run:
-        """The best by its verdict, then the lowest objective, then the least work."""
+        """The best by its verdict, then the lowest objective, then the lowest cost."""
 
         def merit(run: Run) -> tuple[int, float, float]:
-            known = [np.inf if np.isnan(number) else number for number in (run.objective, run.effort.equivalents)]
+            known = [np.inf if np.isnan(number) else number for number in (run.objective, run.equivalents)]
             return RANKS.get(run.verdict, len(RANKS)), known[0], known[1]
 
         return min(self.runs, key=merit)

@@ -1,6 +1,6 @@
 """What can be drawn: axes, their ticks and what is computed from positions overflow far below the largest double.
 
-Tables tell every number as it is. Figures leave out what is beyond ``LARGEST``, and the page says so.
+Tables have every number as it is. Figures leave out what is beyond ``LARGEST``, and the page says so.
 """
 
 from __future__ import annotations

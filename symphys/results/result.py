@@ -1,26 +1,41 @@
-"""What a run found: the fields of result.json."""
+"""result.json: what a run found. Every field is declared here once, for those that write it and those that read it."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any, Self
+
+import numpy as np
 
 from symphys import files
+from symphys import json_values as values
 from symphys.findings.levels import Judged
 from symphys.findings.verdict import ACCEPTED, NOT_SOLVED, Ruling, rule
+from symphys.json_values import Array, Text
+from symphys.results.trace import renamed
 
 FORMAT = 1
-MEASURES = ("error", "tolerance", "ratio")
 JUDGED_LATE = {"verdict", "doubts"}
 """Fields that older files do not have."""
+REACHED = frozenset(
+    (
+        *("objective", "costs", "outputs", "checks", "z", "iterations", "counts", "price", "equivalents", "seconds"),
+        *("trust", "guess", "stages"),
+    )
+)
+"""Fields that a run does not reach where it fails: then they are null in the file."""
 
 
-class CheckRecord(TypedDict):
-    """One target, constraint or goal: ``error`` and ``tolerance`` in its own unit; met where ``ratio`` <= 1."""
+@dataclass(frozen=True)
+class CheckRecord:
+    """One target, constraint or goal: ``error`` and ``tolerance`` in its own unit; met where ``ratio`` <= 1.
+
+    ``kind``: "target", "constraint" or "goal". ``name``: as in the problem file.
+    """
 
     kind: str
     name: str
@@ -29,24 +44,82 @@ class CheckRecord(TypedDict):
     ratio: float
     met: bool
 
-
-class BlockRecord(TypedDict):
-    """One variable: ``shape`` (components, knots); the lists hold components * knots numbers, knot after knot."""
-
-    sets: list[str]
-    shape: list[int]
-    value: list[float]
-    guess: list[float]
-    lower: list[float | None]
-    upper: list[float | None]
+    @classmethod
+    def from_json(cls, value: object, text: Text = values.name) -> CheckRecord:
+        """A check without a kind is a "check", one without a name has that of its kind."""
+        entry = values.table(value)
+        kind = text(entry.get("kind")) or "check"
+        read = values.record(cls, value, text, kind=kind, name=text(entry.get("name")) or kind)
+        return read if "ratio" in entry else dataclasses.replace(read, ratio=_share(read.error, read.tolerance))
 
 
-class StageRecord(TypedDict):
-    """One stage of smoothing, and its best point.
+def _share(error: float, tolerance: float) -> float:
+    """Error / tolerance; inf for an error without any tolerance."""
+    if tolerance > 0:
+        return error / tolerance
+    return 0.0 if error == 0 else error * np.inf
 
-    ``objective`` and ``worst`` (largest error / tolerance) are those at this smoothing; ``exact_objective``,
-    ``exact_worst`` and ``solved`` those of the exact rollout. ``counts``, ``equivalents`` and ``seconds`` are what the
-    stage took, those before it left out; ``status`` is how it ended.
+
+@dataclass(frozen=True, eq=False)
+class VariableRecord:
+    """One variable; two are equal if the file has the same of them.
+
+    Attributes:
+        name: in the problem file; the key in the file.
+        sets: the quantities that it sets, as the problem file writes them where that can be read.
+        value, guess: (components, knots); flat in the file, knot after knot, beside their ``shape``.
+        lower, upper: (components, knots) bounds, infinite where there is none, which is null in the file.
+    """
+
+    name: str
+    sets: tuple[str, ...]
+    value: Array
+    guess: Array
+    lower: Array
+    upper: Array
+
+    @classmethod
+    def from_json(cls, value: object, text: Text = values.name) -> VariableRecord:
+        """One without its name; a shape that does not fit the values is replaced by one knot."""
+        entry = values.table(value)
+        size = values.numbers(entry.get("value")).size
+        shape = [values.whole(number) for number in values.numbers(entry.get("shape"))[:2]]
+        fits = len(shape) == 2 and min(shape) > 0 and shape[0] * shape[1] == size
+        components, knots = (shape[0], shape[1]) if fits else (size, 1)
+
+        def block(key: str, missing: float) -> Array:
+            flat = values.numbers(entry.get(key))
+            flat = flat if flat.size == size else np.full(size, np.nan)
+            return np.where(np.isnan(flat), missing, flat).reshape((knots, components)).T
+
+        arrays = {key: block(key, np.nan) for key in ("value", "guess")}
+        bounds = {"lower": block("lower", -np.inf), "upper": block("upper", np.inf)}
+        return values.record(cls, value, text, name="", **arrays, **bounds)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the file has the same of both."""
+        return isinstance(other, VariableRecord) and files.strict(self.to_json()) == files.strict(other.to_json())
+
+    def to_json(self) -> dict[str, Any]:
+        """The entry of the file."""
+        flat = {key: getattr(self, key).T.ravel().tolist() for key in ("value", "guess", "lower", "upper")}
+        for key in ("lower", "upper"):
+            flat[key] = [number if math.isfinite(number) else None for number in flat[key]]
+        return {"sets": list(self.sets), "shape": list(self.value.shape), **flat}
+
+
+@dataclass(frozen=True)
+class StageRecord:
+    """One stage of continuation in the smoothing, and its best point.
+
+    Attributes:
+        smoothing: of the contacts [m/s].
+        status: how it ended.
+        objective, worst: of its best point at this smoothing; ``worst`` is the largest error / tolerance.
+        exact_objective, exact_worst, solved: the same point in the exact rollout.
+        counts: evaluations by kind, those of the stages before it left out.
+        equivalents: their cost in rollouts.
+        seconds: wall time, likewise.
     """
 
     smoothing: float
@@ -56,14 +129,46 @@ class StageRecord(TypedDict):
     exact_objective: float
     exact_worst: float
     solved: bool
-    counts: dict[str, int]
+    counts: Mapping[str, float]
     equivalents: float
     seconds: float
 
 
 @dataclass(frozen=True)
+class BackendRecord:
+    """What evaluated the functions.
+
+    Attributes:
+        name: of the backend.
+        lanes, threads: rollouts that one instruction computes; blocks that are computed at once.
+        precision: of the arithmetic.
+        compiler: and its version; empty where nothing is compiled.
+        note: why it is not what was asked for, or empty.
+        compiled: "cold", "warm" (from the cache) or empty.
+    """
+
+    name: str = ""
+    lanes: int = 0
+    threads: int = 0
+    precision: str = ""
+    compiler: str = ""
+    note: str = ""
+    compiled: str = ""
+
+    def __str__(self) -> str:
+        """In a line."""
+        counts = [f"{n} {what}{'s' * (n > 1)}" for n, what in ((self.lanes, "lane"), (self.threads, "thread")) if n]
+        start = {"cold": "compiled anew", "warm": "taken from the cache"}.get(self.compiled, "")
+        parts = [self.name, *counts, self.precision and f"{self.precision} precision", self.compiler, start]
+        return "; ".join(filter(None, [", ".join(filter(None, parts)), self.note]))
+
+
+@dataclass(frozen=True, eq=False)
 class Result:
-    """One solve, judged by the exact rollout at smoothing 0. What is not known is None.
+    """One solve, judged by the exact rollout at smoothing 0; nan or empty is what is not known.
+
+    Two are equal if their files are. A number whose field has a ``label`` is shown under it at the top of the page,
+    rounded to so many ``decimals`` if the field says so; a new one needs nothing else but to be filled in.
 
     Attributes:
         problem, title: the file's stem and its title.
@@ -73,27 +178,27 @@ class Result:
         status, advice: how the solver ended and what to try.
         objective: of the exact rollout.
         costs: weighted value of each cost by name.
-        outputs: what the problem tells, by name.
+        outputs: the problem's reported quantities by name and unit.
         checks: targets, constraints and the goal.
         z: the variables by name.
         iterations: of the solver.
         counts: evaluations by kind.
         price: measured cost of one evaluation by kind, in rollouts.
-        equivalents: the whole work in rollouts.
+        equivalents: the cost of all evaluations in rollouts.
         seconds: wall time of "build", "compile" and "solve"; what a solver loads beforehand is in none of them.
-        trust: how far the solution can be trusted; without an examination what
-            ``symphys.verification.survey`` says.
-        guess: what the run started from, exactly: "objective", "worst", the largest error / tolerance, and what is
-            told, by "told: " and its name.
+        trust: how far the solution can be trusted, with the keys of ``symphys.findings.examination``; without an
+            examination what ``symphys.verification.survey`` measures.
+        guess: of the start, exactly: "objective", "worst", the largest error / tolerance, and outputs, by "output: "
+            and their names.
         stages: those of smoothing that were begun, in their order; the solution is the point of the last, unless that
             of another or the guess is better exactly.
         versions: of everything that took part.
         when: UTC time of the end, ISO 8601.
         command: what was typed.
-        backend: what evaluated: "name", "lanes", "threads", "precision", "compiler"; "compiled": "cold", "warm" (from
-            the cache) or empty; "note": why it is not what was asked for, or empty.
+        backend: what evaluated the functions.
         verdict: a word of ``symphys.findings.verdict``.
         doubts: why the motion is not to be relied on, one clause each.
+        absent: names of the fields above that the run did not reach; they are null in the file.
     """
 
     problem: str
@@ -103,25 +208,30 @@ class Result:
     solved: bool
     status: str
     advice: str
-    objective: float | None = None
-    costs: dict[str, float] | None = None
-    outputs: dict[str, float] | None = None
-    checks: list[CheckRecord] | None = None
-    z: dict[str, BlockRecord] | None = None
-    iterations: int | None = None
-    counts: dict[str, int] | None = None
-    price: dict[str, float] | None = None
-    equivalents: float | None = None
-    seconds: dict[str, float] | None = None
-    trust: dict[str, Any] | None = None
-    guess: dict[str, float] | None = None
-    stages: list[StageRecord] | None = None
-    versions: dict[str, str] = field(default_factory=dict)
+    objective: float = np.nan
+    costs: Mapping[str, float] = field(default_factory=dict)
+    outputs: Mapping[str, float] = field(default_factory=dict)
+    checks: tuple[CheckRecord, ...] = ()
+    z: Mapping[str, VariableRecord] = field(default_factory=dict)
+    iterations: float = np.nan
+    counts: Mapping[str, float] = field(default_factory=dict)
+    price: Mapping[str, float] = field(default_factory=dict)
+    equivalents: float = field(default=np.nan, metadata={"label": "Work, in rollouts", "decimals": 1})
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    trust: Mapping[str, Any] = field(default_factory=dict)
+    guess: Mapping[str, float] = field(default_factory=dict)
+    stages: tuple[StageRecord, ...] = ()
+    versions: Mapping[str, str] = field(default_factory=dict)
     when: str = ""
     command: str = ""
-    backend: dict[str, Any] = field(default_factory=dict)
+    backend: BackendRecord = field(default_factory=BackendRecord)
     verdict: str = NOT_SOLVED
-    doubts: list[str] = field(default_factory=list)
+    doubts: tuple[str, ...] = ()
+    absent: frozenset[str] = frozenset()
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the files would be the same."""
+        return isinstance(other, Result) and files.strict(self.to_json()) == files.strict(other.to_json())
 
     @property
     def interrupted(self) -> bool:
@@ -136,43 +246,81 @@ class Result:
     @property
     def worst(self) -> float | None:
         """Largest ratio of the checks, nan if one is nan: all are met at 1 or below. None without any."""
-        ratios = [check["ratio"] for check in self.checks or ()]
-        return max(ratios, key=lambda r: math.inf if math.isnan(r) else r, default=None)
+        ratios = [check.ratio for check in self.checks]
+        return max(ratios, key=lambda ratio: math.inf if math.isnan(ratio) else ratio, default=None)
+
+    @property
+    def worst_ratio(self) -> float:
+        """Largest ratio of the checks, inf if one is nan; nan without any."""
+        worst = math.nan if self.worst is None else self.worst
+        return math.inf if self.checks and math.isnan(worst) else worst
+
+    def judge(self, met: bool) -> Judged:
+        """The judgement of the exact rollout; ``met``: whether nothing is missed."""
+        goal = any(check.kind == "goal" for check in self.checks)
+        costs = np.nan if goal else sum(self.costs.values())
+        return Judged(self.objective, self.worst_ratio, met, bool(self.checks), costs)
 
     def to_json(self) -> dict[str, Any]:
         """The object of result.json."""
-        return {"format": FORMAT, **dataclasses.asdict(self)}
+        found: dict[str, Any] = {"format": FORMAT}
+        for each in dataclasses.fields(Result):
+            found[each.name] = getattr(self, each.name)
+        del found["absent"]
+        found["checks"] = [dataclasses.asdict(check) for check in self.checks]
+        found["z"] = {name: variable.to_json() for name, variable in self.z.items()}
+        found["stages"] = [dataclasses.asdict(stage) for stage in self.stages]
+        found["backend"] = dataclasses.asdict(self.backend) if self.backend.name else {}
+        found["doubts"] = list(self.doubts)
+        return found | dict.fromkeys(self.absent)
 
     @classmethod
-    def from_json(cls, value: Any) -> Result:
-        """The result in an object of result.json; FileError if it is none, or of another format."""
-        if not isinstance(value, Mapping) or value.get("format") != FORMAT:
-            raise files.FileError(f"not a result of format {FORMAT}")
-        known = {f.name for f in dataclasses.fields(cls)}
-        if missing := known - JUDGED_LATE - value.keys():
-            raise files.FileError(f"a result without {', '.join(sorted(missing))}")
-        kept = {"problem", "title", "status", "advice", "checks", "backend", "verdict", "doubts"}
-        fields = {key: value[key] if key in kept else files.numbers(value[key]) for key in known & value.keys()}
-        if fields["checks"] is not None:
-            fields["checks"] = [{**c, **files.numbers({k: c[k] for k in MEASURES})} for c in fields["checks"]]
-        result = cls(**fields)
-        return result if value.keys() >= JUDGED_LATE else result.judged_late()
+    def from_json(cls, value: object, text: Text = values.name, **given: Any) -> Self:
+        """The result in an object of result.json, as far as it can be read; ``given``: fields that are known already.
 
-    def judged_late(self) -> Result:
-        """The result of a file that is older than verdicts, whose ``solved`` means that everything is met."""
-        objective, worst = (math.nan if number is None else number for number in (self.objective, self.worst))
-        judged = Judged(objective, worst, self.solved, bool(self.checks))
-        return dataclasses.replace(self, **ruled(rule(self.status, judged, self.trust)))
+        A file that is older than verdicts, whose ``solved`` means that everything is met, is ruled on anew.
+        """
+        entry = values.table(value)
+        read = values.record(
+            cls,
+            value,
+            text,
+            absent=frozenset(key for key in REACHED & entry.keys() if entry[key] is None),
+            guess={renamed(key): number for key, number in values.measures(entry.get("guess")).items()},
+            **{"verdict": text(entry.get("verdict")), **given},
+        )
+        named = {name: dataclasses.replace(each, name=name) for name, each in read.z.items()}
+        read = dataclasses.replace(read, z=named)
+        if read.verdict:
+            return read
+        met = everything_met(entry, read)
+        return dataclasses.replace(read, **ruled(rule(read.status, read.judge(met), values.table(entry.get("trust")))))
+
+
+def everything_met(entry: Mapping[str, object], result: Result) -> bool:
+    """Whether the file says that nothing is missed; one that is older than verdicts says so by ``solved``."""
+    return all(check.met for check in result.checks) and ("verdict" in entry or entry.get("solved") is True)
 
 
 def ruled(ruling: Ruling) -> dict[str, Any]:
-    """The fields of a result that say what was ruled."""
-    return {"solved": ruling.solved, "verdict": ruling.verdict, "doubts": list(ruling.doubts)}
+    """The fields of a result that hold a ruling."""
+    return {"solved": ruling.solved, "verdict": ruling.verdict, "doubts": ruling.doubts}
 
 
 def read_result(path: Path) -> Result:
-    """The result in a file; FileError, which names the file, if there is none."""
+    """The result in a file of this program's own; FileError, which names the file, if there is none."""
     try:
-        return Result.from_json(files.read_json(path))
+        value = files.read_json(path)
+        if not isinstance(value, Mapping) or value.get("format") != FORMAT:
+            raise files.FileError(f"not a result of format {FORMAT}")
+        known = {each.name for each in dataclasses.fields(Result)} - {"absent"}
+        if missing := known - JUDGED_LATE - value.keys():
+            raise files.FileError(f"a result without {', '.join(sorted(missing))}")
     except files.FileError as error:
         raise files.FileError(f"{path}: {error}") from error
+    return Result.from_json(value, values.verbatim)
+
+
+def smoothed(stages: Iterable[StageRecord]) -> bool:
+    """Whether the solver saw anything but exact contact."""
+    return any(stage.smoothing > 0 for stage in stages)

@@ -1,84 +1,208 @@
-"""What a picture of a motion needs to know of its world: the fields of scene.json."""
+"""scene.json: what a picture of a motion needs of its world. Frozen records, their writing and their reading.
+
+What cannot be read, or is too large to draw, is left out of the picture.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from symphys.model.shapes import Box, Fixture, Plane, Shape, Sphere, Static, Terrain
-from symphys.model.world import Body
-from symphys.problem import Problem
-from symphys.results.scene_joints import joint_entry
-from symphys.results.terrain_crop import Window, sample, window
-from symphys.shooting import Array
-from symphys.trajectory import Trajectory
+from symphys import json_values as values
+from symphys.json_values import Array, Text
+from symphys.results.drawable import LARGEST, small
+from symphys.results.scene_joints import SceneJoint
+from symphys.results.text_files import read_table
+
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 
-def scene(problem: Problem, z: Mapping[str, Array], motion: Trajectory | None = None) -> dict[str, Any]:
-    """Gravity, bodies, what stands still, and joints, in SI units, with the parameters that ``z`` (by variable) sets.
+@dataclass(frozen=True)
+class Solid:
+    """All points within ``radius`` of an inner box: a sphere, whose box is a point, a capsule, a line, or a box.
 
-    Terrain is sampled where ``motion`` goes; without one, around the bodies at the start.
+    In the file: ``kind``, and sizes as in problem files.
+
+    Attributes:
+        radius: [m]; 0 for a box.
+        half: (3,) half sizes of the inner box along its own axes [m].
+        centre: (3,) [m], in the body's frame; in the world for what stands still.
+        orientation: (4,) unit quaternion w x y z.
     """
-    world = problem.world(parameters(problem, z))
-    if motion is None:
-        places = np.array([problem.initial[f"{body.name}.position"] for body in world.bodies])
-    else:
-        places = motion.position.reshape(-1, 3)
-    near = window(world, places)
-    return {
-        "gravity": plain(world.gravity),
-        "bodies": [body_entry(body) for body in world.bodies],
-        "planes": statics(world.statics, Plane, near),
-        "fixtures": statics(world.statics, Fixture, near),
-        "terrain": statics(world.statics, Terrain, near),
-        "joints": [joint_entry(joint, [body.name for body in world.bodies]) for joint in world.joints],
-    }
+
+    radius: float = 0.0
+    half: Array = field(default_factory=lambda: np.zeros(3))
+    centre: Array = field(default_factory=lambda: np.zeros(3))
+    orientation: Array = field(default_factory=lambda: np.array(UPRIGHT))
+
+    @property
+    def girth(self) -> float:
+        """The smallest half size [m]."""
+        return self.radius or float(self.half.min())
+
+    @property
+    def reach(self) -> float:
+        """From the origin to the farthest point, at most [m]."""
+        return float(np.linalg.norm(self.centre) + np.linalg.norm(self.half)) + self.radius
+
+    @property
+    def is_ball(self) -> bool:
+        """Whether it is a sphere, or a point."""
+        return not self.half.any()
+
+    def to_json(self) -> dict[str, Any]:
+        """One of ``shapes``."""
+        if self.is_ball:
+            return {"kind": "sphere", "radius": self.radius, "centre": self.centre.tolist()}
+        placed = {"centre": self.centre.tolist(), "orientation": self.orientation.tolist()}
+        if self.radius == 0:
+            return {"kind": "box", "size": (2 * self.half).tolist(), **placed}
+        return {"kind": "capsule", "radius": self.radius, "length": 2 * float(self.half[2]), **placed}
+
+    @classmethod
+    def from_json(cls, value: object, text: Text = values.name) -> Solid | None:
+        """A sphere, a box or a capsule; None if it has no size and place that can be drawn."""
+        entry = values.table(value)
+        kind = entry.get("kind", "sphere")
+        radius, half = values.number(entry.get("radius")), np.zeros(3)
+        if kind == "box":
+            radius, half = 0.0, values.vector(entry.get("size")) / 2
+        elif kind == "capsule":
+            half = np.array([0.0, 0.0, values.number(entry.get("length")) / 2])
+        sizes = half if kind == "box" else np.array([radius, *half[2:]]) if kind == "capsule" else np.array([radius])
+        centre = values.vector(entry.get("centre"))
+        if kind not in ("sphere", "box", "capsule") or not (small([*sizes, *centre]) and (sizes > 0).all()):
+            return None
+        return cls(radius, half, centre, _orientation(entry.get("orientation")))
 
 
-def body_entry(body: Body) -> dict[str, Any]:
-    """A body as JSON: mass [kg] and shapes."""
-    return {"name": body.name, "mass": float(body.mass), "shapes": [solid(shape) for shape in body.shapes]}
+def _orientation(value: object) -> Array:
+    """(4,): a unit quaternion; no rotation for anything that is none."""
+    read = values.numbers(value)
+    length = float(np.linalg.norm(read)) if read.size == 4 else 0.0
+    return read / length if 0 < length < np.inf else np.array(UPRIGHT)
 
 
-def statics(found: tuple[Static, ...], kind: type[Static], near: Window) -> list[dict[str, Any]]:
-    """Those of one kind as JSON."""
-    return [static_entry(static, near) for static in found if isinstance(static, kind)]
+@dataclass(frozen=True)
+class SceneBody:
+    """A body's name, the solids of its surface (``shapes`` in the file), and its mass [kg]; nan if it is not known."""
+
+    name: str
+    solids: tuple[Solid, ...] = field(metadata={"key": "shapes"})
+    mass: float = np.nan
+
+    def to_json(self) -> dict[str, Any]:
+        """One of ``bodies``."""
+        return {"name": self.name, "mass": self.mass, "shapes": [solid.to_json() for solid in self.solids]}
 
 
-def static_entry(static: Static, near: Window) -> dict[str, Any]:
-    """A static surface as JSON."""
-    if isinstance(static, Plane):
-        return {"name": static.name, "normal": plain(static.normal), "offset": float(static.offset)}
-    if isinstance(static, Fixture):
-        return {"name": static.name, "shape": solid(static.shape)}
-    return {"name": static.name, **sample(static, near)}
+@dataclass(frozen=True)
+class ScenePlane:
+    """A static half space {x: normal . x < offset}; ``normal`` (3,) of length 1, ``offset`` [m]."""
+
+    name: str
+    normal: Array
+    offset: float = 0.0
+
+    def to_json(self) -> dict[str, Any]:
+        """One of ``planes``."""
+        return {"name": self.name, "normal": self.normal.tolist(), "offset": self.offset}
+
+    @classmethod
+    def from_json(cls, value: object, text: Text = values.name) -> ScenePlane | None:
+        """A plane; None if it has no direction."""
+        normal = values.vector(values.table(value).get("normal"))
+        length = float(np.linalg.norm(normal))
+        if not 0 < length < np.inf:
+            return None
+        read = values.record(cls, value, text, normal=normal / length)
+        return read if small(read.offset) else None
 
 
-def parameters(problem: Problem, z: Mapping[str, Array]) -> dict[str, Any]:
-    """The values of the physical parameters that variables set; ``z`` holds (components, knots) arrays."""
-    values: dict[str, Any] = {}
-    for variable in problem.variables:
-        if variable.kind != "parameter":
-            continue
-        for slot in variable.slots:
-            whole = values.get(slot.name, np.array(problem.parameters[slot.name], float))
-            whole[list(slot.components)] = z[variable.name].ravel()
-            values[slot.name] = whole
-    return {name: float(whole[0]) if whole.size == 1 else tuple(whole.tolist()) for name, whole in values.items()}
+@dataclass(frozen=True)
+class SceneFixture:
+    """A static solid (``shape`` in the file), placed in the world."""
+
+    name: str
+    solid: Solid
+
+    def to_json(self) -> dict[str, Any]:
+        """One of ``fixtures``."""
+        return {"name": self.name, "shape": self.solid.to_json()}
+
+    @classmethod
+    def from_json(cls, value: object, text: Text = values.name) -> SceneFixture | None:
+        """A fixture; None if its shape cannot be read."""
+        entry = values.table(value)
+        solid = Solid.from_json(entry.get("shape"))
+        return None if solid is None else cls(text(entry.get("name")), solid)
 
 
-def solid(shape: Shape) -> dict[str, Any]:
-    """A shape as JSON: sizes as in problem files, ``centre`` (3,), and ``orientation`` (4,) w x y z."""
-    if isinstance(shape, Sphere):
-        return {"kind": "sphere", "radius": float(shape.radius), "centre": plain(shape.centre)}
-    placed = {"centre": plain(shape.centre), "orientation": plain(shape.orientation)}
-    if isinstance(shape, Box):
-        return {"kind": "box", "size": [2 * half for half in plain(shape.half_sizes)], **placed}
-    return {"kind": "capsule", "radius": float(shape.radius), "length": 2 * float(shape.half_length), **placed}
+@dataclass(frozen=True)
+class SceneTerrain:
+    """Heights ``z`` (rows, columns) of the ground at ``y`` (rows,), ``x`` (columns,) [m]; nan where there is none."""
+
+    name: str
+    x: Array
+    y: Array
+    z: Array
+
+    def to_json(self) -> dict[str, Any]:
+        """One of ``terrain``."""
+        return {"name": self.name, "x": self.x.tolist(), "y": self.y.tolist(), "z": self.z.tolist()}
+
+    @classmethod
+    def from_json(cls, value: object, text: Text = values.name) -> SceneTerrain | None:
+        """Terrain; None if its heights are no grid over rising x and y."""
+        entry = values.table(value)
+        x, y, rows = values.numbers(entry.get("x")), values.numbers(entry.get("y")), entry.get("z")
+        found = [values.numbers(row) for row in rows] if isinstance(rows, list) else []
+        if len(found) != y.size or any(row.size != x.size for row in found) or min(x.size, y.size) < 2:
+            return None
+        if not all(small(side) and (np.diff(side) > 0).all() for side in (x, y)):
+            return None
+        z = np.array(found)
+        return cls(text(entry.get("name")), x, y, np.where(np.abs(z) <= LARGEST, z, np.nan))
 
 
-def plain(vector: Any) -> list[float]:
-    """A vector as JSON."""
-    return [float(component) for component in vector]
+@dataclass(frozen=True)
+class Scene:
+    """What is drawn around and for the states of a trajectory; ``gravity`` (3) [m/s^2], empty if it is not known."""
+
+    gravity: tuple[float, ...] = ()
+    bodies: tuple[SceneBody, ...] = ()
+    planes: tuple[ScenePlane, ...] = ()
+    fixtures: tuple[SceneFixture, ...] = ()
+    terrain: tuple[SceneTerrain, ...] = ()
+    joints: tuple[SceneJoint, ...] = ()
+
+    @property
+    def weight_per_mass(self) -> float:
+        """The size of gravity [m/s^2]; nan if it is not known."""
+        return float(np.linalg.norm(self.gravity)) if self.gravity else np.nan
+
+    def solids(self, name: str) -> tuple[Solid, ...]:
+        """The surface of the body called ``name``; none if the scene has no such body."""
+        return next((body.solids for body in self.bodies if body.name == name), ())
+
+    def to_json(self) -> dict[str, Any]:
+        """The object of scene.json."""
+        kinds = {key: getattr(self, key) for key in ("bodies", "planes", "fixtures", "terrain", "joints")}
+        return {
+            "gravity": list(self.gravity),
+            **{key: [each.to_json() for each in found] for key, found in kinds.items()},
+        }
+
+    @classmethod
+    def from_json(cls, value: object, text: Text = values.name) -> Scene:
+        """The scene, as far as it can be read."""
+        gravity = tuple(values.numbers(values.table(value).get("gravity")).tolist())
+        return values.record(cls, value, text, gravity=gravity)
+
+
+def read_scene(path: Path) -> Scene:
+    """The scene in a file. Raises ReportError."""
+    return Scene.from_json(read_table(path))

@@ -1,51 +1,136 @@
-"""What a picture of joints needs to know of them: the entries of "joints" in scene.json."""
+"""Joints as scene.json has them: frozen records, their writing and their reading."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
-from symphys.model.joints import Joint, Motor, Servo, TorqueMotor, VelocityMotor
-from symphys.model.shapes import Scalar
+import numpy as np
 
-MOTORS: dict[type[Motor], str] = {Servo: "servo", VelocityMotor: "velocity", TorqueMotor: "torque"}
-"""As problem files call them."""
+from symphys import json_values as values
+from symphys.json_values import Array, Text
 
 
-def joint_entry(joint: Joint, bodies: Sequence[str]) -> dict[str, Any]:
-    """A joint as JSON.
+@dataclass(frozen=True)
+class SceneSocket:
+    """Where a joint is on one side, in the frame of the body or the world: ``point`` (3,) [m], ``orientation`` (4,)."""
 
-    ``first`` and ``second``: names of the two bodies, None for the world; coordinates are those of the first against
-    the second. ``sockets``: of both, ``point`` (3,) [m] and ``orientation`` (4,) w x y z in the body's frame, or the
-    world's. ``coordinates``: ``name``, and ``turns``: [rad], else [m]. ``limits``: lower and upper of each coordinate,
-    None where there is none. ``motor``: its ``kind`` and numbers, or None.
+    point: Array = field(default_factory=lambda: np.zeros(3))
+    orientation: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0, 0.0]))
 
-    Args:
-        joint: with numbers, no symbols.
-        bodies: the names of the world's bodies.
+    def to_json(self) -> dict[str, Any]:
+        """One of ``sockets``."""
+        return {"point": self.point.tolist(), "orientation": self.orientation.tolist()}
+
+    @classmethod
+    def from_json(cls, value: object, text: Text = values.name) -> SceneSocket | None:
+        """One side; None if its place is not finite or its orientation none."""
+        read = values.record(cls, {"point": None, "orientation": None, **values.table(value)}, text)
+        length = float(np.linalg.norm(read.orientation))
+        if read.point.size != 3 or not np.isfinite(read.point).all():
+            return None
+        return (
+            cls(read.point, read.orientation / length) if read.orientation.size == 4 and 0 < length < np.inf else None
+        )
+
+
+@dataclass(frozen=True)
+class SceneCoordinate:
+    """A coordinate of a joint: its name, and whether it is an angle [rad], else a displacement [m]."""
+
+    name: str
+    turns: bool
+
+
+@dataclass(frozen=True)
+class SceneMotor:
+    """A motor: its kind as in problem files, and those of its numbers that there are, in SI units, by their keys."""
+
+    kind: str
+    numbers: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def torque(self) -> float:
+        """The largest [N m] or [N]; nan where it is not known."""
+        return self.numbers.get("torque", np.nan)
+
+    @property
+    def velocity(self) -> float:
+        """The largest speed [rad/s] or [m/s]; nan where it is not known."""
+        return self.numbers.get("velocity", np.nan)
+
+    def to_json(self) -> dict[str, Any]:
+        """The ``motor`` of a joint."""
+        return {"kind": self.kind, **self.numbers}
+
+    @classmethod
+    def from_json(cls, value: object, text: Text = values.name) -> SceneMotor | None:
+        """A motor; None for no table."""
+        entry = values.table(value)
+        numbers = {key: values.number(number) for key, number in entry.items() if key != "kind"}
+        return cls(text(entry.get("kind")), numbers) if entry else None
+
+
+@dataclass(frozen=True)
+class SceneJoint:
+    """What holds two bodies together, or a body to the world; coordinates are those of the first against the second.
+
+    Attributes:
+        name, kind: as in the problem file.
+        first, second: names of bodies; ``second`` is empty for the world, which is null in the file.
+        sockets: of the first and of the second.
+        coordinates: in the order of the joint's values.
+        lower, upper: bounds of every coordinate, ``limits`` in the file; infinite where there is none, which is null.
+        motor: None if nothing drives it.
     """
-    return {
-        "name": joint.name,
-        "kind": joint.kind.name,
-        "first": bodies[joint.first],
-        "second": None if joint.second is None else bodies[joint.second],
-        "sockets": [
-            {"point": [float(x) for x in socket.point], "orientation": [float(x) for x in socket.orientation]}
-            for socket in joint.sockets
-        ],
-        "coordinates": [{"name": each.name, "turns": each.turns} for each in joint.kind.coordinates],
-        "limits": [bound(joint.limits.lower), bound(joint.limits.upper)],
-        "motor": None if joint.motor is None else motor_entry(joint.motor),
-    }
 
+    name: str
+    kind: str = ""
+    first: str = ""
+    second: str = ""
+    sockets: tuple[SceneSocket, ...] = (SceneSocket(), SceneSocket())
+    coordinates: tuple[SceneCoordinate, ...] = ()
+    lower: float = -np.inf
+    upper: float = np.inf
+    motor: SceneMotor | None = None
 
-def bound(value: Scalar | None) -> float | None:
-    """One end of limits."""
-    return None if value is None else float(value)
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """The names of those that it holds."""
+        return tuple(name for name in (self.first, self.second) if name)
 
+    @property
+    def turns(self) -> tuple[bool, ...]:
+        """For each coordinate whether it is an angle."""
+        return tuple(coordinate.turns for coordinate in self.coordinates)
 
-def motor_entry(motor: Motor) -> dict[str, Any]:
-    """A motor as JSON: its kind as in problem files, those of its bounds that there are, a servo's gain; SI units."""
-    numbers = {key: float(value) for key, value in asdict(motor).items() if value is not None}
-    return {"kind": MOTORS[type(motor)], **numbers}
+    def to_json(self) -> dict[str, Any]:
+        """One of ``joints``."""
+        return {
+            "name": self.name,
+            "kind": self.kind,
+            "first": self.first,
+            "second": self.second or None,
+            "sockets": [socket.to_json() for socket in self.sockets],
+            "coordinates": [{"name": each.name, "turns": each.turns} for each in self.coordinates],
+            "limits": [bound if np.isfinite(bound) else None for bound in (self.lower, self.upper)],
+            "motor": None if self.motor is None else self.motor.to_json(),
+        }
+
+    @classmethod
+    def from_json(cls, value: object, text: Text = values.name) -> SceneJoint | None:
+        """A joint; None for one without a name, a body and two sockets."""
+        entry = values.table(value)
+        limits = values.numbers(entry.get("limits"))
+        lower, upper = limits if limits.size == 2 else (np.nan, np.nan)
+        read = values.record(
+            cls,
+            {"sockets": None, **entry},
+            text,
+            lower=-np.inf if np.isnan(lower) else float(lower),
+            upper=np.inf if np.isnan(upper) else float(upper),
+            motor=SceneMotor.from_json(entry.get("motor")),
+        )
+        whole = len(read.sockets) == len(values.tables(entry.get("sockets"))) == 2
+        return read if read.name and read.first and whole else None

@@ -5,8 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from symphys.findings.values import name, table, words
-from symphys.results.records import ReportError
+from symphys.errors import SymphysError
+from symphys.json_values import name, table, words
+
+
+class ReportError(SymphysError):
+    """A folder or file from which no report can be made."""
 
 
 def read_words(path: Path) -> str:

@@ -1,4 +1,4 @@
-"""The motion of a run folder: trajectory.npz and guess.npz."""
+"""Trajectories on disk: trajectory.npz and guess.npz of a run folder, read by the fields of ``Trajectory``."""
 
 from __future__ import annotations
 
@@ -11,12 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from symphys.findings import values
+from symphys import json_values as values
 from symphys.results.drawable import largest, oversized
-from symphys.results.records import Array, ReportError, Trajectory
+from symphys.results.text_files import ReportError
+from symphys.trajectory import Array, Trajectory, shapes
 
-TRAJECTORY = "trajectory.npz"
-GUESS = "guess.npz"
+ABSENT = {"force": 0.0, "torque": 0.0, "contact_force": 0.0}
+"""What stands for quantities that a file does not have, where that is not nan."""
+UNUSED = ("residual", "crowded", "ambiguous", "paradox")
+"""Numbers on the contact solver: nothing that draws a motion depends on them, so they may be anything."""
 
 UNREADABLE = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError, MemoryError)
 """What numpy and zipfile raise at files that are no archives of plain arrays."""
@@ -41,7 +44,7 @@ def read_trajectory(path: Path) -> Trajectory:
     except (ValueError, KeyError, TypeError) as error:
         raise ReportError(f"{path.name}: not a recorded motion ({values.name(str(error))})") from error
     for name, array in vars(motion).items():
-        if oversized(array):
+        if name not in UNUSED and oversized(array):
             raise ReportError(f"{path.name}: {name} has numbers up to {largest(array):.3g}, which cannot be drawn")
     return motion
 
@@ -55,39 +58,23 @@ def unpack(content: object) -> dict[str, Array]:
 
 
 def make_trajectory(arrays: Mapping[str, Array]) -> Trajectory:
-    """Check the shapes; quantities that are absent become nan, orientations the identity."""
+    """Check the shapes; quantities that are absent become nan, forces on bodies and contacts 0, orientations 1."""
     time = np.asarray(arrays["time"], float).reshape(-1)
     count, bodies = shape_of(arrays["position"], time.size)
     contacts, joints = names_of(arrays, "contact_names"), names_of(arrays, "joint_names")
     value = np.asarray(arrays.get("joint_value", np.zeros((0, 0, 0))))
-    along = (len(joints), value.shape[2] if value.ndim == 3 else 0)
-
-    def quantity(key: str, shape: tuple[int, ...], missing: float = np.nan) -> Array:
-        read = np.asarray(arrays[key], float) if key in arrays else np.full(shape, missing)
-        if read.shape != shape:
-            raise ValueError(f"{key} has shape {read.shape}, {shape} is expected")
-        return read
-
-    orientation = np.broadcast_to(np.array([1.0, 0.0, 0.0, 0.0]), (count, bodies, 4))
-    return Trajectory(
-        time=time,
-        body_names=names_of(arrays, "body_names", bodies),
-        position=quantity("position", (count, bodies, 3)),
-        orientation=quantity("orientation", (count, bodies, 4)) if "orientation" in arrays else orientation,
-        velocity=quantity("velocity", (count, bodies, 3)),
-        angular_velocity=quantity("angular_velocity", (count, bodies, 3)),
-        force=quantity("force", (count - 1, bodies, 3), 0.0),
-        torque=quantity("torque", (count - 1, bodies, 3), 0.0),
-        contact_names=contacts,
-        contact_force=quantity("contact_force", (count - 1, len(contacts), 3), 0.0),
-        contact_gap=quantity("contact_gap", (count, len(contacts))),
-        joint_names=joints,
-        joint_value=quantity("joint_value", (count, *along)),
-        joint_rate=quantity("joint_rate", (count, *along)),
-        joint_torque=quantity("joint_torque", (count - 1, *along)),
-        joint_command=quantity("joint_command", (count - 1, *along)),
-        joint_separation=quantity("joint_separation", (count, len(joints))),
-    )
+    coordinates = value.shape[2] if value.ndim == 3 else 0
+    sizes = {"N + 1": count, "N": count - 1, "B": bodies, "C": len(contacts), "J": len(joints), "K": coordinates}
+    found: dict[str, Any] = {}
+    for name, letters in shapes().items():
+        shape = tuple(sizes[letter] if letter in sizes else int(letter) for letter in letters)
+        found[name] = np.asarray(arrays[name], float) if name in arrays else np.full(shape, ABSENT.get(name, np.nan))
+        if found[name].shape != shape and name not in UNUSED:
+            raise ValueError(f"{name} has shape {found[name].shape}, {shape} is expected")
+    if "orientation" not in arrays:
+        found["orientation"] = np.broadcast_to(np.array([1.0, 0.0, 0.0, 0.0]), (count, bodies, 4))
+    found["body_names"] = names_of(arrays, "body_names", bodies)
+    return Trajectory(time=time, contact_names=contacts, joint_names=joints, **found)
 
 
 def shape_of(position: Array, times: int) -> tuple[int, int]:
@@ -114,9 +101,6 @@ def trim(trajectory: Trajectory) -> Trajectory:
         raise ValueError("no state is finite")
     if keep == finite.size:
         return trajectory
-    cut: dict[str, Any] = {
-        name: array[:keep] for name, array in vars(trajectory).items() if isinstance(array, np.ndarray)
-    }
-    for name in ("force", "torque", "contact_force", "joint_torque", "joint_command"):
-        cut[name] = cut[name][: keep - 1]
-    return replace(trajectory, **cut)
+    ends = {"N + 1": keep, "N": keep - 1}
+    cut: dict[str, Any] = {name: getattr(trajectory, name)[: ends[letters[0]]] for name, letters in shapes().items()}
+    return replace(trajectory, time=trajectory.time[:keep], **cut)

@@ -1,17 +1,18 @@
-"""Runs: solve problems, and keep what was found in folders that can be read, skipped and continued."""
+"""Runs: solve problems, and write run folders that can be read, skipped and continued."""
 
+from symphys.results.file_names import RESULT, SCENE, TRAJECTORY
 from symphys.results.result import Result, read_result
-from symphys.results.scene import scene
-from symphys.runs.batch import Batch, Observer, run_batch
+from symphys.results.scene_of_problem import make_scene
+from symphys.runs.batch import BatchResult, Observer, run_batch
 from symphys.runs.execute import execute
-from symphys.runs.folder import RESULT, SCENE, TRAJECTORY, RunFolder
+from symphys.runs.folder import RunFolder
 from symphys.runs.job import Job, check_tables, make_jobs
 
 __all__ = [
     "RESULT",
     "SCENE",
     "TRAJECTORY",
-    "Batch",
+    "BatchResult",
     "Job",
     "Observer",
     "Result",
@@ -19,7 +20,7 @@ __all__ = [
     "check_tables",
     "execute",
     "make_jobs",
+    "make_scene",
     "read_result",
     "run_batch",
-    "scene",
 ]

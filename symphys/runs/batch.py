@@ -11,13 +11,13 @@ from symphys.runs.execute import execute
 from symphys.runs.job import Job
 from symphys.runs.multi_start import groups, solve_group
 from symphys.runs.stopping import Interrupts, Stop
-from symphys.runs.transcription_cache import Transcribe, Workshop
+from symphys.runs.transcription_cache import Transcribe, TranscriptionCache
 from symphys.runs.workers import side_by_side
 from symphys.solvers import Monitor, TraceRow
 
 
 class Observer(Protocol):
-    """Is told what happens to the runs of a batch."""
+    """Receives what happens to the runs of a batch."""
 
     def started(self, job: Job, resumed: bool) -> None:
         """The run begins, or goes on."""
@@ -30,7 +30,7 @@ class Observer(Protocol):
 
 
 @dataclass(frozen=True)
-class Batch:
+class BatchResult:
     """What came of the jobs.
 
     Attributes:
@@ -48,11 +48,11 @@ class Batch:
 
 
 def run_batch(
-    jobs: Sequence[Job], processes: int, observer: Observer, transcribe: Transcribe, together: bool = False
-) -> Batch:
+    jobs: Sequence[Job], processes: int, observer: Observer, transcribe: Transcribe, multi_start: bool = False
+) -> BatchResult:
     """Run what is not done yet, here or in ``processes`` workers, until all is done or Ctrl-C is pressed.
 
-    ``together``: here, solve the seeds of a problem and solver side by side where the solver can.
+    ``multi_start``: here, solve the seeds of a problem and solver side by side where the solver can.
     """
     ledger = Ledger(jobs, observer)
     waiting = {index: job for index, job in enumerate(jobs) if not ledger.skip(index)}
@@ -60,13 +60,13 @@ def run_batch(
         if processes > 1 and len(waiting) > 1:
             side_by_side(waiting, processes, transcribe, ledger, stop)
         else:
-            one_by_one(waiting, transcribe, ledger, stop, together)
-    return Batch(tuple(ledger.results), stop.requested)
+            one_by_one(waiting, transcribe, ledger, stop, multi_start)
+    return BatchResult(tuple(ledger.results), stop.requested)
 
 
-def one_by_one(jobs: Mapping[int, Job], transcribe: Transcribe, ledger: Ledger, stop: Stop, together: bool) -> None:
+def one_by_one(jobs: Mapping[int, Job], transcribe: Transcribe, ledger: Ledger, stop: Stop, multi_start: bool) -> None:
     """Run all jobs in this process."""
-    workshop = Workshop(transcribe)
+    transcriptions = TranscriptionCache(transcribe)
 
     def watch(index: int) -> Monitor:
         def monitor(row: TraceRow) -> None:
@@ -76,15 +76,15 @@ def one_by_one(jobs: Mapping[int, Job], transcribe: Transcribe, ledger: Ledger, 
 
         return monitor
 
-    for group in groups(jobs, ledger.halfway) if together else [[index] for index in jobs]:
+    for group in groups(jobs, ledger.halfway) if multi_start else [[index] for index in jobs]:
         if stop():
             return
         for index in group:
             ledger.started(index)
         here = {index: jobs[index] for index in group}
-        solved = solve_group(here, workshop, watch) if len(group) > 1 else {}
+        solved = solve_group(here, transcriptions, watch) if len(group) > 1 else {}
         for index, job in here.items():
-            ledger.ended(index, execute(job, watch(index), workshop, solved.get(index)))
+            ledger.ended(index, execute(job, watch(index), transcriptions, solved.get(index)))
 
 
 @dataclass
@@ -118,14 +118,14 @@ class Ledger:
         return True
 
     def started(self, index: int) -> None:
-        """Tell that a run begins, or goes on."""
+        """Report that a run begins, or goes on."""
         self.observer.started(self.jobs[index], resumed=index in self.halfway)
 
     def advanced(self, index: int, row: TraceRow) -> None:
-        """Tell of an iteration."""
+        """Report an iteration."""
         self.observer.advanced(self.jobs[index], row)
 
     def ended(self, index: int, result: Result) -> None:
-        """Keep a result and tell of it."""
+        """Keep a result and report it."""
         self.results[index] = result
         self.observer.ended(self.jobs[index], result, skipped=False)

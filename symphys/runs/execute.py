@@ -6,17 +6,18 @@ import traceback
 
 from symphys import files
 from symphys.errors import SymphysError
+from symphys.results.file_names import CHECKPOINT, LOG, RESULT
 from symphys.results.result import Result
-from symphys.runs.folder import CHECKPOINT, LOG, RESULT, FolderBusy
+from symphys.runs.folder import FolderBusy
 from symphys.runs.job import Job
-from symphys.runs.provenance import stamp
+from symphys.runs.record import failure
 from symphys.runs.solving import solve
-from symphys.runs.transcription_cache import Workshop
+from symphys.runs.transcription_cache import TranscriptionCache
 from symphys.solvers import Monitor, Outcome
 
 
-def execute(job: Job, monitor: Monitor, workshop: Workshop, solved: Outcome | None = None) -> Result:
-    """Do the run, or go on with it, unless it is done; write its folder; tell what it found.
+def execute(job: Job, monitor: Monitor, transcriptions: TranscriptionCache, solved: Outcome | None = None) -> Result:
+    """Do the run, or go on with it, unless it is done; write its folder; return what it found.
 
     ``monitor`` sees each iteration and may raise KeyboardInterrupt, which ends the run so that it can go on later.
     ``solved``: what its solver has found already, side by side with other seeds.
@@ -27,13 +28,17 @@ def execute(job: Job, monitor: Monitor, workshop: Workshop, solved: Outcome | No
             earlier = job.folder.earlier(job.config)
             if earlier and not earlier.interrupted:
                 return earlier
-            return proceed(job, monitor, workshop, earlier, solved)
+            return proceed(job, monitor, transcriptions, earlier, solved)
     except FolderBusy as error:
         return failure(job, str(error))
 
 
 def proceed(
-    job: Job, monitor: Monitor, workshop: Workshop, earlier: Result | None, solved: Outcome | None = None
+    job: Job,
+    monitor: Monitor,
+    transcriptions: TranscriptionCache,
+    earlier: Result | None,
+    solved: Outcome | None = None,
 ) -> Result:
     """Solve and write down what came of it; ``earlier`` is the interrupted run to go on with."""
     checkpoint = job.folder.checkpoint() if earlier else None
@@ -42,7 +47,7 @@ def proceed(
         job.folder.begin(job.config, job.problem.text)
     log = Log(job)
     try:
-        result = solve(job, workshop(job), monitor, log, checkpoint, earlier, solved)
+        result = solve(job, transcriptions(job), monitor, log, checkpoint, earlier, solved)
     except files.FileError:
         raise
     except SymphysError as error:
@@ -57,7 +62,7 @@ def proceed(
 
 
 class Log:
-    """The text of log.txt: what the solver says, line by line; a continued run adds to what is there."""
+    """The text of log.txt: messages of the solver, line by line; a continued run adds to what is there."""
 
     def __init__(self, job: Job) -> None:
         """Start from what an interrupted run wrote."""
@@ -74,7 +79,7 @@ class Log:
 
 
 def finish(job: Job, result: Result) -> None:
-    """Write the result, last of all files, as it tells that the others are whole."""
+    """Write the result, last of all files, so that it exists only where the others are whole."""
     files.write_json(job.folder.path / RESULT, result.to_json())
     if not result.interrupted:
         files.remove(job.folder.path / CHECKPOINT)
@@ -85,8 +90,3 @@ def give_up(job: Job, message: str) -> Result:
     result = failure(job, message)
     finish(job, result)
     return result
-
-
-def failure(job: Job, message: str) -> Result:
-    """The result of a run that could not be done."""
-    return Result(**stamp(job), solved=False, status="failed", advice=message)

@@ -1,29 +1,23 @@
-"""A run's folder: where its files are, what they say about being done, and who may write to them."""
+"""A run's folder: where its files are, whether the run is done, and its lock."""
 
 from __future__ import annotations
 
 import contextlib
-import csv
 import dataclasses
-import io
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from symphys import files
+from symphys.results.config import Config, read_config
+from symphys.results.file_names import CHECKPOINT, CONFIG, GUESS, LOG, PROBLEM, RESULT, SCENE, TRACE, TRAJECTORY
 from symphys.results.result import Result, read_result
-from symphys.runs.config import Config
+from symphys.results.trace import trace_text
 
 try:
     import fcntl
 except ImportError:  # not a POSIX system: concurrent commands are then kept apart by atomic writes alone
     fcntl = None  # type: ignore[assignment]
-
-PROBLEM, CONFIG, RESULT, CHECKPOINT = "problem.toml", "config.json", "result.json", "checkpoint.json"
-TRAJECTORY, GUESS, SCENE, TRACE, LOG = "trajectory.npz", "guess.npz", "scene.json", "trace.csv", "log.txt"
-
-TOLD = "told: "
-"""Before the names of columns of the trace that problems and solvers tell of."""
 
 
 class FolderBusy(files.FileError):
@@ -32,7 +26,7 @@ class FolderBusy(files.FileError):
 
 @dataclasses.dataclass(frozen=True)
 class RunFolder:
-    """The files of one run; ARCHITECTURE.md says what each holds."""
+    """The files of one run; ``symphys.results.file_names`` lists what each holds."""
 
     path: Path
 
@@ -46,10 +40,9 @@ class RunFolder:
     def earlier(self, config: Config) -> Result | None:
         """The result of the very run that ``config`` asks for, interrupted or finished; None if there is none."""
         try:
-            if files.read_json(self.path / CONFIG)["key"] != config.key:
-                return None
-            return read_result(self.path / RESULT)
-        except (files.FileError, KeyError, TypeError):
+            same = read_config(self.path / CONFIG).key == config.key
+            return read_result(self.path / RESULT) if same else None
+        except files.FileError:
             return None
 
     def checkpoint(self) -> dict[str, object] | None:
@@ -70,13 +63,7 @@ class RunFolder:
 
     def write_trace(self, rows: Iterable[Mapping[str, object]]) -> None:
         """Write one line per iteration under a header with the names of the columns; what a row lacks is nan."""
-        rows = list(rows)
-        columns = list(dict.fromkeys(key for row in rows for key in row))
-        buffer = io.StringIO()
-        writer = csv.DictWriter(buffer, columns, restval="nan", lineterminator="\n")
-        writer.writeheader()
-        writer.writerows({key: repr(value) for key, value in row.items()} for row in rows)
-        files.write_text(self.path / TRACE, buffer.getvalue())
+        files.write_text(self.path / TRACE, trace_text(rows))
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:

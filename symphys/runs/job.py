@@ -10,7 +10,7 @@ from typing import Any
 
 from symphys.codegen.backends import BEST
 from symphys.problem import Problem, require_solvable, require_solvers, validate_options
-from symphys.runs.config import Config, make_config
+from symphys.results.config import Config, make_config
 from symphys.runs.folder import RunFolder
 from symphys.solvers import SOLVERS, solver
 
@@ -60,7 +60,7 @@ def make_jobs(
 
     ``solvers`` None: those that each problem names, or those that fit it.
 
-    ProblemError for a problem without variables or aims, and for bad solver options.
+    ProblemError for a problem without variables or objectives, and for bad solver options.
     """
     seeds = tuple(seeds)
     jobs = []

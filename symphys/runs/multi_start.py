@@ -1,4 +1,4 @@
-"""Seeds of one problem and solver solved side by side, so that their evaluations go to the backend in batches."""
+"""Multi-start: seeds of one problem and solver solved side by side, their evaluations in batches."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Collection, Mapping
 
 from symphys.runs.job import Job
-from symphys.runs.transcription_cache import Workshop
+from symphys.runs.transcription_cache import TranscriptionCache
 from symphys.solvers import Monitor, Outcome, TraceRow, solve_together, solver
 
 
@@ -27,27 +27,29 @@ def alike(one: Job, other: Job) -> bool:
     return same and solver(one.config.solver).threaded
 
 
-def solve_group(jobs: Mapping[int, Job], workshop: Workshop, watch: Callable[[int], Monitor]) -> dict[int, Outcome]:
+def solve_group(
+    jobs: Mapping[int, Job], transcriptions: TranscriptionCache, watch: Callable[[int], Monitor]
+) -> dict[int, Outcome]:
     """The outcomes of a group, each as if solved alone; none where something fails: each then has to show by itself."""
     first = next(iter(jobs.values()))
     lock = threading.Lock()
 
     def monitored(index: int) -> Monitor:
-        tell = watch(index)
+        report = watch(index)
 
         def monitor(row: TraceRow) -> None:
             with lock:
-                tell(row)
+                report(row)
 
         return monitor
 
     seeds = [job.config.seed for job in jobs.values()]
     try:
-        shooting = workshop(first).shooting
+        shooting = transcriptions(first).shooting
         starts = [shooting.start(seed) for seed in seeds]
         monitors = [monitored(index) for index in jobs]
         chosen = solver(first.config.solver)
         found = solve_together(chosen, shooting, starts, first.options, seeds, monitors)
-    except Exception:  # what it was, the run that it belongs to will tell
+    except Exception:  # the run that it belongs to reports it when it is solved alone
         return {}
     return dict(zip(jobs, found, strict=True))

@@ -13,7 +13,7 @@ Stop = Callable[[], bool]
 
 
 class Interrupts:
-    """Counts Ctrl-C while ``listening``; asking it, ``interrupts()``, tells whether there was one."""
+    """Counts Ctrl-C while ``listening``; ``interrupts()`` returns whether there was one."""
 
     def __init__(self) -> None:
         """Nothing has happened yet."""
@@ -43,8 +43,8 @@ class Interrupts:
 
 
 @contextmanager
-def deaf() -> Iterator[None]:
-    """Processes started within the block never see Ctrl-C: who started them tells them to stop."""
+def ignoring_interrupts() -> Iterator[None]:
+    """Processes started within the block never see Ctrl-C: the process that started them stops them."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

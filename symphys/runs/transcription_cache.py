@@ -12,7 +12,7 @@ Transcribe = Callable[[Problem, bool], Transcription]
 """(problem, whether smoothing 0 is all that will be asked for) -> its transcription."""
 
 
-class Workshop:
+class TranscriptionCache:
     """Keeps the transcription of the problem that was last asked for; one problem's functions may be large."""
 
     def __init__(self, transcribe: Transcribe) -> None:

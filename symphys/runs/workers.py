@@ -1,4 +1,4 @@
-"""Runs side by side in worker processes, which a crash of one of them or Ctrl-C leaves in good order."""
+"""Runs side by side in worker processes, robust against the crash of one of them and Ctrl-C."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from symphys.errors import SymphysError
 from symphys.results.result import Result
 from symphys.runs.execute import execute, give_up
 from symphys.runs.job import Job
-from symphys.runs.stopping import Stop, deaf
-from symphys.runs.transcription_cache import Transcribe, Workshop
+from symphys.runs.stopping import Stop, ignoring_interrupts
+from symphys.runs.transcription_cache import Transcribe, TranscriptionCache
 from symphys.solvers import TraceRow
 
 TICK = 0.1
-"""[s] between two looks at what the workers say; a worker tells of its iterations no more often."""
+"""[s] between two readings of the messages of workers; a worker reports its iterations no more often."""
 CRASHED = "the process of this run died: killed from outside, out of memory, or a crash in compiled code"
 
 
@@ -33,7 +33,7 @@ Message = tuple[int, TraceRow | None]
 
 
 class Listener(Protocol):
-    """Is told of the runs by their index."""
+    """Receives what happens to the runs, by their index."""
 
     def started(self, index: int) -> None:
         """The run begins."""
@@ -48,19 +48,19 @@ class Listener(Protocol):
 def side_by_side(jobs: Mapping[int, Job], count: int, transcribe: Transcribe, listener: Listener, stop: Stop) -> None:
     """Run all jobs in ``count`` processes; a process that dies fails the run that killed it and no other.
 
-    Which of the runs in work did it shows when each of them is tried again alone.
+    Which of the running ones did it shows when each of them is tried again alone.
     """
     threads.limit()
     waiting = dict(jobs)
     while waiting and not stop():
-        pool = Pool(waiting, count, transcribe, listener, stop)
+        pool = WorkerPool(waiting, count, transcribe, listener, stop)
         pool.run()
         if pool.broken and not pool.begun:
             raise SymphysError("worker processes cannot be started here; leave --jobs out")
         for index in pool.suspects:
             if stop():
                 return
-            alone = Pool({index: waiting[index]}, 1, transcribe, listener, stop)
+            alone = WorkerPool({index: waiting[index]}, 1, transcribe, listener, stop)
             alone.run()
             if alone.suspects:
                 listener.ended(index, give_up(waiting[index], CRASHED))
@@ -68,8 +68,8 @@ def side_by_side(jobs: Mapping[int, Job], count: int, transcribe: Transcribe, li
 
 
 @dataclass
-class Pool:
-    """One set of worker processes and what became of its jobs.
+class WorkerPool:
+    """One set of worker processes and the outcome of its jobs.
 
     Attributes:
         begun, ended: indices of jobs.
@@ -87,7 +87,7 @@ class Pool:
 
     @property
     def suspects(self) -> list[int]:
-        """The jobs that were in work when a worker died."""
+        """The jobs that were running when a worker died."""
         return sorted(self.begun - self.ended) if self.broken else []
 
     @property
@@ -98,39 +98,39 @@ class Pool:
     def run(self) -> None:
         """Do all jobs, or as many as can be."""
         context = multiprocessing.get_context("spawn")
-        mailbox, halt = context.SimpleQueue(), context.Event()
+        messages, halt = context.SimpleQueue(), context.Event()
         count = min(self.count, len(self.jobs))
         futures: dict[Future[Result], int] = {}
-        with ProcessPoolExecutor(count, context, prepare, (mailbox, halt, self.transcribe)) as pool:
+        with ProcessPoolExecutor(count, context, prepare, (messages, halt, self.transcribe)) as pool:
             try:
-                with deaf():
+                with ignoring_interrupts():
                     futures.update({pool.submit(work, index, job): index for index, job in self.jobs.items()})
-                self.follow(futures, mailbox, halt)
+                self.follow(futures, messages, halt)
             except BrokenProcessPool:
-                self.hear(mailbox)
+                self.hear(messages)
                 self.broken = True
             except KeyboardInterrupt:
                 for child in multiprocessing.active_children():
                     child.terminate()
                 raise
             except SymphysError:
-                bring_home(futures, halt)
+                cancel_waiting(futures, halt)
                 raise
 
-    def follow(self, futures: dict[Future[Result], int], mailbox: SimpleQueue[Message], halt: Event) -> None:
-        """Pass on what the workers say until all is done."""
+    def follow(self, futures: dict[Future[Result], int], messages: SimpleQueue[Message], halt: Event) -> None:
+        """Pass on the messages of the workers until all is done."""
         while futures:
             done, _ = wait(futures, timeout=TICK, return_when=FIRST_COMPLETED)
             if self.stop() and not halt.is_set():
-                bring_home(futures, halt)
-            self.hear(mailbox)
+                cancel_waiting(futures, halt)
+            self.hear(messages)
             for future in done:
                 self.end(futures.pop(future), future)
 
-    def hear(self, mailbox: SimpleQueue[Message]) -> None:
+    def hear(self, messages: SimpleQueue[Message]) -> None:
         """Read the messages that are there."""
-        while not mailbox.empty():
-            index, row = mailbox.get()
+        while not messages.empty():
+            index, row = messages.get()
             if row is not None:
                 self.listener.advanced(index, row)
             elif index not in self.begun:
@@ -147,8 +147,8 @@ class Pool:
         self.listener.ended(index, result)
 
 
-def bring_home(futures: Iterable[Future[Result]], halt: Event) -> None:
-    """Start nothing more, and let the runs in work stop where they can go on later."""
+def cancel_waiting(futures: Iterable[Future[Result]], halt: Event) -> None:
+    """Start nothing more, and let the running ones stop where they can go on later."""
     halt.set()
     for future in futures:
         future.cancel()
@@ -158,38 +158,38 @@ def bring_home(futures: Iterable[Future[Result]], halt: Event) -> None:
 class Worker:
     """What a worker process has for all its jobs."""
 
-    mailbox: SimpleQueue[Message]
+    messages: SimpleQueue[Message]
     halt: Event
-    workshop: Workshop
-    told: float = 0.0
+    transcriptions: TranscriptionCache
+    reported: float = 0.0
 
     def work(self, index: int, job: Job) -> Result:
         """Do one job."""
-        self.mailbox.put((index, None))
-        return execute(job, lambda row: self.watch(index, row), self.workshop)
+        self.messages.put((index, None))
+        return execute(job, lambda row: self.watch(index, row), self.transcriptions)
 
     def watch(self, index: int, row: TraceRow) -> None:
-        """Tell the parent now and then; stop the solver when asked to."""
+        """Report to the parent now and then; stop the solver when asked to."""
         if self.halt.is_set():
             raise KeyboardInterrupt
         now = time.monotonic()
-        if now - self.told > TICK:
-            self.told = now
-            self.mailbox.put((index, row))
+        if now - self.reported > TICK:
+            self.reported = now
+            self.messages.put((index, row))
 
 
 here: list[Worker] = []
 """The worker of this process, if it is one: the executor hands its jobs to module functions only."""
 
 
-def prepare(mailbox: SimpleQueue[Message], halt: Event, transcribe: Transcribe) -> None:
+def prepare(messages: SimpleQueue[Message], halt: Event, transcribe: Transcribe) -> None:
     """Set a worker process up, and let it end with its parent."""
-    here[:] = [Worker(mailbox, halt, Workshop(transcribe))]
+    here[:] = [Worker(messages, halt, TranscriptionCache(transcribe))]
     threading.Thread(target=end_with_parent, daemon=True).start()
 
 
 def end_with_parent() -> None:
-    """Wait for the parent's end; a parent that was killed cannot tell its workers."""
+    """Wait for the parent's end; a parent that was killed cannot stop its workers."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()

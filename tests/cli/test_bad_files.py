@@ -1,4 +1,4 @@
-"""Files that cannot be solved: one message, exit code 2, nothing written."""
+"""A file that cannot be solved gives one message, exit code 2, and no output."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``symphys check``: a description, an examination in words, and an exit code."""
+"""``symphys check`` describes and examines a problem, and its exit code is what the examination found."""
 
 from __future__ import annotations
 

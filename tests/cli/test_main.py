@@ -248,8 +248,8 @@ def test_ctrl_c_saves_and_the_same_command_goes_on(throw: Path, tmp_path: Path, 
 def test_a_backend_is_chosen_and_told(run: Run, throw: Path) -> None:
     assert run("solve", throw, "--solver", "least_squares", "--backend", "casadi")[0] == 0
     found = read_result(Path("reports/throw/least_squares-seed0/result.json"))
-    assert found.backend["name"] == "casadi" and found.backend["compiled"] == "" and found.backend["note"] == ""
-    assert found.seconds is not None and found.seconds["compile"] == 0
+    assert found.backend.name == "casadi" and found.backend.compiled == "" and found.backend.note == ""
+    assert found.seconds["compile"] == 0
     config = json.loads(Path("reports/throw/least_squares-seed0/config.json").read_text(encoding="utf-8"))
     assert config["backend"] == "casadi"
     code, _, err = run("solve", throw, "--solver", "least_squares")
@@ -268,7 +268,7 @@ def test_without_a_compiler_one_line_says_so(
     said = [line for line in err.splitlines() if "ziglang" in line]
     assert len(said) == 1 and said[0].startswith("symphys: casadi's virtual machine evaluates")
     folder = Path("reports/throw/gradient-seed1")
-    assert read_result(folder / "result.json").backend["note"] in said[0]
+    assert read_result(folder / "result.json").backend.note in said[0]
     assert "ziglang" in (folder / "log.txt").read_text(encoding="utf-8")
     assert "ziglang" in (folder / "report.html").read_text(encoding="utf-8")
 

@@ -1,4 +1,4 @@
-"""Stages of smoothing from the command line."""
+"""Stages of smoothing set on the command line are solved one after the other, each judged exactly."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ Run = Callable[..., tuple[int, str, str]]
 def test_a_setting_makes_stages(run: Run, throw: Path) -> None:
     code, _, _ = run("solve", throw, "--solver", "least_squares", "--set", "simulation.smoothing=[0.1, 0.01, 0]")
     found = read_result(Path("reports/throw/least_squares-seed0/result.json"))
-    assert code == 0 and found.stages is not None
-    assert [(stage["smoothing"], stage["solved"]) for stage in found.stages] == [(0.1, True), (0.01, True), (0.0, True)]
+    assert code == 0
+    assert [(stage.smoothing, stage.solved) for stage in found.stages] == [(0.1, True), (0.01, True), (0.0, True)]
     assert "Stages of smoothing" in Path("reports/throw/least_squares-seed0/report.html").read_text(encoding="utf-8")
 
 

@@ -1,4 +1,4 @@
-"""cache, doctor and export: what they say, what they write, and their exit codes."""
+"""cache, doctor and export say what they do, write what they say, and exit with 0, 1 or 2."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is typed is read as meant, and what is found is said briefly."""
+"""Values typed are read as TOML means them; results are worded in one line."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from symphys.cli.arguments import UsageFault, read_settings, read_value
 from symphys.cli.progress import Live, Plain, at
 from symphys.cli.summary import advice, table
 from symphys.cli.wording import brief, duration, many_pairs, number, whole
+from symphys.results.result import CheckRecord
 from symphys.runs import Result
 from symphys.solvers import TraceRow
 
@@ -95,8 +96,8 @@ def test_advice_is_given_once_and_for_unsolved_runs_only() -> None:
 
 def test_a_verdict_that_is_neither_solved_nor_unsolved_is_said_in_words() -> None:
     job: Any = Job()
-    checks = [{"kind": "target", "name": "there", "error": 0.0, "tolerance": 1.0, "ratio": 0.0, "met": True}]
-    doubted = result(solved=False, verdict="doubted", doubts=["a goes through b", "5 J too many"], checks=checks)
+    checks = (CheckRecord("target", "there", 0.0, 1.0, 0.0, met=True),)
+    doubted = result(solved=False, verdict="doubted", doubts=("a goes through b", "5 J too many"), checks=checks)
     best = result(solved=False, verdict="best_found", status="budget", advice="raise it")
     assert brief(job, doubted, skipped=False).startswith("met, but not to be trusted, objective")
     assert brief(job, best, skipped=False).startswith("best found, budget ended, objective")

@@ -9,17 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from symphys.findings.examination import Energy, GradientCheck, Growth, Miss, Refined, Smoothed, Trust
-from symphys.findings.examined import advice, findings, slopes
+from symphys.findings.advice import advice, findings, slopes
+from symphys.findings.contacts import IN_TIME, impact_findings, miss_findings, residual_finding
+from symphys.findings.energy import balance_finding
+from symphys.findings.examination import Energy, Examination, GradientCheck, Growth, Miss, Refined, Smoothed
 from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Judged
-from symphys.findings.nearby import miss_findings
 from symphys.findings.numerics import smoothed_findings
-from symphys.findings.physics import balance_finding
-from symphys.findings.touching import IN_TIME, impact_findings, residual_finding
 
 MET = Judged(1.0, 0.5, True, True, 1.0)
 NO_CHECKS = Judged(1.0, math.nan, True, False, 1.0)
-UNSETTLED = Trust(residual=0.5, impulse=1.0)
+UNSETTLED = Examination(residual=0.5, impulse=1.0)
 
 
 @pytest.mark.parametrize(("finer", "helps"), [(0.1, True), (0.5, False), (0.7, False), (math.inf, False)])
@@ -35,36 +34,36 @@ def test_of_more_sweeps_nothing_is_said_that_nobody_measured() -> None:
 
 
 def test_a_variable_without_influence_is_named_first_and_its_gradient_not_called_right() -> None:
-    none = Trust(gradient=(GradientCheck("push", 0.0, 0.0, felt=0.0),))
+    none = Examination(gradient=(GradientCheck("push", 0.0, 0.0, felt=0.0),))
     assert advice(none, NO_CHECKS).startswith("The gradient of push is zero")
     assert "is right" not in advice(none, NO_CHECKS)
     assert slopes(none)[1][0][3] == "zero"
     (line,) = findings(none, NO_CHECKS)
     assert line.level == FAIR and "no solver that follows gradients" in line.meaning
-    both = Trust(gradient=(*none.gradient, GradientCheck("kick", 0.0, 1.0, felt=1.0)))
+    both = Examination(gradient=(*none.gradient, GradientCheck("kick", 0.0, 1.0, felt=1.0)))
     assert advice(both, NO_CHECKS).startswith("The gradient of push is zero")
     assert "The gradient is right" in advice(both, NO_CHECKS)
 
 
 def test_no_method_is_advised_that_there_is_not() -> None:
     for growth in (np.array([1e9, 1.0]), 10.0 ** np.arange(8, -1, -1)):
-        far = Trust(growth=Growth(np.arange(float(growth.size)), growth))
+        far = Examination(growth=Growth(np.arange(float(growth.size)), growth))
         assert "shorten the horizon" in advice(far, MET)
         assert "multiple shooting" not in advice(far, MET)
 
 
 def test_targets_are_not_spoken_of_where_there_are_none() -> None:
-    same = Trust(refined=(Refined("dt / 2", 1.0, math.nan),))
+    same = Examination(refined=(Refined("dt / 2", 1.0, math.nan),))
     assert "changes little" in advice(same, NO_CHECKS)
     assert not {"target", "check"} & set(advice(same, NO_CHECKS).split())
-    assert "still meets every check" in advice(Trust(refined=(Refined("dt / 2", 1.0, 0.5),)), MET)
+    assert "still meets every check" in advice(Examination(refined=(Refined("dt / 2", 1.0, 0.5),)), MET)
 
 
 @pytest.mark.parametrize(
     ("what", "words"), [("sweeps x 2", "add sweeps until"), ("dt / 2", "halve the time step until")]
 )
 def test_what_changes_the_answer_is_what_is_to_be_refined(what: str, words: str) -> None:
-    assert words in advice(Trust(refined=(Refined(what, 9.0, 9.0),)), MET)
+    assert words in advice(Examination(refined=(Refined(what, 9.0, 9.0),)), MET)
 
 
 @pytest.mark.parametrize(
@@ -99,21 +98,25 @@ def test_smoothing_that_changes_cost_or_motion_is_not_good(row: Smoothed, judged
 )
 def test_impacts_are_called_resolved_only_where_nothing_speaks_against_it(change: dict[str, Any]) -> None:
     energy = Energy(*(np.array([0.0, 1.0]) for _ in range(5)))
-    sound = Trust(multiple_impacts=0.0, steps=10.0, gained=0.0, residual=0.0, deepest=0.0, passed=0.0, energy=energy)
+    sound = Examination(
+        multiple_impacts=0.0, steps=10.0, gained=0.0, residual=0.0, deepest=0.0, passed=0.0, energy=energy
+    )
     assert [line.meaning for line in impact_findings(sound)] == [IN_TIME]
     assert IN_TIME not in [line.meaning for line in impact_findings(replace(sound, **change))]
 
 
 def test_near_misses_are_told_where_a_small_step_or_a_seed_would_make_them_touch() -> None:
     miss = Miss("ball-wall", False, 0.7, 0.003, "vz", 0.004, 0.004, math.inf)
-    assert miss_findings(Trust(misses=(miss,))) == []
-    (by_step,) = miss_findings(Trust(misses=(replace(miss, steps=1e-4),)))
-    (by_seed,) = miss_findings(Trust(misses=(replace(miss, spreads=0.5),)))
-    (touch,) = miss_findings(Trust(misses=(replace(miss, spreads=0.5, touches=True),)))
+    assert miss_findings(Examination(misses=(miss,))) == []
+    (by_step,) = miss_findings(Examination(misses=(replace(miss, steps=1e-4),)))
+    (by_seed,) = miss_findings(Examination(misses=(replace(miss, spreads=0.5),)))
+    (touch,) = miss_findings(Examination(misses=(replace(miss, spreads=0.5, touches=True),)))
     assert "clears by 0.003 m" in by_step.meaning and "vz by 0.004 makes it touch" in by_step.meaning
     assert "spread of seeds" in by_seed.meaning and "the objective jumps" in by_seed.meaning
     assert (touch.what, touch.level) == ("Glancing touch", FAIR) and "misses it" in touch.meaning
-    assert advice(Trust(misses=(replace(miss, spreads=0.5),)), MET).startswith("Close by the motion is another one.")
+    assert advice(Examination(misses=(replace(miss, spreads=0.5),)), MET).startswith(
+        "Close by the motion is another one."
+    )
 
 
 @pytest.mark.parametrize(
@@ -129,7 +132,9 @@ def test_near_misses_are_told_where_a_small_step_or_a_seed_would_make_them_touch
 )
 def test_energy_that_servos_may_have_done_refutes_nothing(numbers: dict[str, float], level: str, doubted: bool) -> None:
     """Of 1 J of motion; the last but one is of a file that tells one number only."""
-    line = balance_finding(Trust(momentum=0.0, energy=Energy(*(np.array([0.0, 1.0]) for _ in range(5))), **numbers))
+    line = balance_finding(
+        Examination(momentum=0.0, energy=Energy(*(np.array([0.0, 1.0]) for _ in range(5))), **numbers)
+    )
     assert (line.level, bool(line.doubt)) == (level, doubted)
 
 
@@ -138,7 +143,8 @@ def test_rounding_of_what_stands_still_is_no_energy_from_nowhere() -> None:
     still, high = np.array([0.0, 1e-25]), np.array([100.0, 100.0])
     energy = Energy(still, still, high, still, still)
     assert (
-        balance_finding(Trust(momentum=0.0, drift=1e-14, unexplained=1e-14, drifted=1e-14, energy=energy)).doubt == ""
+        balance_finding(Examination(momentum=0.0, drift=1e-14, unexplained=1e-14, drifted=1e-14, energy=energy)).doubt
+        == ""
     )
-    lost = balance_finding(Trust(momentum=0.0, drift=1.0, unexplained=1.0, drifted=1.0, energy=energy))
+    lost = balance_finding(Examination(momentum=0.0, drift=1.0, unexplained=1.0, drifted=1.0, energy=energy))
     assert "1 J of energy come from nowhere" in lost.doubt

@@ -19,6 +19,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "suggest": ("", "", "hints for error messages"),
     "threads": ("", "", "one thread for linear algebra"),
     "files": ("errors", "numpy", "files appear at once and whole, or not at all"),
+    "json_values": ("", "numpy", "tolerant readings of JSON"),
     "trajectory": ("errors", "numpy", "a simulated motion as arrays"),
     "shooting": ("", "numpy", "the shooting problem: all that a solver sees"),
     "maths": ("", "casadi", "rotations and smoothed primitives"),
@@ -48,9 +49,9 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "other programs' files",
     ),
     "solvers": ("errors shooting", "casadi cma numpy scipy", "optimisation methods"),
-    "findings": ("", "numpy", "what the numbers of an examination mean"),
+    "findings": ("json_values", "numpy", "what the numbers of an examination mean"),
     "results": (
-        "errors files findings model problem shooting trajectory",
+        "errors files findings json_values model problem shooting trajectory",
         "casadi numpy",
         "what a run folder holds",
     ),
@@ -59,7 +60,11 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "numpy",
         "solve, judge, examine, write",
     ),
-    "report": ("files findings results", "matplotlib numpy", "pages and figures, made from run folders alone"),
+    "report": (
+        "files findings results trajectory",
+        "matplotlib numpy",
+        "pages and figures, made from run folders alone",
+    ),
     "doctor": ("codegen", "casadi numpy", "what there is on this machine"),
     "cli": (
         "codegen doctor errors export files findings problem problems report results runs solvers suggest threads "

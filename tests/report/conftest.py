@@ -13,10 +13,9 @@ import numpy as np
 import pytest
 from walker import SCENE, write_walker
 
-from symphys.results.records import Trajectory
-from symphys.results.scene_reading import read_scene
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene, read_scene
 from symphys.results.trajectories import read_trajectory
+from symphys.trajectory import Trajectory
 
 Arrays = dict[str, Any]
 GRAVITY, BOUNCE, RADIUS = 9.81, 0.5, 0.5

@@ -1,4 +1,4 @@
-"""The page of a batch: every solver, every target, every broken folder by name."""
+"""The page of a batch has every solver, every target and every broken folder by name."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 from symphys.report import write_batch_report, write_run_report
 from symphys.results.discovery import run_folders
-from symphys.results.records import ReportError
+from symphys.results.text_files import ReportError
 
 
 def read(folder: Path) -> str:

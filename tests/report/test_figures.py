@@ -1,4 +1,4 @@
-"""What the figures show: medians, thinning, views, contact forces, ratios."""
+"""Figures show the recorded numbers: medians, thinning, views, contact forces and ratios are what they are called."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 
 from symphys.report.figures import style
+from symphys.report.figures.checks import limits, ratios
 from symphys.report.figures.contacts import pair_normals, shown_pairs
-from symphys.report.figures.curves import Curve, best_so_far, median_curve, miss_so_far
-from symphys.report.pages.checks import limits, ratios
+from symphys.report.figures.convergence import Curve, best_so_far, median_curve, violation_so_far
 from symphys.report.scene.motion import draw_motion
 from symphys.report.scene.views import SIDE_XZ, SIDE_YZ, TOP, TOP_TURNED, choose_views, turn
 from symphys.results.discovery import read_all, studies
-from symphys.results.reading import read_run
-from symphys.results.records import Trace, Trajectory
-from symphys.results.scene_reading import read_scene
-from symphys.results.scene_records import Scene, ScenePlane
+from symphys.results.run import read_run
+from symphys.results.scene import Scene, ScenePlane, read_scene
+from symphys.results.trace import Trace
 from symphys.results.trajectories import read_trajectory
+from symphys.trajectory import Trajectory
 
 GROUND = Scene(planes=(ScenePlane("ground", np.array([0.0, 0.0, 1.0]), 0.0),))
 
@@ -39,10 +39,10 @@ def test_median_of_step_functions() -> None:
 
 
 def test_best_and_miss_only_fall(made: Path) -> None:
-    trace = Trace({"objective": np.array([3.0, np.nan, 4, 1]), "miss": np.array([9.0, 2, 5, np.nan])}, 4)
+    trace = Trace({"objective": np.array([3.0, np.nan, 4, 1]), "max_violation": np.array([9.0, 2, 5, np.nan])}, 4)
     run = replace(read_run(made / "ball_throw" / "gradient-seed0", made), trace=trace)
     assert best_so_far(run).tolist() == [3, 3, 3, 1]
-    assert miss_so_far(run).tolist() == [9, 2, 2, 2]
+    assert violation_so_far(run).tolist() == [9, 2, 2, 2]
 
 
 def test_thinning_keeps_spikes() -> None:

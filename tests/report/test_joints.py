@@ -1,4 +1,4 @@
-"""What a page tells of joints: angles, limits, targets, torques, saturation, how well they hold."""
+"""Figures and tables of joints agree with the recorded angles, limits, commands, torques and separations."""
 
 from __future__ import annotations
 
@@ -16,12 +16,11 @@ from walker import DT, SCENE, STEPS, hinge, motion, write_walker
 
 from symphys.report import write_motion, write_run_report
 from symphys.report.figures import style
-from symphys.report.pages.joints import limits_told, motors_told, separation_told
-from symphys.report.robots.joint_figures import BEYOND, FULL, TARGET, draw_joints, unwound, window
-from symphys.report.robots.joint_grid import make_grid, shown
+from symphys.report.pages.joints import limits_sentence, motors_sentence, separation_sentence
+from symphys.report.robots.joint_figures import BEYOND, FULL, TARGET, axis_range, draw_joints, make_grid, shown, unwound
 from symphys.report.robots.joint_use import channels, separation
-from symphys.results.records import Trajectory
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene
+from symphys.trajectory import Trajectory
 
 Load = Callable[..., tuple[Trajectory, Scene]]
 KNEE = 3
@@ -50,11 +49,11 @@ def panel(axes: list[Axes], title: str) -> Axes:
 def test_saturation_is_the_share_of_the_time_at_the_bounds(load: Load) -> None:
     every = channels(*load(worked()))
     assert [channel.share for channel in every] == [0.3 if k == KNEE else 0.0 for k in range(8)]
-    assert motors_told(every) == "1 of 8 motors is saturated at some time, fr_knee, for 30 % of the time."
-    assert motors_told(every[:2]) == "No motor is ever saturated: each could give more at all times."
-    assert motors_told([every[KNEE]]) == "The motor of fr_knee is saturated for 30 % of the time."
-    assert motors_told(every[:1]) == "The motor is never saturated: it could give more at all times."
-    assert motors_told([]) == ""
+    assert motors_sentence(every) == "1 of 8 motors is saturated at some time, fr_knee, for 30 % of the time."
+    assert motors_sentence(every[:2]) == "No motor is ever saturated: each could give more at all times."
+    assert motors_sentence([every[KNEE]]) == "The motor of fr_knee is saturated for 30 % of the time."
+    assert motors_sentence(every[:1]) == "The motor is never saturated: it could give more at all times."
+    assert motors_sentence([]) == ""
 
 
 def test_saturation_is_marked_where_it_is(load: Load) -> None:
@@ -132,7 +131,7 @@ def test_separation_names_the_worst(load: Load) -> None:
     found = separation(trajectory)
     assert found is not None
     assert found.rms == pytest.approx(0.041 / np.sqrt(41 * 8))
-    assert separation_told(trajectory) == (
+    assert separation_sentence(trajectory) == (
         "Joints come apart by 0.0023 m (root mean square) and 0.041 m at most (fr_knee at t = 0.5 s)."
     )
 
@@ -140,10 +139,10 @@ def test_separation_names_the_worst(load: Load) -> None:
 def test_limits_that_are_reached_are_named(load: Load) -> None:
     arrays = motion()
     arrays["joint_value"] = arrays["joint_value"].copy()
-    assert limits_told(channels(*load(arrays))) == ""
+    assert limits_sentence(channels(*load(arrays))) == ""
     arrays["joint_value"][7, [0, KNEE], 0] = [-1.0, 1.9995]
     arrays["joint_value"][8, 1, 0] = 1.99
-    assert limits_told(channels(*load(arrays))) == "fl_hip and fr_knee come to a limit."
+    assert limits_sentence(channels(*load(arrays))) == "fl_hip and fr_knee come to a limit."
 
 
 def test_an_angle_that_goes_round_has_a_gap() -> None:
@@ -153,10 +152,10 @@ def test_an_angle_that_goes_round_has_a_gap() -> None:
 
 
 def test_an_axis_shows_limits_that_are_near_and_no_noise_at_large() -> None:
-    low, high = window(np.array([-1e-6, 1e-6]), [-np.inf, 0.6], 0.1)
+    low, high = axis_range(np.array([-1e-6, 1e-6]), [-np.inf, 0.6], 0.1)
     assert low < -0.05
     assert 0.6 < high < 0.8
-    assert window(np.array([0.0, 1.0]), [100.0], 0.1)[1] < 1.2
+    assert axis_range(np.array([0.0, 1.0]), [100.0], 0.1)[1] < 1.2
 
 
 def test_the_page_has_joints_gait_and_strip(run_dir: Path) -> None:

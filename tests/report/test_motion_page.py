@@ -1,4 +1,4 @@
-"""The page of a motion alone, and the animation in it."""
+"""The page of a motion alone is complete, and its animation carries the recorded states."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from page_scripts import NODE, plays_to_the_end
 
 from symphys.report import write_motion
 from symphys.report.scene.animation import NUMBERS, motion_data
-from symphys.results.records import ReportError
-from symphys.results.scene_reading import read_scene
+from symphys.results.scene import read_scene
+from symphys.results.text_files import ReportError
 from symphys.results.trajectories import read_trajectory
 
 

@@ -1,4 +1,4 @@
-"""Numbers far beyond any that can be drawn: pages are made all the same, and say what they leave out."""
+"""Numbers far beyond any that can be drawn leave a page that says what it leaves out."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 
 from symphys.report import write_batch_report, write_run_report
 from symphys.results.drawable import LARGEST, OVERSIZED, drawable, oversized
-from symphys.results.reading import read_run
+from symphys.results.run import read_run
 
 HUGE = [1e155, 1e299, 1e307]
 RECORDED = ("objective", "best", "miss", "gradient_norm", "step")

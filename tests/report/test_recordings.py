@@ -1,4 +1,4 @@
-"""Recorded joints are read; records from before there were any are read too."""
+"""Trajectories on disk are read with the shapes of their fields; older files without some arrays are read too."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from symphys.results.records import ReportError
+from symphys.results.text_files import ReportError
 from symphys.results.trajectories import read_trajectory
 
 BODIES = {"time": np.linspace(0, 0.3, 4), "body_names": np.array(["arm"]), "position": np.zeros((4, 1, 3))}

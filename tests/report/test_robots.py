@@ -1,4 +1,4 @@
-"""Robots as they are drawn: limbs, pivots, snapshots, strips, the gait, the camera."""
+"""Kinematic branches, joint positions, poses over time and gaits are those of the recorded motion."""
 
 from __future__ import annotations
 
@@ -12,19 +12,17 @@ from page_scripts import NODE, plays_to_the_end, run_script
 from walker import DT, LEGS, NAMES, SCENE, STEPS, TURNED, hinge, motion
 
 from symphys.report.figures import style
-from symphys.report.figures.spans import spans
-from symphys.report.pages.joints import steps_told
-from symphys.report.robots.branches import colours, keys, limbs, traced
-from symphys.report.robots.gait import stances, weight
-from symphys.report.robots.gait_figure import draw_gait
-from symphys.report.robots.joint_positions import axes_of, bones, on_side, pivot
-from symphys.report.robots.snapshots import extents, spaced
+from symphys.report.pages.joints import steps_sentence
+from symphys.report.robots.branches import branches, colours, keys, traced
+from symphys.report.robots.gait import draw_gait, spans, stances, weight
+from symphys.report.robots.joint_positions import axes_of, bones, on_side, position
+from symphys.report.robots.poses import extents, spaced
 from symphys.report.robots.strip import draw_strip, make_strip
 from symphys.report.scene.animation import NUMBERS, motion_data
 from symphys.report.scene.motion import draw_motion
 from symphys.report.scene.views import SIDE_XZ, TOP
-from symphys.results.records import Trajectory
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene
+from symphys.trajectory import Trajectory
 
 Load = Callable[..., tuple[Trajectory, Scene]]
 
@@ -53,7 +51,7 @@ def test_a_body_stands_while_it_carries_a_share_of_the_weight(load: Load) -> Non
     assert list(found) == ["fl_shin", "hl_shin", "hr_shin"]
     assert spans(found["fl_shin"].stands) == [(0, 10), (20, 30)]
     assert [found[name].duty for name in found] == [0.5, 0.125, 0.5]
-    assert steps_told(trajectory, scene) == (
+    assert steps_sentence(trajectory, scene) == (
         "2 bodies at most stand at once, 1.1 on average; for 38 % of the time none does."
     )
 
@@ -82,10 +80,10 @@ def test_no_gait_where_none_is(load: Load) -> None:
     assert draw_gait(*load(trotting(), {**SCENE, "bodies": light})) is None
 
 
-def test_limbs_are_what_hangs_on_the_trunk(load: Load) -> None:
+def test_branches_are_what_joints_connect_to_the_base(load: Load) -> None:
     trajectory, scene = load(motion())
-    assert [limb.name for limb in limbs(trajectory, scene)] == ["torso", *LEGS]
-    assert [limb.bodies for limb in limbs(trajectory, scene)] == [(0,), (1, 2), (3, 4), (5, 6), (7, 8)]
+    assert [branch.name for branch in branches(trajectory, scene)] == ["torso", *LEGS]
+    assert [branch.bodies for branch in branches(trajectory, scene)] == [(0,), (1, 2), (3, 4), (5, 6), (7, 8)]
     of_body = colours(trajectory, scene)
     assert of_body[1] == of_body[2] != of_body[3]
     assert [name for name, _ in keys(trajectory, scene)] == ["torso", *LEGS]
@@ -101,7 +99,7 @@ def test_few_bodies_keep_their_own_colours(load: Load) -> None:
 def test_the_body_that_the_world_holds_is_the_trunk(load: Load) -> None:
     held = hinge("base", "hr_shin", None, ([0, 0, -0.15], [-0.3, -0.2, 0.05]))
     trajectory, scene = load(motion(), {**SCENE, "joints": [*SCENE["joints"], held]})
-    assert [limb.name for limb in limbs(trajectory, scene) if limb.is_trunk] == ["hr_shin"]
+    assert [branch.name for branch in branches(trajectory, scene) if branch.is_base] == ["hr_shin"]
 
 
 def turned_leg() -> dict[str, Any]:
@@ -115,7 +113,7 @@ def turned_leg() -> dict[str, Any]:
 def test_pivots_and_axes_go_with_the_bodies(load: Load) -> None:
     trajectory, scene = load(turned_leg())
     hip, knee = scene.joints[:2]
-    assert np.allclose(pivot(trajectory, hip, 0), [0.3, 0.2, 0.65])
+    assert np.allclose(position(trajectory, hip, 0), [0.3, 0.2, 0.65])
     assert np.allclose(on_side(trajectory, knee, 1, knee.sockets[1].point, 0, True), [0, 0.2, 0.65])
     (side, axis), *more = axes_of(hip)
     assert more == []
@@ -136,7 +134,7 @@ def test_a_universal_joint_has_two_axes_and_the_world_stands_still(load: Load) -
     assert base.sockets[0].orientation.tolist() == TURNED
 
 
-def test_snapshots_of_a_whole_robot_hardly_cover_each_other(load: Load) -> None:
+def test_poses_of_a_whole_robot_hardly_cover_each_other(load: Load) -> None:
     trajectory, scene = load(motion(speed=3.0))
     shots = spaced(trajectory, scene, SIDE_XZ)
     places = trajectory.position[shots, 0, 0]
@@ -186,7 +184,7 @@ def test_numbers_below_a_strip_do_not_meet(load: Load) -> None:
     assert not [1 for i, a in enumerate(boxes) for b in boxes[:i] if a.overlaps(b)]
 
 
-def test_a_robot_is_drawn_with_its_limbs_in_the_legend(load: Load) -> None:
+def test_a_robot_is_drawn_with_its_branches_in_the_legend(load: Load) -> None:
     figure = draw_motion(*load(motion(speed=3.0)))
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.get_texts()] == ["torso", *LEGS]
@@ -220,5 +218,5 @@ def test_script_and_figures_have_the_same_pivots(load: Load) -> None:
     for joint, told in zip(scene.joints, data["joints"], strict=True):
         side = json.dumps(told["sides"][0])
         found = run_script(f"carried({side}, {told['sides'][0]['point']}, {json.dumps(poses)}, true)", "joints.js")
-        assert np.allclose(found, pivot(trajectory, joint, 0), atol=1e-5)
+        assert np.allclose(found, position(trajectory, joint, 0), atol=1e-5)
     assert run_script("carried({ body: -1 }, [1, 2, 3], [], true)", "joints.js") == [1, 2, 3]

@@ -1,4 +1,4 @@
-"""The page of one run: complete, alone, harmless, and the same again."""
+"""The page of one run is complete, self-contained, harmless, and the same when it is made again."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import pytest
 
 from symphys.report import write_run_report
 from symphys.report.pages.verification import NOT_EXAMINED
-from symphys.results.records import ReportError
+from symphys.results.text_files import ReportError
 
 LARGEST = 3_000_000
 SLOWEST = 10.0
@@ -212,7 +212,7 @@ def test_run_without_motion_says_so(batch: Path) -> None:
         ({"checks": [], "status": "budget"}, "Best found, budget ended"),
         ({"checks": [], "status": "stalled"}, "Best found, no more progress"),
         ({"checks": [], "status": "converged"}, "Solved"),
-        ({"trust": {"deepest": 0.0, "size": 0.1}}, "Only the motion was looked at."),
+        ({"trust": {"deepest": 0.0, "size": 0.1}}, "Only the motion was examined."),
         ({"format": 2}, "this report reads 1"),
     ],
 )

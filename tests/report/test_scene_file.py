@@ -1,4 +1,4 @@
-"""What scene.json says of shapes, fixtures and terrain: read, or left out."""
+"""scene.json is read as it is written; a shape, fixture or terrain that is damaged is left out."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from yard import write_yard
 
-from symphys.results.scene_reading import read_scene
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene, read_scene
 
 
 def test_scene_is_read(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The geometry of the page's scripts, run by node."""
+"""The geometry of the page's scripts is that of the figures; run by node."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from page_scripts import NODE, run_script
 from yard import area
 
 from symphys.report.scene.outlines import outline
-from symphys.results.scene_records import Solid
+from symphys.results.scene import Solid
 
 pytestmark = NODE
 

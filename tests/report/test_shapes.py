@@ -1,4 +1,4 @@
-"""Boxes, capsules, compounds, fixtures and terrain: how they are seen and drawn."""
+"""Every shape is drawn with its outline: boxes, capsules, compounds, fixtures and terrain."""
 
 from __future__ import annotations
 
@@ -21,10 +21,9 @@ from symphys.report.scene.motion import draw_motion
 from symphys.report.scene.outlines import inner_edges, outline
 from symphys.report.scene.panel import make_panel
 from symphys.report.scene.views import SIDE_XZ, SIDE_YZ, TOP, TOP_TURNED, choose_views, half_axes
-from symphys.results.records import Trajectory
-from symphys.results.scene_reading import read_scene
-from symphys.results.scene_records import Scene, Solid
+from symphys.results.scene import Scene, Solid, read_scene
 from symphys.results.trajectories import read_trajectory
+from symphys.trajectory import Trajectory
 
 
 @pytest.fixture(scope="module")

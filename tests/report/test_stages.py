@@ -1,4 +1,4 @@
-"""Runs in stages of smoothing: told with exact numbers, marked in the figures, and never mixed with smoothed ones."""
+"""Stages of smoothing are shown with exact numbers, marked in figures, and never mixed with smoothed ones."""
 
 from __future__ import annotations
 
@@ -13,11 +13,9 @@ import numpy as np
 import pytest
 
 from symphys.report import write_batch_report, write_run_report
-from symphys.report.figures.curves import Curve, best_so_far, curve, miss_so_far
-from symphys.report.figures.history import draw_run
-from symphys.report.pages.stages import exact_ends, segments
-from symphys.results.reading import read_run
-from symphys.results.records import Run
+from symphys.report.figures.convergence import Curve, best_so_far, curve, violation_so_far
+from symphys.report.figures.history import draw_run, exact_ends, segments
+from symphys.results.run import Run, read_run
 
 Edit = Callable[..., None]
 KNOBS = (0.1, 0.01, 0.0)
@@ -102,8 +100,8 @@ def test_only_exact_numbers_are_compared(staged: Path) -> None:
     exact = run.trace["best"][ENDS[1] + 1 :]
     expected = np.concatenate([np.full(20, 7.0), np.full(10, 0.5), [0.02], np.minimum(exact, 0.02)])
     np.testing.assert_allclose(best_so_far(run), expected)
-    miss = np.fmin.accumulate(np.append(2.0, run.trace["miss"][ENDS[1] + 1 :]))
-    np.testing.assert_allclose(miss_so_far(run), [*np.full(20, 700), *np.full(10, 50), *miss])
+    miss = np.fmin.accumulate(np.append(2.0, run.trace["max_violation"][ENDS[1] + 1 :]))
+    np.testing.assert_allclose(violation_so_far(run), [*np.full(20, 700), *np.full(10, 50), *miss])
 
 
 def test_a_curve_of_constant_smoothing_is_its_start_and_end(staged: Path, edit: Edit) -> None:

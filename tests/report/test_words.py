@@ -1,4 +1,4 @@
-"""Numbers in plain words, HTML from parts, levels from numbers."""
+"""Numbers, durations and lists are worded to their precision; text is escaped once; levels follow the numbers."""
 
 from __future__ import annotations
 
@@ -11,17 +11,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from symphys.findings import values
-from symphys.findings.examination import Energy, Gain, GradientCheck, Growth, Refined, Smoothed, Trust
-from symphys.findings.examined import advice, answers, findings, slopes
+from symphys import json_values as values
+from symphys.findings.advice import advice, answers, findings, slopes
+from symphys.findings.contacts import depth_finding, residual_finding
+from symphys.findings.examination import Energy, Examination, Gain, GradientCheck, Growth, Refined, Smoothed
 from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Judged, graded
 from symphys.findings.numerics import slope_finding, smoothed_findings
-from symphys.findings.touching import depth_finding, residual_finding
-from symphys.report.figures.output import slug
-from symphys.report.pages.markup import Html, tag
+from symphys.report.pages.markup import Html, slug, tag
 from symphys.report.pages.sections import variable_rows
 from symphys.report.pages.words import count, listed, seconds, show
-from symphys.results.records import Variable
+from symphys.results.result import VariableRecord
 
 
 @pytest.mark.parametrize(
@@ -80,15 +79,15 @@ def test_names_can_be_written(text: str) -> None:
 
 def test_levels() -> None:
     assert [graded(x, (1, 3)) for x in (0.5, 1, 2, 4, math.inf, math.nan)] == [GOOD, GOOD, FAIR, BAD, BAD, UNKNOWN]
-    assert residual_finding(Trust(residual=1e-3, impulse=0.1)).level == FAIR
-    assert residual_finding(Trust(residual=1e-3)).level == UNKNOWN
-    assert depth_finding(Trust(deepest=0.02, size=0.1)).level == BAD
-    assert depth_finding(Trust(deepest=-1e-9)).level == GOOD
-    named = depth_finding(Trust(deepest=0.02, size=0.1, depth_contact="box-ground", depth_time=1.5))
+    assert residual_finding(Examination(residual=1e-3, impulse=0.1)).level == FAIR
+    assert residual_finding(Examination(residual=1e-3)).level == UNKNOWN
+    assert depth_finding(Examination(deepest=0.02, size=0.1)).level == BAD
+    assert depth_finding(Examination(deepest=-1e-9)).level == GOOD
+    named = depth_finding(Examination(deepest=0.02, size=0.1, depth_contact="box-ground", depth_time=1.5))
     assert "box-ground at t = 1.5 s" in named.number
 
 
-SOUND = Trust(
+SOUND = Examination(
     gradient=(GradientCheck("throw", 1e-9, 1.0),),
     refined=(Refined("dt / 2", 1.01, 0.5, {"throw": 0.01}), Refined("sweeps x 2", 1.0, 0.5, {"throw": 0.0})),
     smoothed=(Smoothed(1e-3, False, 1.0, 0.5),),
@@ -136,11 +135,11 @@ def test_advice_names_what_is_wrong(change: dict[str, Any], words: str) -> None:
 
 def test_the_gradient_under_refinement() -> None:
     rows = (Refined("dt / 2", 1.0, 0.5, {"a": 0.01, "b": np.nan}), Refined("dt / 4", 1.0, 0.5, {"a": 0.6, "b": 0.0}))
-    (line,) = slope_finding(Trust(refined=rows, order={"gradient": 1.04}))
+    (line,) = slope_finding(Examination(refined=rows, order={"gradient": 1.04}))
     assert line.level == BAD
     assert "60 % with dt" in line.number
     assert "dt to the power 1" in line.meaning
-    assert slope_finding(Trust(refined=(Refined("dt / 2", 1.0, 0.5),))) == []
+    assert slope_finding(Examination(refined=(Refined("dt / 2", 1.0, 0.5),))) == []
 
 
 def test_smoothing_of_the_problem_and_smoothing_that_would_do_no_harm() -> None:
@@ -163,7 +162,7 @@ def test_tables_of_refinement() -> None:
 def test_weights_of_a_net_take_one_row() -> None:
     """The range of the guess and of what was found, and how far they are apart."""
     guess, free = np.linspace(-1, 2, 500)[:, None], np.full((500, 1), np.inf)
-    (row,) = variable_rows(Variable("w", ("brain.weights",), guess + 0.5, guess, -free, free))
+    (row,) = variable_rows(VariableRecord("w", ("brain.weights",), guess + 0.5, guess, -free, free))
     text = " ".join(row)
     assert "500 numbers" in text and "brain.weights" in text
     assert "1 to 2" in text and "0.5 to 2.5" in text and "changed by 0.5 (rms)" in text

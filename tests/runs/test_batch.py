@@ -1,4 +1,4 @@
-"""Many runs: order, failures, interruption; here and in worker processes."""
+"""Runs of a batch keep their order, survive failures of others and go on after an interruption, in workers too."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One run: what is written, what is skipped, what goes on, and what a failure leaves."""
+"""One run writes every file, is skipped when done, goes on when interrupted, and leaves no remains of another."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import pytest
 from symphys import files, solvers
 from symphys.problem import load_problem
 from symphys.runs import Job, Result, execute, make_jobs
-from symphys.runs.transcription_cache import Workshop
+from symphys.runs.transcription_cache import TranscriptionCache
 from symphys.solvers import Outcome, Status, TraceRow
 from symphys.transcription import transcribe
 
@@ -27,7 +27,7 @@ def silent(row: TraceRow) -> None:
 
 
 def run(job: Job, monitor: Callable[[TraceRow], None] = silent) -> Result:
-    return execute(job, monitor, Workshop(transcribe))
+    return execute(job, monitor, TranscriptionCache(transcribe))
 
 
 def interrupt_at(iteration: int) -> Callable[[TraceRow], None]:
@@ -64,9 +64,9 @@ def test_what_a_problem_tells_is_in_the_result_and_along_the_trace(problem_file:
     rows: list[TraceRow] = []
     result = run(job, rows.append)
     assert result.outputs == {"ahead [m]": pytest.approx(0.5, abs=0.01)}
-    assert result.guess and result.guess["told: ahead [m]"] == pytest.approx(0.2)
+    assert result.guess and result.guess["output: ahead [m]"] == pytest.approx(0.2)
     with (job.folder.path / "trace.csv").open(encoding="utf-8") as file:
-        column = [float(row["told: ahead [m]"]) for row in csv.DictReader(file)]
+        column = [float(row["output: ahead [m]"]) for row in csv.DictReader(file)]
     assert column == [row.told["ahead [m]"] for row in rows]
     assert (column[0], column[-1]) == (pytest.approx(0.2), pytest.approx(0.5, abs=0.01))
 
@@ -74,7 +74,7 @@ def test_what_a_problem_tells_is_in_the_result_and_along_the_trace(problem_file:
 def test_a_run_need_not_be_examined(make_job: MakeJob) -> None:
     """What is cheap is measured all the same, since the verdict rests on it."""
     result = run(replace(make_job(), examine=False))
-    assert result.solved and result.trust is not None
+    assert result.solved
     assert {"gained", "drift", "deepest", "residual", "passed"} <= result.trust.keys()
     assert not {"gradient", "refined", "growth"} & result.trust.keys()
 
@@ -87,7 +87,7 @@ def test_what_is_met_by_a_motion_that_cannot_be_is_not_solved(problem_file: Path
     for examine in (True, False):
         (job,) = make_jobs([load_problem(problem_file)], ["told"], [0], {}, tmp_path / str(examine))
         result = run(replace(job, examine=examine))
-        assert all(check["met"] for check in result.checks or ())
+        assert all(check.met for check in result.checks)
         assert (result.solved, result.accepted, result.verdict) == (False, False, "doubted")
         assert any("ball-ground" in doubt and "t = 0 s" in doubt for doubt in result.doubts), result.doubts
         assert job.folder.earlier(job.config) == result
@@ -118,12 +118,12 @@ def test_the_result_is_that_of_the_exact_rollout(make_job: MakeJob) -> None:
     assert result.solved and result.status == "met"
     assert result.objective == pytest.approx(6.25e-4, abs=1e-9)
     assert result.costs == pytest.approx({"speed": 6.25e-4})
-    assert result.checks is not None and result.checks[0]["error"] == pytest.approx(0, abs=1e-9)
-    assert result.z is not None
-    assert result.z["throw"]["value"] == [2.5, 0, 0]
-    assert result.z["throw"]["lower"] == [-10, -10, 0] and result.z["throw"]["upper"] == [None] * 3
+    assert result.checks[0].error == pytest.approx(0, abs=1e-9)
+    assert result.z["throw"].to_json()["value"] == [2.5, 0, 0]
+    assert result.z["throw"].to_json()["lower"] == [-10, -10, 0]
+    assert result.z["throw"].to_json()["upper"] == [None] * 3
     assert result.counts == {"rollouts": 3, "gradients": 3, "jacobians": 0, "hessians": 0}
-    assert result.price is not None and result.price["gradient"] > 0
+    assert result.price["gradient"] > 0
     assert result.equivalents == pytest.approx(3 + 3 * result.price["gradient"])
 
 
@@ -162,7 +162,6 @@ def test_what_a_solver_loads_is_no_part_of_its_time(make_job: MakeJob, monkeypat
     monkeypatch.setitem(solvers.SOLVERS, "told", replace(solvers.SOLVERS["told"], prepare=prepare))
     result = run(make_job())
     assert len(prepared) == 1
-    assert result.seconds is not None
     assert sum(result.seconds.values()) < 0.5
 
 
@@ -202,7 +201,6 @@ def test_an_interrupted_run_goes_on_where_it_stopped(make_job: MakeJob) -> None:
         "told to solve from 0",
         "told to solve from 3",
     ]
-    assert result.seconds is not None and stopped.seconds is not None
     assert result.seconds["solve"] > stopped.seconds["solve"]
 
 

@@ -1,4 +1,4 @@
-"""Results survive their file; errors against tolerances are told apart."""
+"""A result survives its file, and a file older than verdicts is ruled on as a new one is."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from symphys import files
+from symphys.results.config import make_config
 from symphys.results.result import CheckRecord
 from symphys.runs import Result, read_result
-from symphys.runs.config import make_config
 
 NAN = float("nan")
 GROWN = {"time": [0, 1], "factor": [1e5, 1]}
@@ -19,7 +19,7 @@ GAIN = {"step": 1, "time": 0.1, "energy": 9.0, "contacts": ["a-b"]}
 
 
 def result(*errors: float) -> Result:
-    checks = [CheckRecord(kind="target", name="inf", error=e, tolerance=0.5, ratio=2 * e, met=e <= 0.5) for e in errors]
+    checks = tuple(CheckRecord("target", "inf", error=e, tolerance=0.5, ratio=2 * e, met=e <= 0.5) for e in errors)
     return Result("p", "nan", "gradient", 0, False, "budget", "", objective=NAN, checks=checks)
 
 

@@ -1,4 +1,4 @@
-"""What scene.json says of a world."""
+"""scene.json has the sizes, places and joints that the variables set, in SI units."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from symphys.problem import Problem, load_problem
-from symphys.results.scene import scene
+from symphys.results.scene_of_problem import make_scene
 from symphys.transcription import transcribe
 
 SHAPES = """
@@ -114,7 +114,7 @@ def problem_of(folder: Path, text: str) -> Problem:
 
 
 def test_shapes_have_the_sizes_that_variables_set(tmp_path: Path) -> None:
-    found = scene(problem_of(tmp_path, SHAPES), Z)
+    found = make_scene(problem_of(tmp_path, SHAPES), Z).to_json()
     tower, bar = found["bodies"]
     box, ball, _ = tower["shapes"]
     assert {**box, "orientation": None} == {"kind": "box", "size": [1, 2, 3], "centre": [0, 0, 0], "orientation": None}
@@ -132,7 +132,7 @@ def test_shapes_have_the_sizes_that_variables_set(tmp_path: Path) -> None:
 
 
 def test_terrain_is_sampled_around_the_start(tmp_path: Path) -> None:
-    (hills,) = scene(problem_of(tmp_path, SHAPES), Z)["terrain"]
+    (hills,) = make_scene(problem_of(tmp_path, SHAPES), Z).to_json()["terrain"]
     x, y, z = (np.array(hills[key]) for key in "xyz")
     assert hills["name"] == "hills"
     np.testing.assert_allclose(z, x - 2 * y[:, None], atol=1e-5)
@@ -150,7 +150,7 @@ def test_terrain_is_sampled_along_the_motion(tmp_path: Path) -> None:
     motion = transcribe(replace(problem, plan=replace(problem.plan, statics=())), backend="casadi").simulate(
         np.array([20.0, 0, 0])
     )
-    (hills,) = scene(problem, {}, motion)["terrain"]
+    (hills,) = make_scene(problem, {}, motion).to_json()["terrain"]
     x, z = np.array(hills["x"]), np.array(hills["z"])
     assert x[-1] > 20.5
     assert np.isnan(z[:, x > 8]).all()
@@ -159,7 +159,7 @@ def test_terrain_is_sampled_along_the_motion(tmp_path: Path) -> None:
 
 def test_joints_are_told_with_all_that_a_report_needs(tmp_path: Path) -> None:
     """Sockets in the frames of the bodies; the motor's bound is that which a variable sets."""
-    found = scene(problem_of(tmp_path, ARM), {"made": np.array([[12.0]])})
+    found = make_scene(problem_of(tmp_path, ARM), {"made": np.array([[12.0]])}).to_json()
     assert found["gravity"] == [0, 0, -5]
     assert [(body["name"], body["mass"]) for body in found["bodies"]] == [("upper", 2.0), ("lower", 1.0)]
     shoulder, elbow, strut = found["joints"]

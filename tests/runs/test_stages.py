@@ -1,9 +1,10 @@
-"""Runs in stages of smoothing: each stage is judged exactly, and a run goes on in whatever stage it stopped."""
+"""Each stage of smoothing is judged exactly, and a run goes on in whatever stage it stopped."""
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,8 +13,9 @@ import pytest
 
 from symphys.problem import Problem, load_problem
 from symphys.problems import find
+from symphys.results.result import StageRecord
 from symphys.runs import Job, Result, execute, make_jobs, read_result, run_batch
-from symphys.runs.transcription_cache import Workshop
+from symphys.runs.transcription_cache import TranscriptionCache
 from symphys.solvers import TraceRow
 from symphys.transcription import Transcription, transcribe
 
@@ -38,39 +40,35 @@ def job(out: Path, knobs: Any = (0.1, 0.01, 0.0), solver: str = "least_squares",
 
 
 def run(asked: Job, monitor: Callable[[TraceRow], None] = lambda row: None) -> Result:
-    return execute(asked, monitor, Workshop(once))
+    return execute(asked, monitor, TranscriptionCache(once))
 
 
-def without_times(result: Result) -> list[dict[str, Any]]:
+def without_times(result: Result) -> list[StageRecord]:
     """The stages without what a clock has measured."""
-    assert result.stages is not None
-    return [{**stage, "seconds": 0.0, "equivalents": 0.0} for stage in result.stages]
+    return [replace(stage, seconds=0.0, equivalents=0.0) for stage in result.stages]
 
 
 def test_each_stage_is_judged_exactly(tmp_path: Path) -> None:
     (asked,), (first,) = job(tmp_path / "all"), job(tmp_path / "first", (0.1,))
     whole, part = run(asked), run(first)
-    assert whole.stages is not None and part.stages is not None
-    assert [stage["smoothing"] for stage in whole.stages] == KNOBS
+    assert [stage.smoothing for stage in whole.stages] == KNOBS
     # the first stage alone is a run of its own, and the judge of runs says the same of it
-    assert part.objective == part.stages[0]["exact_objective"] == whole.stages[0]["exact_objective"]
-    assert part.worst == part.stages[0]["exact_worst"] == whole.stages[0]["exact_worst"]
-    assert not part.solved and not whole.stages[0]["solved"]
-    assert whole.stages[0]["exact_objective"] > 10 * whole.stages[0]["objective"]
+    assert part.objective == part.stages[0].exact_objective == whole.stages[0].exact_objective
+    assert part.worst == part.stages[0].exact_worst == whole.stages[0].exact_worst
+    assert not part.solved and not whole.stages[0].solved
+    assert whole.stages[0].exact_objective > 10 * whole.stages[0].objective
     last = whole.stages[-1]
-    assert (last["exact_objective"], last["exact_worst"], last["solved"]) == (whole.objective, whole.worst, True)
-    assert last["objective"] == pytest.approx(last["exact_objective"], rel=1e-9)
+    assert (last.exact_objective, last.exact_worst, last.solved) == (whole.objective, whole.worst, True)
+    assert last.objective == pytest.approx(last.exact_objective, rel=1e-9)
 
 
 def test_the_work_of_the_stages_is_that_of_the_run(tmp_path: Path) -> None:
     (asked,) = job(tmp_path)
     result = run(asked)
-    assert result.stages is not None and result.counts is not None and result.equivalents is not None
     for kind, count in result.counts.items():
-        assert sum(stage["counts"][kind] for stage in result.stages) == count
-    assert sum(stage["equivalents"] for stage in result.stages) == pytest.approx(result.equivalents)
-    assert result.seconds is not None
-    assert sum(stage["seconds"] for stage in result.stages) <= result.seconds["solve"]
+        assert sum(stage.counts[kind] for stage in result.stages) == count
+    assert sum(stage.equivalents for stage in result.stages) == pytest.approx(result.equivalents)
+    assert sum(stage.seconds for stage in result.stages) <= result.seconds["solve"]
 
 
 def test_what_the_guess_is_worth(tmp_path: Path) -> None:
@@ -82,7 +80,7 @@ def test_what_the_guess_is_worth(tmp_path: Path) -> None:
 def test_files_tell_of_the_stages(tmp_path: Path) -> None:
     (asked,) = job(tmp_path)
     result = run(asked)
-    assert repr(read_result(asked.folder.path / "result.json")) == repr(result)
+    assert read_result(asked.folder.path / "result.json") == result
     with (asked.folder.path / "trace.csv").open(encoding="utf-8", newline="") as file:
         knobs = [float(row["smoothing"]) for row in csv.DictReader(file)]
     assert list(dict.fromkeys(knobs)) == KNOBS
@@ -99,9 +97,8 @@ def test_interrupted_in_any_stage_it_goes_on_to_the_same_end(tmp_path: Path, kno
     (asked,), (broken,) = job(tmp_path / "whole"), job(tmp_path / "broken")
     whole, stopped = run(asked), run(broken, press)
     assert stopped.status == "interrupted"
-    assert stopped.stages is not None
-    assert [stage["smoothing"] for stage in stopped.stages] == KNOBS[: KNOBS.index(knob) + 1]
-    assert stopped.stages[-1]["status"] == "interrupted"
+    assert [stage.smoothing for stage in stopped.stages] == KNOBS[: KNOBS.index(knob) + 1]
+    assert stopped.stages[-1].status == "interrupted"
     rest = run(broken)
     assert (rest.z, rest.counts, rest.iterations) == (whole.z, whole.counts, whole.iterations)
     assert without_times(rest) == without_times(whole)
@@ -109,7 +106,7 @@ def test_interrupted_in_any_stage_it_goes_on_to_the_same_end(tmp_path: Path, kno
 
 def test_side_by_side(tmp_path: Path, recorder: Any) -> None:
     alone = run_batch(job(tmp_path / "a", seeds=3), 1, recorder, once)
-    beside = run_batch(job(tmp_path / "b", seeds=3), 1, recorder, once, together=True)
+    beside = run_batch(job(tmp_path / "b", seeds=3), 1, recorder, once, multi_start=True)
     assert alone.accepted and beside.accepted
     for one, other in zip(alone.results, beside.results, strict=True):
         assert one is not None and other is not None

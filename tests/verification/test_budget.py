@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from symphys.findings.examination import Energy, Gain, Trust
+from symphys.findings.energy import balance_finding, gains_finding
+from symphys.findings.examination import Energy, Examination, Gain
 from symphys.findings.levels import BAD, GOOD
-from symphys.findings.physics import balance_finding, gains_finding
 from symphys.problem import load_problem
 from symphys.problems import find
 from symphys.transcription import transcribe
@@ -166,13 +166,13 @@ def test_an_impact_adds_no_energy_unless_asked_to(make):
 def test_words_of_the_budget():
     energy = Energy(*(np.array([0.0, 1.0]) for _ in range(5)))
     gain = Gain(113, 1.13, 0.2, ("rod-ground",))
-    line = gains_finding(Trust(energy=energy, gains=(gain,), gained=0.2))
+    line = gains_finding(Examination(energy=energy, gains=(gain,), gained=0.2))
     assert line.level == BAD
     for word in ("rod-ground", "1.13", "113", "0.2 J"):
         assert word in line.meaning
-    assert gains_finding(Trust(energy=energy, gained=0.0)).level == GOOD
-    assert balance_finding(Trust(energy=energy, momentum=1e-3, drift=0.0)).level == BAD
-    assert balance_finding(Trust(energy=energy, momentum=1e-15, drift=0.0)).level == GOOD
+    assert gains_finding(Examination(energy=energy, gained=0.0)).level == GOOD
+    assert balance_finding(Examination(energy=energy, momentum=1e-3, drift=0.0)).level == BAD
+    assert balance_finding(Examination(energy=energy, momentum=1e-15, drift=0.0)).level == GOOD
 
 
 def test_points_of_one_contact_have_its_name():

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from symphys.findings.examination import Growth, Trust
-from symphys.findings.examined import advice
+from symphys.findings.advice import advice
+from symphys.findings.examination import Examination, Growth
 from symphys.findings.levels import BAD, GOOD, Judged
 from symphys.findings.numerics import GROWTH_LIMITS, growth_finding, reach
 from symphys.verification.sensitivity_growth import backwards, growth, state_columns
@@ -117,7 +117,7 @@ def test_billiards_grow_exponentially_and_the_advice_says_so(make):
     assert far.total > 1e5
     assert far.doubling == pytest.approx(np.log(2) / expected, rel=0.2)
     assert growth_finding(curve).level == BAD
-    text = advice(Trust(growth=curve), JUDGED)
+    text = advice(Examination(growth=curve), JUDGED)
     assert "not to be trusted beyond" in text and "shorten the horizon" in text
 
 

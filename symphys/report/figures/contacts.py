@@ -14,8 +14,8 @@ from matplotlib.lines import Line2D
 
 from symphys.report.figures import style
 from symphys.report.scene.views import centres
-from symphys.results.records import Array, Trajectory
-from symphys.results.scene_records import Scene, Solid
+from symphys.results.scene import Scene, Solid
+from symphys.trajectory import Array, Trajectory
 
 MOST_PAIRS = 6
 NORMAL, TANGENTIAL, WHOLE, GAP = style.BODIES[0], style.ORANGE, style.GREEN, style.GREY
@@ -125,7 +125,7 @@ def draw_gap(axes: Axes, trajectory: Trajectory, pair: int) -> None:
 def pair_normals(trajectory: Trajectory, scene: Scene) -> Iterator[tuple[str, Array]]:
     """The names that pairs of surfaces have, each with its unit normal (N, 3) or (3,) at the start of a step.
 
-    Only planes, and balls against each other, have one normal that the shapes alone tell.
+    Only planes, and balls against each other, have a normal that the shapes alone determine.
     """
     solids = list(labels(trajectory, scene))
     for (label, _, _), plane in itertools.product(solids, scene.planes):

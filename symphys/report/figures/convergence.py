@@ -1,8 +1,9 @@
-"""How solvers came to their results: objective and errors against work and time."""
+"""Convergence of solvers: objective and errors against work and time."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,20 +11,96 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from symphys.report.figures import style
-from symphys.report.figures.curves import QUANTITIES, Curve, Quantity, curve, median_curve, miss_so_far, told
 from symphys.results.discovery import Study
-from symphys.results.records import Array
+from symphys.results.result import StageRecord, smoothed
+from symphys.results.run import Run
+from symphys.results.trace import OUTPUT
+from symphys.trajectory import Array
+
+GRID = 300
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A quantity as a step function: ``y[i]`` holds from ``x[i]`` on."""
+
+    x: Array
+    y: Array
+
+
+def best_so_far(run: Run) -> Array:
+    """(rows,): the lowest objective up to each iteration, as the solver recorded it where it did."""
+    recorded = run.trace["best"]
+    known = recorded if np.isfinite(recorded).any() else run.trace["objective"]
+    return falling(run, known, "objective", lambda stage: stage.exact_objective)
+
+
+def violation_so_far(run: Run) -> Array:
+    """(rows,): the smallest largest error / tolerance up to each iteration."""
+    return falling(run, run.trace["max_violation"], "worst", lambda stage: stage.exact_worst)
+
+
+def best_output(name: str) -> Quantity:
+    """(rows,): a reported quantity of the best point so far."""
+    return lambda run: np.where(run.trace["smoothing"] > 0, np.nan, run.trace[OUTPUT + name])
+
+
+Quantity = Callable[[Run], Array]
+QUANTITIES: tuple[tuple[str, Quantity], ...] = (
+    ("Lowest objective so far", best_so_far),
+    ("Largest error / tolerance, smallest so far", violation_so_far),
+)
+
+
+def falling(run: Run, recorded: Array, name: str, exact: Callable[[StageRecord], float]) -> Array:
+    """(rows,): the lowest of what is known to hold exactly.
+
+    A row of a stage with smoothing belongs to another problem: of such a stage only its start and its end count,
+    judged exactly. ``name``: the quantity among those of the guess; ``exact``: that of a stage.
+    """
+    smoothing = run.trace["smoothing"]
+    known = np.where(smoothing > 0, np.nan, recorded)
+    if smoothed(run.stages) and known.size:
+        known[0] = run.guess.get(name, np.nan)
+    for stage in run.stages:
+        rows = np.flatnonzero(smoothing == stage.smoothing)
+        if stage.smoothing > 0 and rows.size:
+            known[rows[-1]] = exact(stage)
+    return np.fmin.accumulate(known) if known.size else known
+
+
+def curve(run: Run, along: str, quantity: Quantity) -> Curve | None:
+    """One run's curve; None if nothing of it is finite."""
+    x, y = run.trace[along], quantity(run)
+    known = np.isfinite(x) & np.isfinite(y)
+    return Curve(x[known], y[known]) if known.any() else None
+
+
+def median_curve(curves: Sequence[Curve]) -> Curve:
+    """The median of step functions from where all have begun; a curve that has ended keeps its last value."""
+    if len(curves) == 1:
+        return curves[0]
+    grid = np.unique(np.concatenate([c.x for c in curves]))
+    grid = grid[grid >= max(c.x[0] for c in curves)]
+    if grid.size > GRID:
+        grid = grid[np.linspace(0, grid.size - 1, GRID).round().astype(int)]
+    values = [c.y[np.searchsorted(c.x, grid, side="right") - 1] for c in curves]
+    return Curve(grid, np.median(values, axis=0))
+
 
 WORK, SECONDS = "equivalents", "seconds"
 AXIS_TITLES = {WORK: "work [rollout equivalents]", SECONDS: "time of the solve [s]"}
-MISS_FLOOR = 1e-3
+VIOLATION_FLOOR = 1e-3
 """Errors below this share of the tolerance are drawn as this: nothing is gained below it."""
 
 
 def draw_convergence(study: Study) -> Figure | None:
-    """All solvers on one axis: objective, errors and what is told against rollout equivalents and against time."""
+    """All solvers on one axis: objective, errors and reported quantities against rollout equivalents and time."""
     outputs = dict.fromkeys(name for run in study.runs for name in run.outputs)
-    asked = [*QUANTITIES, *((f"{name[:1].upper()}{name[1:]}, of the best so far", told(name)) for name in outputs)]
+    asked = [
+        *QUANTITIES,
+        *((f"{name[:1].upper()}{name[1:]}, of the best so far", best_output(name)) for name in outputs),
+    ]
     rows = [quantity for quantity in asked if any(curve(run, WORK, quantity[1]) for run in study.runs)]
     columns = [x for x in (WORK, SECONDS) if any(np.isfinite(run.trace[x]).any() for run in study.runs)]
     if not rows or not columns:
@@ -35,7 +112,7 @@ def draw_convergence(study: Study) -> Figure | None:
             draw_panel(grid[row, column], study, along, quantity)
             grid[row, column].set_xlabel(AXIS_TITLES[along] if row == len(rows) - 1 else "")
         grid[row, 0].set_title(title)
-        if quantity is miss_so_far:
+        if quantity is violation_so_far:
             mark_tolerance(list(grid[row]))
     add_legend(figure, study)
     return figure
@@ -44,7 +121,7 @@ def draw_convergence(study: Study) -> Figure | None:
 def draw_panel(axes: Axes, study: Study, along: str, quantity: Quantity) -> None:
     """Thin lines for seeds, a strong one for their median, a mark at each end."""
     marks = style.solver_marks(entry.solver for entry in study.entries)
-    floor = MISS_FLOOR if quantity is miss_so_far else -np.inf
+    floor = VIOLATION_FLOOR if quantity is violation_so_far else -np.inf
     seen_x, seen_y = [], []
     for entry in study.entries:
         colour, marker = marks[entry.solver]
@@ -63,7 +140,7 @@ def draw_panel(axes: Axes, study: Study, along: str, quantity: Quantity) -> None
         seen_x += [c.x for c in curves]
         seen_y += [c.y for c in curves]
     if seen_x:
-        scale_panel(axes, np.concatenate(seen_x), np.concatenate(seen_y), quantity is miss_so_far)
+        scale_panel(axes, np.concatenate(seen_x), np.concatenate(seen_y), quantity is violation_so_far)
 
 
 def raise_to(source: Curve, floor: float) -> Curve:

@@ -3,25 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
+from symphys.findings.writing import show
 from symphys.report.figures import style
-from symphys.report.figures.convergence import AXIS_TITLES, MISS_FLOOR, WORK, fit_values, mark_tolerance
-from symphys.report.pages import stages
-from symphys.results.records import TOLD, Array, Run
-from symphys.results.stage_record import Stage, smoothed
+from symphys.report.figures.convergence import AXIS_TITLES, VIOLATION_FLOOR, WORK, fit_values, mark_tolerance
+from symphys.results.result import StageRecord, smoothed
+from symphys.results.run import Run
+from symphys.results.trace import OUTPUT
+from symphys.trajectory import Array
 
+NARROWEST = 0.09
+"""A stage that takes less of the axis has no room for its name."""
 HEADROOM = 0.16
 """Above and below the curves where names of stages stand over them, as a share of the axis."""
 
 
 @dataclass(frozen=True)
-class Panel:
+class HistoryPanel:
     """One recorded column.
 
     Attributes:
@@ -35,12 +41,12 @@ class Panel:
     title: str
     values: Array
     best: Array | None = None
-    exact: Callable[[Stage], float] | None = None
+    exact: Callable[[StageRecord], float] | None = None
     relative: bool = False
 
 
 def draw_run(run: Run) -> Figure | None:
-    """Objective, errors, gradient norm, step, what is told; what was not recorded is left out."""
+    """Objective, errors, gradient norm, step, reported quantities; what was not recorded is left out."""
     x = run.trace[WORK]
     x = x if np.isfinite(x).any() else run.trace["iteration"]
     shown = [panel for panel in panels_of(run) if np.isfinite(panel.values).any()]
@@ -60,24 +66,24 @@ def draw_run(run: Run) -> Figure | None:
         axes.set_xlabel(label)
         axes.tick_params(labelbottom=True)
     if smoothed(run.stages):
-        style.legend_above(figure, *stages.legend(colour))
+        style.legend_above(figure, *legend(colour))
     return figure
 
 
-def panels_of(run: Run) -> list[Panel]:
+def panels_of(run: Run) -> list[HistoryPanel]:
     """All that may be drawn."""
     trace = run.trace
     return [
-        Panel("Objective", trace["objective"], stage_best(run), lambda stage: stage.exact_objective),
-        Panel(
+        HistoryPanel("Objective", trace["objective"], stage_best(run), lambda stage: stage.exact_objective),
+        HistoryPanel(
             "Largest error / tolerance",
-            np.maximum(trace["miss"], MISS_FLOOR),
-            exact=lambda stage: max(stage.exact_worst, MISS_FLOOR),
+            np.maximum(trace["max_violation"], VIOLATION_FLOOR),
+            exact=lambda stage: max(stage.exact_worst, VIOLATION_FLOOR),
             relative=True,
         ),
-        Panel("Norm of the gradient", trace["gradient_norm"]),
-        Panel("Step" if not run.solver.startswith("cma") else "Step size σ", trace["step"]),  # noqa: RUF001
-        *(Panel(name[:1].upper() + name[1:], trace[TOLD + name]) for name in trace.told),
+        HistoryPanel("Norm of the gradient", trace["gradient_norm"]),
+        HistoryPanel("Step" if not run.solver.startswith("cma") else "Step size σ", trace["step"]),  # noqa: RUF001
+        *(HistoryPanel(name[:1].upper() + name[1:], trace[OUTPUT + name]) for name in trace.outputs),
     ]
 
 
@@ -86,14 +92,14 @@ def stage_best(run: Run) -> Array:
     recorded, objective = run.trace["best"], run.trace["objective"]
     if np.isfinite(recorded).any() or not recorded.size:
         return recorded
-    return np.concatenate([np.fmin.accumulate(objective[part]) for part in stages.segments(run)])
+    return np.concatenate([np.fmin.accumulate(objective[part]) for part in segments(run)])
 
 
-def draw_panel(axes: Axes, run: Run, x: Array, panel: Panel, colour: str, named: bool) -> None:
+def draw_panel(axes: Axes, run: Run, x: Array, panel: HistoryPanel, colour: str, named: bool) -> None:
     """One column against the work; of a run in stages with their bands and exact ends."""
-    for part in stages.segments(run):
+    for part in segments(run):
         draw_history(axes, x[part], panel.values[part], None if panel.best is None else panel.best[part], colour)
-    ends = stages.exact_ends(run, x, panel.exact) if smoothed(run.stages) and panel.exact else []
+    ends = exact_ends(run, x, panel.exact) if smoothed(run.stages) and panel.exact else []
     fit_values(axes, np.append(panel.values, [y for _, y, _ in ends]), panel.relative)
     axes.set_title(panel.title)
     if named and smoothed(run.stages):
@@ -101,8 +107,8 @@ def draw_panel(axes: Axes, run: Run, x: Array, panel: Panel, colour: str, named:
     if panel.relative:
         mark_tolerance([axes])
     if smoothed(run.stages):
-        stages.draw_bands(axes, run, x, named)
-        stages.draw_exact(axes, ends)
+        draw_bands(axes, run, x, named)
+        draw_exact(axes, ends)
 
 
 def draw_history(axes: Axes, x: Array, values: Array, best: Array | None, colour: str) -> None:
@@ -115,3 +121,57 @@ def draw_history(axes: Axes, x: Array, values: Array, best: Array | None, colour
     axes.plot(times, shown[:, 0], color=colour, linewidth=1.4, marker="o" if few else "", markersize=3)
     style.set_linear(axes, "x")
     axes.margins(x=0.02)
+
+
+def segments(run: Run) -> list[slice]:
+    """The rows of the trace, split where the smoothing changes."""
+    smoothing = np.nan_to_num(run.trace["smoothing"])
+    cuts = [0, *(np.flatnonzero(np.diff(smoothing)) + 1).tolist(), len(smoothing)]
+    return [slice(first, last) for first, last in pairwise(cuts) if last > first]
+
+
+def draw_bands(axes: Axes, run: Run, x: Array, named: bool) -> None:
+    """A pale band behind every other stage; ``named`` writes the smoothing on those that have room."""
+    parts = segments(run)
+    edges = [x[0], *(0.5 * (x[part.start - 1] + x[part.start]) for part in parts[1:]), x[-1]]
+    for index, (part, left, right) in enumerate(zip(parts, edges, edges[1:], strict=False)):
+        if index % 2:
+            axes.axvspan(left, right, color=style.GROUND, linewidth=0, alpha=0.7, zorder=0.2)
+        if index:
+            axes.axvline(left, color=style.FAINT, linewidth=0.8, zorder=0.4)
+        if named and right - left >= NARROWEST * (x[-1] - x[0]):
+            value = run.trace["smoothing"][part.start]
+            axes.annotate(
+                f"smoothing {show(value)}" if value else "exact",
+                (0.5 * (left + right), 1),
+                xycoords=("data", "axes fraction"),
+                xytext=(0, -3),
+                textcoords="offset points",
+                ha="center",
+                va="top",
+                color=style.SOFT,
+                fontsize=7.5,
+            )
+
+
+def exact_ends(run: Run, x: Array, of: Callable[[StageRecord], float]) -> list[tuple[float, float, bool]]:
+    """(x, exact number, whether met) at the end of each stage that is in the trace."""
+    ends = {run.trace["smoothing"][part.start]: x[part.stop - 1] for part in segments(run)}
+    found = [(ends[s.smoothing], of(s), s.solved) for s in run.stages if s.smoothing in ends]
+    return [end for end in found if math.isfinite(end[0]) and math.isfinite(end[1])]
+
+
+def draw_exact(axes: Axes, ends: Sequence[tuple[float, float, bool]]) -> None:
+    """A diamond at the exact number of each stage's end, hollow where it misses something."""
+    axes.plot([x for x, _, _ in ends], [y for _, y, _ in ends], color=style.INK, linewidth=0.8, linestyle=(0, (1, 2)))
+    for x, y, met in ends:
+        face = style.INK if met else "white"
+        axes.plot(x, y, "D", color=style.INK, markerfacecolor=face, markersize=5.5, zorder=4, clip_on=False)
+
+
+def legend(colour: str) -> tuple[list[Line2D], list[str]]:
+    """Handles and labels of a run's figure."""
+    own = Line2D([], [], color=colour, linewidth=1.4)
+    ends = [Line2D([], [], color=style.INK, marker="D", markersize=5.5, linestyle="none", markerfacecolor=face)
+            for face in (style.INK, "white")]  # fmt: skip
+    return [own, *ends], ["at the stage's own smoothing", "exact, at its end", "the same, something missed"]

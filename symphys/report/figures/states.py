@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from symphys.report.figures import style
 from symphys.report.scene.views import NAMES
-from symphys.results.records import Array, Trajectory
+from symphys.trajectory import Array, Trajectory
 
 MOST_BODIES = 5
 

@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -17,8 +18,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator, SymmetricalLogLocator
 
+from symphys import files
 from symphys.findings import writing
-from symphys.results.records import Array
+from symphys.results.file_names import FIGURES
+from symphys.trajectory import Array
 
 WIDTH = 10.0
 """[in] of every figure"""
@@ -213,3 +216,9 @@ def thin(time: Array, columns: Array, points: int = 700) -> tuple[Array, Array]:
 def legend_above(figure: Figure, handles: Sequence[Artist], labels: Sequence[str]) -> None:
     """One legend for all panels, in a row above them."""
     figure.legend(handles, labels, loc="outside upper left", ncols=min(len(labels), 8), borderaxespad=0.2)
+
+
+def write_figures(folder: Path, pictures: Iterable[Picture]) -> None:
+    """Write every picture into ``folder``/figures. Raises FileError."""
+    for picture in pictures:
+        files.write_text(folder / FIGURES / f"{picture.name}.svg", picture.svg)

@@ -10,7 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from symphys.report.figures import style
-from symphys.results.records import Array, Run, Variable
+from symphys.results.result import VariableRecord
+from symphys.results.run import Run
+from symphys.trajectory import Array
 
 MOST_PANELS = 8
 VECTORS = ("position", "velocity", "angular_velocity", "force", "torque", "gravity")
@@ -18,7 +20,7 @@ SLOT = re.compile(r"(?P<name>\w+)(\[\s*(?P<first>-?\d+)?\s*:\s*(?P<last>-?\d+)?\
 """A quantity, with a range of components or without."""
 
 
-def component_names(variable: Variable) -> list[str]:
+def component_names(variable: VariableRecord) -> list[str]:
     """x, y, z for a vector in space, numbers otherwise, nothing for a scalar."""
     size = variable.value.shape[0]
     if size == 1:
@@ -32,7 +34,7 @@ def component_names(variable: Variable) -> list[str]:
     return [str(index) for index in range(size)]
 
 
-def knotted(run: Run) -> list[Variable]:
+def knotted(run: Run) -> list[VariableRecord]:
     """The variables that are curves."""
     return [variable for variable in run.variables if variable.value.shape[1] > 1]
 
@@ -51,7 +53,7 @@ def draw_variables(run: Run) -> Figure | None:
     return figure
 
 
-def draw_curves(axes: Axes, variable: Variable) -> None:
+def draw_curves(axes: Axes, variable: VariableRecord) -> None:
     """The components of one variable against the number of the knot."""
     knots = np.arange(1, variable.value.shape[1] + 1, dtype=float)
     colours = [*style.AXES, style.PURPLE, style.ORANGE, style.SKY]
@@ -74,7 +76,7 @@ def draw_curves(axes: Axes, variable: Variable) -> None:
     axes.margins(x=0.01)
 
 
-def draw_bounds(axes: Axes, variable: Variable) -> None:
+def draw_bounds(axes: Axes, variable: VariableRecord) -> None:
     """Lines at bounds that are near the values."""
     shown = np.concatenate([variable.value.ravel(), variable.guess.ravel()])
     shown = shown[np.isfinite(shown)]

@@ -1,4 +1,4 @@
-"""How changes grow along the horizon, and what becomes of the energy."""
+"""Sensitivity growth and energy along the horizon."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from symphys.findings.examination import Energy, Growth
 from symphys.findings.numerics import reach
 from symphys.findings.writing import show
 from symphys.report.figures import style
-from symphys.results.records import Array, Trajectory
+from symphys.trajectory import Array, Trajectory
 
 HEIGHT = 2.3
 LEAST_RANGE = 100.0

@@ -9,21 +9,22 @@ from symphys import files
 from symphys.findings import writing
 from symphys.findings.verdict import ACCEPTED
 from symphys.report.figures import style
+from symphys.report.figures.checks import MOST_CHECKS, draw_checks, ratios
 from symphys.report.figures.convergence import draw_convergence
-from symphys.report.figures.output import slug, write_figures
-from symphys.report.figures.style import Picture
+from symphys.report.figures.style import Picture, write_figures
 from symphys.report.pages import comparison
-from symphys.report.pages.checks import MOST_CHECKS, draw_checks, ratios
-from symphys.report.pages.markup import Html, card, facts, figures, join, page, table, tag
+from symphys.report.pages.markup import Html, card, facts, figures, join, page, slug, table, tag
 from symphys.report.robots.strip import draw_strip
 from symphys.report.scene.animation import NUMBERS, animation
 from symphys.report.scene.motion import draw_motion
 from symphys.results.discovery import Study, read_all, studies
 from symphys.results.drawable import OVERSIZED, drawable, oversized
-from symphys.results.records import ReportError, Run, Trajectory
-from symphys.results.scene_reading import SCENE, read_scene
-from symphys.results.scene_records import Scene
-from symphys.results.trajectories import GUESS, TRAJECTORY, read_trajectory
+from symphys.results.file_names import GUESS, SCENE, TRAJECTORY
+from symphys.results.run import Run
+from symphys.results.scene import Scene, read_scene
+from symphys.results.text_files import ReportError
+from symphys.results.trajectories import read_trajectory
+from symphys.trajectory import Trajectory
 
 PAGE = "index.html"
 CLOSEST = "run that came closest"
@@ -95,7 +96,7 @@ def build_study(study: Study, root: Path, numbers: int, anchor: str, titled: boo
         strip = draw_strip(motion, scene) if motion else None
         drawn = draw_motion(motion, scene, guess) if motion else None
         moved = style.picture(f"{anchor}-strip", "The motion at even times", strip)
-        moved += style.picture(f"{anchor}-motion", "Path and snapshots", drawn)
+        moved += style.picture(f"{anchor}-motion", "Path and poses over time", drawn)
     write_figures(root, converged + checked + moved)
     played = animation(motion, scene, guess, numbers) if motion else tag("p", f"There is no motion to draw: {why}.")
     best = study.best
@@ -154,18 +155,18 @@ def provenance(runs: Sequence[Run]) -> Html:
         known = list(dict.fromkeys(text for text in texts if text))
         return "; ".join(known[:most]) + (f"; and {len(known) - most} more" if len(known) > most else "")
 
-    when = sorted(run.origin.when for run in runs if run.origin.when)
+    when = sorted(run.when for run in runs if run.when)
     span = when[0] if len(set(when)) == 1 else f"{when[0]} to {when[-1]}" if when else ""
     named = ("symphys", "python", "casadi", "numpy", "scipy", "cma")
-    versions = [", ".join(f"{n} {run.origin.versions[n]}" for n in named if run.origin.versions.get(n)) for run in runs]
-    commands = once([run.origin.command for run in runs])
+    versions = [", ".join(f"{n} {run.versions[n]}" for n in named if run.versions.get(n)) for run in runs]
+    commands = once([run.command for run in runs])
     content = facts(
         [
             ("Command", tag("code", commands) if commands else ""),
             ("When", span),
-            ("Machine", once([run.origin.versions.get("platform", "") for run in runs])),
+            ("Machine", once([run.versions.get("platform", "") for run in runs])),
             ("Versions", once(versions)),
-            ("Evaluated by", once([run.origin.backend for run in runs])),
+            ("Evaluated by", once([str(run.backend) for run in runs])),
         ]
     )
     return card("Where this comes from", content)

@@ -14,8 +14,8 @@ from symphys.report.figures import style
 from symphys.report.pages import words
 from symphys.report.pages.markup import ICONS, Html, banner, card, dot, join, pill, table, tag
 from symphys.results.discovery import Entry, Study, middle
-from symphys.results.records import Run
-from symphys.results.stage_record import smoothed
+from symphys.results.result import smoothed
+from symphys.results.run import Run
 
 RUN_PAGE = "report.html"
 MOST_BROKEN = 50
@@ -44,7 +44,7 @@ def summary(found: Sequence[Study], broken: Sequence[Run]) -> str:
 
 
 def study_verdict(study: Study) -> Html:
-    """A banner: who solved it, and who did with the least work and time."""
+    """A banner: which solvers solved it, and which with the least work and time."""
     entries = [entry for entry in study.entries if any(run.status != "not_applicable" for run in entry.runs)]
     full = [entry for entry in entries if entry.solved == len(entry.runs)]
     none = [entry for entry in entries if entry.solved == 0]
@@ -89,8 +89,8 @@ def tally(entries: Sequence[Entry], full: Sequence[Entry], none: Sequence[Entry]
 def thrift(study: Study) -> str:
     """The solver with the least work and the one with the least time, among those that solved every run."""
     full = [entry for entry in study.entries if entry.solved == len(entry.runs)]
-    work = {e.solver: e.median([run.effort.equivalents for run in e.runs]) for e in full}
-    time = {e.solver: e.median([run.effort.seconds.get("solve", math.nan) for run in e.runs]) for e in full}
+    work = {e.solver: e.median([run.equivalents for run in e.runs]) for e in full}
+    time = {e.solver: e.median([run.seconds.get("solve", math.nan) for run in e.runs]) for e in full}
     work, time = ({k: v for k, v in numbers.items() if math.isfinite(v)} for numbers in (work, time))
     if len(full) < 2 or not work or not time:
         return ""
@@ -103,24 +103,24 @@ def columns(study: Study) -> list[Column]:
     """The numeric columns; those that no run uses are left out."""
     fixed: list[Column] = [
         ("objective", lambda run: run.objective, lambda v: show(v, 4)),
-        ("largest error / tolerance", lambda run: run.worst, lambda v: show(v, 3)),
-        ("rollouts", lambda run: run.effort.counts.get("rollouts", math.nan), words.count),
-        ("gradients", lambda run: run.effort.counts.get("gradients", math.nan), words.count),
+        ("largest error / tolerance", lambda run: run.worst_ratio, lambda v: show(v, 3)),
+        ("rollouts", lambda run: run.counts.get("rollouts", math.nan), words.count),
+        ("gradients", lambda run: run.counts.get("gradients", math.nan), words.count),
     ]
     for kind in ("jacobians", "hessians"):
-        if any(run.effort.counts.get(kind, 0) > 0 for run in study.runs):
-            fixed.append((kind, lambda run, kind=kind: run.effort.counts.get(kind, math.nan), words.count))  # type: ignore[misc]
+        if any(run.counts.get(kind, 0) > 0 for run in study.runs):
+            fixed.append((kind, lambda run, kind=kind: run.counts.get(kind, math.nan), words.count))  # type: ignore[misc]
     return [
         *fixed,
-        ("work in rollouts", lambda run: run.effort.equivalents, lambda v: words.count(round(v, 1))),
-        ("solve", lambda run: run.effort.seconds.get("solve", math.nan), words.seconds),
+        ("work in rollouts", lambda run: run.equivalents, lambda v: words.count(round(v, 1))),
+        ("solve", lambda run: run.seconds.get("solve", math.nan), words.seconds),
         ("build", built, words.seconds),
     ]
 
 
 def built(run: Run) -> float:
     """[s] before the solve: build and compile."""
-    return run.effort.seconds.get("build", math.nan) + run.effort.seconds.get("compile", 0.0)
+    return run.seconds.get("build", math.nan) + run.seconds.get("compile", 0.0)
 
 
 LEAST_IS_BEST = ("work in rollouts", "solve")
@@ -187,19 +187,23 @@ def smoothing_note(study: Study) -> str:
     """Which runs used stages of smoothing, and which; nothing where none did."""
     used: dict[str, list[str]] = {}
     for entry in study.entries:
-        for knobs in dict.fromkeys(stages_of(run) for run in entry.runs if smoothed(run.stages)):
-            used.setdefault(knobs, []).append(entry.solver)
-    told = [f"{knobs} m/s: {writing.listed(list(dict.fromkeys(names)))}" for knobs, names in used.items()]
-    return f"Solved in stages of smoothing, {'; '.join(told)}. All that is told here is exact." if told else ""
+        for widths in dict.fromkeys(stages_of(run) for run in entry.runs if smoothed(run.stages)):
+            used.setdefault(widths, []).append(entry.solver)
+    stages = [f"{widths} m/s: {writing.listed(list(dict.fromkeys(names)))}" for widths, names in used.items()]
+    return (
+        f"Solved in stages of smoothing, {'; '.join(stages)}. All numbers here are of the exact rollout."
+        if stages
+        else ""
+    )
 
 
 def stages_of(run: Run) -> str:
-    """The knobs of its stages."""
+    """The smoothing of its stages."""
     return writing.listed([show(stage.smoothing) for stage in run.stages])
 
 
 def convergence_note(study: Study) -> str:
-    """What the figure does not say by itself."""
+    """The caption: what the figure does not show."""
     marked = any(len(entry.runs) > 1 for entry in study.entries)
     text = "Strong: the median over seeds; a run that has ended keeps its last value. " if marked else ""
     text += "Errors below a thousandth of the tolerance are drawn there."

@@ -10,15 +10,13 @@ import numpy as np
 from symphys.findings.writing import listed, percent, several, show
 from symphys.report.figures.style import Picture, picture
 from symphys.report.pages.markup import Html, Part, card, figures, join, pill, table, tag
-from symphys.report.robots.gait import LOADED, stances, weight
-from symphys.report.robots.gait_figure import draw_gait
-from symphys.report.robots.joint_figures import draw_joints
-from symphys.report.robots.joint_grid import shown
+from symphys.report.robots.gait import LOADED, draw_gait, stances, weight
+from symphys.report.robots.joint_figures import draw_joints, shown
 from symphys.report.robots.joint_use import Channel, channels, separation
 from symphys.report.robots.strip import draw_strip
-from symphys.results.joint_records import SceneMotor
-from symphys.results.records import Trajectory
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene
+from symphys.results.scene_joints import SceneMotor
+from symphys.trajectory import Trajectory
 
 OFTEN = 0.25
 """A motor that is saturated for this share of the time is marked in the table."""
@@ -44,7 +42,7 @@ def joint_card(trajectory: Trajectory, scene: Scene, pictures: Mapping[str, Pict
     drawn = [pictures[name] for name in ("joints", "motors") if name in pictures]
     few = shown(every)
     left_out = f"Drawn are {len(few)} of {len(every)} coordinates: those that move most." * (len(few) < len(every))
-    sentences = [motors_told(every), limits_told(every), separation_told(trajectory)]
+    sentences = [motors_sentence(every), limits_sentence(every), separation_sentence(trajectory)]
     return card(
         "Joints",
         tag("p", " ".join(filter(None, sentences))) if any(sentences) else "",
@@ -54,7 +52,7 @@ def joint_card(trajectory: Trajectory, scene: Scene, pictures: Mapping[str, Pict
     )
 
 
-def motors_told(every: Sequence[Channel]) -> str:
+def motors_sentence(every: Sequence[Channel]) -> str:
     """How many motors are saturated, and which most of all."""
     driven = [channel for channel in every if channel.bound > 0]
     full = sorted((c for c in driven if c.share > 0), key=lambda c: -c.share)
@@ -72,8 +70,8 @@ def motors_told(every: Sequence[Channel]) -> str:
     return f"{len(full)} of {several(len(driven), 'motor')} {verb} saturated at some time, {which}{most}."
 
 
-def limits_told(every: Sequence[Channel]) -> str:
-    """Which joints come to their limits."""
+def limits_sentence(every: Sequence[Channel]) -> str:
+    """Which joints reach their limits."""
     names = [channel.name for channel in every if channel.at_limit]
     if not names:
         return ""
@@ -81,8 +79,8 @@ def limits_told(every: Sequence[Channel]) -> str:
     return f"{listed([*names[:MOST_NAMED], *more])} {'comes' if len(names) == 1 else 'come'} to a limit."
 
 
-def separation_told(trajectory: Trajectory) -> str:
-    """How well joints hold together."""
+def separation_sentence(trajectory: Trajectory) -> str:
+    """How far joints separate."""
     found = separation(trajectory)
     if found is None:
         return ""
@@ -107,19 +105,19 @@ def use_row(channel: Channel) -> list[Part]:
         join([channel.name, Html(" "), tag("small", joint.kind)]),
         f"{show(low)} to {show(high)} {channel.unit}",
         f"{show(joint.lower)} to {show(joint.upper)}" if bounded else "",
-        "" if joint.motor is None else motor_told(joint.motor, channel),
+        "" if joint.motor is None else motor_words(joint.motor, channel),
         f"{show(float(np.abs(channel.torque).max(initial=0.0)))} {channel.torque_unit}" if channel.driven else "",
-        share_told(channel),
+        share_words(channel),
     ]
 
 
-def motor_told(motor: SceneMotor, channel: Channel) -> str:
+def motor_words(motor: SceneMotor, channel: Channel) -> str:
     """Its kind and bounds."""
     speed = f", {show(motor.velocity)} {channel.unit}/s" if math.isfinite(motor.velocity) else ""
     return f"{motor.kind}, {show(motor.torque)} {channel.torque_unit}{speed}"
 
 
-def share_told(channel: Channel) -> Html:
+def share_words(channel: Channel) -> Html:
     """How long it is saturated."""
     if not channel.bound > 0:
         return Html("")
@@ -133,11 +131,13 @@ def gait_card(trajectory: Trajectory, scene: Scene, pictures: Mapping[str, Pictu
     if "gait" not in pictures:
         return Html("")
     least = f"{percent(LOADED)} of the weight of {show(weight(trajectory, scene))} N"
-    told = f"A bar: the body carries more than {least}. The duty factor is the share of the time that it does."
-    return card("Gait", tag("p", steps_told(trajectory, scene)), figures([pictures["gait"]], told), anchor="gait")
+    caption = f"A bar: the body carries more than {least}. The duty factor is the share of the time that it does."
+    return card(
+        "Gait", tag("p", steps_sentence(trajectory, scene)), figures([pictures["gait"]], caption), anchor="gait"
+    )
 
 
-def steps_told(trajectory: Trajectory, scene: Scene) -> str:
+def steps_sentence(trajectory: Trajectory, scene: Scene) -> str:
     """How many bodies stand at once."""
     found = stances(trajectory, scene)
     at_once = np.sum([stance.stands for stance in found], axis=0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import html
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -123,3 +124,8 @@ def page(title: str, body: Part, animated: bool = False) -> str:
     )
     scripts = tag("script", Html(script)) if animated else Html("")
     return "<!doctype html>\n" + tag("html", head, tag("body", tag("main", body), scripts), lang="en") + "\n"
+
+
+def slug(text: str) -> str:
+    """A name that is safe as a file name and as an anchor."""
+    return re.sub(r"[^a-z0-9_]+", "-", text.lower()).strip("-")[:60] or "unnamed"

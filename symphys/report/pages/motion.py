@@ -13,10 +13,9 @@ from symphys.report.pages import sections
 from symphys.report.pages.joints import gait_card, joint_card, joint_pictures
 from symphys.report.pages.markup import card, figures, join, page, tag
 from symphys.report.scene.motion import draw_motion
-from symphys.results.records import Trajectory
-from symphys.results.scene_reading import read_scene
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene, read_scene
 from symphys.results.trajectories import read_trajectory
+from symphys.trajectory import Trajectory
 
 
 def write_motion(trajectory_npz: Path, scene_json: Path, out: Path, title: str = "Motion") -> Path:
@@ -57,7 +56,7 @@ CARDS = (("states", "States over time"), ("controls", "Controls"), ("contacts", 
 
 def draw(trajectory: Trajectory, scene: Scene) -> dict[str, style.Picture]:
     """Every figure by name."""
-    made = style.picture("motion", "Path and snapshots", draw_motion(trajectory, scene))
+    made = style.picture("motion", "Path and poses over time", draw_motion(trajectory, scene))
     made += joint_pictures(trajectory, scene)
     made += style.picture("states", "Position, velocity and angular velocity over time", draw_states(trajectory))
     made += style.picture("controls", "Forces and torques over time", draw_controls(trajectory))

@@ -11,9 +11,8 @@ from symphys.findings import writing
 from symphys.report.figures import style
 from symphys.report.figures.contacts import by_surfaces, draw_contacts, shown_pairs
 from symphys.report.figures.history import draw_run
-from symphys.report.figures.output import write_figures
 from symphys.report.figures.states import MOST_BODIES, controlled_bodies, draw_controls, draw_states, shown_bodies
-from symphys.report.figures.style import Picture
+from symphys.report.figures.style import Picture, write_figures
 from symphys.report.figures.variables import draw_variables
 from symphys.report.figures.verification import draw_energy, draw_growth
 from symphys.report.pages import sections
@@ -25,20 +24,21 @@ from symphys.report.scene.motion import draw_motion
 from symphys.results import text_files as tables
 from symphys.results.discovery import is_run
 from symphys.results.drawable import OVERSIZED, drawable, oversized
-from symphys.results.reading import CONFIG, PROBLEM, read_run
-from symphys.results.records import ReportError, Run, Trajectory
-from symphys.results.scene_reading import SCENE, read_scene
-from symphys.results.scene_records import Scene
-from symphys.results.stage_record import smoothed
-from symphys.results.trajectories import GUESS, TRAJECTORY, read_trajectory
+from symphys.results.file_names import CONFIG, GUESS, PROBLEM, SCENE, TRAJECTORY
+from symphys.results.result import smoothed
+from symphys.results.run import Run, read_run
+from symphys.results.scene import Scene, read_scene
+from symphys.results.text_files import ReportError
+from symphys.results.trajectories import read_trajectory
+from symphys.trajectory import Trajectory
 
 PAGE = "report.html"
 LOG = "log.txt"
 
 
 @dataclass(frozen=True)
-class Recording:
-    """The motion of a run, as far as it could be read; ``faults`` says what could not."""
+class RecordedMotion:
+    """The motion of a run, as far as it could be read; ``faults`` names what could not."""
 
     trajectory: Trajectory | None
     guess: Trajectory | None
@@ -63,7 +63,7 @@ def write_run_report(run_dir: Path) -> Path:
     if not is_run([path.name for path in run_dir.iterdir()]):
         raise ReportError(f"{run_dir}: no run folder; one holds result.json, or config.json and problem.toml")
     run = read_run(run_dir, run_dir)
-    recording = read_recording(run_dir)
+    recording = read_motions(run_dir)
     with style.paper():
         pictures = draw(drawable(run), recording)
     write_figures(run_dir, pictures.values())
@@ -73,7 +73,7 @@ def write_run_report(run_dir: Path) -> Path:
     return run_dir / PAGE
 
 
-def read_recording(folder: Path) -> Recording:
+def read_motions(folder: Path) -> RecordedMotion:
     """Read what there is; the guess is no loss where it is missing."""
     faults: list[str] = []
     trajectory = read_or_note(folder / TRAJECTORY, faults)
@@ -83,7 +83,7 @@ def read_recording(folder: Path) -> Recording:
     except ReportError as error:
         scene = Scene()
         faults.append(str(error))
-    return Recording(trajectory, guess, scene, tuple(faults))
+    return RecordedMotion(trajectory, guess, scene, tuple(faults))
 
 
 def read_or_note(path: Path, faults: list[str]) -> Trajectory | None:
@@ -95,23 +95,25 @@ def read_or_note(path: Path, faults: list[str]) -> Trajectory | None:
         return None
 
 
-def draw(run: Run, recording: Recording) -> dict[str, Picture]:
+def draw(run: Run, recording: RecordedMotion) -> dict[str, Picture]:
     """Every figure of the page by name; those that have nothing to show are left out."""
     made = style.picture("convergence", "Convergence of this run", draw_run(run))
     made += style.picture("variables", "Variables against their knots", draw_variables(run))
     motion = recording.trajectory
     if motion is not None:
-        made += style.picture("motion", "Path and snapshots", draw_motion(motion, recording.scene, recording.guess))
+        made += style.picture(
+            "motion", "Path and poses over time", draw_motion(motion, recording.scene, recording.guess)
+        )
         made += joint_pictures(motion, recording.scene)
         made += style.picture("states", "Position, velocity and angular velocity over time", draw_states(motion))
         made += style.picture("controls", "Forces and torques over time", draw_controls(motion))
         made += style.picture("contacts", "Contact forces and gaps over time", draw_contacts(motion, recording.scene))
-    made += style.picture("growth", "How changes grow until the end", draw_growth(run.trust.growth, motion))
-    made += style.picture("energy", "Energy over time", draw_energy(run.trust.energy))
+    made += style.picture("growth", "Growth of changes until the end", draw_growth(run.examination.growth, motion))
+    made += style.picture("energy", "Energy over time", draw_energy(run.examination.energy))
     return {picture.name: picture for picture in made}
 
 
-def build(run: Run, recording: Recording, pictures: dict[str, Picture]) -> Html:
+def build(run: Run, recording: RecordedMotion, pictures: dict[str, Picture]) -> Html:
     """The page, from the verdict to the sources."""
     cards = [
         sections.checks(run),
@@ -134,11 +136,11 @@ def build(run: Run, recording: Recording, pictures: dict[str, Picture]) -> Html:
 
 
 def how_drawn(run: Run) -> str:
-    """What the figure of the convergence does not say by itself."""
+    """The caption of the convergence: what the figure does not show."""
     return f"Pale: the lowest so far{' in its stage' * smoothed(run.stages)}. Work counts one rollout as 1."
 
 
-def motion_card(run: Run, recording: Recording, pictures: dict[str, Picture]) -> Html:
+def motion_card(run: Run, recording: RecordedMotion, pictures: dict[str, Picture]) -> Html:
     """The motion; nothing where there is neither a result nor a motion."""
     if recording.trajectory is None and not run.readable:
         return Html("")
@@ -150,7 +152,7 @@ def only(pictures: dict[str, Picture], name: str) -> list[Picture]:
     return [pictures[name]] if name in pictures else []
 
 
-def motion_cards(recording: Recording, pictures: dict[str, Picture]) -> list[Html]:
+def motion_cards(recording: RecordedMotion, pictures: dict[str, Picture]) -> list[Html]:
     """Joints, gait, states, controls and contacts over time."""
     motion = recording.trajectory
     if motion is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 from collections.abc import Sequence
@@ -17,8 +18,11 @@ from symphys.report.pages import words
 from symphys.report.pages.markup import Html, banner, card, facts, figures, fold, join, pill, stats, table, tag
 from symphys.report.robots.branches import is_large
 from symphys.report.scene.animation import animation
-from symphys.results.records import TOLD, Array, Check, Run, Trajectory, Variable
-from symphys.results.scene_records import Scene
+from symphys.results.result import CheckRecord, Result, VariableRecord
+from symphys.results.run import Run
+from symphys.results.scene import Scene
+from symphys.results.trace import OUTPUT
+from symphys.trajectory import Array, Trajectory
 
 FOOTER = tag("footer", "Made by symphys from the files of the run folder; make it again with “symphys report”.")
 MOST_ROWS = 60
@@ -26,19 +30,17 @@ LOG_TAIL = 20_000
 HOW_JUDGED = (
     "Judged by an exact rollout of the result, without smoothing. The bar ends at the error, the line is the tolerance."
 )
-HOW_DRAWN = (
-    "Snapshots at even times, the later the darker, fewer where a body hardly moves; spokes and edges turn with it."
-)
+HOW_DRAWN = "Poses at even times, the later the darker, fewer where a body hardly moves; spokes and edges turn with it."
 HOW_ROBOTS_DRAWN = (
-    "The whole where it has moved on by most of its length, the later the stronger; lines are paths of trunks and feet."
+    "Whole poses, each most of a length further on, the later the stronger; lines are paths of base bodies and feet."
 )
 HOW_JOINTS_DRAWN = "Dots are joints, squares those that slide or hold fast; bars are the axes."
-HOW_STRIP_DRAWN = "At even times; the window goes with what travels far."
+HOW_STRIP_DRAWN = "At even times; the section shown follows what travels far."
 CHAPTERS = (
     ("checks", "Checks"),
     ("motion", "Motion"),
     ("found", "Found"),
-    ("trust", "Trust"),
+    ("trust", "Verification"),
     ("stages", "Stages"),
     ("convergence", "Convergence"),
     ("joints", "Joints"),
@@ -69,19 +71,31 @@ def key_numbers(run: Run) -> Html:
     """The strip of numbers below the verdict."""
     if not run.readable:
         return Html("")
-    derivatives = [(kind, run.effort.counts.get(kind, 0.0)) for kind in ("gradients", "jacobians", "hessians")]
+    derivatives = [(kind, run.counts.get(kind, 0.0)) for kind in ("gradients", "jacobians", "hessians")]
     used = [(kind.capitalize(), words.count(number)) for kind, number in derivatives if number > 0]
     return stats(
         [
             ("Objective", show(run.objective)),
-            ("Error / tolerance", show(run.worst)),
+            ("Error / tolerance", show(run.worst_ratio)),
             *((name[:1].upper() + name[1:], show(value)) for name, value in run.outputs.items()),
-            ("Rollouts", words.count(run.effort.counts.get("rollouts", math.nan))),
+            ("Rollouts", words.count(run.counts.get("rollouts", math.nan))),
             *used,
-            ("Work, in rollouts", words.count(round(run.effort.equivalents, 1))),
-            ("Time of the solve", words.seconds(run.effort.seconds.get("solve", math.nan))),
+            *labelled(run),
+            ("Time of the solve", words.seconds(run.seconds.get("solve", math.nan))),
         ]
     )
+
+
+def labelled(run: Run) -> list[tuple[str, str]]:
+    """The numbers of a result whose definition has a label."""
+    found = []
+    for each in dataclasses.fields(Result):
+        if "label" in each.metadata:
+            value, decimals = getattr(run, each.name), each.metadata.get("decimals")
+            found.append(
+                (each.metadata["label"], show(value) if decimals is None else words.count(round(value, decimals)))
+            )
+    return found
 
 
 def checks(run: Run) -> Html:
@@ -103,19 +117,19 @@ def checks(run: Run) -> Html:
         table(["name", "error", "tolerance", "ratio", "", ""], rows, "tnnntt", "Checks") if rows else "",
         tag("h3", "Costs, weighted") if costs else "",
         costs,
-        tag("h3", "Told") if run.outputs else "",
-        facts([(name, told(run, name)) for name in run.outputs]),
+        tag("h3", "Reported quantities") if run.outputs else "",
+        facts([(name, output_line(run, name)) for name in run.outputs]),
         anchor="checks",
         note=HOW_JUDGED,
     )
 
 
-def told(run: Run, name: str) -> str:
+def output_line(run: Run, name: str) -> str:
     """A number of the result, and what it was at the guess."""
-    return f"{show(run.outputs[name], 4)} (at the guess {show(run.guess.get(TOLD + name, math.nan), 4)})"
+    return f"{show(run.outputs[name], 4)} (at the guess {show(run.guess.get(OUTPUT + name, math.nan), 4)})"
 
 
-def gauge(check: Check) -> Html:
+def gauge(check: CheckRecord) -> Html:
     """Error against tolerance: the middle of the bar is 1, its end 2 and more."""
     share = min(check.ratio / 2, 1.0) if math.isfinite(check.ratio) else 1.0
     bar = tag("span", style=f"width:{100 * max(share, 0):.1f}%")
@@ -157,7 +171,7 @@ def found(run: Run, pictures: dict[str, Picture]) -> Html:
     )
 
 
-def variable_rows(variable: Variable) -> list[list[str]]:
+def variable_rows(variable: VariableRecord) -> list[list[str]]:
     """One row for each component; one for all of a variable with very many, such as the weights of a net."""
     if len(variable.value) > MOST_ROWS:
         return [many_row(variable)]
@@ -172,7 +186,7 @@ def variable_rows(variable: Variable) -> list[list[str]]:
     return rows
 
 
-def many_row(variable: Variable) -> list[str]:
+def many_row(variable: VariableRecord) -> list[str]:
     """The range of very many components, and how far they are from the guess."""
     guess, value = variable.guess[:, 0], variable.value[:, 0]
     label = join([tag("b", variable.name), f" {len(value)} numbers ", tag("small", ", ".join(variable.sets))])
@@ -206,7 +220,7 @@ def between(value: float, guess: float, low: float, high: float) -> Html:
 def time_split(run: Run) -> Html:
     """Build, compile and solve as one bar."""
     colours = {"build": style.SKY, "compile": style.ORANGE, "solve": style.BODIES[0]}
-    parts = [(name, run.effort.seconds.get(name, math.nan), colour) for name, colour in colours.items()]
+    parts = [(name, run.seconds.get(name, math.nan), colour) for name, colour in colours.items()]
     known = [(name, took, colour) for name, took, colour in parts if math.isfinite(took) and took >= 0]
     total = sum(took for _, took, _ in known)
     if total <= 0:
@@ -216,7 +230,7 @@ def time_split(run: Run) -> Html:
         tag("li", tag("span", class_="dot", style=f"background:{c}"), f"{name} {words.seconds(took)}")
         for name, took, c in known
     ]
-    prices = [f"{name} {show(price, 2)}" for name, price in run.effort.price.items() if math.isfinite(price)]
+    prices = [f"{name} {show(price, 2)}" for name, price in run.price.items() if math.isfinite(price)]
     priced = f"Measured price in rollouts: {writing.listed(prices)}." if prices else ""
     return card(
         "Where the time went",
@@ -229,16 +243,16 @@ def time_split(run: Run) -> Html:
 
 def provenance(run: Run) -> Html:
     """When, with what and by which command."""
-    versions = ", ".join(f"{name} {version}" for name, version in run.origin.versions.items() if name != "platform")
+    versions = ", ".join(f"{name} {version}" for name, version in run.versions.items() if name != "platform")
     return facts(
         [
-            ("Command", tag("code", run.origin.command) if run.origin.command else ""),
-            ("When", run.origin.when),
-            ("Machine", run.origin.versions.get("platform", "")),
+            ("Command", tag("code", run.command) if run.command else ""),
+            ("When", run.when),
+            ("Machine", run.versions.get("platform", "")),
             ("Versions", versions),
-            ("Evaluated by", run.origin.backend),
+            ("Evaluated by", str(run.backend)),
             ("Ended as", words.status(run.status)),
-            ("Iterations", words.count(run.effort.iterations) if math.isfinite(run.effort.iterations) else ""),
+            ("Iterations", words.count(run.iterations) if math.isfinite(run.iterations) else ""),
         ]
     )
 

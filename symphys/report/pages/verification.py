@@ -1,22 +1,22 @@
-"""The panel "how far to trust this" of a run's page."""
+"""Verification of a solution: the panel "how far to trust this" of a run's page."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 
-from symphys.findings.examination import Trust
-from symphys.findings.examined import advice, answers, findings, slopes
+from symphys.findings.advice import advice, answers, findings, slopes
+from symphys.findings.contacts import sliding
+from symphys.findings.examination import Examination
 from symphys.findings.levels import MARKS, Judged
-from symphys.findings.touching import sliding
 from symphys.findings.writing import show
 from symphys.report.figures.style import Picture
 from symphys.report.pages.markup import Html, Part, card, figures, pill, table, tag
-from symphys.results.records import Run
+from symphys.results.run import Run
 
-NOT_EXAMINED = "This run was not examined; “symphys check --at” its folder tells how far to trust it."
+NOT_EXAMINED = "This run was not examined; “symphys check --at” its folder examines how far to trust it."
 ONLY_MOTION = (
-    "Only the motion was looked at. “symphys check --at” this folder also tells of its gradient, finer time steps and "
+    "Only the motion was examined. “symphys check --at” this folder also examines its gradient, finer time steps and "
     "the growth of changes."
 )
 TITLE = "How far to trust this"
@@ -33,25 +33,25 @@ HOW_REFINED = "The same variables, simulated otherwise: the answers, and in perc
 def trusted(run: Run, pictures: Mapping[str, Picture]) -> Html:
     """Advice, findings, figures, and the refinements as numbers."""
     judged = run.judged
-    lines = findings(run.trust, judged)
+    lines = findings(run.examination, judged)
     if not lines:
         unknown = tag("p", NOT_EXAMINED) if run.readable else ""
         return card(TITLE, unknown, anchor="trust")
     rows = [[pill(line.level, MARKS[line.level]), line.what, line.number, line.meaning] for line in lines]
     return card(
         TITLE,
-        tag("p", advice(run.trust, judged)),
-        tag("p", ONLY_MOTION) if not run.trust.gradient else "",
-        table(["", "looked at", "number", "meaning"], rows, "tttt", "Trust"),
-        notes(run.trust),
+        tag("p", advice(run.examination, judged)),
+        tag("p", ONLY_MOTION) if not run.examination.gradient else "",
+        table(["", "looked at", "number", "meaning"], rows, "tttt", "Verification"),
+        notes(run.examination),
         drawn(pictures, "growth", HOW_GROWN),
-        drawn(pictures, "energy", " ".join(filter(None, [HOW_BALANCED, sliding(run.trust)]))),
-        refined(run.trust, judged),
+        drawn(pictures, "energy", " ".join(filter(None, [HOW_BALANCED, sliding(run.examination)]))),
+        refined(run.examination, judged),
         anchor="trust",
     )
 
 
-def notes(trust: Trust) -> Html:
+def notes(trust: Examination) -> Html:
     """What the numbers are, where that is not in the lines."""
     if not math.isfinite(trust.step):
         return Html("")
@@ -60,7 +60,7 @@ def notes(trust: Trust) -> Html:
     )
 
 
-def refined(trust: Trust, judged: Judged) -> Html:
+def refined(trust: Examination, judged: Judged) -> Html:
     """The refinements as tables; nothing without any."""
     if not trust.refined:
         return Html("")

@@ -5,29 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from symphys.findings.verdict import BEST_FOUND, DOUBTED, SOLVED, told
+from symphys.findings.endings import ending
+from symphys.findings.verdict import BEST_FOUND, DOUBTED, SOLVED, verdict_words
 from symphys.findings.writing import listed, plain, show
-from symphys.results.records import Check, Run
-
-STATUS = {
-    "met": "everything met",
-    "converged": "converged",
-    "budget": "budget spent",
-    "stalled": "no more progress",
-    "not_finite": "a number was not finite",
-    "not_applicable": "not applicable",
-    "failed": "failed",
-    "interrupted": "interrupted",
-    "unreadable": "no readable result",
-}
-
-STOPPED = {
-    "converged": "The solver converged.",
-    "budget": "The solver's budget was spent.",
-    "stalled": "The solver could make no more progress.",
-    "not_finite": "A number in the simulation was not finite.",
-    "failed": "The solver failed.",
-}
+from symphys.results.result import CheckRecord
+from symphys.results.run import Run
 
 
 def count(value: float) -> str:
@@ -45,19 +27,19 @@ def seconds(value: float) -> str:
 
 
 def status(code: str) -> str:
-    """A status in plain words; one that is not known is told as it stands."""
-    return STATUS.get(code, code.replace("_", " ") or "no status")
+    """A status in plain words; one that is not known stands as it is."""
+    return ending(code).words
 
 
 def ended(code: str) -> str:
     """A status in two words at most, for tables."""
-    return {"met": "met", "not_finite": "not finite"}.get(code, status(code))
+    return ending(code).in_table or ending(code).words
 
 
 def came_to(run: Run) -> str:
     """How a run ended, in a few words for tables: as its solver did, or its verdict, where that says more."""
     if run.verdict in (DOUBTED, BEST_FOUND):
-        return told(run.verdict, run.status, bool(run.checks))
+        return verdict_words(run.verdict, run.status, bool(run.checks))
     return ended(run.status)
 
 
@@ -67,20 +49,19 @@ def level(run: Run) -> str:
         return "good"
     if run.verdict == DOUBTED:
         return "bad"
-    return "bad" if run.status in ("failed", "not_finite", "unreadable", "") else "fair"
+    return "bad" if ending(run.status).faulty else "fair"
 
 
 def headline(run: Run) -> str:
     """A few words for a run."""
     if run.verdict in (SOLVED, DOUBTED, BEST_FOUND):
-        words = told(run.verdict, run.status, bool(run.checks))
+        words = verdict_words(run.verdict, run.status, bool(run.checks))
         return words[:1].upper() + words[1:]
-    known = {"interrupted": "Interrupted", "not_applicable": "Not applicable", "failed": "Failed"}
-    return known.get(run.status, "Not solved" if run.readable else "No result")
+    return ending(run.status).headline
 
 
 def verdict(run: Run) -> str:
-    """What came out, in one or two sentences; the solver's own advice is told apart."""
+    """What came out, in one or two sentences; the solver's own advice is separate."""
     if not run.readable:
         return "No result could be read from this folder."
     missed = [check for check in run.checks if not check.met]
@@ -88,17 +69,17 @@ def verdict(run: Run) -> str:
         return f"{run.solver} does not apply to this problem."
     if run.status == "interrupted":
         return "The run was interrupted; the same command goes on from where it stopped."
-    if not run.checks and run.status in STOPPED and math.isnan(run.objective):
-        return f"{STOPPED[run.status]} There is nothing to judge."
+    if not run.checks and ending(run.status).sentence and math.isnan(run.objective):
+        return f"{ending(run.status).sentence} There is nothing to judge."
     if not run.checks:
         text = (
-            f"The problem states nothing to meet; the objective is {show(run.objective)}. {STOPPED.get(run.status, '')}"
+            f"The problem states nothing to meet; the objective is {show(run.objective)}. {ending(run.status).sentence}"
         )
     elif run.verdict in (SOLVED, DOUBTED):
         total = "The only check is" if len(run.checks) == 1 else f"All {len(run.checks)} checks are"
-        text = f"{total} met; the largest error is {show(run.worst, 2)} of its tolerance{work(run)}."
+        text = f"{total} met; the largest error is {show(run.worst_ratio, 2)} of its tolerance{work(run)}."
     else:
-        text = f"{misses(missed, len(run.checks))} {STOPPED.get(run.status, '')}"
+        text = f"{misses(missed, len(run.checks))} {ending(run.status).sentence}"
     return f"{text.strip()} {doubted(run)}".strip()
 
 
@@ -107,7 +88,7 @@ def doubted(run: Run) -> str:
     return f"But it is not to be relied on: {'; '.join(run.doubts)}." if run.verdict == DOUBTED else ""
 
 
-def misses(missed: Sequence[Check], total: int) -> str:
+def misses(missed: Sequence[CheckRecord], total: int) -> str:
     """How many checks are missed, and the worst by name."""
     if not missed:
         return "The run did not end as solved, though no check is missed."
@@ -122,8 +103,8 @@ def misses(missed: Sequence[Check], total: int) -> str:
 
 def work(run: Run) -> str:
     """What a solve took."""
-    counts = [(kind, run.effort.counts.get(kind, 0.0)) for kind in ("rollouts", "gradients")]
+    counts = [(kind, run.counts.get(kind, 0.0)) for kind in ("rollouts", "gradients")]
     parts = [f"{count(number)} {kind}" for kind, number in counts if number > 0]
-    took = run.effort.seconds.get("solve", math.nan)
+    took = run.seconds.get("solve", math.nan)
     spent = f" in {seconds(took)}" if math.isfinite(took) else ""
     return f", after {listed(parts)}{spent}" if parts else ""

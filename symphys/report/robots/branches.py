@@ -1,4 +1,4 @@
-"""Which bodies hang together by joints, and what their limbs are: bodies of a limb share a colour."""
+"""Kinematic branches: the bodies that joints connect, cut at a base body; bodies of a branch share a colour."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from symphys.report.figures import style
-from symphys.results.records import Trajectory
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene
+from symphys.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
-class Limb:
-    """Indices of bodies that hang together once the trunk is taken away; a trunk is one of its own."""
+class KinematicBranch:
+    """Indices of bodies that joints connect once the base body is taken away, which is a branch of its own."""
 
     name: str
     bodies: tuple[int, ...]
     colour: str
-    is_trunk: bool
+    is_base: bool
 
 
 def linked(trajectory: Trajectory, scene: Scene) -> tuple[int, ...]:
-    """The bodies that joints hold."""
+    """The bodies that joints connect to a body or the world."""
     held = {name for joint in scene.joints for name in joint.bodies}
     return tuple(index for index, name in enumerate(trajectory.body_names) if name in held)
 
@@ -33,56 +33,56 @@ def is_large(trajectory: Trajectory, scene: Scene) -> bool:
 
 
 def colours(trajectory: Trajectory, scene: Scene) -> tuple[str, ...]:
-    """The colour of each body: its own, or its limb's where many hang together."""
+    """The colour of each body: its own, or its branch's where joints connect many."""
     names = trajectory.body_names
     if not is_large(trajectory, scene):
         return tuple(style.BODIES[index % len(style.BODIES)] for index in range(len(names)))
-    of_limb = {body: limb.colour for limb in limbs(trajectory, scene) for body in limb.bodies}
-    return tuple(of_limb.get(index, style.FAINT) for index in range(len(names)))
+    of_branch = {body: branch.colour for branch in branches(trajectory, scene) for body in branch.bodies}
+    return tuple(of_branch.get(index, style.FAINT) for index in range(len(names)))
 
 
 def keys(trajectory: Trajectory, scene: Scene) -> list[tuple[str, str]]:
-    """What colours mean: (name, colour) of bodies, of limbs where many hang together; none where that is plain."""
+    """What colours mean: (name, colour) of bodies, of branches where joints connect many; none where that is plain."""
     if is_large(trajectory, scene):
-        found = [(limb.name, limb.colour) for limb in limbs(trajectory, scene)]
+        found = [(branch.name, branch.colour) for branch in branches(trajectory, scene)]
     else:
         found = list(zip(trajectory.body_names, colours(trajectory, scene), strict=True))
     return found if 1 < len(found) <= len(style.BODIES) else []
 
 
 def traced(trajectory: Trajectory, scene: Scene) -> tuple[str, ...]:
-    """The bodies whose path is drawn: all, but of many that hang together the trunks and the ends of limbs."""
+    """The bodies whose path is drawn: all, but of many that joints connect the base bodies and the ends of branches."""
     names = trajectory.body_names
     if not is_large(trajectory, scene):
         return names
     edges, held = edges_of(trajectory, scene), linked(trajectory, scene)
-    trunks = {limb.bodies[0] for limb in limbs(trajectory, scene) if limb.is_trunk}
+    bases = {branch.bodies[0] for branch in branches(trajectory, scene) if branch.is_base}
     ends = {body for body in held if sum(body in edge for edge in edges) == 1}
-    return tuple(name for body, name in enumerate(names) if body in trunks | ends or body not in held)
+    return tuple(name for body, name in enumerate(names) if body in bases | ends or body not in held)
 
 
-def limbs(trajectory: Trajectory, scene: Scene) -> list[Limb]:
-    """Trunks, each followed by the limbs that joints hold to it, in the order of the bodies."""
-    found: list[Limb] = []
+def branches(trajectory: Trajectory, scene: Scene) -> list[KinematicBranch]:
+    """Base bodies, each followed by the branches that joints connect to it, in the order of the bodies."""
+    found: list[KinematicBranch] = []
     edges = edges_of(trajectory, scene)
     for group in components(linked(trajectory, scene), edges):
-        trunk = trunk_of(group, edges, trajectory, scene)
-        found.append(Limb(trajectory.body_names[trunk], (trunk,), style.BODIES[0], True))
-        for number, bodies in enumerate(components([body for body in group if body != trunk], edges)):
-            name = limb_name([trajectory.body_names[body] for body in bodies])
-            found.append(Limb(name, bodies, style.BODIES[1 + number % (len(style.BODIES) - 1)], False))
+        base = base_of(group, edges, trajectory, scene)
+        found.append(KinematicBranch(trajectory.body_names[base], (base,), style.BODIES[0], True))
+        for number, bodies in enumerate(components([body for body in group if body != base], edges)):
+            name = branch_name([trajectory.body_names[body] for body in bodies])
+            found.append(KinematicBranch(name, bodies, style.BODIES[1 + number % (len(style.BODIES) - 1)], False))
     return found
 
 
 def edges_of(trajectory: Trajectory, scene: Scene) -> set[frozenset[int]]:
-    """The pairs of bodies that joints hold together."""
+    """The pairs of bodies that joints connect."""
     index = {name: body for body, name in enumerate(trajectory.body_names)}
     pairs = [frozenset(index[name] for name in joint.bodies if name in index) for joint in scene.joints]
     return {pair for pair in pairs if len(pair) == 2}
 
 
 def components(bodies: Sequence[int], edges: set[frozenset[int]]) -> list[tuple[int, ...]]:
-    """Those of ``bodies`` that hang together, in their order."""
+    """The connected parts of ``bodies``, in their order."""
     left, found = list(bodies), []
     while left:
         group, queue = set[int](), [left[0]]
@@ -95,14 +95,14 @@ def components(bodies: Sequence[int], edges: set[frozenset[int]]) -> list[tuple[
     return found
 
 
-def trunk_of(group: Sequence[int], edges: set[frozenset[int]], trajectory: Trajectory, scene: Scene) -> int:
+def base_of(group: Sequence[int], edges: set[frozenset[int]], trajectory: Trajectory, scene: Scene) -> int:
     """The body that the world holds, else the one with most joints, the first of equals."""
     grounded = {joint.first for joint in scene.joints if not joint.second}
     held = [body for body in group if trajectory.body_names[body] in grounded]
     return held[0] if held else max(group, key=lambda body: sum(body in edge for edge in edges))
 
 
-def limb_name(names: Sequence[str]) -> str:
+def branch_name(names: Sequence[str]) -> str:
     """What the names of its bodies begin with, else the first of them."""
     same = itertools.takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
     return "".join(letters[0] for letters in same).rstrip("_-. ") or names[0]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import itertools
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -13,11 +14,11 @@ from matplotlib.patches import Patch
 
 from symphys.findings.writing import percent
 from symphys.report.figures import style
-from symphys.report.figures.spans import spans
-from symphys.report.robots.joint_grid import FEW, Grid, colour_of, make_grid, shown
+from symphys.report.robots.branches import branches, colours
+from symphys.report.robots.gait import spans
 from symphys.report.robots.joint_use import Channel, channels
-from symphys.results.records import Array, Trajectory
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene
+from symphys.trajectory import Array, Trajectory
 
 BEYOND = "#e9edf0"
 FULL = style.VERMILION
@@ -91,8 +92,10 @@ def draw_grid(grid: Grid, draw: Draw, trajectory: Trajectory, scene: Scene) -> F
 
 def draw_value(axes: Axes, time: Array, channel: Channel, colour: str) -> None:
     """The coordinate, what is beyond its limits, and a servo's target, dashed."""
-    told = channel.value if channel.target is None else np.concatenate([channel.value, channel.target])
-    low, high = window(told, [channel.joint.lower, channel.joint.upper], LEAST_TURN if channel.turns else LEAST_SLIDE)
+    shown_values = channel.value if channel.target is None else np.concatenate([channel.value, channel.target])
+    low, high = axis_range(
+        shown_values, [channel.joint.lower, channel.joint.upper], LEAST_TURN if channel.turns else LEAST_SLIDE
+    )
     for edge, beyond in ((channel.joint.lower, low), (channel.joint.upper, high)):
         if low <= edge <= high:
             axes.axhspan(min(edge, beyond), max(edge, beyond), color=BEYOND, linewidth=0, zorder=0.5)
@@ -107,7 +110,7 @@ def draw_value(axes: Axes, time: Array, channel: Channel, colour: str) -> None:
 def draw_torque(axes: Axes, time: Array, channel: Channel, colour: str) -> None:
     """What the motor gives, its bounds, and where it is at them."""
     bounds = [-channel.bound, channel.bound] if np.isfinite(channel.bound) else [0.0]
-    low, high = window(np.append(channel.torque, bounds), [], LEAST_TORQUE)
+    low, high = axis_range(np.append(channel.torque, bounds), [], LEAST_TORQUE)
     for edge in bounds:
         axes.axhline(edge, color=style.GROUND_EDGE, linewidth=0.9, linestyle=DOTS, zorder=1.5)
     steps = np.append(channel.torque, channel.torque[-1:])
@@ -122,9 +125,9 @@ def draw_torque(axes: Axes, time: Array, channel: Channel, colour: str) -> None:
         axes.set_title(percent(channel.share), loc="right", color=FULL)
 
 
-def window(told: Array, edges: list[float], least: float) -> tuple[float, float]:
-    """What an axis shows: all that is told, ``least`` at least, and the edges unless they make that too small."""
-    known = told[np.isfinite(told)]
+def axis_range(values: Array, edges: list[float], least: float) -> tuple[float, float]:
+    """What an axis shows: all values, ``least`` at least, and the edges unless they make that too small."""
+    known = values[np.isfinite(values)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
     lack = max(least - (high - low), 0.0) / 2
     low, high = low - lack, high + lack
@@ -158,7 +161,7 @@ def value_keys(every: list[Channel]) -> list[Key]:
     """Of pictures of coordinates, those that there are."""
     keys: list[Key] = [(Line2D([], [], color=style.BODIES[0]), "angle or position")]
     if any(channel.target is not None for channel in every):
-        keys.append((Line2D([], [], color=TARGET, linewidth=1.0, linestyle=DASHES), "what the servo was told"))
+        keys.append((Line2D([], [], color=TARGET, linewidth=1.0, linestyle=DASHES), "command of the servo"))
     if any(np.isfinite([channel.joint.lower, channel.joint.upper]).any() for channel in every):
         keys.append((Patch(facecolor=BEYOND, edgecolor=style.GROUND_EDGE, linewidth=0.8), "beyond a limit"))
     return keys
@@ -178,3 +181,58 @@ def add_keys(figure: Figure, keys: list[Key]) -> None:
     """A row above all."""
     if keys:
         style.legend_above(figure, [artist for artist, _ in keys], [label for _, label in keys])
+
+
+MOST = 24
+"""Coordinates in a figure at most."""
+FEW = 4
+"""So many have a row each, with angle and torque side by side."""
+WIDE, TALL = 4, 6
+"""Columns side by side, and joints in a column, at most."""
+UNEVEN = 2
+"""The longest column has at most so many times the joints of the shortest."""
+
+Grid = list[list[Channel | None]]
+"""Rows; None is an empty place."""
+
+
+def shown(channels: Sequence[Channel]) -> list[Channel]:
+    """All, or of many those that move most, in the file's order."""
+    if len(channels) <= MOST:
+        return list(channels)
+    most = np.argsort([-np.ptp(channel.value) for channel in channels], kind="stable")[:MOST]
+    return [channels[index] for index in sorted(most)]
+
+
+def make_grid(channels: Sequence[Channel], trajectory: Trajectory, scene: Scene) -> Grid:
+    """A column for each branch where there are several of like size; else the file's order, row by row."""
+    columns = by_branch(channels, trajectory, scene)
+    sizes = [len(column) for column in columns]
+    if len(columns) < 2 or max(sizes) > min(TALL, UNEVEN * min(sizes)):
+        rows = [list(channels[start : start + WIDE]) for start in range(0, len(channels), WIDE)]
+        return [[*row, *[None] * (WIDE - len(row))] for row in rows]
+    bands = [columns[start : start + WIDE] for start in range(0, len(columns), WIDE)]
+    wide = max(map(len, bands))
+    return [[*row, *[None] * (wide - len(row))] for band in bands for row in map(list, itertools.zip_longest(*band))]
+
+
+def by_branch(channels: Sequence[Channel], trajectory: Trajectory, scene: Scene) -> list[list[Channel]]:
+    """The coordinates of each branch that has some; those that hold base bodies come last."""
+    places = {
+        trajectory.body_names[body]: n for n, branch in enumerate(branches(trajectory, scene)) for body in branch.bodies
+    }
+    bases = {trajectory.body_names[branch.bodies[0]] for branch in branches(trajectory, scene) if branch.is_base}
+    found: dict[int, list[Channel]] = {}
+    for channel in channels:
+        own = [places[name] for name in channel.joint.bodies if name in places and name not in bases]
+        found.setdefault(min(own, default=len(places)), []).append(channel)
+    return [found[key] for key in sorted(found)]
+
+
+def colour_of(channel: Channel, trajectory: Trajectory, scene: Scene) -> str:
+    """That of the body which moves: of the first, but where that is a base body of the second."""
+    bases = {trajectory.body_names[branch.bodies[0]] for branch in branches(trajectory, scene) if branch.is_base}
+    of_body = dict(zip(trajectory.body_names, colours(trajectory, scene), strict=True))
+    names = [name for name in channel.joint.bodies if name in of_body]
+    moving = [name for name in names if name not in bases] or names
+    return of_body[moving[0]] if moving else style.BODIES[0]

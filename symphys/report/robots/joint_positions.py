@@ -1,4 +1,4 @@
-"""Where joints are in a motion, and their marks in a panel: a dot at the pivot, a bar along the axis."""
+"""Where joints are in a motion, and their marks in a panel: a dot at the position, a bar along the axis."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from symphys.report.figures import style
 from symphys.report.robots.branches import linked
 from symphys.report.scene.views import View, centres, turn
-from symphys.results.joint_records import SceneJoint
-from symphys.results.records import Array, Trajectory
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene
+from symphys.results.scene_joints import SceneJoint
+from symphys.trajectory import Array, Trajectory
 
 AXES = {"hinge": ((0, 0),), "slider": ((1, 0),), "universal": ((1, 1), (0, 0))}
 """Which axes of a joint are drawn: (side, axis of that side's socket)."""
@@ -34,11 +34,11 @@ def on_side(trajectory: Trajectory, joint: SceneJoint, side: int, vector: Array,
 
 
 def drawable(trajectory: Trajectory, scene: Scene) -> list[SceneJoint]:
-    """The joints whose bodies the motion knows."""
+    """The joints whose bodies are in the motion."""
     return [joint for joint in scene.joints if set(joint.bodies) <= set(trajectory.body_names)]
 
 
-def pivot(trajectory: Trajectory, joint: SceneJoint, shot: int) -> Array:
+def position(trajectory: Trajectory, joint: SceneJoint, shot: int) -> Array:
     """(3,) [m]: the point of the first side."""
     return on_side(trajectory, joint, 0, joint.sockets[0].point, shot, True)
 
@@ -61,18 +61,18 @@ def bones(trajectory: Trajectory, scene: Scene, shot: int) -> Iterator[tuple[int
                 yield body, np.array([trajectory.position[shot, body], centres(trajectory, body, solid)[shot]])
 
 
-def draw_pivots(axes: Axes, view: View, trajectory: Trajectory, scene: Scene, shot: int, scale: float) -> None:
+def draw_joint_positions(axes: Axes, view: View, trajectory: Trajectory, scene: Scene, shot: int, scale: float) -> None:
     """The marks of all joints at one time, on top of all; ``scale`` [in/m]."""
     joints = drawable(trajectory, scene)
     bars = []
     for joint in joints:
-        place = view.flat(pivot(trajectory, joint, shot))
+        place = view.flat(position(trajectory, joint, shot))
         for side, direction in axes_of(joint):
             half = BAR / scale * view.flat(on_side(trajectory, joint, side, direction, shot, False))
             bars += [place - half, place + half]
     draw_lines(axes, np.array(bars), style.INK, 0.8, 7)
     for shape, square in (("o", False), ("s", True)):
-        chosen = [pivot(trajectory, joint, shot) for joint in joints if (joint.kind in SQUARE) == square]
+        chosen = [position(trajectory, joint, shot) for joint in joints if (joint.kind in SQUARE) == square]
         if chosen:
             (mark,) = axes.plot(*view.flat(np.array(chosen)).T, shape, color="white", markersize=2.5, zorder=7.1)
             mark.set(markeredgecolor=style.INK, markeredgewidth=0.7)

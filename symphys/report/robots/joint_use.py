@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symphys.results.joint_records import SceneJoint
-from symphys.results.records import Array, Mask, Trajectory
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene
+from symphys.results.scene_joints import SceneJoint
+from symphys.trajectory import Array, Mask, Trajectory
 
 FULL = 1 - 1e-3
 """A motor is saturated from this share of its largest torque on."""
@@ -25,7 +25,7 @@ class Channel:
         turns: whether it is an angle.
         value: (N + 1,) [rad] or [m].
         torque: (N,) [N m] or [N] of its motor.
-        command: (N,) what the motor was told; nan in records that do not say.
+        command: (N,) command of the motor; nan in files that do not have it.
     """
 
     name: str
@@ -78,14 +78,14 @@ class Channel:
 
     @property
     def target(self) -> Array | None:
-        """(N,): the angle, or place, that a servo was told; None for anything else."""
+        """(N,): the commanded angle, or place, of a servo; None for anything else."""
         if self.joint.motor is None or self.joint.motor.kind != "servo" or not np.isfinite(self.command).all():
             return None
         return self.command
 
     @property
     def at_limit(self) -> bool:
-        """Whether it came to one of its limits."""
+        """Whether it reached one of its limits."""
         near = (self.value <= self.joint.lower + AT_LIMIT) | (self.value >= self.joint.upper - AT_LIMIT)
         return bool(near.any())
 

@@ -1,6 +1,6 @@
-"""A motion of bodies that hang together as a strip of pictures at even times: side view above, top view below.
+"""A motion of bodies connected by joints as a strip of pictures at even times: side view above, top view below.
 
-The window goes with bodies that travel far to the right or the left; up and down it stands still.
+The section shown follows bodies that travel far to the right or the left; up and down it is fixed.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from matplotlib.figure import Figure
 
 from symphys.report.figures import style
 from symphys.report.robots.branches import linked
-from symphys.report.robots.joint_positions import draw_pivots
-from symphys.report.robots.snapshots import Whole, extents
+from symphys.report.robots.joint_positions import draw_joint_positions
+from symphys.report.robots.poses import RobotDrawing, extents
 from symphys.report.scene.ground import draw_ground
-from symphys.report.scene.panel import Panel, include
+from symphys.report.scene.panel import ViewPanel, include
 from symphys.report.scene.views import NAMES, View, choose_views
-from symphys.results.records import Array, Trajectory
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene
+from symphys.trajectory import Array, Trajectory
 
 LEFT, RIGHT, BOTTOM, TOP, GAP, BETWEEN = 0.72, 0.1, 0.42, 0.3, 0.1, 0.18
 """[in] margins, and gaps between columns and rows"""
 TALLEST, LOWEST = 2.4, 0.75
 """[in] a picture is at most and at least"""
 FAR, FAR_ON_RAILS = 2.0, 6.0
-"""A window stands still where all fits into so many sizes of the bodies: of free ones, and of those the world holds."""
+"""The section shown is fixed where all fits into so many sizes of the bodies: free ones, and those on the world."""
 MARGIN = 0.06
 EDGE = 0.14
 """[in] Numbers are at least so far from the sides of a picture, so that those of neighbours do not meet."""
@@ -35,7 +35,7 @@ EDGE = 0.14
 
 @dataclass(frozen=True)
 class Strip:
-    """Windows that are equally large: ``low`` (shots, 2) [m] are their corners, ``size`` (2,) [m]."""
+    """Sections that are equally large: ``low`` (shots, 2) [m] are their corners, ``size`` (2,) [m]."""
 
     view: View
     low: Array
@@ -57,7 +57,7 @@ def draw_strip(trajectory: Trajectory, scene: Scene) -> Figure | None:
     for row, strip in enumerate(strips):
         for column, shot in enumerate(shots):
             axes = figure.add_axes(places[row][column])
-            panel = Panel(strip.view, strip.low[column], strip.low[column] + strip.size)
+            panel = ViewPanel(strip.view, strip.low[column], strip.low[column] + strip.size)
             draw_frame(axes, panel, trajectory, scene, shot, scale)
             dress_frame(axes, panel, scale, column == 0, row == len(strips) - 1)
             axes.set_title(f"{trajectory.time[shot]:.2f} s" if row == 0 else "")
@@ -83,13 +83,13 @@ def lay_out(strips: Sequence[Strip], width: float, scale: float) -> tuple[Figure
 
 
 def even_shots(count: int, size: Array) -> list[int]:
-    """Even times, more of them the slimmer the window is."""
+    """Even times, more of them the slimmer the section is."""
     number = int(np.clip(round(8 * size[1] / size[0]), 4, 8))
     return [int(shot) for shot in np.unique(np.linspace(0, count - 1, number).round())]
 
 
 def make_strip(view: View, trajectory: Trajectory, scene: Scene, shots: Sequence[int]) -> Strip:
-    """The windows of these shots, and the ground where it is near."""
+    """The sections of these shots, and the ground where it is near."""
     low, high = (part[list(shots)] for part in extents(trajectory, scene, view, linked(trajectory, scene)))
     size, union = (high - low).max(axis=0), high.max(axis=0) - low.min(axis=0)
     middle = (low + high) / 2
@@ -112,15 +112,15 @@ def widened(strip: Strip, width: float, height: float) -> Strip:
     return Strip(strip.view, strip.low - lack / 2, strip.size + lack)
 
 
-def draw_frame(axes: Axes, panel: Panel, trajectory: Trajectory, scene: Scene, shot: int, scale: float) -> None:
-    """What stands still, the bodies at one time, and their joints."""
+def draw_frame(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Scene, shot: int, scale: float) -> None:
+    """Static surfaces, the bodies at one time, and their joints."""
     draw_ground(axes, panel, trajectory, scene)
     axes.set_title("")
-    Whole(axes, panel.view, trajectory, scene, shot).draw()
-    draw_pivots(axes, panel.view, trajectory, scene, shot, scale)
+    RobotDrawing(axes, panel.view, trajectory, scene, shot).draw()
+    draw_joint_positions(axes, panel.view, trajectory, scene, shot, scale)
 
 
-def dress_frame(axes: Axes, panel: Panel, scale: float, first: bool, bottom: bool) -> None:
+def dress_frame(axes: Axes, panel: ViewPanel, scale: float, first: bool, bottom: bool) -> None:
     """Axes to scale; numbers along the left and below only."""
     view = panel.view
     vertical = [panel.low[1], panel.high[1]]
@@ -137,5 +137,5 @@ def dress_frame(axes: Axes, panel: Panel, scale: float, first: bool, bottom: boo
 
 
 def inside(ticks: Array, low: float, high: float, edge: float) -> Array:
-    """The ticks that are well within a window."""
+    """The ticks that are well within a section."""
     return ticks[(ticks > low + edge) & (ticks < high - edge)]

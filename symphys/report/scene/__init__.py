@@ -1,1 +1,1 @@
-"""Pictures of a motion: what moves, what stands around it, from which side it is seen."""
+"""Pictures of a motion: moving bodies, static surfaces, and the views of both."""

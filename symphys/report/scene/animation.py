@@ -8,11 +8,11 @@ import numpy as np
 
 from symphys.report.figures import style
 from symphys.report.pages.markup import Html, dot, join, tag
-from symphys.report.robots.branches import colours, keys, traced
-from symphys.report.robots.played_joints import follow_data, joint_data
-from symphys.report.scene.views import SIDE_YZ, TOP, choose_views, solids_of
-from symphys.results.records import Array, Trajectory
-from symphys.results.scene_records import Scene, SceneTerrain, Solid
+from symphys.report.robots.branches import colours, keys, linked, traced
+from symphys.report.robots.joint_positions import SQUARE, axes_of, drawable
+from symphys.report.scene.views import SIDE_YZ, TOP, choose_views, reach, solids_of
+from symphys.results.scene import Scene, SceneTerrain, Solid
+from symphys.trajectory import Array, Trajectory
 
 NUMBERS = 60_000
 """How many numbers a page carries at most for one motion, about 400 kB."""
@@ -40,7 +40,7 @@ def animation(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = N
 
 
 def controls(duration: float, follows: bool) -> Html:
-    """Play button, slider, time, speed and views, and whether the camera goes along where it can."""
+    """Play button, slider, time, speed and views, and whether the camera can follow."""
     fitting = [speed for speed in SPEEDS if speed <= 1 and duration / speed >= LEAST_PLAY]
     chosen = max(fitting, default=SPEEDS[0])
     speeds = [tag("option", f"{s:g}×", value=f"{s:g}", selected="" if s == chosen else None) for s in SPEEDS]  # noqa: RUF001
@@ -129,3 +129,38 @@ def rounded(values: Array, share: float) -> list[float]:
     largest = float(np.abs(values).max(initial=0.0))
     decimals = int(np.ceil(-np.log10(share * largest))) if largest > 0 else 0
     return [entry + 0.0 for entry in np.round(values.ravel(), max(decimals, 0)).tolist()]
+
+
+FAR = 2.5
+"""The camera follows where bodies connected by joints travel farther than so many times their size."""
+
+
+def joint_data(trajectory: Trajectory, scene: Scene) -> list[dict[str, object]]:
+    """Both sides of each joint, index of the body (-1: the world) and point, and its axes: [side, direction]."""
+    index = {name: body for body, name in enumerate(trajectory.body_names)} | {"": -1}
+    return [
+        {
+            "sides": [
+                {"body": index[name], "point": socket.point.round(6).tolist()}
+                for name, socket in zip((joint.first, joint.second), joint.sockets, strict=True)
+            ],
+            "axes": [[side, direction.round(6).tolist()] for side, direction in axes_of(joint)],
+            "square": joint.kind in SQUARE,
+        }
+        for joint in drawable(trajectory, scene)
+    ]
+
+
+def follow_data(trajectory: Trajectory, scene: Scene) -> dict[str, object] | None:
+    """The bodies connected by joints, how high they are on average, and how far they reach [m]; None if they stay."""
+    bodies = list(linked(trajectory, scene))
+    if not bodies:
+        return None
+    place = trajectory.position[:, bodies]
+    middle = place.mean(axis=1)
+    middle[:, 2] = middle[:, 2].mean()
+    sizes = [reach(trajectory, scene, body) for body in bodies]
+    radius = float((np.linalg.norm(place - middle[:, None], axis=2) + sizes).max())
+    if np.ptp(middle, axis=0).max() <= FAR * 2 * radius:
+        return None
+    return {"bodies": bodies, "height": round(float(middle[0, 2]), 6), "radius": round(radius, 6)}

@@ -1,4 +1,4 @@
-"""What stands around a motion, in a panel: planes, fixtures and terrain."""
+"""Static surfaces in a panel: planes, fixtures and terrain."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from matplotlib.ticker import MaxNLocator
 from symphys.findings import writing
 from symphys.report.figures import style
 from symphys.report.scene.outlines import inner_edges, outline
-from symphys.report.scene.panel import Panel
+from symphys.report.scene.panel import ViewPanel
 from symphys.report.scene.views import View, half_axes
-from symphys.results.records import Trajectory
-from symphys.results.scene_records import UPRIGHT, Scene, SceneTerrain, Solid
+from symphys.results.scene import UPRIGHT, Scene, SceneTerrain, Solid
+from symphys.trajectory import Trajectory
 
 SHADES = LinearSegmentedColormap.from_list("heights", ["#ffffff", "#d8dfe6"])
 HATCH: dict[str, Any] = {"facecolor": style.GROUND, "edgecolor": "#d5dbe1", "hatch": "////", "linewidth": 0}
@@ -25,8 +25,8 @@ LINES = 8
 """Lines of height in a view from above, at most about."""
 
 
-def draw_ground(axes: Axes, panel: Panel, trajectory: Trajectory, scene: Scene) -> None:
-    """All that stands still; planes and terrain hide what is below them."""
+def draw_ground(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Scene) -> None:
+    """All static surfaces; planes and terrain hide what is below them."""
     for ground in scene.terrain:
         if panel.view.depth == 2:
             draw_heights(axes, panel, ground)
@@ -48,7 +48,7 @@ def draw_fixture(axes: Axes, view: View, solid: Solid) -> None:
             axes.plot(*edge.T, color=style.GROUND_EDGE, linewidth=0.8, zorder=1.56)
 
 
-def draw_profile(axes: Axes, panel: Panel, trajectory: Trajectory, ground: SceneTerrain) -> None:
+def draw_profile(axes: Axes, panel: ViewPanel, trajectory: Trajectory, ground: SceneTerrain) -> None:
     """A cut through terrain in the middle of the motion's depth; palely, how high it is behind and in front."""
     along_x = panel.view.right == 0
     along, across, z = (ground.x, ground.y, ground.z) if along_x else (ground.y, ground.x, ground.z.T)
@@ -63,7 +63,7 @@ def draw_profile(axes: Axes, panel: Panel, trajectory: Trajectory, ground: Scene
     axes.plot(along, cut, color=style.GROUND_EDGE, linewidth=1.6, zorder=1.58)
 
 
-def draw_heights(axes: Axes, panel: Panel, ground: SceneTerrain) -> None:
+def draw_heights(axes: Axes, panel: ViewPanel, ground: SceneTerrain) -> None:
     """Lines of height, and in the title how far apart they are."""
     low, high = np.nanmin(ground.z, initial=np.inf), np.nanmax(ground.z, initial=-np.inf)
     if not high - low > 1e-9 * max(abs(high), abs(low)):
@@ -76,7 +76,7 @@ def draw_heights(axes: Axes, panel: Panel, ground: SceneTerrain) -> None:
     axes.set_title(f"{panel.view.title}; a line of height every {writing.show(levels[1] - levels[0], 3)} m")
 
 
-def draw_planes(axes: Axes, panel: Panel, trajectory: Trajectory, scene: Scene) -> None:
+def draw_planes(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Scene) -> None:
     """The solid side of every plane that is seen from its edge, cut at the middle of the motion's depth."""
     depth = float(np.median(trajectory.position[..., panel.view.depth]))
     middle, size = (panel.low + panel.high) / 2, float(np.linalg.norm(panel.span))

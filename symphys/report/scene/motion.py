@@ -1,4 +1,4 @@
-"""The motion seen from the side and from above: path, snapshots at even times, what stands around, the guess."""
+"""The motion seen from the side and from above: path, poses at even times, static surfaces, the guess."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from matplotlib.lines import Line2D
 
 from symphys.report.figures import style
 from symphys.report.robots.branches import is_large, keys, traced
-from symphys.report.robots.joint_positions import draw_pivots
-from symphys.report.robots.snapshots import draw_robots
+from symphys.report.robots.joint_positions import draw_joint_positions
+from symphys.report.robots.poses import draw_robots
 from symphys.report.scene.ground import draw_ground
-from symphys.report.scene.panel import RIGHT, Panel, arrange, dress, lay_out, make_panel, widen
-from symphys.report.scene.snapshots import draw_bodies
+from symphys.report.scene.panel import RIGHT, ViewPanel, arrange, dress, lay_out, make_panel, widen
+from symphys.report.scene.poses import draw_bodies
 from symphys.report.scene.views import choose_views
-from symphys.results.records import Trajectory
-from symphys.results.scene_records import Scene
+from symphys.results.scene import Scene
+from symphys.trajectory import Trajectory
 
 
 def draw_motion(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = None) -> Figure:
@@ -36,12 +36,12 @@ def draw_motion(trajectory: Trajectory, scene: Scene, guess: Trajectory | None =
             draw_robots(axes, panel, trajectory, scene, scale)
         else:
             draw_bodies(axes, panel, trajectory, scene, scale)
-            draw_pivots(axes, panel.view, trajectory, scene, len(trajectory.time) - 1, scale)
+            draw_joint_positions(axes, panel.view, trajectory, scene, len(trajectory.time) - 1, scale)
     add_legend(figure, trajectory, scene, guess is not None)
     return figure
 
 
-def draw_guess(axes: Axes, panel: Panel, guess: Trajectory, names: Sequence[str]) -> None:
+def draw_guess(axes: Axes, panel: ViewPanel, guess: Trajectory, names: Sequence[str]) -> None:
     """The guess's paths of these bodies, thin and grey."""
     for body in (index for index, name in enumerate(guess.body_names) if name in names):
         path = panel.view.flat(guess.position[:, body])
@@ -50,7 +50,7 @@ def draw_guess(axes: Axes, panel: Panel, guess: Trajectory, names: Sequence[str]
 
 
 def add_legend(figure: Figure, trajectory: Trajectory, scene: Scene, guessed: bool) -> None:
-    """Bodies or limbs by colour, and the guess; nothing where the picture explains itself."""
+    """Bodies or kinematic branches by colour, and the guess; nothing where the picture explains itself."""
     handles = [Line2D([], [], color=colour, label=style.short(name, 20)) for name, colour in keys(trajectory, scene)]
     if guessed:
         handles.append(Line2D([], [], color="#98a4af", linewidth=0.9, linestyle=(0, (4, 2.5)), label="guess"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from symphys.results.records import Array
+from symphys.trajectory import Array
 
 ROUND = 16
 """Straight pieces of a half circle."""

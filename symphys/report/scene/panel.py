@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from symphys.report.figures import style
 from symphys.report.scene.views import NAMES, View, half_axes, reach
-from symphys.results.records import Array, Trajectory
-from symphys.results.scene_records import UPRIGHT, Scene, SceneFixture, ScenePlane, SceneTerrain
+from symphys.results.scene import UPRIGHT, Scene, SceneFixture, ScenePlane, SceneTerrain
+from symphys.trajectory import Array, Trajectory
 
 LEFT, RIGHT, BOTTOM, TOP, GAP = 0.62, 0.15, 0.5, 0.5, 0.62
 """[in] margins of the figure and between its panels"""
@@ -20,8 +20,8 @@ LEAST = 1.1
 
 
 @dataclass(frozen=True)
-class Panel:
-    """A view and the window (low, high) x (right, up) [m] that it shows."""
+class ViewPanel:
+    """A view and the rectangle (low, high) x (right, up) [m] that it shows."""
 
     view: View
     low: Array
@@ -33,8 +33,8 @@ class Panel:
         return self.high - self.low
 
 
-def make_panel(view: View, trajectory: Trajectory, scene: Scene, guess: Trajectory | None) -> Panel:
-    """The window that holds every body, what stands close by, and the guess unless it goes far away."""
+def make_panel(view: View, trajectory: Trajectory, scene: Scene, guess: Trajectory | None) -> ViewPanel:
+    """The rectangle that holds every body, nearby static surfaces, and the guess unless it goes far away."""
     sizes = np.array([reach(trajectory, scene, body) for body in range(len(trajectory.body_names))])[:, None]
     flat = view.flat(trajectory.position)
     low, high = (flat - sizes).min(axis=(0, 1)), (flat + sizes).max(axis=(0, 1))
@@ -48,11 +48,11 @@ def make_panel(view: View, trajectory: Trajectory, scene: Scene, guess: Trajecto
     for box in (*map(of_fixture, scene.fixtures), *map(of_terrain, scene.terrain)):
         low, high = take_in(view.flat(box), low, high, 0.25 * room)
     margin = 0.05 * room
-    return Panel(view, low - margin, high + margin)
+    return ViewPanel(view, low - margin, high + margin)
 
 
 def include(plane: ScenePlane, view: View, low: Array, high: Array, room: float) -> tuple[Array, Array]:
-    """Widen a window by at most ``room`` to take in a plane that stands along one of its edges."""
+    """Widen a rectangle by at most ``room`` to take in a plane that stands along one of its edges."""
     normal = view.flat(plane.normal)
     for axis in range(2):
         if abs(normal[axis]) > 0.99:
@@ -77,14 +77,14 @@ def of_terrain(ground: SceneTerrain) -> Array:
 
 
 def take_in(box: Array, low: Array, high: Array, room: float) -> tuple[Array, Array]:
-    """Widen a window by at most ``room`` on each side to take in a box (2, 2) that reaches into it or close to it."""
+    """Widen a rectangle by at most ``room`` on each side to take in a box (2, 2) that reaches into it or near it."""
     near = (box[0] < high + room).all() and (box[1] > low - room).all()
     if not near:
         return low, high
     return np.maximum(np.minimum(low, box[0]), low - room), np.minimum(np.maximum(high, box[1]), high + room)
 
 
-def arrange(panels: list[Panel]) -> tuple[bool, float]:
+def arrange(panels: list[ViewPanel]) -> tuple[bool, float]:
     """Whether the panels stand above each other, and the scale [in/m]: the arrangement that shows more."""
     spans = np.array([panel.span for panel in panels])
     width = style.WIDTH - LEFT - RIGHT
@@ -93,13 +93,15 @@ def arrange(panels: list[Panel]) -> tuple[bool, float]:
     return (True, float(stacked)) if stacked >= beside else (False, float(beside))
 
 
-def widen(panel: Panel, scale: float) -> Panel:
+def widen(panel: ViewPanel, scale: float) -> ViewPanel:
     """Make room on both sides where a panel would be too thin to read."""
     lack = np.maximum(LEAST / scale - panel.span, 0) / 2
-    return Panel(panel.view, panel.low - lack, panel.high + lack)
+    return ViewPanel(panel.view, panel.low - lack, panel.high + lack)
 
 
-def lay_out(panels: list[Panel], stacked: bool, scale: float) -> tuple[Figure, list[tuple[float, float, float, float]]]:
+def lay_out(
+    panels: list[ViewPanel], stacked: bool, scale: float
+) -> tuple[Figure, list[tuple[float, float, float, float]]]:
     """The figure, and (left, bottom, width, height) of each panel in shares of it."""
     sizes = [panel.span * scale for panel in panels]
     gaps = GAP * (len(panels) - 1)
@@ -116,7 +118,7 @@ def lay_out(panels: list[Panel], stacked: bool, scale: float) -> tuple[Figure, l
     return figure, places
 
 
-def dress(axes: Axes, panel: Panel, scale: float) -> None:
+def dress(axes: Axes, panel: ViewPanel, scale: float) -> None:
     """Axes to scale with names and units."""
     view = panel.view
     vertical = [panel.low[1], panel.high[1]]

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symphys.results.records import Array, Trajectory
-from symphys.results.scene_records import Scene, Solid
+from symphys.results.scene import Scene, Solid
+from symphys.trajectory import Array, Trajectory
 
 NAMES = "xyz"
 STILL = 1e-3

@@ -18,7 +18,7 @@ from symphys.codegen.cuda import DeviceKernel, compile_on
 from symphys.codegen.runtime.batch import RolloutBatch
 from symphys.problem import load_problem
 from symphys.problems import find
-from symphys.runs.provenance import evaluated
+from symphys.runs.record import evaluated_by
 from symphys.transcription import rollout_program, symbolic_rollout, transcribe
 
 LARGE = 8
@@ -73,7 +73,7 @@ def test_a_large_batch_goes_where_the_first_of_its_size_was_faster(
     kernel.gradient(points(here, 2 * LARGE), np.ones(kernel._seeds()), [0.0])
     assert run.rows[-1] == 2 * LARGE  # another kind and size is tried anew
     assert "gradients of 16 to 31 rollouts" in kernel.chosen
-    assert kernel.chosen in evaluated(described(kernel, 0.0))["note"]
+    assert kernel.chosen in evaluated_by(described(kernel, 0.0)).note
 
 
 def test_small_batches_ask_no_gpu(here: ProcessorKernel) -> None:

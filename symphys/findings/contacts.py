@@ -1,10 +1,10 @@
-"""Whether contacts are resolved: settled, not too deep, nobody through anybody, every impact in time."""
+"""Whether contacts are resolved: settled, not too deep, no tunnelling, every impact in time, no near misses."""
 
 from __future__ import annotations
 
 import math
 
-from symphys.findings.examination import Trust
+from symphys.findings.examination import Examination, Miss
 from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Finding, graded
 from symphys.findings.writing import listed, several, show
 
@@ -35,13 +35,13 @@ COUNTED = (
         "Painleve's paradox: Coulomb's law has no sliding solution there, or several; the contact sticks at once.",
     ),
 )
-"""Kinds of steps that are counted: the number in ``Trust`` (and in ``reading.PLAIN``), what it is, and what it means
-where it is not 0. A kind that nobody counted is left out, and so are all but the first where there were none."""
+"""Kinds of steps that are counted: the number in ``Examination``, what it is, and what it means where it is not 0. A
+kind that was not counted is left out, and so are all but the first where there were none."""
 IN_TIME = "Every impact was resolved in time."
 NOT_SOUND = "There were none; but other lines here say that not every impact was resolved."
 
 
-def contact_findings(trust: Trust) -> list[Finding]:
+def contact_findings(trust: Examination) -> list[Finding]:
     """Every line on contacts for which there is a number."""
     numbers = (
         (trust.residual, residual_finding),
@@ -51,7 +51,7 @@ def contact_findings(trust: Trust) -> list[Finding]:
     return [find(trust) for number, find in numbers if not math.isnan(number)] + impact_findings(trust)
 
 
-def residual_finding(trust: Trust) -> Finding:
+def residual_finding(trust: Examination) -> Finding:
     """How far the contact solver was from its end."""
     share = trust.residual / trust.impulse if trust.impulse > 0 else math.nan
     level = GOOD if trust.residual == 0 else graded(share, RESIDUAL_LIMITS)
@@ -67,7 +67,7 @@ def residual_finding(trust: Trust) -> Finding:
     return Finding(CONTACTS, level, "Contact solver's residual", number, meaning, doubt * (level == BAD))
 
 
-def more_sweeps(trust: Trust) -> str:
+def more_sweeps(trust: Examination) -> str:
     """A clause on what more sweeps would do, as far as that was measured."""
     if math.isnan(trust.residual_finer):
         return ""
@@ -80,7 +80,7 @@ def more_sweeps(trust: Trust) -> str:
     )
 
 
-def depth_finding(trust: Trust) -> Finding:
+def depth_finding(trust: Examination) -> Finding:
     """How deep bodies sank into each other."""
     level = GOOD if trust.deepest <= 0 else graded(trust.deepest / trust.size, DEPTH_LIMITS)
     place = f" ({trust.depth_contact} at t = {show(trust.depth_time)} s)" if trust.depth_contact else ""
@@ -97,12 +97,12 @@ def depth_finding(trust: Trust) -> Finding:
     return Finding(CONTACTS, level, "Deepest penetration", number, meaning, doubt * (level == BAD))
 
 
-def passage_finding(trust: Trust) -> Finding:
+def passage_finding(trust: Examination) -> Finding:
     """Whether a body went through another between two instants."""
     what, level = "Passing through between two instants", graded(trust.passed, PASSED_LIMITS)
     where = f"{trust.passed_contact} at t = {show(trust.passed_time)} s, {show(trust.passed_depth, 2)} m deep"
     meaning = {
-        GOOD: "Nobody went through anybody.",
+        GOOD: "No body went through another.",
         FAIR: f"{where}: on the straight way between two instants; a smaller time step shows whether it was so.",
         BAD: f"{where}: a body was on one side before the step and beyond after it; use a smaller time step.",
     }[level]
@@ -111,7 +111,7 @@ def passage_finding(trust: Trust) -> Finding:
     return Finding(CONTACTS, level, what, number, meaning, doubt * (level == BAD))
 
 
-def impact_findings(trust: Trust) -> list[Finding]:
+def impact_findings(trust: Examination) -> list[Finding]:
     """Steps in which the exact time of impact does not hold, one line for each kind that was counted."""
     kinds = [(getattr(trust, name), what, meaning) for name, what, meaning in COUNTED]
     known = [kind for kind in kinds if not math.isnan(kind[0])]
@@ -125,16 +125,45 @@ def impact_findings(trust: Trust) -> list[Finding]:
     ]
 
 
-def resolved(trust: Trust) -> bool:
+def resolved(trust: Examination) -> bool:
     """Whether no other number speaks against it that impacts were resolved in time."""
     unsettled = residual_finding(trust).level == BAD
     gains = trust.gained > 0
     return not (unsettled or gains or trust.passed > PASSED_LIMITS[0] or depth_finding(trust).level == BAD)
 
 
-def sliding(trust: Trust) -> str:
+def sliding(trust: Examination) -> str:
     """A sentence on how far surfaces slid; empty where none did."""
     if not trust.slides:
         return ""
-    told = [f"{slide.contact} {show(slide.distance, 2)} m (up to {show(slide.speed, 2)} m/s)" for slide in trust.slides]
-    return f"Under load these surfaces slid: {listed(told)}; the slip of impacts is not counted."
+    slides = [
+        f"{slide.contact} {show(slide.distance, 2)} m (up to {show(slide.speed, 2)} m/s)" for slide in trust.slides
+    ]
+    return f"Under load these surfaces slid: {listed(slides)}; the slip of impacts is not counted."
+
+
+NEARBY = "nearby"
+
+STEP = 1e-3
+"""Of the variables' scales: what solvers step in any case."""
+SPREAD = 1.0
+"""Of their spreads: where seeds begin."""
+
+
+def miss_findings(trust: Examination) -> list[Finding]:
+    """A line for each that lies within a small step or within the spread of seeds."""
+    return [miss_finding(miss) for miss in trust.misses if miss.steps <= STEP or miss.spreads <= SPREAD]
+
+
+def miss_finding(miss: Miss) -> Finding:
+    """One near miss, or one glancing touch."""
+    number = f"{show(miss.gap, 2)} m ({miss.contact} at t = {show(miss.time)} s)"
+    by = f"a change of {miss.variable} by {show(miss.change, 2)}"
+    if miss.touches:
+        meaning = f"{miss.contact} touches at t = {show(miss.time)} s by {show(miss.gap, 2)} m only: {by} misses it"
+        what = "Glancing touch"
+    else:
+        meaning = f"{miss.contact} clears by {show(miss.gap, 2)} m at t = {show(miss.time)} s: {by} makes it touch"
+        what = "Near miss"
+    where = "within the spread of seeds" if miss.spreads <= SPREAD else "a small step for a solver"
+    return Finding(NEARBY, FAIR, what, number, f"{meaning}, which is {where}; beyond that the objective jumps.")

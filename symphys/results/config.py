@@ -1,13 +1,17 @@
-"""What exactly was asked for: the fields of config.json, and the key by which a finished run is known again."""
+"""config.json: what exactly was asked for, and the key by which a finished run is recognised."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 from symphys import __version__, files
+from symphys import json_values as values
+from symphys.json_values import Text
 
 
 @dataclass(frozen=True)
@@ -27,14 +31,24 @@ class Config:
     problem: str
     solver: str
     seed: int
-    settings: dict[str, object] = field(default_factory=dict)
-    options: dict[str, object] = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    options: Mapping[str, Any] = field(default_factory=dict)
     backend: str = "auto"
     key: str = ""
 
     def to_json(self) -> dict[str, Any]:
         """The object of config.json."""
         return asdict(self)
+
+    @classmethod
+    def from_json(cls, value: object, text: Text = values.name) -> Config:
+        """The object of config.json; empty texts for what it does not have."""
+        return values.record(cls, value, text)
+
+
+def read_config(path: Path) -> Config:
+    """The configuration in a file of this program's own; FileError if there is none."""
+    return Config.from_json(files.read_json(path), values.verbatim)
 
 
 def make_config(

@@ -1,6 +1,6 @@
 """How far a solution can be trusted: every finding of an examination, and one paragraph of advice from them.
 
-``symphys check`` at a guess and the pages of runs tell it in these words.
+``symphys check`` at a guess and the pages of runs use these words.
 """
 
 from __future__ import annotations
@@ -8,9 +8,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from symphys.findings.examination import Trust
+from symphys.findings.contacts import CONTACTS, contact_findings, miss_findings
+from symphys.findings.energy import ENERGY, balance_finding, gains_finding
+from symphys.findings.examination import Examination
 from symphys.findings.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN, Finding, Judged, worst_of
-from symphys.findings.nearby import miss_findings
 from symphys.findings.numerics import (
     GRADIENT,
     GRID,
@@ -25,8 +26,6 @@ from symphys.findings.numerics import (
     smoothed_findings,
     unfelt,
 )
-from symphys.findings.physics import ENERGY, balance_finding, gains_finding
-from symphys.findings.touching import CONTACTS, contact_findings
 from symphys.findings.writing import listed, percent, show
 
 FAULT, NO_SLOPE = "fault", "zero"
@@ -35,7 +34,7 @@ VERDICTS = {GOOD: "agrees", FAIR: "agrees roughly", BAD: "disagrees", UNKNOWN: "
 """Of a gradient with differences."""
 
 
-def findings(trust: Trust, judged: Judged) -> list[Finding]:
+def findings(trust: Examination, judged: Judged) -> list[Finding]:
     """Every line for which there is a number."""
     lines = [Finding(FAULT, BAD, "A number that is not finite", "", f"{sentence(trust.fault)}")] if trust.fault else []
     lines += [gradient_finding(check) for check in trust.gradient]
@@ -49,7 +48,7 @@ def findings(trust: Trust, judged: Judged) -> list[Finding]:
     return lines + contact_findings(trust)
 
 
-def slopes(trust: Trust) -> tuple[list[str], list[list[str]]]:
+def slopes(trust: Examination) -> tuple[list[str], list[list[str]]]:
     """Header and rows of a table of gradients: against differences, and by how much refinements change them."""
     header = ["gradient of", "norm", "differs by", "", *(row.what for row in trust.refined)]
     rows = []
@@ -60,19 +59,19 @@ def slopes(trust: Trust) -> tuple[list[str], list[list[str]]]:
     return header, rows
 
 
-def answers(trust: Trust, judged: Judged) -> tuple[list[str], list[list[str]]]:
+def answers(trust: Examination, judged: Judged) -> tuple[list[str], list[list[str]]]:
     """Header and rows of a table of objective and worst error / tolerance by discretisation and smoothing."""
     rows = [["as asked", show(judged.objective, 4), show(judged.worst, 4), ""]]
     for row in trust.refined:
         verdict = MARKS[refined_finding(row, judged).level]
         rows.append([row.what, show(row.objective, 4), show(row.worst, 4), verdict])
-    for knob in trust.smoothed:
-        rows.append([f"smoothed {show(knob.smoothing)} m/s", show(knob.objective, 4), show(knob.worst, 4), ""])
+    for smooth in trust.smoothed:
+        rows.append([f"smoothed {show(smooth.smoothing)} m/s", show(smooth.objective, 4), show(smooth.worst, 4), ""])
     return ["simulated", "objective", "worst / tolerance", ""], rows
 
 
-def advice(trust: Trust, judged: Judged) -> str:
-    """One paragraph: what the findings say together."""
+def advice(trust: Examination, judged: Judged) -> str:
+    """One paragraph: what follows from the findings."""
     lines = findings(trust, judged)
     if trust.fault:
         return f"Mend this first, since solvers cannot pass it: {trust.fault}."
@@ -89,8 +88,8 @@ def advice(trust: Trust, judged: Judged) -> str:
     return " ".join(part for part in parts if part)
 
 
-def of_influence(trust: Trust) -> str:
-    """What to say of variables that change nothing."""
+def of_influence(trust: Examination) -> str:
+    """What follows where variables change nothing."""
     none = [check.variable for check in trust.gradient if unfelt(check)]
     if not none:
         return ""
@@ -101,7 +100,7 @@ def of_influence(trust: Trust) -> str:
     )
 
 
-def of_misses(trust: Trust) -> str:
+def of_misses(trust: Examination) -> str:
     """What near misses and glancing touches advise."""
     line = next(iter(miss_findings(trust)), None)
     return f"Close by the motion is another one. {line.meaning}" if line else ""
@@ -118,7 +117,7 @@ def of_gradient(level: str, growth: str) -> str:
     }.get(level, "")
 
 
-def of_growth(trust: Trust, level: str) -> str:
+def of_growth(trust: Examination, level: str) -> str:
     """What the growth of changes advises."""
     far = reach(trust.growth)
     if not math.isnan(far.lost):
@@ -136,7 +135,7 @@ def of_growth(trust: Trust, level: str) -> str:
     }.get(level, "")
 
 
-def of_grid(trust: Trust, level: str, judged: Judged) -> str:
+def of_grid(trust: Examination, level: str, judged: Judged) -> str:
     """What refinement advises."""
     if level == GOOD:
         held = "still meets every check" if judged.met and judged.checked else "changes little"
@@ -147,7 +146,7 @@ def of_grid(trust: Trust, level: str, judged: Judged) -> str:
     }.get(level, "")
 
 
-def finer(trust: Trust, judged: Judged) -> str:
+def finer(trust: Examination, judged: Judged) -> str:
     """What to refine: that by which the answer changes most."""
     bad = [row for row in trust.refined if refined_finding(row, judged).level == BAD or row.change > SLOPE_LIMITS[1]]
     by_sweeps = bad and all(row.what == "sweeps x 2" for row in bad)

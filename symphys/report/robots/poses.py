@@ -1,4 +1,4 @@
-"""Many bodies that hang together, drawn whole: what is nearer hides what is behind, so that legs stay apart."""
+"""Poses over time of robots, drawn whole: nearer solids hide those behind, so that legs can be told apart."""
 
 from __future__ import annotations
 
@@ -12,30 +12,30 @@ from matplotlib.patches import Circle, Polygon
 
 from symphys.report.figures import style
 from symphys.report.robots.branches import colours, linked, traced
-from symphys.report.robots.joint_positions import bones, draw_lines, draw_pivots
+from symphys.report.robots.joint_positions import bones, draw_joint_positions, draw_lines
 from symphys.report.scene.outlines import inner_edges, outline
-from symphys.report.scene.panel import Panel
+from symphys.report.scene.panel import ViewPanel
 from symphys.report.scene.views import View, centres, half_axes, solids_of, turn
-from symphys.results.records import Array, Trajectory
-from symphys.results.scene_records import Scene, Solid
+from symphys.results.scene import Scene, Solid
+from symphys.trajectory import Array, Trajectory
 
 APART = 0.75
-"""Snapshots in one picture are apart by this share of the robot's length at least."""
+"""Poses in one picture are apart by this share of the robot's length at least."""
 MOST = 8
 
 
-def draw_robots(axes: Axes, panel: Panel, trajectory: Trajectory, scene: Scene, scale: float) -> None:
-    """Paths of trunks and feet, and whole snapshots that hardly cover each other, the later the stronger."""
+def draw_robots(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Scene, scale: float) -> None:
+    """Paths of base bodies and feet, and whole poses that hardly cover each other, the later the stronger."""
     draw_paths(axes, panel.view, trajectory, scene)
     shots = spaced(trajectory, scene, panel.view)
     for order, shot in enumerate(shots):
         strength = 1.0 if shot == shots[-1] else 0.3 + 0.35 * shot / max(shots[-1], 1)
-        Whole(axes, panel.view, trajectory, scene, shot).draw(strength, order)
-    draw_pivots(axes, panel.view, trajectory, scene, shots[-1], scale)
+        RobotDrawing(axes, panel.view, trajectory, scene, shot).draw(strength, order)
+    draw_joint_positions(axes, panel.view, trajectory, scene, shots[-1], scale)
 
 
 def spaced(trajectory: Trajectory, scene: Scene, view: View) -> list[int]:
-    """The snapshots: first, last and between at even distances, if linked bodies go far enough; else the last."""
+    """The poses: first, last and between at even distances, if linked bodies go far enough; else the last."""
     low, high = extents(trajectory, scene, view, linked(trajectory, scene))
     gone = ((low + high) / 2 - (low[0] + high[0]) / 2) / (high - low).max(axis=0)
     along = gone[:, np.abs(gone[-1]).argmax()]
@@ -56,7 +56,7 @@ def extents(trajectory: Trajectory, scene: Scene, view: View, bodies: Sequence[i
 
 
 def draw_paths(axes: Axes, view: View, trajectory: Trajectory, scene: Scene) -> None:
-    """The paths of trunks and of the bodies at the ends of limbs."""
+    """The paths of base bodies and of the bodies at the ends of branches."""
     kept = traced(trajectory, scene)
     for body, colour in enumerate(colours(trajectory, scene)):
         if trajectory.body_names[body] in kept:
@@ -65,7 +65,7 @@ def draw_paths(axes: Axes, view: View, trajectory: Trajectory, scene: Scene) -> 
 
 
 @dataclass(frozen=True)
-class Whole:
+class RobotDrawing:
     """All bodies of a scene at one time."""
 
     axes: Axes
@@ -75,7 +75,7 @@ class Whole:
     shot: int
 
     def draw(self, strength: float = 1.0, order: int = 0) -> None:
-        """From the back to the front; paler with less ``strength``, over snapshots of a lower ``order``."""
+        """From the back to the front; paler with less ``strength``, over poses of a lower ``order``."""
         colour = colours(self.trajectory, self.scene)
         base = 2.5 + 0.25 * order / MOST
         lines = list(bones(self.trajectory, self.scene, self.shot))

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from symphys.findings.examination import Trust
+from symphys.findings.examination import Examination
 from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Finding, graded, worst_of
 from symphys.findings.writing import listed, percent, show
 
@@ -24,13 +24,13 @@ DRIFTED_LIMITS = (1e-3, 5e-2)
 """The same, added up over the motion."""
 
 
-def largest_energy(trust: Trust) -> float:
+def largest_energy(trust: Examination) -> float:
     """[J] that energies are compared with: the largest kinetic one, or a share of the other where nothing moves."""
     potential = float(np.abs(trust.energy.potential).max(initial=0.0))
     return max(float(trust.energy.kinetic.max(initial=0.0)), AT_REST * potential)
 
 
-def gains_finding(trust: Trust) -> Finding:
+def gains_finding(trust: Examination) -> Finding:
     """Energy that contacts add."""
     peak = largest_energy(trust)
     level = GOOD if trust.gained == 0 else graded(trust.gained / peak if peak > 0 else math.nan, GAIN_LIMITS)
@@ -44,7 +44,7 @@ def gains_finding(trust: Trust) -> Finding:
     return Finding(ENERGY, level, what, number, meaning, doubt * (level == BAD))
 
 
-def balance_finding(trust: Trust) -> Finding:
+def balance_finding(trust: Examination) -> Finding:
     """What neither forces nor contacts account for."""
     peak = largest_energy(trust)
     worst = trust.drift if math.isnan(trust.unexplained) else trust.unexplained

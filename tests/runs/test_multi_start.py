@@ -25,7 +25,7 @@ def jobs_of(problem_file: Path, out: Path, seeds: int = 4) -> list[Job]:
 
 def test_results_are_those_of_one_after_another(problem_file: Path, tmp_path: Path, recorder: Any) -> None:
     alone = run_batch(jobs_of(problem_file, tmp_path / "a"), 1, recorder, transcribe)
-    beside = run_batch(jobs_of(problem_file, tmp_path / "b"), 1, recorder, transcribe, together=True)
+    beside = run_batch(jobs_of(problem_file, tmp_path / "b"), 1, recorder, transcribe, multi_start=True)
     assert alone.accepted and beside.accepted
     for one, other in zip(alone.results, beside.results, strict=True):
         assert one is not None and other is not None
@@ -49,10 +49,10 @@ def test_ctrl_c_loses_nothing(problem_file: Path, tmp_path: Path, recorder: Any)
             os.kill(os.getpid(), signal.SIGINT)
 
     recorder.advanced = press
-    broken = run_batch(jobs_of(problem_file, tmp_path / "broken"), 1, recorder, transcribe, together=True)
+    broken = run_batch(jobs_of(problem_file, tmp_path / "broken"), 1, recorder, transcribe, multi_start=True)
     assert broken.interrupted
     recorder.advanced = told
-    rest = run_batch(jobs_of(problem_file, tmp_path / "broken"), 1, recorder, transcribe, together=True)
+    rest = run_batch(jobs_of(problem_file, tmp_path / "broken"), 1, recorder, transcribe, multi_start=True)
     assert rest.accepted
     for one, other in zip(whole.results, rest.results, strict=True):
         assert one is not None and other is not None
@@ -66,5 +66,5 @@ def test_one_that_fails_spoils_no_other(
         raise RuntimeError("out of order")
 
     monkeypatch.setattr("symphys.runs.multi_start.solve_together", broken)
-    batch = run_batch(jobs_of(problem_file, tmp_path), 1, recorder, transcribe, together=True)
+    batch = run_batch(jobs_of(problem_file, tmp_path), 1, recorder, transcribe, multi_start=True)
     assert batch.accepted

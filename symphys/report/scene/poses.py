@@ -1,4 +1,4 @@
-"""Bodies in a panel: their paths, and what they look like at even times."""
+"""Poses over time of single bodies in a panel: their paths, and their solids at even times."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from matplotlib.patches import Circle, Polygon
 
 from symphys.report.figures import style
 from symphys.report.scene.outlines import inner_edges, outline
-from symphys.report.scene.panel import Panel
+from symphys.report.scene.panel import ViewPanel
 from symphys.report.scene.views import View, centres, half_axes, reach, solids_of, turn
-from symphys.results.records import Array, Trajectory
-from symphys.results.scene_records import Scene, Solid
+from symphys.results.scene import Scene, Solid
+from symphys.trajectory import Array, Trajectory
 
 MOST_LABELLED = 3
 SHAPES = 220
 """How many solids are drawn in a panel, at most about."""
 
 
-def draw_bodies(axes: Axes, panel: Panel, trajectory: Trajectory, scene: Scene, scale: float) -> None:
-    """Path and snapshots of every body; the first and last one of few, which no joint holds, are named."""
+def draw_bodies(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Scene, scale: float) -> None:
+    """Path and poses of every body; the first and last one of few, which no joint holds, are named."""
     bodies = range(len(trajectory.body_names))
     total = sum(len(solids_of(trajectory, scene, body)) for body in bodies)
     shots = np.linspace(0, len(trajectory.time) - 1, int(np.clip(SHAPES // total, 3, 10))).round().astype(int)
@@ -35,13 +35,13 @@ def draw_bodies(axes: Axes, panel: Panel, trajectory: Trajectory, scene: Scene, 
         for shot in apart(trajectory, panel.view, body, solids, shots):
             strength = 0.08 + 0.3 * shot / max(int(shots[-1]), 1)
             for solid in solids:
-                Snapshot(axes, panel.view, colour, strength, shot == shots[-1]).draw(trajectory, body, solid, shot)
+                BodyDrawing(axes, panel.view, colour, strength, shot == shots[-1]).draw(trajectory, body, solid, shot)
         if len(bodies) <= MOST_LABELLED and not scene.joints:
             name_ends(axes, panel, trajectory, reach(trajectory, scene, body), body, scale)
 
 
 def apart(trajectory: Trajectory, view: View, body: int, solids: Sequence[Solid], shots: Array) -> list[int]:
-    """The snapshots in which some solid lies well off its place in the one kept after them; the last is kept."""
+    """The poses in which some solid lies well off its place in the one kept after them; the last is kept."""
     marks = np.stack([marked(trajectory, view, body, solid) for solid in solids], axis=1)
     least = np.array([0.35 * (solid.radius + solid.half.max()) for solid in solids])
     kept = [int(shots[-1])]
@@ -60,7 +60,7 @@ def marked(trajectory: Trajectory, view: View, body: int, solid: Solid) -> Array
 
 
 @dataclass(frozen=True)
-class Snapshot:
+class BodyDrawing:
     """How a body is drawn at one time: in its colour, paler the earlier, thicker the last."""
 
     axes: Axes
@@ -120,7 +120,7 @@ def spoke(orientation: Array, view: View) -> Array:
     return max((turn(orientation, direction) for direction in np.eye(3)), key=seen)
 
 
-def name_ends(axes: Axes, panel: Panel, trajectory: Trajectory, radius: float, body: int, scale: float) -> None:
+def name_ends(axes: Axes, panel: ViewPanel, trajectory: Trajectory, radius: float, body: int, scale: float) -> None:
     """Write ``start`` and ``end`` at a body's first and last place; the end below where both are close."""
     colour = style.BODIES[body % len(style.BODIES)]
     first, last = panel.view.flat(trajectory.position[[0, -1], body])

@@ -9,11 +9,11 @@ from matplotlib.lines import Line2D
 
 from symphys.report.figures import style
 from symphys.results.discovery import Study
-from symphys.results.records import Array
+from symphys.trajectory import Array
 
 MOST_CHECKS = 16
 LOWEST, HIGHEST = 1e-3, 1e4
-"""Ratios are drawn between these at most; beyond them an arrow says that it goes on."""
+"""Ratios are drawn between these at most; beyond them stands an arrow."""
 
 Ratios = dict[str, dict[str, Array]]
 

@@ -1,0 +1,18 @@
+"""The files of a run folder.
+
+| file | holds |
+|---|---|
+| problem.toml | the problem file as it was read, includes resolved |
+| config.json | what was asked for: ``symphys.results.config`` |
+| result.json | what was found: ``symphys.results.result`` |
+| trace.csv | a row for each iteration: ``symphys.results.trace`` |
+| trajectory.npz, guess.npz | the motion of the result and of the guess: ``symphys.trajectory`` |
+| scene.json | bodies, static surfaces and joints to draw: ``symphys.results.scene`` |
+| checkpoint.json | where an interrupted solve goes on |
+| log.txt | what the solver printed |
+| report.html, figures/ | the page, made from the others |
+"""
+
+PROBLEM, CONFIG, RESULT, CHECKPOINT = "problem.toml", "config.json", "result.json", "checkpoint.json"
+TRAJECTORY, GUESS, SCENE, TRACE, LOG = "trajectory.npz", "guess.npz", "scene.json", "trace.csv", "log.txt"
+FIGURES = "figures"

@@ -1,0 +1,157 @@
+"""The scene of a problem: what a picture needs of a world whose parameters are set."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from symphys.model.joints import Joint, Motor, Servo, TorqueMotor, VelocityMotor
+from symphys.model.shapes import Box, Fixture, Plane, Scalar, Shape, Sphere, Terrain
+from symphys.model.world import Body, World
+from symphys.problem import Problem
+from symphys.problem.parametric.sizes import extent
+from symphys.results.scene import Scene, SceneBody, SceneFixture, ScenePlane, SceneTerrain, Solid
+from symphys.results.scene_joints import SceneCoordinate, SceneJoint, SceneMotor, SceneSocket
+from symphys.shooting import Array
+from symphys.trajectory import Trajectory
+
+MOTORS: dict[type[Motor], str] = {Servo: "servo", VelocityMotor: "velocity", TorqueMotor: "torque"}
+"""As problem files call them."""
+
+
+def make_scene(problem: Problem, z: Mapping[str, Array], motion: Trajectory | None = None) -> Scene:
+    """Gravity, bodies, static surfaces, and joints, in SI units, with the parameters that ``z`` (by variable) sets.
+
+    Terrain is sampled where ``motion`` goes; without one, around the bodies at the start.
+    """
+    world = problem.world(parameters(problem, z))
+    if motion is None:
+        places = np.array([problem.initial[f"{body.name}.position"] for body in world.bodies])
+    else:
+        places = motion.position.reshape(-1, 3)
+    near = crop(world, places)
+    names = [body.name for body in world.bodies]
+    return Scene(
+        gravity=tuple(plain(world.gravity).tolist()),
+        bodies=tuple(
+            SceneBody(body.name, tuple(map(make_solid, body.shapes)), float(body.mass)) for body in world.bodies
+        ),
+        planes=tuple(
+            ScenePlane(each.name, plain(each.normal), float(each.offset))
+            for each in world.statics
+            if isinstance(each, Plane)
+        ),
+        fixtures=tuple(
+            SceneFixture(each.name, make_solid(each.shape)) for each in world.statics if isinstance(each, Fixture)
+        ),
+        terrain=tuple(sample(each, near) for each in world.statics if isinstance(each, Terrain)),
+        joints=tuple(make_joint(joint, names) for joint in world.joints),
+    )
+
+
+def parameters(problem: Problem, z: Mapping[str, Array]) -> dict[str, Any]:
+    """The values of the physical parameters that variables set; ``z`` holds (components, knots) arrays."""
+    values: dict[str, Any] = {}
+    for variable in problem.variables:
+        if variable.kind != "parameter":
+            continue
+        for slot in variable.slots:
+            whole = values.get(slot.name, np.array(problem.parameters[slot.name], float))
+            whole[list(slot.components)] = z[variable.name].ravel()
+            values[slot.name] = whole
+    return {name: float(whole[0]) if whole.size == 1 else tuple(whole.tolist()) for name, whole in values.items()}
+
+
+def make_solid(shape: Shape) -> Solid:
+    """A shape with numbers, no symbols."""
+    if isinstance(shape, Sphere):
+        return Solid(float(shape.radius), centre=plain(shape.centre))
+    if isinstance(shape, Box):
+        return Solid(0.0, plain(shape.half_sizes), plain(shape.centre), plain(shape.orientation))
+    half = np.array([0.0, 0.0, float(shape.half_length)])
+    return Solid(float(shape.radius), half, plain(shape.centre), plain(shape.orientation))
+
+
+def make_joint(joint: Joint, bodies: Sequence[str]) -> SceneJoint:
+    """A joint with numbers, no symbols; ``bodies``: the names of the world's bodies."""
+    return SceneJoint(
+        name=joint.name,
+        kind=joint.kind.name,
+        first=bodies[joint.first],
+        second="" if joint.second is None else bodies[joint.second],
+        sockets=tuple(SceneSocket(plain(socket.point), plain(socket.orientation)) for socket in joint.sockets),
+        coordinates=tuple(SceneCoordinate(each.name, each.turns) for each in joint.kind.coordinates),
+        lower=bound(joint.limits.lower, -np.inf),
+        upper=bound(joint.limits.upper, np.inf),
+        motor=None if joint.motor is None else make_motor(joint.motor),
+    )
+
+
+def bound(value: Scalar | None, missing: float) -> float:
+    """One end of limits."""
+    return missing if value is None else float(value)
+
+
+def make_motor(motor: Motor) -> SceneMotor:
+    """A motor with those of its bounds that there are, and a servo's gain."""
+    return SceneMotor(MOTORS[type(motor)], {key: float(v) for key, v in asdict(motor).items() if v is not None})
+
+
+def plain(vector: Any) -> Array:
+    """A vector of numbers."""
+    return np.array([float(component) for component in vector])
+
+
+MOST = 49
+"""Heights along the longer side."""
+LEAST_SHARE = 0.3
+"""Of the shorter side in the longer one."""
+MARGIN = 0.15
+"""On each side, as a share of the longer one."""
+
+
+@dataclass(frozen=True)
+class TerrainCrop:
+    """A rectangle of the x-y plane: ``low`` and ``high`` (2,) [m]."""
+
+    low: Array
+    high: Array
+
+
+def crop(world: World, places: Array) -> TerrainCrop:
+    """Where bodies at (n, 3) places may touch the ground, with room around."""
+    flat = places[np.isfinite(places).all(axis=1), :2]
+    flat = flat if len(flat) else np.zeros((1, 2))
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    reach = max(size(body) for body in world.bodies)
+    side = float((high - low).max()) + 2 * reach
+    side = side if side > 0 else 1.0
+    room = np.maximum(high - low + 2 * reach, LEAST_SHARE * side) / 2 + MARGIN * side
+    middle = (low + high) / 2
+    return TerrainCrop(middle - room, middle + room)
+
+
+def size(body: Body) -> float:
+    """From a body's centre of mass to the farthest point of its surface, at most [m]."""
+    return max((float(np.linalg.norm(shape.centre)) + extent(shape) for shape in body.shapes), default=0.0)
+
+
+def sample(terrain: Terrain, near: TerrainCrop) -> SceneTerrain:
+    """The heights there."""
+    sides = near.high - near.low
+    columns, rows = (int(count) for count in np.maximum(np.round(MOST * sides / sides.max()), 2))
+    x, y = (np.linspace(near.low[k], near.high[k], count) for k, count in enumerate((columns, rows)))
+    a, b = ca.SX.sym("x"), ca.SX.sym("y")
+    height = ca.Function("height", [a, b], [terrain.height(a, b)])
+    found = height(np.tile(x, rows)[None, :], np.repeat(y, columns)[None, :])
+    z = np.array(found, float).reshape(rows, columns)
+    return SceneTerrain(terrain.name, short(x), short(y), np.array([short(row) for row in z]))
+
+
+def short(numbers: Array) -> Array:
+    """Numbers with no more digits than a picture can show."""
+    return np.array([float(f"{number:.7g}") for number in numbers.tolist()])

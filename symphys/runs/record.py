@@ -1,0 +1,192 @@
+"""What a run writes of its outcome: result.json with its provenance, and the rows of trace.csv."""
+
+from __future__ import annotations
+
+import datetime
+import platform
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from symphys import __version__, files
+from symphys.codegen.backends import Description
+from symphys.findings.levels import Judged
+from symphys.findings.verdict import rule
+from symphys.results.result import (
+    REACHED,
+    BackendRecord,
+    CheckRecord,
+    Result,
+    StageRecord,
+    VariableRecord,
+    ruled,
+)
+from symphys.results.trace import OUTPUT
+from symphys.runs.job import Job
+from symphys.shooting import Array
+from symphys.solvers import Counts, Outcome, StageResult, TraceRow
+from symphys.trajectory import Trajectory
+from symphys.transcription import Transcription, Verdict
+
+JUDGED = frozenset(("objective", "costs", "outputs", "checks"))
+"""What is not known where the exact rollout cannot be simulated."""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The exact rollout of the solution; all None where it cannot be simulated.
+
+    Attributes:
+        verdict: costs and checks.
+        trajectory: the motion.
+        trust: how far the solution can be trusted, or, not examined, what is always measured; None also for a run that
+            is not over.
+        advice: the solver's and what the rollout adds.
+    """
+
+    verdict: Verdict | None
+    trajectory: Trajectory | None
+    trust: dict[str, Any] | None
+    advice: str
+
+
+def make_result(
+    job: Job,
+    transcription: Transcription,
+    outcome: Outcome,
+    judgement: Judgement,
+    price: dict[str, float],
+    seconds: dict[str, float],
+) -> Result:
+    """The result of a run that its solver ended."""
+    verdict = judgement.verdict
+    found: dict[str, Any] = {}
+    if verdict:
+        found = {"objective": verdict.objective, "costs": dict(verdict.costs), "outputs": dict(verdict.outputs)}
+        found["checks"] = tuple(
+            CheckRecord(check.kind, check.name, check.error, check.tolerance, check.ratio, check.met)
+            for check in verdict.checks
+        )
+    return Result(
+        **provenance(job),
+        **found,
+        backend=evaluated_by(transcription.backend),
+        **ruled(rule(outcome.status.value, judged(verdict), files.strict(judgement.trust))),
+        status=outcome.status.value,
+        advice=judgement.advice,
+        z=variables(transcription, outcome.z),
+        iterations=outcome.trace[-1].iteration if outcome.trace else 0,
+        counts=asdict(outcome.counts),
+        price=price,
+        equivalents=equivalents(outcome.counts, price),
+        seconds=seconds,
+        trust=judgement.trust or {},
+        guess=guess_values(transcription, job.config.seed),
+        stages=tuple(stage_record(transcription, stage, price) for stage in outcome.stages),
+        absent=(frozenset() if verdict else JUDGED) | (frozenset() if judgement.trust else {"trust"}),
+    )
+
+
+def failure(job: Job, message: str) -> Result:
+    """The result of a run that could not be done."""
+    return Result(**provenance(job), solved=False, status="failed", advice=message, absent=REACHED)
+
+
+def judged(verdict: Verdict | None) -> Judged:
+    """What is known of how the exact rollout does."""
+    if verdict is None:
+        return Judged(np.nan, np.nan, met=False, checked=False)
+    return Judged(verdict.objective, verdict.worst, verdict.solved, bool(verdict.checks))
+
+
+def variables(transcription: Transcription, z: Array) -> dict[str, VariableRecord]:
+    """The variables by name."""
+    sets = {v.name: tuple(slot.name for slot in v.slots) for v in transcription.problem.variables}
+
+    def block(flat: Array, shape: tuple[int, int]) -> Array:
+        return flat.reshape(shape[::-1]).T
+
+    return {
+        each.name: VariableRecord(
+            each.name,
+            sets[each.name],
+            *(block(flat, each.shape) for flat in (z[each.start : each.stop], each.guess, each.lower, each.upper)),
+        )
+        for each in transcription.shooting.blocks
+    }
+
+
+def guess_values(transcription: Transcription, seed: int) -> dict[str, float]:
+    """The exact rollout of the start of a seed."""
+    exact = transcription.judge(transcription.shooting.start(seed))
+    outputs = {OUTPUT + name: value for name, value in exact.outputs.items()}
+    return {"objective": exact.objective, "worst": exact.worst, **outputs}
+
+
+def stage_record(transcription: Transcription, stage: StageResult, price: Mapping[str, float]) -> StageRecord:
+    """A stage of a solve; its point is judged by the exact rollout, which is no part of its time."""
+    exact = transcription.judge(stage.z)
+    return StageRecord(
+        smoothing=stage.smoothing,
+        status=stage.status.value,
+        objective=stage.objective,
+        worst=stage.miss,
+        exact_objective=exact.objective,
+        exact_worst=exact.worst,
+        solved=exact.solved,
+        counts=asdict(stage.counts),
+        equivalents=equivalents(stage.counts, price),
+        seconds=stage.seconds,
+    )
+
+
+def trace_row(row: TraceRow, price: Mapping[str, float]) -> dict[str, object]:
+    """An iteration as a line of trace.csv."""
+    values = {each.name: getattr(row, each.name) for each in fields(row)}
+    numbers = {name: value for name, value in values.items() if not isinstance(value, Mapping)}
+    outputs = {OUTPUT + name: value for name, value in row.told.items()}
+    return {**numbers, "equivalents": equivalents(row, price), **outputs}
+
+
+def used(counts: Counts) -> list[str]:
+    """The kinds of evaluation whose price matters here."""
+    return ["gradient", *(kind for kind, count in priced(counts).items() if count and kind != "gradient")]
+
+
+def priced(counts: Counts | TraceRow) -> dict[str, int]:
+    """How often each kind of evaluation that is dearer than a rollout was done."""
+    return {"gradient": counts.gradients, "jacobian": counts.jacobians, "hessian": counts.hessians}
+
+
+def equivalents(counts: Counts | TraceRow, price: Mapping[str, float]) -> float:
+    """The cost in rollouts: every evaluation times its measured price."""
+    return float(counts.rollouts + sum(count * price[kind] for kind, count in priced(counts).items() if count))
+
+
+def provenance(job: Job) -> dict[str, Any]:
+    """The fields of a result that are known however the run ends: which run, versions, machine, time."""
+    return {
+        "problem": job.config.problem,
+        "title": job.problem.title,
+        "solver": job.config.solver,
+        "seed": job.config.seed,
+        "versions": {
+            "symphys": __version__,
+            "python": platform.python_version(),
+            **{name: version(name) for name in ("casadi", "numpy", "scipy", "cma")},
+            "platform": f"{platform.system()} {platform.machine()}",
+        },
+        "when": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "command": job.command,
+    }
+
+
+def evaluated_by(backend: Description) -> BackendRecord:
+    """The ``backend`` of a result."""
+    compiled = "" if backend.cached is None else "warm" if backend.cached else "cold"
+    return BackendRecord(
+        backend.name, backend.lanes, backend.threads, backend.precision, backend.compiler, backend.said(), compiled
+    )
