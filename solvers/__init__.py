@@ -14,7 +14,7 @@ from typing import Any
 
 from symphys.errors import SymphysError
 from symphys.solvers.core.interface import Solver
-from symphys.solvers.core.multi_start import solve_together
+from symphys.solvers.core.multi_start import solve_multi_start
 from symphys.solvers.core.outcome import Counts, Monitor, Outcome, StageResult, Status, TraceRow
 from symphys.solvers.methods.cma_es import CMA, CmaOptions
 from symphys.solvers.methods.evolution import EVOLUTION, EvolutionOptions
@@ -38,7 +38,7 @@ __all__ = [
     "Status",
     "StochasticOptions",
     "TraceRow",
-    "solve_together",
+    "solve_multi_start",
     "solver",
 ]
 

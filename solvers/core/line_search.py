@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symphys.solvers.core.evaluator import Meter
+from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.outcome import Array
 from symphys.solvers.core.point import Point
 
@@ -20,7 +20,7 @@ ROUNDING = 64 * float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
-class Search:
+class LineSearchResult:
     """Where a line search ended.
 
     Attributes:
@@ -32,11 +32,13 @@ class Search:
     not_finite: bool = False
 
 
-def backtrack(meter: Meter, z: Array, step: Array, slope: float, merit: float, ceiling: float) -> Search:
+def backtrack(
+    evaluator: CountingEvaluator, z: Array, step: Array, slope: float, merit: float, ceiling: float
+) -> LineSearchResult:
     """Shorten ``step`` (n,) from z until merit(z + t step) <= ceiling + 1e-4 t slope.
 
     Args:
-        meter: each trial is one rollout.
+        evaluator: each trial is one rollout.
         z: (n,) where the merit is ``merit``.
         step: (n,) to a point within the bounds.
         slope: d merit / dt at t = 0, negative.
@@ -45,12 +47,12 @@ def backtrack(meter: Meter, z: Array, step: Array, slope: float, merit: float, c
     """
     t, trial = 1.0, None
     for _ in range(TRIALS):
-        trial = meter.value(meter.clip(z + t * step))
+        trial = evaluator.value(evaluator.clip(z + t * step))
         if trial.finite and trial.merit <= ceiling + SLOPE_SHARE * t * slope:
-            return Search(trial)
+            return LineSearchResult(trial)
         t *= shrink(trial, t, slope, merit)
     finite = trial is not None and trial.finite
-    return Search(None, not finite)
+    return LineSearchResult(None, not finite)
 
 
 def shrink(trial: Point, t: float, slope: float, merit: float) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from enum import Enum
 
 import numpy as np
@@ -25,7 +25,19 @@ class Status(Enum):
     INTERRUPTED = "interrupted"
 
 
-@dataclass
+@dataclass(frozen=True)
+class StopReason:
+    """Why a stage of a solve ended: a status, and one sentence of advice, see ``Outcome``."""
+
+    status: Status
+    advice: str = ""
+
+    def __str__(self) -> str:
+        """Return the line of the log."""
+        return ": ".join(filter(None, (self.status.value, self.advice)))
+
+
+@dataclass(frozen=True)
 class Counts:
     """Work done: each rollout, gradient, residual Jacobian, Hessian that was evaluated, line searches included."""
 
@@ -33,6 +45,18 @@ class Counts:
     gradients: int = 0
     jacobians: int = 0
     hessians: int = 0
+
+    def __add__(self, other: Counts) -> Counts:
+        """Return the work of both."""
+        return Counts(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
+
+    def __sub__(self, other: Counts) -> Counts:
+        """Return the work without that of ``other``."""
+        return Counts(*(a - b for a, b in zip(astuple(self), astuple(other), strict=True)))
+
+    def share(self, fraction: float) -> Counts:
+        """Return a fraction of the work, in whole evaluations."""
+        return Counts(*(round(number * fraction) for number in astuple(self)))
 
 
 @dataclass(frozen=True)

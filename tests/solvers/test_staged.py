@@ -13,7 +13,7 @@ from toys import PLAIN, failing, solve, stop_at, through_json, toy, values
 from symphys.errors import SymphysError
 from symphys.maths.smoothing import positive
 from symphys.shooting import ShootingProblem
-from symphys.solvers import Counts, Outcome, StageResult, Status, solve_together, solver
+from symphys.solvers import Counts, Outcome, StageResult, Status, solve_multi_start, solver
 from symphys.solvers.core.vanishing_gradient import FLAT
 
 KNOBS = (1.0, 0.1, 0.0)
@@ -229,7 +229,7 @@ def test_side_by_side_they_are_those_of_each_alone(name: str) -> None:
     """Solves that are in different stages share no batch, and each goes its own way."""
     problem, chosen = bent(), solver(name)
     starts = [problem.start(seed) for seed in range(4)]
-    for seed, found in enumerate(solve_together(chosen, problem, starts, chosen.Options())):
+    for seed, found in enumerate(solve_multi_start(chosen, problem, starts, chosen.Options())):
         same(found, solve(name, problem, seed))
 
 

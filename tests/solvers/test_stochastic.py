@@ -13,7 +13,7 @@ from windy import BEST, Winds, windy
 
 from symphys.shooting import Array, Drawn, Values
 from symphys.solvers import SOLVERS, Status, StochasticOptions, TraceRow
-from symphys.solvers.randomized.aggregation import average, centred, evolution, together
+from symphys.solvers.randomized.aggregation import average, centred, evolution, mixed
 
 SOLVE = SOLVERS["stochastic"].solve
 
@@ -124,13 +124,12 @@ def test_evolution_estimates_the_gradient() -> None:
     """Of a quadratic, on the average of many pairs."""
     winds, z, step = Winds(), np.array([1.5, 0.75]), np.array([0.1, 0.2])
     rng = np.random.default_rng(0)
-    found = evolution(winds, z, step, winds.draw(rng, 20_000), 0.0, rng)
+    found = evolution(lambda Z, drawn: winds.value(Z, drawn, 0.0), z, step, winds.draw(rng, 20_000), rng)
     way = 2 * (z - BEST) * step
     assert found.gradient @ way == pytest.approx(np.linalg.norm(found.gradient) * np.linalg.norm(way), rel=1e-3)
     assert (found.pairs, found.alive) == (20_000, 1.0)
     assert found.merit == pytest.approx(((z - BEST) ** 2).sum() + 2 * 0.3**2 / 3 + (step**2).sum(), rel=0.02)
-    mixed = together(np.array([3.0, 0]), np.array([0, 0.1]), 0.25)
-    assert mixed == pytest.approx([0.75, 0.25])
+    assert mixed(np.array([3.0, 0]), np.array([0, 0.1]), 0.25) == pytest.approx([0.75, 0.25])
 
 
 def test_ranks() -> None:

@@ -17,7 +17,7 @@ from symphys.errors import SymphysError
 from symphys.problem import load_problem
 from symphys.problems import find
 from symphys.shooting import Values
-from symphys.solvers import Outcome, Status, solve_together, solver
+from symphys.solvers import Outcome, Status, solve_multi_start, solver
 from symphys.transcription import transcribe
 
 descents = pytest.mark.parametrize("name", ["gradient", "least_squares"])
@@ -25,7 +25,7 @@ descents = pytest.mark.parametrize("name", ["gradient", "least_squares"])
 
 def together(name: str, problem: Any, seeds: range = range(5), **more: Any) -> list[Outcome]:
     chosen = solver(name)
-    return solve_together(chosen, problem, [problem.start(seed) for seed in seeds], chosen.Options(), **more)
+    return solve_multi_start(chosen, problem, [problem.start(seed) for seed in seeds], chosen.Options(), **more)
 
 
 def same(a: Outcome, b: Outcome) -> None:
