@@ -26,6 +26,8 @@ READERS: dict[str, Callable[[Any], Any]] = {
     "tuple[float, ...]": lambda value: tuple(float(number) for number in value),
 }
 """By the annotation of a field; float() also reads the strings "nan" and "inf" of strict JSON."""
+OLD_NAMES = {"miss": "max_violation"}
+"""Of fields in checkpoints that were written before these were renamed."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ def from_plain(
         point = Point(z, *numbers, errors, met, outputs, spoilt=int(best["spoilt"]))
         counts = Counts(*map(int, saved["counts"]))
         rows = [revive(TraceRow, dict(zip(names(TraceRow), row, strict=True))) for row in saved["rows"]]
-        stages = tuple(revive(StageResult, dict(each), Counts) for each in saved["stages"])
+        stages = tuple(revive(StageResult, present(each), Counts) for each in saved["stages"])
         seconds = float(saved["seconds"])
         state, last = dict(saved["state"]), np.array(saved["last"], float)
     except (KeyError, TypeError, ValueError) as error:
@@ -94,6 +96,11 @@ def from_plain(
     if tuple(stage.smoothing for stage in stages) != problem.smoothing[:-1][: len(stages)]:
         raise SymphysError("this checkpoint has other stages of smoothing than the problem")
     return Checkpoint(stages, state, point, last, counts, len(rows), seconds), state, rows
+
+
+def present(stage: dict[str, Any]) -> dict[str, Any]:
+    """The fields of a stage by their present names."""
+    return {OLD_NAMES.get(name, name): value for name, value in stage.items()}
 
 
 def revive(kind: type[T], values: dict[str, Any], *parts: type[Any]) -> T:

@@ -45,8 +45,8 @@ def stage_result(
     for stage in before:
         counts -= stage.counts
     seconds -= sum(stage.seconds for stage in before)
-    objective, miss = (best.objective, best.miss) if best else (np.nan, np.nan)
-    return StageResult(smoothing, status, z, objective, miss, counts, seconds)
+    objective, max_violation = (best.objective, best.max_violation) if best else (np.nan, np.nan)
+    return StageResult(smoothing, status, z, objective, max_violation, counts, seconds)
 
 
 def exact_best(

@@ -22,7 +22,7 @@ ADAM_FLOOR = 1e-8
 LONGEST = 1e12
 """A spectral step and its inverse stay below it."""
 GROWTH = 10.0
-"""The spectral step grows by it where the merit curves downward and so says nothing of a length."""
+"""The spectral step grows by it where the merit curves downward and so suggests no length."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class DirectionMemory:
     """What a direction depends on beside the gradient: running means of the gradients before, and a step length.
 
     Attributes:
-        ticks: gradients seen since the memory was empty.
+        ticks: gradients since the memory was empty.
         mean, square: (n,) running means of the gradient and of its square.
         length: the spectral step a; 0 before the first step.
     """
@@ -42,7 +42,7 @@ class DirectionMemory:
 
     @classmethod
     def empty(cls, n: int) -> DirectionMemory:
-        """Nothing seen yet."""
+        """Before the first gradient."""
         return cls(0, np.zeros(n), np.zeros(n), 0.0)
 
 

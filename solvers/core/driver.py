@@ -83,7 +83,7 @@ def make_solver(
     constraints: bool = False,
     prepare: Callable[[], None] = nothing,
     threaded: bool = False,
-    situations: bool | None = False,
+    scenarios: bool | None = False,
 ) -> Solver[O_inv]:
     """A solver of its parts; those that are not named here are the fields of ``Solver``.
 
@@ -114,7 +114,7 @@ def make_solver(
         request = Request(name, problem, start, seed, monitor, checkpoint, log or silent, constraints)
         return Driver(request, run_stage, rate(options, seed)).run()
 
-    return Solver(name, summary, Options, solve, prepare, threaded, situations)
+    return Solver(name, summary, Options, solve, prepare, threaded, scenarios)
 
 
 @dataclass(frozen=True)
@@ -178,7 +178,7 @@ class Driver:
         if point is None:
             return
         best, counts = evaluator.incumbent.best or point, evaluator.counter.counts
-        numbers = (point.objective, best.objective, point.miss, iteration.gradient_norm, iteration.step)
+        numbers = (point.objective, best.objective, point.max_violation, iteration.gradient_norm, iteration.step)
         outputs = {**dict(zip(names, best.outputs.tolist(), strict=False)), **iteration.outputs}
         row = self._trace.append(counts, (*numbers, evaluator.smoothing), outputs)
         self._last = point.z
@@ -204,16 +204,16 @@ class Driver:
     def _run_stages(self) -> tuple[StopReason, Array]:
         """One stage after the other; why the last one ended, and the solution (n,)."""
         z, saved = self._resume()
-        reason, knobs = StopReason(Status.MET), self._request.problem.smoothing
-        for index, smoothing in enumerate(knobs[len(self._stages) :], len(self._stages)):
+        reason, smoothings = StopReason(Status.MET), self._request.problem.smoothing
+        for index, smoothing in enumerate(smoothings[len(self._stages) :], len(self._stages)):
             if saved is None:
                 self._evaluator = self._evaluator.at(smoothing, Incumbent(self._request.problem.stop_when_met))
                 self._last = None
-            self._request.log(f"stage {index + 1} of {len(knobs)}: smoothing {smoothing:g}")
+            self._request.log(f"stage {index + 1} of {len(smoothings)}: smoothing {smoothing:g}")
             reason = StopReason(Status.MET) if saved == FINISHED else self._run_stage(z, saved)
             status, best = reason.status, self._evaluator.incumbent.best
             z, saved = (best.z if best else z), None
-            solution, over = z, status in FATAL or index + 1 == len(knobs)
+            solution, over = z, status in FATAL or index + 1 == len(smoothings)
             if over:
                 reason, solution = exact_best(self._evaluator, self._rate, self._start, self._stages, z, reason)
             total = self._evaluator.counter.counts, self._trace.seconds

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from symphys.shooting import Drawn, Evaluator, ShootingProblem, Situations, Values
+from symphys.shooting import Evaluator, ScenarioEvaluator, ScenarioSamples, ShootingProblem, Values
 from symphys.solvers.core.outcome import Array, Counts
 from symphys.solvers.core.point import Incumbent, Point
 
@@ -113,25 +113,25 @@ class CountingEvaluator:
         self.counter.add(Counts(jacobians=1))
         return self._offered(self._points(z[None], values))[0]
 
-    def sample_values(self, Z: Array, samples: Drawn) -> Values:
+    def sample_values(self, Z: Array, samples: ScenarioSamples) -> Values:
         """One rollout in each sample of a scenario; Z (batch, n), or (1, n) for all."""
         values = self.scenario.value(Z, samples, self.smoothing)
         self.counter.add(Counts(rollouts=len(samples.numbers)))
         return values
 
     def sample_gradients(
-        self, z: Array, samples: Drawn, adjoint_discount: float = 0.0, horizon: float = math.inf
+        self, z: Array, samples: ScenarioSamples, adjoint_discount: float = 0.0, horizon: float = math.inf
     ) -> Values:
-        """One gradient at z (n,) in each sample of a scenario; see ``Situations.gradient``."""
+        """One gradient at z (n,) in each sample of a scenario; see ``ScenarioEvaluator.gradient``."""
         values = self.scenario.gradient(z[None], samples, self.smoothing, adjoint_discount, horizon)
         self.counter.add(Counts(gradients=len(samples.numbers)))
         return values
 
     @property
-    def scenario(self) -> Situations:
+    def scenario(self) -> ScenarioEvaluator:
         """The problem's scenario, for those who have checked that it has one."""
-        assert self.problem.situations is not None, "the problem has a scenario"
-        return self.problem.situations
+        assert self.problem.scenario is not None, "the problem has a scenario"
+        return self.problem.scenario
 
     @property
     def _evaluator(self) -> Evaluator:

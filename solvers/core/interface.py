@@ -142,7 +142,7 @@ class Solver(Generic[O_inv]):
         prepare: loads what ``solve`` needs, such as a library, so that who times solves can leave it out; ``solve``
             works without, and a second call costs nothing.
         threaded: whether several solves may run in threads side by side, see ``multi_start``.
-        situations: whether it is for problems with scenarios, and for no others; None: for all.
+        scenarios: whether it is for problems with scenarios, and for no others; None: for all.
     """
 
     name: str
@@ -151,4 +151,4 @@ class Solver(Generic[O_inv]):
     solve: Solve[O_inv]
     prepare: Callable[[], None] = nothing
     threaded: bool = False
-    situations: bool | None = False
+    scenarios: bool | None = False

@@ -85,7 +85,7 @@ class EvaluationBatcher:
         self.closed = False
 
     def ask(self, request: PendingEvaluation) -> Values:
-        """Wait until all have requested; an error of the evaluator is raised in every solve whose request it concerns."""
+        """Wait until all have requested; an error of the evaluator is raised in every solve that it concerns."""
         with self.changed:
             self.waiting.append(request)
             self.serve()
@@ -113,10 +113,8 @@ class EvaluationBatcher:
         if not self.waiting or len(self.waiting) < self.solves or self.closed:
             return
         pending, self.waiting = self.waiting, []
-        for kind, smoothing in dict.fromkeys((request.kind, request.smoothing) for request in pending):
-            evaluate_batch(
-                self.evaluator, [each for each in pending if (each.kind, each.smoothing) == (kind, smoothing)]
-            )
+        for kind in dict.fromkeys((request.kind, request.smoothing) for request in pending):
+            evaluate_batch(self.evaluator, [each for each in pending if (each.kind, each.smoothing) == kind])
         self.changed.notify_all()
 
 

@@ -1,4 +1,4 @@
-"""What every solver takes and gives: one request, one outcome, one status with advice."""
+"""What every solver returns: an outcome, with its status, advice, work, trace and stages."""
 
 from __future__ import annotations
 
@@ -69,11 +69,11 @@ class TraceRow:
         seconds: since the solve began (all earlier sessions of a continued solve included).
         objective: at this iterate (for a population: its best).
         best: lowest so far.
-        miss: largest of the normalised errors of targets and constraints; met at 1 or below; nan without any.
+        max_violation: largest of the normalised errors of targets and constraints; met at 1 or below; nan without any.
         gradient_norm: nan where the solver has none.
         step: length of the step in z (CMA-ES: sigma); nan for none.
-        smoothing: the knob in force.
-        told: by name, what the problem tells of the best point so far, and the solver of the iteration.
+        smoothing: in force.
+        outputs: by name, the problem's outputs at the best point so far, and the solver's own of the iteration.
     """
 
     iteration: int
@@ -84,11 +84,11 @@ class TraceRow:
     seconds: float
     objective: float
     best: float
-    miss: float
+    max_violation: float
     gradient_norm: float
     step: float
     smoothing: float
-    told: dict[str, float] = field(default_factory=dict)
+    outputs: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -96,10 +96,10 @@ class StageResult:
     """What one stage of smoothing came to.
 
     Attributes:
-        smoothing: the knob.
+        smoothing: of the stage.
         status: how it ended; INTERRUPTED for one that is to go on.
         z: (n,) its best point.
-        objective, miss: of that point at this smoothing; see ``TraceRow``. nan where nothing was evaluated.
+        objective, max_violation: of that point at this smoothing; see ``TraceRow``. nan where nothing was evaluated.
         counts, seconds: what the stage took, those before it left out.
     """
 
@@ -107,7 +107,7 @@ class StageResult:
     status: Status
     z: Array
     objective: float
-    miss: float
+    max_violation: float
     counts: Counts
     seconds: float
 
@@ -117,7 +117,7 @@ Monitor = Callable[[TraceRow], None]
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a solver found.
+    """The result of a solve.
 
     Attributes:
         status: how it ended.

@@ -42,7 +42,7 @@ class Point:
     violation: float = 0.0
 
     @property
-    def miss(self) -> float:
+    def max_violation(self) -> float:
         """The largest of the errors; nan without any."""
         return float(np.max(self.errors)) if self.errors.size else math.nan
 

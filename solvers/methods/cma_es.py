@@ -6,12 +6,12 @@ pycma's own options pass through ``options``; it prints nothing, and reads and w
 pycma's: ``tolflatfitness`` is 50. Generations whose merits are all the same are no convergence but a plateau (see
 ``vanishing_gradient``), which the search leaves as its candidates spread; pycma gives up on the second one.
 
-Where situations differ, each candidate of a generation is rated by its mean over the same few of them, which the next
-generation draws anew, and the start and the means of the search are validated, since what is best in a few
-situations was lucky.
+Where the problem has a scenario, each candidate of a generation is rated by its mean over the same few samples, which
+the next generation draws anew. The start and the means of the search are validated, since what is best in a few
+samples was lucky.
 
-A solve goes on by replay: the strategy is asked again from the same random stream and told the recorded merits, so
-that mean, step size, covariance and paths are the same to the last bit under any options, at the cost of no rollout.
+A solve goes on by replay: the strategy asks again from the same random stream and is told the recorded merits, so that
+mean, step size, covariance and paths are the same to the last bit under any options, at the cost of no rollout.
 """
 
 from __future__ import annotations
@@ -52,9 +52,9 @@ class CmaOptions:
         evaluations: rollouts in each stage of smoothing; the generation that reaches it is the last.
         options: pycma's own, such as {tolfun = 1e-8, CMA_diagonal = 50}; cma.CMAOptions() lists them. With more than
             2,000 variables the covariance is diagonal.
-        samples: where situations differ: in how many each candidate is rolled out.
+        samples: of a scenario: in how many each candidate is rolled out.
         width: how widely these vary, relative to their tables.
-        validation: situations that decide which mean of the search, or the start, is kept; 0: the last is.
+        validation: samples that decide which mean of the search, or the start, is kept; 0: the last is.
         validation_width: how widely these vary.
         every: generations between two validations.
     """
@@ -72,7 +72,7 @@ class CmaOptions:
     every: int = 5
 
     def __post_init__(self) -> None:
-        """ValueError that names the option and says what would be valid."""
+        """ValueError that names the option and what would be valid."""
         require(0 < self.sigma < math.inf, "sigma", "above 0")
         require(self.population == 0 or self.population > 2, "population", "0 or at least 3")
         at_least(0, evaluations=self.evaluations, validation=self.validation)
@@ -80,7 +80,7 @@ class CmaOptions:
         at_least(1, samples=self.samples, every=self.every)
 
     def batch(self, seed: int) -> ValidationBatch:
-        """For validation, where situations differ."""
+        """For validation, where there is a scenario."""
         return ValidationBatch(self.validation, self.validation_width, seed)
 
 
@@ -97,7 +97,7 @@ class CmaEs:
         self.start, self.seed, self.options = context.start, context.seed, options
         self.held = not np.any(self.evaluator.lower < self.evaluator.upper)
         self.candidates: Candidates = NominalCandidates(self.evaluator)
-        if self.evaluator.problem.situations is not None:
+        if self.evaluator.problem.scenario is not None:
             self.candidates = SampledCandidates(
                 self.evaluator, options.samples, options.width, options.batch(self.seed), options.every, context.log
             )
@@ -191,5 +191,5 @@ CMA = make_solver(
     iterating(CmaEs),
     rate=lambda options, seed: rate_by_validation(options.batch(seed)),
     prepare=prepare,
-    situations=None,
+    scenarios=None,
 )

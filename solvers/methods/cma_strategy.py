@@ -174,7 +174,7 @@ def rescale(scaling: Any, index: int, value: float) -> None:
 
 
 def check(options: Mapping[str, Any], defaults: Mapping[str, Any]) -> None:
-    """SymphysError for the first option that pycma does not know, or that cannot be passed to it."""
+    """SymphysError for the first option that pycma does not have, or that cannot be passed to it."""
     for name, value in options.items():
         if name in RESERVED or name.startswith("verb_"):
             raise refuse("cma", name, f"cannot be set: {RESERVED.get(name, RESERVED['verbose'])}")

@@ -1,7 +1,7 @@
-"""An evolution strategy: Adam along differences of values to either side of a point, in situations that differ.
+"""An evolution strategy: Adam along differences of values to either side of a point, over samples of a scenario.
 
-Salimans et al. 2017 (arXiv 1703.03864): antithetic pairs and ranks; each pair is rolled out in a situation of its own.
-It needs no derivatives, and sees what they do not: that a motion was over before its time.
+Salimans et al. 2017 (arXiv 1703.03864): antithetic pairs and ranks; each pair is rolled out in a sample of its own. It
+needs no derivatives, and its values include what derivatives do not: that a motion ended early.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from symphys.shooting import Drawn
+from symphys.shooting import ScenarioSamples
 from symphys.solvers.core.driver import iterating, make_solver
 from symphys.solvers.core.options import require
 from symphys.solvers.core.outcome import Status, StopReason
@@ -43,7 +43,7 @@ class EvolutionOptions(DescentOptions):
     sigma: float = 0.03
 
     def __post_init__(self) -> None:
-        """ValueError that names the option and says what would be valid."""
+        """ValueError that names the option and what would be valid."""
         super().__post_init__()
         require(0 < self.sigma < math.inf, "sigma", "above 0")
 
@@ -51,7 +51,7 @@ class EvolutionOptions(DescentOptions):
 class EvolutionStrategy(Descent[EvolutionOptions]):
     """Along differences of values at antithetic pairs."""
 
-    def estimate(self, state: DescentState, samples: Drawn) -> GradientEstimate | StopReason:
+    def estimate(self, state: DescentState, samples: ScenarioSamples) -> GradientEstimate | StopReason:
         """See ``Descent``."""
         options, evaluator = self.options, self.evaluator
         stream = np.random.default_rng([self.seed, NOISE, state.iteration])
@@ -66,11 +66,11 @@ class EvolutionStrategy(Descent[EvolutionOptions]):
 
 EVOLUTION = make_solver(
     "evolution",
-    "an evolution strategy in situations that are drawn anew",
+    "an evolution strategy over samples of the scenarios, drawn anew",
     EvolutionOptions,
     iterating(EvolutionStrategy),
     refusal=refusal,
     rate=lambda options, seed: rate_by_validation(options.batch(seed)),
-    situations=True,
+    scenarios=True,
 )
 """See ``Solver``."""

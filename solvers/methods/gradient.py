@@ -78,7 +78,7 @@ class GradientOptions:
     patience: int = 30
 
     def __post_init__(self) -> None:
-        """ValueError that names the option and says what would be valid."""
+        """ValueError that names the option and what would be valid."""
         require(self.method in DIRECTIONS, "method", f"one of {', '.join(DIRECTIONS)}")
         at_least(0, iterations=self.iterations, backtracking=self.backtracking)
         at_least(0, tolerance=self.tolerance, patience=self.patience)

@@ -96,7 +96,7 @@ class IpoptOptions:
     options: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """ValueError that names the option and says what would be valid."""
+        """ValueError that names the option and what would be valid."""
         at_least(0, iterations=self.iterations)
         require(0 < self.tolerance < math.inf, "tolerance", "above 0")
         require(self.hessian in ("limited-memory", "exact"), "hessian", "limited-memory or exact")
@@ -141,7 +141,7 @@ def stage(
 
 
 def build(evaluator: CountingEvaluator, options: IpoptOptions, iterations: int, watch: Watch, text: Path) -> Any:
-    """The nlpsol over x = z / scale, the knob as its paraevaluator."""
+    """The nlpsol over x = z / scale, with the smoothing as its parameter."""
     if evaluator.problem.nlp.expression is None:
         raise SymphysError("IPOPT needs expressions, and nets this large have none; take gradient or cma")
     nlp, derivatives = functions(evaluator.problem.nlp, evaluator.scale, options.hessian == "exact")
@@ -165,7 +165,7 @@ def build(evaluator: CountingEvaluator, options: IpoptOptions, iterations: int, 
 
 
 def arguments(evaluator: CountingEvaluator, z: Array) -> dict[str, Any]:
-    """Start, knob and bounds."""
+    """Start, smoothing and bounds."""
     problem, scale = evaluator.problem, evaluator.scale
     bounds = {"lbx": evaluator.lower / scale, "ubx": evaluator.upper / scale}
     limits = {"lbg": problem.constraint_lower, "ubg": problem.constraint_upper}
@@ -208,7 +208,7 @@ class Watch(ca.Callback):
         self.construct("watch", {})
 
     def get_n_in(self) -> int:
-        """All that nlpsol gives out."""
+        """All outputs of nlpsol."""
         return int(ca.nlpsol_n_out())
 
     def get_n_out(self) -> int:

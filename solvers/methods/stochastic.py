@@ -1,23 +1,23 @@
-"""First-order descent in situations that are drawn anew in each iteration: what long motions through contact need.
+"""First-order descent over samples of a scenario, drawn anew in each iteration: for long motions through contact.
 
-Each iteration evaluates gradients in a batch of situations, the problem's own first, then takes a step of Adam along
-the mean of the gradients, each shortened by itself before (``clip``): a few situations in which small changes explode
-would drown all others. ``forget`` lets adjoints fade on their way back, at the price of a bias. A batch of its own,
-drawn once, decides which point is kept, since the path crosses regions that look good in a few situations only.
+Each iteration evaluates gradients in a batch of samples, the problem's own first, then takes a step of Adam along the
+mean of the gradients, each shortened by itself before (``clip``): a few samples in which small changes explode would
+drown all others. ``adjoint_discount`` lets adjoints decay on their way back, at the price of a bias. A batch of its
+own, drawn once, decides which point is kept, since the path crosses regions that look good in a few samples only.
 
-Motions that are over before their time add nothing to a gradient after that, so ``fallen`` lets what they say of the
-time before count more; that they were over is seen by the validation batch, through the cost of [fall].
+Motions that end early add nothing to a gradient after that, so ``fallen`` raises the weight of their gradient of the
+time before. Validation rates that they end early, through the cost of [fall].
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 
-from symphys.shooting import Drawn
+from symphys.shooting import ScenarioSamples
 from symphys.solvers.core.driver import iterating, make_solver
 from symphys.solvers.core.options import at_least, require
 from symphys.solvers.core.outcome import Array, Status, StopReason
@@ -32,16 +32,16 @@ from symphys.solvers.randomized.descent import (
 )
 from symphys.solvers.randomized.validation import NOISE, first_sample, rate_by_validation
 
-NOT_FINITE = "not one situation of a batch is finite: bound the variables, lower `rate`, or add [fall]"
+NOT_FINITE = "not one sample of a batch is finite: bound the variables, lower `rate`, or add [fall]"
 
 
 @dataclass(frozen=True)
 class StochasticOptions(DescentOptions):
-    """Options of descent in drawn situations, beside those of ``DescentOptions``.
+    """Options of descent over samples, beside those of ``DescentOptions``.
 
     Attributes:
-        clip: largest norm of each situation's scaled gradient; inf: none.
-        forget: [1/s] how fast adjoints fade on their way back; 0: not at all.
+        clip: largest norm of each sample's scaled gradient; inf: none.
+        adjoint_discount: [1/s] how fast adjoints decay on their way back; 0: not at all. Its old name is ``forget``.
         fallen: weight of a motion that was over before its time.
         horizons: [s] shorter motions that gradients begin with, one after the other.
         growth: share of the iterations that these take together.
@@ -52,7 +52,7 @@ class StochasticOptions(DescentOptions):
     __pydantic_config__: ClassVar[dict[str, object]] = {"extra": "forbid"}
 
     clip: float = 1.0
-    forget: float = 2.0
+    adjoint_discount: float = field(default=2.0, metadata={"was": "forget"})
     fallen: float = 5.0
     horizons: tuple[float, ...] = ()
     growth: float = 0.5
@@ -60,9 +60,9 @@ class StochasticOptions(DescentOptions):
     sigma: float = 0.03
 
     def __post_init__(self) -> None:
-        """ValueError that names the option and says what would be valid."""
+        """ValueError that names the option and what would be valid."""
         super().__post_init__()
-        at_least(0, forget=self.forget)
+        at_least(0, adjoint_discount=self.adjoint_discount)
         require(self.clip > 0, "clip", "above 0")
         require(self.fallen > 0, "fallen", "above 0")
         require(0 < self.sigma < math.inf, "sigma", "above 0")
@@ -79,11 +79,11 @@ class StochasticOptions(DescentOptions):
 class StochasticDescent(Descent[StochasticOptions]):
     """Along the mean of shortened gradients."""
 
-    def estimate(self, state: DescentState, samples: Drawn) -> GradientEstimate | StopReason:
+    def estimate(self, state: DescentState, samples: ScenarioSamples) -> GradientEstimate | StopReason:
         """See ``Descent``."""
         options = self.options
         horizon = options.horizon(state.iteration)
-        values = self.evaluator.sample_gradients(state.z, samples, options.forget, horizon)
+        values = self.evaluator.sample_gradients(state.z, samples, options.adjoint_discount, horizon)
         found = average(values, self.scale, options.clip, options.fallen)
         if found.left_out == len(values.merit):
             return StopReason(Status.NOT_FINITE, NOT_FINITE)
@@ -95,7 +95,7 @@ class StochasticDescent(Descent[StochasticOptions]):
         outputs = {LASTING: found.alive, "agreement of its gradients": found.agreement}
         return GradientEstimate(point, self._mixed(state, samples, found), found.typical, words, outputs)
 
-    def _mixed(self, state: DescentState, samples: Drawn, found: GradientAverage) -> Array:
+    def _mixed(self, state: DescentState, samples: ScenarioSamples, found: GradientAverage) -> Array:
         """The gradient that the step is made of."""
         options = self.options
         if not options.evolution:
@@ -107,11 +107,11 @@ class StochasticDescent(Descent[StochasticOptions]):
 
 STOCHASTIC = make_solver(
     "stochastic",
-    "first-order descent in situations that are drawn anew",
+    "first-order descent over samples of the scenarios, drawn anew",
     StochasticOptions,
     iterating(StochasticDescent),
     refusal=refusal,
     rate=lambda options, seed: rate_by_validation(options.batch(seed)),
-    situations=True,
+    scenarios=True,
 )
 """See ``Solver``."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symphys.shooting import Drawn, Values
+from symphys.shooting import ScenarioSamples, Values
 from symphys.solvers.core.outcome import Array
 
 TINY, LARGEST = 1e-300, 1e300
@@ -87,10 +87,10 @@ class ValueGradient:
 
 
 def evolution(
-    evaluate: Callable[[Array, Drawn], Values],
+    evaluate: Callable[[Array, ScenarioSamples], Values],
     z: Array,
     step: Array,
-    drawn: Drawn,
+    samples: ScenarioSamples,
     rng: np.random.Generator,
 ) -> ValueGradient:
     """A gradient from values: z moved to either side at random in each sample.
@@ -99,19 +99,19 @@ def evolution(
     samples, in units of ``step`` = s (n,), where r is the rank of a merit among all that are finite, from -1/2 to
     1/2: how bad a fall is does not matter then, only that it is worse.
     """
-    noise = rng.standard_normal((len(drawn.numbers), z.size))
-    sides = [evaluate(z + sign * step * noise, drawn) for sign in (1, -1)]
+    noise = rng.standard_normal((len(samples.numbers), z.size))
+    sides = [evaluate(z + sign * step * noise, samples) for sign in (1, -1)]
     merits = np.stack([side.merit for side in sides])
-    known = np.isfinite(merits).all(axis=0)
-    high, low = centred(merits[:, known])
-    pairs = int(known.sum())
-    objective = np.stack([side.objective for side in sides])[:, known]
+    finite = np.isfinite(merits).all(axis=0)
+    high, low = centred(merits[:, finite])
+    pairs = int(finite.sum())
+    objective = np.stack([side.objective for side in sides])[:, finite]
     lasted = [1.0 if side.alive is None else float(side.alive.mean()) for side in sides]
     return ValueGradient(
-        gradient=np.asarray((high - low) / 2 @ noise[known] / max(pairs, 1)),
+        gradient=np.asarray((high - low) / 2 @ noise[finite] / max(pairs, 1)),
         pairs=pairs,
         objective=mean(objective),
-        merit=mean(merits[:, known]),
+        merit=mean(merits[:, finite]),
         first=sides[0],
         alive=sum(lasted) / 2,
     )

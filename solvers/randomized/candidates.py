@@ -7,13 +7,13 @@ from typing import Protocol
 
 import numpy as np
 
-from symphys.shooting import Drawn
+from symphys.shooting import ScenarioSamples
 from symphys.solvers.core.convergence import converged
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Log
 from symphys.solvers.core.outcome import Array, Status, StopReason
 from symphys.solvers.core.point import Point
-from symphys.solvers.randomized.validation import SITUATIONS, Validation, ValidationBatch, outputs_of
+from symphys.solvers.randomized.validation import SAMPLES, Validation, ValidationBatch, outputs_of
 
 
 class Candidates(Protocol):
@@ -86,9 +86,9 @@ class SampledCandidates:
     def rate(self, Z: Sequence[Array], generation: int) -> list[Point]:
         """See ``Candidates``: means; a candidate with one motion that is not finite is none."""
         scenario, batch, each = self.evaluator.scenario, self.validation.batch, self.rollouts
-        stream = np.random.default_rng([batch.seed, SITUATIONS, generation])
+        stream = np.random.default_rng([batch.seed, SAMPLES, generation])
         drawn = scenario.draw(stream, each, self.width, generation % len(scenario.grids))
-        many = Drawn(drawn.grid, np.tile(drawn.numbers, (len(Z), 1)))
+        many = ScenarioSamples(drawn.grid, np.tile(drawn.numbers, (len(Z), 1)))
         values = self.evaluator.sample_values(np.repeat(np.array(Z), each, axis=0), many)
         met = self.evaluator.problem.met
         merits, objectives = (part.reshape(-1, each).mean(axis=1) for part in (values.merit, values.objective))

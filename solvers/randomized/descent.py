@@ -12,36 +12,36 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from symphys.shooting import Drawn, ShootingProblem
+from symphys.shooting import ScenarioSamples, ShootingProblem
 from symphys.solvers.core.checkpoint import revive
 from symphys.solvers.core.directions import DirectionMemory, Habits, adam
 from symphys.solvers.core.interface import Iteration, StageContext
 from symphys.solvers.core.options import at_least, require
 from symphys.solvers.core.outcome import Array, Status, StopReason
 from symphys.solvers.core.point import Point
-from symphys.solvers.randomized.validation import SITUATIONS, Validation, ValidationBatch
+from symphys.solvers.randomized.validation import SAMPLES, Validation, ValidationBatch
 
-NO_SITUATIONS = (
-    "this problem has no situations to draw: add [[scenario]] tables (and a C compiler, if there is none), or use "
+NO_SCENARIO = (
+    "this problem has no samples to draw: add [[scenario]] tables (and a C compiler, if there is none), or use "
     "another solver"
 )
-DONE = "all iterations are done; kept is the point that did best in the situations for validation"
+DONE = "all iterations are done; kept is the point that did best in the validation samples"
 LASTING = "share of the batch that lasts"
 
 
 @dataclass(frozen=True)
 class DescentOptions:
-    """Options that all descents in drawn situations share.
+    """Options that all descents over samples share.
 
     Attributes:
         iterations: batches, in each stage of smoothing.
-        samples: situations in a batch, the problem's own among them. Discretisations take turns.
-        width: how widely situations vary, relative to their tables.
+        samples: of the scenarios in a batch, the problem's own among them. Discretisations take turns.
+        width: how widely samples vary, relative to their tables.
         rate: of Adam, in units of scale.
         hold: share of the iterations at the full rate; from then on it falls in proportion, to ``last`` of it.
         last: share of the rate at the end.
         betas: of Adam.
-        validation: situations that decide which point is kept, the start among them; 0: the last point is.
+        validation: samples that decide which point is kept, the start among them; 0: the last point is.
         validation_width: how widely these vary.
         every: iterations between two validations.
         patience: share of the iterations before the first of them.
@@ -60,7 +60,7 @@ class DescentOptions:
     patience: float = 0.3
 
     def __post_init__(self) -> None:
-        """ValueError that names the option and says what would be valid."""
+        """ValueError that names the option and what would be valid."""
         at_least(0, iterations=self.iterations, validation=self.validation)
         at_least(1, samples=self.samples, every=self.every)
         at_least(0, width=self.width, validation_width=self.validation_width)
@@ -138,7 +138,7 @@ class Descent(ABC, Generic[OptionsT]):
         self.validation = Validation(self.evaluator, options.batch(self.seed), self.log)
 
     @abstractmethod
-    def estimate(self, state: DescentState, samples: Drawn) -> GradientEstimate | StopReason:
+    def estimate(self, state: DescentState, samples: ScenarioSamples) -> GradientEstimate | StopReason:
         """The gradient from a batch; the reason where it yields none."""
 
     def init(self) -> Iteration[DescentState]:
@@ -173,13 +173,13 @@ class Descent(ABC, Generic[OptionsT]):
         """See ``Method``."""
         return revive(DescentState, saved, DirectionMemory)
 
-    def draw(self, iteration: int) -> Drawn:
+    def draw(self, iteration: int) -> ScenarioSamples:
         """The batch of an iteration, on the grid whose turn it is."""
-        stream = np.random.default_rng([self.seed, SITUATIONS, iteration])
+        stream = np.random.default_rng([self.seed, SAMPLES, iteration])
         grid = iteration % len(self.scenario.grids)
         return self.scenario.draw(stream, self.options.samples, self.options.width, grid)
 
 
 def refusal(problem: ShootingProblem) -> str:
     """Why a descent over samples is not for a problem."""
-    return NO_SITUATIONS if problem.situations is None else ""
+    return NO_SCENARIO if problem.scenario is None else ""

@@ -19,10 +19,10 @@ from symphys.solvers.core.point import Point
 from symphys.solvers.randomized.aggregation import mean
 
 NO_BETTER = (
-    "no point did better in the situations for validation than the start, which is kept: take smaller steps, another "
+    "no point did better in the validation samples than the start, which is kept: take smaller steps, another "
     "seed or another solver"
 )
-VALIDATION, SITUATIONS, NOISE = 1, 2, 3
+VALIDATION, SAMPLES, NOISE = 1, 2, 3
 """Streams of random numbers."""
 
 
@@ -72,7 +72,7 @@ class Validation:
         return StopReason(Status.STALLED if reason.status is Status.CONVERGED else reason.status, NO_BETTER)
 
     def rated(self, z: Array) -> tuple[Point, str]:
-        """The point by its means, and words on how many motions last."""
+        """The point by its means, and for the log how many motions last."""
         values = self.evaluator.sample_values(z[None], self.samples)
         finite = np.isfinite(values.merit)
         means = mean(values.merit[finite]), mean(values.objective[finite])
@@ -84,7 +84,7 @@ def rate_by_validation(batch: ValidationBatch) -> Rate:
     """Rates points as a validation does where there are samples; by one rollout each where there is no scenario."""
 
     def rate(evaluator: CountingEvaluator, Z: Sequence[Array]) -> list[Point]:
-        if evaluator.problem.situations is None:
+        if evaluator.problem.scenario is None:
             return evaluator.rate(Z)
         if not batch.count:
             return []

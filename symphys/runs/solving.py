@@ -131,9 +131,9 @@ def write(
 
 def columns(row: TraceRow, price: Mapping[str, float]) -> dict[str, object]:
     """A row of the trace as a line of a table."""
-    numbers = asdict(row)
-    told = numbers.pop("told")
-    return {**numbers, "equivalents": equivalents(row, price), **{TOLD + name: value for name, value in told.items()}}
+    numbers = {"miss" if name == "max_violation" else name: value for name, value in asdict(row).items()}
+    outputs = {TOLD + name: value for name, value in numbers.pop("outputs").items()}
+    return {**numbers, "equivalents": equivalents(row, price), **outputs}
 
 
 def record(

@@ -34,7 +34,7 @@ def stage_record(transcription: Transcription, stage: StageResult, price: Mappin
         smoothing=stage.smoothing,
         status=stage.status.value,
         objective=stage.objective,
-        worst=stage.miss,
+        worst=stage.max_violation,
         exact_objective=exact.objective,
         exact_worst=exact.worst,
         solved=exact.solved,

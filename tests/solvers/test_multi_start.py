@@ -1,4 +1,4 @@
-"""Solves side by side end as they do alone, in fewer calls."""
+"""Batched multi-start: solves side by side end as each does alone, to the bit, in fewer calls."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def same(a: Outcome, b: Outcome) -> None:
     assert (a.status, a.advice, a.counts) == (b.status, b.advice, b.counts)
     assert np.array_equal(a.z, b.z)
     rows = [
-        [(*astuple(replace(row, seconds=0))[:-1], *row.told.values()) for row in outcome.trace] for outcome in (a, b)
+        [(*astuple(replace(row, seconds=0))[:-1], *row.outputs.values()) for row in outcome.trace] for outcome in (a, b)
     ]
     np.testing.assert_array_equal(rows[0], rows[1])
 
