@@ -83,7 +83,7 @@ def raced(walks: Walks, name: str, seed: int) -> Course:
     found = SOLVERS[name].solve(shooting, shooting.start(seed), options, seed, monitor=rows.append)
     spent = perf_counter() - began
     course = Course(
-        NAMES[name], np.array([row.seconds for row in rows]), np.array([row.told["speed [m/s]"] for row in rows])
+        NAMES[name], np.array([row.seconds for row in rows]), np.array([row.outputs["speed [m/s]"] for row in rows])
     )
     speed, upright = walks(found.z, walks.situations.draw(np.random.default_rng(SEED), UNSEEN))
     marks = ", ".join(f"{mark} m/s after {course.reaches(mark):.0f} s" for mark in MARKS)

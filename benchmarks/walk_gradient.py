@@ -46,7 +46,7 @@ def gait(made: Transcription, amplitude: float) -> Array:
 
 def compared(made: Transcription, z: Array) -> tuple[Array, Array]:
     """(situations * directions,) relative errors of slopes, and (situations,) lengths of gradients."""
-    situations = made.shooting.situations
+    situations = made.shooting.scenario
     assert situations is not None
     rng = np.random.default_rng(0)
     drawn = situations.draw(rng, SITUATIONS)

@@ -20,7 +20,7 @@ from symphys.codegen import Place
 from symphys.problem import Problem, load_problem
 from symphys.problems import find
 from symphys.runs.job import solver_options
-from symphys.shooting import Drawn
+from symphys.shooting import ScenarioSamples
 from symphys.solvers import SOLVERS
 from symphys.transcription import Transcription, transcribe
 from symphys.transcription.randomization.evaluator import KernelSituations
@@ -35,12 +35,12 @@ class Walks:
     def __init__(self, problem: Problem) -> None:
         """Compile it."""
         made = transcribe(problem, exact=True)
-        assert isinstance(made.shooting.situations, KernelSituations), made.backend.note
-        self.problem, self.made, self.situations = problem, made, made.shooting.situations
+        assert isinstance(made.shooting.scenario, KernelSituations), made.backend.note
+        self.problem, self.made, self.situations = problem, made, made.shooting.scenario
         names = [*(f"target {t.name}" for t in problem.targets), *(c.name for c in problem.constraints)]
         self.upright = names.index("stays upright")
 
-    def __call__(self, z: Array, drawn: Drawn) -> tuple[Array, Array]:
+    def __call__(self, z: Array, drawn: ScenarioSamples) -> tuple[Array, Array]:
         """(count,) mean speed [m/s], and whether upright at every step."""
         errors = self.situations.value(z[None], drawn, 0.0).errors
         kernel, rows = self.situations.kernels[0], np.hstack([np.tile(z, (len(drawn.numbers), 1)), drawn.numbers])
@@ -49,7 +49,7 @@ class Walks:
         ends = kernel.trajectory(rows, last, 1, [0.0])[:, 0, 0]
         return ends / self.problem.simulation.duration, errors[:, self.upright] <= 1
 
-    def draw(self, count: int) -> Drawn:
+    def draw(self, count: int) -> ScenarioSamples:
         """Situations as the tables say, the problem's own first."""
         return self.situations.draw(np.random.default_rng(SEED), count)
 

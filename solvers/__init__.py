@@ -1,4 +1,4 @@
-"""Optimisers: each takes a shooting problem and gives an outcome, and knows nothing of physics.
+"""Optimisers: each takes a shooting problem and returns an outcome; none depends on the physics.
 
 ``SOLVERS`` lists them; ``solver(name)`` finds one. All follow one interface, ``Solver``, and stop at the first
 evaluated point that meets every target, unless the problem says otherwise.
@@ -14,7 +14,8 @@ from typing import Any
 
 from symphys.errors import SymphysError
 from symphys.solvers.core.interface import Solver
-from symphys.solvers.core.multi_start import solve_together
+from symphys.solvers.core.multi_start import solve_multi_start
+from symphys.solvers.core.options import recorded_options
 from symphys.solvers.core.outcome import Counts, Monitor, Outcome, StageResult, Status, TraceRow
 from symphys.solvers.methods.cma_es import CMA, CmaOptions
 from symphys.solvers.methods.evolution import EVOLUTION, EvolutionOptions
@@ -38,7 +39,8 @@ __all__ = [
     "Status",
     "StochasticOptions",
     "TraceRow",
-    "solve_together",
+    "recorded_options",
+    "solve_multi_start",
     "solver",
 ]
 

@@ -1,4 +1,4 @@
-"""The shooting problem: all that a solver sees, evaluated for batches of decision vectors z."""
+"""The shooting problem: what a solver minimises, evaluated for batches of decision vectors z."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Function = Any
 
 
 @dataclass(frozen=True)
-class Block:
+class VariableBlock:
     """One named part of z, flattened knot after knot.
 
     Attributes:
@@ -49,7 +49,7 @@ class Values:
     Attributes:
         merit, objective: (batch,).
         errors: (batch, k).
-        outputs: (batch, o) what is told, see ``ShootingProblem.output_names``; None: nothing.
+        outputs: (batch, o) see ``ShootingProblem.output_names``; None: the problem has none.
         gradient: (batch, n) of the merit; None where it was not asked for.
         residuals, jacobian: (batch, m) and (batch, m, n), merit = r . r; None where they were not asked for.
         probe: (batch,) the number whose gradient is examined; None where it is not computed.
@@ -103,20 +103,22 @@ class WithoutResiduals:
 
 
 @dataclass(frozen=True)
-class Drawn:
-    """Situations that were drawn: one a row.
+class ScenarioSamples:
+    """Samples of the problem's scenarios, one a row.
 
     Attributes:
         grid: the number of the discretisation.
-        numbers: (batch, s) all that differs.
+        numbers: (batch, s) all that differs between samples.
     """
 
     grid: int
     numbers: Array
 
 
-class Situations(Protocol):
-    """Evaluates points in situations that differ: other friction, other masses, another pose, pushes.
+class ScenarioEvaluator(Protocol):
+    """Draws samples of the problem's scenarios (domain randomization), and evaluates points in them.
+
+    Samples differ in friction, masses, start pose, pushes: in what the [[scenario]] tables vary.
 
     Attributes:
         grids: what the discretisations are called; the first is that of the problem.
@@ -124,25 +126,31 @@ class Situations(Protocol):
 
     grids: tuple[str, ...]
 
-    def draw(self, rng: np.random.Generator, count: int, width: float = 1.0, grid: int = 0) -> Drawn:
-        """``count`` situations: the first is that of the problem, the others vary ``width`` times as widely as there.
+    def draw(self, rng: np.random.Generator, count: int, width: float = 1.0, grid: int = 0) -> ScenarioSamples:
+        """``count`` samples: the first is the problem's own, the others vary ``width`` times as widely as its tables.
 
-        The same stream gives the same situations on every grid.
+        The same stream gives the same samples on every grid.
         """
         ...
 
-    def value(self, Z: Array, drawn: Drawn, smoothing: float) -> Values:
+    def value(self, Z: Array, samples: ScenarioSamples, smoothing: float, /) -> Values:
         """Z (batch, n), or (1, n) for all: merits, objectives, errors, alive."""
         ...
 
     def gradient(
-        self, Z: Array, drawn: Drawn, smoothing: float, forget: float = 0.0, horizon: float = math.inf
+        self,
+        Z: Array,
+        samples: ScenarioSamples,
+        smoothing: float,
+        /,
+        adjoint_discount: float = 0.0,
+        horizon: float = math.inf,
     ) -> Values:
         """These and the gradients of the merits.
 
-        With ``forget`` [1/s] above 0 the adjoint of the state falls like exp(-forget t) on its way back, and ends where
-        a motion was over: no derivative, but what descends where derivatives explode. After ``horizon`` [s] nothing
-        moves, and what is summed over time is 0: what is computed takes so much less time.
+        With ``adjoint_discount`` [1/s] above 0 the adjoint of the state decays like exp(-adjoint_discount t) on its way
+        back, and ends where a motion was over: no derivative, but what descends where derivatives explode. After
+        ``horizon`` [s] nothing moves, and what is summed over time is 0: what is computed takes so much less time.
         """
         ...
 
@@ -170,7 +178,7 @@ class Nlp:
 class ShootingProblem:
     """Minimise objective(z) within bounds and constraints.
 
-    ``merit`` is the objective plus the quadratic penalty of violated constraints, for solvers that know no
+    ``merit`` is the objective plus the quadratic penalty of violated constraints, for solvers without
     constraints; without constraints both are the same. ``errors`` holds one number per target, constraint and goal,
     divided by its tolerance: met where <= 1.
 
@@ -183,14 +191,14 @@ class ShootingProblem:
         constraint_names: one per entry of the constraints.
         constraint_lower, constraint_upper: (m,).
         limits: which of the errors are those of constraints.
-        smoothing: stages of the knob, decreasing, at least one; each starts from the best point of the one before.
+        smoothing: of each stage, decreasing, at least one; each starts from the best point of the one before.
         stop_when_met: stop at the first point whose errors are all <= 1, instead of at a stationary point.
-        output_names: of the numbers that are told.
-        situations: in which points can be evaluated, beside that of ``evaluator``; None: there are no others.
+        output_names: of the reported quantities.
+        scenario: evaluates points in samples of the problem's scenarios; None: it has none.
     """
 
     name: str
-    blocks: tuple[Block, ...]
+    blocks: tuple[VariableBlock, ...]
     evaluator: Evaluator
     nlp: Nlp
     squares: bool
@@ -201,7 +209,7 @@ class ShootingProblem:
     smoothing: tuple[float, ...] = (0.0,)
     stop_when_met: bool = True
     output_names: tuple[str, ...] = ()
-    situations: Situations | None = None
+    scenario: ScenarioEvaluator | None = None
 
     @property
     def n(self) -> int:

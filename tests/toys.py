@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from symphys.codegen import FunctionCall, KernelUnavailable, MemoryLayout, Program
 from symphys.codegen.backends import BackendSource, choose
 from symphys.codegen.toolchain.compiler import find_compiler
-from symphys.shooting import Block, Evaluator, ShootingProblem, Values
+from symphys.shooting import Evaluator, ShootingProblem, Values, VariableBlock
 from symphys.solvers import SOLVERS, Outcome, TraceRow, solver
 
-PLAIN = [name for name, each in SOLVERS.items() if not each.situations]
-"""The solvers that need no situations."""
+PLAIN = [name for name, each in SOLVERS.items() if not each.scenarios]
+"""The solvers that need no scenario."""
 
 Array = NDArray[np.float64]
 Formula = Callable[[Any, Any], Any]
@@ -50,12 +50,12 @@ def toy(
     guess: float = 0.0,
     scale: float = 1.0,
     backend: str = "casadi",
-    told: bool = False,
+    outputs: bool = False,
     **more: Any,
 ) -> ShootingProblem:
     """A problem from formulas; ``constraint`` should be zero and is penalised in the merit.
 
-    ``told``: it tells the sum of z.
+    ``outputs``: it has one, the sum of z.
     """
     z, s = ca.MX.sym("z", n), ca.MX.sym("s")
     r = residuals(z, s) if residuals else None
@@ -63,7 +63,7 @@ def toy(
     c = constraint(z, s) if constraint else ca.MX(0, 1)
     e = ca.vertcat(errors(z, s) if errors else ca.MX(0, 1), ca.fabs(c) / TOLERANCE)
     rows = ca.vertcat(r, np.sqrt(PENALTY) * c) if residuals else None
-    o = ca.sum1(z) if told else ca.MX(0, 1)
+    o = ca.sum1(z) if outputs else ca.MX(0, 1)
     merit = f + PENALTY * ca.sumsqr(c)
     functions = ToyFunctions(
         value=ca.Function("value", [z, s], [merit, f, e, o]),
@@ -84,7 +84,7 @@ def toy(
         constraint_lower=zeros,
         constraint_upper=zeros,
         limits=range(e.numel() - c.numel(), e.numel()),
-        output_names=("sum [m]",) if told else (),
+        output_names=("sum [m]",) if outputs else (),
         **more,
     )
 
@@ -109,10 +109,10 @@ def program(z: Any, s: Any, named: dict[str, Any]) -> Program:
     return Program(layout.size, *inputs, steps=0, outputs=outputs, epilogue=(call,))
 
 
-def block(n: int, bounds: tuple[float, float], guess: float, scale: float) -> Block:
+def block(n: int, bounds: tuple[float, float], guess: float, scale: float) -> VariableBlock:
     """One block of n components."""
     ones = np.ones(n)
-    return Block("x", 0, (n, 1), guess * ones, bounds[0] * ones, bounds[1] * ones, scale * ones, 0.1 * ones)
+    return VariableBlock("x", 0, (n, 1), guess * ones, bounds[0] * ones, bounds[1] * ones, scale * ones, 0.1 * ones)
 
 
 def quadratic(**more: Any) -> ShootingProblem:

@@ -1,4 +1,4 @@
-"""A toy whose situations differ: a wind that moves what is best."""
+"""A toy with a scenario: a wind that moves what is best."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from toys import toy
 
-from symphys.shooting import Array, Drawn, ShootingProblem, Values
+from symphys.shooting import Array, ScenarioSamples, ShootingProblem, Values
 
 BEST = np.array([0.5, -0.25])
 
@@ -22,12 +22,12 @@ class Winds:
         self.asked: list[int] = []
         self.horizons: list[float] = []
 
-    def draw(self, rng: np.random.Generator, count: int, width: float = 1.0, grid: int = 0) -> Drawn:
+    def draw(self, rng: np.random.Generator, count: int, width: float = 1.0, grid: int = 0) -> ScenarioSamples:
         rows = width * self.spread * rng.uniform(-1, 1, (count, 2))
         rows[0] = 0
-        return Drawn(grid, rows)
+        return ScenarioSamples(grid, rows)
 
-    def value(self, Z: Array, drawn: Drawn, smoothing: float) -> Values:
+    def value(self, Z: Array, drawn: ScenarioSamples, smoothing: float) -> Values:
         off = Z - BEST - drawn.numbers
         merit = (off**2).sum(axis=1)
         over = np.abs(drawn.numbers).max(axis=1) > self.storm
@@ -35,7 +35,7 @@ class Winds:
         return Values(merit, merit, np.zeros((len(merit), 0)), alive=1.0 - over)
 
     def gradient(
-        self, Z: Array, drawn: Drawn, smoothing: float, forget: float = 0.0, horizon: float = np.inf
+        self, Z: Array, drawn: ScenarioSamples, smoothing: float, adjoint_discount: float = 0.0, horizon: float = np.inf
     ) -> Values:
         self.asked.append(drawn.grid)
         self.horizons.append(horizon)
@@ -46,4 +46,4 @@ class Winds:
 
 def windy(**settings: Any) -> ShootingProblem:
     """The problem."""
-    return replace(toy(2, objective=lambda z, s: ca.sumsqr(z - BEST)), situations=Winds(**settings))
+    return replace(toy(2, objective=lambda z, s: ca.sumsqr(z - BEST)), scenario=Winds(**settings))

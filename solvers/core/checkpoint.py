@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import astuple, fields, is_dataclass
+from dataclasses import astuple, dataclass, fields, is_dataclass
 from enum import Enum
 from functools import partial
 from typing import Any, TypeVar
@@ -12,8 +12,7 @@ import numpy as np
 
 from symphys.errors import SymphysError
 from symphys.shooting import ShootingProblem
-from symphys.solvers.core.evaluator import Snapshot
-from symphys.solvers.core.outcome import Counts, StageResult, Status, TraceRow
+from symphys.solvers.core.outcome import Array, Counts, StageResult, Status, TraceRow
 from symphys.solvers.core.point import Point
 
 T = TypeVar("T")
@@ -27,15 +26,38 @@ READERS: dict[str, Callable[[Any], Any]] = {
     "tuple[float, ...]": lambda value: tuple(float(number) for number in value),
 }
 """By the annotation of a field; float() also reads the strings "nan" and "inf" of strict JSON."""
+OLD_NAMES = {"miss": "max_violation"}
+"""Of fields in checkpoints that were written before these were renamed."""
 
 
-def to_checkpoint(solver: str, snapshot: Snapshot, rows: Iterable[TraceRow]) -> dict[str, object]:
-    """Everything that ``from_checkpoint`` asks for."""
-    best = snapshot.best
+@dataclass(frozen=True)
+class Checkpoint:
+    """All that a solve needs to go on: taken when an iteration is complete, never in its middle.
+
+    Attributes:
+        stages: of smoothing, that were over by then.
+        state: the method's own.
+        best: of this stage.
+        last: (n,) z of the last row of the trace.
+        counts, rows, seconds: the work up to here, and the number of rows of the trace.
+    """
+
+    stages: tuple[StageResult, ...]
+    state: object
+    best: Point
+    last: Array
+    counts: Counts
+    rows: int
+    seconds: float
+
+
+def to_plain(solver: str, checkpoint: Checkpoint, rows: Iterable[TraceRow]) -> dict[str, object]:
+    """Everything that ``from_plain`` reads."""
+    best = checkpoint.best
     return {
         "solver": solver,
-        "stages": plain(snapshot.stages),
-        "state": plain(snapshot.state),
+        "stages": plain(checkpoint.stages),
+        "state": plain(checkpoint.state),
         "best": {
             "z": plain(best.z),
             "merit": best.merit,
@@ -44,36 +66,41 @@ def to_checkpoint(solver: str, snapshot: Snapshot, rows: Iterable[TraceRow]) -> 
             "outputs": plain(best.outputs),
             "spoilt": best.spoilt,
         },
-        "last": plain(snapshot.last),
-        "counts": list(astuple(snapshot.counts)),
-        "seconds": snapshot.seconds,
+        "last": plain(checkpoint.last),
+        "counts": list(astuple(checkpoint.counts)),
+        "seconds": checkpoint.seconds,
         "rows": [list(astuple(row)) for row in rows],
     }
 
 
-def from_checkpoint(
-    checkpoint: dict[str, Any], solver: str, problem: ShootingProblem
-) -> tuple[Snapshot, dict[str, Any], list[TraceRow]]:
-    """The snapshot, the solver's state as plain values, the trace; SymphysError if damaged or of another solve."""
-    if checkpoint.get("solver") != solver:
-        raise SymphysError(f"this checkpoint is of the solver {checkpoint.get('solver')!r}, not of {solver!r}")
+def from_plain(
+    saved: dict[str, Any], solver: str, problem: ShootingProblem
+) -> tuple[Checkpoint, dict[str, Any], list[TraceRow]]:
+    """The checkpoint, the method's state as plain values, the trace; SymphysError if damaged or of another solve."""
+    if saved.get("solver") != solver:
+        raise SymphysError(f"this checkpoint is of the solver {saved.get('solver')!r}, not of {solver!r}")
     try:
-        best = checkpoint["best"]
+        best = saved["best"]
         z, errors, outputs = (np.array(best[name], float) for name in ("z", "errors", "outputs"))
         numbers, met = (float(best["merit"]), float(best["objective"])), problem.met(errors)
         point = Point(z, *numbers, errors, met, outputs, spoilt=int(best["spoilt"]))
-        counts = Counts(*map(int, checkpoint["counts"]))
-        rows = [revive(TraceRow, dict(zip(names(TraceRow), row, strict=True))) for row in checkpoint["rows"]]
-        stages = tuple(revive(StageResult, dict(each), Counts) for each in checkpoint["stages"])
-        seconds = float(checkpoint["seconds"])
-        state, last = dict(checkpoint["state"]), np.array(checkpoint["last"], float)
+        counts = Counts(*map(int, saved["counts"]))
+        rows = [revive(TraceRow, dict(zip(names(TraceRow), row, strict=True))) for row in saved["rows"]]
+        stages = tuple(revive(StageResult, present(each), Counts) for each in saved["stages"])
+        seconds = float(saved["seconds"])
+        state, last = dict(saved["state"]), np.array(saved["last"], float)
     except (KeyError, TypeError, ValueError) as error:
         raise damaged(error) from error
     if z.shape != (problem.n,):
         raise SymphysError(f"this checkpoint has {z.size} variables, the problem {problem.n}")
     if tuple(stage.smoothing for stage in stages) != problem.smoothing[:-1][: len(stages)]:
         raise SymphysError("this checkpoint has other stages of smoothing than the problem")
-    return Snapshot(stages, state, point, last, counts, len(rows), seconds), state, rows
+    return Checkpoint(stages, state, point, last, counts, len(rows), seconds), state, rows
+
+
+def present(stage: dict[str, Any]) -> dict[str, Any]:
+    """The fields of a stage by their present names."""
+    return {OLD_NAMES.get(name, name): value for name, value in stage.items()}
 
 
 def revive(kind: type[T], values: dict[str, Any], *parts: type[Any]) -> T:
@@ -100,7 +127,7 @@ def plain(value: object) -> Any:
 
 
 def damaged(error: Exception) -> SymphysError:
-    """What to say of a checkpoint that cannot be read."""
+    """The error for a checkpoint that cannot be read."""
     return SymphysError(f"the checkpoint is damaged ({error!r}): start afresh without it")
 
 

@@ -1,124 +1,106 @@
 """Continuation: a solve as stages of smoothing, from large to small, each from the best point of the one before.
 
-What a stage hands on is a point and nothing else. Step lengths, damping and sigma begin anew: those that a stage ends
-with are small because it has converged, and say nothing of the next one, whose merit is another function. A stage ends
-as a solve does, when it has converged, stalled or used up its budget, each stage having the whole of it; where the
-problem stops at the first point that meets everything, a stage stops at the first that does at its own smoothing. The
-last stage decides how the solve ended: what an earlier one met at its own smoothing counts for nothing. Its best point
-is the solution, unless the start or the point of another stage does better at smoothing 0, see ``comparison``.
+A stage passes on a point and nothing else. Step lengths, damping and sigma begin anew: those that a stage ends with are
+small because it has converged, and do not fit the next one, whose merit is another function. A stage ends as a solve
+does, when it has converged, stalled or used up its budget, each stage having the whole of it; where the problem stops
+at the first point that meets everything, a stage stops at the first that does at its own smoothing. The last stage
+decides how the solve ended: what an earlier one met at its own smoothing counts for nothing.
 
-A solver knows nothing of this: it gives one function that minimises at the meter's smoothing.
+Smoothed merits do not bound exact ones: the best point of a stage may be worse at smoothing 0 than where it started. So
+at the end of the last stage its point, those of the other stages and the start are all rated at 0. The solution is that
+of the last stage unless another is strictly better. A solve without smoothing has compared all of its points already.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import astuple, dataclass
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from symphys.shooting import ShootingProblem
-from symphys.solvers.core.checkpoint import from_checkpoint
-from symphys.solvers.core.comparison import Rate, compared
-from symphys.solvers.core.evaluator import Meter, Snapshot, Stop, Verdict
-from symphys.solvers.core.interface import Log
-from symphys.solvers.core.outcome import Array, Counts, Monitor, StageResult, Status
+from symphys.solvers.core.evaluator import CountingEvaluator
+from symphys.solvers.core.outcome import Array, Counts, StageResult, Status, StopReason
+from symphys.solvers.core.point import Incumbent, Point
 
-FINISHED: dict[str, object] = {}
-"""The state of a stage that has nothing left to do."""
+Rate = Callable[[CountingEvaluator, Sequence[Array]], list[Point]]
+"""Rates points as the solver compares them, without offering them to the incumbent; [] where it compares none."""
+EXACT = 0.0
 FATAL = (Status.NOT_APPLICABLE, Status.FAILED)
 """What ends the solve in whatever stage it happens. Numbers that are not finite may be so at one smoothing only."""
+OVERTAKEN = (
+    "{} does better in the exact rollout than what the last stage came to, and is kept: what the stages gained, they "
+    "gained for another problem; try other stages, or none"
+)
 
-Stage = Callable[[Meter, Array, "dict[str, object] | None"], Verdict]
-"""Solve one stage from z, or from the solver's own state where a solve goes on; may raise Stop."""
+
+def stage_result(
+    smoothing: float,
+    status: Status,
+    z: Array,
+    best: Point | None,
+    total: tuple[Counts, float],
+    before: Sequence[StageResult],
+) -> StageResult:
+    """A stage that ended at ``z``; ``total``: the work and seconds up to its end, those of ``before`` included."""
+    counts, seconds = total
+    for stage in before:
+        counts -= stage.counts
+    seconds -= sum(stage.seconds for stage in before)
+    objective, max_violation = (best.objective, best.max_violation) if best else (np.nan, np.nan)
+    return StageResult(smoothing, status, z, objective, max_violation, counts, seconds)
 
 
-@dataclass(frozen=True)
-class Request:
-    """What a solver was called with, its own options and seed aside.
+def exact_best(
+    evaluator: CountingEvaluator,
+    rate: Rate,
+    start: Array,
+    stages: Sequence[StageResult],
+    z: Array,
+    reason: StopReason,
+) -> tuple[StopReason, Array]:
+    """The end of a solve and its solution (n,), where the last stage came to ``z`` (n,) for ``reason``.
 
-    Attributes:
-        solver: its name.
-        problem, start, monitor, checkpoint, log: see ``interface.Solve``.
-        constraints: whether the solver knows constraints, so that violated ones come before the merit.
-        rate: how the solver compares points; None: by one rollout each.
+    Args:
+        evaluator: of the last stage.
+        rate: how the solver compares points.
+        start: (n,) of the solve, within the bounds.
+        stages: those before the last.
+        z: (n,) the point of the last stage.
+        reason: why the last stage ended.
     """
-
-    solver: str
-    problem: ShootingProblem
-    start: Array
-    monitor: Monitor | None
-    checkpoint: dict[str, object] | None
-    log: Log | None
-    constraints: bool = False
-    rate: Rate | None = None
-
-
-def run_stages(request: Request, stage: Stage, meter: Meter, log: Log) -> Verdict:
-    """One stage after the other; the verdict is that of the last one run."""
-    z = meter.clip(np.array(request.start, float))
-    state: dict[str, object] | None = None
-    if request.checkpoint:
-        snapshot, state, rows = from_checkpoint(request.checkpoint, request.solver, request.problem)
-        meter.restore(snapshot, rows)
-        z = snapshot.stages[-1].z if snapshot.stages else z
-    verdict, knobs = Verdict(Status.MET), request.problem.smoothing
-    for index, smoothing in enumerate(knobs[len(meter.stages) :], len(meter.stages)):
-        meter.enter(smoothing, resumed=state is not None)
-        log(f"stage {index + 1} of {len(knobs)}: smoothing {smoothing:g}")
-        verdict = Verdict(Status.MET) if state == FINISHED else run_stage(request.solver, meter, stage, z, state)
-        z, state = (meter.best.z if meter.best else z), None
-        over, status = verdict.status in FATAL or index + 1 == len(knobs), verdict.status
-        if over:
-            verdict = compared(meter, request.rate or Meter.rated, request.start, z, verdict)
-        meter.stages = (*meter.stages, ended(meter, status, z))
-        if over:
-            break
-        log(words(verdict))
-    return verdict
+    problem = evaluator.problem
+    if problem.smoothing == (EXACT,) or reason.status is Status.NOT_APPLICABLE:
+        return reason, z
+    points = _rated(evaluator, rate, [z, *(stage.z for stage in stages), start])
+    if not points:
+        return reason, z
+    last, *others = points
+    if evaluator.smoothing == EXACT and evaluator.incumbent.best is not None:
+        last = evaluator.incumbent.best
+    chosen = last
+    for point in others:
+        chosen = point if point.better(chosen) else chosen
+    if chosen is last:
+        return reason, z
+    advice = OVERTAKEN.format(_name(stages, chosen.z))
+    if chosen.met and problem.stop_when_met:
+        return StopReason(Status.MET, advice), chosen.z
+    gained = reason.status in (Status.MET, Status.CONVERGED)
+    return StopReason(Status.STALLED if gained else reason.status, advice), chosen.z
 
 
-def run_stage(solver: str, meter: Meter, stage: Stage, z: Array, state: dict[str, object] | None) -> Verdict:
-    """Run a stage; errors of foreign code, and matrices that there is no memory for, become a verdict."""
+def _rated(evaluator: CountingEvaluator, rate: Rate, candidates: Sequence[Array]) -> list[Point]:
+    """At smoothing 0; [] where that fails, or where the candidates are all the same."""
+    if all(np.array_equal(each, candidates[0]) for each in candidates):
+        return []
     try:
-        return attempt(meter, stage, z, state)
-    except (RuntimeError, ArithmeticError, np.linalg.LinAlgError, MemoryError) as error:
-        return Verdict(Status.FAILED, f"{solver} failed: {str(error).strip() or type(error).__name__}")
+        return rate(evaluator.at(EXACT, Incumbent(stop_when_met=False)), candidates)
+    except (RuntimeError, ArithmeticError, np.linalg.LinAlgError):
+        return []
 
 
-def attempt(meter: Meter, stage: Stage, z: Array, state: dict[str, object] | None) -> Verdict:
-    """Run a stage; a point that ended it in the middle of an iteration gets its row in the trace."""
-    try:
-        return stage(meter, z, state)
-    except Stop as stop:
-        if stop.verdict.status is Status.MET and meter.best:
-            before = meter.best.z if meter.last is None else meter.last
-            meter.commit(meter.best, FINISHED, step=float(np.linalg.norm(meter.best.z - before)))
-        return stop.verdict
-
-
-def ended(meter: Meter, status: Status, z: Array) -> StageResult:
-    """The stage that is over, whose best point is ``z``."""
-    spent = less(meter.counts, (stage.counts for stage in meter.stages))
-    seconds = meter.seconds - sum(stage.seconds for stage in meter.stages)
-    objective, miss = (meter.best.objective, meter.best.miss) if meter.best else (np.nan, np.nan)
-    return StageResult(meter.smoothing, status, z, objective, miss, spent, seconds)
-
-
-def halfway(problem: ShootingProblem, snapshot: Snapshot) -> StageResult:
-    """The stage that an interruption has cut short."""
-    before, best = snapshot.stages, snapshot.best
-    spent = less(snapshot.counts, (stage.counts for stage in before))
-    seconds = snapshot.seconds - sum(stage.seconds for stage in before)
-    smoothing = problem.smoothing[len(before)]
-    return StageResult(smoothing, Status.INTERRUPTED, best.z, best.objective, best.miss, spent, seconds)
-
-
-def less(total: Counts, parts: Iterable[Counts]) -> Counts:
-    """The work that is not in the parts."""
-    return Counts(*(whole - sum(some) for whole, *some in zip(*map(astuple, (total, *parts)), strict=True)))
-
-
-def words(verdict: Verdict) -> str:
-    """A verdict in a line of the log."""
-    return ": ".join(filter(None, (verdict.status.value, verdict.advice)))
+def _name(stages: Sequence[StageResult], z: Array) -> str:
+    """A candidate in the words of the advice."""
+    for stage in stages:
+        if np.array_equal(stage.z, z):
+            return f"the point of the stage at smoothing {stage.smoothing:g}"
+    return "the guess"

@@ -1,83 +1,280 @@
-"""One solve from start to outcome: interruption and going on, foreign errors, what to say of a point."""
+"""The driver of a solve: it runs the stages and the loop of a method, records iterations, keeps the checkpoint.
+
+A method has ``init``, ``step`` and ``terminate``, see ``interface.Method``. Interruption and going on, the errors of
+foreign code, the trace and continuation are here, the same for all.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
-from symphys.solvers.core.checkpoint import to_checkpoint
-from symphys.solvers.core.continuation import Request, Stage, halfway, run_stages, words
-from symphys.solvers.core.evaluator import Meter, Stop, Verdict
-from symphys.solvers.core.outcome import Outcome, Status
-from symphys.solvers.core.point import Point
-from symphys.solvers.core.vanishing_gradient import FLAT, flat
+from symphys.shooting import ShootingProblem
+from symphys.solvers.core.checkpoint import Checkpoint, from_plain, to_plain
+from symphys.solvers.core.continuation import FATAL, Rate, exact_best, stage_result
+from symphys.solvers.core.evaluator import CountingEvaluator, WorkCounter
+from symphys.solvers.core.interface import Iteration, Log, Method, Recorder, Solver, StageContext, nothing
+from symphys.solvers.core.outcome import Array, Counts, Monitor, Outcome, StageResult, Status, StopReason
+from symphys.solvers.core.point import Incumbent, Stop
+from symphys.solvers.core.trace import SolveTrace, counts_of
 
+FINISHED: dict[str, object] = {}
+"""The state of a stage that has nothing left to do."""
 INTERRUPTED = "interrupted; with its checkpoint the solve goes on from here"
-MISSED = (
-    "a stationary point where not everything is met: try another guess or seed, other weights, "
-    "or stages such as smoothing = [0.1, 0.01, 0] in [simulation]"
-)
-START_NOT_FINITE = "the simulation of the start is not finite: look at the guess and at the formulas"
-GRADIENT_NOT_FINITE = (
-    "the cost is finite but its derivative is not: look for roots or norms of something that is zero in the formulas, "
-    "or solve with smoothing above 0"
-)
+
+O_inv = TypeVar("O_inv")
+StateT = TypeVar("StateT")
+Stage = Callable[[StageContext, O_inv, "dict[str, object] | None", Recorder], StopReason]
+"""Runs one stage from its start, or from the saved state of a method where a solve goes on."""
 
 
-def run(request: Request, stage: Stage) -> Outcome:
-    """Run every stage; whatever happens becomes a status with advice. SymphysError alone passes through."""
-    meter = Meter(request.problem, request.monitor, request.constraints)
-    log = request.log or silent
-    try:
-        verdict = run_stages(request, stage, meter, log)
-    except KeyboardInterrupt:
-        verdict = Verdict(Status.INTERRUPTED, INTERRUPTED)
-    log(words(verdict))
-    return outcome(request, meter, verdict)
+def refuse_none(problem: ShootingProblem) -> str:
+    """No reason: the solver is for every problem."""
+    return ""
 
 
-def outcome(request: Request, meter: Meter, verdict: Verdict) -> Outcome:
-    """The best point; of an interrupted solve that of its last complete iteration, and all that belongs to it."""
-    snapshot = meter.snapshot
-    if verdict.status is not Status.INTERRUPTED or snapshot is None:
-        end = meter.stages[-1].z if meter.stages else meter.clip(np.array(request.start, float))
-        z = end if meter.solution is None else meter.solution
-        return Outcome(verdict.status, verdict.advice, z, tuple(meter.rows), replace(meter.counts), {}, meter.stages)
-    rows = tuple(meter.rows[: snapshot.rows])
-    return Outcome(
-        verdict.status,
-        verdict.advice,
-        snapshot.best.z,
-        rows,
-        snapshot.counts,
-        to_checkpoint(request.solver, snapshot, rows),
-        (*snapshot.stages, halfway(request.problem, snapshot)),
-    )
+def rate_by_rollout(options: object, seed: int) -> Rate:
+    """Rates points by one rollout each."""
+    return CountingEvaluator.rate
 
 
-def begin(point: Point) -> Point:
-    """The first point of a stage if it is finite; Stop(NOT_FINITE) otherwise."""
-    if not point.finite:
-        raise Stop(Status.NOT_FINITE, not_finite(point, START_NOT_FINITE).advice)
-    return point
+def iterating(method: Callable[[StageContext, O_inv], Method[Any]]) -> Stage[O_inv]:
+    """The stage of a method, whose loop is here."""
+
+    def stage(context: StageContext, options: O_inv, saved: dict[str, object] | None, recorder: Recorder) -> StopReason:
+        return iterate(method(context, options), saved, recorder)
+
+    return stage
 
 
-def not_finite(point: Point, advice: str) -> Verdict:
-    """What to say of a point: ``advice`` where its values are not finite, else that its derivatives are not."""
-    values = np.isfinite([point.merit, point.objective, *point.errors])
-    return Verdict(Status.NOT_FINITE, GRADIENT_NOT_FINITE if np.all(values) else advice)
+def iterate(method: Method[StateT], saved: dict[str, object] | None, recorder: Recorder) -> StopReason:
+    """The loop of every method that has none of its own."""
+    if saved:
+        state = method.resume(saved)
+    else:
+        first = method.init()
+        if isinstance(first, StopReason):
+            return first
+        recorder.commit(first)
+        state = first.state
+    while True:
+        reason = method.terminate(state)
+        if reason is not None:
+            return reason
+        following = method.step(state)
+        if isinstance(following, StopReason):
+            return following
+        recorder.commit(following)
+        state = following.state
 
 
-def converged(meter: Meter) -> Verdict:
-    """A stationary point, with advice where the best point misses something or lies on a plateau."""
-    best = meter.best
-    if best is None or best.met:
-        return Verdict(Status.CONVERGED)
-    if flat(meter, best.z):
-        return Verdict(Status.CONVERGED, FLAT)
-    return Verdict(Status.CONVERGED, MISSED if best.errors.size else "")
+def make_solver(
+    name: str,
+    summary: str,
+    Options: type[O_inv],
+    stage: Stage[O_inv],
+    *,
+    check: Callable[[O_inv], None] = lambda options: None,
+    refusal: Callable[[ShootingProblem], str] = refuse_none,
+    rate: Callable[[O_inv, int], Rate] = rate_by_rollout,
+    constraints: bool = False,
+    prepare: Callable[[], None] = nothing,
+    threaded: bool = False,
+    scenarios: bool | None = False,
+) -> Solver[O_inv]:
+    """A solver of its parts; those that are not named here are the fields of ``Solver``.
+
+    ``stage`` runs one stage of smoothing, see ``iterating``. ``check`` raises SymphysError for options that cannot be
+    passed to a library. ``refusal`` returns why the solver is not for a problem, or nothing. ``rate`` makes, from
+    options and seed, what compares the points of several stages. ``constraints``: whether violated constraints come
+    before the merit in the comparison of points.
+    """
+
+    def solve(
+        problem: ShootingProblem,
+        start: Array,
+        options: O_inv,
+        seed: int = 0,
+        monitor: Monitor | None = None,
+        checkpoint: dict[str, object] | None = None,
+        log: Log | None = None,
+    ) -> Outcome:
+        """See ``interface.Solve``."""
+        check(options)
+
+        def run_stage(context: StageContext, saved: dict[str, object] | None, recorder: Recorder) -> StopReason:
+            refused = refusal(problem)
+            if refused:
+                return StopReason(Status.NOT_APPLICABLE, refused)
+            return stage(context, options, saved, recorder)
+
+        request = Request(name, problem, start, seed, monitor, checkpoint, log or silent, constraints)
+        return Driver(request, run_stage, rate(options, seed)).run()
+
+    return Solver(name, summary, Options, solve, prepare, threaded, scenarios)
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a solver was called with, see ``interface.Solve``, its own options aside.
+
+    Attributes:
+        solver: its name.
+        problem, start, seed, monitor, checkpoint, log: of the call.
+        constraints: see ``make_solver``.
+    """
+
+    solver: str
+    problem: ShootingProblem
+    start: Array
+    seed: int
+    monitor: Monitor | None
+    checkpoint: dict[str, object] | None
+    log: Log
+    constraints: bool
+
+
+class Driver:
+    """One solve from start to outcome; a ``Recorder`` for its stages."""
+
+    def __init__(
+        self,
+        request: Request,
+        stage: Callable[[StageContext, dict[str, object] | None, Recorder], StopReason],
+        rate: Rate,
+    ) -> None:
+        """Nothing is evaluated yet."""
+        problem = request.problem
+        self._request, self._stage, self._rate = request, stage, rate
+        self._evaluator = CountingEvaluator(
+            problem, problem.smoothing[0], Incumbent(problem.stop_when_met), constraints=request.constraints
+        )
+        self._start = self._evaluator.clip(np.array(request.start, float))
+        self._trace = SolveTrace()
+        self._last: Array | None = None
+        self._stages: tuple[StageResult, ...] = ()
+        self._checkpoint: Checkpoint | None = None
+
+    def run(self) -> Outcome:
+        """Run every stage; whatever happens becomes a status with advice. SymphysError alone passes through."""
+        try:
+            reason, z = self._run_stages()
+        except KeyboardInterrupt:
+            reason = StopReason(Status.INTERRUPTED, INTERRUPTED)
+            z = self._stages[-1].z if self._stages else self._start
+        self._request.log(str(reason))
+        if reason.status is Status.INTERRUPTED and self._checkpoint is not None:
+            return self._interrupted(reason, self._checkpoint)
+        return Outcome(
+            reason.status, reason.advice, z, self._trace.rows, self._evaluator.counter.counts, {}, self._stages
+        )
+
+    def commit(self, iteration: Iteration[Any]) -> None:
+        """See ``Recorder``."""
+        point, evaluator, names = iteration.point, self._evaluator, self._request.problem.output_names
+        if point is None:
+            return
+        best, counts = evaluator.incumbent.best or point, evaluator.counter.counts
+        numbers = (point.objective, best.objective, point.max_violation, iteration.gradient_norm, iteration.step)
+        outputs = {**dict(zip(names, best.outputs.tolist(), strict=False)), **iteration.outputs}
+        row = self._trace.append(counts, (*numbers, evaluator.smoothing), outputs)
+        self._last = point.z
+        self._checkpoint = Checkpoint(
+            self._stages, iteration.state, best, point.z, counts, len(self._trace), row.seconds
+        )
+        if self._request.monitor:
+            self._request.monitor(row)
+
+    def distribute(self, work: Counts, first: int) -> None:
+        """See ``Recorder``."""
+        self._trace.distribute(work, first)
+        self._evaluator.counter.add(work)
+        if self._checkpoint:
+            last = self._trace.rows[self._checkpoint.rows - 1]
+            self._checkpoint = replace(self._checkpoint, counts=counts_of(last))
+
+    @property
+    def rows(self) -> int:
+        """See ``Recorder``."""
+        return len(self._trace)
+
+    def _run_stages(self) -> tuple[StopReason, Array]:
+        """One stage after the other; why the last one ended, and the solution (n,)."""
+        z, saved = self._resume()
+        reason, smoothings = StopReason(Status.MET), self._request.problem.smoothing
+        for index, smoothing in enumerate(smoothings[len(self._stages) :], len(self._stages)):
+            if saved is None:
+                self._evaluator = self._evaluator.at(smoothing, Incumbent(self._request.problem.stop_when_met))
+                self._last = None
+            self._request.log(f"stage {index + 1} of {len(smoothings)}: smoothing {smoothing:g}")
+            reason = StopReason(Status.MET) if saved == FINISHED else self._run_stage(z, saved)
+            status, best = reason.status, self._evaluator.incumbent.best
+            z, saved = (best.z if best else z), None
+            solution, over = z, status in FATAL or index + 1 == len(smoothings)
+            if over:
+                reason, solution = exact_best(self._evaluator, self._rate, self._start, self._stages, z, reason)
+            total = self._evaluator.counter.counts, self._trace.seconds
+            self._stages += (stage_result(smoothing, status, z, best, total, self._stages),)
+            if over:
+                return reason, solution
+            self._request.log(str(reason))
+        return reason, z
+
+    def _resume(self) -> tuple[Array, dict[str, object] | None]:
+        """Where the next stage begins, and the saved state of its method where the solve goes on."""
+        request = self._request
+        if not request.checkpoint:
+            return self._start, None
+        checkpoint, saved, rows = from_plain(request.checkpoint, request.solver, request.problem)
+        self._checkpoint, self._stages, self._last = checkpoint, checkpoint.stages, checkpoint.last
+        self._trace = SolveTrace(rows, checkpoint.seconds)
+        best = replace(checkpoint.best, violation=self._evaluator.violation(checkpoint.best.errors))
+        self._evaluator = replace(
+            self._evaluator,
+            smoothing=request.problem.smoothing[len(self._stages)],
+            incumbent=Incumbent(request.problem.stop_when_met, best),
+            counter=WorkCounter(checkpoint.counts),
+        )
+        return self._stages[-1].z if self._stages else self._start, saved
+
+    def _run_stage(self, z: Array, saved: dict[str, object] | None) -> StopReason:
+        """Run a stage; errors of foreign code, and matrices that there is no memory for, become a reason."""
+        context = StageContext(self._evaluator, z, self._request.seed, self._request.log)
+        try:
+            try:
+                return self._stage(context, saved, self)
+            except Stop as stop:
+                self._commit_incumbent()
+                return stop.reason
+        except (RuntimeError, ArithmeticError, np.linalg.LinAlgError, MemoryError) as error:
+            text = str(error).strip() or type(error).__name__
+            return StopReason(Status.FAILED, f"{self._request.solver} failed: {text}")
+
+    def _commit_incumbent(self) -> None:
+        """A row for the point that ended a stage in the middle of an iteration."""
+        best = self._evaluator.incumbent.best
+        if best is not None:
+            before = best.z if self._last is None else self._last
+            self.commit(Iteration(FINISHED, best, step=float(np.linalg.norm(best.z - before))))
+
+    def _interrupted(self, reason: StopReason, checkpoint: Checkpoint) -> Outcome:
+        """The outcome at the end of the last complete iteration, with what the solve needs to go on."""
+        request, before, best = self._request, checkpoint.stages, checkpoint.best
+        rows = self._trace.rows[: checkpoint.rows]
+        halfway = stage_result(
+            request.problem.smoothing[len(before)],
+            reason.status,
+            best.z,
+            best,
+            (checkpoint.counts, checkpoint.seconds),
+            before,
+        )
+        saved = to_plain(request.solver, checkpoint, rows)
+        return Outcome(reason.status, reason.advice, best.z, rows, checkpoint.counts, saved, (*before, halfway))
 
 
 def silent(line: str) -> None:
-    """The log of one who wants none."""
+    """A log that drops each line."""

@@ -1,101 +1,76 @@
-"""The meter between a solver and its problem: evaluates, counts, remembers the best point, writes the trace."""
+"""The counting evaluator between a method and its problem: one smoothing, points within the bounds, work counted."""
 
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Iterable, Mapping
-from dataclasses import asdict, astuple, dataclass, replace
-from types import MappingProxyType
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
-from symphys.shooting import ShootingProblem, Values
-from symphys.solvers.core.outcome import Array, Counts, Monitor, StageResult, Status, TraceRow
-from symphys.solvers.core.point import Point
-
-NOTHING: Mapping[str, float] = MappingProxyType({})
+from symphys.shooting import Evaluator, ScenarioEvaluator, ScenarioSamples, ShootingProblem, Values
+from symphys.solvers.core.outcome import Array, Counts
+from symphys.solvers.core.point import Incumbent, Point
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """How a stage of a solve ended; see ``Outcome``."""
+class WorkCounter:
+    """The work of a solve so far; the evaluators of all stages share one."""
 
-    status: Status
-    advice: str = ""
-
-
-class Stop(Exception):
-    """Ends a stage from within an evaluation."""
-
-    def __init__(self, status: Status, advice: str = "") -> None:
-        """Carry the verdict."""
-        super().__init__(status.value)
-        self.verdict = Verdict(status, advice)
-
-
-@dataclass(frozen=True)
-class Snapshot:
-    """All that a solve needs to go on: taken when an iteration is complete, never in its middle.
-
-    Attributes:
-        stages: of smoothing, that were over by then.
-        state: the solver's own.
-        best: of this stage.
-        last: (n,) z of the last row of the trace.
-        counts, rows, seconds: the work up to here, and how many rows of the trace tell of it.
-    """
-
-    stages: tuple[StageResult, ...]
-    state: object
-    best: Point
-    last: Array
-    counts: Counts
-    rows: int
-    seconds: float
-
-
-class Meter:
-    """Evaluates a problem at points inside its bounds.
-
-    ``value``, ``gradient``, ``residuals`` and ``jacobian`` raise Stop(MET) once a point meets everything, where the
-    problem asks to stop there; the point is ``best`` then. ``solution`` (n,) is set where that is not the last best.
-    """
-
-    def __init__(self, problem: ShootingProblem, monitor: Monitor | None = None, constraints: bool = False) -> None:
-        """Nothing is evaluated yet; ``constraints``: violated ones come before the merit."""
-        self.problem = problem
-        self.monitor = monitor
-        self.constraints = constraints
-        self.scale, self.lower, self.upper = (problem.stacked(field) for field in ("scale", "lower", "upper"))
-        self.counts = Counts()
-        self.rows: list[TraceRow] = []
-        self.best: Point | None = None
-        self.last: Array | None = None
-        self.stages: tuple[StageResult, ...] = ()
-        self.smoothing = problem.smoothing[0]
-        self.snapshot: Snapshot | None = None
-        self.solution: Array | None = None
-        self.began, self.earlier = time.perf_counter(), 0.0
-
-    def enter(self, smoothing: float, resumed: bool = False) -> None:
-        """Begin a stage, or go on with one; merits at another smoothing are not compared with those of this one."""
-        self.smoothing = smoothing
-        if not resumed:
-            self.best, self.last = None, None
-
-    def restore(self, snapshot: Snapshot, rows: Iterable[TraceRow]) -> None:
-        """Go on from a snapshot and its trace, as if there had been no break."""
-        best = replace(snapshot.best, violation=self.violation(snapshot.best.errors))
-        self.snapshot, self.best, self.last = snapshot, best, snapshot.last
-        self.stages = snapshot.stages
-        self.counts, self.rows = replace(snapshot.counts), list(rows)
-        self.earlier, self.began = snapshot.seconds, time.perf_counter()
+    def __init__(self, counts: Counts | None = None) -> None:
+        """Start from ``counts``, where a solve goes on."""
+        self._counts = counts or Counts()
 
     @property
-    def seconds(self) -> float:
-        """Since the solve began, breaks left out."""
-        return self.earlier + time.perf_counter() - self.began
+    def counts(self) -> Counts:
+        """The total."""
+        return self._counts
+
+    def add(self, work: Counts) -> None:
+        """Count some more."""
+        self._counts += work
+
+
+@dataclass(frozen=True)
+class CountingEvaluator:
+    """Evaluates a problem at one smoothing and counts the work.
+
+    ``value``, ``values``, ``gradient``, ``residuals`` and ``jacobian`` offer their points to the incumbent, which
+    raises Stop once a point meets everything, where the problem asks to stop there. ``rate`` and the samples of a
+    scenario are offered to none.
+
+    Attributes:
+        problem: what is evaluated.
+        smoothing: of all evaluations.
+        incumbent: the best point of the stage.
+        counter: of the work.
+        constraints: whether violated constraints come before the merit, see ``Point.violation``.
+    """
+
+    problem: ShootingProblem
+    smoothing: float
+    incumbent: Incumbent
+    counter: WorkCounter = field(default_factory=WorkCounter)
+    constraints: bool = False
+
+    @cached_property
+    def scale(self) -> Array:
+        """(n,) the size of a typical change of z."""
+        return self.problem.stacked("scale")
+
+    @cached_property
+    def lower(self) -> Array:
+        """(n,) bound on z."""
+        return self.problem.stacked("lower")
+
+    @cached_property
+    def upper(self) -> Array:
+        """(n,) bound on z."""
+        return self.problem.stacked("upper")
+
+    def at(self, smoothing: float, incumbent: Incumbent) -> CountingEvaluator:
+        """An evaluator of the same problem at another smoothing, which counts its work here too."""
+        return replace(self, smoothing=smoothing, incumbent=incumbent)
 
     def clip(self, z: Array) -> Array:
         """The nearest point within the bounds."""
@@ -109,66 +84,64 @@ class Meter:
         """One rollout at z, which must lie within the bounds."""
         return self.values([z])[0]
 
-    def values(self, population: Iterable[Array]) -> list[Point]:
+    def values(self, population: Sequence[Array]) -> list[Point]:
         """One rollout for each, in one call; stops after it if one of them meets everything."""
-        return self.seen(self.rated(population))
+        return self._offered(self.rate(population))
 
-    def rated(self, population: Iterable[Array]) -> list[Point]:
-        """One rollout for each, in one call, of which nothing is remembered."""
-        Z = np.array(list(population))
-        values = self.problem.evaluator.value(Z, self.smoothing)
-        self.counts.rollouts += len(Z)
-        return self.points(Z, values)
+    def rate(self, population: Sequence[Array]) -> list[Point]:
+        """One rollout for each, in one call, not offered to the incumbent."""
+        Z = np.array(population)
+        values = self._evaluator.value(Z, self.smoothing)
+        self.counter.add(Counts(rollouts=len(Z)))
+        return self._points(Z, values)
 
     def gradient(self, z: Array) -> Point:
         """One gradient at z."""
-        values = self.problem.evaluator.gradient(z[None], self.smoothing)
-        self.counts.gradients += 1
-        return self.seen(self.points(z[None], values))[0]
+        values = self._evaluator.gradient(z[None], self.smoothing)
+        self.counter.add(Counts(gradients=1))
+        return self._offered(self._points(z[None], values))[0]
 
     def residuals(self, z: Array) -> Point:
         """One rollout at z, with residuals."""
-        values = self.problem.evaluator.residuals(z[None], self.smoothing)
-        self.counts.rollouts += 1
-        return self.seen(self.points(z[None], values))[0]
+        values = self._evaluator.residuals(z[None], self.smoothing)
+        self.counter.add(Counts(rollouts=1))
+        return self._offered(self._points(z[None], values))[0]
 
     def jacobian(self, z: Array) -> Point:
         """One Jacobian of the residuals at z; the gradient comes with it."""
-        values = self.problem.evaluator.jacobian(z[None], self.smoothing)
-        self.counts.jacobians += 1
-        return self.seen(self.points(z[None], values))[0]
+        values = self._evaluator.jacobian(z[None], self.smoothing)
+        self.counter.add(Counts(jacobians=1))
+        return self._offered(self._points(z[None], values))[0]
 
-    def commit(
-        self,
-        point: Point,
-        state: object,
-        gradient_norm: float = math.nan,
-        step: float = math.nan,
-        told: Mapping[str, float] = NOTHING,
-    ) -> None:
-        """End an iteration: a row of the trace, a snapshot, then the monitor, which may raise KeyboardInterrupt."""
-        best, self.last = self.best or point, point.z
-        told = {**dict(zip(self.problem.output_names, best.outputs.tolist(), strict=False)), **told}
-        work = (*astuple(self.counts), self.seconds)
-        numbers = (point.objective, best.objective, point.miss, gradient_norm, step, self.smoothing)
-        row = TraceRow(*(len(self.rows), *work, *numbers, told))
-        self.rows.append(row)
-        self.snapshot = Snapshot(self.stages, state, best, point.z, replace(self.counts), len(self.rows), row.seconds)
-        if self.monitor:
-            self.monitor(row)
+    def sample_values(self, Z: Array, samples: ScenarioSamples) -> Values:
+        """One rollout in each sample of a scenario; Z (batch, n), or (1, n) for all."""
+        values = self.scenario.value(Z, samples, self.smoothing)
+        self.counter.add(Counts(rollouts=len(samples.numbers)))
+        return values
 
-    def settle(self, first: int, work: Counts) -> None:
-        """For a library that tells its counts at the end only: add ``work`` to the rows from ``first`` on, evenly."""
-        share = len(self.rows) - first
-        for index in range(first, len(self.rows)):
-            part = scaled(work, (index - first + 1) / share)
-            self.rows[index] = replace(self.rows[index], **asdict(added(self.rows[index], part)))
-        self.counts = added(self.counts, work)
-        if self.snapshot:
-            last = self.rows[self.snapshot.rows - 1]
-            self.snapshot = replace(self.snapshot, counts=added(last, Counts()))
+    def sample_gradients(
+        self, z: Array, samples: ScenarioSamples, adjoint_discount: float = 0.0, horizon: float = math.inf
+    ) -> Values:
+        """One gradient at z (n,) in each sample of a scenario; see ``ScenarioEvaluator.gradient``."""
+        values = self.scenario.gradient(z[None], samples, self.smoothing, adjoint_discount, horizon)
+        self.counter.add(Counts(gradients=len(samples.numbers)))
+        return values
 
-    def points(self, Z: Array, values: Values) -> list[Point]:
+    @property
+    def scenario(self) -> ScenarioEvaluator:
+        """The problem's scenario, for those who have checked that it has one."""
+        assert self.problem.scenario is not None, "the problem has a scenario"
+        return self.problem.scenario
+
+    @property
+    def _evaluator(self) -> Evaluator:
+        return self.problem.evaluator
+
+    def _offered(self, points: list[Point]) -> list[Point]:
+        self.incumbent.offer(points)
+        return points
+
+    def _points(self, Z: Array, values: Values) -> list[Point]:
         """The rows as points with their own copies of everything."""
         names = [name for name in ("outputs", "gradient", "residuals", "jacobian") if getattr(values, name) is not None]
         merits, objectives = values.merit.tolist(), values.objective.tolist()
@@ -185,22 +158,3 @@ class Meter:
     def violation(self, errors: Array) -> float:
         """See ``Point``."""
         return self.problem.violation(errors) if self.constraints else 0.0
-
-    def seen(self, points: list[Point]) -> list[Point]:
-        """Remember the best; Stop(MET) if it meets everything and the problem asks to stop there."""
-        for point in points:
-            if point.better(self.best):
-                self.best = point
-        if self.best and self.best.met and self.problem.stop_when_met:
-            raise Stop(Status.MET)
-        return points
-
-
-def scaled(counts: Counts, share: float) -> Counts:
-    """A share of the work, in whole evaluations."""
-    return Counts(*(round(number * share) for number in astuple(counts)))
-
-
-def added(row: TraceRow | Counts, work: Counts) -> Counts:
-    """The counts of a row and some more."""
-    return Counts(**{name: getattr(row, name) + number for name, number in asdict(work).items()})

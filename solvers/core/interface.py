@@ -1,19 +1,99 @@
-"""What every solver looks like from outside."""
+"""What every solver looks like from outside, and what a method is: ``init``, ``step``, ``terminate``."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Generic, Protocol, TypeVar
 
 from symphys.shooting import ShootingProblem
-from symphys.solvers.core.outcome import Array, Monitor, Outcome
+from symphys.solvers.core.evaluator import CountingEvaluator
+from symphys.solvers.core.outcome import Array, Counts, Monitor, Outcome, StopReason
+from symphys.solvers.core.point import Point
 
 Log = Callable[[str], None]
 """Takes one line of text."""
 
 O_contra = TypeVar("O_contra", contravariant=True)
 O_inv = TypeVar("O_inv")
+StateT = TypeVar("StateT")
+
+
+@dataclass(frozen=True)
+class StageContext:
+    """What a method works with in one stage of smoothing.
+
+    Attributes:
+        evaluator: of the problem at the smoothing of the stage; its incumbent is the best point of the stage.
+        start: (n,) where the stage begins, within the bounds.
+        seed: of the solve.
+        log: takes the method's own text.
+    """
+
+    evaluator: CountingEvaluator
+    start: Array
+    seed: int
+    log: Log
+
+
+@dataclass(frozen=True)
+class Iteration(Generic[StateT]):
+    """What one iteration came to: the state after it, and what the trace records.
+
+    Attributes:
+        state: all that the next step depends on; a dataclass of numbers, arrays and dataclasses of these.
+        point: of the row of the trace; None: the iteration gets no row, and a solve does not go on from it.
+        gradient_norm, step, outputs: see ``TraceRow``.
+    """
+
+    state: StateT
+    point: Point | None
+    gradient_norm: float = math.nan
+    step: float = math.nan
+    outputs: Mapping[str, float] = field(default_factory=dict)
+
+
+class Method(Protocol[StateT]):
+    """A method of optimisation in one stage. The driver runs the loop: ``init``, then ``step`` until ``terminate``.
+
+    As in optimistix a method has no loop and stores no progress: all of it is in the state. An evaluation ends the
+    stage by itself once a point meets everything, see ``Stop``. The budget of a method is an option of it, so
+    ``terminate`` compares the state with it, and its advice names the option.
+    """
+
+    def init(self) -> Iteration[StateT] | StopReason:
+        """Evaluate the start; the reason where no step can be made from there."""
+        ...
+
+    def step(self, state: StateT) -> Iteration[StateT] | StopReason:
+        """Make one iteration; the reason where none leads on."""
+        ...
+
+    def terminate(self, state: StateT) -> StopReason | None:
+        """Why to end here: a stationary point, a budget that is used up, no progress. None: make another step."""
+        ...
+
+    def resume(self, saved: dict[str, Any]) -> StateT:
+        """The state from the plain values of a checkpoint; SymphysError if they do not fit."""
+        ...
+
+
+class Recorder(Protocol):
+    """Where iterations are recorded: the driver, as a library with a loop of its own depends on it."""
+
+    def commit(self, iteration: Iteration[Any]) -> None:
+        """End an iteration: a row of the trace, a checkpoint, then the monitor, which may raise KeyboardInterrupt."""
+        ...
+
+    def distribute(self, work: Counts, first: int) -> None:
+        """Count work that a library reports at its end only, evenly over the rows from ``first`` on."""
+        ...
+
+    @property
+    def rows(self) -> int:
+        """The number of rows so far."""
+        ...
 
 
 class Solve(Protocol[O_contra]):
@@ -24,7 +104,7 @@ class Solve(Protocol[O_contra]):
         start: (n,) where to begin; a seed's perturbation of the guess is already in it.
         options: of the solver.
         seed: the random stream is ``numpy.random.default_rng([seed, 1])``, the same for every solver that draws.
-        monitor: sees each row of the trace; it may raise KeyboardInterrupt, which ends the solve so that it can go on.
+        monitor: takes each row of the trace; it may raise KeyboardInterrupt, which ends the solve so that it can go on.
         checkpoint: ``Outcome.checkpoint`` of an interrupted solve; from it the solve goes on.
         log: takes the solver's own text.
 
@@ -47,7 +127,7 @@ class Solve(Protocol[O_contra]):
 
 
 def nothing() -> None:
-    """What most solvers need to load."""
+    """Load nothing, as most solvers need no library."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +141,8 @@ class Solver(Generic[O_inv]):
         solve: see ``Solve``.
         prepare: loads what ``solve`` needs, such as a library, so that who times solves can leave it out; ``solve``
             works without, and a second call costs nothing.
-        threaded: whether several solves may run in threads side by side, see ``together``.
-        situations: whether it is for problems whose situations differ, and for no others; None: for all.
+        threaded: whether several solves may run in threads side by side, see ``multi_start``.
+        scenarios: whether it is for problems with scenarios, and for no others; None: for all.
     """
 
     name: str
@@ -71,4 +151,4 @@ class Solver(Generic[O_inv]):
     solve: Solve[O_inv]
     prepare: Callable[[], None] = nothing
     threaded: bool = False
-    situations: bool | None = False
+    scenarios: bool | None = False

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symphys.solvers.core.evaluator import Meter
+from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.outcome import Array
 from symphys.solvers.core.point import Point
 
@@ -14,48 +14,50 @@ SLOPE_SHARE = 1e-4
 """Of the decrease that the slope promises, so much must come (Armijo)."""
 SHORTEST, LONGEST = 0.1, 0.5
 """A rejected step is cut to a share within these, by quadratic interpolation."""
-TRIALS = 30
+CANDIDATES = 30
 ROUNDING = 64 * float(np.finfo(float).eps)
 """Relative change of a merit that is no more than rounding."""
 
 
 @dataclass(frozen=True)
-class Search:
+class LineSearchResult:
     """Where a line search ended.
 
     Attributes:
         point: low enough; None if there was none.
-        not_finite: the last trial was not finite.
+        not_finite: the last candidate was not finite.
     """
 
     point: Point | None
     not_finite: bool = False
 
 
-def backtrack(meter: Meter, z: Array, step: Array, slope: float, merit: float, ceiling: float) -> Search:
+def backtrack(
+    evaluator: CountingEvaluator, z: Array, step: Array, slope: float, merit: float, ceiling: float
+) -> LineSearchResult:
     """Shorten ``step`` (n,) from z until merit(z + t step) <= ceiling + 1e-4 t slope.
 
     Args:
-        meter: each trial is one rollout.
+        evaluator: each candidate is one rollout.
         z: (n,) where the merit is ``merit``.
         step: (n,) to a point within the bounds.
         slope: d merit / dt at t = 0, negative.
         merit: at z.
         ceiling: the merit of z, or the largest of the last few.
     """
-    t, trial = 1.0, None
-    for _ in range(TRIALS):
-        trial = meter.value(meter.clip(z + t * step))
-        if trial.finite and trial.merit <= ceiling + SLOPE_SHARE * t * slope:
-            return Search(trial)
-        t *= shrink(trial, t, slope, merit)
-    finite = trial is not None and trial.finite
-    return Search(None, not finite)
+    t, candidate = 1.0, None
+    for _ in range(CANDIDATES):
+        candidate = evaluator.value(evaluator.clip(z + t * step))
+        if candidate.finite and candidate.merit <= ceiling + SLOPE_SHARE * t * slope:
+            return LineSearchResult(candidate)
+        t *= shrink(candidate, t, slope, merit)
+    finite = candidate is not None and candidate.finite
+    return LineSearchResult(None, not finite)
 
 
-def shrink(trial: Point, t: float, slope: float, merit: float) -> float:
-    """The factor on t: to the lowest point of the parabola through what is known, within limits."""
-    above = trial.merit - merit - t * slope
-    if not trial.finite or above <= 0:
-        return SHORTEST if not trial.finite else LONGEST
+def shrink(candidate: Point, t: float, slope: float, merit: float) -> float:
+    """The factor on t: to the lowest point of the parabola through the values so far, within limits."""
+    above = candidate.merit - merit - t * slope
+    if not candidate.finite or above <= 0:
+        return SHORTEST if not candidate.finite else LONGEST
     return min(max(-t * slope / (2 * above), SHORTEST), LONGEST)

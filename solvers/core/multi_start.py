@@ -1,7 +1,7 @@
-"""Several solves of one problem side by side, their single evaluations gathered into batches.
+"""Batched multi-start: several solves of one problem side by side, their evaluations gathered into batches.
 
-Each solve runs in a thread of its own and evaluates through a seat at one table. When every solve that is still going
-has asked for something, the last one to ask evaluates for all: one call for each kind of evaluation and smoothing. A
+Each solve runs in a thread of its own and evaluates through one batcher. When every solve that is still going has
+requested an evaluation, the last one to do so evaluates for all: one call for each kind of evaluation and smoothing. A
 row's numbers do not depend on its batch, so each outcome is that of the solve alone, to the last bit.
 """
 
@@ -23,7 +23,7 @@ from symphys.solvers.core.outcome import Array, Monitor, Outcome
 Own = TypeVar("Own")
 
 
-def solve_together(
+def solve_multi_start(
     solver: Solver[Own],
     problem: ShootingProblem,
     starts: Sequence[Array],
@@ -44,28 +44,28 @@ def solve_together(
     """
     if not solver.threaded:
         raise SymphysError(f"the solver {solver.name!r} cannot run several solves side by side")
-    table = Table(problem.evaluator, len(starts))
+    batcher = EvaluationBatcher(problem.evaluator, len(starts))
     seeds, monitors = seeds or [0] * len(starts), monitors or [None] * len(starts)
 
     def one(start: Array, seed: int, monitor: Monitor | None) -> Outcome:
         try:
-            seated = replace(problem, evaluator=Seat(table))
-            return solver.solve(seated, start, options, seed, monitor=monitor)
+            batched = replace(problem, evaluator=BatchedEvaluator(batcher))
+            return solver.solve(batched, start, options, seed, monitor=monitor)
         finally:
-            table.leave()
+            batcher.leave()
 
     solver.prepare()
     with ThreadPoolExecutor(max(len(starts), 1), thread_name_prefix="symphys-solve") as pool:
         try:
             return list(pool.map(one, starts, seeds, monitors))
-        except BaseException:  # Ctrl-C in this thread: the solves cannot hear it
-            table.close()
+        except BaseException:  # Ctrl-C in this thread: the other threads do not get it
+            batcher.close()
             raise
 
 
 @dataclass
-class Order:
-    """What a solve has asked for, and what came of it."""
+class PendingEvaluation:
+    """An evaluation that a solve waits for, and its values or error."""
 
     kind: str
     Z: Array
@@ -74,32 +74,32 @@ class Order:
     error: BaseException | None = None
 
 
-class Table:
-    """Where the orders of all solves meet."""
+class EvaluationBatcher:
+    """Collects the pending evaluations of all solves, and evaluates them in one call."""
 
-    def __init__(self, evaluator: Evaluator, seats: int) -> None:
-        """As many solves as seats."""
-        self.evaluator, self.seats = evaluator, seats
+    def __init__(self, evaluator: Evaluator, solves: int) -> None:
+        """``solves``: how many wait for each other."""
+        self.evaluator, self.solves = evaluator, solves
         self.changed = threading.Condition()
-        self.waiting: list[Order] = []
+        self.waiting: list[PendingEvaluation] = []
         self.closed = False
 
-    def ask(self, order: Order) -> Values:
-        """Wait until all have asked; what the evaluator raised is raised in every solve whose order it spoiled."""
+    def ask(self, request: PendingEvaluation) -> Values:
+        """Wait until all have requested; an error of the evaluator is raised in every solve that it concerns."""
         with self.changed:
-            self.waiting.append(order)
+            self.waiting.append(request)
             self.serve()
-            self.changed.wait_for(lambda: self.closed or order.values is not None or order.error is not None)
-        if order.error is not None:
-            raise order.error
-        if order.values is None:
+            self.changed.wait_for(lambda: self.closed or request.values is not None or request.error is not None)
+        if request.error is not None:
+            raise request.error
+        if request.values is None:
             raise KeyboardInterrupt
-        return order.values
+        return request.values
 
     def leave(self) -> None:
         """A solve is over: the others need not wait for it."""
         with self.changed:
-            self.seats -= 1
+            self.solves -= 1
             self.serve()
 
     def close(self) -> None:
@@ -109,28 +109,28 @@ class Table:
             self.changed.notify_all()
 
     def serve(self) -> None:
-        """Evaluate once everybody has asked."""
-        if not self.waiting or len(self.waiting) < self.seats or self.closed:
+        """Evaluate once every solve has requested."""
+        if not self.waiting or len(self.waiting) < self.solves or self.closed:
             return
-        orders, self.waiting = self.waiting, []
-        for kind, smoothing in dict.fromkeys((order.kind, order.smoothing) for order in orders):
-            fill(self.evaluator, [each for each in orders if (each.kind, each.smoothing) == (kind, smoothing)])
+        pending, self.waiting = self.waiting, []
+        for kind in dict.fromkeys((request.kind, request.smoothing) for request in pending):
+            evaluate_batch(self.evaluator, [each for each in pending if (each.kind, each.smoothing) == kind])
         self.changed.notify_all()
 
 
-def fill(evaluator: Evaluator, orders: Sequence[Order]) -> None:
-    """Evaluate orders of one kind as one batch."""
-    call: Callable[[Array, float], Values] = getattr(evaluator, orders[0].kind)
+def evaluate_batch(evaluator: Evaluator, pending: Sequence[PendingEvaluation]) -> None:
+    """Evaluate requests of one kind as one batch."""
+    call: Callable[[Array, float], Values] = getattr(evaluator, pending[0].kind)
     try:
-        values = call(np.concatenate([order.Z for order in orders]), orders[0].smoothing)
-    except BaseException as error:  # who waits must hear of it
-        for order in orders:
-            order.error = error
+        values = call(np.concatenate([request.Z for request in pending]), pending[0].smoothing)
+    except BaseException as error:  # raised in the solves that wait
+        for request in pending:
+            request.error = error
         return
     start = 0
-    for order in orders:
-        stop = start + len(order.Z)
-        order.values, start = rows(values, start, stop), stop
+    for request in pending:
+        stop = start + len(request.Z)
+        request.values, start = rows(values, start, stop), stop
 
 
 def rows(values: Values, start: int, stop: int) -> Values:
@@ -140,23 +140,23 @@ def rows(values: Values, start: int, stop: int) -> Values:
 
 
 @dataclass(frozen=True)
-class Seat:
-    """An evaluator that asks at the table; see ``Evaluator``."""
+class BatchedEvaluator:
+    """An evaluator that leaves its requests with the batcher; see ``Evaluator``."""
 
-    table: Table
+    batcher: EvaluationBatcher
 
     def value(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
-        return self.table.ask(Order("value", Z, smoothing))
+        return self.batcher.ask(PendingEvaluation("value", Z, smoothing))
 
     def gradient(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
-        return self.table.ask(Order("gradient", Z, smoothing))
+        return self.batcher.ask(PendingEvaluation("gradient", Z, smoothing))
 
     def residuals(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
-        return self.table.ask(Order("residuals", Z, smoothing))
+        return self.batcher.ask(PendingEvaluation("residuals", Z, smoothing))
 
     def jacobian(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
-        return self.table.ask(Order("jacobian", Z, smoothing))
+        return self.batcher.ask(PendingEvaluation("jacobian", Z, smoothing))

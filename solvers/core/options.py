@@ -1,9 +1,11 @@
-"""Checks that the options of all solvers share."""
+"""What the options of all solvers share: checks, and names as they are recorded."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import asdict, fields
 from difflib import get_close_matches
+from typing import Any
 
 from symphys.errors import SymphysError
 
@@ -29,3 +31,12 @@ def nearest(name: str, valid: Iterable[str]) -> str:
 def refuse(solver: str, name: str, reason: str) -> SymphysError:
     """The error for an option of a library that cannot be passed to it."""
     return SymphysError(f"solver.{solver}.options.{name}: {reason}")
+
+
+def recorded_options(options: Any) -> dict[str, object]:
+    """Options as plain values; one that was renamed (metadata "was" of its field) by its first name.
+
+    So the key of a run, which is made from them, stays the same.
+    """
+    first = {field.name: field.metadata.get("was", field.name) for field in fields(options)}
+    return {first[name]: value for name, value in asdict(options).items()}

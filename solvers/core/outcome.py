@@ -1,9 +1,9 @@
-"""What every solver takes and gives: one request, one outcome, one status with advice."""
+"""What every solver returns: an outcome, with its status, advice, work, trace and stages."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from enum import Enum
 
 import numpy as np
@@ -25,7 +25,19 @@ class Status(Enum):
     INTERRUPTED = "interrupted"
 
 
-@dataclass
+@dataclass(frozen=True)
+class StopReason:
+    """Why a stage of a solve ended: a status, and one sentence of advice, see ``Outcome``."""
+
+    status: Status
+    advice: str = ""
+
+    def __str__(self) -> str:
+        """Return the line of the log."""
+        return ": ".join(filter(None, (self.status.value, self.advice)))
+
+
+@dataclass(frozen=True)
 class Counts:
     """Work done: each rollout, gradient, residual Jacobian, Hessian that was evaluated, line searches included."""
 
@@ -33,6 +45,18 @@ class Counts:
     gradients: int = 0
     jacobians: int = 0
     hessians: int = 0
+
+    def __add__(self, other: Counts) -> Counts:
+        """Return the work of both."""
+        return Counts(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
+
+    def __sub__(self, other: Counts) -> Counts:
+        """Return the work without that of ``other``."""
+        return Counts(*(a - b for a, b in zip(astuple(self), astuple(other), strict=True)))
+
+    def share(self, fraction: float) -> Counts:
+        """Return a fraction of the work, in whole evaluations."""
+        return Counts(*(round(number * fraction) for number in astuple(self)))
 
 
 @dataclass(frozen=True)
@@ -45,11 +69,11 @@ class TraceRow:
         seconds: since the solve began (all earlier sessions of a continued solve included).
         objective: at this iterate (for a population: its best).
         best: lowest so far.
-        miss: largest of the normalised errors of targets and constraints; met at 1 or below; nan without any.
+        max_violation: largest of the normalised errors of targets and constraints; met at 1 or below; nan without any.
         gradient_norm: nan where the solver has none.
         step: length of the step in z (CMA-ES: sigma); nan for none.
-        smoothing: the knob in force.
-        told: by name, what the problem tells of the best point so far, and the solver of the iteration.
+        smoothing: in force.
+        outputs: by name, the problem's outputs at the best point so far, and the solver's own of the iteration.
     """
 
     iteration: int
@@ -60,11 +84,11 @@ class TraceRow:
     seconds: float
     objective: float
     best: float
-    miss: float
+    max_violation: float
     gradient_norm: float
     step: float
     smoothing: float
-    told: dict[str, float] = field(default_factory=dict)
+    outputs: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -72,10 +96,10 @@ class StageResult:
     """What one stage of smoothing came to.
 
     Attributes:
-        smoothing: the knob.
+        smoothing: of the stage.
         status: how it ended; INTERRUPTED for one that is to go on.
         z: (n,) its best point.
-        objective, miss: of that point at this smoothing; see ``TraceRow``. nan where nothing was evaluated.
+        objective, max_violation: of that point at this smoothing; see ``TraceRow``. nan where nothing was evaluated.
         counts, seconds: what the stage took, those before it left out.
     """
 
@@ -83,7 +107,7 @@ class StageResult:
     status: Status
     z: Array
     objective: float
-    miss: float
+    max_violation: float
     counts: Counts
     seconds: float
 
@@ -93,7 +117,7 @@ Monitor = Callable[[TraceRow], None]
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a solver found.
+    """The result of a solve.
 
     Attributes:
         status: how it ended.

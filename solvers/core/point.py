@@ -1,14 +1,15 @@
-"""A point that was evaluated, and which of two is better."""
+"""An evaluated point, which of two points is better, and the incumbent: the best point of a stage."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
-from symphys.solvers.core.outcome import Array
+from symphys.solvers.core.outcome import Array, Status, StopReason
 
 
 @dataclass(frozen=True)
@@ -20,12 +21,12 @@ class Point:
         merit, objective: see ``ShootingProblem``.
         errors: normalised; met where <= 1.
         met: all errors met.
-        outputs: what the problem tells of it; empty where it tells nothing.
+        outputs: (o,) the problem's outputs, see ``ShootingProblem.output_names``; empty where it has none.
         gradient: (n,) of the merit by z; empty where it was not asked for.
         residuals, jacobian: (m,) and (m, n), merit = r . r; empty where they were not asked for.
-        spoilt: situations for validation in which it is not finite; of a point that was not validated, all.
-        violation: largest error of a constraint, 0 where all are met; 0 for solvers that know no constraints, which
-            have the penalty in the merit.
+        spoilt: validation samples in which it is not finite; of a point that was not validated, all.
+        violation: largest error of a constraint, 0 where all are met; 0 for solvers without constraints, which have the
+            penalty in the merit.
     """
 
     z: Array
@@ -41,7 +42,7 @@ class Point:
     violation: float = 0.0
 
     @property
-    def miss(self) -> float:
+    def max_violation(self) -> float:
         """The largest of the errors; nan without any."""
         return float(np.max(self.errors)) if self.errors.size else math.nan
 
@@ -73,3 +74,41 @@ def best_of(points: list[Point]) -> Point | None:
     for point in points:
         best = point if point.better(best) else best
     return best
+
+
+class Stop(Exception):
+    """Ends a stage from within an evaluation: the incumbent meets everything, and the problem asks to stop there."""
+
+    def __init__(self) -> None:
+        """Carry the reason."""
+        super().__init__(Status.MET.value)
+        self.reason = StopReason(Status.MET)
+
+
+class Incumbent:
+    """The best point of a stage, in the measure that a run is judged by, see ``Point.rank``."""
+
+    def __init__(self, stop_when_met: bool, best: Point | None = None) -> None:
+        """Start from ``best``, where a solve goes on; ``stop_when_met``: see ``ShootingProblem``."""
+        self._stop_when_met, self._best = stop_when_met, best
+
+    @property
+    def best(self) -> Point | None:
+        """The best point so far; None before the first finite one."""
+        return self._best
+
+    def offer(self, points: Iterable[Point]) -> None:
+        """Keep the best of these and the present one; Stop where that is enough."""
+        for point in points:
+            if point.better(self._best):
+                self._best = point
+        self._stop_if_met()
+
+    def replace(self, point: Point) -> None:
+        """Keep this point, whatever the present one is; Stop where that is enough."""
+        self._best = point
+        self._stop_if_met()
+
+    def _stop_if_met(self) -> None:
+        if self._stop_when_met and self._best is not None and self._best.met:
+            raise Stop

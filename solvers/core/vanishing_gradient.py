@@ -1,17 +1,17 @@
-"""Plateaus: places where nothing that may vary has any influence on what is missed, as where a ball passes another by.
+"""Vanishing gradients: plateaus, where no variable has any influence on what is missed, as where a ball misses another.
 
 A long first step may end on one, with a merit that is even lower than at the start: the gradient there is exactly
-zero, and no method that follows gradients comes back. So a trial point where the gradient (for least squares the
+zero, and no method that follows gradients comes back. So a candidate where the gradient (for least squares the
 Jacobian) vanishes that did not before, while something is missed, counts as a bad step: it is refused and shortened
-as a line search shortens. Two rollouts beside it tell a plateau from a minimum. After ``REFUSALS`` the point is taken
-after all, as the plateau may be all there is. What is refused was evaluated, so it counts as work.
+as a line search shortens. Two rollouts beside it distinguish a plateau from a minimum. After ``REFUSALS`` the point is
+taken after all, as the plateau may be all there is. What is refused was evaluated, so it counts as work.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from symphys.solvers.core.evaluator import Meter
+from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.outcome import Array
 from symphys.solvers.core.point import Point
 
@@ -32,19 +32,19 @@ FLAT = (
 )
 
 
-def lost(meter: Meter, point: Point, derivatives: Array, before: Array) -> bool:
+def vanished(evaluator: CountingEvaluator, point: Point, derivatives: Array, before: Array) -> bool:
     """Whether a step ended on a plateau; derivatives: gradients (n,) or Jacobians (m, n) at and before ``point``."""
     if point.met or not point.errors.size:
         return False
-    now, then = (float(np.linalg.norm(each * meter.scale)) for each in (derivatives, before))
-    return now <= VANISHED * then and flat(meter, point.z)
+    now, then = (float(np.linalg.norm(each * evaluator.scale)) for each in (derivatives, before))
+    return now <= VANISHED * then and flat(evaluator, point.z)
 
 
-def flat(meter: Meter, z: Array) -> bool:
+def flat(evaluator: CountingEvaluator, z: Array) -> bool:
     """Whether something that is missed stays the same beside z; without errors, whether the merit does."""
-    step = STEP * meter.scale * direction(z.size)
-    step = np.where(meter.clip(z + 2 * step) == z + 2 * step, step, -step)
-    near, far = (meter.value(meter.clip(z + length * step)) for length in (1, 2))
+    step = STEP * evaluator.scale * direction(z.size)
+    step = np.where(evaluator.clip(z + 2 * step) == z + 2 * step, step, -step)
+    near, far = (evaluator.value(evaluator.clip(z + length * step)) for length in (1, 2))
     if not (near.finite and far.finite):
         return False
     a, b = (point.errors if point.errors.size else np.array([point.merit]) for point in (near, far))

@@ -1,17 +1,17 @@
-"""CMA-ES by pycma (Hansen 2016, arXiv 1604.00772), asked and told, in x = z / scale.
+"""CMA-ES by pycma (Hansen 2016, arXiv 1604.00772), through its ask-and-tell interface, in x = z / scale.
 
 A generation is evaluated as one batch; if a candidate of it meets every target, the solve stops at the end of that
 generation, and all of its rollouts count. There are no restarts. Candidates whose simulation is not finite rank last.
 pycma's own options pass through ``options``; it prints nothing, and reads and writes no files. One default is not
 pycma's: ``tolflatfitness`` is 50. Generations whose merits are all the same are no convergence but a plateau (see
-``plateau``), which the search leaves as its candidates spread; pycma gives up on the second one.
+``vanishing_gradient``), which the search leaves as its candidates spread; pycma gives up on the second one.
 
-Where situations differ, each candidate of a generation is rated by its mean over the same few of them, which the next
-generation draws anew, and the start and the means of the search are validated, since what is best in a few
-situations was lucky.
+Where the problem has a scenario, each candidate of a generation is rated by its mean over the same few samples, which
+the next generation draws anew. The start and the means of the search are validated, since what is best in a few
+samples was lucky.
 
-A solve goes on by replay: the strategy is asked again from the same random stream and told the recorded merits, so
-that mean, step size, covariance and paths are the same to the last bit under any options, at the cost of no rollout.
+A solve goes on by replay: the strategy asks again from the same random stream and is told the recorded merits, so that
+mean, step size, covariance and paths are the same to the last bit under any options, at the cost of no rollout.
 """
 
 from __future__ import annotations
@@ -22,19 +22,18 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from symphys.shooting import ShootingProblem
 from symphys.solvers.core.checkpoint import damaged
-from symphys.solvers.core.continuation import Request
-from symphys.solvers.core.driver import begin, converged, run
-from symphys.solvers.core.evaluator import Meter, Verdict
-from symphys.solvers.core.interface import Log, Solver
+from symphys.solvers.core.convergence import converged, not_finite
+from symphys.solvers.core.driver import iterating, make_solver
+from symphys.solvers.core.evaluator import CountingEvaluator
+from symphys.solvers.core.interface import Iteration, StageContext
 from symphys.solvers.core.options import at_least, require
-from symphys.solvers.core.outcome import Array, Monitor, Outcome, Status
-from symphys.solvers.core.point import Point, best_of
+from symphys.solvers.core.outcome import Array, Status, StopReason
+from symphys.solvers.core.point import best_of
 from symphys.solvers.core.vanishing_gradient import FLAT
-from symphys.solvers.methods.cma_strategy import PLATEAU, Strategy, Trail, load
-from symphys.solvers.randomized.candidates import Alone, Drawing, Trials
-from symphys.solvers.randomized.validation import Batch, comparing
+from symphys.solvers.methods.cma_strategy import PLATEAU, CmaState, Strategy, load
+from symphys.solvers.randomized.candidates import Candidates, NominalCandidates, SampledCandidates
+from symphys.solvers.randomized.validation import ValidationBatch, rate_by_validation
 
 BUDGETS = {"maxiter", "timeout"}
 CONVERGED = {"tolfun", "tolfunhist", "tolfunrel", "tolx", "ftarget"}
@@ -53,9 +52,9 @@ class CmaOptions:
         evaluations: rollouts in each stage of smoothing; the generation that reaches it is the last.
         options: pycma's own, such as {tolfun = 1e-8, CMA_diagonal = 50}; cma.CMAOptions() lists them. With more than
             2,000 variables the covariance is diagonal.
-        samples: where situations differ: in how many each candidate is rolled out.
+        samples: of a scenario: in how many each candidate is rolled out.
         width: how widely these vary, relative to their tables.
-        validation: situations that decide which mean of the search, or the start, is kept; 0: the last is.
+        validation: samples that decide which mean of the search, or the start, is kept; 0: the last is.
         validation_width: how widely these vary.
         every: generations between two validations.
     """
@@ -73,120 +72,111 @@ class CmaOptions:
     every: int = 5
 
     def __post_init__(self) -> None:
-        """ValueError that names the option and says what would be valid."""
+        """ValueError that names the option and what would be valid."""
         require(0 < self.sigma < math.inf, "sigma", "above 0")
         require(self.population == 0 or self.population > 2, "population", "0 or at least 3")
         at_least(0, evaluations=self.evaluations, validation=self.validation)
         at_least(0, width=self.width, validation_width=self.validation_width)
         at_least(1, samples=self.samples, every=self.every)
 
-    def batch(self, seed: int) -> Batch:
-        """For validation, where situations differ."""
-        return Batch(self.validation, self.validation_width, seed)
+    def batch(self, seed: int) -> ValidationBatch:
+        """For validation, where there is a scenario."""
+        return ValidationBatch(self.validation, self.validation_width, seed)
 
 
-def solve(
-    problem: ShootingProblem,
-    start: Array,
-    options: CmaOptions,
-    seed: int = 0,
-    monitor: Monitor | None = None,
-    checkpoint: dict[str, object] | None = None,
-    log: Log | None = None,
-) -> Outcome:
-    """Search; every stage of smoothing draws from the same stream anew. See ``interface.Solve``."""
+class CmaEs:
+    """The method, see ``interface.Method``; every stage of smoothing draws from the same stream anew.
 
-    def stage(meter: Meter, z: Array, saved: dict[str, object] | None) -> Verdict:
-        if not np.any(meter.lower < meter.upper):
-            meter.commit(begin(meter.value(z)), {"free": 0})
-            return converged(meter)
-        trail = read_trail(saved) if saved else None
-        stream = np.random.default_rng([seed, 1])
-        strategy = Strategy(
-            meter, trail.start if trail else z, options.sigma, options.population, options.options, stream
-        )
-        search = Search(meter, options, strategy, trials(meter, options, seed, log))
-        strategy.follow(trail) if trail else search.begin(z)
-        return search.run()
+    pycma's strategy cannot be copied. So a state is what it can be replayed from, and the strategy that made the last
+    state is kept beside it: a step from that state costs no replay.
+    """
 
-    rate = comparing(options.batch(seed)) if problem.situations else None
-    return run(Request("cma", problem, start, monitor, checkpoint, log, rate=rate), stage)
+    def __init__(self, context: StageContext, options: CmaOptions) -> None:
+        """For one stage."""
+        self.evaluator: CountingEvaluator = context.evaluator
+        self.start, self.seed, self.options = context.start, context.seed, options
+        self.held = not np.any(self.evaluator.lower < self.evaluator.upper)
+        self.candidates: Candidates = NominalCandidates(self.evaluator)
+        if self.evaluator.problem.scenario is not None:
+            self.candidates = SampledCandidates(
+                self.evaluator, options.samples, options.width, options.batch(self.seed), options.every, context.log
+            )
+        self._latest: Strategy | None = None
 
+    def init(self) -> Iteration[CmaState] | StopReason:
+        """The start is the first point that may be kept. Where bounds hold every variable it is the only one."""
+        if self.held:
+            point = self.evaluator.value(self.start)
+            return Iteration(self._held_state(), point) if point.finite else not_finite(point)
+        strategy = self._latest = self._fresh(self.start)
+        (point,) = self.candidates.rate([self.start], 0)
+        if not point.finite:
+            return not_finite(point)
+        self.candidates.keep(self.start, 0, due=True)
+        return Iteration(strategy.state(), point, step=strategy.sigma)
 
-def trials(meter: Meter, options: CmaOptions, seed: int, log: Log | None) -> Trials:
-    """How candidates are rated."""
-    situations = meter.problem.situations
-    if situations is None:
-        return Alone(meter)
-    return Drawing(meter, situations, options.samples, options.width, options.batch(seed), options.every, log)
+    def step(self, state: CmaState) -> Iteration[CmaState] | StopReason:
+        """Ask for a generation, evaluate it, tell the merits."""
+        strategy, generation = self._strategy(state), len(state.merits)
+        self._latest = None
+        points = self.candidates.rate([self.evaluator.clip(z) for z in strategy.ask()], generation)
+        best = best_of(points)
+        if best is None:
+            return self.candidates.conclude(StopReason(Status.NOT_FINITE, NOT_FINITE), state.start)
+        strategy.tell(tuple(point.merit if point.finite else math.inf for point in points))
+        self._latest = strategy
+        self.candidates.keep(strategy.centre, generation + 1)
+        return Iteration(strategy.state(), best, step=strategy.sigma)
 
+    def terminate(self, state: CmaState) -> StopReason | None:
+        """Whether the budget is used up or one of pycma's criteria holds; the last mean may be kept then."""
+        if self.held:
+            return converged(self.evaluator)
+        strategy = self._strategy(state)
+        reason = self._reason(strategy)
+        if reason is None:
+            return None
+        self.candidates.keep(strategy.centre, len(state.merits), due=True)
+        return self.candidates.conclude(reason, state.start)
 
-class Search:
-    """One generation after the other."""
+    def resume(self, saved: dict[str, Any]) -> CmaState:
+        """See ``Method``."""
+        if self.held:
+            return self._held_state()
+        try:
+            merits = tuple(tuple(float(merit) for merit in each) for each in saved["merits"])
+            start, mean = (np.array(saved[name], float) for name in ("start", "mean"))
+            return CmaState(start, merits, mean, float(saved["sigma"]))
+        except (KeyError, TypeError, ValueError) as error:
+            raise damaged(error) from error
 
-    def __init__(self, meter: Meter, options: CmaOptions, strategy: Strategy, trials: Trials) -> None:
-        """Nothing is asked for yet."""
-        self.meter, self.options, self.strategy, self.trials = meter, options, strategy, trials
+    def _held_state(self) -> CmaState:
+        return CmaState(self.start, (), np.zeros(0), self.options.sigma)
 
-    def begin(self, z: Array) -> None:
-        """Evaluate where it begins, which is the first point that may be kept."""
-        point = self.trials.start(z)
-        self.trials.keep(z, self.generations, due=True)
-        self.commit(point)
-
-    def run(self) -> Verdict:
-        """Until something ends it."""
-        verdict = None
-        while verdict is None:
-            verdict = self.ended() or self.generation()
-        if verdict.status is not Status.NOT_FINITE:
-            self.trials.keep(self.strategy.centre, self.generations, due=True)
-        return self.trials.told(verdict, self.strategy.start)
-
-    @property
-    def generations(self) -> int:
-        """How many are over."""
-        return len(self.strategy.merits)
-
-    def ended(self) -> Verdict | None:
-        """Whether the budget is used up or one of pycma's criteria holds."""
-        if sum(map(len, self.strategy.merits)) * self.trials.rollouts >= self.options.evaluations:
-            return Verdict(Status.BUDGET, BUDGET)
-        reasons = self.strategy.stopped()
+    def _reason(self, strategy: Strategy) -> StopReason | None:
+        if sum(map(len, strategy.merits)) * self.candidates.rollouts >= self.options.evaluations:
+            return StopReason(Status.BUDGET, BUDGET)
+        reasons = strategy.stopped()
         if not reasons:
             return None
         if reasons & BUDGETS:
-            return Verdict(Status.BUDGET, BUDGET)
+            return StopReason(Status.BUDGET, BUDGET)
         if PLATEAU in reasons:
-            return Verdict(Status.STALLED, FLAT)
+            return StopReason(Status.STALLED, FLAT)
         if reasons & CONVERGED:
-            return self.trials.converged()
-        return Verdict(Status.STALLED, STALLED.format(", ".join(reasons)))
+            return self.candidates.converged()
+        return StopReason(Status.STALLED, STALLED.format(", ".join(reasons)))
 
-    def generation(self) -> Verdict | None:
-        """Ask, evaluate, tell."""
-        points = self.trials.rate([self.meter.clip(z) for z in self.strategy.ask()], self.generations)
-        best = best_of(points)
-        if best is None:
-            return Verdict(Status.NOT_FINITE, NOT_FINITE)
-        self.strategy.tell(tuple(point.merit if point.finite else math.inf for point in points))
-        self.trials.keep(self.strategy.centre, self.generations)
-        self.commit(best)
-        return None
+    def _strategy(self, state: CmaState) -> Strategy:
+        """pycma's strategy in a state."""
+        if self._latest is None or self._latest.merits is not state.merits:
+            self._latest = self._fresh(state.start)
+            self._latest.replay(state)
+        return self._latest
 
-    def commit(self, point: Point) -> None:
-        """End an iteration."""
-        self.meter.commit(point, self.strategy.trail(), step=self.strategy.sigma)
-
-
-def read_trail(saved: dict[str, Any]) -> Trail:
-    """From the plain values of a checkpoint."""
-    try:
-        merits = tuple(tuple(float(merit) for merit in each) for each in saved["merits"])
-        start, mean = (np.array(saved[name], float) for name in ("start", "mean"))
-        return Trail(start, merits, mean, float(saved["sigma"]))
-    except (KeyError, TypeError, ValueError) as error:
-        raise damaged(error) from error
+    def _fresh(self, start: Array) -> Strategy:
+        options, stream = self.options, np.random.default_rng([self.seed, 1])
+        return Strategy(self.evaluator, start, options.sigma, options.population, options.options, stream)
 
 
 def prepare() -> None:
@@ -194,4 +184,12 @@ def prepare() -> None:
     load()
 
 
-CMA = Solver("cma", "CMA-ES by pycma, without derivatives", CmaOptions, solve, prepare, situations=None)
+CMA = make_solver(
+    "cma",
+    "CMA-ES by pycma, without derivatives",
+    CmaOptions,
+    iterating(CmaEs),
+    rate=lambda options, seed: rate_by_validation(options.batch(seed)),
+    prepare=prepare,
+    scenarios=None,
+)

@@ -1,4 +1,4 @@
-"""pycma's evolution strategy over the variables that may vary: which options it takes, asking, telling, replaying."""
+"""pycma's evolution strategy over the variables that may vary: its options, ask and tell, replay."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.errors import SymphysError
-from symphys.solvers.core.evaluator import Meter
+from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.options import nearest, refuse
 from symphys.solvers.core.outcome import Array
 
@@ -44,13 +44,13 @@ DRIFTED = "this checkpoint leads elsewhere with the present versions of pycma an
 
 
 @dataclass(frozen=True)
-class Trail:
-    """What a replay needs.
+class CmaState:
+    """Between two generations: what pycma's strategy can be replayed from.
 
     Attributes:
         start: (n,) z where the strategy began.
         merits: (population,) of every generation so far, in the order in which its candidates were asked for.
-        mean, sigma: where that led, to compare; mean (free,) as pycma holds it.
+        mean, sigma: where that led, to compare; mean (free,) as pycma stores it.
     """
 
     start: Array
@@ -64,7 +64,7 @@ class Strategy:
 
     def __init__(
         self,
-        meter: Meter,
+        evaluator: CountingEvaluator,
         start: Array,
         sigma: float,
         population: int,
@@ -75,8 +75,8 @@ class Strategy:
         cma = load()
         check(options, cma.CMAOptions.defaults())
         self.stream = stream
-        self.start, self.scale, self.free = start, meter.scale, meter.lower < meter.upper
-        bounds = [sides(bound / meter.scale, self.free) for bound in (meter.lower, meter.upper)]
+        self.start, self.scale, self.free = start, evaluator.scale, evaluator.lower < evaluator.upper
+        bounds = [sides(bound / evaluator.scale, self.free) for bound in (evaluator.lower, evaluator.upper)]
         named = {name: getattr(cma, options[name]) for name in TEXTS if name in options}
         diagonal = {"CMA_diagonal": True} if self.free.sum() > MOST_FULL else {}
         own = {**DEFAULTS, **diagonal, **options, **named, **QUIET, "bounds": bounds, "randn": self.draw}
@@ -84,8 +84,9 @@ class Strategy:
             own["popsize"] = population
         with pycma():
             kind = single(cma) if self.free.sum() == 1 else cma.CMAEvolutionStrategy
-            self.es = kind((start / meter.scale)[self.free], sigma, own)
+            self.es = kind((start / evaluator.scale)[self.free], sigma, own)
         self.merits: tuple[tuple[float, ...], ...] = ()
+        self._reasons: set[str] | None = None
 
     def draw(self, *shape: int) -> Array:
         """Standard normals."""
@@ -93,6 +94,7 @@ class Strategy:
 
     def ask(self) -> list[Array]:
         """A generation of z (n,)."""
+        self.stopped()  # pycma counts the generations of a plateau there
         with pycma():
             self.asked = self.es.ask()
         return [self.full(x) for x in self.asked]
@@ -102,28 +104,30 @@ class Strategy:
         with pycma():
             self.es.tell(self.asked, list(merits))
         self.es.sm.randn = self.draw  # a sampler that pycma makes on its way would draw from numpy's global stream
-        self.merits = (*self.merits, merits)
+        self.merits, self._reasons = (*self.merits, merits), None
 
     def stopped(self) -> set[str]:
-        """Which of pycma's own criteria hold."""
-        with pycma():
-            reasons = set(self.es.stop())
-        plateau = bool(self.merits) and min(self.merits[-1]) == max(self.merits[-1])
-        return reasons - CONFUSED if plateau else reasons
+        """Which of pycma's own criteria hold; pycma is asked once a generation."""
+        if self._reasons is None:
+            with pycma():
+                reasons = set(self.es.stop())
+            plateau = bool(self.merits) and min(self.merits[-1]) == max(self.merits[-1])
+            self._reasons = reasons - CONFUSED if plateau else reasons
+        return self._reasons
 
-    def trail(self) -> Trail:
-        """The way so far."""
-        return Trail(self.start, self.merits, self.es.mean.copy(), self.sigma)
+    def state(self) -> CmaState:
+        """What it can be replayed from."""
+        return CmaState(self.start, self.merits, self.es.mean.copy(), self.sigma)
 
-    def follow(self, trail: Trail) -> None:
-        """Replay; SymphysError if it does not lead where it led."""
-        for merits in trail.merits:
-            self.stopped()  # pycma counts the generations of a plateau there
+    def replay(self, state: CmaState) -> None:
+        """Make the generations of a state; SymphysError if they do not lead where they led."""
+        for merits in state.merits:
             self.ask()
             self.tell(merits)
-        same = self.es.mean.shape == trail.mean.shape and np.allclose(self.es.mean, trail.mean, rtol=1e-6)
-        if not same or not math.isclose(self.sigma, trail.sigma, rel_tol=1e-6):
+        same = self.es.mean.shape == state.mean.shape and np.allclose(self.es.mean, state.mean, rtol=1e-6)
+        if not same or not math.isclose(self.sigma, state.sigma, rel_tol=1e-6):
             raise SymphysError(DRIFTED)
+        self.merits = state.merits
 
     @property
     def sigma(self) -> float:
@@ -170,7 +174,7 @@ def rescale(scaling: Any, index: int, value: float) -> None:
 
 
 def check(options: Mapping[str, Any], defaults: Mapping[str, Any]) -> None:
-    """SymphysError for the first option that pycma does not know, or that cannot be passed to it."""
+    """SymphysError for the first option that pycma does not have, or that cannot be passed to it."""
     for name, value in options.items():
         if name in RESERVED or name.startswith("verb_"):
             raise refuse("cma", name, f"cannot be set: {RESERVED.get(name, RESERVED['verbose'])}")

@@ -1,33 +1,30 @@
 """First-order descent: d merit / dz by the adjoint of the rollout, one step along a direction of it at a time.
 
-``directions`` has the methods. A direction is projected into the bounds, then shortened until the merit is below the
-largest of the last few (``backtracking``; Grippo, Lampariello, Lucidi 1986; with bounds and the spectral step this is
-the SPG2 of Birgin, Martinez, Raydan 2000). A direction that does not descend is replaced by that of an empty memory.
-A step onto a plateau is refused and shortened, see ``plateau``.
+A direction (``core.directions``) is projected into the bounds, then shortened until the merit is below the largest of
+the last few (``backtracking``; Grippo, Lampariello, Lucidi 1986; with bounds and the spectral step this is the SPG2 of
+Birgin, Martinez, Raydan 2000). A direction that does not descend is replaced by that of an empty memory.
+A step onto a plateau is refused and shortened, see ``vanishing_gradient``.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from symphys.shooting import ShootingProblem
 from symphys.solvers.core.checkpoint import revive
-from symphys.solvers.core.continuation import Request
-from symphys.solvers.core.driver import begin, not_finite, run
-from symphys.solvers.core.evaluator import Meter, Verdict
-from symphys.solvers.core.interface import Log, Solver
+from symphys.solvers.core.convergence import Progress, not_finite, stationary
+from symphys.solvers.core.directions import DIRECTIONS, DirectionMemory, Habits, learn_length
+from symphys.solvers.core.driver import iterating, make_solver
+from symphys.solvers.core.evaluator import CountingEvaluator
+from symphys.solvers.core.interface import Iteration, StageContext
 from symphys.solvers.core.line_search import ROUNDING, backtrack
-from symphys.solvers.core.merit_probe import believed
 from symphys.solvers.core.options import at_least, require
-from symphys.solvers.core.outcome import Array, Monitor, Outcome, Status
+from symphys.solvers.core.outcome import Array, Status, StopReason
 from symphys.solvers.core.point import Point
-from symphys.solvers.core.progress import Progress
-from symphys.solvers.core.vanishing_gradient import REFUSALS, SHORTER, lost
-from symphys.solvers.methods.directions import METHODS, Habits, Memory, learn_length
+from symphys.solvers.core.vanishing_gradient import REFUSALS, SHORTER, vanished
 
 RATES: dict[str, tuple[float, ...]] = {
     "spectral": (1.0,),
@@ -81,8 +78,8 @@ class GradientOptions:
     patience: int = 30
 
     def __post_init__(self) -> None:
-        """ValueError that names the option and says what would be valid."""
-        require(self.method in METHODS, "method", f"one of {', '.join(METHODS)}")
+        """ValueError that names the option and what would be valid."""
+        require(self.method in DIRECTIONS, "method", f"one of {', '.join(DIRECTIONS)}")
         at_least(0, iterations=self.iterations, backtracking=self.backtracking)
         at_least(0, tolerance=self.tolerance, patience=self.patience)
         require(all(rate > 0 for rate in self.rates), "rates", "positive numbers")
@@ -109,14 +106,14 @@ class GradientOptions:
 
 
 @dataclass(frozen=True)
-class State:
+class GradientState:
     """Between two iterations.
 
     Attributes:
         iteration: of this stage.
         z, gradient: (n,).
         merits: the last ones, the present one at the end.
-        memory: of the method.
+        memory: of the direction.
         progress: of the merit.
     """
 
@@ -124,108 +121,100 @@ class State:
     z: Array
     gradient: Array
     merits: tuple[float, ...]
-    memory: Memory
+    memory: DirectionMemory
     progress: Progress
 
 
-def solve(
-    problem: ShootingProblem,
-    start: Array,
-    options: GradientOptions,
-    seed: int = 0,
-    monitor: Monitor | None = None,
-    checkpoint: dict[str, object] | None = None,
-    log: Log | None = None,
-) -> Outcome:
-    """Descend; nothing is drawn, so the seed acts through ``start`` alone. See ``interface.Solve``."""
+class GradientDescent:
+    """The method, see ``interface.Method``. Nothing is drawn: the seed acts through the start alone."""
 
-    def stage(meter: Meter, z: Array, saved: dict[str, object] | None) -> Verdict:
-        step: State | Verdict = revive(State, saved, Memory, Progress) if saved else first(meter, z)
-        while isinstance(step, State):
-            step = finished(meter, options, step) or advance(meter, options, step)
-        return step
+    def __init__(self, context: StageContext, options: GradientOptions) -> None:
+        """For one stage."""
+        self.evaluator: CountingEvaluator = context.evaluator
+        self.start, self.options = context.start, options
 
-    return run(Request("gradient", problem, start, monitor, checkpoint, log), stage)
+    def init(self) -> Iteration[GradientState] | StopReason:
+        """The gradient at the start."""
+        point = self.evaluator.gradient(self.start)
+        if not point.finite:
+            return not_finite(point)
+        z = self.start
+        memory, progress = DirectionMemory.empty(z.size), Progress(point.merit)
+        return self._iteration(point, GradientState(0, z, point.gradient, (point.merit,), memory, progress), math.nan)
 
-
-def first(meter: Meter, z: Array) -> State:
-    """The gradient at the start."""
-    point = begin(meter.gradient(z))
-    state = State(0, z, point.gradient, (point.merit,), Memory.empty(z.size), Progress(point.merit))
-    return complete(meter, point, state, math.nan)
-
-
-def complete(meter: Meter, point: Point, state: State, length: float) -> State:
-    """End an iteration, ``length`` in z away from the last one."""
-    meter.commit(point, state, meter.stationarity(point.z, point.gradient), length)
-    return state
-
-
-def finished(meter: Meter, options: GradientOptions, state: State) -> Verdict | None:
-    """Whether the state is stationary, the budget used up, or the descent gets nowhere."""
-    if meter.stationarity(state.z, state.gradient) <= options.tolerance * (1 + abs(state.merits[-1])):
-        return believed(meter, state.z, state.merits[-1])
-    if state.iteration >= options.iterations:
-        return Verdict(Status.BUDGET, BUDGET)
-    return Verdict(Status.STALLED, SLOW) if state.progress.quiet >= (options.patience or math.inf) else None
-
-
-def advance(meter: Meter, options: GradientOptions, state: State) -> State | Verdict:
-    """One step: direction, line search, new gradient."""
-    g = shortened(state.gradient * meter.scale, options.clip)
-    step, memory = direction(meter, options, state, g)
-    point = follow(meter, options, state, step)
-    if isinstance(point, Verdict):
-        return point
-    if not point.finite:
-        return not_finite(point, NOT_FINITE)
-    z = point.z
-    if options.method == "spectral":
-        memory = learn_length(memory, (z - state.z) / meter.scale, (point.gradient - state.gradient) * meter.scale)
-    merits = (*state.merits, point.merit)[-max(options.backtracking, 1) :]
-    progress = state.progress.after(point.merit) if options.at_last_rate(state.iteration) else Progress(point.merit)
-    following = State(state.iteration + 1, z, point.gradient, merits, memory, progress)
-    return complete(meter, point, following, float(np.linalg.norm(z - state.z)))
-
-
-def direction(meter: Meter, options: GradientOptions, state: State, g: Array) -> tuple[Array, Memory]:
-    """The step (n,) in z to a point within the bounds; downhill, unless every step is taken as it comes."""
-    habits, rate = Habits(options.momentum, options.betas), options.rate(state.iteration)
-    for memory in (state.memory, Memory.empty(g.size)):
-        d, memory = METHODS[options.method](g, memory, rate, habits)
-        step = meter.clip(state.z + meter.scale * d) - state.z
-        if state.gradient @ step < 0 or not options.backtracking:
-            break
-    return step, memory
-
-
-def follow(meter: Meter, options: GradientOptions, state: State, step: Array) -> Point | Verdict:
-    """The next point with its gradient; one on a plateau is refused a few times, and the step shortened."""
-    plateau: Point | None = None
-    for _ in range(REFUSALS + 1):
-        z = search(meter, options, state, step)
-        if isinstance(z, Verdict):
-            return plateau or z
-        point = meter.gradient(z)
-        if not (options.backtracking and point.finite and lost(meter, point, point.gradient, state.gradient)):
+    def step(self, state: GradientState) -> Iteration[GradientState] | StopReason:
+        """Direction, line search, new gradient."""
+        scale, options = self.evaluator.scale, self.options
+        step, memory = self._direction(state)
+        point = self._follow(state, step)
+        if isinstance(point, StopReason):
             return point
-        plateau, step = point, SHORTER * (z - state.z)
-    return point
+        if not point.finite:
+            return not_finite(point, NOT_FINITE)
+        z = point.z
+        if options.method == "spectral":
+            memory = learn_length(memory, (z - state.z) / scale, (point.gradient - state.gradient) * scale)
+        merits = (*state.merits, point.merit)[-max(options.backtracking, 1) :]
+        progress = state.progress.after(point.merit) if options.at_last_rate(state.iteration) else Progress(point.merit)
+        following = GradientState(state.iteration + 1, z, point.gradient, merits, memory, progress)
+        return self._iteration(point, following, float(np.linalg.norm(z - state.z)))
 
+    def terminate(self, state: GradientState) -> StopReason | None:
+        """Whether the state is stationary, the budget used up, or the descent gets nowhere."""
+        options, merit = self.options, state.merits[-1]
+        if self.evaluator.stationarity(state.z, state.gradient) <= options.tolerance * (1 + abs(merit)):
+            return stationary(self.evaluator, state.z, merit)
+        if state.iteration >= options.iterations:
+            return StopReason(Status.BUDGET, BUDGET)
+        return StopReason(Status.STALLED, SLOW) if state.progress.quiet >= (options.patience or math.inf) else None
 
-def search(meter: Meter, options: GradientOptions, state: State, step: Array) -> Array | Verdict:
-    """The next z along the step."""
-    if not options.backtracking:
-        return meter.clip(state.z + step)
-    merit, slope = state.merits[-1], float(state.gradient @ step)
-    found = backtrack(meter, state.z, step, slope, merit, max(state.merits))
-    if found.point:
-        return found.point.z
-    if found.not_finite:
-        return Verdict(Status.NOT_FINITE, NOT_FINITE)
-    if -slope <= ROUNDING * abs(merit):
-        return believed(meter, state.z, merit)
-    return Verdict(Status.STALLED, STALLED)
+    def resume(self, saved: dict[str, Any]) -> GradientState:
+        """See ``Method``."""
+        return revive(GradientState, saved, DirectionMemory, Progress)
+
+    def _iteration(self, point: Point, state: GradientState, step: float) -> Iteration[GradientState]:
+        return Iteration(state, point, self.evaluator.stationarity(point.z, point.gradient), step)
+
+    def _direction(self, state: GradientState) -> tuple[Array, DirectionMemory]:
+        """The step (n,) in z to a point within the bounds; downhill, unless every step is taken as it comes."""
+        evaluator, options = self.evaluator, self.options
+        g = shortened(state.gradient * evaluator.scale, options.clip)
+        habits, rate = Habits(options.momentum, options.betas), options.rate(state.iteration)
+        for memory in (state.memory, DirectionMemory.empty(g.size)):
+            d, memory = DIRECTIONS[options.method](g, memory, rate, habits)
+            step = evaluator.clip(state.z + evaluator.scale * d) - state.z
+            if state.gradient @ step < 0 or not options.backtracking:
+                break
+        return step, memory
+
+    def _follow(self, state: GradientState, step: Array) -> Point | StopReason:
+        """The next point with its gradient; one on a plateau is refused a few times, and the step shortened."""
+        plateau: Point | None = None
+        for _ in range(REFUSALS + 1):
+            z = self._search(state, step)
+            if isinstance(z, StopReason):
+                return plateau or z
+            point = self.evaluator.gradient(z)
+            flat = point.finite and self.options.backtracking > 0
+            if not (flat and vanished(self.evaluator, point, point.gradient, state.gradient)):
+                return point
+            plateau, step = point, SHORTER * (z - state.z)
+        return point
+
+    def _search(self, state: GradientState, step: Array) -> Array | StopReason:
+        """The next z (n,) along the step."""
+        evaluator = self.evaluator
+        if not self.options.backtracking:
+            return evaluator.clip(state.z + step)
+        merit, slope = state.merits[-1], float(state.gradient @ step)
+        found = backtrack(evaluator, state.z, step, slope, merit, max(state.merits))
+        if found.point:
+            return found.point.z
+        if found.not_finite:
+            return StopReason(Status.NOT_FINITE, NOT_FINITE)
+        if -slope <= ROUNDING * abs(merit):
+            return stationary(evaluator, state.z, merit)
+        return StopReason(Status.STALLED, STALLED)
 
 
 def shortened(g: Array, longest: float) -> Array:
@@ -234,6 +223,10 @@ def shortened(g: Array, longest: float) -> Array:
     return g * (longest / norm) if norm > longest else g
 
 
-GRADIENT = Solver(
-    "gradient", "first-order descent by the adjoint of the rollout", GradientOptions, solve, threaded=True
+GRADIENT = make_solver(
+    "gradient",
+    "first-order descent by the adjoint of the rollout",
+    GradientOptions,
+    iterating(GradientDescent),
+    threaded=True,
 )

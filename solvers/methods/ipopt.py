@@ -1,13 +1,14 @@
 """IPOPT (Waechter and Biegler 2006) through casadi's nlpsol, in x = z / scale, with exact bounds and constraints.
 
 The objective and the constraints are those of ``ShootingProblem.nlp``; its penalty on violated constraints, the merit,
-ranks iterates that violate no constraint, or one as much as the other. Each iterate costs one rollout more, which tells
+ranks iterates that violate no constraint, or one as much as the other. Each iterate costs one rollout more, which shows
 whether the targets are met. IPOPT may leave its best iterate for ever, by a step of its watchdog or over a cliff of the
 objective; the best iterate is the result all the same.
 
 The default Hessian is limited-memory BFGS, where IPOPT's own default is the exact one: that pays for few variables, and
 is dear for many controls.
 
+IPOPT runs its own loop, so this is no ``interface.Method`` but a stage by itself: a callback records each iterate.
 IPOPT's options pass through ``options`` unchanged, without a prefix. Its text goes to the log; it reads no option file.
 A solve goes on from its last iterate with a fresh barrier, so its end may differ from that of one without a break.
 """
@@ -25,16 +26,15 @@ import casadi as ca
 import numpy as np
 
 from symphys.errors import SymphysError
-from symphys.shooting import ShootingProblem
+from symphys.shooting import Nlp
 from symphys.solvers.core.checkpoint import revive
-from symphys.solvers.core.continuation import Request
-from symphys.solvers.core.driver import begin, converged, run, silent
-from symphys.solvers.core.evaluator import Meter, Verdict
-from symphys.solvers.core.interface import Log, Solver
+from symphys.solvers.core.convergence import converged, not_finite
+from symphys.solvers.core.driver import make_solver
+from symphys.solvers.core.evaluator import CountingEvaluator
+from symphys.solvers.core.interface import Iteration, Recorder, StageContext
 from symphys.solvers.core.options import at_least, require
-from symphys.solvers.core.outcome import Array, Counts, Monitor, Outcome, Status
+from symphys.solvers.core.outcome import Array, Counts, Status, StopReason
 from symphys.solvers.core.point import Point
-from symphys.solvers.methods.ipopt_functions import functions
 from symphys.solvers.methods.ipopt_options import SILENT, check
 
 BUDGET = "the iterations are used up: raise `iterations`, or try the other `hessian`"
@@ -96,14 +96,14 @@ class IpoptOptions:
     options: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """ValueError that names the option and says what would be valid."""
+        """ValueError that names the option and what would be valid."""
         at_least(0, iterations=self.iterations)
         require(0 < self.tolerance < math.inf, "tolerance", "above 0")
         require(self.hessian in ("limited-memory", "exact"), "hessian", "limited-memory or exact")
 
 
 @dataclass(frozen=True)
-class State:
+class IpoptState:
     """The last iterate.
 
     Attributes:
@@ -115,48 +115,36 @@ class State:
     z: Array
 
 
-def solve(
-    problem: ShootingProblem,
-    start: Array,
-    options: IpoptOptions,
-    seed: int = 0,
-    monitor: Monitor | None = None,
-    checkpoint: dict[str, object] | None = None,
-    log: Log | None = None,
-) -> Outcome:
-    """Solve; nothing is drawn, so the seed acts through ``start`` alone. See ``interface.Solve``."""
-    check(options.options)
-
-    def stage(meter: Meter, z: Array, saved: dict[str, object] | None) -> Verdict:
-        state = revive(State, saved) if saved else State(0, z)
-        if not saved:
-            meter.commit(begin(meter.value(z)), state)
-        return descend(meter, options, state, log or silent)
-
-    return run(Request("ipopt", problem, start, monitor, checkpoint, log, constraints=True), stage)
-
-
-def descend(meter: Meter, options: IpoptOptions, state: State, log: Log) -> Verdict:
-    """One call of IPOPT, then its counts, its log and its verdict."""
-    watch, first = Watch(meter, state.iteration), len(meter.rows)
+def stage(
+    context: StageContext, options: IpoptOptions, saved: dict[str, object] | None, recorder: Recorder
+) -> StopReason:
+    """One call of IPOPT, then its counts and its log. Nothing is drawn: the seed acts through the start alone."""
+    evaluator = context.evaluator
+    state = revive(IpoptState, saved) if saved else IpoptState(0, context.start)
+    if not saved:
+        point = evaluator.value(state.z)
+        if not point.finite:
+            return not_finite(point)
+        recorder.commit(Iteration(state, point))
+    watch, first = Watch(evaluator, recorder, state), recorder.rows
     with tempfile.TemporaryDirectory() as folder:
         text = Path(folder) / "ipopt.txt"
-        solver = build(meter, options, options.iterations - state.iteration, watch, text)
-        result = solver(**arguments(meter, state.z))
+        solver = build(evaluator, options, options.iterations - state.iteration, watch, text)
+        result = solver(**arguments(evaluator, state.z))
         stats = solver.stats()
         for line in text.read_text(errors="replace").splitlines():
-            log(line)
-    meter.settle(first, work(stats, len(meter.problem.constraint_lower) > 0))
+            context.log(line)
+    recorder.distribute(work(stats, len(evaluator.problem.constraint_lower) > 0), first)
     if watch.ended:
         raise watch.ended
-    return judged(meter, str(stats["return_status"]), np.array(result["x"]).ravel() * meter.scale)
+    return reason(evaluator, str(stats["return_status"]), np.array(result["x"]).ravel() * evaluator.scale)
 
 
-def build(meter: Meter, options: IpoptOptions, iterations: int, watch: Watch, text: Path) -> Any:
-    """The nlpsol over x = z / scale, the knob as its parameter."""
-    if meter.problem.nlp.expression is None:
+def build(evaluator: CountingEvaluator, options: IpoptOptions, iterations: int, watch: Watch, text: Path) -> Any:
+    """The nlpsol over x = z / scale, with the smoothing as its parameter."""
+    if evaluator.problem.nlp.expression is None:
         raise SymphysError("IPOPT needs expressions, and nets this large have none; take gradient or cma")
-    nlp, derivatives = functions(meter.problem.nlp, meter.scale, options.hessian == "exact")
+    nlp, derivatives = functions(evaluator.problem.nlp, evaluator.scale, options.hessian == "exact")
     own = {
         **SILENT,
         "file_print_level": 5,
@@ -176,12 +164,12 @@ def build(meter: Meter, options: IpoptOptions, iterations: int, watch: Watch, te
     return ca.nlpsol("solve", "ipopt", nlp, settings)
 
 
-def arguments(meter: Meter, z: Array) -> dict[str, Any]:
-    """Start, knob and bounds."""
-    problem, scale = meter.problem, meter.scale
-    bounds = {"lbx": meter.lower / scale, "ubx": meter.upper / scale}
+def arguments(evaluator: CountingEvaluator, z: Array) -> dict[str, Any]:
+    """Start, smoothing and bounds."""
+    problem, scale = evaluator.problem, evaluator.scale
+    bounds = {"lbx": evaluator.lower / scale, "ubx": evaluator.upper / scale}
     limits = {"lbg": problem.constraint_lower, "ubg": problem.constraint_upper}
-    return {"x0": z / scale, "p": meter.smoothing, **bounds, **limits}
+    return {"x0": z / scale, "p": evaluator.smoothing, **bounds, **limits}
 
 
 def work(stats: dict[str, Any], constrained: bool) -> Counts:
@@ -191,13 +179,17 @@ def work(stats: dict[str, Any], constrained: bool) -> Counts:
     return Counts(rollouts, called["grad_f"], called["jac_g"] if constrained else 0, called["hess_l"])
 
 
-def judged(meter: Meter, ending: str, z: Array) -> Verdict:
-    """The verdict; a solution that is worse than an iterate before it is none."""
+def reason(evaluator: CountingEvaluator, ending: str, z: Array) -> StopReason:
+    """Why IPOPT ended; a solution that is worse than an iterate before it is none."""
     if ending in GOOD:
-        solution = meter.value(meter.clip(z))
-        return Verdict(Status.STALLED, PASSED) if worse(solution, meter.best or solution) else converged(meter)
+        solution = evaluator.value(evaluator.clip(z))
+        return (
+            StopReason(Status.STALLED, PASSED)
+            if worse(solution, evaluator.incumbent.best or solution)
+            else converged(evaluator)
+        )
     unknown = (Status.FAILED, f"IPOPT ended with {ending.replace('_', ' ').lower()}")
-    return Verdict(*ENDS.get(ending, unknown))
+    return StopReason(*ENDS.get(ending, unknown))
 
 
 def worse(solution: Point, best: Point) -> bool:
@@ -206,17 +198,17 @@ def worse(solution: Point, best: Point) -> bool:
 
 
 class Watch(ca.Callback):
-    """Sees every iterate: one rollout, a row of the trace; ends the solve when a target is met or on interruption."""
+    """Records every iterate: one rollout, a row of the trace; ends the solve when all is met or on interruption."""
 
-    def __init__(self, meter: Meter, iteration: int) -> None:
-        """``iteration``: of the start, which has its row already."""
+    def __init__(self, evaluator: CountingEvaluator, recorder: Recorder, state: IpoptState) -> None:
+        """``state``: of the start, which has its row already."""
         ca.Callback.__init__(self)
-        self.meter, self.iteration, self.skip = meter, iteration, True
+        self.evaluator, self.recorder, self.state, self.skip = evaluator, recorder, state, True
         self.ended: BaseException | None = None
         self.construct("watch", {})
 
     def get_n_in(self) -> int:
-        """All that nlpsol gives out."""
+        """All outputs of nlpsol."""
         return int(ca.nlpsol_n_out())
 
     def get_n_out(self) -> int:
@@ -225,7 +217,7 @@ class Watch(ca.Callback):
 
     def get_sparsity_in(self, index: int) -> Any:
         """By the name of the argument."""
-        n, m = self.meter.problem.n, len(self.meter.problem.constraint_lower)
+        n, m = self.evaluator.problem.n, len(self.evaluator.problem.constraint_lower)
         sizes = {"x": n, "lam_x": n, "f": 1, "g": m, "lam_g": m, "lam_p": 1}
         return ca.Sparsity.dense(sizes[ca.nlpsol_out(index)], 1)
 
@@ -235,18 +227,54 @@ class Watch(ca.Callback):
             self.skip = False
             return [0.0]
         try:
-            self.see(self.meter.clip(np.array(arguments[0]).ravel() * self.meter.scale))
+            self.record(self.evaluator.clip(np.array(arguments[0]).ravel() * self.evaluator.scale))
         except (Exception, KeyboardInterrupt) as error:
             self.ended = error
         return [float(self.ended is not None)]
 
-    def see(self, z: Array) -> None:
+    def record(self, z: Array) -> None:
         """A row of the trace."""
-        before = self.meter.last
-        point = self.meter.value(z)
-        self.iteration += 1
-        length = math.nan if before is None else float(np.linalg.norm(z - before))
-        self.meter.commit(point, State(self.iteration, z), step=length)
+        point, before = self.evaluator.value(z), self.state
+        self.state = IpoptState(before.iteration + 1, z)
+        self.recorder.commit(Iteration(self.state, point, step=float(np.linalg.norm(z - before.z))))
 
 
-IPOPT = Solver("ipopt", "interior point with exact bounds and constraints, by casadi and IPOPT", IpoptOptions, solve)
+def functions(nlp: Nlp, scale: Array, exact: bool) -> tuple[dict[str, Any], dict[str, Any]]:
+    """(the problem for ``casadi.nlpsol``, settings with its derivatives).
+
+    Casadi differentiates the expression itself; compiled functions are handed over, an exact Hessian aside, which
+    is that of the expression always.
+    """
+    x, smoothing = ca.MX.sym("x", len(scale)), ca.MX.sym("smoothing")
+    objective, constraints = (nlp.value or nlp.expression)(x * scale, smoothing)
+    problem = {"x": x, "p": smoothing, "f": objective, "g": constraints}
+    settings: dict[str, Any] = {"no_nlp_grad": True, "calc_lam_p": False} if nlp.value else {}
+    if nlp.gradient:
+        f, slope = nlp.gradient(x * scale, smoothing)
+        settings["grad_f"] = ca.Function("nlp_grad_f", [x, smoothing], [f, slope * scale])
+    if nlp.jacobian:
+        g, slopes = nlp.jacobian(x * scale, smoothing)
+        scaled = ca.mtimes(slopes, ca.diag(ca.DM(scale)))
+        settings["jac_g"] = ca.Function("nlp_jac_g", [x, smoothing], [g, scaled])
+    if nlp.value and exact:
+        settings["hess_lag"] = hessian(nlp, scale, x, smoothing)
+    return problem, settings
+
+
+def hessian(nlp: Nlp, scale: Array, x: Any, smoothing: Any) -> ca.Function:
+    """The upper half of the Lagrangian's second derivative."""
+    objective, constraints = nlp.expression(x * scale, smoothing)
+    lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", constraints.sparsity())
+    lagrangian = lam_f * objective + ca.dot(lam_g, constraints)
+    second = ca.triu(ca.hessian(lagrangian, x)[0])
+    return ca.Function("nlp_hess_l", [x, smoothing, lam_f, lam_g], [second])
+
+
+IPOPT = make_solver(
+    "ipopt",
+    "interior point with exact bounds and constraints, by casadi and IPOPT",
+    IpoptOptions,
+    stage,
+    check=lambda options: check(options.options),
+    constraints=True,
+)

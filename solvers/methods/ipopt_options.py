@@ -33,12 +33,12 @@ def check(options: Mapping[str, Any]) -> None:
     for name, value in options.items():
         if name in RESERVED:
             raise refuse("ipopt", name, f"cannot be set: {RESERVED[name]}")
-        reason = trial(name, value)
+        reason = refusal(name, value)
         if reason:
             raise refuse("ipopt", name, f"IPOPT does not take {value!r}: {reason}")
 
 
-def trial(name: str, value: Any) -> str:
+def refusal(name: str, value: Any) -> str:
     """Why IPOPT refuses an option; empty if it does not."""
     x = ca.MX.sym("x")
     problem: dict[str, Any] = {"x": x, "f": x**2}

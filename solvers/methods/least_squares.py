@@ -3,7 +3,7 @@
 Each step solves (J'J + lambda I) d = -J'r over the variables that are free: those at a bound that the gradient
 pushes against are held (active set), and the step is projected into the bounds. lambda follows the gain ratio, the
 decrease of the merit over that of the linear model (Nielsen 1999; Madsen, Nielsen, Tingleff 2004, algorithm 3.16).
-A step onto a plateau is refused like one that raises the merit, see ``plateau``.
+A step onto a plateau is refused like one that raises the merit, see ``vanishing_gradient``.
 
 Why not scipy.optimize.least_squares: it can be stopped between iterations but not at the first point that meets the
 targets, and its trust region cannot be set when a solve goes on, so an interrupted solve would end elsewhere.
@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import scipy.linalg
@@ -21,17 +21,15 @@ from numpy.typing import NDArray
 
 from symphys.shooting import ShootingProblem
 from symphys.solvers.core.checkpoint import revive
-from symphys.solvers.core.continuation import Request
-from symphys.solvers.core.driver import begin, not_finite, run
-from symphys.solvers.core.evaluator import Meter, Verdict
-from symphys.solvers.core.interface import Log, Solver
+from symphys.solvers.core.convergence import Progress, not_finite, stationary
+from symphys.solvers.core.driver import iterating, make_solver
+from symphys.solvers.core.evaluator import CountingEvaluator
+from symphys.solvers.core.interface import Iteration, StageContext
 from symphys.solvers.core.line_search import ROUNDING
-from symphys.solvers.core.merit_probe import believed
 from symphys.solvers.core.options import at_least, require
-from symphys.solvers.core.outcome import Array, Monitor, Outcome, Status
+from symphys.solvers.core.outcome import Array, Status, StopReason
 from symphys.solvers.core.point import Point
-from symphys.solvers.core.progress import Progress
-from symphys.solvers.core.vanishing_gradient import REFUSALS, lost
+from symphys.solvers.core.vanishing_gradient import REFUSALS, vanished
 
 LOOSEST = 1 / 3
 """lambda falls at most to this share after a step that went as foreseen."""
@@ -72,13 +70,13 @@ class LeastSquaresOptions:
     patience: int = 10
 
     def __post_init__(self) -> None:
-        """ValueError that names the option and says what would be valid."""
+        """ValueError that names the option and what would be valid."""
         at_least(0, iterations=self.iterations, tolerance=self.tolerance, patience=self.patience)
         require(0 < self.damping < math.inf, "damping", "above 0")
 
 
 @dataclass(frozen=True)
-class State:
+class LeastSquaresState:
     """Between two iterations.
 
     Attributes:
@@ -111,79 +109,77 @@ class State:
         return 2 * self.jacobian.T @ self.residuals
 
 
-def solve(
-    problem: ShootingProblem,
-    start: Array,
-    options: LeastSquaresOptions,
-    seed: int = 0,
-    monitor: Monitor | None = None,
-    checkpoint: dict[str, object] | None = None,
-    log: Log | None = None,
-) -> Outcome:
-    """Descend; nothing is drawn, so the seed acts through ``start`` alone. See ``interface.Solve``."""
+class LevenbergMarquardt:
+    """The method, see ``interface.Method``. Nothing is drawn: the seed acts through the start alone."""
 
-    def stage(meter: Meter, z: Array, saved: dict[str, object] | None) -> Verdict:
-        if not problem.squares:
-            return Verdict(Status.NOT_APPLICABLE, NO_SQUARES)
-        step: State | Verdict = revive(State, saved, Progress) if saved else first(meter, options, z)
-        while isinstance(step, State):
-            step = finished(meter, options, step) or advance(meter, step)
-        return step
+    def __init__(self, context: StageContext, options: LeastSquaresOptions) -> None:
+        """For one stage."""
+        self.evaluator: CountingEvaluator = context.evaluator
+        self.start, self.options = context.start, options
 
-    return run(Request("least_squares", problem, start, monitor, checkpoint, log), stage)
+    def init(self) -> Iteration[LeastSquaresState] | StopReason:
+        """The Jacobian at the start sets the size of lambda."""
+        point = self.evaluator.jacobian(self.start)
+        if not point.finite:
+            return not_finite(point)
+        size = float(np.max(np.sum((point.jacobian * self.evaluator.scale) ** 2, axis=0), initial=0.0)) or 1.0
+        evaluated, progress = (point.z, point.residuals, point.jacobian), Progress(point.merit)
+        state = LeastSquaresState(0, *evaluated, self.options.damping * size, 2.0, STIFFEST * size, progress)
+        return self._iteration(point, state, math.nan)
 
+    def step(self, state: LeastSquaresState) -> Iteration[LeastSquaresState] | StopReason:
+        """One step that lowers the merit, and the Jacobian there; lambda grows until there is one."""
+        evaluator, first_try, refused = self.evaluator, True, 0
+        while state.damping <= state.stiffest:
+            z, promised = self._candidate(state)
+            if first_try and promised <= ROUNDING * state.merit:
+                return stationary(evaluator, state.z, state.merit)
+            trial, first_try = evaluator.residuals(z), False
+            gain = (state.merit - trial.merit) / promised if promised > 0 else -math.inf
+            if trial.finite and gain > WORTH:
+                point = evaluator.jacobian(z)
+                enough = refused == REFUSALS or not point.finite
+                if enough or not vanished(evaluator, point, point.jacobian, state.jacobian):
+                    return self._accept(state, point, gain)
+                refused += 1
+            state = replace(state, damping=state.damping * state.growth, growth=2 * state.growth)
+        return StopReason(Status.STALLED, STALLED) if trial.finite else not_finite(trial, NOT_FINITE)
 
-def first(meter: Meter, options: LeastSquaresOptions, z: Array) -> State:
-    """The Jacobian at the start sets the size of lambda."""
-    point = begin(meter.jacobian(z))
-    size = float(np.max(np.sum((point.jacobian * meter.scale) ** 2, axis=0), initial=0.0)) or 1.0
-    evaluated = (point.z, point.residuals, point.jacobian)
-    state = State(0, *evaluated, options.damping * size, 2.0, STIFFEST * size, Progress(point.merit))
-    return complete(meter, point, state, math.nan)
+    def terminate(self, state: LeastSquaresState) -> StopReason | None:
+        """Whether the state is stationary, the budget used up, or the descent gets nowhere."""
+        evaluator, options = self.evaluator, self.options
+        flat = evaluator.stationarity(state.z, state.gradient) <= options.tolerance * (1 + state.merit)
+        if flat or cosine(evaluator, state) <= options.tolerance:
+            return stationary(evaluator, state.z, state.merit)
+        if state.iteration >= options.iterations:
+            return StopReason(Status.BUDGET, BUDGET)
+        return StopReason(Status.STALLED, SLOW) if state.progress.quiet >= (options.patience or math.inf) else None
 
+    def resume(self, saved: dict[str, Any]) -> LeastSquaresState:
+        """See ``Method``."""
+        return revive(LeastSquaresState, saved, Progress)
 
-def complete(meter: Meter, point: Point, state: State, length: float) -> State:
-    """End an iteration, ``length`` in z away from the last one."""
-    meter.commit(point, state, meter.stationarity(point.z, point.gradient), length)
-    return state
+    def _iteration(self, point: Point, state: LeastSquaresState, step: float) -> Iteration[LeastSquaresState]:
+        return Iteration(state, point, self.evaluator.stationarity(point.z, point.gradient), step)
 
+    def _candidate(self, state: LeastSquaresState) -> tuple[Array, float]:
+        """The next z (n,), and by how much the linear model expects it to lower the merit."""
+        scale, r, free = self.evaluator.scale, state.residuals, movable(self.evaluator, state)
+        jacobian = state.jacobian * scale
+        d = np.zeros(free.size)
+        d[free] = damped_step(jacobian[:, free], r, state.damping)
+        z = self.evaluator.clip(state.z + scale * d)
+        expected = r + jacobian @ ((z - state.z) / scale)
+        return z, float(r @ r - expected @ expected)
 
-def finished(meter: Meter, options: LeastSquaresOptions, state: State) -> Verdict | None:
-    """Whether the state is stationary, the budget used up, or the descent gets nowhere."""
-    flat = meter.stationarity(state.z, state.gradient) <= options.tolerance * (1 + state.merit)
-    if flat or cosine(meter, state) <= options.tolerance:
-        return believed(meter, state.z, state.merit)
-    if state.iteration >= options.iterations:
-        return Verdict(Status.BUDGET, BUDGET)
-    return Verdict(Status.STALLED, SLOW) if state.progress.quiet >= (options.patience or math.inf) else None
-
-
-def advance(meter: Meter, state: State) -> State | Verdict:
-    """One step that lowers the merit, and the Jacobian there."""
-    first_try, refused = True, 0
-    while state.damping <= state.stiffest:
-        z, promised = candidate(meter, state)
-        if first_try and promised <= ROUNDING * state.merit:
-            return believed(meter, state.z, state.merit)
-        trial, first_try = meter.residuals(z), False
-        gain = (state.merit - trial.merit) / promised if promised > 0 else -math.inf
-        if trial.finite and gain > WORTH:
-            point = meter.jacobian(z)
-            if refused == REFUSALS or not (point.finite and lost(meter, point, point.jacobian, state.jacobian)):
-                return accept(meter, state, point, gain)
-            refused += 1
-        state = replace(state, damping=state.damping * state.growth, growth=2 * state.growth)
-    return Verdict(Status.STALLED, STALLED) if trial.finite else not_finite(trial, NOT_FINITE)
-
-
-def candidate(meter: Meter, state: State) -> tuple[Array, float]:
-    """The next z (n,), and by how much the linear model expects it to lower the merit."""
-    jacobian, r, free = state.jacobian * meter.scale, state.residuals, movable(meter, state)
-    d = np.zeros(free.size)
-    d[free] = damped_step(jacobian[:, free], r, state.damping)
-    z = meter.clip(state.z + meter.scale * d)
-    expected = r + jacobian @ ((z - state.z) / meter.scale)
-    return z, float(r @ r - expected @ expected)
+    def _accept(self, state: LeastSquaresState, point: Point, gain: float) -> Iteration[LeastSquaresState] | StopReason:
+        """Take the step; lambda falls with the gain ratio."""
+        if not point.finite:
+            return not_finite(point, NOT_FINITE)
+        damping = state.damping * max(LOOSEST, 1 - (2 * gain - 1) ** 3)
+        evaluated, progress = (point.z, point.residuals, point.jacobian), state.progress.after(point.merit)
+        taken = LeastSquaresState(state.iteration + 1, *evaluated, damping, 2.0, state.stiffest, progress)
+        return self._iteration(point, taken, float(np.linalg.norm(point.z - state.z)))
 
 
 def damped_step(jacobian: Array, r: Array, damping: float) -> Array:
@@ -197,36 +193,31 @@ def damped_step(jacobian: Array, r: Array, damping: float) -> Array:
     return np.asarray(-jacobian.T @ scipy.linalg.cho_solve(factor, r))
 
 
-def accept(meter: Meter, state: State, point: Point, gain: float) -> State | Verdict:
-    """Take the step; lambda falls with the gain ratio."""
-    if not point.finite:
-        return not_finite(point, NOT_FINITE)
-    damping = state.damping * max(LOOSEST, 1 - (2 * gain - 1) ** 3)
-    evaluated = (point.z, point.residuals, point.jacobian)
-    progress = state.progress.after(point.merit)
-    taken = State(state.iteration + 1, *evaluated, damping, 2.0, state.stiffest, progress)
-    return complete(meter, point, taken, float(np.linalg.norm(point.z - state.z)))
-
-
-def movable(meter: Meter, state: State) -> NDArray[np.bool_]:
+def movable(evaluator: CountingEvaluator, state: LeastSquaresState) -> NDArray[np.bool_]:
     """(n,): False for a variable at a bound that the gradient pushes against."""
-    at_lower = (state.z <= meter.lower) & (state.gradient > 0)
-    at_upper = (state.z >= meter.upper) & (state.gradient < 0)
+    at_lower = (state.z <= evaluator.lower) & (state.gradient > 0)
+    at_upper = (state.z >= evaluator.upper) & (state.gradient < 0)
     return ~(at_lower | at_upper)
 
 
-def cosine(meter: Meter, state: State) -> float:
+def cosine(evaluator: CountingEvaluator, state: LeastSquaresState) -> float:
     """The largest |cosine| between the residuals and a column of the Jacobian that is free to act on them."""
-    jacobian = state.jacobian[:, movable(meter, state)]
+    jacobian = state.jacobian[:, movable(evaluator, state)]
     lengths = np.linalg.norm(jacobian, axis=0) * np.linalg.norm(state.residuals)
-    seen = lengths > 0
-    return float(np.max(np.abs(jacobian.T @ state.residuals)[seen] / lengths[seen], initial=0.0))
+    acting = lengths > 0
+    return float(np.max(np.abs(jacobian.T @ state.residuals)[acting] / lengths[acting], initial=0.0))
 
 
-LEAST_SQUARES = Solver(
+def refusal(problem: ShootingProblem) -> str:
+    """Why the solver is not for a problem."""
+    return "" if problem.squares else NO_SQUARES
+
+
+LEAST_SQUARES = make_solver(
     "least_squares",
     "Levenberg-Marquardt within bounds, for costs that are sums of squares",
     LeastSquaresOptions,
-    solve,
+    iterating(LevenbergMarquardt),
+    refusal=refusal,
     threaded=True,
 )

@@ -1,43 +1,47 @@
-"""First-order descent in situations that are drawn anew in each iteration: what long motions through contact need.
+"""First-order descent over samples of a scenario, drawn anew in each iteration: for long motions through contact.
 
-Each iteration evaluates gradients in a batch of situations, the problem's own first, then takes a step of Adam along
-the mean of the gradients, each shortened by itself before (``clip``): a few situations in which small changes explode
-would drown all others. ``forget`` lets adjoints fade on their way back, at the price of a bias. A batch of its own,
-drawn once, decides which point is kept, since the path crosses regions that look good in a few situations only.
+Each iteration evaluates gradients in a batch of samples, the problem's own first, then takes a step of Adam along the
+mean of the gradients, each shortened by itself before (``clip``): a few samples in which small changes explode would
+drown all others. ``adjoint_discount`` lets adjoints decay on their way back, at the price of a bias. A batch of its
+own, drawn once, decides which point is kept, since the path crosses regions that look good in a few samples only.
 
-Motions that are over before their time add nothing to a gradient after that, so ``fallen`` lets what they say of the
-time before count more; that they were over is seen by the validation batch, through the cost of [fall].
+Motions that end early add nothing to a gradient after that, so ``fallen`` raises the weight of their gradient of the
+time before. Validation rates that they end early, through the cost of [fall].
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 
-from symphys.shooting import Drawn, ShootingProblem, Values
-from symphys.solvers.core.continuation import Request
-from symphys.solvers.core.driver import run
-from symphys.solvers.core.evaluator import Stop
-from symphys.solvers.core.interface import Log, Solver
+from symphys.shooting import ScenarioSamples
+from symphys.solvers.core.driver import iterating, make_solver
 from symphys.solvers.core.options import at_least, require
-from symphys.solvers.core.outcome import Array, Monitor, Outcome, Status
-from symphys.solvers.randomized.aggregation import Average, average, evolution, together
-from symphys.solvers.randomized.descent import LASTING, Descent, DescentOptions, Found, State, stage_of
-from symphys.solvers.randomized.validation import NOISE, comparing, first
+from symphys.solvers.core.outcome import Array, Status, StopReason
+from symphys.solvers.randomized.aggregation import GradientAverage, average, evolution, mixed
+from symphys.solvers.randomized.descent import (
+    LASTING,
+    Descent,
+    DescentOptions,
+    DescentState,
+    GradientEstimate,
+    refusal,
+)
+from symphys.solvers.randomized.validation import NOISE, first_sample, rate_by_validation
 
-NOT_FINITE = "not one situation of a batch is finite: bound the variables, lower `rate`, or add [fall]"
+NOT_FINITE = "not one sample of a batch is finite: bound the variables, lower `rate`, or add [fall]"
 
 
 @dataclass(frozen=True)
 class StochasticOptions(DescentOptions):
-    """Options of descent in drawn situations, beside those of ``DescentOptions``.
+    """Options of descent over samples, beside those of ``DescentOptions``.
 
     Attributes:
-        clip: largest norm of each situation's scaled gradient; inf: none.
-        forget: [1/s] how fast adjoints fade on their way back; 0: not at all.
+        clip: largest norm of each sample's scaled gradient; inf: none.
+        adjoint_discount: [1/s] how fast adjoints decay on their way back; 0: not at all. Its old name is ``forget``.
         fallen: weight of a motion that was over before its time.
         horizons: [s] shorter motions that gradients begin with, one after the other.
         growth: share of the iterations that these take together.
@@ -48,7 +52,7 @@ class StochasticOptions(DescentOptions):
     __pydantic_config__: ClassVar[dict[str, object]] = {"extra": "forbid"}
 
     clip: float = 1.0
-    forget: float = 2.0
+    adjoint_discount: float = field(default=2.0, metadata={"was": "forget"})
     fallen: float = 5.0
     horizons: tuple[float, ...] = ()
     growth: float = 0.5
@@ -56,9 +60,9 @@ class StochasticOptions(DescentOptions):
     sigma: float = 0.03
 
     def __post_init__(self) -> None:
-        """ValueError that names the option and says what would be valid."""
+        """ValueError that names the option and what would be valid."""
         super().__post_init__()
-        at_least(0, forget=self.forget)
+        at_least(0, adjoint_discount=self.adjoint_discount)
         require(self.clip > 0, "clip", "above 0")
         require(self.fallen > 0, "fallen", "above 0")
         require(0 < self.sigma < math.inf, "sigma", "above 0")
@@ -72,58 +76,42 @@ class StochasticOptions(DescentOptions):
         return self.horizons[reached] if reached < len(self.horizons) else math.inf
 
 
-def solve(
-    problem: ShootingProblem,
-    start: Array,
-    options: StochasticOptions,
-    seed: int = 0,
-    monitor: Monitor | None = None,
-    checkpoint: dict[str, object] | None = None,
-    log: Log | None = None,
-) -> Outcome:
-    """Descend. See ``interface.Solve``."""
-    stage = stage_of(Pathwise, options, seed, log)
-    rate = comparing(options.batch(seed))
-    return run(Request("stochastic", problem, start, monitor, checkpoint, log, rate=rate), stage)
-
-
-class Pathwise(Descent[StochasticOptions]):
+class StochasticDescent(Descent[StochasticOptions]):
     """Along the mean of shortened gradients."""
 
-    def way(self, state: State, drawn: Drawn) -> Found:
+    def estimate(self, state: DescentState, samples: ScenarioSamples) -> GradientEstimate | StopReason:
         """See ``Descent``."""
-        values = self.gradients(state, drawn)
-        found = average(values, self.scale, self.options.clip, self.options.fallen)
+        options = self.options
+        horizon = options.horizon(state.iteration)
+        values = self.evaluator.sample_gradients(state.z, samples, options.adjoint_discount, horizon)
+        found = average(values, self.scale, options.clip, options.fallen)
         if found.left_out == len(values.merit):
-            raise Stop(Status.NOT_FINITE, NOT_FINITE)
-        point = first(self.meter, state.z, values, found.merit, found.objective, self.options.validation)
+            return StopReason(Status.NOT_FINITE, NOT_FINITE)
+        point = first_sample(self.evaluator, state.z, values, found.merit, found.objective, options.validation)
         words = (
             f"{found.alive:.0%} last, gradients {found.typical:.2g} (at most {found.longest:.2g}), agreement "
             f"{found.agreement:.2f}" + f", {found.left_out} not finite" * (found.left_out > 0)
         )
-        told = {LASTING: found.alive, "agreement of its gradients": found.agreement}
-        return Found(point, self.mixed(state, drawn, found), found.typical, words, told)
+        outputs = {LASTING: found.alive, "agreement of its gradients": found.agreement}
+        return GradientEstimate(point, self._mixed(state, samples, found), found.typical, words, outputs)
 
-    def gradients(self, state: State, drawn: Drawn) -> Values:
-        """In each situation of the batch."""
-        options, meter = self.options, self.meter
-        meter.counts.gradients += options.samples
-        horizon = options.horizon(state.iteration)
-        return self.situations.gradient(state.z[None], drawn, meter.smoothing, options.forget, horizon)
-
-    def mixed(self, state: State, drawn: Drawn, found: Average) -> Array:
+    def _mixed(self, state: DescentState, samples: ScenarioSamples, found: GradientAverage) -> Array:
         """The gradient that the step is made of."""
-        options, meter = self.options, self.meter
+        options = self.options
         if not options.evolution:
             return found.gradient
         stream = np.random.default_rng([self.seed, NOISE, state.iteration])
-        step = options.sigma * self.scale
-        evolved = evolution(self.situations, state.z, step, drawn, meter.smoothing, stream)
-        meter.counts.rollouts += 2 * options.samples
-        return together(found.gradient, evolved.gradient, options.evolution)
+        by_values = evolution(self.evaluator.sample_values, state.z, options.sigma * self.scale, samples, stream)
+        return mixed(found.gradient, by_values.gradient, options.evolution)
 
 
-STOCHASTIC = Solver(
-    "stochastic", "first-order descent in situations that are drawn anew", StochasticOptions, solve, situations=True
+STOCHASTIC = make_solver(
+    "stochastic",
+    "first-order descent over samples of the scenarios, drawn anew",
+    StochasticOptions,
+    iterating(StochasticDescent),
+    refusal=refusal,
+    rate=lambda options, seed: rate_by_validation(options.batch(seed)),
+    scenarios=True,
 )
 """See ``Solver``."""

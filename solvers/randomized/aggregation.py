@@ -1,19 +1,20 @@
-"""What many situations make of a point: a direction from their gradients, and one from their values alone."""
+"""Aggregation over samples of a scenario: a gradient from their gradients, and one from their values alone."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from symphys.shooting import Drawn, Situations, Values
+from symphys.shooting import ScenarioSamples, Values
 from symphys.solvers.core.outcome import Array
 
 TINY, LARGEST = 1e-300, 1e300
 
 
 @dataclass(frozen=True)
-class Average:
+class GradientAverage:
     """Of a batch.
 
     Attributes:
@@ -35,7 +36,7 @@ class Average:
     left_out: int
 
 
-def average(values: Values, scale: Array, clip: float, fallen: float) -> Average:
+def average(values: Values, scale: Array, clip: float, fallen: float) -> GradientAverage:
     """Each gradient by itself at most ``clip`` long, then their mean; motions that fell count ``fallen`` times."""
     assert values.gradient is not None, "gradients were asked for"
     g = values.gradient * scale
@@ -48,7 +49,7 @@ def average(values: Values, scale: Array, clip: float, fallen: float) -> Average
     lasted = np.ones(len(finite)) if values.alive is None else values.alive
     weights = np.where(lasted[finite] > 0, 1.0, fallen)
     short = directions * np.minimum(norms, clip)[:, None]
-    return Average(
+    return GradientAverage(
         gradient=weights @ short / max(weights.sum(), TINY),
         objective=mean(values.objective[finite]),
         merit=mean(values.merit[finite]),
@@ -66,14 +67,14 @@ def mean(numbers: Array) -> float:
 
 
 @dataclass(frozen=True)
-class Evolved:
-    """What pairs of points to either side of one say of it.
+class ValueGradient:
+    """A gradient from values at pairs of points, one to either side.
 
     Attributes:
         gradient: (n,) scaled.
         pairs: how many were finite.
         objective, merit: means over these.
-        first: what was found on one side, whose first situation is the problem's own.
+        first: the values on one side, whose first sample is the problem's own.
         alive: share of the motions that lasted.
     """
 
@@ -86,32 +87,31 @@ class Evolved:
 
 
 def evolution(
-    situations: Situations,
+    evaluate: Callable[[Array, ScenarioSamples], Values],
     z: Array,
     step: Array,
-    drawn: Drawn,
-    smoothing: float,
+    samples: ScenarioSamples,
     rng: np.random.Generator,
-) -> Evolved:
-    """A gradient from values: z moved to either side at random in each situation.
+) -> ValueGradient:
+    """A gradient from values: z moved to either side at random in each sample.
 
     Antithetic pairs (Salimans et al. 2017, arXiv 1703.03864): the mean of (r(z + s e) - r(z - s e)) / 2 e over
-    situations, in units of ``step`` = s (n,), where r is the rank of a merit among all that are finite, from -1/2 to
+    samples, in units of ``step`` = s (n,), where r is the rank of a merit among all that are finite, from -1/2 to
     1/2: how bad a fall is does not matter then, only that it is worse.
     """
-    noise = rng.standard_normal((len(drawn.numbers), z.size))
-    sides = [situations.value(z + sign * step * noise, drawn, smoothing) for sign in (1, -1)]
+    noise = rng.standard_normal((len(samples.numbers), z.size))
+    sides = [evaluate(z + sign * step * noise, samples) for sign in (1, -1)]
     merits = np.stack([side.merit for side in sides])
-    known = np.isfinite(merits).all(axis=0)
-    high, low = centred(merits[:, known])
-    pairs = int(known.sum())
-    objective = np.stack([side.objective for side in sides])[:, known]
+    finite = np.isfinite(merits).all(axis=0)
+    high, low = centred(merits[:, finite])
+    pairs = int(finite.sum())
+    objective = np.stack([side.objective for side in sides])[:, finite]
     lasted = [1.0 if side.alive is None else float(side.alive.mean()) for side in sides]
-    return Evolved(
-        gradient=np.asarray((high - low) / 2 @ noise[known] / max(pairs, 1)),
+    return ValueGradient(
+        gradient=np.asarray((high - low) / 2 @ noise[finite] / max(pairs, 1)),
         pairs=pairs,
         objective=mean(objective),
-        merit=mean(merits[:, known]),
+        merit=mean(merits[:, finite]),
         first=sides[0],
         alive=sum(lasted) / 2,
     )
@@ -124,7 +124,7 @@ def centred(merits: Array) -> Array:
     return np.asarray(ranks[places].reshape(merits.shape) / max(merits.size - 1, 1) - 0.5)
 
 
-def together(pathwise: Array, evolved: Array, share: float) -> Array:
+def mixed(pathwise: Array, evolved: Array, share: float) -> Array:
     """Both at length 1, mixed by their shares."""
     parts = [(1 - share, pathwise), (share, evolved)]
     return np.asarray(sum(weight * g / max(float(np.linalg.norm(g)), TINY) for weight, g in parts))

@@ -1,4 +1,4 @@
-"""How candidates are rated: in the problem's own situation, or on the average of some that are drawn."""
+"""How candidates of a search are rated: by one rollout each, or by their mean over samples of a scenario."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from typing import Protocol
 
 import numpy as np
 
-from symphys.shooting import Drawn, Situations
-from symphys.solvers.core.driver import begin, converged
-from symphys.solvers.core.evaluator import Meter, Verdict
+from symphys.shooting import ScenarioSamples
+from symphys.solvers.core.convergence import converged
+from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Log
-from symphys.solvers.core.outcome import Array, Status
+from symphys.solvers.core.outcome import Array, Status, StopReason
 from symphys.solvers.core.point import Point
-from symphys.solvers.randomized.validation import SITUATIONS, Batch, Validation, told
+from symphys.solvers.randomized.validation import SAMPLES, Validation, ValidationBatch, outputs_of
 
 
-class Trials(Protocol):
-    """Rates candidates, and says which points are kept.
+class Candidates(Protocol):
+    """Rates candidates, and decides which points are kept.
 
     Attributes:
         rollouts: for each candidate.
@@ -25,104 +25,89 @@ class Trials(Protocol):
 
     rollouts: int
 
-    def start(self, z: Array) -> Point:
-        """The point where a search begins."""
-        ...
-
     def rate(self, Z: Sequence[Array], generation: int) -> list[Point]:
         """A generation."""
         ...
 
     def keep(self, z: Array, generation: int, due: bool = False) -> None:
-        """See whether the mean of a search is to be kept; ``due``: in whatever generation."""
+        """Decide whether the mean of a search is to be kept; ``due``: in whatever generation."""
         ...
 
-    def converged(self) -> Verdict:
-        """What to say of a search that has come to its end."""
+    def converged(self) -> StopReason:
+        """Why a search ends that has converged."""
         ...
 
-    def told(self, verdict: Verdict, start: Array) -> Verdict:
-        """The verdict on a search from there, or what to say where its start (n,) is kept."""
+    def conclude(self, reason: StopReason, start: Array) -> StopReason:
+        """Why a search from ``start`` (n,) ended, or that its start is kept."""
         ...
 
 
-class Alone:
-    """In the problem's own situation, where what is best is kept."""
+class NominalCandidates:
+    """In the problem's own sample, where the best candidate is kept."""
 
     rollouts = 1
 
-    def __init__(self, meter: Meter) -> None:
+    def __init__(self, evaluator: CountingEvaluator) -> None:
         """Evaluate by it."""
-        self.meter = meter
-
-    def start(self, z: Array) -> Point:
-        """See ``Trials``."""
-        return begin(self.meter.value(z))
+        self.evaluator = evaluator
 
     def rate(self, Z: Sequence[Array], generation: int) -> list[Point]:
-        """See ``Trials``."""
-        return self.meter.values(Z)
+        """See ``Candidates``."""
+        return self.evaluator.values(Z)
 
     def keep(self, z: Array, generation: int, due: bool = False) -> None:
-        """See ``Trials``."""
+        """See ``Candidates``."""
 
-    def converged(self) -> Verdict:
-        """See ``Trials``."""
-        return converged(self.meter)
+    def converged(self) -> StopReason:
+        """See ``Candidates``."""
+        return converged(self.evaluator)
 
-    def told(self, verdict: Verdict, start: Array) -> Verdict:
-        """See ``Trials``."""
-        return verdict
+    def conclude(self, reason: StopReason, start: Array) -> StopReason:
+        """See ``Candidates``."""
+        return reason
 
 
-class Drawing:
-    """In situations that each generation draws anew, the same for all of it; means of the search are validated."""
+class SampledCandidates:
+    """In samples that each generation draws anew, the same for all of it; means of the search are validated."""
 
     def __init__(
         self,
-        meter: Meter,
-        situations: Situations,
+        evaluator: CountingEvaluator,
         samples: int,
         width: float,
-        batch: Batch,
+        batch: ValidationBatch,
         every: int,
-        log: Log | None,
+        log: Log,
     ) -> None:
-        """``samples`` situations for each candidate; a validation after ``every`` generations."""
-        self.meter, self.situations, self.rollouts, self.width = meter, situations, samples, width
-        self.seed, self.every = batch.seed, every
-        self.validation = Validation(meter, situations, batch, log)
-
-    def start(self, z: Array) -> Point:
-        """See ``Trials``."""
-        return begin(self.rate([z], 0)[0])
+        """``samples`` for each candidate; a validation after ``every`` generations."""
+        self.evaluator, self.rollouts, self.width, self.every = evaluator, samples, width, every
+        self.validation = Validation(evaluator, batch, log)
 
     def rate(self, Z: Sequence[Array], generation: int) -> list[Point]:
-        """See ``Trials``: means; a candidate with one motion that is not finite is none."""
-        meter, each = self.meter, self.rollouts
-        stream = np.random.default_rng([self.seed, SITUATIONS, generation])
-        drawn = self.situations.draw(stream, each, self.width, generation % len(self.situations.grids))
-        many = Drawn(drawn.grid, np.tile(drawn.numbers, (len(Z), 1)))
-        values = self.situations.value(np.repeat(np.array(Z), each, axis=0), many, meter.smoothing)
-        meter.counts.rollouts += len(many.numbers)
-        spoilt = self.validation.batch.count
+        """See ``Candidates``: means; a candidate with one motion that is not finite is none."""
+        scenario, batch, each = self.evaluator.scenario, self.validation.batch, self.rollouts
+        stream = np.random.default_rng([batch.seed, SAMPLES, generation])
+        drawn = scenario.draw(stream, each, self.width, generation % len(scenario.grids))
+        many = ScenarioSamples(drawn.grid, np.tile(drawn.numbers, (len(Z), 1)))
+        values = self.evaluator.sample_values(np.repeat(np.array(Z), each, axis=0), many)
+        met = self.evaluator.problem.met
         merits, objectives = (part.reshape(-1, each).mean(axis=1) for part in (values.merit, values.objective))
         return [
-            Point(z, merit, objective, errors.copy(), meter.problem.met(errors), told(values, k * each), spoilt=spoilt)
+            Point(z, merit, objective, errors.copy(), met(errors), outputs_of(values, k * each), spoilt=batch.count)
             for k, (z, merit, objective, errors) in enumerate(
                 zip(Z, merits.tolist(), objectives.tolist(), values.errors[::each], strict=True)
             )
         ]
 
     def keep(self, z: Array, generation: int, due: bool = False) -> None:
-        """See ``Trials``."""
+        """See ``Candidates``."""
         if due or generation % self.every == 0:
-            self.validation.keep(self.meter.clip(z))
+            self.validation.keep(self.evaluator.clip(z))
 
-    def converged(self) -> Verdict:
-        """See ``Trials``."""
-        return Verdict(Status.CONVERGED)
+    def converged(self) -> StopReason:
+        """See ``Candidates``."""
+        return StopReason(Status.CONVERGED)
 
-    def told(self, verdict: Verdict, start: Array) -> Verdict:
-        """See ``Trials``."""
-        return self.validation.told(verdict, start)
+    def conclude(self, reason: StopReason, start: Array) -> StopReason:
+        """See ``Candidates``."""
+        return self.validation.conclude(reason, start)

@@ -22,8 +22,10 @@ if TYPE_CHECKING:
 def at(row: TraceRow) -> str:
     """Where a run is; the smoothing only where there is some, as its numbers are not the exact ones then."""
     smoothed = f" at smoothing {row.smoothing:g}" if row.smoothing > 0 else ""
-    outputs = "".join(f", {labelled(name, value)}" for name, value in row.told.items())
-    return f"iteration {row.iteration}, objective {number(row.best)}, worst {number(row.miss)}{outputs}{smoothed}"
+    outputs = "".join(f", {labelled(name, value)}" for name, value in row.outputs.items())
+    return (
+        f"iteration {row.iteration}, objective {number(row.best)}, worst {number(row.max_violation)}{outputs}{smoothed}"
+    )
 
 
 @contextmanager

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,7 @@ from symphys.codegen.backends import BEST
 from symphys.problem import Problem, require_solvable, require_solvers, validate_options
 from symphys.results.config import Config, make_config
 from symphys.runs.folder import RunFolder
-from symphys.solvers import SOLVERS, solver
+from symphys.solvers import SOLVERS, recorded_options, solver
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,7 @@ def make_jobs(
         check_tables(problem)
         for name in solvers or problem.solvers or fitting(problem):
             options = solver_options(problem, name)
-            plain = dataclasses.asdict(options)
+            plain = recorded_options(options)
             for seed in seeds:
                 config = make_config(problem.name, problem.identity, name, seed, settings, plain, backend)
                 folder = RunFolder.of(out, problem.name, name, seed)
@@ -79,7 +78,7 @@ def make_jobs(
 
 def fitting(problem: Problem) -> list[str]:
     """The solvers that are for such problems: with situations that differ, or without."""
-    return [name for name, each in SOLVERS.items() if each.situations in (None, problem.scenarios is not None)]
+    return [name for name, each in SOLVERS.items() if each.scenarios in (None, problem.scenarios is not None)]
 
 
 def solver_options(problem: Problem, name: str) -> Any:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Mapping
 
 from symphys.runs.job import Job
 from symphys.runs.transcription_cache import TranscriptionCache
-from symphys.solvers import Monitor, Outcome, TraceRow, solve_together, solver
+from symphys.solvers import Monitor, Outcome, TraceRow, solve_multi_start, solver
 
 
 def groups(jobs: Mapping[int, Job], halfway: Collection[int]) -> list[list[int]]:
@@ -49,7 +49,7 @@ def solve_group(
         starts = [shooting.start(seed) for seed in seeds]
         monitors = [monitored(index) for index in jobs]
         chosen = solver(first.config.solver)
-        found = solve_together(chosen, shooting, starts, first.options, seeds, monitors)
+        found = solve_multi_start(chosen, shooting, starts, first.options, seeds, monitors)
     except Exception:  # the run that it belongs to reports it when it is solved alone
         return {}
     return dict(zip(jobs, found, strict=True))

@@ -133,7 +133,7 @@ def stage_record(transcription: Transcription, stage: StageResult, price: Mappin
         smoothing=stage.smoothing,
         status=stage.status.value,
         objective=stage.objective,
-        worst=stage.miss,
+        worst=stage.max_violation,
         exact_objective=exact.objective,
         exact_worst=exact.worst,
         solved=exact.solved,
@@ -147,7 +147,7 @@ def trace_row(row: TraceRow, price: Mapping[str, float]) -> dict[str, object]:
     """An iteration as a line of trace.csv."""
     values = {each.name: getattr(row, each.name) for each in fields(row)}
     numbers = {name: value for name, value in values.items() if not isinstance(value, Mapping)}
-    outputs = {OUTPUT + name: value for name, value in row.told.items()}
+    outputs = {OUTPUT + name: value for name, value in row.outputs.items()}
     return {**numbers, "equivalents": equivalents(row, price), **outputs}
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from symphys.model.state_layout import initial_state, input_columns, inputs_size
 from symphys.model.world import World
 from symphys.problem import Problem, Variable, follow
-from symphys.shooting import Block
+from symphys.shooting import VariableBlock
 from symphys.transcription.formula_names import Parameters, spans
 
 Expr = Any
@@ -32,10 +32,10 @@ class Start:
     p: Expr
 
 
-def blocks(problem: Problem) -> tuple[Block, ...]:
+def blocks(problem: Problem) -> tuple[VariableBlock, ...]:
     """The blocks of z: one a variable."""
     return tuple(
-        Block(v.name, start, (v.guess.size // v.knots, v.knots), v.guess, v.lower, v.upper, v.scale, v.spread)
+        VariableBlock(v.name, start, (v.guess.size // v.knots, v.knots), v.guess, v.lower, v.upper, v.scale, v.spread)
         for v, (start, _) in zip(problem.variables, spans(problem.variables), strict=True)
     )
 

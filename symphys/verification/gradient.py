@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.shooting import Block
+from symphys.shooting import VariableBlock
 from symphys.transcription import Transcription
 
 Array = NDArray[np.float64]
@@ -44,7 +44,7 @@ def compare_gradient(transcription: Transcription, z: Array) -> list[dict[str, A
     return [row | {"felt": effect / size} for row, effect in zip(rows, effects, strict=True)]
 
 
-def _compare_block(value: Values, block: Block, z: Array, slope: Array) -> dict[str, Any]:
+def _compare_block(value: Values, block: VariableBlock, z: Array, slope: Array) -> dict[str, Any]:
     norm = float(np.linalg.norm(slope[block.start : block.stop])) or 1.0
     directions = _directions(block, block.stop - block.start, z.size)
     middle, at = _best(lambda d, step: _mismatch(value, z, slope, d, step), directions)
@@ -70,7 +70,7 @@ def max_or_nan(numbers: Any) -> float:
     return float(np.max(np.fromiter(numbers, float), initial=0.0))
 
 
-def _directions(block: Block, size: int, n: int) -> Array:
+def _directions(block: VariableBlock, size: int, n: int) -> Array:
     """(k, n): unit steps in the scale of each component, or random combinations of many."""
     inside = np.eye(size)
     if size > EVERY_COMPONENT:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from symphys.maths import rotation
 from symphys.model.state_layout import GIVEN, Layout
-from symphys.shooting import Block
+from symphys.shooting import VariableBlock
 from symphys.transcription import Record, Rollout, Transcription
 from symphys.verification.sensitivity_growth import DIRECTIONS
 from symphys.verification.signed_gaps import Meeting, meetings
@@ -80,7 +80,7 @@ def _pulled(transcription: Transcription, record: Record, some: Sequence[Approac
     return transcription.pull(record, states, by_p)
 
 
-def _row(approach: Approach, blocks: Sequence[Block], slope: Array, dt: float) -> dict[str, Any]:
+def _row(approach: Approach, blocks: Sequence[VariableBlock], slope: Array, dt: float) -> dict[str, Any]:
     """``slope`` (n,): of the gap."""
     parts = [slope[block.start : block.stop] for block in blocks]
     effects = [float(np.linalg.norm(part * block.scale)) for part, block in zip(parts, blocks, strict=True)]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symphys.problem import Problem
-from symphys.shooting import Block
+from symphys.shooting import VariableBlock
 from symphys.trajectory import NotFinite
 from symphys.transcription import Transcription, transcribe
 
@@ -59,7 +59,7 @@ def settling(transcription: Transcription, z: Array, residual: float, impulse: f
         return {"residual_finer": float("inf")}
 
 
-def change(block: Block, before: Array, after: Array) -> float | None:
+def change(block: VariableBlock, before: Array, after: Array) -> float | None:
     """|after - before| / |before| of one variable's part of a gradient, in its scale; None where it is flat."""
     part = slice(block.start, block.stop)
     norm = float(np.linalg.norm(before[part] * block.scale))

@@ -17,7 +17,7 @@ SPEED = "speed [m/s]"
 def taught(name: str, settings: dict[str, object], seed: int = 0) -> tuple[Transcription, Outcome]:
     """The problem with these settings, and what the solver found."""
     made = transcribe(load_problem(find(name), settings), exact=True)
-    if made.shooting.situations is None:
+    if made.shooting.scenario is None:
         pytest.skip(made.backend.note)
     options = solver_options(made.problem, "stochastic")
     return made, SOLVERS["stochastic"].solve(made.shooting, made.shooting.start(seed), options, seed)
@@ -31,7 +31,7 @@ def test_a_short_lesson_helps() -> None:
     before = made.judge(made.shooting.start(0)).outputs[SPEED]
     after = made.judge(found.z).outputs[SPEED]
     assert after > 1.3 * before
-    assert found.trace[-1].told[SPEED] == pytest.approx(after, rel=1e-9)
+    assert found.trace[-1].outputs[SPEED] == pytest.approx(after, rel=1e-9)
     assert found.z[0] == 80
 
 

@@ -11,21 +11,21 @@ from walk_gradient import compared, gait
 from symphys.problem import load_problem
 from symphys.problems import find
 from symphys.runs.job import solver_options
-from symphys.shooting import Array, Situations
+from symphys.shooting import Array, ScenarioEvaluator
 from symphys.solvers import SOLVERS
 from symphys.transcription import Transcription, transcribe
 
 UNSEEN = 4711
 
 
-def taught(name: str, settings: dict[str, object], seed: int = 0) -> tuple[Transcription, Situations, Array]:
+def taught(name: str, settings: dict[str, object], seed: int = 0) -> tuple[Transcription, ScenarioEvaluator, Array]:
     """The problem with these settings, its situations, and what the solver found."""
     made = transcribe(load_problem(find(name), settings), exact=True)
-    if made.shooting.situations is None:
+    if made.shooting.scenario is None:
         pytest.skip(made.backend.note)
     options = solver_options(made.problem, "stochastic")
     found = SOLVERS["stochastic"].solve(made.shooting, made.shooting.start(seed), options, seed)
-    return made, made.shooting.situations, found.z
+    return made, made.shooting.scenario, found.z
 
 
 def ahead(made: Transcription, z: Array) -> Any:
@@ -57,7 +57,7 @@ def test_a_short_lesson_helps() -> None:
 def test_the_adjoint_of_a_calm_walk_is_its_derivative() -> None:
     """Against central differences over a thousand steps, in situations that differ."""
     made = transcribe(load_problem(find("quadruped_walk")), exact=True)
-    if made.shooting.situations is None:
+    if made.shooting.scenario is None:
         pytest.skip(made.backend.note)
     errors, _ = compared(made, gait(made, 0.05))
     assert np.median(errors) < 1e-6

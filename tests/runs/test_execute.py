@@ -67,7 +67,7 @@ def test_what_a_problem_tells_is_in_the_result_and_along_the_trace(problem_file:
     assert result.guess and result.guess["output: ahead [m]"] == pytest.approx(0.2)
     with (job.folder.path / "trace.csv").open(encoding="utf-8") as file:
         column = [float(row["output: ahead [m]"]) for row in csv.DictReader(file)]
-    assert column == [row.told["ahead [m]"] for row in rows]
+    assert column == [row.outputs["ahead [m]"] for row in rows]
     assert (column[0], column[-1]) == (pytest.approx(0.2), pytest.approx(0.5, abs=0.01))
 
 

@@ -1,4 +1,4 @@
-"""The shipped ball throw, from its guess, with the default options: what each solver needs for it.
+"""Every solver meets the shipped ball throw from its guess, with default options and bounded work.
 
 The bounds are those of the reference experiment (Degrave et al. 2016: 88 gradients) or tighter.
 """

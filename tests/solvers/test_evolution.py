@@ -1,4 +1,4 @@
-"""Search by values alone in situations that differ: the evolution strategy, and CMA-ES."""
+"""By values alone, the evolution strategy and CMA-ES find what is best on the average over samples of a scenario."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_they_go_on_to_the_bit(solve: Any) -> None:
 
 
 @pytest.mark.parametrize("solve", [evolve, search])
-def test_what_is_kept_does_best_in_other_situations_than_it_was_found_in(solve: Any) -> None:
+def test_what_is_kept_does_best_in_other_samples_than_it_was_found_in(solve: Any) -> None:
     """What was best in a few of them was lucky: its merit there is lower than what the kept point is worth."""
     found = solve(windy(spread=2.0))
     assert min(row.objective for row in found.trace) < found.trace[-1].best
@@ -64,19 +64,19 @@ def test_numbers_that_are_not_finite(solve: Any) -> None:
     assert found.status is Status.NOT_FINITE and found.advice
 
 
-def test_an_evolution_strategy_needs_situations() -> None:
+def test_an_evolution_strategy_needs_a_scenario() -> None:
     found = evolve(toy(2, objective=lambda z, s: ca.sumsqr(z)))
     assert found.status is Status.NOT_APPLICABLE and "[[scenario]]" in found.advice
 
 
 def test_cma_stops_where_all_is_met() -> None:
-    """In the situations for validation."""
+    """In the validation samples."""
     problem = windy()
-    problem = replace(problem, stop_when_met=True, situations=Content())
+    problem = replace(problem, stop_when_met=True, scenario=Content())
     assert search(problem).status is Status.MET
 
 
-class Content(type(windy().situations)):  # type: ignore[misc]
+class Content(type(windy().scenario)):  # type: ignore[misc]
     """Winds, with an error that is met near the best point."""
 
     def value(self, Z: Any, drawn: Any, smoothing: float) -> Any:

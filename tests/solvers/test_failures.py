@@ -1,4 +1,4 @@
-"""What goes wrong is a status with advice."""
+"""Whatever goes wrong in a solve is a status with advice, never an exception."""
 
 from __future__ import annotations
 

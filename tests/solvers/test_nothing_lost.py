@@ -17,12 +17,12 @@ import pytest
 from toys import PLAIN, Counted, constrained, rosenbrock, solve, target, toy
 from windy import BEST, Winds, windy
 
-from symphys.shooting import Array, Drawn, Evaluator, ShootingProblem, Values
+from symphys.shooting import Array, Evaluator, ScenarioSamples, ShootingProblem, Values
 from symphys.solvers import SOLVERS, Outcome, Status
 
 Rank = tuple[bool, float, float]
 Spoil = Callable[[Values], Values]
-SITUATED = ["stochastic", "evolution", "cma"]
+SAMPLED = ["stochastic", "evolution", "cma"]
 VALIDATION = 24
 
 
@@ -98,7 +98,7 @@ def fenced() -> ShootingProblem:
 
 
 def opposite(**more: Any) -> ShootingProblem:
-    """With the knob the minimum lies where the exact merit is high, and that has a hill between."""
+    """With smoothing the minimum lies where the exact merit is high, and that has a hill between."""
 
     def worth(z: Any, s: Any) -> Any:
         return ca.if_else(s > 0, (z - 8) ** 2, ca.cos(z) + z**2 / 60)  # least near 3.04 and 9.1
@@ -173,10 +173,10 @@ def test_ipopt_keeps_what_violates_least_not_what_the_penalty_likes() -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in PLAIN if name != "least_squares"])
-@pytest.mark.parametrize("knobs", [(1.0, 0.0), (1.0, 0.1, 0.0), (0.5,)])
-def test_stages_end_no_worse_exactly_than_they_began(name: str, knobs: tuple[float, ...]) -> None:
+@pytest.mark.parametrize("smoothings", [(1.0, 0.0), (1.0, 0.1, 0.0), (0.5,)])
+def test_stages_end_no_worse_exactly_than_they_began(name: str, smoothings: tuple[float, ...]) -> None:
     """The guess is nearly the exact minimum, and the stages lead away from it."""
-    problem, evaluator = recorded(opposite(smoothing=knobs))
+    problem, evaluator = recorded(opposite(smoothing=smoothings))
     found = solve(name, problem, options={"sigma": 0.05} if name == "cma" else {})
     exact = [each for each in evaluator.seen if each.smoothing == 0]
     assert not lost(found, problem, name, exact)
@@ -203,7 +203,7 @@ class Watched(Winds):
         self.hill, self.miss = hill, miss
         self.seen: list[Seen] = []
 
-    def value(self, Z: Array, drawn: Drawn, smoothing: float) -> Values:
+    def value(self, Z: Array, drawn: ScenarioSamples, smoothing: float) -> Values:
         found, more = super().value(Z, drawn, smoothing), self.hill(Z) if smoothing == 0 else 0.0
         errors = found.errors if self.miss is None else self.miss(Z)[:, None] + np.zeros((len(found.merit), 1))
         found = replace(found, merit=found.merit + more, objective=found.objective + more, errors=errors)
@@ -221,34 +221,34 @@ HILLS: dict[str, tuple[Callable[[Array], Array], Callable[[Array], Array] | None
 }
 
 
-def situated(name: str, situations: Watched, knobs: tuple[float, ...] = (0.0,), seed: int = 0) -> Outcome:
+def sampled(name: str, winds: Watched, smoothings: tuple[float, ...] = (0.0,), seed: int = 0) -> Outcome:
     """Solved from far off what is best."""
     own = {"population": 6, "evaluations": 1200, "samples": 4, "sigma": 0.5}
     others = {"iterations": 40, "samples": 8, "rate": 0.1}
     options = {**(own if name == "cma" else others), "validation": VALIDATION}
-    problem = replace(windy(), situations=situations, stop_when_met=False, smoothing=knobs)
+    problem = replace(windy(), scenario=winds, stop_when_met=False, smoothing=smoothings)
     return SOLVERS[name].solve(problem, BEST + 2.5, SOLVERS[name].Options(**options), seed)
 
 
-@pytest.mark.parametrize("name", SITUATED)
+@pytest.mark.parametrize("name", SAMPLED)
 @pytest.mark.parametrize("kind", HILLS)
-def test_where_situations_differ_the_guess_is_validated_too(name: str, kind: str) -> None:
+def test_where_samples_differ_the_guess_is_validated_too(name: str, kind: str) -> None:
     for seed in range(3):
-        situations = Watched(*HILLS[kind])
-        found = situated(name, situations, seed=seed)
-        seen = [each for each in situations.seen if np.isfinite(each.merit)]
+        winds = Watched(*HILLS[kind])
+        found = sampled(name, winds, seed=seed)
+        seen = [each for each in winds.seen if np.isfinite(each.merit)]
         assert any(np.array_equal(each.z, BEST + 2.5) for each in seen)
         assert not lost(found, windy(), name, seen)
         if kind in ("cliff", "fence") and np.array_equal(found.z, BEST + 2.5):
             assert "start" in found.advice
 
 
-@pytest.mark.parametrize("name", SITUATED)
+@pytest.mark.parametrize("name", SAMPLED)
 def test_so_are_the_points_of_stages(name: str) -> None:
     """What the smoothed stage descends to lies on a hill, exactly."""
-    situations = Watched(HILLS["cliff"][0])
-    found = situated(name, situations, (1.0, 0.0))
-    exact = [each for each in situations.seen if each.smoothing == 0]
+    winds = Watched(HILLS["cliff"][0])
+    found = sampled(name, winds, (1.0, 0.0))
+    exact = [each for each in winds.seen if each.smoothing == 0]
     assert not lost(found, windy(), name, exact)
     assert found.z[0] >= 2.95
     assert "the guess" in found.advice

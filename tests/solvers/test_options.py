@@ -1,10 +1,13 @@
-"""Options: what can be set, what cannot, and which name the message gives."""
+"""An option that cannot be is refused before the solve, by a message that names it and what would be valid."""
 
 from __future__ import annotations
 
+import json
+import re
 import subprocess
 import sys
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +15,9 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 from toys import quadratic, rosenbrock, solve
 
-from symphys.errors import SymphysError
-from symphys.solvers import SOLVERS, Status, solver
+from symphys.errors import ProblemError, SymphysError
+from symphys.problem import json_schema, validate_options
+from symphys.solvers import SOLVERS, Status, StochasticOptions, recorded_options, solver
 
 every_solver = pytest.mark.parametrize("name", list(SOLVERS))
 
@@ -163,3 +167,19 @@ def test_imported_by_another_name_says_so(tmp_path: Path) -> None:
     )
     assert done.returncode == 1
     assert "installs as symphys.solvers" in done.stderr
+
+
+def test_an_old_name_of_an_option_is_still_read() -> None:
+    """And marked as deprecated in the schema; what is recorded keeps the first name, and so does the key of a run."""
+    read = partial(validate_options, SOLVERS["stochastic"].Options, file="file.toml", where="solver.stochastic")
+    assert (
+        read(table={"forget": 5.0}) == read(table={"adjoint_discount": 5.0}) == StochasticOptions(adjoint_discount=5.0)
+    )
+    assert recorded_options(StochasticOptions(adjoint_discount=5.0))["forget"] == 5.0
+    with pytest.raises(ProblemError, match=r"forget: is the old name of adjoint_discount"):
+        read(table={"forget": 5.0, "adjoint_discount": 5.0})
+    with pytest.raises(ProblemError, match="adjoint_discount"):
+        read(table={"forget": -1.0})
+    schema = json.dumps(json_schema({"stochastic": StochasticOptions}))
+    assert re.search(r'"forget": \{[^{}]*"deprecated": true', schema)
+    assert not re.search(r'"adjoint_discount": \{[^{}]*"deprecated"', schema)

@@ -1,4 +1,4 @@
-"""Descent in situations that are drawn anew: it finds what is best on the average, and goes on where it was stopped."""
+"""Descent over samples drawn anew finds what is best on the average, and goes on to the bit where it was stopped."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import pytest
 from toys import toy
 from windy import BEST, Winds, windy
 
-from symphys.shooting import Array, Drawn, Values
+from symphys.shooting import Array, ScenarioSamples, Values
 from symphys.solvers import SOLVERS, Status, StochasticOptions, TraceRow
-from symphys.solvers.randomized.aggregation import average, centred, evolution, together
+from symphys.solvers.randomized.aggregation import average, centred, evolution, mixed
 
 SOLVE = SOLVERS["stochastic"].solve
 
@@ -36,16 +36,16 @@ def test_it_finds_the_best_on_the_average(share: float) -> None:
 def test_discretisations_take_turns() -> None:
     problem = windy()
     SOLVE(problem, np.zeros(2), options(iterations=4))
-    assert isinstance(problem.situations, Winds)
-    assert problem.situations.asked == [0, 1, 0, 1]
+    assert isinstance(problem.scenario, Winds)
+    assert problem.scenario.asked == [0, 1, 0, 1]
 
 
 def test_horizons_grow() -> None:
     """Over the first share of the iterations, evenly."""
     problem = windy()
     SOLVE(problem, np.zeros(2), options(iterations=8, horizons=(1.0, 2.0), growth=0.5))
-    assert isinstance(problem.situations, Winds)
-    assert problem.situations.horizons == [1, 1, 2, 2, np.inf, np.inf, np.inf, np.inf]
+    assert isinstance(problem.scenario, Winds)
+    assert problem.scenario.horizons == [1, 1, 2, 2, np.inf, np.inf, np.inf, np.inf]
 
 
 def test_validation_keeps_the_best_point() -> None:
@@ -56,16 +56,16 @@ def test_validation_keeps_the_best_point() -> None:
     assert distance[0] < 0.5 * distance[1]
 
 
-def test_a_point_that_meets_everything_in_the_problem_s_own_situation_goes_first() -> None:
+def test_a_point_that_meets_everything_in_the_problem_s_own_sample_goes_first() -> None:
     """However low the mean of one that does not: on its way to the lowest, the last that meets is kept."""
 
     class Strict(Winds):
-        def value(self, Z: Array, drawn: Drawn, smoothing: float) -> Values:
+        def value(self, Z: Array, drawn: ScenarioSamples, smoothing: float) -> Values:
             found = super().value(Z, drawn, smoothing)
             short = np.broadcast_to(BEST[:1] + 0.5 - Z[:, :1], (len(found.merit), 1))
             return replace(found, errors=1 + short)
 
-    problem = replace(windy(), situations=Strict(), stop_when_met=False)
+    problem = replace(windy(), scenario=Strict(), stop_when_met=False)
     start = np.add(BEST, [1.0, 0.0])
     found = SOLVE(problem, start, options(iterations=120, rate=0.02, hold=1.0, patience=0, every=1))
     assert 0.5 <= found.z[0] - BEST[0] < 0.53
@@ -91,7 +91,7 @@ def test_seeds_differ() -> None:
     assert not np.array_equal(a, b)
 
 
-def test_samples_that_are_not_finite_are_left_out_and_told() -> None:
+def test_samples_that_are_not_finite_are_left_out_and_logged() -> None:
     """All of them: it ends, and says why."""
     lines: list[str] = []
     found = SOLVE(windy(storm=0.2, badly=np.nan), np.ones(2), options(), log=lines.append)
@@ -102,7 +102,7 @@ def test_samples_that_are_not_finite_are_left_out_and_told() -> None:
     assert spoilt.status is Status.NOT_FINITE and "[fall]" in spoilt.advice
 
 
-def test_without_situations_it_is_not_for_this_problem() -> None:
+def test_without_a_scenario_it_is_not_for_this_problem() -> None:
     found = SOLVE(toy(2, objective=lambda z, s: ca.sumsqr(z)), np.ones(2), options())
     assert found.status is Status.NOT_APPLICABLE and "[[scenario]]" in found.advice
 
@@ -124,13 +124,12 @@ def test_evolution_estimates_the_gradient() -> None:
     """Of a quadratic, on the average of many pairs."""
     winds, z, step = Winds(), np.array([1.5, 0.75]), np.array([0.1, 0.2])
     rng = np.random.default_rng(0)
-    found = evolution(winds, z, step, winds.draw(rng, 20_000), 0.0, rng)
+    found = evolution(lambda Z, drawn: winds.value(Z, drawn, 0.0), z, step, winds.draw(rng, 20_000), rng)
     way = 2 * (z - BEST) * step
     assert found.gradient @ way == pytest.approx(np.linalg.norm(found.gradient) * np.linalg.norm(way), rel=1e-3)
     assert (found.pairs, found.alive) == (20_000, 1.0)
     assert found.merit == pytest.approx(((z - BEST) ** 2).sum() + 2 * 0.3**2 / 3 + (step**2).sum(), rel=0.02)
-    mixed = together(np.array([3.0, 0]), np.array([0, 0.1]), 0.25)
-    assert mixed == pytest.approx([0.75, 0.25])
+    assert mixed(np.array([3.0, 0]), np.array([0, 0.1]), 0.25) == pytest.approx([0.75, 0.25])
 
 
 def test_ranks() -> None:

@@ -1,4 +1,4 @@
-"""Every solver on every toy: the answer, the counts, the trace, the bounds."""
+"""Every solver finds the answer of every toy within bounds, and its counts and trace are those of the evaluations."""
 
 from __future__ import annotations
 
@@ -72,8 +72,8 @@ def test_target_is_met_and_the_solve_stops_there(name: str, options: dict[str, A
     assert (found.status, found.advice) == (Status.MET, "")
     errors = values(problem, found.z).errors[0]
     assert problem.met(errors)
-    assert found.trace[-1].miss == pytest.approx(errors.max())
-    assert all(row.miss > 1 for row in found.trace[:-1])
+    assert found.trace[-1].max_violation == pytest.approx(errors.max())
+    assert all(row.max_violation > 1 for row in found.trace[:-1])
 
 
 @every_solver
@@ -154,15 +154,17 @@ def test_counts_of_ipopt_are_its_own_and_one_rollout_an_iterate(hessian: str) ->
     watched, watch = counted(constrained())
     unscaled = {"nlp_scaling_method": "none"}  # scaling takes a gradient that IPOPT's text does not tell of
     found = solve("ipopt", watched, options={"hessian": hessian, "options": unscaled}, log=lines.append)
-    told = {
+    reported = {
         line.split("=")[0].strip(): int(line.split("=")[1])
         for line in lines
         if line.startswith("Number of") and "=" in line
     }
-    rollouts = told["Number of objective function evaluations"] + told["Number of equality constraint evaluations"]
-    assert found.counts.gradients == told["Number of objective gradient evaluations"]
-    assert found.counts.jacobians == told["Number of equality constraint Jacobian evaluations"]
-    assert found.counts.hessians == (told["Number of Lagrangian Hessian evaluations"] if hessian == "exact" else 0)
+    rollouts = (
+        reported["Number of objective function evaluations"] + reported["Number of equality constraint evaluations"]
+    )
+    assert found.counts.gradients == reported["Number of objective gradient evaluations"]
+    assert found.counts.jacobians == reported["Number of equality constraint Jacobian evaluations"]
+    assert found.counts.hessians == (reported["Number of Lagrangian Hessian evaluations"] if hessian == "exact" else 0)
     assert found.counts.rollouts == rollouts + watch.count["value"]
 
 
@@ -223,10 +225,10 @@ def test_compiled_toys(backend: str, name: str, options: dict[str, Any]) -> None
 def test_what_a_problem_tells_of_its_best_point_is_in_every_row(name: str, backend: str) -> None:
     """By name; the last row tells of what was found."""
     require(backend)
-    problem = toy(2, residuals=lambda z, s: z - 3, told=True, backend=backend)
+    problem = toy(2, residuals=lambda z, s: z - 3, outputs=True, backend=backend)
     found = solve(name, problem)
-    assert all(list(row.told) == ["sum [m]"] for row in found.trace)
-    assert found.trace[-1].told["sum [m]"] == pytest.approx(found.z.sum(), rel=1e-6)
+    assert all(list(row.outputs) == ["sum [m]"] for row in found.trace)
+    assert found.trace[-1].outputs["sum [m]"] == pytest.approx(found.z.sum(), rel=1e-6)
 
 
 @pytest.mark.parametrize("bounds", [(-np.inf, np.inf), (0, np.inf), (-np.inf, 5), (0, 5), (-1, 0.9), (0, 1e-3)])

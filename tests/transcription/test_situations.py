@@ -13,7 +13,7 @@ from symphys.dynamics import gap_function
 from symphys.dynamics.observation.joint_coordinates import readings
 from symphys.model.state_layout import initial_state
 from symphys.problem import Problem, load_problem
-from symphys.shooting import Drawn
+from symphys.shooting import ScenarioSamples
 from symphys.transcription import Transcription, transcribe
 from symphys.transcription.randomization.sampler import Sampler
 
@@ -87,7 +87,7 @@ def problem(tmp_path: Path) -> Problem:
 @pytest.fixture
 def walker(problem: Problem) -> Transcription:
     made = transcribe(problem)
-    if made.shooting.situations is None:
+    if made.shooting.scenario is None:
         pytest.skip(made.backend.note)
     return made
 
@@ -167,12 +167,12 @@ def test_poses_hold_together_and_touch_nothing(problem: Problem) -> None:
 
 def test_evaluations_are_those_of_the_numbers_in_a_file(walker: Transcription, tmp_path: Path) -> None:
     """Values and gradients of rows against files with the same numbers."""
-    situations = walker.shooting.situations
+    situations = walker.shooting.scenario
     assert situations is not None
     z, drawn = np.array([[0.3, -0.2]]), situations.draw(np.random.default_rng(2), 3)
     numbers = columns(Sampler(walker.problem), drawn.numbers)
     numbers["torso.force"][:] = 0
-    found = situations.gradient(z, Drawn(0, np.concatenate(list(numbers.values()), axis=1)), 0.0)
+    found = situations.gradient(z, ScenarioSamples(0, np.concatenate(list(numbers.values()), axis=1)), 0.0)
     assert found.gradient is not None
     for k in range(3):
         settings = {
@@ -190,11 +190,11 @@ def test_evaluations_are_those_of_the_numbers_in_a_file(walker: Transcription, t
 
 def test_pushes_push(walker: Transcription) -> None:
     """Sideways, with the force that was drawn."""
-    situations = walker.shooting.situations
+    situations = walker.shooting.scenario
     assert situations is not None
     drawn = situations.draw(np.random.default_rng(2), 30)
     force = columns(Sampler(walker.problem), drawn.numbers)["torso.force"].reshape(30, -1, 2)
-    quiet = Drawn(0, drawn.numbers.copy())
+    quiet = ScenarioSamples(0, drawn.numbers.copy())
     columns(Sampler(walker.problem), quiet.numbers)["torso.force"][:] = 0
     z = np.zeros((1, 2))
     far = [-situations.value(z, each, 0.0).merit for each in (drawn, quiet)]
@@ -206,7 +206,7 @@ def test_pushes_push(walker: Transcription) -> None:
 
 def test_the_problem_itself_is_the_first(walker: Transcription) -> None:
     """On every grid; a finer one has nearly the same answer, and the plain evaluator the same to the bit."""
-    situations = walker.shooting.situations
+    situations = walker.shooting.scenario
     assert situations is not None
     z = np.array([[0.3, -0.2]])
     first, finer = (
@@ -222,7 +222,7 @@ def test_the_problem_itself_is_the_first(walker: Transcription) -> None:
 
 def test_forgetting_and_falling(walker: Transcription) -> None:
     """Shorter adjoints far from the end; what has fallen says so."""
-    situations = walker.shooting.situations
+    situations = walker.shooting.scenario
     assert situations is not None
     drawn = situations.draw(np.random.default_rng(3), 8)
     exact, faded = (situations.gradient(np.zeros((1, 2)), drawn, 0.0, forget) for forget in (0.0, 50.0))
@@ -235,20 +235,20 @@ def test_forgetting_and_falling(walker: Transcription) -> None:
 def test_without_kernels_there_are_none(problem: Problem) -> None:
     """It is said, and the rest works."""
     made = transcribe(problem, backend="casadi")
-    assert made.shooting.situations is None
+    assert made.shooting.scenario is None
     assert "no evaluation in other situations" in made.backend.note
     assert np.isfinite(made.shooting.evaluator.value(np.zeros((1, 2)), 0.0).merit).all()
 
 
 def test_a_shorter_horizon_is_a_shorter_motion(walker: Transcription, tmp_path: Path) -> None:
     """The gradient is that of a file with less duration, in which both knots act together."""
-    situations = walker.shooting.situations
+    situations = walker.shooting.scenario
     assert situations is not None
     z, simulation = np.array([[0.3, 0.3]]), walker.problem.simulation
     shorter = transcribe(replace(walker.problem, simulation=replace(simulation, duration=simulation.duration / 2)))
-    assert shorter.shooting.situations is not None
-    nominal = [each.draw(np.random.default_rng(0), 1) for each in (situations, shorter.shooting.situations)]
+    assert shorter.shooting.scenario is not None
+    nominal = [each.draw(np.random.default_rng(0), 1) for each in (situations, shorter.shooting.scenario)]
     short = situations.gradient(z, nominal[0], 0.0, horizon=simulation.duration / 2)
-    alone = shorter.shooting.situations.gradient(z, nominal[1], 0.0)
+    alone = shorter.shooting.scenario.gradient(z, nominal[1], 0.0)
     assert short.gradient is not None and alone.gradient is not None
     assert short.gradient[0] == pytest.approx([alone.gradient.sum(), 0], rel=1e-9)

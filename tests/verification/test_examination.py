@@ -8,7 +8,7 @@ import pytest
 
 from symphys.problem import load_problem
 from symphys.problems import find
-from symphys.shooting import Block
+from symphys.shooting import VariableBlock
 from symphys.transcription import transcribe
 from symphys.verification import examine
 from symphys.verification.gradient import _compare_block, compare_gradient
@@ -51,7 +51,7 @@ def test_a_kink_is_no_jump(slope, passes):
     z = ca.SX.sym("z")
     values = {True: 2 * z + 1e-6 * (z > 0), False: ca.fabs(z)}
     value, one = ca.Function("f", [z], [values[passes]]), np.ones(1)
-    block = Block("v", 0, (1, 1), 0 * one, -one, one, one, one)
+    block = VariableBlock("v", 0, (1, 1), 0 * one, -one, one, one, one)
     row = _compare_block(lambda Z: np.array(value(Z.T)).ravel(), block, np.zeros(1), np.array([slope]))
     assert (row["error"] < 1e-6) == passes
     assert (row["jump"] == pytest.approx(1e-6 / 2, rel=1e-3)) == passes

@@ -31,6 +31,7 @@ def validate_options(cls: type[Options], table: Mapping[str, object], file: str,
         ProblemError: names unknown keys with the nearest valid ones, and values of the wrong kind.
     """
     faults = Faults(file, {where: table})
+    table = by_present_names(cls, table, where, faults)
     given = read_options(options_model(cls), table, where, faults)
     faults.stop_if_any()
     try:
@@ -56,6 +57,20 @@ def read_options(model: type[BaseModel], table: Mapping[str, object], where: str
     return {}
 
 
+def by_present_names(cls: type[Any], table: Mapping[str, object], where: str, faults: Faults) -> dict[str, object]:
+    """The table with the present names of its options; a complaint where it has both names of one."""
+    present = old_names(cls)
+    for old, name in present.items():
+        if old in table and name in table:
+            faults.add((where, old), f"is the old name of {name}, which is there too: leave it out")
+    return {present.get(key, key): value for key, value in table.items()}
+
+
+def old_names(cls: type[Any]) -> dict[str, str]:
+    """Deprecated names of options, which are still read, to the present ones: metadata "was" of a field."""
+    return {field.metadata["was"]: field.name for field in fields(cls) if "was" in field.metadata}
+
+
 def require_solvers(tables: Iterable[str], asked: Iterable[str], known: Iterable[str], file: str) -> None:
     """ProblemError if a [solver.NAME] table, or a name that the file's ``solvers`` asks for, is that of no solver."""
     names = list(known)
@@ -74,9 +89,13 @@ def options_model(cls: type[Any]) -> type[BaseModel]:
     """The pydantic model of a dataclass: the same keys, kinds and defaults, strict and without others."""
     kinds = get_type_hints(cls, include_extras=True)
     entries: dict[str, Any] = {field.name: (kinds[field.name], default(field)) for field in fields(cls) if field.init}
-    return create_model(
-        cls.__name__, __config__=ConfigDict(extra="forbid", strict=True), __doc__=cls.__doc__, **entries
-    )
+
+    def add_old_names(schema: dict[str, Any]) -> None:
+        for old, name in old_names(cls).items():
+            schema["properties"][old] = {**schema["properties"][name], "deprecated": True}
+
+    config = ConfigDict(extra="forbid", strict=True, json_schema_extra=add_old_names)
+    return create_model(cls.__name__, __config__=config, __doc__=cls.__doc__, **entries)
 
 
 def default(field: Field[Any]) -> Any:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from symphys.codegen import Kernel
 from symphys.codegen.backends.simd import common, probed
 from symphys.codegen.runtime.kernel import Outputs
-from symphys.shooting import Drawn, Values, WithoutResiduals
+from symphys.shooting import ScenarioSamples, Values, WithoutResiduals
 from symphys.transcription.randomization.sampler import Sampler
 
 Array = NDArray[np.float64]
@@ -25,24 +25,26 @@ class KernelSituations:
         """Kernels of the samplers' problems, the merit seeded."""
         self.grids, self.samplers, self.kernels = tuple(grids), tuple(samplers), tuple(kernels)
 
-    def draw(self, rng: np.random.Generator, count: int, width: float = 1.0, grid: int = 0) -> Drawn:
+    def draw(self, rng: np.random.Generator, count: int, width: float = 1.0, grid: int = 0) -> ScenarioSamples:
         """See ``Situations``."""
-        return Drawn(grid, self.samplers[grid].draw(rng, count, width))
+        return ScenarioSamples(grid, self.samplers[grid].draw(rng, count, width))
 
-    def nominal(self, count: int) -> Drawn:
+    def nominal(self, count: int) -> ScenarioSamples:
         """The problem's own situation, ``count`` times."""
-        return Drawn(0, np.tile(self.samplers[0].nominal, (count, 1)))
+        return ScenarioSamples(0, np.tile(self.samplers[0].nominal, (count, 1)))
 
-    def value(self, Z: Array, drawn: Drawn, smoothing: float) -> Values:
+    def value(self, Z: Array, drawn: ScenarioSamples, smoothing: float) -> Values:
         """See ``Situations``."""
         kernel = self.kernels[drawn.grid]
         outputs = kernel.forward(joined(Z, drawn), [smoothing])
         return replace(values(outputs), probe=probed(kernel, outputs))
 
-    def gradient(self, Z: Array, drawn: Drawn, smoothing: float, forget: float = 0.0, horizon: float = inf) -> Values:
+    def gradient(
+        self, Z: Array, drawn: ScenarioSamples, smoothing: float, adjoint_discount: float = 0.0, horizon: float = inf
+    ) -> Values:
         """See ``Situations``."""
         simulation = self.samplers[drawn.grid].problem.simulation
-        loss = 1 - exp(-forget * simulation.dt)
+        loss = 1 - exp(-adjoint_discount * simulation.dt)
         spared = max(0, simulation.steps - round(min(horizon, simulation.duration) / simulation.dt))
         outputs, slopes = self.kernels[drawn.grid].gradient(joined(Z, drawn), [1.0], [smoothing], loss, spared)
         return values(outputs, np.ascontiguousarray(slopes[:, : Z.shape[1]]))
@@ -64,7 +66,7 @@ class NominalEvaluator(WithoutResiduals):
         return self.situations.gradient(Z, self.situations.nominal(len(Z)), smoothing)
 
 
-def joined(Z: Array, drawn: Drawn) -> Array:
+def joined(Z: Array, drawn: ScenarioSamples) -> Array:
     """(batch, n + s)."""
     return np.hstack([np.broadcast_to(Z, (len(drawn.numbers), Z.shape[1])), drawn.numbers])
 

@@ -34,7 +34,7 @@ def with_situations(
         told = replace(plain.backend, note=f"{WITHOUT}: {error}")
         return replace(plain, problem=problem, backend=told)
     shooting = replace(
-        plain.shooting, evaluator=NominalEvaluator(situations), situations=situations, squares=False, nlp=Nlp(None)
+        plain.shooting, evaluator=NominalEvaluator(situations), scenario=situations, squares=False, nlp=Nlp(None)
     )
     grids = f"{len(situations.kernels)} discretisations" if len(situations.kernels) > 1 else ""
     told = described(situations.kernels[0], perf_counter() - began, note=grids)

@@ -1,4 +1,4 @@
-"""Solves side by side end as they do alone, in fewer calls."""
+"""Batched multi-start: solves side by side end as each does alone, to the bit, in fewer calls."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from symphys.errors import SymphysError
 from symphys.problem import load_problem
 from symphys.problems import find
 from symphys.shooting import Values
-from symphys.solvers import Outcome, Status, solve_together, solver
+from symphys.solvers import Outcome, Status, solve_multi_start, solver
 from symphys.transcription import transcribe
 
 descents = pytest.mark.parametrize("name", ["gradient", "least_squares"])
@@ -25,7 +25,7 @@ descents = pytest.mark.parametrize("name", ["gradient", "least_squares"])
 
 def together(name: str, problem: Any, seeds: range = range(5), **more: Any) -> list[Outcome]:
     chosen = solver(name)
-    return solve_together(chosen, problem, [problem.start(seed) for seed in seeds], chosen.Options(), **more)
+    return solve_multi_start(chosen, problem, [problem.start(seed) for seed in seeds], chosen.Options(), **more)
 
 
 def same(a: Outcome, b: Outcome) -> None:
@@ -33,7 +33,7 @@ def same(a: Outcome, b: Outcome) -> None:
     assert (a.status, a.advice, a.counts) == (b.status, b.advice, b.counts)
     assert np.array_equal(a.z, b.z)
     rows = [
-        [(*astuple(replace(row, seconds=0))[:-1], *row.told.values()) for row in outcome.trace] for outcome in (a, b)
+        [(*astuple(replace(row, seconds=0))[:-1], *row.outputs.values()) for row in outcome.trace] for outcome in (a, b)
     ]
     np.testing.assert_array_equal(rows[0], rows[1])
 

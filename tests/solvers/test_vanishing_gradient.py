@@ -1,4 +1,4 @@
-"""Where nothing that may vary has any influence: steps onto a plateau are refused, and an end on one is told."""
+"""Steps onto a plateau, where no variable has any influence, are refused, and the advice reports an end on one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Directions of first-order descent: what each method makes of the gradient. All in x = z / scale.
+"""Directions of first-order descent, each made from the gradient. All in x = z / scale.
 
 gradient   d = -rate g
 momentum   m <- momentum m + g,  d = -rate m                                 (Polyak 1964, heavy ball)
@@ -22,15 +22,15 @@ ADAM_FLOOR = 1e-8
 LONGEST = 1e12
 """A spectral step and its inverse stay below it."""
 GROWTH = 10.0
-"""The spectral step grows by it where the merit curves downward and so says nothing of a length."""
+"""The spectral step grows by it where the merit curves downward and so suggests no length."""
 
 
 @dataclass(frozen=True)
-class Memory:
-    """What a method remembers of its past.
+class DirectionMemory:
+    """What a direction depends on beside the gradient: running means of the gradients before, and a step length.
 
     Attributes:
-        ticks: gradients seen since the memory was empty.
+        ticks: gradients since the memory was empty.
         mean, square: (n,) running means of the gradient and of its square.
         length: the spectral step a; 0 before the first step.
     """
@@ -41,8 +41,8 @@ class Memory:
     length: float
 
     @classmethod
-    def empty(cls, n: int) -> Memory:
-        """Nothing seen yet."""
+    def empty(cls, n: int) -> DirectionMemory:
+        """Before the first gradient."""
         return cls(0, np.zeros(n), np.zeros(n), 0.0)
 
 
@@ -54,22 +54,22 @@ class Habits:
     betas: tuple[float, float]
 
 
-Method = Callable[[Array, Memory, float, Habits], tuple[Array, Memory]]
+Direction = Callable[[Array, DirectionMemory, float, Habits], tuple[Array, DirectionMemory]]
 """(scaled gradient, memory, rate, habits) -> (direction, memory)."""
 
 
-def plain(g: Array, memory: Memory, rate: float, habits: Habits) -> tuple[Array, Memory]:
+def plain(g: Array, memory: DirectionMemory, rate: float, habits: Habits) -> tuple[Array, DirectionMemory]:
     """Straight down."""
     return -rate * g, memory
 
 
-def momentum(g: Array, memory: Memory, rate: float, habits: Habits) -> tuple[Array, Memory]:
+def momentum(g: Array, memory: DirectionMemory, rate: float, habits: Habits) -> tuple[Array, DirectionMemory]:
     """Heavy ball."""
     mean = habits.momentum * memory.mean + g
     return -rate * mean, replace(memory, mean=mean)
 
 
-def adam(g: Array, memory: Memory, rate: float, habits: Habits) -> tuple[Array, Memory]:
+def adam(g: Array, memory: DirectionMemory, rate: float, habits: Habits) -> tuple[Array, DirectionMemory]:
     """Each component by its own root mean square."""
     b1, b2 = habits.betas
     ticks = memory.ticks + 1
@@ -79,16 +79,16 @@ def adam(g: Array, memory: Memory, rate: float, habits: Habits) -> tuple[Array, 
     return -rate * mean / (1 - b1**ticks) / spread, replace(memory, ticks=ticks, mean=mean, square=square)
 
 
-def spectral(g: Array, memory: Memory, rate: float, habits: Habits) -> tuple[Array, Memory]:
+def spectral(g: Array, memory: DirectionMemory, rate: float, habits: Habits) -> tuple[Array, DirectionMemory]:
     """As long as the last change of the gradient suggests; the first step has the length ``rate``."""
     length = memory.length or rate / max(float(np.linalg.norm(g)), 1 / LONGEST)
     return -length * g, replace(memory, length=length)
 
 
-METHODS: dict[str, Method] = {"spectral": spectral, "gradient": plain, "momentum": momentum, "adam": adam}
+DIRECTIONS: dict[str, Direction] = {"spectral": spectral, "gradient": plain, "momentum": momentum, "adam": adam}
 
 
-def learn_length(memory: Memory, s: Array, y: Array) -> Memory:
+def learn_length(memory: DirectionMemory, s: Array, y: Array) -> DirectionMemory:
     """The spectral step after a step s that changed the gradient by y."""
     curvature = float(s @ y)
     length = curvature / float(y @ y) if curvature > 0 else GROWTH * memory.length

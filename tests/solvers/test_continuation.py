@@ -1,4 +1,4 @@
-"""Continuation: stages of smoothing, each from the best point of the one before, under every solver."""
+"""Each stage of smoothing starts from the best point of the one before, and the last decides, under every solver."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from toys import PLAIN, failing, solve, stop_at, through_json, toy, values
 from symphys.errors import SymphysError
 from symphys.maths.smoothing import positive
 from symphys.shooting import ShootingProblem
-from symphys.solvers import Counts, Outcome, StageResult, Status, solve_together, solver
+from symphys.solvers import Counts, Outcome, StageResult, Status, solve_multi_start, solver
 from symphys.solvers.core.vanishing_gradient import FLAT
 
-KNOBS = (1.0, 0.1, 0.0)
+SMOOTHINGS = (1.0, 0.1, 0.0)
 every_solver = pytest.mark.parametrize("name", PLAIN)
 replayed = pytest.mark.parametrize("name", ["gradient", "least_squares", "cma"])
 
 
-def moving(smoothing: tuple[float, ...] = KNOBS, **more: Any) -> ShootingProblem:
-    """The answer moves with the knob: x = 1 + s."""
+def moving(smoothing: tuple[float, ...] = SMOOTHINGS, **more: Any) -> ShootingProblem:
+    """The answer moves with the smoothing: x = 1 + s."""
 
     def miss(z: Any, s: Any) -> Any:
         return z - 1 - s
@@ -40,8 +40,10 @@ def held(smoothing: tuple[float, ...]) -> ShootingProblem:
 
 
 def bent() -> ShootingProblem:
-    """A valley that bends the more the smaller the knob is, so that every stage has its iterations."""
-    return toy(2, lambda z, s: ca.vertcat(1 - z[0], 10 / (1 + s) * (z[1] - z[0] ** 2)), guess=-1.0, smoothing=KNOBS)
+    """A valley that bends the more the smaller the smoothing is, so that every stage has its iterations."""
+    return toy(
+        2, lambda z, s: ca.vertcat(1 - z[0], 10 / (1 + s) * (z[1] - z[0] ** 2)), guess=-1.0, smoothing=SMOOTHINGS
+    )
 
 
 def total(stages: tuple[StageResult, ...]) -> Counts:
@@ -49,7 +51,7 @@ def total(stages: tuple[StageResult, ...]) -> Counts:
     return Counts(*map(sum, zip(*(astuple(stage.counts) for stage in stages), strict=True)))
 
 
-def told(stages: tuple[StageResult, ...]) -> list[Any]:
+def without_seconds(stages: tuple[StageResult, ...]) -> list[Any]:
     """All but the seconds, to compare."""
     return [repr(replace(stage, seconds=0.0)) for stage in stages]
 
@@ -59,23 +61,23 @@ def same(a: Outcome, b: Outcome) -> None:
     assert (a.status, a.counts) == (b.status, b.counts)
     assert np.array_equal(a.z, b.z)
     rows = [
-        [(*astuple(replace(row, seconds=0))[:-1], *row.told.values()) for row in outcome.trace] for outcome in (a, b)
+        [(*astuple(replace(row, seconds=0))[:-1], *row.outputs.values()) for row in outcome.trace] for outcome in (a, b)
     ]
     np.testing.assert_array_equal(rows[0], rows[1])
-    assert told(a.stages) == told(b.stages)
+    assert without_seconds(a.stages) == without_seconds(b.stages)
 
 
 @every_solver
-def test_every_stage_is_told(name: str) -> None:
+def test_every_stage_has_its_result(name: str) -> None:
     """What is met at s > 0 ends its stage, not the solve."""
     found = solve(name, moving())
     assert found.status is Status.MET
     assert found.z == pytest.approx([1.0], abs=1e-3)
-    knobs = [row.smoothing for row in found.trace]
-    assert knobs == sorted(knobs, reverse=True) and set(knobs) == set(KNOBS)
-    assert [stage.smoothing for stage in found.stages] == list(KNOBS)
+    smoothings = [row.smoothing for row in found.trace]
+    assert smoothings == sorted(smoothings, reverse=True) and set(smoothings) == set(SMOOTHINGS)
+    assert [stage.smoothing for stage in found.stages] == list(SMOOTHINGS)
     for stage in found.stages:
-        assert stage.status is Status.MET and stage.miss <= 1
+        assert stage.status is Status.MET and stage.max_violation <= 1
         assert stage.z == pytest.approx([1 + stage.smoothing], abs=1e-3)
         assert stage.objective == values(moving(), stage.z, stage.smoothing).objective[0]
     assert np.array_equal(found.stages[-1].z, found.z)
@@ -85,9 +87,9 @@ def test_every_stage_is_told(name: str) -> None:
 def test_a_stage_starts_where_the_one_before_ended(name: str) -> None:
     problem = moving(stop_when_met=False)
     found = solve(name, problem)
-    for before, knob in zip(found.stages, KNOBS[1:], strict=False):
-        first = next(row for row in found.trace if row.smoothing == knob)
-        assert first.objective == values(problem, before.z, knob).objective[0]
+    for before, smoothing in zip(found.stages, SMOOTHINGS[1:], strict=False):
+        first = next(row for row in found.trace if row.smoothing == smoothing)
+        assert first.objective == values(problem, before.z, smoothing).objective[0]
 
 
 @every_solver
@@ -130,27 +132,27 @@ def test_each_stage_has_the_whole_budget() -> None:
     assert found.status is Status.BUDGET
 
 
-def broken_at(knob: float) -> ShootingProblem:
+def broken_at(smoothing: float) -> ShootingProblem:
     """As ``moving``, but it cannot be simulated at one smoothing."""
     return toy(
         1,
-        lambda z, s: ca.if_else(s == knob, np.nan, z - 1 - s),
+        lambda z, s: ca.if_else(s == smoothing, np.nan, z - 1 - s),
         errors=lambda z, s: ca.fabs(z - 1 - s) / 1e-3,
         guess=5.0,
-        smoothing=KNOBS,
+        smoothing=SMOOTHINGS,
     )
 
 
 @every_solver
-@pytest.mark.parametrize("knob", KNOBS[:2])
-def test_a_stage_that_cannot_be_simulated_is_passed(name: str, knob: float) -> None:
-    found = solve(name, broken_at(knob))
+@pytest.mark.parametrize("smoothing", SMOOTHINGS[:2])
+def test_a_stage_that_cannot_be_simulated_is_passed(name: str, smoothing: float) -> None:
+    found = solve(name, broken_at(smoothing))
     assert found.status is Status.MET
     assert found.z == pytest.approx([1.0], abs=1e-3)
-    broken = found.stages[KNOBS.index(knob)]
+    broken = found.stages[SMOOTHINGS.index(smoothing)]
     assert broken.status is Status.NOT_FINITE
     assert np.isnan(broken.objective)
-    assert broken.z == pytest.approx([5.0] if knob == KNOBS[0] else [2.0], abs=1e-3)
+    assert broken.z == pytest.approx([5.0] if smoothing == SMOOTHINGS[0] else [2.0], abs=1e-3)
 
 
 @every_solver
@@ -174,15 +176,15 @@ def test_a_foreign_error_belongs_to_its_stage() -> None:
 @pytest.mark.parametrize("problem", [moving(), bent()], ids=["moving", "bent"])
 def test_goes_on_in_any_stage_to_the_last_bit(name: str, problem: ShootingProblem) -> None:
     whole = solve(name, problem, seed=2)
-    first, second = (sum(row.smoothing >= knob for row in whole.trace) for knob in KNOBS[:2])
+    first, second = (sum(row.smoothing >= smoothing for row in whole.trace) for smoothing in SMOOTHINGS[:2])
     for stop in {1, first - 1, first, second - 1, second, len(whole.trace) - 1}:
         part = solve(name, problem, seed=2, monitor=stop_at(stop))
         assert part.status is Status.INTERRUPTED
-        knob = whole.trace[stop].smoothing
-        assert [stage.smoothing for stage in part.stages] == list(KNOBS[: KNOBS.index(knob) + 1])
+        smoothing = whole.trace[stop].smoothing
+        assert [stage.smoothing for stage in part.stages] == list(SMOOTHINGS[: SMOOTHINGS.index(smoothing) + 1])
         assert part.stages[-1].status is Status.INTERRUPTED
         assert total(part.stages) == part.counts
-        assert told(part.stages[:-1]) == told(whole.stages[: len(part.stages) - 1])
+        assert without_seconds(part.stages[:-1]) == without_seconds(whole.stages[: len(part.stages) - 1])
         same(solve(name, problem, seed=2, checkpoint=through_json(part.checkpoint)), whole)
 
 
@@ -201,8 +203,8 @@ def test_ipopt_goes_on_in_its_stage() -> None:
     stop = len([row for row in whole.trace if row.smoothing == 1.0]) + 1
     part = solve("ipopt", bent(), monitor=stop_at(stop))
     rest = solve("ipopt", bent(), checkpoint=through_json(part.checkpoint))
-    assert told(rest.stages[:1]) == told(whole.stages[:1])
-    assert [stage.smoothing for stage in rest.stages] == list(KNOBS)
+    assert without_seconds(rest.stages[:1]) == without_seconds(whole.stages[:1])
+    assert [stage.smoothing for stage in rest.stages] == list(SMOOTHINGS)
     assert rest.status is whole.status
     assert rest.z == pytest.approx(whole.z, abs=1e-6)
     assert total(rest.stages) == rest.counts
@@ -211,16 +213,16 @@ def test_ipopt_goes_on_in_its_stage() -> None:
 def test_a_checkpoint_of_other_stages_is_refused() -> None:
     part = solve("gradient", moving(stop_when_met=False), monitor=lambda row: stop_in(row, 0.0))
     saved = through_json(part.checkpoint)
-    for knobs in ((0.0,), (1.0, 0.1), (1.0, 0.2, 0.0)):
+    for smoothings in ((0.0,), (1.0, 0.1), (1.0, 0.2, 0.0)):
         with pytest.raises(SymphysError, match="other stages"):
-            solve("gradient", moving(knobs), checkpoint=saved)
+            solve("gradient", moving(smoothings), checkpoint=saved)
     with pytest.raises(SymphysError, match="damaged"):
         solve("gradient", moving(), checkpoint=saved | {"stages": [{"smoothing": 1.0, "status": "odd"}]})
 
 
-def stop_in(row: Any, knob: float) -> None:
-    """Interrupt in the stage of that knob."""
-    if row.smoothing == knob:
+def stop_in(row: Any, smoothing: float) -> None:
+    """Interrupt in the stage of that smoothing."""
+    if row.smoothing == smoothing:
         raise KeyboardInterrupt
 
 
@@ -229,7 +231,7 @@ def test_side_by_side_they_are_those_of_each_alone(name: str) -> None:
     """Solves that are in different stages share no batch, and each goes its own way."""
     problem, chosen = bent(), solver(name)
     starts = [problem.start(seed) for seed in range(4)]
-    for seed, found in enumerate(solve_together(chosen, problem, starts, chosen.Options())):
+    for seed, found in enumerate(solve_multi_start(chosen, problem, starts, chosen.Options())):
         same(found, solve(name, problem, seed))
 
 

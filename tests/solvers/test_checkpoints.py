@@ -28,7 +28,7 @@ def same(a: Outcome, b: Outcome) -> None:
     assert (a.status, a.counts) == (b.status, b.counts)
     assert np.array_equal(a.z, b.z)
     rows = [
-        [(*astuple(replace(row, seconds=0))[:-1], *row.told.values()) for row in outcome.trace] for outcome in (a, b)
+        [(*astuple(replace(row, seconds=0))[:-1], *row.outputs.values()) for row in outcome.trace] for outcome in (a, b)
     ]
     np.testing.assert_array_equal(rows[0], rows[1])
 

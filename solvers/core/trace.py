@@ -1,0 +1,50 @@
+"""The trace of a solve: one row for each iteration, and the time since the solve began."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, astuple, replace
+
+from symphys.solvers.core.outcome import Counts, TraceRow
+
+
+class SolveTrace:
+    """The iterations of a solve and their times, breaks left out."""
+
+    def __init__(self, rows: Iterable[TraceRow] = (), seconds: float = 0.0) -> None:
+        """Start the clock; ``rows`` and ``seconds``: of a solve that goes on."""
+        self._rows = list(rows)
+        self._earlier, self._began = seconds, time.perf_counter()
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(self._rows)
+
+    @property
+    def rows(self) -> tuple[TraceRow, ...]:
+        """All rows."""
+        return tuple(self._rows)
+
+    @property
+    def seconds(self) -> float:
+        """Since the solve began, breaks left out."""
+        return self._earlier + time.perf_counter() - self._began
+
+    def append(self, counts: Counts, numbers: Iterable[float], outputs: Mapping[str, float]) -> TraceRow:
+        """Add an iteration that ends now; ``numbers``: objective to smoothing, in the order of ``TraceRow``."""
+        row = TraceRow(*(len(self), *astuple(counts), self.seconds, *numbers, dict(outputs)))
+        self._rows.append(row)
+        return row
+
+    def distribute(self, work: Counts, first: int) -> None:
+        """Add work to the rows from ``first`` on, evenly, where a library reports its work at the end only."""
+        share = len(self) - first
+        for index in range(first, len(self)):
+            row, part = self._rows[index], work.share((index - first + 1) / share)
+            self._rows[index] = replace(row, **asdict(counts_of(row) + part))
+
+
+def counts_of(row: TraceRow) -> Counts:
+    """The work up to a row."""
+    return Counts(row.rollouts, row.gradients, row.jacobians, row.hessians)
