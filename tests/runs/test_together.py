@@ -65,6 +65,6 @@ def test_one_that_fails_spoils_no_other(
     def broken(*_: Any) -> Any:
         raise RuntimeError("out of order")
 
-    monkeypatch.setattr("symphys.runs.multi_start.solve_together", broken)
+    monkeypatch.setattr("symphys.runs.multi_start.solve_multi_start", broken)
     batch = run_batch(jobs_of(problem_file, tmp_path), 1, recorder, transcribe, together=True)
     assert batch.accepted
