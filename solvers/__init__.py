@@ -47,6 +47,8 @@ __all__ = [
 SOLVERS: dict[str, Solver[Any]] = {
     each.name: each for each in (GRADIENT, LEAST_SQUARES, IPOPT, CMA, STOCHASTIC, EVOLUTION)
 }
+solve_together = solve_multi_start
+"""Deprecated: the old name of ``solve_multi_start``."""
 
 
 def solver(name: str) -> Solver[Any]:

@@ -64,7 +64,7 @@ def to_plain(solver: str, checkpoint: Checkpoint, rows: Iterable[TraceRow]) -> d
             "objective": best.objective,
             "errors": plain(best.errors),
             "outputs": plain(best.outputs),
-            "spoilt": best.spoilt,
+            "spoilt": best.failed_samples,
         },
         "last": plain(checkpoint.last),
         "counts": list(astuple(checkpoint.counts)),
@@ -83,7 +83,7 @@ def from_plain(
         best = saved["best"]
         z, errors, outputs = (np.array(best[name], float) for name in ("z", "errors", "outputs"))
         numbers, met = (float(best["merit"]), float(best["objective"])), problem.met(errors)
-        point = Point(z, *numbers, errors, met, outputs, spoilt=int(best["spoilt"]))
+        point = Point(z, *numbers, errors, met, outputs, failed_samples=int(best["spoilt"]))
         counts = Counts(*map(int, saved["counts"]))
         rows = [revive(TraceRow, dict(zip(names(TraceRow), row, strict=True))) for row in saved["rows"]]
         stages = tuple(revive(StageResult, present(each), Counts) for each in saved["stages"])

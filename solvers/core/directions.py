@@ -47,31 +47,31 @@ class DirectionMemory:
 
 
 @dataclass(frozen=True)
-class Habits:
-    """How strongly the past counts: ``momentum`` and ``betas`` of ``GradientOptions``."""
+class MomentumWeights:
+    """Weights of the past in a direction: ``momentum`` and ``betas`` of ``GradientOptions``."""
 
     momentum: float
     betas: tuple[float, float]
 
 
-Direction = Callable[[Array, DirectionMemory, float, Habits], tuple[Array, DirectionMemory]]
-"""(scaled gradient, memory, rate, habits) -> (direction, memory)."""
+Direction = Callable[[Array, DirectionMemory, float, MomentumWeights], tuple[Array, DirectionMemory]]
+"""(scaled gradient, memory, rate, weights) -> (direction, memory)."""
 
 
-def plain(g: Array, memory: DirectionMemory, rate: float, habits: Habits) -> tuple[Array, DirectionMemory]:
+def plain(g: Array, memory: DirectionMemory, rate: float, weights: MomentumWeights) -> tuple[Array, DirectionMemory]:
     """Straight down."""
     return -rate * g, memory
 
 
-def momentum(g: Array, memory: DirectionMemory, rate: float, habits: Habits) -> tuple[Array, DirectionMemory]:
+def momentum(g: Array, memory: DirectionMemory, rate: float, weights: MomentumWeights) -> tuple[Array, DirectionMemory]:
     """Heavy ball."""
-    mean = habits.momentum * memory.mean + g
+    mean = weights.momentum * memory.mean + g
     return -rate * mean, replace(memory, mean=mean)
 
 
-def adam(g: Array, memory: DirectionMemory, rate: float, habits: Habits) -> tuple[Array, DirectionMemory]:
+def adam(g: Array, memory: DirectionMemory, rate: float, weights: MomentumWeights) -> tuple[Array, DirectionMemory]:
     """Each component by its own root mean square."""
-    b1, b2 = habits.betas
+    b1, b2 = weights.betas
     ticks = memory.ticks + 1
     mean = b1 * memory.mean + (1 - b1) * g
     square = b2 * memory.square + (1 - b2) * g * g
@@ -79,7 +79,7 @@ def adam(g: Array, memory: DirectionMemory, rate: float, habits: Habits) -> tupl
     return -rate * mean / (1 - b1**ticks) / spread, replace(memory, ticks=ticks, mean=mean, square=square)
 
 
-def spectral(g: Array, memory: DirectionMemory, rate: float, habits: Habits) -> tuple[Array, DirectionMemory]:
+def spectral(g: Array, memory: DirectionMemory, rate: float, weights: MomentumWeights) -> tuple[Array, DirectionMemory]:
     """As long as the last change of the gradient suggests; the first step has the length ``rate``."""
     length = memory.length or rate / max(float(np.linalg.norm(g)), 1 / LONGEST)
     return -length * g, replace(memory, length=length)

@@ -16,7 +16,7 @@ from symphys.shooting import ShootingProblem
 from symphys.solvers.core.checkpoint import Checkpoint, from_plain, to_plain
 from symphys.solvers.core.continuation import FATAL, Rate, exact_best, stage_result
 from symphys.solvers.core.evaluator import CountingEvaluator, WorkCounter
-from symphys.solvers.core.interface import Iteration, Log, Method, Recorder, Solver, StageContext, nothing
+from symphys.solvers.core.interface import Iteration, IterationRecorder, Log, Method, Solver, StageContext, nothing
 from symphys.solvers.core.outcome import Array, Counts, Monitor, Outcome, StageResult, Status, StopReason
 from symphys.solvers.core.point import Incumbent, Stop
 from symphys.solvers.core.trace import SolveTrace, counts_of
@@ -27,7 +27,7 @@ INTERRUPTED = "interrupted; with its checkpoint the solve goes on from here"
 
 O_inv = TypeVar("O_inv")
 StateT = TypeVar("StateT")
-Stage = Callable[[StageContext, O_inv, "dict[str, object] | None", Recorder], StopReason]
+Stage = Callable[[StageContext, O_inv, "dict[str, object] | None", IterationRecorder], StopReason]
 """Runs one stage from its start, or from the saved state of a method where a solve goes on."""
 
 
@@ -44,13 +44,15 @@ def rate_by_rollout(options: object, seed: int) -> Rate:
 def iterating(method: Callable[[StageContext, O_inv], Method[Any]]) -> Stage[O_inv]:
     """The stage of a method, whose loop is here."""
 
-    def stage(context: StageContext, options: O_inv, saved: dict[str, object] | None, recorder: Recorder) -> StopReason:
+    def stage(
+        context: StageContext, options: O_inv, saved: dict[str, object] | None, recorder: IterationRecorder
+    ) -> StopReason:
         return iterate(method(context, options), saved, recorder)
 
     return stage
 
 
-def iterate(method: Method[StateT], saved: dict[str, object] | None, recorder: Recorder) -> StopReason:
+def iterate(method: Method[StateT], saved: dict[str, object] | None, recorder: IterationRecorder) -> StopReason:
     """The loop of every method that has none of its own."""
     if saved:
         state = method.resume(saved)
@@ -105,7 +107,9 @@ def make_solver(
         """See ``interface.Solve``."""
         check(options)
 
-        def run_stage(context: StageContext, saved: dict[str, object] | None, recorder: Recorder) -> StopReason:
+        def run_stage(
+            context: StageContext, saved: dict[str, object] | None, recorder: IterationRecorder
+        ) -> StopReason:
             refused = refusal(problem)
             if refused:
                 return StopReason(Status.NOT_APPLICABLE, refused)
@@ -138,12 +142,12 @@ class Request:
 
 
 class Driver:
-    """One solve from start to outcome; a ``Recorder`` for its stages."""
+    """One solve from start to outcome; a ``IterationRecorder`` for its stages."""
 
     def __init__(
         self,
         request: Request,
-        stage: Callable[[StageContext, dict[str, object] | None, Recorder], StopReason],
+        stage: Callable[[StageContext, dict[str, object] | None, IterationRecorder], StopReason],
         rate: Rate,
     ) -> None:
         """Nothing is evaluated yet."""
@@ -173,7 +177,7 @@ class Driver:
         )
 
     def commit(self, iteration: Iteration[Any]) -> None:
-        """See ``Recorder``."""
+        """See ``IterationRecorder``."""
         point, evaluator, names = iteration.point, self._evaluator, self._request.problem.output_names
         if point is None:
             return
@@ -189,7 +193,7 @@ class Driver:
             self._request.monitor(row)
 
     def distribute(self, work: Counts, first: int) -> None:
-        """See ``Recorder``."""
+        """See ``IterationRecorder``."""
         self._trace.distribute(work, first)
         self._evaluator.counter.add(work)
         if self._checkpoint:
@@ -198,7 +202,7 @@ class Driver:
 
     @property
     def rows(self) -> int:
-        """See ``Recorder``."""
+        """See ``IterationRecorder``."""
         return len(self._trace)
 
     def _run_stages(self) -> tuple[StopReason, Array]:

@@ -79,7 +79,7 @@ class Method(Protocol[StateT]):
         ...
 
 
-class Recorder(Protocol):
+class IterationRecorder(Protocol):
     """Where iterations are recorded: the driver, as a library with a loop of its own depends on it."""
 
     def commit(self, iteration: Iteration[Any]) -> None:

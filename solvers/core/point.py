@@ -24,7 +24,7 @@ class Point:
         outputs: (o,) the problem's outputs, see ``ShootingProblem.output_names``; empty where it has none.
         gradient: (n,) of the merit by z; empty where it was not asked for.
         residuals, jacobian: (m,) and (m, n), merit = r . r; empty where they were not asked for.
-        spoilt: validation samples in which it is not finite; of a point that was not validated, all.
+        failed_samples: validation samples in which it is not finite; of a point that was not validated, all.
         violation: largest error of a constraint, 0 where all are met; 0 for solvers without constraints, which have the
             penalty in the merit.
     """
@@ -38,7 +38,7 @@ class Point:
     gradient: Array = field(default_factory=lambda: np.zeros(0))
     residuals: Array = field(default_factory=lambda: np.zeros(0))
     jacobian: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    spoilt: int = 0
+    failed_samples: int = 0
     violation: float = 0.0
 
     @property
@@ -65,7 +65,7 @@ class Point:
     @property
     def rank(self) -> tuple[int, bool, float, float]:
         """What is judged, the lower the better: met before not met, then the violation, then the merit."""
-        return self.spoilt, not self.met, self.violation, self.merit
+        return self.failed_samples, not self.met, self.violation, self.merit
 
 
 def best_of(points: list[Point]) -> Point | None:

@@ -31,7 +31,7 @@ from symphys.solvers.core.options import at_least, require
 from symphys.solvers.core.outcome import Array, Status, StopReason
 from symphys.solvers.core.point import best_of
 from symphys.solvers.core.vanishing_gradient import FLAT
-from symphys.solvers.methods.cma_strategy import PLATEAU, CmaState, Strategy, load
+from symphys.solvers.methods.cma_strategy import PLATEAU, CmaState, PycmaStrategy, load
 from symphys.solvers.randomized.candidates import Candidates, NominalCandidates, SampledCandidates
 from symphys.solvers.randomized.validation import ValidationBatch, rate_by_validation
 
@@ -101,7 +101,7 @@ class CmaEs:
             self.candidates = SampledCandidates(
                 self.evaluator, options.samples, options.width, options.batch(self.seed), options.every, context.log
             )
-        self._latest: Strategy | None = None
+        self._latest: PycmaStrategy | None = None
 
     def init(self) -> Iteration[CmaState] | StopReason:
         """The start is the first point that may be kept. Where bounds hold every variable it is the only one."""
@@ -153,7 +153,7 @@ class CmaEs:
     def _held_state(self) -> CmaState:
         return CmaState(self.start, (), np.zeros(0), self.options.sigma)
 
-    def _reason(self, strategy: Strategy) -> StopReason | None:
+    def _reason(self, strategy: PycmaStrategy) -> StopReason | None:
         if sum(map(len, strategy.merits)) * self.candidates.rollouts >= self.options.evaluations:
             return StopReason(Status.BUDGET, BUDGET)
         reasons = strategy.stopped()
@@ -167,16 +167,16 @@ class CmaEs:
             return self.candidates.converged()
         return StopReason(Status.STALLED, STALLED.format(", ".join(reasons)))
 
-    def _strategy(self, state: CmaState) -> Strategy:
+    def _strategy(self, state: CmaState) -> PycmaStrategy:
         """pycma's strategy in a state."""
         if self._latest is None or self._latest.merits is not state.merits:
             self._latest = self._fresh(state.start)
             self._latest.replay(state)
         return self._latest
 
-    def _fresh(self, start: Array) -> Strategy:
+    def _fresh(self, start: Array) -> PycmaStrategy:
         options, stream = self.options, np.random.default_rng([self.seed, 1])
-        return Strategy(self.evaluator, start, options.sigma, options.population, options.options, stream)
+        return PycmaStrategy(self.evaluator, start, options.sigma, options.population, options.options, stream)
 
 
 def prepare() -> None:

@@ -59,7 +59,7 @@ class CmaState:
     sigma: float
 
 
-class Strategy:
+class PycmaStrategy:
     """pycma's CMAEvolutionStrategy in x = z / scale, without the variables whose bounds are equal."""
 
     def __init__(

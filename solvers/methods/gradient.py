@@ -16,7 +16,7 @@ import numpy as np
 
 from symphys.solvers.core.checkpoint import revive
 from symphys.solvers.core.convergence import Progress, not_finite, stationary
-from symphys.solvers.core.directions import DIRECTIONS, DirectionMemory, Habits, learn_length
+from symphys.solvers.core.directions import DIRECTIONS, DirectionMemory, MomentumWeights, learn_length
 from symphys.solvers.core.driver import iterating, make_solver
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Iteration, StageContext
@@ -179,9 +179,9 @@ class GradientDescent:
         """The step (n,) in z to a point within the bounds; downhill, unless every step is taken as it comes."""
         evaluator, options = self.evaluator, self.options
         g = shortened(state.gradient * evaluator.scale, options.clip)
-        habits, rate = Habits(options.momentum, options.betas), options.rate(state.iteration)
+        weights, rate = MomentumWeights(options.momentum, options.betas), options.rate(state.iteration)
         for memory in (state.memory, DirectionMemory.empty(g.size)):
-            d, memory = DIRECTIONS[options.method](g, memory, rate, habits)
+            d, memory = DIRECTIONS[options.method](g, memory, rate, weights)
             step = evaluator.clip(state.z + evaluator.scale * d) - state.z
             if state.gradient @ step < 0 or not options.backtracking:
                 break

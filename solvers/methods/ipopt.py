@@ -31,7 +31,7 @@ from symphys.solvers.core.checkpoint import revive
 from symphys.solvers.core.convergence import converged, not_finite
 from symphys.solvers.core.driver import make_solver
 from symphys.solvers.core.evaluator import CountingEvaluator
-from symphys.solvers.core.interface import Iteration, Recorder, StageContext
+from symphys.solvers.core.interface import Iteration, IterationRecorder, StageContext
 from symphys.solvers.core.options import at_least, require
 from symphys.solvers.core.outcome import Array, Counts, Status, StopReason
 from symphys.solvers.core.point import Point
@@ -116,7 +116,7 @@ class IpoptState:
 
 
 def stage(
-    context: StageContext, options: IpoptOptions, saved: dict[str, object] | None, recorder: Recorder
+    context: StageContext, options: IpoptOptions, saved: dict[str, object] | None, recorder: IterationRecorder
 ) -> StopReason:
     """One call of IPOPT, then its counts and its log. Nothing is drawn: the seed acts through the start alone."""
     evaluator = context.evaluator
@@ -200,7 +200,7 @@ def worse(solution: Point, best: Point) -> bool:
 class Watch(ca.Callback):
     """Records every iterate: one rollout, a row of the trace; ends the solve when all is met or on interruption."""
 
-    def __init__(self, evaluator: CountingEvaluator, recorder: Recorder, state: IpoptState) -> None:
+    def __init__(self, evaluator: CountingEvaluator, recorder: IterationRecorder, state: IpoptState) -> None:
         """``state``: of the start, which has its row already."""
         ca.Callback.__init__(self)
         self.evaluator, self.recorder, self.state, self.skip = evaluator, recorder, state, True

@@ -93,7 +93,15 @@ class SampledCandidates:
         met = self.evaluator.problem.met
         merits, objectives = (part.reshape(-1, each).mean(axis=1) for part in (values.merit, values.objective))
         return [
-            Point(z, merit, objective, errors.copy(), met(errors), outputs_of(values, k * each), spoilt=batch.count)
+            Point(
+                z,
+                merit,
+                objective,
+                errors.copy(),
+                met(errors),
+                outputs_of(values, k * each),
+                failed_samples=batch.count,
+            )
             for k, (z, merit, objective, errors) in enumerate(
                 zip(Z, merits.tolist(), objectives.tolist(), values.errors[::each], strict=True)
             )

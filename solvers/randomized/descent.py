@@ -14,7 +14,7 @@ import numpy as np
 
 from symphys.shooting import ScenarioSamples, ShootingProblem
 from symphys.solvers.core.checkpoint import revive
-from symphys.solvers.core.directions import DirectionMemory, Habits, adam
+from symphys.solvers.core.directions import DirectionMemory, MomentumWeights, adam
 from symphys.solvers.core.interface import Iteration, StageContext
 from symphys.solvers.core.options import at_least, require
 from symphys.solvers.core.outcome import Array, Status, StopReason
@@ -156,7 +156,7 @@ class Descent(ABC, Generic[OptionsT]):
             return found
         grid = self.scenario.grids[samples.grid]
         self.log(f"{k}{f' {grid}' if grid else ''}: objective {found.point.objective:.5g}, {found.words}")
-        direction, memory = adam(found.gradient, state.memory, options.rate_at(k), Habits(0.0, options.betas))
+        direction, memory = adam(found.gradient, state.memory, options.rate_at(k), MomentumWeights(0.0, options.betas))
         z = self.evaluator.clip(state.z + self.scale * direction)
         if options.validates(k + 1):
             self.validation.keep(z)

@@ -58,9 +58,11 @@ class Validation:
         """
         incumbent = self.evaluator.incumbent
         point, lasted = self.rated(z)
-        kept = not self.batch.count or (point.better(incumbent.best) and point.spoilt < len(self.samples.numbers))
-        spoils = f", {point.spoilt} not finite" * (point.spoilt > 0)
-        self.log(f"  validation: {point.merit:.5g}{lasted}{spoils}{' (kept)' * kept}")
+        kept = not self.batch.count or (
+            point.better(incumbent.best) and point.failed_samples < len(self.samples.numbers)
+        )
+        failed = f", {point.failed_samples} not finite" * (point.failed_samples > 0)
+        self.log(f"  validation: {point.merit:.5g}{lasted}{failed}{' (kept)' * kept}")
         if kept:
             incumbent.replace(point)
 
@@ -76,7 +78,7 @@ class Validation:
         values = self.evaluator.sample_values(z[None], self.samples)
         finite = np.isfinite(values.merit)
         means = mean(values.merit[finite]), mean(values.objective[finite])
-        point = first_sample(self.evaluator, z, values, *means, spoilt=int((~finite).sum()))
+        point = first_sample(self.evaluator, z, values, *means, failed=int((~finite).sum()))
         return point, "" if values.alive is None else f", {values.alive.mean():.0%} last"
 
 
@@ -95,11 +97,13 @@ def rate_by_validation(batch: ValidationBatch) -> Rate:
 
 
 def first_sample(
-    evaluator: CountingEvaluator, z: Array, values: Values, merit: float, objective: float, spoilt: int
+    evaluator: CountingEvaluator, z: Array, values: Values, merit: float, objective: float, failed: int
 ) -> Point:
     """A point by means over samples, with the errors and outputs of the problem's own, which is the first."""
     errors = values.errors[0].copy()
-    return Point(z, merit, objective, errors, evaluator.problem.met(errors), outputs_of(values, 0), spoilt=spoilt)
+    return Point(
+        z, merit, objective, errors, evaluator.problem.met(errors), outputs_of(values, 0), failed_samples=failed
+    )
 
 
 def outputs_of(values: Values, row: int) -> Array:
