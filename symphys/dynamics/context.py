@@ -7,7 +7,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.tracing.trace import Pieces
+from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.state_layout import input_columns
 from symphys.model.world import Scheme, World
@@ -56,14 +56,12 @@ class Scene:
         setting: how.
         inputs: names of the forces and torques that ``u`` stacks.
         u: what the inputs stack, constant over the step.
-        pieces: how the parts of the step are put together.
     """
 
     world: World
     setting: Setting
     inputs: tuple[str, ...]
     u: Expr
-    pieces: Pieces
 
     def given(self, name: str) -> Expr | None:
         """The input of this name; None if there is none."""
@@ -76,15 +74,14 @@ class Scene:
         return SHORTEST_KICK * self.setting.scheme.dt
 
 
-def make_scene(
-    world: World, scheme: Scheme | None, inputs: tuple[str, ...], u: Expr, knob: Expr, pieces: Pieces
-) -> Scene:
+def make_scene(world: World, scheme: Scheme | None, inputs: tuple[str, ...], u: Expr, knob: Expr) -> Scene:
     """The scene of a world."""
     gravity = ca.vertcat(*world.gravity)
-    setting = Setting(scheme or Scheme(), gravity, knob, pieces.do(reference, gravity))
-    return Scene(world, setting, inputs, u, pieces)
+    setting = Setting(scheme or Scheme(), gravity, knob, reference(gravity))
+    return Scene(world, setting, inputs, u)
 
 
+@traced
 def reference(gravity: Expr) -> Expr:
     """|gravity|, or 1 m/s^2 if that is more."""
     return ca.fmax(ca.sqrt(ca.dot(gravity, gravity) + TINY_SQUARE), SLOWEST)

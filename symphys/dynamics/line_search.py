@@ -18,13 +18,13 @@ import casadi as ca
 
 from symphys.dynamics.contact.constraint import ContactRow
 from symphys.dynamics.contact.projection import Impulse
-from symphys.dynamics.momentum import Momentum
+from symphys.dynamics.momentum import Momentum, Moved
 from symphys.dynamics.motion import Motion, apply
+from symphys.dynamics.tracing.decorator import traced
 from symphys.model.world import World
 
 if TYPE_CHECKING:
     from symphys.dynamics.pgs import Row, Solution
-    from symphys.dynamics.tracing.trace import Pieces
 
 Expr = Any
 """casadi SX"""
@@ -82,26 +82,28 @@ def _unequal(world: World, group: set[int]) -> bool:
 
 
 def lengthened(
-    pieces: Pieces, cluster: Cluster, rows: Sequence[Row], motions: Sequence[Motion], before: Solution, now: Solution
+    cluster: Cluster, rows: Sequence[Row], motions: Sequence[Motion], before: Solution, now: Solution
 ) -> Solution:
     """The solution after the change of the last sweep, from ``before`` to ``now``, is repeated in part."""
     sums: tuple[Expr, Expr] = (ca.SX(0), ca.SX(0))
     longest: Expr = ca.SX(LONGEST)
     for k in cluster.bodies:
-        sums = pieces.do(_of_body, sums, motions[k], now.momenta[k], before.momenta[k])
+        sums = _of_body(sums, motions[k], now.momenta[k], before.momenta[k])
     for k in cluster.rows:
-        sums, longest = pieces.do(_of_row, sums, longest, rows[k].row, now.impulses[k], now.last[k])
-    share = pieces.do(_share, sums, longest)
+        sums, longest = _of_row(sums, longest, rows[k].row, now.impulses[k], now.last[k])
+    share = _share(sums, longest)
     momenta, impulses = list(now.momenta), list(now.impulses)
     for k in cluster.bodies:
-        momenta[k] = pieces.do(_repeated, share, now.momenta[k], before.momenta[k])
+        momenta[k] = _repeated(share, now.momenta[k], before.momenta[k])
     for k in cluster.rows:
-        impulses[k] = pieces.do(_given_again, share, now.impulses[k], now.last[k])
+        impulses[k] = _given_again(share, now.impulses[k], now.last[k])
     return replace(now, momenta=tuple(momenta), impulses=tuple(impulses))
 
 
-def _of_body(sums: tuple[Expr, Expr], motion: Motion, now: Momentum, before: Momentum) -> tuple[Expr, Expr]:
+@traced
+def _of_body(sums: tuple[Expr, Expr], motion: Motion, now: Moved, before: Moved) -> tuple[Expr, Expr]:
     """(what the energy gains along the change, its curvature), with a body's share."""
+    assert isinstance(now, Momentum) and isinstance(before, Momentum)
     moved, turned = now.velocity - before.velocity, now.angular - before.angular
     spun = apply(motion.inverse_mid, turned)
     slope = motion.mass * ca.dot(now.velocity, moved) + ca.dot(now.angular, spun)
@@ -109,6 +111,7 @@ def _of_body(sums: tuple[Expr, Expr], motion: Motion, now: Momentum, before: Mom
     return sums[0] + slope, sums[1] + motion.mass * ca.dot(moved, moved) + ca.dot(turned, spun) + settled
 
 
+@traced
 def _of_row(
     sums: tuple[Expr, Expr], longest: Expr, row: ContactRow, now: Impulse, before: Impulse
 ) -> tuple[tuple[Expr, Expr], Expr]:
@@ -120,15 +123,19 @@ def _of_row(
     return (slope, sums[1] + row.softness * press * press), ca.fmin(longest, falls)
 
 
+@traced
 def _share(sums: tuple[Expr, Expr], longest: Expr) -> Expr:
     return ca.fmin(ca.fmax(-sums[0] / sums[1], 0), longest)
 
 
-def _repeated(share: Expr, now: Momentum, before: Momentum) -> Momentum:
+@traced
+def _repeated(share: Expr, now: Moved, before: Moved) -> Momentum:
+    assert isinstance(now, Momentum) and isinstance(before, Momentum)
     return Momentum(
         now.velocity + share * (now.velocity - before.velocity), now.angular + share * (now.angular - before.angular)
     )
 
 
+@traced
 def _given_again(share: Expr, now: Impulse, before: Impulse) -> Impulse:
     return now.plus(now.minus(before).times(share))

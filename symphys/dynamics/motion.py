@@ -13,6 +13,7 @@ import casadi as ca
 
 from symphys.dynamics import free_rotation
 from symphys.dynamics.collision.predicted_points import Course
+from symphys.dynamics.tracing.decorator import traced
 from symphys.maths import rotation
 from symphys.maths.rotation import turn
 
@@ -86,6 +87,7 @@ class Motion(Course):
             return self.inverse_mid
         return self.inverse_mid + (t - self.dt / 2) * self.inverse_rate
 
+    @traced
     def at_start(self) -> Motion:
         """The same with the inertia of t = 0 at any time: for impulses there."""
         if self.inverse_rate is None:

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 from symphys.dynamics.line_search import EVERY, Cluster, clusters, lengthened
 from symphys.dynamics.momentum import Moved, Rates, States
 from symphys.dynamics.motion import Motion
-from symphys.dynamics.tracing.trace import Pieces
+from symphys.dynamics.tracing.decorator import repeat, traced
 from symphys.model.world import World
 
 Given = Any
@@ -64,34 +64,32 @@ class Leaning:
     motions: tuple[Motion, ...]
 
 
-def relax(
-    pieces: Pieces, world: World, sweeps: int, rows: tuple[Row, ...], start: Solution, motions: Sequence[Motion]
-) -> Solution:
+def relax(world: World, sweeps: int, rows: tuple[Row, ...], start: Solution, motions: Sequence[Motion]) -> Solution:
     """All sweeps; among bodies that lean on each other with longer steps now and then."""
     found = tuple(clusters(world, rows))
     if not found:
-        return pieces.repeat(sweeps, sweep, rows, start)
+        return repeat(sweeps, sweep, rows, start)
     rounds = max((sweeps - 1) // EVERY, 0)
-    moved = pieces.repeat(rounds, _round, Leaning(rows, found, tuple(motions)), start)
-    return pieces.repeat(sweeps - rounds * EVERY, sweep, rows, moved)
+    moved = repeat(rounds, _round, Leaning(rows, found, tuple(motions)), start)
+    return repeat(sweeps - rounds * EVERY, sweep, rows, moved)
 
 
-def _round(pieces: Pieces, leaning: Leaning, state: Solution) -> Solution:
+def _round(leaning: Leaning, state: Solution) -> Solution:
     """Some sweeps, then a longer step along the last."""
-    before = pieces.repeat(EVERY - 1, sweep, leaning.rows, state)
-    now = sweep(pieces, leaning.rows, before)
+    before = repeat(EVERY - 1, sweep, leaning.rows, state)
+    now = sweep(leaning.rows, before)
     for cluster in leaning.clusters:
-        now = lengthened(pieces, cluster, leaning.rows, leaning.motions, before, now)
+        now = lengthened(cluster, leaning.rows, leaning.motions, before, now)
     return now
 
 
-def sweep(pieces: Pieces, rows: tuple[Row, ...], before: Solution) -> Solution:
+def sweep(rows: tuple[Row, ...], before: Solution) -> Solution:
     """One pass over all rows."""
     momenta, new = list(before.momenta), list(before.impulses)
     for run in runs(rows, momenta):
         carriers = tuple(dict.fromkeys(i for k in run for i in rows[k].carriers))
         visits = tuple((rows[k].row, tuple(carriers.index(i) for i in rows[k].carriers)) for k in run)
-        visited, given = pieces.do(_visit, visits, tuple(momenta[i] for i in carriers), [new[k] for k in run])
+        visited, given = _visit(visits, tuple(momenta[i] for i in carriers), [new[k] for k in run])
         for i, moved in zip(carriers, visited, strict=True):
             momenta[i] = moved
         for k, impulse in zip(run, given, strict=True):
@@ -132,11 +130,11 @@ def runs(rows: Sequence[Row], momenta: Sequence[Moved]) -> list[list[int]]:
     return found
 
 
-def begin(pieces: Pieces, rows: Sequence[Row], momenta: States, impulses: Sequence[Given]) -> Solution:
+def begin(rows: Sequence[Row], momenta: States, impulses: Sequence[Given]) -> Solution:
     """Give the impulses that the sweeps start from."""
     started = list(momenta)
     for each, impulse in zip(rows, impulses, strict=True):
-        spread(started, each, pieces.do(_give, each.row, of_bodies(started, each), impulse))
+        spread(started, each, _give(each.row, of_bodies(started, each), impulse))
     return Solution(tuple(started), tuple(impulses), tuple(impulses))
 
 
@@ -151,6 +149,7 @@ def spread(momenta: list[Moved], row: Row, changed: States) -> None:
         momenta[i] = momentum
 
 
+@traced
 def _visit(
     visits: tuple[tuple[Solvable, tuple[int, ...]], ...], states: States, old: list[Given]
 ) -> tuple[States, list[Given]]:
@@ -164,5 +163,6 @@ def _visit(
     return tuple(momenta), given
 
 
+@traced
 def _give(row: Solvable, momenta: States, impulse: Given) -> States:
     return row.given(momenta, impulse)

@@ -20,7 +20,7 @@ from symphys.dynamics.joints.loop_closure import Displaced, Shifts, close_loops,
 from symphys.dynamics.momentum import Moved, Rates, States
 from symphys.dynamics.motion import Motion, apply
 from symphys.dynamics.pgs import Row
-from symphys.dynamics.tracing.trace import Pieces
+from symphys.dynamics.tracing.decorator import repeat, traced
 from symphys.model.joints import linkages
 
 Expr = Any
@@ -37,16 +37,16 @@ def displacements(
     duration: Expr,
 ) -> list[Displaced]:
     """Duration times the new velocities, less what impulses would have done before they act, at the carriers."""
-    do = scene.pieces.do
-    late = [do(_drift, motion, state, duration) for motion, state in zip(trees.motions, solved, strict=True)]
+    late = [_drift(motion, state, duration) for motion, state in zip(trees.motions, solved, strict=True)]
     if not scene.setting.scheme.time_of_impact:
         return late
     for each, *impulses in zip(rows, started, given, strict=True):
         for side, (body, carrier) in enumerate(zip(each.bodies, each.carriers, strict=True)):
-            late[carrier] = do(_delayed, late[carrier], each.row, side, impulses, trees.motions[body].inverse_mid)
+            late[carrier] = _delayed(late[carrier], each.row, side, impulses, trees.motions[body].inverse_mid)
     return late
 
 
+@traced
 def _drift(motion: Motion, state: Moved, duration: Expr) -> Displaced:
     if state is None:
         return None
@@ -55,6 +55,7 @@ def _drift(motion: Motion, state: Moved, duration: Expr) -> Displaced:
     return Shift(duration * state.velocity, duration * apply(motion.inverse_mid, state.angular))
 
 
+@traced
 def _delayed(late: Displaced, row: ContactRow, k: int, impulses: list[Impulse], turning: Expr) -> Displaced:
     """The displacement less that which the impulse on side k would have caused before it acts.
 
@@ -96,16 +97,16 @@ def close_gaps(
 
     What is on a tree is pushed along the tree's coordinates. Joints that close loops push along them too.
     """
-    do, scheme = scene.pieces.do, scene.setting.scheme
+    scheme = scene.setting.scheme
     rigid = tuple(
-        (each, contact, do(_lasts, each.row, impulse)) for each, contact, impulse in rows if not each.row.law.soft
+        (each, contact, _lasts(each.row, impulse)) for each, contact, impulse in rows if not each.row.law.soft
     )
     limits = tuple(each for each in joints if _of_tree(each))
     context = Passing(trees.motions, rigid, limits, scheme.push_out)
     before: Pushed = tuple(moved), tuple(ca.SX(0) for _ in rigid)
-    along, _ = scene.pieces.repeat(scheme.position_sweeps, _push_all, context, before)
+    along, _ = repeat(scheme.position_sweeps, _push_all, context, before)
     others = tuple(each for each in joints if not _of_tree(each))
-    along, by_loops = close_loops(scene.pieces, scheme.position_sweeps, trees.motions, others, along)
+    along, by_loops = close_loops(scheme.position_sweeps, trees.motions, others, along)
     return _closed(scene, trees, along, by_loops)
 
 
@@ -117,7 +118,7 @@ def _closed(scene: Scene, trees: Trees, along: Sequence[Displaced], by_loops: Se
         assert isinstance(ended, Rates)
         own = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
         motions = [trees.motions[i] for i in tree.bodies]
-        places, gained = arrival(scene.pieces, tree, own, chart, motions, ended, by_loops[tree.root])
+        places, gained = arrival(tree, own, chart, motions, ended, by_loops[tree.root])
         arrived |= zip(tree.bodies, places, strict=True)
         made |= zip(tree.bodies, gained, strict=True)
     return Closed(shifts, arrived, made)
@@ -148,25 +149,27 @@ def _of_tree(each: Row) -> bool:
     return isinstance(each.row, AxisRow) and each.row.of_tree is not None
 
 
+@traced
 def _lasts(row: ContactRow, impulse: Impulse) -> Expr:
     """1 if a contact carried load and still does."""
     return ca.logic_and(row.lasts, impulse.normal > row.load)
 
 
-def _push_all(pieces: Pieces, context: Passing, state: Pushed) -> Pushed:
+def _push_all(context: Passing, state: Pushed) -> Pushed:
     """One pass over all rigid contacts and limits."""
     along, pushes = list(state[0]), list(state[1])
     for k, (each, contact, lasts) in enumerate(context.rigid):
         own = tuple(along[i] for i in each.carriers)
-        moved = tuple(pieces.do(displaced, context.motions[i].held, a) for i, a in zip(each.bodies, own, strict=True))
-        after, pushes[k] = pieces.do(_push, each.row, contact, lasts, moved, own, pushes[k], context.share)
+        moved = tuple(displaced(context.motions[i].held, a) for i, a in zip(each.bodies, own, strict=True))
+        after, pushes[k] = _push(each.row, contact, lasts, moved, own, pushes[k], context.share)
         for i, own_after in zip(each.carriers, after, strict=True):
             along[i] = own_after
     for each in context.limits:
-        along[each.carriers[0]] = pieces.do(_back, each.row, along[each.carriers[0]])
+        along[each.carriers[0]] = _back(each.row, along[each.carriers[0]])
     return tuple(along), tuple(pushes)
 
 
+@traced
 def _push(
     row: ContactRow,
     contact: Contact,
@@ -197,8 +200,9 @@ def _pushed(side: Side, along: Displaced, step: Expr) -> Displaced:
     return Shift(along.linear + side.sign * side.inverse_mass * step, along.angular + side.sign * turn)
 
 
-def _back(row: AxisRow, along: Rates) -> Rates:
+@traced
+def _back(row: AxisRow, along: Displaced) -> Rates:
     """The displacement along a tree's coordinates that takes a limit of one back to where it is kept."""
-    assert row.of_tree is not None
+    assert isinstance(along, Rates) and row.of_tree is not None
     moved = ca.mtimes(row.of_tree.see, along.numbers)
     return Rates(along.numbers + ca.mtimes(row.of_tree.gain, row.fitting(moved)))

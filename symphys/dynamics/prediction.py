@@ -13,6 +13,7 @@ from symphys.dynamics.collision import Contact, collide
 from symphys.dynamics.collision.predicted_points import at_rest
 from symphys.dynamics.context import Scene, State
 from symphys.dynamics.motion import BodyState, Motion, free_motion, momentum, motion_from
+from symphys.dynamics.tracing.decorator import traced
 from symphys.model.joints import linkages
 from symphys.model.state_layout import BODY_FIELDS
 from symphys.model.world import Pair, World
@@ -28,7 +29,7 @@ def look(scene: Scene, motions: Sequence[Motion], duration: Expr) -> list[Contac
         surfaces = scene.world.surface(first), scene.world.surface(second)
         a = motions[_index(first.body)].course()
         b = at_rest(duration) if second.body is None else motions[second.body].course()
-        found += scene.pieces.do(collide, *surfaces, a, b)
+        found += collide(*surfaces, a, b)
     return found
 
 
@@ -54,17 +55,19 @@ def expected_motions(scene: Scene, x: State, duration: Expr) -> list[Motion]:
     for tree in linkages(joints):
         own = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
         motions = tuple(found[i] for i in tree.bodies)
-        wrenches = tuple(scene.pieces.do(_wrench, motion) for motion in motions)
-        for i, change in zip(tree.bodies, accelerations(scene.pieces, tree, own, motions, wrenches), strict=True):
-            tensor = scene.pieces.do(world_inertia, found[i].inertia, found[i].rotation)
-            found[i] = scene.pieces.do(_as_held, found[i], tensor, change, gravity)
+        wrenches = tuple(_wrench(motion) for motion in motions)
+        for i, change in zip(tree.bodies, accelerations(tree, own, motions, wrenches), strict=True):
+            tensor = world_inertia(found[i].inertia, found[i].rotation)
+            found[i] = _as_held(found[i], tensor, change, gravity)
     return found
 
 
+@traced
 def _wrench(motion: Motion) -> tuple[Expr, Expr]:
     return motion.mass * motion.acceleration, motion.torque
 
 
+@traced
 def _as_held(motion: Motion, tensor: Expr, change: tuple[Expr, Expr], gravity: Expr) -> Motion:
     """The motion with the accelerations that joints leave."""
     w = motion.angular_velocity
@@ -83,10 +86,11 @@ def _motions(scene: Scene, x: State, duration: Expr, freed: int, share: int) -> 
         given = (scene.given(f"{body.name}.{name}") for name in ("force", "torque"))
         push = tuple(zero if each is None else each for each in given)
         inertial, times = (body.mass, body.inertia), (freed, lag, share, duration)
-        motions.append(scene.pieces.do(_motion, inertial, part, push, scene.setting.gravity, times, index in jointed))
+        motions.append(_motion(inertial, part, push, scene.setting.gravity, times, index in jointed))
     return motions
 
 
+@traced
 def _motion(
     inertial: tuple[Expr, Expr],
     part: dict[str, Expr],

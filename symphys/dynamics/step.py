@@ -24,6 +24,7 @@ from symphys.dynamics.impact.restitution import eccentric_bodies
 from symphys.dynamics.joints.joint_impulse import Along
 from symphys.dynamics.pgs import Given
 from symphys.dynamics.substep import Phase, advance
+from symphys.dynamics.tracing.decorator import traced
 from symphys.model.world import Pair, Scheme, World, is_zero
 
 Expr = Any
@@ -70,7 +71,7 @@ def take_step(scene: Scene, x: State) -> tuple[State, list[Phase]]:
         cut = find_cut(scene, x, left, 1 / (count - k + 1))
         before = advance(scene, x, cut.first, spared=cut.fast)
         struck = collide_now(scene, before.x, cut)
-        x, left = struck.x, scene.pieces.do(_rest, left, cut.first)
+        x, left = struck.x, _rest(left, cut.first)
         phases += [before, struck]
         cuts.append(cut)
     late = deferred(scene, x, left, cuts)
@@ -78,6 +79,7 @@ def take_step(scene: Scene, x: State) -> tuple[State, list[Phase]]:
     return after.x, [*phases, after]
 
 
+@traced
 def _rest(left: Expr, first: Expr) -> Expr:
     return left - first
 
@@ -94,27 +96,25 @@ def cuts_of(world: World, scheme: Scheme) -> int:
 
 def report(scene: Scene, phases: list[Phase]) -> Report:
     """What happened in a step, from its stretches."""
-    do = scene.pieces.do
     forces = tuple(ca.SX.zeros(3) for _ in scene.world.pairs)
     residual, crowded, ambiguous, paradox = ca.SX(0), ca.SX(0), ca.SX(0), ca.SX(0)
     for phase in phases:
         given = zip(forces, phase.rows, phase.impulses, strict=True)
-        forces = tuple(do(_added, force, each.row, impulse, scene.setting.scheme.dt) for force, each, impulse in given)
+        forces = tuple(_added(force, each.row, impulse, scene.setting.scheme.dt) for force, each, impulse in given)
         if phase.ahead:
             forces = tuple(
-                do(_ahead, force, ahead, scene.setting.scheme.dt)
-                for force, ahead in zip(forces, phase.ahead, strict=True)
+                _ahead(force, ahead, scene.setting.scheme.dt) for force, ahead in zip(forces, phase.ahead, strict=True)
             )
         for new, old in phase.changes:
-            residual = do(_larger_change, residual, new, old)
-        crowded = do(_larger, crowded, phase.chained)
-        crowded = do(_crowded, crowded, tuple((each.bodies, each.row.struck, each.row.leaving) for each in phase.rows))
+            residual = _larger_change(residual, new, old)
+        crowded = _larger(crowded, phase.chained)
+        crowded = _crowded(crowded, tuple((each.bodies, each.row.struck, each.row.leaving) for each in phase.rows))
         for meeting in _meetings(scene.world, phase):
-            ambiguous = do(_ambiguous, ambiguous, meeting)
+            ambiguous = _ambiguous(ambiguous, meeting)
         for each, impulse in zip(phase.rows, phase.impulses, strict=True):
-            paradox = do(_pulls, paradox, each.row.paradox, impulse.normal)
+            paradox = _pulls(paradox, each.row.paradox, impulse.normal)
     gaps = tuple(contact.gap for contact in phases[0].contacts)
-    return Report(do(_stack, forces), do(_stack, gaps), residual, crowded, ambiguous, paradox)
+    return Report(_stack(forces), _stack(gaps), residual, crowded, ambiguous, paradox)
 
 
 Met = tuple[Expr, Expr, Expr]
@@ -143,6 +143,7 @@ def _partner(pair: Pair, body: int) -> tuple[int | None, int]:
     return (other.body, 0) if other.body is not None else (None, other.shape)
 
 
+@traced
 def _ambiguous(before: Expr, met: tuple[Met, Met]) -> Expr:
     """1 if both give an impulse at one instant, one of them as an impact, and neither leaves the other as it is."""
     (n, press, struck), (other, also, hit) = met
@@ -150,22 +151,27 @@ def _ambiguous(before: Expr, met: tuple[Met, Met]) -> Expr:
     return ca.fmax(before, ca.logic_and(both, ca.fabs(ca.dot(n, other)) > ACROSS))
 
 
+@traced
 def _pulls(before: Expr, paradox: Expr, press: Expr) -> Expr:
     return ca.fmax(before, ca.logic_and(paradox, press > 0))
 
 
+@traced
 def _added(force: Expr, row: ContactRow, impulse: Impulse, dt: float) -> Expr:
     return force + impulse.linear(row.impulse_normal) / dt
 
 
+@traced
 def _ahead(force: Expr, ahead: Expr, dt: float) -> Expr:
     return force + ahead / dt
 
 
+@traced
 def _stack(columns: tuple[Expr, ...]) -> Expr:
     return ca.densify(ca.vertcat(ca.SX(0, 1), *columns))
 
 
+@traced
 def _larger_change(residual: Expr, new: Given, old: Given) -> Expr:
     change = new.minus(old)
     if isinstance(change, Along):
@@ -173,10 +179,12 @@ def _larger_change(residual: Expr, new: Given, old: Given) -> Expr:
     return ca.fmax(residual, ca.fmax(ca.fabs(change.normal), ca.norm_inf(change.tangent)))
 
 
+@traced
 def _larger(one: Expr, other: Expr) -> Expr:
     return ca.fmax(one, other)
 
 
+@traced
 def _crowded(before: Expr, rows: tuple[tuple[tuple[int, ...], Expr, Expr], ...]) -> Expr:
     """1 if some body has two or more impacts in this stretch, or had before."""
     counts: dict[int, Expr] = {}

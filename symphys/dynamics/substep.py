@@ -26,6 +26,7 @@ from symphys.dynamics.motion import Motion, angular_velocity, apply, isotropic
 from symphys.dynamics.pgs import Row, Solution, begin, relax
 from symphys.dynamics.position_correction import Closed, close_gaps, displacements
 from symphys.dynamics.prediction import bodies_of, expected_motions, free_motions, jointed_bodies, look
+from symphys.dynamics.tracing.decorator import traced
 from symphys.maths import rotation
 from symphys.model.state_layout import BODY_FIELDS
 
@@ -65,7 +66,7 @@ def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = (),
     Pairs whose ``spared`` is 1 give no impulse, since the stretch ends as they meet. Where ``plastic`` is 1 nothing
     rebounds.
     """
-    kick, half = scene.pieces.do(_times, duration, x["lag"])
+    kick, half = _times(duration, x["lag"])
 
     # free motion, in which impacts find their instant; what joints hold moves as the last step's forces say
     motions = free_motions(scene, x, duration)
@@ -73,7 +74,7 @@ def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = (),
     contacts = look(scene, paths, duration)
 
     # trees of joints, whose velocities are solved for in the coordinates that joints leave
-    free = tuple(scene.pieces.do(_mid_momentum, motion) for motion in motions)
+    free = tuple(_mid_momentum(motion) for motion in motions)
     trees = make_trees(scene, paths, free, half)
 
     # rows: where, when and how the surfaces meet, what acts along the coordinates of joints
@@ -117,7 +118,7 @@ def _contact_rows(
         bodies, force = bodies_of(pair), x[f"{pair.name}.force"]
         conditions = Conditions(off, plastic, force, trees.same(bodies), may_couple(scene.world, pair))
         arguments = pair.law, contact, tuple(trees.motions[i] for i in bodies), duration, conditions
-        rows.append(trees.row(bodies, scene.pieces.do(prepare, scene.setting, *arguments)))
+        rows.append(trees.row(bodies, prepare(scene.setting, *arguments)))
     return rows
 
 
@@ -126,8 +127,8 @@ def _sweep(
 ) -> tuple[Solution, tuple[Any, ...], tuple[Impulse, ...]]:
     """What sweeps come to from these impulses; and of it the impulses of joints, and those of contacts."""
     every = (*(each.row for each in joints), *rows)
-    state = begin(scene.pieces, every, trees.states, start)
-    solved = relax(scene.pieces, scene.world, scene.setting.scheme.sweeps, every, state, trees.motions)
+    state = begin(every, trees.states, start)
+    solved = relax(scene.world, scene.setting.scheme.sweeps, every, state, trees.motions)
     return solved, solved.impulses[: len(joints)], solved.impulses[len(joints) :]
 
 
@@ -139,13 +140,13 @@ def _poses(
     jointed = jointed_bodies(scene.world)
     for k, motion in enumerate(motions):
         if k in closed.arrived:
-            poses.append(scene.pieces.do(_arrived, motion, closed.arrived[k]))
+            poses.append(_arrived(motion, closed.arrived[k]))
             continue
         shift = closed.shifts[k]
         if k in jointed or isotropic(scene.world.bodies[k].inertia):
-            poses.append(scene.pieces.do(_pose, motion, shift))
+            poses.append(_pose(motion, shift))
         else:
-            pose, turned[k] = scene.pieces.do(_free_pose, motion, moved[k], shift, momenta[k])
+            pose, turned[k] = _free_pose(motion, moved[k], shift, momenta[k])
             poses.append(pose)
     return poses, tuple(turned)
 
@@ -158,9 +159,9 @@ def _moving_bodies(
     poses: Sequence[tuple[Expr, Expr]],
 ) -> State:
     """The fields of all bodies at the end of the stretch."""
-    do, values = scene.pieces.do, State()
-    ended = [do(_end_momentum, *parts) for parts in zip(motions, momenta, resting, strict=True)]
-    apart = [do(_velocities, *parts) for parts in zip(motions, ended, poses, strict=True)]
+    values = State()
+    ended = [_end_momentum(*parts) for parts in zip(motions, momenta, resting, strict=True)]
+    apart = [_velocities(*parts) for parts in zip(motions, ended, poses, strict=True)]
     moving = fitting(scene, ended, poses, apart)
     for body, pose, velocities, reaction in zip(scene.world.bodies, poses, moving, resting, strict=True):
         stored = (*pose, *velocities, *reaction)
@@ -168,10 +169,12 @@ def _moving_bodies(
     return values
 
 
+@traced
 def _mid_momentum(motion: Motion) -> Momentum:
     return Momentum(motion.mid_velocity, motion.mid_momentum)
 
 
+@traced
 def _times(duration: Expr, lag: Expr) -> tuple[Expr, Expr]:
     """(over which impulses act as forces, how far the stored velocities will be ahead of the sweeps')."""
     return duration / 2 + lag, duration / 2
@@ -185,10 +188,11 @@ def _warm_start(scene: Scene, rows: Sequence[Row], x: State, kick: Expr) -> list
     for pair, each in zip(scene.world.pairs, rows, strict=True):
         force = x[f"{pair.name}.force"]
         torque = x[f"{pair.name}.torque"] if pair.law.spins else None
-        impulses.append(scene.pieces.do(_resumed, each.row.impulse_normal, kick, force, torque))
+        impulses.append(_resumed(each.row.impulse_normal, kick, force, torque))
     return impulses
 
 
+@traced
 def _resumed(n: Expr, kick: Expr, force: Expr, torque: Expr | None) -> Impulse:
     normal, tangent = _split(kick * force, n)
     if torque is None:
@@ -206,43 +210,51 @@ def _store_forces(
     scene: Scene, rows: Sequence[Row], impulses: Sequence[Impulse], kick: Expr, values: State
 ) -> list[tuple[Expr, Expr]]:
     """Persistent contact forces (impacts left out) into ``values``; returns their sum on each body."""
-    pieces, scheme = scene.pieces, scene.setting.scheme
+    scheme = scene.setting.scheme
     total = [(ca.SX.zeros(3), ca.SX.zeros(3)) for _ in scene.world.bodies]
     for pair, each, impulse in zip(scene.world.pairs, rows, impulses, strict=True):
-        force, torque = pieces.do(_persistent, each.row, impulse, kick, scene.shortest_kick)
+        force, torque = _persistent(each.row, impulse, kick, scene.shortest_kick)
         values[f"{pair.name}.force"] = force if scheme.warm_start else ca.SX.zeros(3)
         if pair.law.spins:
             values[f"{pair.name}.torque"] = torque if scheme.warm_start else ca.SX.zeros(3)
         for k, body in enumerate(each.bodies):
-            total[body] = pieces.do(_summed, total[body], each.row, k, force, torque)
+            total[body] = _summed(total[body], each.row, k, force, torque)
     return total
 
 
+@traced
 def _persistent(row: ContactRow, impulse: Impulse, kick: Expr, shortest: float) -> tuple[Expr, Expr]:
     share = (1 - row.leaving) * (1 - row.struck) / ca.fmax(kick, shortest)
     return share * impulse.linear(row.impulse_normal), share * impulse.angular(row.impulse_normal)
 
 
+@traced
 def _summed(total: tuple[Expr, Expr], row: ContactRow, k: int, force: Expr, torque: Expr) -> tuple[Expr, Expr]:
     side = row.sides[k]
     turning = ca.cross(side.impulse_arm, force) + torque
     return total[0] + side.sign * force, total[1] + side.sign * turning
 
 
+@traced
 def _pose(motion: Motion, shift: Shift) -> tuple[Expr, Expr]:
     return motion.position + shift.linear, rotation.turn(motion.orientation, shift.angular)
 
 
+@traced
 def _arrived(motion: Motion, arrived: Arrived) -> tuple[Expr, Expr]:
     return arrived.position, rotation.unit(rotation.multiply(arrived.turn, motion.orientation))
 
 
-def _free_pose(motion: Motion, moved: Shift, shift: Shift, momentum: Momentum) -> tuple[tuple[Expr, Expr], Momentum]:
+@traced
+def _free_pose(
+    motion: Motion, moved: Displaced, shift: Shift, momentum: Momentum
+) -> tuple[tuple[Expr, Expr], Momentum]:
     """Free rotation with the momentum after the impulses, less what these did too early, then pushes.
 
     A push turns the angular momentum with the body: about the axis of a slender body it would else become a spin, with
     energy from nowhere.
     """
+    assert isinstance(moved, Shift)
     late = moved.angular - motion.dt * apply(motion.inverse_mid, momentum.angular)
     pushed = rotation.exponential(shift.angular - moved.angular)
     free = turned(motion.inertia, motion.orientation, momentum.angular, motion.dt)
@@ -250,6 +262,7 @@ def _free_pose(motion: Motion, moved: Shift, shift: Shift, momentum: Momentum) -
     return (motion.position + shift.linear, q), replace(momentum, angular=rotation.rotate(pushed, momentum.angular))
 
 
+@traced
 def _end_momentum(motion: Motion, momentum: Momentum, resting: tuple[Expr, Expr]) -> Momentum:
     """At the end of the stretch."""
     half, (force, torque) = motion.dt / 2, resting
@@ -259,5 +272,6 @@ def _end_momentum(motion: Motion, momentum: Momentum, resting: tuple[Expr, Expr]
     )
 
 
+@traced
 def _velocities(motion: Motion, momentum: Momentum, pose: tuple[Expr, Expr]) -> tuple[Expr, Expr]:
     return momentum.velocity, angular_velocity(motion.inertia, pose[1], momentum.angular)

@@ -13,7 +13,7 @@ from symphys.dynamics.articulated import spatial as screws
 from symphys.dynamics.articulated.factorisation import Eliminated
 from symphys.dynamics.articulated.schur_complement import Above, Axes, Columns, Inertia, LimbMatrix, Screw
 from symphys.dynamics.collision.predicted_points import Course
-from symphys.dynamics.tracing.trace import Pieces
+from symphys.dynamics.tracing.decorator import traced
 from symphys.model.joints import Linkage
 
 Expr = Any
@@ -100,31 +100,29 @@ class Solved:
     z: tuple[Expr, ...]
 
 
-def axes_at(
-    pieces: Pieces, linkage: Linkage, joints: screws.Joints, courses: Sequence[Course], t: Expr, origin: Expr
-) -> Columns:
+def axes_at(linkage: Linkage, joints: screws.Joints, courses: Sequence[Course], t: Expr, origin: Expr) -> Columns:
     """The screws of all links at time t."""
     place = {link.body: k for k, link in enumerate(linkage.links)}
     found = []
     for link, joint, course in zip(linkage.links, joints, courses, strict=True):
         own = (course,) if link.parent is None else (course, courses[place[link.parent]])
-        found.append(pieces.do(screws.axes_of, joint, link.sign, own, t, origin))
+        found.append(screws.axes_of(joint, link.sign, own, t, origin))
     return tuple(found)
 
 
-def tree_matrix(pieces: Pieces, tree: Tree, inertias: Sequence[Inertia]) -> TreeMatrix:
+def tree_matrix(tree: Tree, inertias: Sequence[Inertia]) -> TreeMatrix:
     """Of a tree, its bodies' inertias given."""
-    parts = tuple(pieces.do(limbs.limb_matrix, limb.above, limb.of(inertias), tree.axes(limb)) for limb in tree.limbs)
+    parts = tuple(limbs.limb_matrix(limb.above, limb.of(inertias), tree.axes(limb)) for limb in tree.limbs)
     root = tree.seen[0], None if tree.given is None else tree.given[0]
-    return TreeMatrix(parts, pieces.do(limbs.root_matrix, inertias[0], root, tuple(part.at_root for part in parts)))
+    return TreeMatrix(parts, limbs.root_matrix(inertias[0], root, tuple(part.at_root for part in parts)))
 
 
-def solve(pieces: Pieces, tree: Tree, matrix: TreeMatrix, momenta: Sequence[Screw]) -> Solved:
+def solve(tree: Tree, matrix: TreeMatrix, momenta: Sequence[Screw]) -> Solved:
     """The rates that momenta, or forces, of all bodies stand for."""
     given, found = tree.impulses, []
     for limb, part in zip(tree.limbs, matrix.limbs, strict=True):
-        found.append(pieces.do(limbs.limb_load, limb.above, part, limb.of(given), given[0], limb.of(momenta)))
-    r = pieces.do(limbs.root_rates, matrix.root, given[0], momenta[0], tuple(push for _, push in found))
+        found.append(limbs.limb_load(limb.above, part, limb.of(given), given[0], limb.of(momenta)))
+    r = limbs.root_rates(matrix.root, given[0], momenta[0], tuple(push for _, push in found))
     return Solved(r, tuple(z for z, _ in found))
 
 
@@ -136,22 +134,24 @@ class Moving:
     screws: tuple[Screw, ...]
 
 
-def moving(pieces: Pieces, tree: Tree, matrix: TreeMatrix, rates: Solved) -> Moving:
+def moving(tree: Tree, matrix: TreeMatrix, rates: Solved) -> Moving:
     """How all bodies move."""
     n = len(tree.seen)
-    root = pieces.do(_root_moving, tree.seen[0], rates.r)
+    root = _root_moving(tree.seen[0], rates.r)
     turns, found = [rates.r] * n, [root] * n
     for limb, part, z in zip(tree.limbs, matrix.limbs, rates.z, strict=True):
-        own, moved = pieces.do(_limb_moving, limb.above, part, limb.of(tree.seen), z, rates.r, root)
+        own, moved = _limb_moving(limb.above, part, limb.of(tree.seen), z, rates.r, root)
         for k, rate, screw in zip(limb.links, own, moved, strict=True):
             turns[k], found[k] = rate, screw
     return Moving(tuple(turns), tuple(found))
 
 
+@traced
 def _root_moving(axes: Expr, r: Expr) -> Screw:
     return Screw(ca.mtimes(axes, r))
 
 
+@traced
 def _limb_moving(
     above: Above, matrix: LimbMatrix, axes: Columns, z: Expr, r: Expr, root: Screw
 ) -> tuple[Columns, tuple[Screw, ...]]:

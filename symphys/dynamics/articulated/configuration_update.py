@@ -22,7 +22,7 @@ from symphys.dynamics.articulated.impulse_response import Placed, numbering
 from symphys.dynamics.articulated.schur_complement import Screw
 from symphys.dynamics.momentum import Momentum, Rates
 from symphys.dynamics.motion import Motion
-from symphys.dynamics.tracing.trace import Pieces
+from symphys.dynamics.tracing.decorator import traced
 from symphys.maths import rotation
 from symphys.model.joints import Linkage
 
@@ -69,7 +69,6 @@ class Aim:
 
 
 def arrival(
-    pieces: Pieces,
     linkage: Linkage,
     joints: screws.Joints,
     chart: Chart,
@@ -81,36 +80,34 @@ def arrival(
 
     ``along``: displacements along the tree's numbers; ``by_loops``: what of them joints that close loops did.
     """
-    do, places, tree, matrix = pieces.do, [motion.position for motion in motions], chart.tree, chart.matrix
-    seats = seats_of(pieces, linkage, joints, [motion.course() for motion in motions])
-    numbers = do(apart, numbering(tree), along.numbers)
-    moved = moving(pieces, tree, matrix, numbers)
-    aims = [do(_aim, *each) for each in zip(moved.screws, chart.bodies, places, strict=True)]
-    bodies = [(motion.mass, do(_counted, motion.position, places[0])) for motion in motions]
+    places, tree, matrix = [motion.position for motion in motions], chart.tree, chart.matrix
+    seats = seats_of(linkage, joints, [motion.course() for motion in motions])
+    numbers = apart(numbering(tree), along.numbers)
+    moved = moving(tree, matrix, numbers)
+    aims = [_aim(*each) for each in zip(moved.screws, chart.bodies, places, strict=True)]
+    bodies = [(motion.mass, motion.position - places[0]) for motion in motions]
     for k in range(CORRECTIONS + 1):
-        arrived = arrive(pieces, linkage, joints, seats, places, moved.rates)
-        parts = zip(bodies, chart.bodies, aims, arrived, strict=True)
-        beside = tuple(do(_beside, *body, *each) for body, *each in parts)
+        arrived = arrive(linkage, joints, seats, places, moved.rates)
+        beside = tuple(
+            _beside(*body, placed, aim, at)
+            for body, placed, aim, at in zip(bodies, chart.bodies, aims, arrived, strict=True)
+        )
         if k < CORRECTIONS:
-            numbers = do(_less, numbers, solve(pieces, tree, matrix, [each.screw for each in beside]))
-            moved = moving(pieces, tree, matrix, numbers)
-    arrived, beside = _kept(pieces, chart, joints[0] is None, bodies, arrived, beside)
+            numbers = _less(numbers, solve(tree, matrix, [each.screw for each in beside]))
+            moved = moving(tree, matrix, numbers)
+    arrived, beside = _kept(chart, joints[0] is None, bodies, arrived, beside)
     if by_loops is None:
         return arrived, tuple(Made(each.made) for each in beside)
-    loops = moving(pieces, tree, matrix, do(apart, numbering(tree), by_loops.numbers)).screws
-    return arrived, tuple(do(_made, *each) for each in zip(beside, chart.bodies, loops, strict=True))
+    loops = moving(tree, matrix, apart(numbering(tree), by_loops.numbers)).screws
+    return arrived, tuple(_made(*each) for each in zip(beside, chart.bodies, loops, strict=True))
 
 
-def _counted(position: Expr, origin: Expr) -> Expr:
-    return position - origin
-
-
+@traced
 def _less(numbers: Solved, by: Solved) -> Solved:
     return Solved(numbers.r - by.r, tuple(a - b for a, b in zip(numbers.z, by.z, strict=True)))
 
 
 def _kept(
-    pieces: Pieces,
     chart: Chart,
     floats: bool,
     bodies: Sequence[tuple[Expr, Expr]],
@@ -122,20 +119,21 @@ def _kept(
     A tree that floats is shifted; else, and for spin, the root's share of momenta changes: of momenta only those along
     free motions count in the end (``articulate.consistent``), so it does not matter whose they are.
     """
-    do = pieces.do
-    total, mass = do(_total, tuple(each.screw for each in beside), tuple(mass for mass, _ in bodies))
+    total, mass = _total(tuple(each.screw for each in beside), tuple(mass for mass, _ in bodies))
     if floats:
-        moved = [do(_shifted, *each, total, mass) for each in zip(bodies, arrived, beside, strict=True)]
+        moved = [_shifted(*each, total, mass) for each in zip(bodies, arrived, beside, strict=True)]
         arrived, beside = (tuple(each) for each in zip(*moved, strict=True))
-        total = do(_total, tuple(each.screw for each in beside), ())[0]
-    root = do(_without, beside[0], chart.tree.impulses[0], total, bodies[0][0], floats)
+        total = _total(tuple(each.screw for each in beside), ())[0]
+    root = _without(beside[0], chart.tree.impulses[0], total, bodies[0][0], floats)
     return tuple(arrived), (root, *beside[1:])
 
 
+@traced
 def _total(screws: tuple[Screw, ...], masses: tuple[Expr, ...]) -> tuple[Screw, Expr]:
     return Screw(sum(each.parts for each in screws)), sum(masses)
 
 
+@traced
 def _shifted(
     body: tuple[Expr, Expr], arrived: Arrived, beside: Beside, total: Screw, mass: Expr
 ) -> tuple[Arrived, Beside]:
@@ -145,6 +143,7 @@ def _shifted(
     return replace(arrived, position=arrived.position - by), Beside(made, Screw(screw))
 
 
+@traced
 def _without(beside: Beside, axes: Expr, total: Screw, mass: Expr, floats: bool) -> Beside:
     """What is conserved about axes that turn and along those that slide, at right angles to each other."""
     if floats:
@@ -158,16 +157,19 @@ def _without(beside: Beside, axes: Expr, total: Screw, mass: Expr, floats: bool)
     return replace(beside, made=made)
 
 
+@traced
 def _made(beside: Beside, placed: Placed, loops: Screw) -> Made:
     linear, angular = screws.at_place(loops.parts, placed.place)
     return Made(beside.made, Momentum(linear, ca.mtimes(placed.inertia, angular)))
 
 
+@traced
 def _aim(screw: Screw, placed: Placed, position: Expr) -> Aim:
     linear, angular = screws.at_place(screw.parts, placed.place)
     return Aim(position + linear, angular, rotation.exponential(-angular))
 
 
+@traced
 def _beside(mass: Expr, counted: Expr, placed: Placed, aim: Aim, arrived: Arrived) -> Beside:
     linear = arrived.position - aim.position
     more = rotation.multiply(arrived.turn, aim.back)

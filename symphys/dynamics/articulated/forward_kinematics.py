@@ -14,7 +14,7 @@ import casadi as ca
 from symphys.dynamics.articulated import spatial as screws
 from symphys.dynamics.collision.predicted_points import Course
 from symphys.dynamics.joints.joint_frames import errors, locked, sockets_on
-from symphys.dynamics.tracing.trace import Pieces
+from symphys.dynamics.tracing.decorator import traced
 from symphys.maths import rotation
 from symphys.model.joints import Joint, Linkage
 
@@ -51,19 +51,16 @@ HERE = Arrived(ca.SX.zeros(3), ca.SX([1, 0, 0, 0]))
 """The world."""
 
 
-def seats_of(
-    pieces: Pieces, linkage: Linkage, joints: screws.Joints, courses: Sequence[Course]
-) -> tuple[Seat | None, ...]:
+def seats_of(linkage: Linkage, joints: screws.Joints, courses: Sequence[Course]) -> tuple[Seat | None, ...]:
     """Of each link; None for a root that floats."""
     place, found = {link.body: k for k, link in enumerate(linkage.links)}, list[Seat | None]()
     for link, joint, course in zip(linkage.links, joints, courses, strict=True):
         own = (course,) if link.parent is None else (course, courses[place[link.parent]])
-        found.append(None if joint is None else pieces.do(_seat, joint, link.sign, own))
+        found.append(None if joint is None else _seat(joint, link.sign, own))
     return tuple(found)
 
 
 def arrive(
-    pieces: Pieces,
     linkage: Linkage,
     joints: screws.Joints,
     seats: Sequence[Seat | None],
@@ -74,13 +71,14 @@ def arrive(
     place, found = {link.body: k for k, link in enumerate(linkage.links)}, list[Arrived]()
     for link, joint, seat, position, moved in zip(linkage.links, joints, seats, positions, along, strict=True):
         if joint is None or seat is None:
-            found.append(pieces.do(_floated, position, moved))
+            found.append(_floated(position, moved))
         else:
             parent = HERE if link.parent is None else found[place[link.parent]]
-            found.append(pieces.do(_carried, joint, link.sign, seat, parent, moved))
+            found.append(_carried(joint, link.sign, seat, parent, moved))
     return tuple(found)
 
 
+@traced
 def _seat(joint: Joint, sign: int, courses: tuple[Course, ...]) -> Seat:
     now, sockets = ca.SX(0), sockets_on(joint, courses if sign > 0 else courses[::-1])
     placed, arms = sockets.placed(now), tuple(arm.at(now) for arm in sockets.arms)
@@ -100,10 +98,12 @@ def _turns(joint: Joint, k: int) -> bool:
     return not joint.kind.coordinates or joint.kind.coordinates[k].turns
 
 
+@traced
 def _floated(position: Expr, moved: Expr) -> Arrived:
     return Arrived(position + moved[:3], rotation.exponential(moved[3:]))
 
 
+@traced
 def _carried(joint: Joint, sign: int, seat: Seat, parent: Arrived, moved: Expr) -> Arrived:
     apart, turned = seat.apart, _turned(joint, seat, moved)
     for k, coordinate in enumerate(joint.kind.coordinates):

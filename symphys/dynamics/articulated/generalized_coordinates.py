@@ -21,7 +21,7 @@ from symphys.dynamics.articulated.impulse_response import Gain, Numbering, Place
 from symphys.dynamics.articulated.schur_complement import Inertia, Screw
 from symphys.dynamics.momentum import Momentum, Rates
 from symphys.dynamics.motion import Held, Motion, apply
-from symphys.dynamics.tracing.trace import Pieces
+from symphys.dynamics.tracing.decorator import traced
 from symphys.model.joints import Linkage
 
 Expr = Any
@@ -53,7 +53,6 @@ class Chart:
 
 
 def make_chart(
-    pieces: Pieces,
     linkage: Linkage,
     joints: screws.Joints,
     reached: Sequence[bool],
@@ -64,7 +63,6 @@ def make_chart(
     """The chart of a tree.
 
     Args:
-        pieces: how its parts are put together.
         linkage: the tree.
         joints: of its links, as are the other sequences.
         reached: whether anything but the tree's own joints acts on the body.
@@ -72,20 +70,20 @@ def make_chart(
         free: their momenta without any impulse of the stretch.
         middle: when velocities are seen [s].
     """
-    do, origin = pieces.do, motions[0].position
+    origin = motions[0].position
     courses = [motion.course() for motion in motions]
-    seen, given = (axes_at(pieces, linkage, joints, courses, t, origin) for t in (middle, ca.SX(0)))
+    seen, given = (axes_at(linkage, joints, courses, t, origin) for t in (middle, ca.SX(0)))
     tree = Tree(linkage, seen, given)
-    parts = [do(_counted, motion, momentum, origin, middle) for motion, momentum in zip(motions, free, strict=True)]
+    parts = [_counted(motion, momentum, origin, middle) for motion, momentum in zip(motions, free, strict=True)]
     bodies, inertias, momenta = zip(*parts, strict=True)
-    matrix = tree_matrix(pieces, tree, inertias)
-    rates = do(_joined, numbering(tree), solve(pieces, tree, matrix, momenta))
+    matrix = tree_matrix(tree, inertias)
+    rates = _joined(numbering(tree), solve(tree, matrix, momenta))
     places = [
-        (do(_place, motion, origin), body) if on else None
+        (motion.position - origin, body) if on else None
         for motion, body, on in zip(motions, bodies, reached, strict=True)
     ]
-    held = held_of(pieces, tree, matrix, places)
-    gains = gains_of(pieces, tree, matrix, [acts(joint) for joint in joints])
+    held = held_of(tree, matrix, places)
+    gains = gains_of(tree, matrix, [acts(joint) for joint in joints])
     return Chart(Rates(rates), held, gains, tree, matrix, bodies)
 
 
@@ -94,24 +92,22 @@ def acts(joint: Any) -> bool:
     return joint is not None and bool(joint.acting)
 
 
-def body_momenta(pieces: Pieces, chart: Chart, rates: Any) -> tuple[Momentum, ...]:
+def body_momenta(chart: Chart, rates: Any) -> tuple[Momentum, ...]:
     """Of the bodies of a tree, from the rates that sweeps know of it."""
-    return tuple(pieces.do(_momentum, *each) for each in zip(_moving(pieces, chart, rates), chart.bodies, strict=True))
+    return tuple(_momentum(*each) for each in zip(_moving(chart, rates), chart.bodies, strict=True))
 
 
-def _moving(pieces: Pieces, chart: Chart, rates: Any) -> tuple[Screw, ...]:
-    return moving(pieces, chart.tree, chart.matrix, pieces.do(apart, numbering(chart.tree), rates.numbers)).screws
+def _moving(chart: Chart, rates: Any) -> tuple[Screw, ...]:
+    return moving(chart.tree, chart.matrix, apart(numbering(chart.tree), rates.numbers)).screws
 
 
+@traced
 def _momentum(screw: Screw, body: Placed) -> Momentum:
     velocity, spin = screws.at_place(screw.parts, body.place)
     return Momentum(velocity, apply(body.inertia, spin))
 
 
-def _place(motion: Motion, origin: Expr) -> Expr:
-    return motion.position - origin
-
-
+@traced
 def _counted(motion: Motion, free: Momentum, origin: Expr, middle: Expr) -> tuple[Placed, Inertia, Screw]:
     """A body at mid-step, its momentum at the start for what is seen at mid-step, and its free momentum."""
     counted, place, inertia = motion.position - origin, motion.centre().at(middle) - origin, motion.inertia_at(middle)
@@ -119,10 +115,13 @@ def _counted(motion: Motion, free: Momentum, origin: Expr, middle: Expr) -> tupl
     return Placed(place, inertia), Inertia(screws.inertia_of(motion.mass, inertia, counted, place)), Screw(momentum)
 
 
+@traced
 def _joined(numbering: Numbering, rates: Solved) -> Expr:
     return spread(numbering, (rates.r, *rates.z))
 
 
+@traced
+@traced
 def apart(numbering: Numbering, numbers: Expr) -> Solved:
     """What sweeps know of a tree, by its root and limbs."""
     r, *z = (numbers[list(each), 0] for each in numbering)

@@ -15,6 +15,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics.articulated.factorisation import Eliminated, Sparse, eliminated
+from symphys.dynamics.tracing.decorator import traced
 
 Expr = Any
 """casadi SX"""
@@ -88,6 +89,7 @@ def paths(above: Above, axes: Columns) -> list[list[int]]:
     return found
 
 
+@traced
 def limb_matrix(above: Above, inertias: Sequence[Inertia], axes: Axes) -> LimbMatrix:
     """Of a limb, its bodies' inertias given."""
     symmetric, (given, root_given) = axes.given is None, axes.impulses
@@ -114,6 +116,7 @@ def limb_matrix(above: Above, inertias: Sequence[Inertia], axes: Axes) -> LimbMa
     return LimbMatrix(block, follows, pushes, mirrored(at_root) if symmetric else at_root)
 
 
+@traced
 def root_matrix(inertia: Inertia, axes: tuple[Expr, Expr | None], limbs: tuple[Expr, ...]) -> Eliminated:
     """S, from the root's inertia, its screws as they are seen and given, and what limbs add."""
     seen, given = axes
@@ -124,6 +127,7 @@ def root_matrix(inertia: Inertia, axes: tuple[Expr, Expr | None], limbs: tuple[E
     return eliminated([{j: whole[i, j] for j in range(m)} for i in range(m)], given is None)
 
 
+@traced
 def limb_load(
     above: Above, matrix: LimbMatrix, given: Columns, root: Expr, momenta: Sequence[Screw]
 ) -> tuple[Expr, Expr]:
@@ -138,6 +142,7 @@ def limb_load(
     return z, ca.mtimes(root.T, base) - ca.mtimes(matrix.pushes, z)
 
 
+@traced
 def root_rates(matrix: Eliminated, given: Expr, momentum: Screw, limbs: tuple[Expr, ...]) -> Expr:
     """r (m,): of the root's own momentum and what limbs pass on."""
     right = ca.mtimes(given.T, momentum.parts)

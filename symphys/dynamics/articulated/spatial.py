@@ -15,6 +15,7 @@ import casadi as ca
 
 from symphys.dynamics.collision.predicted_points import Course
 from symphys.dynamics.joints.joint_frames import Sockets, sockets_on
+from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.rotation import cross_matrix
 from symphys.model.joints import Joint, Placed
 
@@ -24,6 +25,7 @@ Joints = Sequence[Joint | None]
 """The joint of each link; None for a root that floats."""
 
 
+@traced
 def axes_of(joint: Joint | None, sign: int, courses: tuple[Course, ...], t: Expr, origin: Expr) -> Expr:
     """(6, count): the screws of a link's coordinates at time t; ``courses`` of the link's body and of its parent's."""
     if joint is None:

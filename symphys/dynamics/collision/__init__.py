@@ -17,6 +17,7 @@ from symphys.dynamics.collision.pairs.sphere_plane import sphere_plane
 from symphys.dynamics.collision.pairs.sphere_sphere import sphere_sphere
 from symphys.dynamics.collision.pairs.terrain import box_terrain, capsule_terrain, sphere_terrain
 from symphys.dynamics.collision.predicted_points import Course
+from symphys.dynamics.tracing.decorator import traced
 from symphys.model.shapes import Box, Capsule, Plane, Sphere, Surface, Terrain
 
 __all__ = ["Contact", "collide"]
@@ -40,6 +41,7 @@ RULES: dict[tuple[type, type], Rule] = {
 """Which rule covers which surfaces; ``shapes.POINTS`` says how many points each returns."""
 
 
+@traced
 def collide(first: Surface, second: Surface, a: Course, b: Course) -> list[Contact]:
     """The contacts of two surfaces, carried along a and b, in this step: one for each point."""
     rule = RULES.get((type(first), type(second)))

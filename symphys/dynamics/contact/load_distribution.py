@@ -19,6 +19,7 @@ from symphys.dynamics.contact.constraint import ContactRow
 from symphys.dynamics.contact.projection import Impulse
 from symphys.dynamics.context import Scene
 from symphys.dynamics.pgs import Row
+from symphys.dynamics.tracing.decorator import traced
 from symphys.model.shapes import Plane, Terrain
 from symphys.model.world import Pair, World
 
@@ -37,7 +38,7 @@ def shared(scene: Scene, rows: Sequence[Row], impulses: Sequence[Impulse]) -> li
     if not scene.setting.scheme.load_sharing:
         return found
     for group in faces(scene.world):
-        loads = scene.pieces.do(_linear, tuple(rows[k].row for k in group), tuple(found[k].normal for k in group))
+        loads = _linear(tuple(rows[k].row for k in group), tuple(found[k].normal for k in group))
         for k, load in zip(group, loads, strict=True):
             found[k] = replace(found[k], normal=load)
     return found
@@ -59,6 +60,7 @@ def _face(world: World, pair: Pair) -> Any:
     return (pair.first.body if isinstance(static, Plane) else pair.first), pair.second
 
 
+@traced
 def _linear(rows: tuple[ContactRow, ...], loads: tuple[Expr, ...]) -> tuple[Expr, ...]:
     parts = [ca.fmax(load - row.load, 0) / ca.fmax(load, row.load) for row, load in zip(rows, loads, strict=True)]
     total = sum(parts) + BLUNT

@@ -24,6 +24,7 @@ from symphys.dynamics.contact.effective_mass import (
 )
 from symphys.dynamics.contact.local_solver import coupling_of, pulls_together
 from symphys.dynamics.context import Setting
+from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.smoothing import clip, positive
 from symphys.model.world import Law
 
@@ -65,6 +66,7 @@ class Conditions:
     coupled: bool
 
 
+@traced
 def prepare(
     setting: Setting, law: Law, contact: Contact, motions: Moving, duration: Expr, conditions: Conditions
 ) -> ContactRow:

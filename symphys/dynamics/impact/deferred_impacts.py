@@ -13,6 +13,7 @@ from symphys.dynamics.context import Scene, Setting, State
 from symphys.dynamics.impact.impact import TOUCHING, Cut, strikes
 from symphys.dynamics.impact.restitution import eccentric_bodies
 from symphys.dynamics.prediction import bodies_of, expected_motions, look
+from symphys.dynamics.tracing.decorator import traced
 from symphys.model.shapes import Sphere
 from symphys.model.world import Law, Pair, World, is_zero
 
@@ -44,27 +45,27 @@ def deferred(scene: Scene, x: State, duration: Expr, cuts: Sequence[Cut]) -> Def
     energy. So a blow that goes through a row of balls takes an impact a stretch, as in the row: the next ball is not
     held back before it is hit.
     """
-    do, pairs, world = scene.pieces.do, scene.world.pairs, scene.world
+    pairs, world = scene.world.pairs, scene.world
     contacts = look(scene, expected_motions(scene, x, duration), duration)
-    hits = [do(_hit, scene.setting, pair.law, contact) for pair, contact in zip(pairs, contacts, strict=True)]
+    hits = [_hit(scene.setting, pair.law, contact) for pair, contact in zip(pairs, contacts, strict=True)]
     eccentric, sides = eccentric_bodies(world), {k for pair in pairs for k in bodies_of(pair)}
     rebounds = {k for pair in pairs if not is_zero(pair.law.restitution) for k in bodies_of(pair)}
     first: dict[int, tuple[Expr, Expr]] = dict.fromkeys(sides & (eccentric | rebounds), (duration, ca.SX(0)))
     for pair, contact, (_, meets) in zip(pairs, contacts, hits, strict=True):
         for body in first.keys() & set(bodies_of(pair)):
-            first[body] = do(_sooner, first[body], meets, contact.time, contact.rate)
+            first[body] = _sooner(first[body], meets, contact.time, contact.rate)
     found, chained, plastic = list[Expr](), ca.SX(0), ca.SX(0)
     for pair, contact, (fast, meets) in zip(pairs, contacts, hits, strict=True):
-        waits = do(_passes, fast, meets)
+        waits = _passes(fast, meets)
         for body in sorted(first.keys() & set(bodies_of(pair))):
             struck = [cut.struck[j] for cut in cuts for j, other in enumerate(pairs) if body in bodies_of(other)]
             struck = struck if body in eccentric else []
-            waits = do(_later, waits, fast, contact.time, first[body][0], tuple(struck))
+            waits = _later(waits, fast, contact.time, first[body][0], tuple(struck))
             if (room := _room(world, pair, eccentric)) is not None:
                 before = waits, chained, plastic
-                waits, chained, plastic = do(_driven, scene.setting, before, fast, contact, first[body], duration, room)
+                waits, chained, plastic = _driven(scene.setting, before, fast, contact, first[body], duration, room)
         found.append(waits)
-        chained = do(_chained, chained, waits, meets)
+        chained = _chained(chained, waits, meets)
     return Deferral(tuple(found), chained, plastic)
 
 
@@ -77,17 +78,20 @@ def _room(world: World, pair: Pair, eccentric: set[int]) -> Expr | None:
     return radii[0] if len(radii) == 1 else ca.fmin(*radii)
 
 
+@traced
 def _hit(setting: Setting, law: Law, contact: Contact) -> tuple[Expr, Expr]:
     """(whether it closes at speed, whether it then meets)."""
     fast = strikes(setting, law, contact)
     return fast, ca.logic_and(fast, contact.hit)
 
 
+@traced
 def _sooner(first: tuple[Expr, Expr], meets: Expr, time: Expr, rate: Expr) -> tuple[Expr, Expr]:
     """(when a body is first hit, the greatest speed at which it is), with one more contact looked at."""
     return ca.if_else(meets, ca.fmin(first[0], time), first[0]), ca.if_else(meets, ca.fmax(first[1], -rate), first[1])
 
 
+@traced
 def _driven(
     setting: Setting,
     before: tuple[Expr, Expr, Expr],
@@ -108,14 +112,17 @@ def _driven(
     return ca.fmax(before[0], waits), ca.fmax(before[1], driven), ca.fmax(before[2], ca.logic_and(driven, 1 - waits))
 
 
+@traced
 def _chained(before: Expr, waits: Expr, meets: Expr) -> Expr:
     return ca.fmax(before, ca.logic_and(waits, meets))
 
 
+@traced
 def _passes(fast: Expr, meets: Expr) -> Expr:
     return ca.logic_and(fast, ca.logic_not(meets))
 
 
+@traced
 def _later(waits: Expr, fast: Expr, time: Expr, first: Expr, struck: tuple[Expr, ...]) -> Expr:
     before = ca.mmax(ca.vertcat(*struck)) if struck else ca.SX(0)
     return ca.fmax(waits, ca.logic_and(fast, ca.logic_or(time > first, before)))

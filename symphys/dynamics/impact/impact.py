@@ -22,6 +22,7 @@ from symphys.dynamics.motion import Motion, angular_velocity, apply
 from symphys.dynamics.pgs import Row, Solution
 from symphys.dynamics.prediction import bodies_of, expected_motions, look
 from symphys.dynamics.substep import Phase
+from symphys.dynamics.tracing.decorator import traced
 from symphys.maths import rotation
 from symphys.maths.smoothing import positive
 from symphys.model.world import Law
@@ -59,24 +60,25 @@ def find_cut(scene: Scene, x: State, duration: Expr, share: float) -> Cut:
 
     Without an impact the cut is at ``share`` of the duration.
     """
-    do = scene.pieces.do
     contacts = look(scene, expected_motions(scene, x, duration), duration)
-    fast = [do(strikes, scene.setting, p.law, c) for p, c in zip(scene.world.pairs, contacts, strict=True)]
+    fast = [strikes(scene.setting, p.law, c) for p, c in zip(scene.world.pairs, contacts, strict=True)]
     earliest = ca.SX(0), duration
     for contact, closes in zip(contacts, fast, strict=True):
-        earliest = do(_earlier, earliest, closes, contact.hit, contact.time, scene.setting.scheme.dt)
-    first = do(_inside, earliest, duration, share)
-    until = do(_until, earliest[1], first, scene.setting.scheme.dt)
-    struck = [do(_is_struck, c, contact.hit, contact.time, until) for contact, c in zip(contacts, fast, strict=True)]
-    late = [do(_late, earliest[1], s, contact.time) for contact, s in zip(contacts, struck, strict=True)]
+        earliest = _earlier(earliest, closes, contact.hit, contact.time, scene.setting.scheme.dt)
+    first = _inside(earliest, duration, share)
+    until = _until(earliest[1], first, scene.setting.scheme.dt)
+    struck = [_is_struck(c, contact.hit, contact.time, until) for contact, c in zip(contacts, fast, strict=True)]
+    late = [_late(earliest[1], s, contact.time) for contact, s in zip(contacts, struck, strict=True)]
     return Cut(earliest[0], first, tuple(fast), tuple(struck), tuple(late))
 
 
+@traced
 def strikes(setting: Setting, law: Law, contact: Contact) -> Expr:
     """1 if a contact's meeting is an impact."""
     return ca.SX(0) if law.soft else closes_fast(setting, contact)
 
 
+@traced
 def _earlier(earliest: tuple[Expr, Expr], closes: Expr, hit: Expr, time: Expr, dt: float) -> tuple[Expr, Expr]:
     """(whether there is an impact, when), with one more contact looked at; at a tie with the slope of this one."""
     meets = ca.logic_and(closes, hit)
@@ -84,19 +86,23 @@ def _earlier(earliest: tuple[Expr, Expr], closes: Expr, hit: Expr, time: Expr, d
     return ca.fmax(earliest[0], meets), ca.if_else(sooner, time, earliest[1])
 
 
+@traced
 def _until(earliest: Expr, first: Expr, dt: float) -> Expr:
     """When the last of the impacts that share the cut may be; none may be left between its instant and the cut."""
     return ca.fmax(earliest, first) + TOGETHER * dt
 
 
+@traced
 def _is_struck(closes: Expr, hit: Expr, time: Expr, until: Expr) -> Expr:
     return ca.logic_and(ca.logic_and(closes, hit), time <= until)
 
 
+@traced
 def _late(earliest: Expr, struck: Expr, time: Expr) -> Expr:
     return ca.if_else(struck, time - earliest, 0)
 
 
+@traced
 def _inside(earliest: tuple[Expr, Expr], duration: Expr, share: float) -> Expr:
     """The length of the stretch before the cut; near an end it is shifted, not clamped, so that its slope stays.
 
@@ -111,9 +117,9 @@ def _inside(earliest: tuple[Expr, Expr], duration: Expr, share: float) -> Expr:
 def collide_now(scene: Scene, x: State, cut: Cut) -> Phase:
     """The state after the impacts at ``cut``; leapfrog begins anew there, so ``lag`` is 0. Without one the same x."""
     duration = ca.SX(scene.setting.scheme.dt)
-    motions = [scene.pieces.do(Motion.at_start, motion) for motion in expected_motions(scene, x, duration)]
+    motions = [Motion.at_start(motion) for motion in expected_motions(scene, x, duration)]
     contacts = look(scene, motions, duration)
-    momenta = tuple(scene.pieces.do(_momentum, motion) for motion in motions)
+    momenta = tuple(_momentum(motion) for motion in motions)
     trees = make_trees(scene, motions, momenta, ca.SX(0))
     rows = []
     for pair, contact, struck in zip(scene.world.pairs, contacts, cut.struck, strict=True):
@@ -121,7 +127,7 @@ def collide_now(scene: Scene, x: State, cut: Cut) -> Phase:
         moving = tuple(trees.motions[i] for i in bodies)
         coupled = may_couple(scene.world, pair)
         arguments = pair.law, contact, moving, struck, cut.impact, trees.same(bodies), coupled
-        rows.append(trees.row(bodies, scene.pieces.do(_row, scene.setting, *arguments)))
+        rows.append(trees.row(bodies, _row(scene.setting, *arguments)))
     locks = locks_at(scene, trees)
     n, still = len(locks), (*(nothing for _, nothing in locks), *(ZERO for _ in rows))
     every = (*(row for row, _ in locks), *rows)
@@ -129,19 +135,22 @@ def collide_now(scene: Scene, x: State, cut: Cut) -> Phase:
     after = _with_velocities(scene, x, motions, momenta_of(scene, trees, solved.momenta), cut.impact)
     _delay(scene, after, rows, solved.impulses[n:], cut.late)
     forces = (x[f"{pair.name}.force"] for pair in scene.world.pairs)
-    ahead = tuple(scene.pieces.do(_ahead, cut.impact, x["lag"], force) for force in forces)
+    ahead = tuple(_ahead(cut.impact, x["lag"], force) for force in forces)
     changes = tuple(zip(solved.impulses, solved.last, strict=True))
     return Phase(after, tuple(rows), tuple(contacts), solved.impulses[n:], changes, ahead)
 
 
+@traced
 def _momentum(motion: Motion) -> Momentum:
     return Momentum(motion.velocity, motion.momentum_k)
 
 
+@traced
 def _ahead(impact: Expr, lag: Expr, force: Expr) -> Expr:
     return impact * lag * force
 
 
+@traced
 def _row(
     setting: Setting,
     law: Law,
@@ -193,8 +202,8 @@ def _with_velocities(
     for body, motion, momentum in zip(scene.world.bodies, motions, momenta, strict=True):
         names = f"{body.name}.velocity", f"{body.name}.angular_velocity"
         before = tuple(x[name] for name in names)
-        values |= zip(names, scene.pieces.do(_after, motion, momentum, before, impact), strict=True)
-    values["lag"] = scene.pieces.do(_renewed, impact, x["lag"])
+        values |= zip(names, _after(motion, momentum, before, impact), strict=True)
+    values["lag"] = _renewed(impact, x["lag"])
     return values
 
 
@@ -209,9 +218,10 @@ def _delay(scene: Scene, x: State, rows: Sequence[Row], impulses: Sequence[Impul
             names = tuple(f"{scene.world.bodies[index].name}.{part}" for part in ("position", "orientation"))
             if index not in held:
                 pose = x[names[0]], x[names[1]]
-                x |= zip(names, scene.pieces.do(_delayed, pose, each.row, k, impulse, time), strict=True)
+                x |= zip(names, _delayed(pose, each.row, k, impulse, time), strict=True)
 
 
+@traced
 def _delayed(pose: tuple[Expr, Expr], row: ContactRow, k: int, impulse: Impulse, time: Expr) -> tuple[Expr, Expr]:
     side, (position, q) = row.sides[k], pose
     push, twist = impulse.linear(row.impulse_normal), impulse.angular(row.impulse_normal)
@@ -220,11 +230,13 @@ def _delayed(pose: tuple[Expr, Expr], row: ContactRow, k: int, impulse: Impulse,
     return position + early * side.inverse_mass * push, q + rotation.multiply(ca.vertcat(0, turn / 2), q)
 
 
+@traced
 def _after(motion: Motion, momentum: Momentum, before: tuple[Expr, ...], impact: Expr) -> tuple[Expr, Expr]:
     """(velocity, angular velocity): as solved if there is an impact, else as before."""
     spin = angular_velocity(motion.inertia, motion.orientation, momentum.angular)
     return ca.if_else(impact, momentum.velocity, before[0]), ca.if_else(impact, spin, before[1])
 
 
+@traced
 def _renewed(impact: Expr, lag: Expr) -> Expr:
     return ca.if_else(impact, 0, lag)

@@ -22,6 +22,7 @@ from symphys.dynamics.joints.assembly import Trees, momenta_of
 from symphys.dynamics.momentum import Momentum, Moved, Rates
 from symphys.dynamics.motion import Motion, apply, inverse_inertia
 from symphys.dynamics.pgs import Given, Row, Solution, relax
+from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.shapes import Sphere
 from symphys.model.world import World, is_zero
@@ -42,30 +43,32 @@ def eccentric_bodies(world: World) -> set[int]:
 
 def rebound(scene: Scene, rows: tuple[Row, ...], start: Solution, motions: Sequence[Motion], trees: Trees) -> Solution:
     """The impulses of an impact, and the momenta after it."""
-    pieces, scheme = scene.pieces, scene.setting.scheme
+    scheme = scene.setting.scheme
     if not (scheme.energy_cap and eccentric_bodies(scene.world)):
-        return relax(pieces, scene.world, scheme.sweeps, rows, start, motions)
-    dead = tuple(replace(each, row=pieces.do(_without_rebound, each.row)) for each in rows)
-    plastic = relax(pieces, scene.world, scheme.sweeps, dead, start, motions)
-    newton = relax(pieces, scene.world, scheme.sweeps, rows, plastic, motions)
+        return relax(scene.world, scheme.sweeps, rows, start, motions)
+    dead = tuple(replace(each, row=_without_rebound(each.row)) for each in rows)
+    plastic = relax(scene.world, scheme.sweeps, dead, start, motions)
+    newton = relax(scene.world, scheme.sweeps, rows, plastic, motions)
     sums: tuple[Expr, Expr, Expr] = (ca.SX(0), ca.SX(0), ca.SX(0))
     bodies = (momenta_of(scene, trees, solution.momenta) for solution in (start, plastic, newton))
     for motion, *momenta in zip(motions, *bodies, strict=True):
-        sums = pieces.do(_energies, motion, momenta, sums)
-    share = pieces.do(_largest_share, sums)
+        sums = _energies(motion, momenta, sums)
+    share = _largest_share(sums)
     return Solution(
-        tuple(pieces.do(_between_states, share, a, b) for a, b in zip(plastic.momenta, newton.momenta, strict=True)),
-        tuple(pieces.do(_between, share, a, b) for a, b in zip(plastic.impulses, newton.impulses, strict=True)),
-        tuple(pieces.do(_between, share, a, b) for a, b in zip(plastic.last, newton.last, strict=True)),
+        tuple(_between_states(share, a, b) for a, b in zip(plastic.momenta, newton.momenta, strict=True)),
+        tuple(_between(share, a, b) for a, b in zip(plastic.impulses, newton.impulses, strict=True)),
+        tuple(_between(share, a, b) for a, b in zip(plastic.last, newton.last, strict=True)),
     )
 
 
+@traced
 def _without_rebound(row: Any) -> Any:
     if not isinstance(row, ContactRow):
         return row
     return replace(row, target=ca.fmin(row.target, 0))
 
 
+@traced
 def _energies(motion: Motion, momenta: list[Momentum], sums: tuple[Expr, Expr, Expr]) -> tuple[Expr, Expr, Expr]:
     """Coefficients of the change of kinetic energy, a s^2 + b s + c, at share s of the way to Newton's impulse."""
     before, plastic, newton = momenta
@@ -81,6 +84,7 @@ def _energies(motion: Motion, momenta: list[Momentum], sums: tuple[Expr, Expr, E
     return a + product(way, way), b + 2 * product(way, plastic), c + change
 
 
+@traced
 def _largest_share(sums: tuple[Expr, Expr, Expr]) -> Expr:
     """The largest s in [0, 1] with a s^2 + b s + c <= 0, where c <= 0 up to rounding."""
     a, b, c = sums[0], sums[1], ca.fmin(sums[2], 0)
@@ -89,6 +93,7 @@ def _largest_share(sums: tuple[Expr, Expr, Expr]) -> Expr:
     return ca.if_else(a + b + c > 0, ca.fmin(share, 1), 1)
 
 
+@traced
 def _between_states(share: Expr, plastic: Moved, newton: Moved) -> Moved:
     if plastic is None or newton is None:
         return None
@@ -102,5 +107,6 @@ def _between_states(share: Expr, plastic: Moved, newton: Moved) -> Moved:
     )
 
 
+@traced
 def _between(share: Expr, plastic: Given, newton: Given) -> Given:
     return plastic.plus(newton.minus(plastic).times(share))

@@ -18,6 +18,7 @@ from symphys.dynamics.joints.locked_directions import LockRow
 from symphys.dynamics.momentum import Momenta, Moved, States
 from symphys.dynamics.motion import Motion
 from symphys.dynamics.pgs import Row
+from symphys.dynamics.tracing.decorator import traced
 from symphys.model.joints import carriers, linkages, tree_joints
 from symphys.model.world import World
 
@@ -60,7 +61,7 @@ def make_trees(scene: Scene, motions: Sequence[Motion], free: Momenta, middle: E
         own = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
         reached = tuple(body in touched for body in tree.bodies)
         parts = tuple(motions[i] for i in tree.bodies), tuple(free[i] for i in tree.bodies)
-        chart = make_chart(scene.pieces, tree, own, reached, *parts, middle)
+        chart = make_chart(tree, own, reached, *parts, middle)
         charts.append(chart)
         for body, holds in zip(tree.bodies, chart.held, strict=True):
             held[body], states[body] = replace(motions[body], held=holds), None
@@ -80,7 +81,7 @@ def momenta_of(scene: Scene, trees: Trees, solved: States) -> Momenta:
     """Of all bodies."""
     found = list(solved)
     for tree, chart in zip(linkages(scene.world.joints), trees.charts, strict=True):
-        momenta = body_momenta(scene.pieces, chart, solved[tree.root])
+        momenta = body_momenta(chart, solved[tree.root])
         for body, momentum in zip(tree.bodies, momenta, strict=True):
             found[body] = momentum
     return tuple(found)  # type: ignore[arg-type]
@@ -104,24 +105,24 @@ def joint_rows(
     scene: Scene, trees: Trees, paths: Sequence[Motion], duration: Expr, kick: Expr
 ) -> tuple[list[JointRow], list[Row]]:
     """(what the sweeps visit, what the position pass closes) of all joints over a stretch."""
-    do, setting, stretch = scene.pieces.do, scene.setting, Stretch(duration, kick)
+    setting, stretch = scene.setting, Stretch(duration, kick)
     visited, fitted = list[JointRow](), list[Row]()
     places = _places(scene.world, trees)
     for index, joint in enumerate(scene.world.joints):
         moving = tuple(trees.motions[i] for i in joint.bodies)
         bare = tuple(paths[i] for i in joint.bodies)
-        sockets, same = do(sockets_of, joint, bare), trees.same(joint.bodies)
+        sockets, same = sockets_of(joint, bare), trees.same(joint.bodies)
         if index not in places:
-            lock = trees.row(joint.bodies, do(lock_row, setting, sockets, moving, stretch, same))
+            lock = trees.row(joint.bodies, lock_row(setting, sockets, moving, stretch, same))
             visited.append(JointRow(lock, f"{joint.name}.lock"))
             fitted += [] if joint.soft else [lock]
         for k in range(len(joint.kind.coordinates)) if joint.acting else ():
             states = tuple(trees.states[trees.carriers[i]] for i in joint.bodies)
-            at = do(along_coordinate, sockets, k, moving, states, duration, places.get(index, same))
+            at = along_coordinate(sockets, k, moving, states, duration, places.get(index, same))
             command = scene.given(f"{joint.name}.command")
             command = ca.SX(0) if command is None else command[k]
             for part in joint.acting:
-                row = trees.row(joint.bodies, do(ROWS[part], setting, joint, at, command, stretch))
+                row = trees.row(joint.bodies, ROWS[part](setting, joint, at, command, stretch))
                 visited.append(JointRow(row, f"{joint.name}.{part}", k))
                 fitted += [row] if part in LIMITS else []
     return visited, fitted
@@ -145,8 +146,8 @@ def locks_at(scene: Scene, trees: Trees) -> list[tuple[Row, Along]]:
             continue
         moving = tuple(trees.motions[i] for i in joint.bodies)
         states = tuple(trees.states[trees.carriers[i]] for i in joint.bodies)
-        sockets = scene.pieces.do(sockets_of, joint, moving)
-        row = scene.pieces.do(lock_now, sockets, moving, states, trees.same(joint.bodies))
+        sockets = sockets_of(joint, moving)
+        row = lock_now(sockets, moving, states, trees.same(joint.bodies))
         found.append((trees.row(joint.bodies, row), Along(ca.SX(joint.locked, 1))))
     return found
 
@@ -155,7 +156,7 @@ def resumed(scene: Scene, rows: Sequence[JointRow], x: State, kick: Expr) -> lis
     """What the sweeps start from: the last step's forces over this stretch's kick."""
     if not scene.setting.scheme.warm_start:
         return [Along(ca.SX(numbers_of(each.row.row), 1)) for each in rows]
-    return [scene.pieces.do(_again, each.row.row, x[each.name], each.k, kick) for each in rows]
+    return [_again(each.row.row, x[each.name], each.k, kick) for each in rows]
 
 
 def numbers_of(row: LockRow | AxisRow) -> int:
@@ -168,5 +169,6 @@ def own(stored: Expr, k: int | None) -> Expr:
     return stored if k is None else stored[k]
 
 
+@traced
 def _again(row: LockRow | AxisRow, stored: Expr, k: int | None, kick: Expr) -> Along:
     return row.taken_up(kick * own(stored, k))

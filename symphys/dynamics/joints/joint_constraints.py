@@ -22,6 +22,7 @@ from symphys.dynamics.joints.joint_frames import Sockets, errors, free, locked
 from symphys.dynamics.joints.joint_impulse import Directions, mobility, speeds
 from symphys.dynamics.joints.locked_directions import LockRow, inverse
 from symphys.dynamics.momentum import Momentum
+from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.smoothing import clip
 from symphys.model.joints import Joint, Servo, TorqueMotor, VelocityMotor
 
@@ -68,6 +69,7 @@ class AlongCoordinate:
     of_tree: OfTree | None
 
 
+@traced
 def lock_row(setting: Setting, sockets: Sockets, motions: Moving, stretch: Stretch, same: bool) -> LockRow:
     """What the joint locks; soft if it gives way (Catto, GDC 2011)."""
     joint, start, middle = sockets.joint, ca.SX(0), stretch.duration / 2
@@ -88,6 +90,7 @@ def lock_row(setting: Setting, sockets: Sockets, motions: Moving, stretch: Stret
     )
 
 
+@traced
 def lock_now(sockets: Sockets, motions: Moving, momenta: tuple[Any, ...], same: bool) -> LockRow:
     """What the joint locks, at the instant of an impact: it changes no velocity unless something else does."""
     now = ca.SX(0)
@@ -116,6 +119,7 @@ def _softness(joint: Joint, mobilities: Expr, dt: float) -> tuple[Expr, Expr]:
     return dt * stiffness / (damper + dt * stiffness), 1 / (dt * (damper + dt * stiffness))
 
 
+@traced
 def along_coordinate(
     sockets: Sockets, k: int, motions: Moving, momenta: tuple[Any, ...], duration: Expr, place: tuple[int, Any] | bool
 ) -> AlongCoordinate:
@@ -149,6 +153,7 @@ def along_coordinate(
     )
 
 
+@traced
 def motor_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr, stretch: Stretch) -> AxisRow:
     """A motor; the bounds of its torque are rounded off over what the knob makes of an effective mass."""
     motor, width = joint.motor, setting.knob / at.mobility
@@ -169,6 +174,7 @@ def servo_velocity(servo: Servo, command: Expr, value: Expr, knob: Expr) -> Expr
     return servo.gain * (command - value)
 
 
+@traced
 def lower_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr, stretch: Stretch) -> AxisRow:
     """A limit from below: it may be reached within the stretch, not passed, and pushes only.
 
@@ -179,6 +185,7 @@ def lower_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr
     return _row(at, law, ca.SX(0), None, setting.knob / at.mobility, left + TIE * strikes, strikes)
 
 
+@traced
 def upper_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr, stretch: Stretch) -> AxisRow:
     """A limit from above."""
     left, strikes = joint.limits.upper - at.value, _strikes(setting, at, at.rate_now)
@@ -196,6 +203,7 @@ def _strikes(setting: Setting, at: AlongCoordinate, closing: Expr) -> Expr:
     return closing > 4 * ca.fabs(at.rate - at.rate_now) + REACHED / setting.scheme.dt
 
 
+@traced
 def spring_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr, stretch: Stretch) -> AxisRow:
     """A spring and damper.
 

@@ -11,6 +11,7 @@ import casadi as ca
 from symphys.dynamics.collision.predicted_points import Course, Parabola, at_rest
 from symphys.dynamics.contact.constraint import Moving, Side, reach_of
 from symphys.dynamics.joints.joint_impulse import Directions
+from symphys.dynamics.tracing.decorator import traced
 from symphys.maths import rotation
 from symphys.model.joints import Coordinate, Joint, Placed
 
@@ -64,6 +65,7 @@ class Sockets:
         )
 
 
+@traced
 def sockets_of(joint: Joint, motions: Moving) -> Sockets:
     """The sockets of a joint whose moving sides have these motions."""
     return sockets_on(joint, [motion.course() for motion in motions])

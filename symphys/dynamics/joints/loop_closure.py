@@ -15,7 +15,7 @@ from symphys.dynamics.joints.locked_directions import LockRow
 from symphys.dynamics.momentum import Rates
 from symphys.dynamics.motion import Held, Motion, apply
 from symphys.dynamics.pgs import Row
-from symphys.dynamics.tracing.trace import Pieces
+from symphys.dynamics.tracing.decorator import repeat, traced
 
 Expr = Any
 """casadi SX"""
@@ -34,19 +34,20 @@ class Fitting:
     rows: tuple[Row, ...]
 
 
-def close_loops(
-    pieces: Pieces, sweeps: int, motions: tuple[Motion, ...], rows: tuple[Row, ...], along: Sequence[Displaced]
-) -> Fitted:
+def close_loops(sweeps: int, motions: tuple[Motion, ...], rows: tuple[Row, ...], along: Sequence[Displaced]) -> Fitted:
     """Gauss-Seidel on displacements, over rows of locks and limits."""
     looped = {each.carriers[0] for each in rows if isinstance(each.row, LockRow)}
-    still = tuple(pieces.do(_still, each) if i in looped else None for i, each in enumerate(along))
-    return pieces.repeat(sweeps, _fit_all, Fitting(motions, rows), (tuple(along), still))
+    still = tuple(_still(each) if i in looped else None for i, each in enumerate(along))
+    return repeat(sweeps, _fit_all, Fitting(motions, rows), (tuple(along), still))
 
 
-def _still(along: Rates) -> Rates:
+@traced
+def _still(along: Displaced) -> Rates:
+    assert isinstance(along, Rates)
     return Rates(ca.SX(along.numbers.size1(), 1))
 
 
+@traced
 def displaced(held: Held | None, along: Displaced) -> Shift:
     """A body's displacement."""
     if held is not None and isinstance(along, Rates):
@@ -56,22 +57,23 @@ def displaced(held: Held | None, along: Displaced) -> Shift:
     return along
 
 
-def _fit_all(pieces: Pieces, context: Fitting, state: Fitted) -> Fitted:
+def _fit_all(context: Fitting, state: Fitted) -> Fitted:
     """One pass over all rows."""
     along, made = list(state[0]), list(state[1])
     for each in context.rows:
         before = tuple(along[i] for i in each.carriers)
         parts = zip(each.bodies, before, strict=True)
-        moved = tuple(pieces.do(displaced, context.motions[i].held, own) for i, own in parts)
-        after = pieces.do(_fit, each.row, moved, before)
+        moved = tuple(displaced(context.motions[i].held, own) for i, own in parts)
+        after = _fit(each.row, moved, before)
         for i, own in zip(each.carriers, after, strict=True):
             along[i] = own
         root = each.carriers[0]
         if isinstance(each.row, LockRow):
-            made[root] = pieces.do(_more, made[root], before[0], after[0])
+            made[root] = _more(made[root], before[0], after[0])
     return tuple(along), tuple(made)
 
 
+@traced
 def _fit(row: LockRow | AxisRow, moved: Shifts, along: tuple[Displaced, ...]) -> tuple[Displaced, ...]:
     """Displacements after which the joint fits."""
     push, twist = row.given_along.split(row.fitting(_relative(row, moved)))
@@ -91,7 +93,9 @@ def _pushed(side: Side, along: Displaced, push: Expr, twist: Expr) -> Displaced:
     return Shift(along.linear + side.sign * side.inverse_mass * push, along.angular + side.sign * turn)
 
 
-def _more(made: Rates, before: Rates, after: Rates) -> Rates:
+@traced
+def _more(made: Rates | None, before: Displaced, after: Displaced) -> Rates:
+    assert isinstance(made, Rates) and isinstance(before, Rates) and isinstance(after, Rates)
     return Rates(made.numbers + after.numbers - before.numbers)
 
 

@@ -18,6 +18,7 @@ from symphys.dynamics.joints.joint_impulse import Along
 from symphys.dynamics.joints.locked_directions import LockRow, in_world
 from symphys.dynamics.momentum import Momenta, Momentum
 from symphys.dynamics.pgs import Row
+from symphys.dynamics.tracing.decorator import traced
 from symphys.model.joints import Joint, linkages, tree_joints
 from symphys.model.world import World
 
@@ -58,10 +59,11 @@ def _struck(scene: Scene, contacts: Sequence[Row], joints: Sequence[JointRow], g
             for each, impulse in zip(joints, given, strict=True)
             if group & set(each.row.bodies) and each.name.rpartition(".")[2] in LIMITS
         )
-        found[group] = scene.pieces.do(_any_struck, meeting, limits)
+        found[group] = _any_struck(meeting, limits)
     return found
 
 
+@traced
 def _any_struck(rows: tuple[ContactRow, ...], limits: tuple[tuple[AxisRow, Along], ...]) -> Expr:
     struck = [ca.fmax(row.struck, row.leaving > 0) for row in rows]
     struck += [ca.logic_and(row.landing, impulse.numbers != 0) for row, impulse in limits]
@@ -78,9 +80,9 @@ def _lasting_forces(
     kept = dict[str, list[Expr]]()
     for each, impulse in zip(rows, given, strict=True):
         row, impact, old = each.row.row, of_body(struck, each.row.bodies[0]), x[each.name]
-        force = scene.pieces.do(_lasting, row, impulse, old, each.k, impact, kick, scene.shortest_kick)
+        force = _lasting(row, impulse, old, each.k, impact, kick, scene.shortest_kick)
         kept.setdefault(each.name, []).append(force)
-    return {name: scene.pieces.do(_stacked, tuple(parts)) for name, parts in kept.items()}
+    return {name: _stacked(tuple(parts)) for name, parts in kept.items()}
 
 
 def of_body(struck: Struck, body: int) -> Expr:
@@ -88,12 +90,14 @@ def of_body(struck: Struck, body: int) -> Expr:
     return next(impact for group, impact in struck.items() if body in group)
 
 
+@traced
 def _lasting(
     row: LockRow | AxisRow, impulse: Along, old: Expr, k: int | None, struck: Expr, kick: Expr, shortest: float
 ) -> Expr:
     return ca.if_else(struck, own(old, k), row.carried(impulse) / ca.fmax(kick, shortest))
 
 
+@traced
 def _stacked(parts: tuple[Expr, ...]) -> Expr:
     return ca.vertcat(*parts)
 
@@ -110,11 +114,12 @@ def hold(scene: Scene, forces: State, poses: Poses, total: Total) -> None:
         if not names:
             continue
         parts = tuple((part, forces[f"{joint.name}.{part}"]) for part in names)
-        found = scene.pieces.do(_on_bodies, joint, held, parts)
+        found = _on_bodies(joint, held, parts)
         for body, wrench in zip(joint.bodies, found, strict=True):
-            total[body] = scene.pieces.do(_added, total[body], wrench)
+            total[body] = _added(total[body], wrench)
 
 
+@traced
 def _on_bodies(
     joint: Joint, poses: tuple[tuple[Expr, Expr], ...], parts: tuple[tuple[str, Expr], ...]
 ) -> tuple[tuple[Expr, Expr], ...]:
@@ -135,6 +140,7 @@ def _on_bodies(
     return (first, second)[: len(poses)]
 
 
+@traced
 def _added(total: tuple[Expr, Expr], wrench: tuple[Expr, Expr]) -> tuple[Expr, Expr]:
     return total[0] + wrench[0], total[1] + wrench[1]
 
@@ -147,10 +153,11 @@ def keep_up(scene: Scene, momenta: Momenta, made: Mapping[int, Made], struck: St
     """
     found, dt = list(momenta), scene.setting.scheme.dt
     for i, more in made.items():
-        found[i] = scene.pieces.do(_kept_up, momenta[i], more, of_body(struck, i), duration, dt)
+        found[i] = _kept_up(momenta[i], more, of_body(struck, i), duration, dt)
     return tuple(found)
 
 
+@traced
 def _kept_up(momentum: Momentum, made: Made, impact: Expr, duration: Expr, dt: float) -> Momentum:
     velocity, angular = made.by_tree.velocity, made.by_tree.angular
     if made.by_loops is not None:
@@ -177,6 +184,6 @@ def fitting(
         bodies = [scene.world.bodies[i] for i in tree.bodies]
         inertials = tuple((body.mass, body.inertia) for body in bodies)
         parts = tuple(poses[i] for i in tree.bodies), tuple(momenta[i] for i in tree.bodies)
-        for i, fits in zip(tree.bodies, consistent(scene.pieces, tree, along, inertials, *parts), strict=True):
+        for i, fits in zip(tree.bodies, consistent(tree, along, inertials, *parts), strict=True):
             found[i] = fits
     return found

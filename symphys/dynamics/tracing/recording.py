@@ -7,14 +7,14 @@ same numbers, is computed once.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import casadi as ca
 
-from symphys.dynamics.tracing.pytree import Code, Numbers, dismantle, outline, rebuild
-from symphys.dynamics.tracing.trace import Once, Pieces
+from symphys.dynamics.tracing.pytree import Code, TracedMatrix, dismantle, outline, rebuild
+from symphys.dynamics.tracing.trace import Tracer
 
 T = TypeVar("T")
 Expr = Any
@@ -23,7 +23,7 @@ Expr = Any
 
 @dataclass(frozen=True)
 class Slot:
-    """Numbers that lie side by side: a named part of the state or an argument of the step, or what a piece gave.
+    """TracedMatrix that lie side by side: a named part of the state or an argument of the step, or what a piece gave.
 
     Attributes:
         name: of an argument, or of a part of the next state; "" for what a piece gave.
@@ -45,7 +45,7 @@ class Piece:
     outputs: tuple[Slot, ...]
 
 
-class Recorder(Pieces):
+class Recorder(Tracer):
     """Collects the pieces of a step."""
 
     def __init__(self) -> None:
@@ -62,17 +62,17 @@ class Recorder(Pieces):
 
     def give(self, name: str, values: Sequence[Expr]) -> Slot:
         """A piece that puts values side by side."""
-        tree = self.do(_side_by_side, tuple(values))
+        stacked = self.call(_side_by_side, (tuple(values),), {})
         slots: dict[int, int] = {}
-        codes = [(slots.setdefault(c[0], len(slots)), c[1]) if isinstance(c, tuple) else c for c in tree.codes]
+        codes = [(slots.setdefault(c[0], len(slots)), c[1]) if isinstance(c, tuple) else c for c in stacked.codes]
         symbols = [ca.SX.sym("a", self._slots[k].size) for k in slots]
         entries = [ca.SX(c) if isinstance(c, float) else symbols[c[0]][c[1]] for c in codes]
         function = self.shared(ca.Function("piece", symbols, [ca.vertcat(*entries)]))
         (given,) = self._add(name, function, list(slots))
         return self._slots[given]
 
-    def repeat(self, count: int, once: Once[T], context: Any, state: T) -> T:
-        """See ``Pieces``; as soon as it repeats itself its pieces are copied."""
+    def repeat(self, count: int, once: Callable[[Any, T], T], context: Any, state: T) -> T:
+        """See ``Tracer``; as soon as it repeats itself its pieces are copied."""
         before, template = state, list[Piece]()
         for _ in range(count):
             slots = self._alike(before, state)
@@ -81,7 +81,7 @@ class Recorder(Pieces):
                 template = self.pieces[-len(template) :]
             else:
                 first = len(self.pieces)
-                before, state = state, once(self, context, state)
+                before, state = state, once(context, state)
                 template = self.pieces[first:]
         return state
 
@@ -122,16 +122,16 @@ class Recorder(Pieces):
         renamed: T = rebuild(shape, (self._renamed(leaf, slots) for leaf in leaves))
         return renamed
 
-    def _renamed(self, leaf: Expr, slots: dict[int, int]) -> Numbers:
-        codes = leaf.codes if isinstance(leaf, Numbers) else self._codes(leaf)
+    def _renamed(self, leaf: Expr, slots: dict[int, int]) -> TracedMatrix:
+        codes = leaf.codes if isinstance(leaf, TracedMatrix) else self._codes(leaf)
         new = [c if isinstance(c, float) else (slots.get(c[0], c[0]), c[1]) for c in codes]
-        return Numbers(leaf.leaf if isinstance(leaf, Numbers) else outline(leaf), tuple(new))
+        return TracedMatrix(leaf.leaf if isinstance(leaf, TracedMatrix) else outline(leaf), tuple(new))
 
     def _codes_of(self, tree: Any) -> list[Code]:
         """The codes of all entries of a tree, in order."""
         leaves: list[Expr] = []
         dismantle(tree, leaves)
-        return [c for leaf in leaves for c in (leaf.codes if isinstance(leaf, Numbers) else self._codes(leaf))]
+        return [c for leaf in leaves for c in (leaf.codes if isinstance(leaf, TracedMatrix) else self._codes(leaf))]
 
     def _size(self, code: tuple[int, int]) -> int:
         return self._slots[code[0]].size

@@ -10,8 +10,8 @@ import pytest
 
 from symphys.dynamics import Piece, Recording, Slot, record_step, step_function
 from symphys.dynamics.tracing.dead_code import trimmed
+from symphys.dynamics.tracing.decorator import repeat, traced, tracing
 from symphys.dynamics.tracing.recording import Recorder
-from symphys.dynamics.tracing.trace import Pieces
 from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Body, Law, Scheme, World, make_world
@@ -107,11 +107,13 @@ def test_equal_parts_share_a_function_and_numbers_in_passing_are_no_part_of_it()
     recorder.argument("x", x)
     recorder.argument("y", y)
 
+    @traced
     def part(tree: dict[str, ca.SX]) -> tuple[ca.SX, ca.SX, ca.SX]:
         return tree["a"] ** 2, tree["b"], ca.SX(3)
 
-    square, passed, constant = recorder.do(part, {"a": x[0], "b": x[1]})
-    again, *_ = recorder.do(part, {"a": y[0], "b": y[1]})
+    with tracing(recorder):
+        square, passed, constant = part({"a": x[0], "b": x[1]})
+        again, *_ = part({"a": y[0], "b": y[1]})
     first, second = recorder.pieces
     assert first.function is second.function
     assert (first.outputs[0].size, first.inputs[0].name, second.inputs[0].name) == (1, "x", "y")
@@ -123,14 +125,20 @@ def test_equal_parts_share_a_function_and_numbers_in_passing_are_no_part_of_it()
 def test_members_of_a_tuple_look_alike_to_what_comes_next() -> None:
     recorder, x = Recorder(), ca.SX.sym("x", 4)
     recorder.argument("x", x)
-    pairs = recorder.do(lambda x: ((2 * x[0], 3 * x[1]), (4 * x[2], 5 * x[3])), x)
-    for pair in pairs:
-        recorder.do(added, *pair)
+    with tracing(recorder):
+        for pair in multiples(x):
+            added(*pair)
     _, first, second = recorder.pieces
     assert first.function is second.function
     assert first.inputs[0] != second.inputs[0]
 
 
+@traced
+def multiples(x: ca.SX) -> tuple[tuple[ca.SX, ca.SX], ...]:
+    return ((2 * x[0], 3 * x[1]), (4 * x[2], 5 * x[3]))
+
+
+@traced
 def added(a: ca.SX, b: ca.SX) -> ca.SX:
     return a + b
 
@@ -138,18 +146,39 @@ def added(a: ca.SX, b: ca.SX) -> ca.SX:
 def test_what_is_asked_for_twice_is_computed_once() -> None:
     recorder, x = Recorder(), ca.SX.sym("x", 2)
     recorder.argument("x", x)
-    first, second, other = (recorder.do(added, *pair) for pair in ((x[0], x[1]), (x[0], x[1]), (x[0], 2.0)))
+    with tracing(recorder):
+        first, second, other = (added(*pair) for pair in ((x[0], x[1]), (x[0], x[1]), (x[0], 2.0)))
     assert first == second != other
     assert len(recorder.pieces) == 2
+
+
+def test_arithmetic_between_traced_calls_is_traced() -> None:
+    """Operators of a traced matrix are parts of their own, on either side; so are named arguments."""
+    recorder, x = Recorder(), ca.SX.sym("x", 2)
+    recorder.argument("x", x)
+    with tracing(recorder):
+        a, b = added(x[0], b=1.0), added(x[0], b=x[1])
+        results = [a - b, 1 - a, a * 2, ca.SX(3) / b, -b, a < b, a > 1]
+    recorder.give("next", results)
+    memory = {slot: np.array([3.0, 5.0]) for slot in recorder.pieces[0].inputs}
+    for piece in recorder.pieces:
+        memory |= evaluate(piece, memory)
+    assert memory[recorder.pieces[-1].outputs[0]] == pytest.approx([-4, -3, 8, 3 / 8, -8, 1, 1])
+
+
+def test_a_traced_function_is_a_plain_one_without_a_tracer() -> None:
+    assert added(2.0, 3.0) == 5.0
+    assert float(repeat(6, turn, 2.0, ca.DM([1, 2]))[0]) == 15.0
 
 
 def test_what_nobody_reads_is_left_out() -> None:
     """Of a record of four words one is read, by way of a part of which one result is read; another part not at all."""
     recorder, x = Recorder(), ca.SX.sym("x", 4)
     recorder.argument("x", x)
-    squares = recorder.do(lambda x: x * x, x)
-    recorder.do(lambda squares: ca.sin(squares), squares)
-    root, _ = recorder.do(lambda squares: (ca.sqrt(squares[2]), ca.exp(squares[1])), squares)
+    with tracing(recorder):
+        squares = traced(lambda x: x * x)(x)
+        traced(lambda squares: ca.sin(squares))(squares)
+        root, _ = traced(lambda squares: (ca.sqrt(squares[2]), ca.exp(squares[1])))(squares)
     recorder.give("next", [root])
     left = trimmed(recorder.pieces)
     assert [(piece.function.nnz_in(), piece.function.nnz_out()) for piece in left] == [(4, 1), (1, 1), (1, 1)]
@@ -159,11 +188,8 @@ def test_what_nobody_reads_is_left_out() -> None:
     assert values[left[-1].outputs[0]] == pytest.approx([3.0])
 
 
-def turn(pieces: Pieces, factor: float, state: ca.SX) -> ca.SX:
-    return pieces.do(turned, factor, state)
-
-
-def turned(factor: float, state: ca.SX) -> ca.SX:
+@traced
+def turn(factor: float, state: ca.SX) -> ca.SX:
     return ca.vertcat(state[1] + 1, factor * state[0])
 
 
@@ -171,7 +197,9 @@ def test_sweeps_that_change_places_are_right() -> None:
     """Each number moves to another place every time."""
     recorder, x = Recorder(), ca.SX.sym("x", 2)
     recorder.argument("x", x)
-    recorder.give("next", [recorder.repeat(6, turn, 2.0, x)])
+    with tracing(recorder):
+        turned = repeat(6, turn, 2.0, x)
+    recorder.give("next", [turned])
     values = np.array([1.0, 2.0])
     memory = {slot: values for piece in recorder.pieces for slot in piece.inputs if slot.name == "x"}
     for piece in recorder.pieces:
