@@ -26,19 +26,19 @@ State = dict[str, Expr]
 
 
 @dataclass(frozen=True)
-class Setting:
+class StepSettings:
     """What every part of a step may need to know.
 
     Attributes:
         scheme: how the step is taken.
         gravity: (3,) [m/s^2].
-        knob: smoothing [m/s].
+        smoothing: smoothing [m/s].
         reference: the acceleration [m/s^2] below which nothing counts as fast.
     """
 
     scheme: Scheme
     gravity: Expr
-    knob: Expr
+    smoothing: Expr
     reference: Expr
 
     @property
@@ -48,37 +48,37 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Scene:
+class StepContext:
     """What stays the same over a step.
 
     Attributes:
         world: what is simulated.
-        setting: how.
+        settings: how.
         inputs: names of the forces and torques that ``u`` stacks.
         u: what the inputs stack, constant over the step.
     """
 
     world: World
-    setting: Setting
+    settings: StepSettings
     inputs: tuple[str, ...]
     u: Expr
 
-    def given(self, name: str) -> Expr | None:
+    def input(self, name: str) -> Expr | None:
         """The input of this name; None if there is none."""
         columns = input_columns(self.world, self.inputs).get(name)
         return None if columns is None else self.u[columns]
 
     @property
     def shortest_kick(self) -> float:
-        """[s]: impulses of a shorter stretch are stored as forces over this time; what an impact adds is no force."""
-        return SHORTEST_KICK * self.setting.scheme.dt
+        """[s]: impulses of a shorter substep are stored as forces over this time; what an impact adds is no force."""
+        return SHORTEST_KICK * self.settings.scheme.dt
 
 
-def make_scene(world: World, scheme: Scheme | None, inputs: tuple[str, ...], u: Expr, knob: Expr) -> Scene:
-    """The scene of a world."""
+def make_context(world: World, scheme: Scheme | None, inputs: tuple[str, ...], u: Expr, smoothing: Expr) -> StepContext:
+    """The context of a world."""
     gravity = ca.vertcat(*world.gravity)
-    setting = Setting(scheme or Scheme(), gravity, knob, reference(gravity))
-    return Scene(world, setting, inputs, u)
+    settings = StepSettings(scheme or Scheme(), gravity, smoothing, reference(gravity))
+    return StepContext(world, settings, inputs, u)
 
 
 @traced

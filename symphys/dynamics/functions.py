@@ -8,11 +8,11 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.context import Scene, State, make_scene
+from symphys.dynamics.context import State, StepContext, make_context
 from symphys.dynamics.step import report, take_step
-from symphys.dynamics.tracing.dead_code import trimmed
+from symphys.dynamics.tracing.dead_code import without_dead_code
 from symphys.dynamics.tracing.decorator import tracing
-from symphys.dynamics.tracing.recording import Piece, Recorder, Slot
+from symphys.dynamics.tracing.recording import Recorder, TracedCall, TracedVector
 from symphys.dynamics.tracing.trace import InlineTracer
 from symphys.model.state_layout import Layout, inputs_size
 from symphys.model.world import Scheme, World
@@ -42,7 +42,7 @@ def step_function(
     arguments = arguments_of(world, inputs, parameters)
     tracer, layout = inline(world, arguments), Layout(world)
     with tracing(tracer):
-        after, _ = take_step(scene_of(world, scheme, inputs, arguments), parts_of(layout, arguments[0]))
+        after, _ = take_step(context_of(world, scheme, inputs, arguments), parts_of(layout, arguments[0]))
     packed = _packed(layout, tracer, after)
     step = ca.Function("step", arguments, [packed], ["x", "u", "p", "smoothing"], ["x_next"])
     if step.n_instructions() > MOST_INSTRUCTIONS:
@@ -57,16 +57,16 @@ def report_function(
     arguments = arguments_of(world, inputs, parameters)
     tracer, layout = inline(world, arguments), Layout(world)
     with tracing(tracer):
-        scene = scene_of(world, scheme, inputs, arguments)
-        after, phases = take_step(scene, parts_of(layout, arguments[0]))
-        r = report(scene, phases)
+        context = context_of(world, scheme, inputs, arguments)
+        after, substeps = take_step(context, parts_of(layout, arguments[0]))
+        r = report(context, substeps)
     reported = {field.name: tracer.value(getattr(r, field.name)) for field in fields(r)}
     outputs, names = [_packed(layout, tracer, after), *reported.values()], ["x_next", *reported]
     return ca.Function("report", arguments, outputs, ["x", "u", "p", "smoothing"], names)
 
 
 @dataclass(frozen=True)
-class Recording:
+class TracedStep:
     """One time step as pieces.
 
     Attributes:
@@ -74,28 +74,28 @@ class Recording:
         results: which columns of the next state each slot named "next" holds.
     """
 
-    pieces: tuple[Piece, ...]
-    results: Mapping[Slot, slice]
+    pieces: tuple[TracedCall, ...]
+    results: Mapping[TracedVector, slice]
 
 
-def record_step(
+def trace_step(
     world: World,
     scheme: Scheme | None = None,
     inputs: Sequence[str] = (),
     parameters: Sequence[Any] = (),
     exact: bool = False,
-) -> Recording:
+) -> TracedStep:
     """The step of ``step_function`` in pieces; their named slots are the parts of x, and "u", "p" and "smoothing".
 
-    ``exact`` is the step at smoothing 0 only: what the knob would add is left out.
+    ``exact`` is the step at smoothing 0 only: what the smoothing would add is left out.
     """
-    x, u, p, knob = arguments_of(world, inputs, parameters)
+    x, u, p, smoothing = arguments_of(world, inputs, parameters)
     layout, recorder = Layout(world), Recorder()
-    for name, symbols in (("u", u), ("p", p), ("smoothing", knob), *parts_of(layout, x).items()):
+    for name, symbols in (("u", u), ("p", p), ("smoothing", smoothing), *parts_of(layout, x).items()):
         recorder.argument(name, symbols)
     with tracing(recorder):
-        scene = scene_of(world, scheme, inputs, [x, u, p, ca.SX(0) if exact else knob])
-        after, _ = take_step(scene, parts_of(layout, x))
+        context = context_of(world, scheme, inputs, [x, u, p, ca.SX(0) if exact else smoothing])
+        after, _ = take_step(context, parts_of(layout, x))
     owners: dict[str, list[str]] = {}
     for name in layout.names():
         owners.setdefault(name.rpartition(".")[0], []).append(name)
@@ -103,7 +103,7 @@ def record_step(
     for names in owners.values():
         slot = recorder.give("next", [after[name] for name in names])
         results[slot] = slice(layout[names[0]].start, layout[names[-1]].stop)
-    return Recording(trimmed(recorder.pieces), results)
+    return TracedStep(without_dead_code(recorder.pieces), results)
 
 
 def inline(world: World, arguments: Sequence[Expr]) -> InlineTracer:
@@ -114,9 +114,9 @@ def inline(world: World, arguments: Sequence[Expr]) -> InlineTracer:
     return tracer
 
 
-def scene_of(world: World, scheme: Scheme | None, inputs: Sequence[str], arguments: Sequence[Expr]) -> Scene:
+def context_of(world: World, scheme: Scheme | None, inputs: Sequence[str], arguments: Sequence[Expr]) -> StepContext:
     """Of a step with these arguments."""
-    return make_scene(world, scheme, tuple(inputs), arguments[1], arguments[3])
+    return make_context(world, scheme, tuple(inputs), arguments[1], arguments[3])
 
 
 def _packed(layout: Layout, tracer: InlineTracer, x: State) -> Expr:

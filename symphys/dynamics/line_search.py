@@ -16,15 +16,14 @@ from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 
-from symphys.dynamics.contact.constraint import ContactRow
-from symphys.dynamics.contact.projection import Impulse
-from symphys.dynamics.momentum import Momentum, Moved
-from symphys.dynamics.motion import Motion, apply
+from symphys.dynamics.contact.constraint import ContactConstraint, ContactImpulse
+from symphys.dynamics.motion import PredictedMotion, apply
 from symphys.dynamics.tracing.decorator import traced
+from symphys.dynamics.unknowns import Momentum, Velocities
 from symphys.model.world import World
 
 if TYPE_CHECKING:
-    from symphys.dynamics.pgs import Row, Solution
+    from symphys.dynamics.unknowns import PlacedConstraint, Solution
 
 Expr = Any
 """casadi SX"""
@@ -49,7 +48,7 @@ class Cluster:
     rows: tuple[int, ...]
 
 
-def clusters(world: World, rows: Sequence[Row]) -> list[Cluster]:
+def clusters(world: World, rows: Sequence[PlacedConstraint]) -> list[Cluster]:
     """Those of bodies that differ much in mass, or may: where a symbol decides it."""
     roots = list(range(len(world.bodies)))
     for bodies in [row.bodies for row in rows] + [joint.bodies for joint in world.joints]:
@@ -82,7 +81,11 @@ def _unequal(world: World, group: set[int]) -> bool:
 
 
 def lengthened(
-    cluster: Cluster, rows: Sequence[Row], motions: Sequence[Motion], before: Solution, now: Solution
+    cluster: Cluster,
+    rows: Sequence[PlacedConstraint],
+    motions: Sequence[PredictedMotion],
+    before: Solution,
+    now: Solution,
 ) -> Solution:
     """The solution after the change of the last sweep, from ``before`` to ``now``, is repeated in part."""
     sums: tuple[Expr, Expr] = (ca.SX(0), ca.SX(0))
@@ -101,8 +104,10 @@ def lengthened(
 
 
 @traced
-def _of_body(sums: tuple[Expr, Expr], motion: Motion, now: Moved, before: Moved) -> tuple[Expr, Expr]:
-    """(what the energy gains along the change, its curvature), with a body's share."""
+def _of_body(
+    sums: tuple[Expr, Expr], motion: PredictedMotion, now: Velocities, before: Velocities
+) -> tuple[Expr, Expr]:
+    """(what the energy responses along the change, its curvature), with a body's share."""
     assert isinstance(now, Momentum) and isinstance(before, Momentum)
     moved, turned = now.velocity - before.velocity, now.angular - before.angular
     spun = apply(motion.inverse_mid, turned)
@@ -113,7 +118,7 @@ def _of_body(sums: tuple[Expr, Expr], motion: Motion, now: Moved, before: Moved)
 
 @traced
 def _of_row(
-    sums: tuple[Expr, Expr], longest: Expr, row: ContactRow, now: Impulse, before: Impulse
+    sums: tuple[Expr, Expr], longest: Expr, row: ContactConstraint, now: ContactImpulse, before: ContactImpulse
 ) -> tuple[tuple[Expr, Expr], Expr]:
     """The same less what the row's targets ask for; how often the change can be repeated."""
     press = now.normal - before.normal
@@ -129,7 +134,7 @@ def _share(sums: tuple[Expr, Expr], longest: Expr) -> Expr:
 
 
 @traced
-def _repeated(share: Expr, now: Moved, before: Moved) -> Momentum:
+def _repeated(share: Expr, now: Velocities, before: Velocities) -> Momentum:
     assert isinstance(now, Momentum) and isinstance(before, Momentum)
     return Momentum(
         now.velocity + share * (now.velocity - before.velocity), now.angular + share * (now.angular - before.angular)
@@ -137,5 +142,5 @@ def _repeated(share: Expr, now: Moved, before: Moved) -> Momentum:
 
 
 @traced
-def _given_again(share: Expr, now: Impulse, before: Impulse) -> Impulse:
+def _given_again(share: Expr, now: ContactImpulse, before: ContactImpulse) -> ContactImpulse:
     return now.plus(now.minus(before).times(share))

@@ -7,74 +7,44 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 from symphys.dynamics.line_search import EVERY, Cluster, clusters, lengthened
-from symphys.dynamics.momentum import Moved, Rates, States
-from symphys.dynamics.motion import Motion
+from symphys.dynamics.motion import PredictedMotion
 from symphys.dynamics.tracing.decorator import repeat, traced
+from symphys.dynamics.unknowns import (
+    AllVelocities,
+    AnyImpulse,
+    Constraint,
+    GeneralizedVelocities,
+    PlacedConstraint,
+    Solution,
+    Velocities,
+)
 from symphys.model.world import World
 
-Given = Any
-"""What a row gives: ``impulse.Impulse`` of a contact, ``along.Along`` of a joint."""
-
-
-class Solvable(Protocol):
-    """What sweeps visit. Implementations are frozen dataclasses."""
-
-    def visit(self, momenta: States, old: Given) -> tuple[States, Given]:
-        """One projection: the momenta of the row's bodies and what the row has given since the sweeps began."""
-        ...
-
-    def given(self, momenta: States, impulse: Given) -> States:
-        """The momenta after an impulse."""
-        ...
-
 
 @dataclass(frozen=True)
-class Solution:
-    """What the sweeps have come to: of all bodies, of all rows, and of all rows before the last sweep."""
-
-    momenta: States
-    impulses: tuple[Given, ...]
-    last: tuple[Given, ...]
-
-
-@dataclass(frozen=True)
-class Row:
-    """A row.
-
-    Attributes:
-        bodies: indices of those on its moving sides.
-        row: Solvable.
-        carriers: where the sweeps keep what they know of those bodies: at themselves, or at the root of their tree.
-    """
-
-    bodies: tuple[int, ...]
-    row: Any
-    carriers: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class Leaning:
+class Acceleration:
     """Rows, and the bodies that lean on each other by them, with their motions; see ``acceleration``."""
 
-    rows: tuple[Row, ...]
+    rows: tuple[PlacedConstraint, ...]
     clusters: tuple[Cluster, ...]
-    motions: tuple[Motion, ...]
+    motions: tuple[PredictedMotion, ...]
 
 
-def relax(world: World, sweeps: int, rows: tuple[Row, ...], start: Solution, motions: Sequence[Motion]) -> Solution:
+def iterate(
+    world: World, sweeps: int, rows: tuple[PlacedConstraint, ...], start: Solution, motions: Sequence[PredictedMotion]
+) -> Solution:
     """All sweeps; among bodies that lean on each other with longer steps now and then."""
     found = tuple(clusters(world, rows))
     if not found:
         return repeat(sweeps, sweep, rows, start)
     rounds = max((sweeps - 1) // EVERY, 0)
-    moved = repeat(rounds, _round, Leaning(rows, found, tuple(motions)), start)
+    moved = repeat(rounds, _round, Acceleration(rows, found, tuple(motions)), start)
     return repeat(sweeps - rounds * EVERY, sweep, rows, moved)
 
 
-def _round(leaning: Leaning, state: Solution) -> Solution:
+def _round(leaning: Acceleration, state: Solution) -> Solution:
     """Some sweeps, then a longer step along the last."""
     before = repeat(EVERY - 1, sweep, leaning.rows, state)
     now = sweep(leaning.rows, before)
@@ -83,13 +53,13 @@ def _round(leaning: Leaning, state: Solution) -> Solution:
     return now
 
 
-def sweep(rows: tuple[Row, ...], before: Solution) -> Solution:
+def sweep(rows: tuple[PlacedConstraint, ...], before: Solution) -> Solution:
     """One pass over all rows."""
     momenta, new = list(before.momenta), list(before.impulses)
     for run in runs(rows, momenta):
         carriers = tuple(dict.fromkeys(i for k in run for i in rows[k].carriers))
         visits = tuple((rows[k].row, tuple(carriers.index(i) for i in rows[k].carriers)) for k in run)
-        visited, given = _visit(visits, tuple(momenta[i] for i in carriers), [new[k] for k in run])
+        visited, given = _project_run(visits, tuple(momenta[i] for i in carriers), [new[k] for k in run])
         for i, moved in zip(carriers, visited, strict=True):
             momenta[i] = moved
         for k, impulse in zip(run, given, strict=True):
@@ -97,7 +67,7 @@ def sweep(rows: tuple[Row, ...], before: Solution) -> Solution:
     return Solution(tuple(momenta), tuple(new), before.impulses)
 
 
-def visiting_order(rows: Sequence[Row]) -> list[int]:
+def projection_order(rows: Sequence[PlacedConstraint]) -> list[int]:
     """Rows one after the other that share no body as far as may be: a processor works on several visits at once."""
     order: list[int] = []
     left = list(range(len(rows)))
@@ -111,17 +81,17 @@ def visiting_order(rows: Sequence[Row]) -> list[int]:
     return order
 
 
-def runs(rows: Sequence[Row], momenta: Sequence[Moved]) -> list[list[int]]:
+def runs(rows: Sequence[PlacedConstraint], momenta: Sequence[Velocities]) -> list[list[int]]:
     """The rows in visiting order, those of one tree of joints together: what is known of it is handed on within a run.
 
     A row joins the last run that shares a body with it, so that nothing is visited in another order than before.
     """
     found: list[list[int]] = []
     last: dict[int, int] = {}
-    for k in visiting_order(rows):
+    for k in projection_order(rows):
         carriers = set(rows[k].carriers)
         latest = max((last[i] for i in carriers if i in last), default=-1)
-        within = len(carriers) == 1 and isinstance(momenta[min(carriers)], Rates)
+        within = len(carriers) == 1 and isinstance(momenta[min(carriers)], GeneralizedVelocities)
         if not (within and latest >= 0 and carriers == set(rows[found[latest][0]].carriers)):
             latest = len(found)
             found.append([])
@@ -130,7 +100,7 @@ def runs(rows: Sequence[Row], momenta: Sequence[Moved]) -> list[list[int]]:
     return found
 
 
-def begin(rows: Sequence[Row], momenta: States, impulses: Sequence[Given]) -> Solution:
+def apply_start(rows: Sequence[PlacedConstraint], momenta: AllVelocities, impulses: Sequence[AnyImpulse]) -> Solution:
     """Give the impulses that the sweeps start from."""
     started = list(momenta)
     for each, impulse in zip(rows, impulses, strict=True):
@@ -138,25 +108,25 @@ def begin(rows: Sequence[Row], momenta: States, impulses: Sequence[Given]) -> So
     return Solution(tuple(started), tuple(impulses), tuple(impulses))
 
 
-def of_bodies(momenta: Sequence[Moved], row: Row) -> States:
+def of_bodies(momenta: Sequence[Velocities], row: PlacedConstraint) -> AllVelocities:
     """The momenta of the row's bodies."""
     return tuple(momenta[i] for i in row.carriers)
 
 
-def spread(momenta: list[Moved], row: Row, changed: States) -> None:
+def spread(momenta: list[Velocities], row: PlacedConstraint, changed: AllVelocities) -> None:
     """Put the momenta of the row's bodies back."""
     for i, momentum in zip(row.carriers, changed, strict=True):
         momenta[i] = momentum
 
 
 @traced
-def _visit(
-    visits: tuple[tuple[Solvable, tuple[int, ...]], ...], states: States, old: list[Given]
-) -> tuple[States, list[Given]]:
+def _project_run(
+    visits: tuple[tuple[Constraint, tuple[int, ...]], ...], states: AllVelocities, old: list[AnyImpulse]
+) -> tuple[AllVelocities, list[AnyImpulse]]:
     """Visits one after the other: rows, and which of the states are those of their sides."""
     momenta, given = list(states), []
     for (row, places), impulse in zip(visits, old, strict=True):
-        visited, new = row.visit(tuple(momenta[i] for i in places), impulse)
+        visited, new = row.project(tuple(momenta[i] for i in places), impulse)
         given.append(new)
         for i, moved in zip(places, visited, strict=True):
             momenta[i] = moved
@@ -164,5 +134,5 @@ def _visit(
 
 
 @traced
-def _give(row: Solvable, momenta: States, impulse: Given) -> States:
-    return row.given(momenta, impulse)
+def _give(row: Constraint, momenta: AllVelocities, impulse: AnyImpulse) -> AllVelocities:
+    return row.apply(momenta, impulse)

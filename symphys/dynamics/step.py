@@ -1,6 +1,6 @@
-"""A whole step: one stretch of dt, or two with the first impact between them.
+"""A whole step: one substep of dt, or two with the first impact between them.
 
-A contact that lasts (a ball that rolls) changes its force when its body is struck (by a cushion). Within one stretch
+A contact that lasts (a ball that rolls) changes its force when its body is struck (by a cushion). Within one substep
 that force is one, as if the blow had come at the step's start: results then jump at step boundaries, and gradients
 are wrong at any step size. So where bodies have several contacts a step is cut at its first impact. There no time
 passes, only velocities change, and leapfrog starts anew. Without an impact the step is cut in the middle.
@@ -15,16 +15,15 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.contact.constraint import ContactRow
-from symphys.dynamics.contact.projection import Impulse
-from symphys.dynamics.context import Scene, State
-from symphys.dynamics.impact.deferred_impacts import deferred
-from symphys.dynamics.impact.impact import Cut, collide_now, find_cut
+from symphys.dynamics.contact.constraint import ContactConstraint, ContactImpulse
+from symphys.dynamics.context import State, StepContext
+from symphys.dynamics.impact.deferred_impacts import defer_impacts
+from symphys.dynamics.impact.impact import Split, find_split, resolve_impact
 from symphys.dynamics.impact.restitution import eccentric_bodies
-from symphys.dynamics.joints.joint_impulse import Along
-from symphys.dynamics.pgs import Given
-from symphys.dynamics.substep import Phase, advance
+from symphys.dynamics.joints.joint_impulse import JointImpulse
+from symphys.dynamics.substep import Substep, advance
 from symphys.dynamics.tracing.decorator import traced
+from symphys.dynamics.unknowns import AnyImpulse
 from symphys.model.world import Pair, Scheme, World, is_zero
 
 Expr = Any
@@ -39,14 +38,14 @@ ACROSS = 1e-3
 
 
 @dataclass(frozen=True)
-class Report:
+class StepReport:
     """What happened in a step; forces and gaps in the order of the world's pairs.
 
     Attributes:
         forces: (3 * pairs,) impulse / dt on each pair's first body [N], world frame.
         gaps: (pairs,) at the start of the step [m].
         residual: largest change of a normal or friction impulse in a last sweep [N s].
-        crowded: 1 if some body has two or more impacts at once (in one stretch), or impacts of a chain come late.
+        crowded: 1 if some body has two or more impacts at once (in one substep), or impacts of a chain come late.
         ambiguous: 1 if several bodies meet at one instant and rebound: rigid bodies have no one answer then.
         paradox: 1 if friction pulls a sliding contact together, for which no sliding force may exist (Painleve).
     """
@@ -59,24 +58,24 @@ class Report:
     paradox: Expr
 
 
-def take_step(scene: Scene, x: State) -> tuple[State, list[Phase]]:
-    """The state after one step, and the stretches and the impact that led there."""
-    scheme, dt = scene.setting.scheme, scene.setting.scheme.dt
-    count = cuts_of(scene.world, scheme)
+def take_step(context: StepContext, x: State) -> tuple[State, list[Substep]]:
+    """The state after one step, and the substeps and the impact that led there."""
+    scheme, dt = context.settings.scheme, context.settings.scheme.dt
+    count = splits_of(context.world, scheme)
     if not count:
-        phase = advance(scene, x, ca.SX(dt))
-        return phase.x, [phase]
-    left, phases, cuts = ca.SX(dt), list[Phase](), list[Cut]()
+        substep = advance(context, x, ca.SX(dt))
+        return substep.x, [substep]
+    left, substeps, cuts = ca.SX(dt), list[Substep](), list[Split]()
     for k in range(count):
-        cut = find_cut(scene, x, left, 1 / (count - k + 1))
-        before = advance(scene, x, cut.first, spared=cut.fast)
-        struck = collide_now(scene, before.x, cut)
+        cut = find_split(context, x, left, 1 / (count - k + 1))
+        before = advance(context, x, cut.first, suppressed=cut.fast)
+        struck = resolve_impact(context, before.x, cut)
         x, left = struck.x, _rest(left, cut.first)
-        phases += [before, struck]
+        substeps += [before, struck]
         cuts.append(cut)
-    late = deferred(scene, x, left, cuts)
-    after = replace(advance(scene, x, left, late.spared, late.plastic), chained=late.chained)
-    return after.x, [*phases, after]
+    late = defer_impacts(context, x, left, cuts)
+    after = replace(advance(context, x, left, late.suppressed, late.plastic), chained=late.chained)
+    return after.x, [*substeps, after]
 
 
 @traced
@@ -84,7 +83,7 @@ def _rest(left: Expr, first: Expr) -> Expr:
     return left - first
 
 
-def cuts_of(world: World, scheme: Scheme) -> int:
+def splits_of(world: World, scheme: Scheme) -> int:
     """How often a step is cut: not where it can change nothing, since all is central and no body has two pairs."""
     sides = Counter(i for pair in world.pairs for i in {pair.first.body, pair.second.body} if i is not None)
     if not scheme.time_of_impact or not (eccentric_bodies(world) & set(sides) or max(sides.values(), default=0) > 1):
@@ -94,37 +93,38 @@ def cuts_of(world: World, scheme: Scheme) -> int:
     return CUTS_OFF_CENTRE if eccentric_bodies(world) else 1
 
 
-def report(scene: Scene, phases: list[Phase]) -> Report:
-    """What happened in a step, from its stretches."""
-    forces = tuple(ca.SX.zeros(3) for _ in scene.world.pairs)
+def report(context: StepContext, substeps: list[Substep]) -> StepReport:
+    """What happened in a step, from its substeps."""
+    forces = tuple(ca.SX.zeros(3) for _ in context.world.pairs)
     residual, crowded, ambiguous, paradox = ca.SX(0), ca.SX(0), ca.SX(0), ca.SX(0)
-    for phase in phases:
-        given = zip(forces, phase.rows, phase.impulses, strict=True)
-        forces = tuple(_added(force, each.row, impulse, scene.setting.scheme.dt) for force, each, impulse in given)
-        if phase.ahead:
+    for substep in substeps:
+        given = zip(forces, substep.rows, substep.impulses, strict=True)
+        forces = tuple(_added(force, each.row, impulse, context.settings.scheme.dt) for force, each, impulse in given)
+        if substep.ahead:
             forces = tuple(
-                _ahead(force, ahead, scene.setting.scheme.dt) for force, ahead in zip(forces, phase.ahead, strict=True)
+                _ahead(force, ahead, context.settings.scheme.dt)
+                for force, ahead in zip(forces, substep.ahead, strict=True)
             )
-        for new, old in phase.changes:
+        for new, old in substep.changes:
             residual = _larger_change(residual, new, old)
-        crowded = _larger(crowded, phase.chained)
-        crowded = _crowded(crowded, tuple((each.bodies, each.row.struck, each.row.leaving) for each in phase.rows))
-        for meeting in _meetings(scene.world, phase):
+        crowded = _larger(crowded, substep.chained)
+        crowded = _crowded(crowded, tuple((each.bodies, each.row.struck, each.row.leaving) for each in substep.rows))
+        for meeting in _meetings(context.world, substep):
             ambiguous = _ambiguous(ambiguous, meeting)
-        for each, impulse in zip(phase.rows, phase.impulses, strict=True):
+        for each, impulse in zip(substep.rows, substep.impulses, strict=True):
             paradox = _pulls(paradox, each.row.paradox, impulse.normal)
-    gaps = tuple(contact.gap for contact in phases[0].contacts)
-    return Report(_stack(forces), _stack(gaps), residual, crowded, ambiguous, paradox)
+    gaps = tuple(contact.gap for contact in substeps[0].contacts)
+    return StepReport(_stack(forces), _stack(gaps), residual, crowded, ambiguous, paradox)
 
 
 Met = tuple[Expr, Expr, Expr]
 """Normal (3,), normal impulse, whether the surfaces meet at speed."""
 
 
-def _meetings(world: World, phase: Phase) -> list[tuple[Met, Met]]:
+def _meetings(world: World, substep: Substep) -> list[tuple[Met, Met]]:
     """The contacts of one body with two others, two by two, of which one rebounds."""
     of: dict[int, list[int]] = {}
-    for k, each in enumerate(phase.rows):
+    for k, each in enumerate(substep.rows):
         for body in each.bodies:
             of.setdefault(body, []).append(k)
     found = []
@@ -133,7 +133,7 @@ def _meetings(world: World, phase: Phase) -> list[tuple[Met, Met]]:
             one, other = world.pairs[i], world.pairs[j]
             apart = _partner(one, body) != _partner(other, body)
             if apart and not (is_zero(one.law.restitution) and is_zero(other.law.restitution)):
-                a, b = ((phase.rows[k].row, phase.impulses[k].normal) for k in (i, j))
+                a, b = ((substep.rows[k].row, substep.impulses[k].normal) for k in (i, j))
                 found.append(((a[0].normal, a[1], a[0].struck), (b[0].normal, b[1], b[0].struck)))
     return found
 
@@ -157,7 +157,7 @@ def _pulls(before: Expr, paradox: Expr, press: Expr) -> Expr:
 
 
 @traced
-def _added(force: Expr, row: ContactRow, impulse: Impulse, dt: float) -> Expr:
+def _added(force: Expr, row: ContactConstraint, impulse: ContactImpulse, dt: float) -> Expr:
     return force + impulse.linear(row.impulse_normal) / dt
 
 
@@ -172,9 +172,9 @@ def _stack(columns: tuple[Expr, ...]) -> Expr:
 
 
 @traced
-def _larger_change(residual: Expr, new: Given, old: Given) -> Expr:
+def _larger_change(residual: Expr, new: AnyImpulse, old: AnyImpulse) -> Expr:
     change = new.minus(old)
-    if isinstance(change, Along):
+    if isinstance(change, JointImpulse):
         return ca.fmax(residual, ca.norm_inf(change.numbers))
     return ca.fmax(residual, ca.fmax(ca.fabs(change.normal), ca.norm_inf(change.tangent)))
 
@@ -186,7 +186,7 @@ def _larger(one: Expr, other: Expr) -> Expr:
 
 @traced
 def _crowded(before: Expr, rows: tuple[tuple[tuple[int, ...], Expr, Expr], ...]) -> Expr:
-    """1 if some body has two or more impacts in this stretch, or had before."""
+    """1 if some body has two or more impacts in this substep, or had before."""
     counts: dict[int, Expr] = {}
     for bodies, struck, leaving in rows:
         for body in bodies:

@@ -11,15 +11,15 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.articulated import spatial as screws
-from symphys.dynamics.articulated.branches import Moving, Tree, axes_at, moving, solve, tree_matrix
-from symphys.dynamics.articulated.schur_complement import Inertia, Screw, mirrored
-from symphys.dynamics.collision.predicted_points import Course
-from symphys.dynamics.momentum import Momentum
-from symphys.dynamics.motion import Motion, in_world, inertia_matrix
+from symphys.dynamics.articulated import spatial
+from symphys.dynamics.articulated.branches import Tree, TreeMotion, axes_at, solve, tree_matrix, tree_motion
+from symphys.dynamics.articulated.schur_complement import SpatialInertia, SpatialVector, mirrored
+from symphys.dynamics.collision.predicted_points import PredictedPath
+from symphys.dynamics.motion import PredictedMotion, in_world, inertia_matrix
 from symphys.dynamics.tracing.decorator import traced
+from symphys.dynamics.unknowns import Momentum
 from symphys.maths import rotation
-from symphys.model.joints import Joint, Link, Linkage
+from symphys.model.joints import Joint, KinematicTree, Link
 
 Expr = Any
 """casadi SX"""
@@ -30,22 +30,25 @@ _rotation = traced(rotation.matrix)
 
 
 def accelerations(
-    linkage: Linkage, joints: screws.Joints, motions: Sequence[Motion], wrenches: Sequence[Wrench]
+    kinematic_tree: KinematicTree,
+    joints: spatial.Joints,
+    motions: Sequence[PredictedMotion],
+    wrenches: Sequence[Wrench],
 ) -> tuple[Wrench, ...]:
     """Of the bodies of a tree, from their poses and velocities and all forces but the joints'."""
     origin = motions[0].position
-    tree = Tree(linkage, axes_at(linkage, joints, [m.course() for m in motions], NOW, origin))
+    tree = Tree(kinematic_tree, axes_at(kinematic_tree, joints, [m.predicted_path() for m in motions], NOW, origin))
     tensors = [world_inertia(m.inertia, m.rotation) for m in motions]
     bodies = [(m.mass, tensor, m.position, origin) for m, tensor in zip(motions, tensors, strict=True)]
     matrix = tree_matrix(tree, [_inertia(*body) for body in bodies])
     momenta = [_momentum(*body, m.velocity, m.angular_velocity) for body, m in zip(bodies, motions, strict=True)]
-    now = moving(tree, matrix, solve(tree, matrix, momenta))
+    now = tree_motion(tree, matrix, solve(tree, matrix, momenta))
     biases = _biases(tree, joints, now)
     lacking = [
         _lacking(*body, screw, bias, wrench)
         for body, screw, bias, wrench in zip(bodies, now.screws, biases, wrenches, strict=True)
     ]
-    changes = moving(tree, matrix, solve(tree, matrix, lacking)).screws
+    changes = tree_motion(tree, matrix, solve(tree, matrix, lacking)).screws
     return tuple(
         _accelerated(motion.position, origin, screw, bias, change)
         for motion, screw, bias, change in zip(motions, now.screws, biases, changes, strict=True)
@@ -53,8 +56,8 @@ def accelerations(
 
 
 def consistent(
-    linkage: Linkage,
-    joints: screws.Joints,
+    kinematic_tree: KinematicTree,
+    joints: spatial.Joints,
     inertials: Sequence[tuple[Expr, Expr]],
     poses: Sequence[tuple[Expr, Expr]],
     momenta: Sequence[Momentum],
@@ -62,59 +65,61 @@ def consistent(
     """Velocity and angular velocity of each body: those that fit the joints and have the momenta along free motions."""
     zero, origin = ca.SX.zeros(3), poses[0][0]
     turned = [_rotation(q) for _, q in poses]
-    courses = [Course(p, r, zero, zero, zero, zero, NOW) for (p, _), r in zip(poses, turned, strict=True)]
-    tree = Tree(linkage, axes_at(linkage, joints, courses, NOW, origin))
+    courses = [PredictedPath(p, r, zero, zero, zero, zero, NOW) for (p, _), r in zip(poses, turned, strict=True)]
+    tree = Tree(kinematic_tree, axes_at(kinematic_tree, joints, courses, NOW, origin))
     parts = list(zip(inertials, poses, turned, momenta, strict=True))
     tensors = (world_inertia(inertia, r) for (_, inertia), _, r, _ in parts)
     inertias = [_inertia(mass, t, p, origin) for ((mass, _), (p, _), *_), t in zip(parts, tensors, strict=True)]
     counted = [_counted(mass, p, origin, momentum) for (mass, _), (p, _), _, momentum in parts]
     matrix = tree_matrix(tree, inertias)
-    moved = moving(tree, matrix, solve(tree, matrix, counted)).screws
+    moved = tree_motion(tree, matrix, solve(tree, matrix, counted)).screws
     return tuple(_at_place(screw, p, origin) for screw, (p, _) in zip(moved, poses, strict=True))
 
 
 @traced
-def _inertia(mass: Expr, tensor: Expr, position: Expr, origin: Expr) -> Inertia:
+def _inertia(mass: Expr, tensor: Expr, position: Expr, origin: Expr) -> SpatialInertia:
     place = position - origin
-    return Inertia(mirrored(screws.inertia_of(mass, tensor, place, place)))
+    return SpatialInertia(mirrored(spatial.inertia_of(mass, tensor, place, place)))
 
 
 @traced
-def _momentum(mass: Expr, tensor: Expr, position: Expr, origin: Expr, velocity: Expr, spin: Expr) -> Screw:
-    return Screw(screws.about_origin(position - origin, mass * velocity, ca.mtimes(tensor, spin)))
+def _momentum(mass: Expr, tensor: Expr, position: Expr, origin: Expr, velocity: Expr, spin: Expr) -> SpatialVector:
+    return SpatialVector(spatial.about_origin(position - origin, mass * velocity, ca.mtimes(tensor, spin)))
 
 
 @traced
-def _counted(mass: Expr, position: Expr, origin: Expr, momentum: Momentum) -> Screw:
-    return Screw(screws.about_origin(position - origin, mass * momentum.velocity, momentum.angular))
+def _counted(mass: Expr, position: Expr, origin: Expr, momentum: Momentum) -> SpatialVector:
+    return SpatialVector(spatial.about_origin(position - origin, mass * momentum.velocity, momentum.angular))
 
 
 @traced
 def _lacking(
-    mass: Expr, tensor: Expr, position: Expr, origin: Expr, screw: Screw, bias: Screw, wrench: Wrench
-) -> Screw:
+    mass: Expr, tensor: Expr, position: Expr, origin: Expr, screw: SpatialVector, bias: SpatialVector, wrench: Wrench
+) -> SpatialVector:
     """What forces do beside what the motion needs as it is."""
     place, w = position - origin, screw.parts[:3]
     linear, angular = _at(bias.parts, screw.parts, place)
     turning = ca.mtimes(tensor, angular) + ca.cross(w, ca.mtimes(tensor, w))
-    return Screw(screws.about_origin(place, wrench[0] - mass * linear, wrench[1] - turning))
+    return SpatialVector(spatial.about_origin(place, wrench[0] - mass * linear, wrench[1] - turning))
 
 
 @traced
-def _accelerated(position: Expr, origin: Expr, screw: Screw, bias: Screw, change: Screw) -> Wrench:
+def _accelerated(
+    position: Expr, origin: Expr, screw: SpatialVector, bias: SpatialVector, change: SpatialVector
+) -> Wrench:
     return _at(change.parts + bias.parts, screw.parts, position - origin)
 
 
 @traced
-def _at_place(screw: Screw, position: Expr, origin: Expr) -> Wrench:
-    return screws.at_place(screw.parts, position - origin)
+def _at_place(screw: SpatialVector, position: Expr, origin: Expr) -> Wrench:
+    return spatial.at_place(screw.parts, position - origin)
 
 
-def _biases(tree: Tree, joints: screws.Joints, now: Moving) -> list[Screw]:
+def _biases(tree: Tree, joints: spatial.Joints, now: TreeMotion) -> list[SpatialVector]:
     """(6,) rates of change of the bodies' screws while the coordinates' rates do not change."""
-    place = {link.body: k for k, link in enumerate(tree.linkage.links)}
-    found: list[Screw] = []
-    for k, (link, joint) in enumerate(zip(tree.linkage.links, joints, strict=True)):
+    place = {link.body: k for k, link in enumerate(tree.kinematic_tree.links)}
+    found: list[SpatialVector] = []
+    for k, (link, joint) in enumerate(zip(tree.kinematic_tree.links, joints, strict=True)):
         if joint is None:
             found.append(_floating_bias(now.screws[k]))
             continue
@@ -126,20 +131,27 @@ def _biases(tree: Tree, joints: screws.Joints, now: Moving) -> list[Screw]:
 
 
 @traced
-def _floating_bias(screw: Screw) -> Screw:
-    return Screw(ca.vertcat(ca.SX.zeros(3), ca.cross(screw.parts[3:], screw.parts[:3])))  # its centre is at the origin
+def _floating_bias(screw: SpatialVector) -> SpatialVector:
+    return SpatialVector(
+        ca.vertcat(ca.SX.zeros(3), ca.cross(screw.parts[3:], screw.parts[:3]))
+    )  # its centre is at the origin
 
 
 @traced
 def _bias(
-    carriers: tuple[bool, ...], axes: Expr, rates: Expr, own: Screw, parent: Screw | None, above: Screw | None
-) -> Screw:
+    carriers: tuple[bool, ...],
+    axes: Expr,
+    rates: Expr,
+    own: SpatialVector,
+    parent: SpatialVector | None,
+    above: SpatialVector | None,
+) -> SpatialVector:
     total = ca.SX.zeros(6) if above is None else above.parts
     for j, by_child in enumerate(carriers):
         carrier = own if by_child else parent
         if carrier is not None:
             total = total + rates[j] * _carried(carrier.parts, axes[:, j])
-    return Screw(total)
+    return SpatialVector(total)
 
 
 def _carried_by_child(link: Link, joint: Joint, coordinate: int) -> bool:
@@ -148,15 +160,15 @@ def _carried_by_child(link: Link, joint: Joint, coordinate: int) -> bool:
     return first == (link.sign > 0)
 
 
-def _carried(moving: Expr, screw: Expr) -> Expr:
+def _carried(carrier: Expr, screw: Expr) -> Expr:
     """(6,): how a screw that is fixed in a body changes as the body moves."""
-    w, v = moving[:3], moving[3:]
+    w, v = carrier[:3], carrier[3:]
     return ca.vertcat(ca.cross(w, screw[:3]), ca.cross(w, screw[3:]) + ca.cross(v, screw[:3]))
 
 
 def _at(change: Expr, screw: Expr, place: Expr) -> Wrench:
     """Acceleration of the centre of mass, at ``place``, and angular acceleration: from a screw and its change."""
-    velocity = screws.at_place(screw, place)[0]
+    velocity = spatial.at_place(screw, place)[0]
     return change[3:] + ca.cross(change[:3], place) + ca.cross(screw[:3], velocity), change[:3]
 
 

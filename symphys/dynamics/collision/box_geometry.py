@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics.collision.body_points import axes
-from symphys.dynamics.collision.predicted_points import Course, Parabola, chosen
+from symphys.dynamics.collision.predicted_points import Parabola, PredictedPath, chosen
 from symphys.dynamics.collision.witness_points import steady
 from symphys.model.shapes import Box
 
@@ -24,7 +24,7 @@ TINY_CHANGE = 1e-15
 
 
 @dataclass(frozen=True)
-class Block:
+class MovingBox:
     """A box over the step: courses of its centre and its three axes, half sizes (3,) [m]."""
 
     centre: Parabola
@@ -61,12 +61,12 @@ class Face:
         return [self.point(su * self.half_u, sv * self.half_v) for su, sv in signs]
 
 
-def block(box: Box, course: Course) -> Block:
+def moving_box(box: Box, course: PredictedPath) -> MovingBox:
     """A box that is carried along a course."""
-    return Block(course.path(box.centre), axes(course, box), box.half_sizes)
+    return MovingBox(course.path(box.centre), axes(course, box), box.half_sizes)
 
 
-def facing(box: Block, direction: Expr, t: Expr) -> Face:
+def facing(box: MovingBox, direction: Expr, t: Expr) -> Face:
     """The face whose outward normal is nearest to ``direction`` at time t."""
     along = [ca.dot(axis.at(t), direction) for axis in box.axes]
     first = ca.logic_and(ca.fabs(along[0]) >= ca.fabs(along[1]), ca.fabs(along[0]) >= ca.fabs(along[2]))
@@ -91,7 +91,7 @@ def facing(box: Block, direction: Expr, t: Expr) -> Face:
     )
 
 
-def faces_and_edges(a: Block, b: Block) -> tuple[list[Parabola], list[Parabola]]:
+def faces_and_edges(a: MovingBox, b: MovingBox) -> tuple[list[Parabola], list[Parabola]]:
     """The directions along which two boxes can be apart: face normals of both, and edge across edge."""
     return [*a.axes, *b.axes], [one.cross(other) for one in a.axes for other in b.axes]
 
@@ -113,7 +113,9 @@ class Nearing:
     apart: Expr
 
 
-def nearing(a: Block, b: Block, faces: list[Parabola], edges: list[Parabola], dt: Expr, radius: Expr = 0.0) -> Nearing:
+def nearing(
+    a: MovingBox, b: MovingBox, faces: list[Parabola], edges: list[Parabola], dt: Expr, radius: Expr = 0.0
+) -> Nearing:
     """How two boxes, the first of them grown by ``radius``, come to overlap; the first of equal directions."""
     ends = [places(a, b, faces, edges, t, radius) for t in (ca.SX(0), dt)]
     best, last, largest, first_exit = faces[0], ca.SX(-1), ca.SX(0), ca.SX(1)
@@ -138,7 +140,7 @@ def crossed(start: Expr, end: Expr) -> Expr:
 
 
 def places(
-    a: Block, b: Block, faces: list[Parabola], edges: list[Parabola], t: Expr, radius: Expr
+    a: MovingBox, b: MovingBox, faces: list[Parabola], edges: list[Parabola], t: Expr, radius: Expr
 ) -> list[tuple[Expr, Expr]]:
     """Along each direction at time t: how far the first box is from the second, and how near is overlapping [m]."""
     apart, found = (a.centre - b.centre).at(t), []

@@ -68,7 +68,7 @@ def chosen(condition: Expr, one: Parabola, other: Parabola) -> Parabola:
 
 
 @dataclass(frozen=True)
-class Course:
+class PredictedPath:
     """A body's pose over the step.
 
     Attributes:
@@ -105,7 +105,7 @@ class Course:
         return self.centre() + self.arm(offset)
 
 
-def at_rest(dt: Expr) -> Course:
+def at_rest(dt: Expr) -> PredictedPath:
     """The course of what is static: its frame is the world's."""
     zero = ca.SX.zeros(3)
-    return Course(zero, ca.SX.eye(3), zero, zero, zero, zero, dt)
+    return PredictedPath(zero, ca.SX.eye(3), zero, zero, zero, zero, dt)

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import casadi as ca
 
-from symphys.dynamics.collision.contact_geometry import Contact, Meeting
+from symphys.dynamics.collision.contact_geometry import Contact, ContactGeometry
 from symphys.maths.smoothing import TINY_SQUARE
 
 Expr = Any
@@ -55,7 +55,7 @@ def within(t: Expr, dt: Expr) -> Expr:
     return no_later(ca.if_else(t < -ROUNDING * dt, 0, t), dt)
 
 
-class Timed(Meeting, Protocol):
+class Timed(ContactGeometry, Protocol):
     """A meeting that knows its gap at any time."""
 
     def gap(self, t: Expr) -> Expr:

@@ -16,13 +16,20 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.contact.constraint import ContactRow
-from symphys.dynamics.context import Scene
-from symphys.dynamics.joints.assembly import Trees, momenta_of
-from symphys.dynamics.momentum import Momentum, Moved, Rates
-from symphys.dynamics.motion import Motion, apply, inverse_inertia
-from symphys.dynamics.pgs import Given, Row, Solution, relax
+from symphys.dynamics.contact.constraint import ContactConstraint
+from symphys.dynamics.context import StepContext
+from symphys.dynamics.joints.assembly import KinematicTrees, momenta_of
+from symphys.dynamics.motion import PredictedMotion, apply, inverse_inertia
+from symphys.dynamics.pgs import iterate
 from symphys.dynamics.tracing.decorator import traced
+from symphys.dynamics.unknowns import (
+    AnyImpulse,
+    GeneralizedVelocities,
+    Momentum,
+    PlacedConstraint,
+    Solution,
+    Velocities,
+)
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.shapes import Sphere
 from symphys.model.world import World, is_zero
@@ -41,16 +48,22 @@ def eccentric_bodies(world: World) -> set[int]:
     }
 
 
-def rebound(scene: Scene, rows: tuple[Row, ...], start: Solution, motions: Sequence[Motion], trees: Trees) -> Solution:
+def rebound(
+    context: StepContext,
+    rows: tuple[PlacedConstraint, ...],
+    start: Solution,
+    motions: Sequence[PredictedMotion],
+    trees: KinematicTrees,
+) -> Solution:
     """The impulses of an impact, and the momenta after it."""
-    scheme = scene.setting.scheme
-    if not (scheme.energy_cap and eccentric_bodies(scene.world)):
-        return relax(scene.world, scheme.sweeps, rows, start, motions)
+    scheme = context.settings.scheme
+    if not (scheme.energy_cap and eccentric_bodies(context.world)):
+        return iterate(context.world, scheme.sweeps, rows, start, motions)
     dead = tuple(replace(each, row=_without_rebound(each.row)) for each in rows)
-    plastic = relax(scene.world, scheme.sweeps, dead, start, motions)
-    newton = relax(scene.world, scheme.sweeps, rows, plastic, motions)
+    plastic = iterate(context.world, scheme.sweeps, dead, start, motions)
+    newton = iterate(context.world, scheme.sweeps, rows, plastic, motions)
     sums: tuple[Expr, Expr, Expr] = (ca.SX(0), ca.SX(0), ca.SX(0))
-    bodies = (momenta_of(scene, trees, solution.momenta) for solution in (start, plastic, newton))
+    bodies = (momenta_of(context, trees, solution.momenta) for solution in (start, plastic, newton))
     for motion, *momenta in zip(motions, *bodies, strict=True):
         sums = _energies(motion, momenta, sums)
     share = _largest_share(sums)
@@ -63,13 +76,15 @@ def rebound(scene: Scene, rows: tuple[Row, ...], start: Solution, motions: Seque
 
 @traced
 def _without_rebound(row: Any) -> Any:
-    if not isinstance(row, ContactRow):
+    if not isinstance(row, ContactConstraint):
         return row
     return replace(row, target=ca.fmin(row.target, 0))
 
 
 @traced
-def _energies(motion: Motion, momenta: list[Momentum], sums: tuple[Expr, Expr, Expr]) -> tuple[Expr, Expr, Expr]:
+def _energies(
+    motion: PredictedMotion, momenta: list[Momentum], sums: tuple[Expr, Expr, Expr]
+) -> tuple[Expr, Expr, Expr]:
     """Coefficients of the change of kinetic energy, a s^2 + b s + c, at share s of the way to Newton's impulse."""
     before, plastic, newton = momenta
     turning = inverse_inertia(motion.inertia, motion.rotation)
@@ -94,12 +109,12 @@ def _largest_share(sums: tuple[Expr, Expr, Expr]) -> Expr:
 
 
 @traced
-def _between_states(share: Expr, plastic: Moved, newton: Moved) -> Moved:
+def _between_states(share: Expr, plastic: Velocities, newton: Velocities) -> Velocities:
     if plastic is None or newton is None:
         return None
-    if isinstance(plastic, Rates):
-        assert isinstance(newton, Rates)
-        return Rates(plastic.numbers + share * (newton.numbers - plastic.numbers))
+    if isinstance(plastic, GeneralizedVelocities):
+        assert isinstance(newton, GeneralizedVelocities)
+        return GeneralizedVelocities(plastic.numbers + share * (newton.numbers - plastic.numbers))
     assert isinstance(newton, Momentum)
     return Momentum(
         plastic.velocity + share * (newton.velocity - plastic.velocity),
@@ -108,5 +123,5 @@ def _between_states(share: Expr, plastic: Moved, newton: Moved) -> Moved:
 
 
 @traced
-def _between(share: Expr, plastic: Given, newton: Given) -> Given:
+def _between(share: Expr, plastic: AnyImpulse, newton: AnyImpulse) -> AnyImpulse:
     return plastic.plus(newton.minus(plastic).times(share))

@@ -12,9 +12,9 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.contact.constraint import Side
-from symphys.dynamics.joints.joint_impulse import Along, Directions, kicked, speeds
-from symphys.dynamics.momentum import Rates
+from symphys.dynamics.contact.body_term import BodyTerm
+from symphys.dynamics.joints.joint_impulse import Directions, JointImpulse, apply_impulse, speeds
+from symphys.dynamics.unknowns import GeneralizedVelocities
 from symphys.maths.smoothing import at_least, at_most
 
 Expr = Any
@@ -22,31 +22,31 @@ Expr = Any
 
 
 @dataclass(frozen=True)
-class OfTree:
-    """A coordinate of a tree: its rate (1, n) by what sweeps know, and what a unit impulse does to that (n,)."""
+class TreeCoordinate:
+    """A coordinate of a tree: its Jacobian (1, n), and the response (n,) of the velocities to a unit impulse."""
 
-    see: Expr
-    gain: Expr
+    jacobian: Expr
+    response: Expr
 
 
 @dataclass(frozen=True)
-class AxisRow:
+class CoordinateConstraint:
     """What acts along one coordinate, as the sweeps see it; impulses in [N m s], or [N s] where it slides.
 
     Attributes:
-        sides: arms at the row's instant, and to the common point for impulses.
+        terms: arms at the row's instant, and to the common point for impulses.
         seen, given_along: the one direction at the row's instant, and of the impulse.
         keep, slope, offset: see the module.
         low, high: bounds of the impulse; None where there is none.
         width: of the smoothed bounds [N m s].
-        same: whether both sides are of one tree of joints.
+        same: whether both terms are of one tree of joints.
         of_tree: where the coordinate is one of a tree's.
         left: how far a limit is away at the start [rad], [m]; None for what is none.
         inverse_mobility: effective mass.
         landing: 1 for a limit that is struck: its impulse is an impact, not a force.
     """
 
-    sides: tuple[Side, ...]
+    terms: tuple[BodyTerm, ...]
     seen: Directions
     given_along: Directions
     keep: Expr
@@ -56,7 +56,7 @@ class AxisRow:
     high: Expr | None
     width: Expr
     same: bool
-    of_tree: OfTree | None
+    of_tree: TreeCoordinate | None
     left: Expr | None
     inverse_mobility: Expr
     landing: Expr
@@ -70,18 +70,18 @@ class AxisRow:
     def rate(self, momenta: tuple[Any, ...]) -> Expr:
         """Of the coordinate."""
         if self.of_tree is None:
-            return speeds(self.sides, self.seen, momenta)
-        return momenta[0].along(self.of_tree.see)
+            return speeds(self.terms, self.seen, momenta)
+        return momenta[0].along(self.of_tree.jacobian)
 
-    def carried(self, impulse: Along) -> Expr:
+    def carried(self, impulse: JointImpulse) -> Expr:
         """(1,): what is stored of an impulse; also of a force."""
         return impulse.numbers
 
-    def taken_up(self, stored: Expr) -> Along:
+    def taken_up(self, stored: Expr) -> JointImpulse:
         """The impulse that is stored so."""
-        return Along(stored)
+        return JointImpulse(stored)
 
-    def visit(self, momenta: tuple[Any, ...], old: Along) -> tuple[tuple[Any, ...], Along]:
+    def project(self, momenta: tuple[Any, ...], old: JointImpulse) -> tuple[tuple[Any, ...], JointImpulse]:
         """See ``pgs.Solvable``."""
         rate = self.rate(momenta)
         new = self.keep * old.numbers - self.slope * rate - self.offset
@@ -89,14 +89,14 @@ class AxisRow:
             new = at_least(new, self.low, self.width)
         if self.high is not None:
             new = at_most(new, self.high, self.width)
-        return self.given(momenta, Along(new - old.numbers)), Along(new)
+        return self.apply(momenta, JointImpulse(new - old.numbers)), JointImpulse(new)
 
-    def given(self, momenta: tuple[Any, ...], impulse: Along) -> tuple[Any, ...]:
+    def apply(self, momenta: tuple[Any, ...], impulse: JointImpulse) -> tuple[Any, ...]:
         """See ``pgs.Solvable``."""
         if self.of_tree is None:
-            return kicked(self.sides, self.given_along, momenta, impulse.numbers, self.same)
-        after = Rates(momenta[0].numbers + ca.mtimes(self.of_tree.gain, impulse.numbers))
-        return tuple(after for _ in self.sides)
+            return apply_impulse(self.terms, self.given_along, momenta, impulse.numbers, self.same)
+        after = GeneralizedVelocities(momenta[0].numbers + ca.mtimes(self.of_tree.response, impulse.numbers))
+        return tuple(after for _ in self.terms)
 
 
 def towards(target: Expr, mobility: Expr) -> dict[str, Expr]:

@@ -8,11 +8,11 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics.collision import Contact
-from symphys.dynamics.contact.constraint import Moving, at_touch
-from symphys.dynamics.context import Scene
-from symphys.dynamics.functions import arguments_of, inline, parts_of, scene_of
-from symphys.dynamics.motion import Motion
-from symphys.dynamics.prediction import bodies_of, expected_motions, look
+from symphys.dynamics.contact.body_term import Motions, at_touch
+from symphys.dynamics.context import StepContext
+from symphys.dynamics.functions import arguments_of, context_of, inline, parts_of
+from symphys.dynamics.motion import PredictedMotion
+from symphys.dynamics.prediction import bodies_of, detect_contacts, predicted_motions
 from symphys.dynamics.tracing.decorator import traced, tracing
 from symphys.model.state_layout import Layout
 from symphys.model.world import Scheme, World
@@ -26,7 +26,7 @@ def gap_function(world: World) -> ca.Function:
     arguments = arguments_of(world, (), ())
     tracer = inline(world, arguments)
     with tracing(tracer):
-        contacts, _ = _contacts(world, scene_of(world, None, (), arguments), arguments[0])
+        contacts, _ = _contacts(world, context_of(world, None, (), arguments), arguments[0])
     gaps = [tracer.value(contact.gap) for contact in contacts]
     return ca.Function("gaps", arguments[:1], [ca.densify(ca.vertcat(ca.SX(0, 1), *gaps))])
 
@@ -38,7 +38,7 @@ def slip_function(
     x, u, p, _ = arguments = arguments_of(world, inputs, parameters)
     tracer = inline(world, arguments)
     with tracing(tracer):
-        contacts, motions = _contacts(world, scene_of(world, scheme, inputs, [x, u, p, ca.SX(0)]), x)
+        contacts, motions = _contacts(world, context_of(world, scheme, inputs, [x, u, p, ca.SX(0)]), x)
         moving = (tuple(motions[i] for i in bodies_of(pair)) for pair in world.pairs)
         speeds = [_slip(contact, each) for contact, each in zip(contacts, moving, strict=True)]
     values = map(tracer.value, speeds)
@@ -46,12 +46,12 @@ def slip_function(
 
 
 @traced
-def _slip(contact: Contact, motions: Moving) -> Expr:
+def _slip(contact: Contact, motions: Motions) -> Expr:
     velocity, _, normal = at_touch(contact, motions, ca.SX(0))
     return ca.norm_2(velocity - normal * ca.dot(normal, velocity))
 
 
-def _contacts(world: World, scene: Scene, x: Expr) -> tuple[list[Contact], list[Motion]]:
-    duration = ca.SX(scene.setting.scheme.dt)
-    motions = expected_motions(scene, parts_of(Layout(world), x), duration)
-    return look(scene, motions, duration), motions
+def _contacts(world: World, context: StepContext, x: Expr) -> tuple[list[Contact], list[PredictedMotion]]:
+    duration = ca.SX(context.settings.scheme.dt)
+    motions = predicted_motions(context, parts_of(Layout(world), x), duration)
+    return detect_contacts(context, motions, duration), motions

@@ -8,7 +8,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.tracing.recording import Piece, Slot
+from symphys.dynamics.tracing.recording import TracedCall, TracedVector
 
 Expr = Any
 """casadi SX"""
@@ -16,7 +16,7 @@ Words = tuple[int, ...]
 """Places in a slot, in order."""
 
 
-def trimmed(pieces: Sequence[Piece]) -> tuple[Piece, ...]:
+def without_dead_code(pieces: Sequence[TracedCall]) -> tuple[TracedCall, ...]:
     """Pieces that give the same named slots; what lies in the others lies closer together."""
     return _Trimming(pieces).pieces()
 
@@ -24,23 +24,23 @@ def trimmed(pieces: Sequence[Piece]) -> tuple[Piece, ...]:
 class _Trimming:
     """Which words of each slot are read, and the functions that are left."""
 
-    def __init__(self, pieces: Sequence[Piece]) -> None:
+    def __init__(self, pieces: Sequence[TracedCall]) -> None:
         self._pieces = pieces
-        self._read: dict[Slot, set[int]] = {}
+        self._read: dict[TracedVector, set[int]] = {}
         self._needs: dict[tuple[int, tuple[Words, ...]], list[set[int]]] = {}
         self._functions: dict[Any, ca.Function] = {}
         for piece in reversed(pieces):
             for slot, words in zip(piece.inputs, self._needed(piece), strict=True):
                 self._read.setdefault(slot, set()).update(words)
 
-    def pieces(self) -> tuple[Piece, ...]:
+    def pieces(self) -> tuple[TracedCall, ...]:
         """Those of which something is read."""
         return tuple(self._trimmed(piece) for piece in self._pieces if any(map(self._kept, piece.outputs)))
 
-    def _kept(self, slot: Slot) -> Words:
+    def _kept(self, slot: TracedVector) -> Words:
         return tuple(range(slot.size)) if slot.name else tuple(sorted(self._read.get(slot, ())))
 
-    def _needed(self, piece: Piece) -> list[set[int]]:
+    def _needed(self, piece: TracedCall) -> list[set[int]]:
         """The words of its inputs that a piece needs for what is read of it."""
         key = piece.function.__hash__(), tuple(map(self._kept, piece.outputs))
         if key not in self._needs:
@@ -51,15 +51,15 @@ class _Trimming:
             ]
         return self._needs[key]
 
-    def _trimmed(self, piece: Piece) -> Piece:
+    def _trimmed(self, piece: TracedCall) -> TracedCall:
         inputs = [slot for slot, words in zip(piece.inputs, self._needed(piece), strict=True) if words]
         outputs = [slot for slot in piece.outputs if self._kept(slot)]
-        return Piece(self._function(piece), tuple(map(self._closer, inputs)), tuple(map(self._closer, outputs)))
+        return TracedCall(self._function(piece), tuple(map(self._closer, inputs)), tuple(map(self._closer, outputs)))
 
-    def _closer(self, slot: Slot) -> Slot:
+    def _closer(self, slot: TracedVector) -> TracedVector:
         return slot if slot.name else replace(slot, size=len(self._kept(slot)))
 
-    def _function(self, piece: Piece) -> ca.Function:
+    def _function(self, piece: TracedCall) -> ca.Function:
         """The function from what is kept of the inputs to what is kept of the outputs."""
         kept, given = tuple(map(self._kept, piece.inputs)), tuple(map(self._kept, piece.outputs))
         key = piece.function.__hash__(), kept, given

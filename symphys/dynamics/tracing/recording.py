@@ -22,7 +22,7 @@ Expr = Any
 
 
 @dataclass(frozen=True)
-class Slot:
+class TracedVector:
     """TracedMatrix that lie side by side: a named part of the state or an argument of the step, or what a piece gave.
 
     Attributes:
@@ -37,12 +37,12 @@ class Slot:
 
 
 @dataclass(frozen=True)
-class Piece:
+class TracedCall:
     """An SX function from slots to slots."""
 
     function: ca.Function
-    inputs: tuple[Slot, ...]
-    outputs: tuple[Slot, ...]
+    inputs: tuple[TracedVector, ...]
+    outputs: tuple[TracedVector, ...]
 
 
 class Recorder(Tracer):
@@ -51,16 +51,16 @@ class Recorder(Tracer):
     def __init__(self) -> None:
         """Nothing yet."""
         super().__init__()
-        self.pieces: list[Piece] = []
-        self._slots: list[Slot] = []
+        self.pieces: list[TracedCall] = []
+        self._slots: list[TracedVector] = []
         self._adopted: list[Expr] = []
         self._given: dict[tuple[int, tuple[int, ...]], Sequence[int]] = {}
 
     def argument(self, name: str, symbols: Expr) -> None:
         """A slot for an argument of the step."""
-        self._slots.append(Slot(name, symbols.numel(), self.take(symbols)))
+        self._slots.append(TracedVector(name, symbols.numel(), self.take(symbols)))
 
-    def give(self, name: str, values: Sequence[Expr]) -> Slot:
+    def give(self, name: str, values: Sequence[Expr]) -> TracedVector:
         """A piece that puts values side by side."""
         stacked = self.call(_side_by_side, (tuple(values),), {})
         slots: dict[int, int] = {}
@@ -73,7 +73,7 @@ class Recorder(Tracer):
 
     def repeat(self, count: int, once: Callable[[Any, T], T], context: Any, state: T) -> T:
         """See ``Tracer``; as soon as it repeats itself its pieces are copied."""
-        before, template = state, list[Piece]()
+        before, template = state, list[TracedCall]()
         for _ in range(count):
             slots = self._alike(before, state)
             if template and slots is not None:
@@ -111,7 +111,7 @@ class Recorder(Tracer):
                 return None
         return slots if len(old) == len(new) else None
 
-    def _copy(self, template: list[Piece], slots: dict[int, int], after: T) -> T:
+    def _copy(self, template: list[TracedCall], slots: dict[int, int], after: T) -> T:
         """The state one time later: as ``template`` led to ``after``, its copy leads on from there."""
         for piece in template:
             inputs = [slots.get(slot.number, slot.number) for slot in piece.inputs]
@@ -140,8 +140,8 @@ class Recorder(Tracer):
         first = len(self._slots)
         for k in range(function.n_out()):
             symbols = ca.SX.sym("kept", function.numel_out(k))
-            self._slots.append(Slot(name, symbols.numel(), self.take(symbols)))
-        self.pieces.append(Piece(function, tuple(self._slots[k] for k in slots), tuple(self._slots[first:])))
+            self._slots.append(TracedVector(name, symbols.numel(), self.take(symbols)))
+        self.pieces.append(TracedCall(function, tuple(self._slots[k] for k in slots), tuple(self._slots[first:])))
         return range(first, len(self._slots))
 
 

@@ -8,8 +8,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symphys.dynamics import Piece, Recording, Slot, record_step, step_function
-from symphys.dynamics.tracing.dead_code import trimmed
+from symphys.dynamics import TracedCall, TracedStep, TracedVector, step_function, trace_step
+from symphys.dynamics.tracing.dead_code import without_dead_code
 from symphys.dynamics.tracing.decorator import repeat, traced, tracing
 from symphys.dynamics.tracing.recording import Recorder
 from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain
@@ -41,15 +41,15 @@ def shapes() -> World:
     return World(world.bodies, world.statics, tuple(p for p in world.pairs if p.name.split(":")[0] in kept))
 
 
-def evaluate(piece: Piece, values: dict[Slot, np.ndarray]) -> dict[Slot, np.ndarray]:
+def evaluate(piece: TracedCall, values: dict[TracedVector, np.ndarray]) -> dict[TracedVector, np.ndarray]:
     """What a piece gives."""
     results = piece.function.call([ca.DM(values[slot]) for slot in piece.inputs])
     return {slot: np.array(ca.DM(result)).ravel() for slot, result in zip(piece.outputs, results, strict=True)}
 
 
-def run(recording: Recording, layout: Layout, x: np.ndarray, u: np.ndarray, knob: float, p: Any = ()) -> np.ndarray:
+def run(recording: TracedStep, layout: Layout, x: np.ndarray, u: np.ndarray, knob: float, p: Any = ()) -> np.ndarray:
     """The next state, piece by piece."""
-    values: dict[Slot, np.ndarray] = {}
+    values: dict[TracedVector, np.ndarray] = {}
     after = np.zeros(layout.size)
     for piece in recording.pieces:
         for slot in piece.inputs:
@@ -76,7 +76,7 @@ def test_pieces_give_the_whole_step_of_other_shapes() -> None:
 def compare(world: World, scheme: Scheme) -> None:
     """Twelve steps, pushed about, with and without smoothing."""
     layout = Layout(world)
-    whole, pieces = step_function(world, scheme, INPUTS), record_step(world, scheme, INPUTS)
+    whole, pieces = step_function(world, scheme, INPUTS), trace_step(world, scheme, INPUTS)
     rng = np.random.default_rng(1)
     x = np.array(initial_state(world, {f"{b.name}.position": [0.25 * i, 0, 0.1] for i, b in enumerate(world.bodies)}))
     x = x.ravel()
@@ -96,7 +96,7 @@ def test_equal_parts_share_their_functions() -> None:
         balls = [Body.ball(f"ball{i}", 0.1, 1.0) for i in range(count)]
         ground = make_world(balls, [Plane.ground()], Law(0.5, 0.5))
         apart = World(ground.bodies, ground.statics, tuple(p for p in ground.pairs if p.second.body is None))
-        return len({piece.function.__hash__() for piece in record_step(apart, Scheme(sweeps=sweeps)).pieces})
+        return len({piece.function.__hash__() for piece in trace_step(apart, Scheme(sweeps=sweeps)).pieces})
 
     assert distinct(20, 10) == distinct(2, 10) == distinct(2, 40)
 
@@ -180,7 +180,7 @@ def test_what_nobody_reads_is_left_out() -> None:
         traced(lambda squares: ca.sin(squares))(squares)
         root, _ = traced(lambda squares: (ca.sqrt(squares[2]), ca.exp(squares[1])))(squares)
     recorder.give("next", [root])
-    left = trimmed(recorder.pieces)
+    left = without_dead_code(recorder.pieces)
     assert [(piece.function.nnz_in(), piece.function.nnz_out()) for piece in left] == [(4, 1), (1, 1), (1, 1)]
     values = {left[0].inputs[0]: np.array([1.0, 2.0, 3.0, 4.0])}
     for piece in left:
@@ -214,7 +214,7 @@ def test_parameters_in_expressions_have_a_piece() -> None:
     """A mass that follows from a radius is computed, once a step."""
     radius = ca.SX.sym("radius")
     world = make_world([Body.ball("ball", radius, 1000 * radius**3)], [Plane.ground()])
-    recording = record_step(world, parameters=[radius])
+    recording = trace_step(world, parameters=[radius])
     assert run(recording, Layout(world), *start(world), 0.0, np.array([0.1])) == pytest.approx(
         np.array(step_function(world, parameters=[radius])(start(world)[0], [], 0.1, 0)).ravel()
     )
