@@ -9,7 +9,8 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics.context import State, StepContext, make_context
-from symphys.dynamics.step import report, take_step
+from symphys.dynamics.step import take_step
+from symphys.dynamics.step_report import report
 from symphys.dynamics.tracing.dead_code import without_dead_code
 from symphys.dynamics.tracing.decorator import tracing
 from symphys.dynamics.tracing.recording import Recorder, TracedCall, TracedVector

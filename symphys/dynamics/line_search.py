@@ -42,16 +42,16 @@ SETTLED = 1e-10
 
 @dataclass(frozen=True)
 class Cluster:
-    """Bodies without joints that may lean on each other, and their rows, by index."""
+    """Bodies without joints that may lean on each other, and their constraints, by index."""
 
     bodies: tuple[int, ...]
-    rows: tuple[int, ...]
+    constraints: tuple[int, ...]
 
 
-def clusters(world: World, rows: Sequence[PlacedConstraint]) -> list[Cluster]:
+def clusters(world: World, constraints: Sequence[PlacedConstraint]) -> list[Cluster]:
     """Those of bodies that differ much in mass, or may: where a symbol decides it."""
     roots = list(range(len(world.bodies)))
-    for bodies in [row.bodies for row in rows] + [joint.bodies for joint in world.joints]:
+    for bodies in [constraint.bodies for constraint in constraints] + [joint.bodies for joint in world.joints]:
         for k in bodies[1:]:
             roots[_root(roots, k)] = _root(roots, bodies[0])
     groups: dict[int, set[int]] = {}
@@ -60,7 +60,9 @@ def clusters(world: World, rows: Sequence[PlacedConstraint]) -> list[Cluster]:
     held = {k for joint in world.joints for k in joint.bodies}
     apart = [group for group in groups.values() if _unequal(world, group) and not group & held]
     return [
-        Cluster(tuple(sorted(group)), tuple(k for k, row in enumerate(rows) if group & set(row.bodies)))
+        Cluster(
+            tuple(sorted(group)), tuple(k for k, constraint in enumerate(constraints) if group & set(constraint.bodies))
+        )
         for group in apart
     ]
 
@@ -82,7 +84,7 @@ def _unequal(world: World, group: set[int]) -> bool:
 
 def lengthened(
     cluster: Cluster,
-    rows: Sequence[PlacedConstraint],
+    constraints: Sequence[PlacedConstraint],
     motions: Sequence[PredictedMotion],
     before: Solution,
     now: Solution,
@@ -92,13 +94,13 @@ def lengthened(
     longest: Expr = ca.SX(LONGEST)
     for k in cluster.bodies:
         sums = _of_body(sums, motions[k], now.momenta[k], before.momenta[k])
-    for k in cluster.rows:
-        sums, longest = _of_row(sums, longest, rows[k].row, now.impulses[k], now.last[k])
+    for k in cluster.constraints:
+        sums, longest = _of_constraint(sums, longest, constraints[k].constraint, now.impulses[k], now.last[k])
     share = _share(sums, longest)
     momenta, impulses = list(now.momenta), list(now.impulses)
     for k in cluster.bodies:
         momenta[k] = _repeated(share, now.momenta[k], before.momenta[k])
-    for k in cluster.rows:
+    for k in cluster.constraints:
         impulses[k] = _given_again(share, now.impulses[k], now.last[k])
     return replace(now, momenta=tuple(momenta), impulses=tuple(impulses))
 
@@ -117,15 +119,15 @@ def _of_body(
 
 
 @traced
-def _of_row(
-    sums: tuple[Expr, Expr], longest: Expr, row: ContactConstraint, now: ContactImpulse, before: ContactImpulse
+def _of_constraint(
+    sums: tuple[Expr, Expr], longest: Expr, constraint: ContactConstraint, now: ContactImpulse, before: ContactImpulse
 ) -> tuple[tuple[Expr, Expr], Expr]:
-    """The same less what the row's targets ask for; how often the change can be repeated."""
+    """The same less what the constraint's targets ask for; how often the change can be repeated."""
     press = now.normal - before.normal
-    asked = row.target * press + ca.dot(row.slip_target, now.tangent - before.tangent)
-    slope = sums[0] - asked + row.softness * now.normal * press
+    asked = constraint.target * press + ca.dot(constraint.slip_target, now.tangent - before.tangent)
+    slope = sums[0] - asked + constraint.softness * now.normal * press
     falls = ca.if_else(press < 0, now.normal / ca.fmax(-press, TINY), LONGEST)
-    return (slope, sums[1] + row.softness * press * press), ca.fmin(longest, falls)
+    return (slope, sums[1] + constraint.softness * press * press), ca.fmin(longest, falls)
 
 
 @traced

@@ -29,7 +29,7 @@ Expr = Any
 def displacements(
     context: StepContext,
     trees: KinematicTrees,
-    rows: Sequence[PlacedConstraint],
+    constraints: Sequence[PlacedConstraint],
     started: Sequence[ContactImpulse],
     solved: AllVelocities,
     given: Sequence[ContactImpulse],
@@ -39,9 +39,9 @@ def displacements(
     late = [_drift(motion, state, duration) for motion, state in zip(trees.motions, solved, strict=True)]
     if not context.settings.scheme.time_of_impact:
         return late
-    for each, *impulses in zip(rows, started, given, strict=True):
+    for each, *impulses in zip(constraints, started, given, strict=True):
         for term, (body, carrier) in enumerate(zip(each.bodies, each.carriers, strict=True)):
-            late[carrier] = _delayed(late[carrier], each.row, term, impulses, trees.motions[body].inverse_mid)
+            late[carrier] = _delayed(late[carrier], each.constraint, term, impulses, trees.motions[body].inverse_mid)
     return late
 
 
@@ -56,15 +56,15 @@ def _drift(motion: PredictedMotion, state: Velocities, duration: Expr) -> TreeDi
 
 @traced
 def _delayed(
-    late: TreeDisplacement, row: ContactConstraint, k: int, impulses: list[ContactImpulse], turning: Expr
+    late: TreeDisplacement, constraint: ContactConstraint, k: int, impulses: list[ContactImpulse], turning: Expr
 ) -> TreeDisplacement:
     """The displacement less that which the impulse on term k would have caused before it acts.
 
     What goes on from the last step has acted all the time, whatever rounding makes of the gap.
     """
-    term, impulse = row.terms[k], impulses[1].minus(impulses[0].times(row.lasts))
-    force, twist = impulse.linear(row.impulse_normal), impulse.angular(row.impulse_normal)
-    early = row.delay * term.sign
+    term, impulse = constraint.terms[k], impulses[1].minus(impulses[0].times(constraint.lasts))
+    force, twist = impulse.linear(constraint.impulse_normal), impulse.angular(constraint.impulse_normal)
+    early = constraint.delay * term.sign
     if isinstance(late, GeneralizedVelocities) and term.jacobian is not None:
         return GeneralizedVelocities(
             late.numbers
@@ -94,7 +94,7 @@ class Corrected:
 def close_gaps(
     context: StepContext,
     trees: KinematicTrees,
-    rows: Sequence[tuple[PlacedConstraint, Contact, ContactImpulse]],
+    constraints: Sequence[tuple[PlacedConstraint, Contact, ContactImpulse]],
     joints: Sequence[PlacedConstraint],
     moved: Sequence[TreeDisplacement],
 ) -> Corrected:
@@ -104,7 +104,9 @@ def close_gaps(
     """
     scheme = context.settings.scheme
     rigid = tuple(
-        (each, contact, _lasts(each.row, impulse)) for each, contact, impulse in rows if not each.row.law.soft
+        (each, contact, _lasts(each.constraint, impulse))
+        for each, contact, impulse in constraints
+        if not each.constraint.law.soft
     )
     limits = tuple(each for each in joints if _of_tree(each))
     fixed = PositionPass(trees.motions, rigid, limits, scheme.push_out)
@@ -156,13 +158,13 @@ class PositionPass:
 
 
 def _of_tree(each: PlacedConstraint) -> bool:
-    return isinstance(each.row, CoordinateConstraint) and each.row.of_tree is not None
+    return isinstance(each.constraint, CoordinateConstraint) and each.constraint.of_tree is not None
 
 
 @traced
-def _lasts(row: ContactConstraint, impulse: ContactImpulse) -> Expr:
+def _lasts(constraint: ContactConstraint, impulse: ContactImpulse) -> Expr:
     """1 if a contact carried load and still does."""
-    return ca.logic_and(row.lasts, impulse.normal > row.load)
+    return ca.logic_and(constraint.lasts, impulse.normal > constraint.load)
 
 
 def _push_all(fixed: PositionPass, state: Pushed) -> Pushed:
@@ -171,17 +173,17 @@ def _push_all(fixed: PositionPass, state: Pushed) -> Pushed:
     for k, (each, contact, lasts) in enumerate(fixed.rigid):
         own = tuple(along[i] for i in each.carriers)
         moved = tuple(displaced(fixed.motions[i].jacobian, a) for i, a in zip(each.bodies, own, strict=True))
-        after, pushes[k] = _push(each.row, contact, lasts, moved, own, pushes[k], fixed.share)
+        after, pushes[k] = _push(each.constraint, contact, lasts, moved, own, pushes[k], fixed.share)
         for i, own_after in zip(each.carriers, after, strict=True):
             along[i] = own_after
     for each in fixed.limits:
-        along[each.carriers[0]] = _back(each.row, along[each.carriers[0]])
+        along[each.carriers[0]] = _back(each.constraint, along[each.carriers[0]])
     return tuple(along), tuple(pushes)
 
 
 @traced
 def _push(
-    row: ContactConstraint,
+    constraint: ContactConstraint,
     contact: Contact,
     lasts: Expr,
     moved: Displacements,
@@ -189,17 +191,17 @@ def _push(
     old: Expr,
     share: float,
 ) -> tuple[tuple[TreeDisplacement, ...], Expr]:
-    gap = contact.geometry.gap_after(moved[0], moved[1] if len(moved) > 1 else UNMOVED) + row.slack
-    free = old - share * gap * row.normal_mass * row.separates
+    gap = contact.geometry.gap_after(moved[0], moved[1] if len(moved) > 1 else UNMOVED) + constraint.slack
+    free = old - share * gap * constraint.normal_mass * constraint.separates
     # at 0 the slope is that of ``free``: a body that exactly touches is held by the surface
     new = ca.if_else(ca.logic_or(lasts, free >= 0), free, 0)
-    step = (new - old) * row.normal
-    if row.same:
+    step = (new - old) * constraint.normal
+    if constraint.same:
         after = along[0]
-        for term in row.terms:
+        for term in constraint.terms:
             after = _pushed(term, after, step)
-        return tuple(after for _ in row.terms), new
-    return tuple(_pushed(term, each, step) for term, each in zip(row.terms, along, strict=True)), new
+        return tuple(after for _ in constraint.terms), new
+    return tuple(_pushed(term, each, step) for term, each in zip(constraint.terms, along, strict=True)), new
 
 
 def _pushed(term: BodyTerm, along: TreeDisplacement, step: Expr) -> TreeDisplacement:
@@ -211,8 +213,8 @@ def _pushed(term: BodyTerm, along: TreeDisplacement, step: Expr) -> TreeDisplace
 
 
 @traced
-def _back(row: CoordinateConstraint, along: TreeDisplacement) -> GeneralizedVelocities:
+def _back(constraint: CoordinateConstraint, along: TreeDisplacement) -> GeneralizedVelocities:
     """The displacement along a tree's coordinates that takes a limit of one back to where it is kept."""
-    assert isinstance(along, GeneralizedVelocities) and row.of_tree is not None
-    moved = ca.mtimes(row.of_tree.jacobian, along.numbers)
-    return GeneralizedVelocities(along.numbers + ca.mtimes(row.of_tree.response, row.fitting(moved)))
+    assert isinstance(along, GeneralizedVelocities) and constraint.of_tree is not None
+    moved = ca.mtimes(constraint.of_tree.jacobian, along.numbers)
+    return GeneralizedVelocities(along.numbers + ca.mtimes(constraint.of_tree.response, constraint.fitting(moved)))

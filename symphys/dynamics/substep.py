@@ -1,4 +1,4 @@
-"""A substep of time within a step: free motion, rows, sweeps, positions, and what is stored at its end."""
+"""A substep of time within a step: free motion, constraints, sweeps, positions, and what is stored at its end."""
 
 from __future__ import annotations
 
@@ -18,8 +18,6 @@ from symphys.dynamics.contact.preparation import Conditions, prepare
 from symphys.dynamics.context import State, StepContext
 from symphys.dynamics.free_rotation import turned
 from symphys.dynamics.joints.assembly import (
-    JointConstraint,
-    KinematicTrees,
     joint_constraints,
     momenta_of,
     prepare_trees,
@@ -32,7 +30,7 @@ from symphys.dynamics.pgs import apply_start, iterate
 from symphys.dynamics.position_correction import Corrected, close_gaps, displacements
 from symphys.dynamics.prediction import bodies_of, detect_contacts, free_motions, jointed_bodies, predicted_motions
 from symphys.dynamics.tracing.decorator import traced
-from symphys.dynamics.unknowns import Momenta, Momentum, PlacedConstraint, Solution
+from symphys.dynamics.unknowns import Momenta, Momentum, PlacedConstraint
 from symphys.maths import rotation
 from symphys.model.state_layout import BODY_FIELDS
 
@@ -49,16 +47,16 @@ class Substep:
 
     Attributes:
         x: the state at its end.
-        rows, contacts: of the pairs.
+        constraints, contacts: of the pairs.
         impulses: what each has given.
-        changes: of every row, joints too, what it has given and what it had before the final sweep.
+        changes: of every constraint, joints too, what it has given and what it had before the final sweep.
         ahead: (3,) each [N s]: what persistent forces had given to the true velocities ahead of the impulses of
             sweeps. The next substep takes it off again, but after an impact, where leapfrog begins anew, it stays.
         chained: 1 if impacts were left to the next step.
     """
 
     x: State
-    rows: tuple[PlacedConstraint, ...]
+    constraints: tuple[PlacedConstraint, ...]
     contacts: tuple[Contact, ...]
     impulses: tuple[ContactImpulse, ...]
     changes: tuple[tuple[Any, Any], ...]
@@ -69,83 +67,58 @@ class Substep:
 def advance(
     context: StepContext, x: State, duration: Expr, suppressed: Sequence[Expr] = (), plastic: Expr = NONE
 ) -> Substep:
-    """The state after ``duration`` [s].
+    """The state after ``duration`` [s]; numbers are those of the equations in docs/time_step.md.
 
     Pairs whose ``suppressed`` is 1 give no impulse, since the substep ends as they meet. Where ``plastic`` is 1 nothing
     rebounds.
     """
-    kick, half = _times(duration, x["lag"])
+    world, scheme = context.world, context.settings.scheme
+    kick, half = _times(duration, x["lag"])  # (2)
 
-    # free motion, in which impacts find their instant; what joints hold moves as the last step's forces say
+    # 1-2. predicted motion: free (1, 3, 4); of bodies with joints as the forces of the last step have it (5)
     motions = free_motions(context, x, duration)
-    paths = predicted_motions(context, x, duration) if context.world.joints else motions
-    contacts = detect_contacts(context, paths, duration)
-
-    # trees of joints, whose velocities are solved for in the coordinates that joints leave
-    free = tuple(_mid_momentum(motion) for motion in motions)
+    paths = predicted_motions(context, x, duration) if world.joints else motions
+    free = tuple(Momentum(motion.mid_velocity, motion.mid_momentum) for motion in motions)
     trees = prepare_trees(context, paths, free, half)
 
-    # rows: where, when and how the surfaces meet, what acts along the coordinates of joints
-    rows = _contact_rows(context, x, trees, contacts, duration, suppressed or [ca.SX(0)] * len(contacts), plastic)
+    # 3. contacts along the predicted paths (6)
+    contacts = detect_contacts(context, paths, duration)
+
+    # 4. constraints of contacts (7-13) and of joints (25, 26)
+    suppressed = suppressed or [ca.SX(0)] * len(contacts)
+    constraints = []
+    for pair, contact, off in zip(world.pairs, contacts, suppressed, strict=True):
+        bodies = bodies_of(pair)
+        moving = tuple(trees.motions[i] for i in bodies)
+        conditions = Conditions(off, plastic, x[f"{pair.name}.force"], trees.same(bodies), may_couple(world, pair))
+        constraint = prepare(context.settings, pair.law, contact, moving, duration, conditions)
+        constraints.append(trees.placed(bodies, constraint))
     joints, fitted = joint_constraints(context, trees, paths, duration, kick)
 
-    # velocities: warm start, then sweeps
-    given = distribute_loads(context, rows, _warm_start(context, rows, x, kick))
-    solved, by_joints, impulses = _sweep(
-        context, trees, joints, rows, (*warm_started(context, joints, x, kick), *given)
-    )
+    # 5-6. velocities: warm start (16), then projections (14, 15, 17)
+    given = distribute_loads(context, constraints, _warm_start(context, constraints, x, kick))
+    every = (*(each.placed for each in joints), *constraints)
+    start = apply_start(every, trees.states, (*warm_started(context, joints, x, kick), *given))
+    solved = iterate(world, scheme.sweeps, every, start, trees.motions)
+    by_joints, impulses = solved.impulses[: len(joints)], solved.impulses[len(joints) :]
     momenta = momenta_of(context, trees, solved.momenta)
 
-    # positions
-    moved = displacements(context, trees, rows, given, solved.momenta, impulses, duration)
-    closed = close_gaps(context, trees, list(zip(rows, contacts, impulses, strict=True)), fitted, moved)
-
-    # the next state
-    values: State = {"lag": half}
-    resting = _store_forces(context, rows, impulses, kick, values)
+    # 7. positions: displacements (18), then what still overlaps (19)
+    moved = displacements(context, trees, constraints, given, solved.momenta, impulses, duration)
+    closed = close_gaps(context, trees, list(zip(constraints, contacts, impulses, strict=True)), fitted, moved)
     poses, momenta = _poses(context, motions, moved, closed, momenta)
-    if context.world.joints:
-        struck, forces = lasting_forces(context, rows, joints, by_joints, x, kick)
-        add_joint_forces(context, forces, poses, resting)
+
+    # 8. what is stored: persistent forces (20), velocities (21)
+    values: State = {"lag": half}
+    reactions = _store_forces(context, constraints, impulses, kick, values)
+    if world.joints:
+        struck, forces = lasting_forces(context, constraints, joints, by_joints, x, kick)
+        add_joint_forces(context, forces, poses, reactions)
         momenta = keep_momentum(context, momenta, closed.made, struck, duration)
-        warm = context.settings.scheme.warm_start
-        values |= forces if warm else {name: ca.SX.zeros(force.shape) for name, force in forces.items()}
-    values |= _moving_bodies(context, motions, momenta, resting, poses)
-    return Substep(
-        values, tuple(rows), tuple(contacts), impulses, tuple(zip(solved.impulses, solved.last, strict=True))
-    )
-
-
-def _contact_rows(
-    context: StepContext,
-    x: State,
-    trees: KinematicTrees,
-    contacts: Sequence[Contact],
-    duration: Expr,
-    suppressed: Sequence[Expr],
-    plastic: Expr,
-) -> list[PlacedConstraint]:
-    rows = []
-    for pair, contact, off in zip(context.world.pairs, contacts, suppressed, strict=True):
-        bodies, force = bodies_of(pair), x[f"{pair.name}.force"]
-        conditions = Conditions(off, plastic, force, trees.same(bodies), may_couple(context.world, pair))
-        arguments = pair.law, contact, tuple(trees.motions[i] for i in bodies), duration, conditions
-        rows.append(trees.row(bodies, prepare(context.settings, *arguments)))
-    return rows
-
-
-def _sweep(
-    context: StepContext,
-    trees: KinematicTrees,
-    joints: Sequence[JointConstraint],
-    rows: Sequence[PlacedConstraint],
-    start: Sequence[Any],
-) -> tuple[Solution, tuple[Any, ...], tuple[ContactImpulse, ...]]:
-    """What sweeps come to from these impulses; and of it the impulses of joints, and those of contacts."""
-    every = (*(each.row for each in joints), *rows)
-    state = apply_start(every, trees.states, start)
-    solved = iterate(context.world, context.settings.scheme.sweeps, every, state, trees.motions)
-    return solved, solved.impulses[: len(joints)], solved.impulses[len(joints) :]
+        values |= forces if scheme.warm_start else {name: ca.SX.zeros(*force.shape) for name, force in forces.items()}
+    values |= _moving_bodies(context, motions, momenta, reactions, poses)
+    changes = tuple(zip(solved.impulses, solved.last, strict=True))
+    return Substep(values, tuple(constraints), tuple(contacts), impulses, changes)
 
 
 def _poses(
@@ -175,23 +148,18 @@ def _moving_bodies(
     context: StepContext,
     motions: Sequence[PredictedMotion],
     momenta: Momenta,
-    resting: Sequence[tuple[Expr, Expr]],
+    reactions: Sequence[tuple[Expr, Expr]],
     poses: Sequence[tuple[Expr, Expr]],
 ) -> State:
     """The fields of all bodies at the end of the substep."""
     values = State()
-    ended = [_end_momentum(*parts) for parts in zip(motions, momenta, resting, strict=True)]
+    ended = [_end_momentum(*parts) for parts in zip(motions, momenta, reactions, strict=True)]
     apart = [_velocities(*parts) for parts in zip(motions, ended, poses, strict=True)]
     moving = project_velocities(context, ended, poses, apart)
-    for body, pose, velocities, reaction in zip(context.world.bodies, poses, moving, resting, strict=True):
+    for body, pose, velocities, reaction in zip(context.world.bodies, poses, moving, reactions, strict=True):
         stored = (*pose, *velocities, *reaction)
         values |= {f"{body.name}.{field}": value for (field, _), value in zip(BODY_FIELDS, stored, strict=True)}
     return values
-
-
-@traced
-def _mid_momentum(motion: PredictedMotion) -> Momentum:
-    return Momentum(motion.mid_velocity, motion.mid_momentum)
 
 
 @traced
@@ -200,15 +168,17 @@ def _times(duration: Expr, lag: Expr) -> tuple[Expr, Expr]:
     return duration / 2 + lag, duration / 2
 
 
-def _warm_start(context: StepContext, rows: Sequence[PlacedConstraint], x: State, kick: Expr) -> list[ContactImpulse]:
+def _warm_start(
+    context: StepContext, constraints: Sequence[PlacedConstraint], x: State, kick: Expr
+) -> list[ContactImpulse]:
     """The last step's persistent forces, over this step's kick, in this step's frames."""
     if not context.settings.scheme.warm_start:
-        return [ZERO for _ in rows]
+        return [ZERO for _ in constraints]
     impulses = []
-    for pair, each in zip(context.world.pairs, rows, strict=True):
+    for pair, each in zip(context.world.pairs, constraints, strict=True):
         force = x[f"{pair.name}.force"]
         torque = x[f"{pair.name}.torque"] if pair.law.spins else None
-        impulses.append(_resumed(each.row.impulse_normal, kick, force, torque))
+        impulses.append(_resumed(each.constraint.impulse_normal, kick, force, torque))
     return impulses
 
 
@@ -228,7 +198,7 @@ def _split(impulse: Expr, n: Expr) -> tuple[Expr, Expr]:
 
 def _store_forces(
     context: StepContext,
-    rows: Sequence[PlacedConstraint],
+    constraints: Sequence[PlacedConstraint],
     impulses: Sequence[ContactImpulse],
     kick: Expr,
     values: State,
@@ -236,25 +206,29 @@ def _store_forces(
     """Persistent contact forces (impacts left out) into ``values``; returns their sum on each body."""
     scheme = context.settings.scheme
     total = [(ca.SX.zeros(3), ca.SX.zeros(3)) for _ in context.world.bodies]
-    for pair, each, impulse in zip(context.world.pairs, rows, impulses, strict=True):
-        force, torque = _persistent(each.row, impulse, kick, context.shortest_kick)
+    for pair, each, impulse in zip(context.world.pairs, constraints, impulses, strict=True):
+        force, torque = _persistent(each.constraint, impulse, kick, context.shortest_kick)
         values[f"{pair.name}.force"] = force if scheme.warm_start else ca.SX.zeros(3)
         if pair.law.spins:
             values[f"{pair.name}.torque"] = torque if scheme.warm_start else ca.SX.zeros(3)
         for k, body in enumerate(each.bodies):
-            total[body] = _summed(total[body], each.row, k, force, torque)
+            total[body] = _summed(total[body], each.constraint, k, force, torque)
     return total
 
 
 @traced
-def _persistent(row: ContactConstraint, impulse: ContactImpulse, kick: Expr, shortest: float) -> tuple[Expr, Expr]:
-    share = (1 - row.leaving) * (1 - row.struck) / ca.fmax(kick, shortest)
-    return share * impulse.linear(row.impulse_normal), share * impulse.angular(row.impulse_normal)
+def _persistent(
+    constraint: ContactConstraint, impulse: ContactImpulse, kick: Expr, shortest: float
+) -> tuple[Expr, Expr]:
+    share = (1 - constraint.leaving) * (1 - constraint.struck) / ca.fmax(kick, shortest)
+    return share * impulse.linear(constraint.impulse_normal), share * impulse.angular(constraint.impulse_normal)
 
 
 @traced
-def _summed(total: tuple[Expr, Expr], row: ContactConstraint, k: int, force: Expr, torque: Expr) -> tuple[Expr, Expr]:
-    term = row.terms[k]
+def _summed(
+    total: tuple[Expr, Expr], constraint: ContactConstraint, k: int, force: Expr, torque: Expr
+) -> tuple[Expr, Expr]:
+    term = constraint.terms[k]
     turning = ca.cross(term.impulse_arm, force) + torque
     return total[0] + term.sign * force, total[1] + term.sign * turning
 
@@ -287,9 +261,9 @@ def _free_pose(
 
 
 @traced
-def _end_momentum(motion: PredictedMotion, momentum: Momentum, resting: tuple[Expr, Expr]) -> Momentum:
+def _end_momentum(motion: PredictedMotion, momentum: Momentum, reactions: tuple[Expr, Expr]) -> Momentum:
     """At the end of the substep."""
-    half, (force, torque) = motion.dt / 2, resting
+    half, (force, torque) = motion.dt / 2, reactions
     return Momentum(
         momentum.velocity + half * (motion.acceleration + force / motion.mass),
         momentum.angular + half * (motion.torque + torque),

@@ -43,14 +43,14 @@ AllVelocities = tuple[Velocities, ...]
 
 
 AnyImpulse = Any
-"""What a row gives: ``impulse.Impulse`` of a contact, ``along.Along`` of a joint."""
+"""``ContactImpulse`` of a contact, ``JointImpulse`` of a joint."""
 
 
 class Constraint(Protocol):
-    """What sweeps visit. Implementations are frozen dataclasses."""
+    """What a sweep projects. Implementations are frozen dataclasses."""
 
     def project(self, momenta: AllVelocities, old: AnyImpulse) -> tuple[AllVelocities, AnyImpulse]:
-        """One projection: the momenta of the row's bodies and what the row has given since the sweeps began."""
+        """One projection: the momenta of the bodies, and the accumulated impulse after it."""
         ...
 
     def apply(self, momenta: AllVelocities, impulse: AnyImpulse) -> AllVelocities:
@@ -60,7 +60,7 @@ class Constraint(Protocol):
 
 @dataclass(frozen=True)
 class Solution:
-    """What the sweeps have come to: of all bodies, of all rows, and of all rows before the last sweep."""
+    """Momenta of all bodies, accumulated impulses of all constraints, and these before the last sweep."""
 
     momenta: AllVelocities
     impulses: tuple[AnyImpulse, ...]
@@ -69,14 +69,14 @@ class Solution:
 
 @dataclass(frozen=True)
 class PlacedConstraint:
-    """A row.
+    """A constraint and the bodies that it acts on.
 
     Attributes:
-        bodies: indices of those on its moving sides.
-        row: Solvable.
-        carriers: where the sweeps keep what they know of those bodies: at themselves, or at the root of their tree.
+        bodies: indices of those that can move.
+        constraint: see ``Constraint``.
+        carriers: where the velocities of these bodies are stored: at themselves, or at the root of their tree.
     """
 
     bodies: tuple[int, ...]
-    row: Any
+    constraint: Any
     carriers: tuple[int, ...]

@@ -114,7 +114,7 @@ def still(terms: Sequence[BodyTerm]) -> tuple[Any, ...]:
 
 
 def point_jacobian(motion: PredictedMotion, t: Expr, arm: Expr, impulse_arm: Expr) -> PointJacobian | None:
-    """The reach of a term at a row's instant."""
+    """The reach of a term at a constraint's instant."""
     jacobian = motion.jacobian
     if jacobian is None:
         return None
@@ -141,16 +141,16 @@ def at_touch(contact: Contact, motions: Motions, t: Expr) -> tuple[Expr, Expr, E
     return velocity, acceleration, frame.normal
 
 
-def body_terms(motions: Motions, row_time: Expr, frame: Frame, applied: Frame) -> tuple[BodyTerm, ...]:
-    """The terms of a row that is evaluated at ``row_time`` in ``frame`` and whose impulse acts in ``applied``."""
+def body_terms(motions: Motions, instant: Expr, frame: Frame, applied: Frame) -> tuple[BodyTerm, ...]:
+    """The terms of a constraint that is evaluated at ``instant`` in ``frame`` and whose impulse acts in ``applied``."""
     return tuple(
         BodyTerm(
             sign=1 - 2 * k,
             inverse_mass=1 / motion.mass,
-            inverse_inertia=motion.inverse_inertia(row_time),
+            inverse_inertia=motion.inverse_inertia(instant),
             arm=frame.arms[k],
             impulse_arm=applied.arms[k],
-            jacobian=point_jacobian(motion, row_time, frame.arms[k], applied.arms[k]),
+            jacobian=point_jacobian(motion, instant, frame.arms[k], applied.arms[k]),
         )
         for k, motion in enumerate(motions)
     )

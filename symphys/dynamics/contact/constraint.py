@@ -29,7 +29,7 @@ Expr = Any
 
 NEVER = ca.SX(0)
 UNREACHED = -1e6
-"""[m/s] a normal velocity that no row reaches: it gives no impulse."""
+"""[m/s] a normal velocity that no constraint reaches: it gives no impulse."""
 LEAST = 0.01
 """Of W_nn: the least effective inverse mass of a sliding contact."""
 FLAT = 1e-12
@@ -89,7 +89,7 @@ class ContactConstraint:
     Attributes:
         law: of the pair.
         terms: one or two moving terms.
-        normal: (3,) at the row's instant; the impulse's normal is ``impulse_normal``.
+        normal: (3,) at the constraint's instant; the impulse's normal is ``impulse_normal``.
         impulse_normal: (3,).
         delassus_column: (3,) relative velocity of the touching points for a unit normal impulse [1/kg].
         separates: 1 if such an impulse separates them, else 0: the contact gives none then.

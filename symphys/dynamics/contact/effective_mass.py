@@ -49,7 +49,7 @@ def delassus_column(terms: Sequence[BodyTerm], n: Expr, same: bool) -> Expr:
 
 
 def separates(terms: Sequence[BodyTerm], n: Expr, column: Expr) -> Expr:
-    """1 if an impulse parts the surfaces: where joints turn far between its instant and the row's it may pull.
+    """1 if an impulse parts the surfaces: where joints turn far between its instant and the constraint's it may pull.
 
     Sweeps would answer each pull by a stronger one: a shin that was struck, at 90 rad/s at 10 ms a step, sent its robot
     to 1e19 m/s within a step.
@@ -76,7 +76,7 @@ def inverse_masses(terms: Sequence[BodyTerm], n: Expr, push: Expr, twist: Expr) 
 
 
 def effective_masses(normal: Expr, tangent: Expr, spin: Expr, roll: Expr) -> dict[str, Expr]:
-    """The fields of a row from the inverse effective masses k; here they are inverted once, not in each sweep."""
+    """The fields of a constraint from the inverse effective masses k, which are inverted once, not in each sweep."""
     return {"normal_mass": 1 / normal, "tangent_mass": 1 / tangent, "spin_mass": 1 / spin, "roll_mass": 1 / roll}
 
 

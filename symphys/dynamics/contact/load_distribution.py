@@ -32,14 +32,14 @@ BLUNT = 1e-12
 
 
 def distribute_loads(
-    context: StepContext, rows: Sequence[PlacedConstraint], impulses: Sequence[ContactImpulse]
+    context: StepContext, constraints: Sequence[PlacedConstraint], impulses: Sequence[ContactImpulse]
 ) -> list[ContactImpulse]:
     """The impulses with normal parts that are linear across each face; what carries no load takes no part."""
     found = list(impulses)
     if not context.settings.scheme.load_sharing:
         return found
     for group in faces(context.world):
-        loads = _linear(tuple(rows[k].row for k in group), tuple(found[k].normal for k in group))
+        loads = _linear(tuple(constraints[k].constraint for k in group), tuple(found[k].normal for k in group))
         for k, load in zip(group, loads, strict=True):
             found[k] = replace(found[k], normal=load)
     return found
@@ -62,10 +62,13 @@ def _face(world: World, pair: Pair) -> Any:
 
 
 @traced
-def _linear(rows: tuple[ContactConstraint, ...], loads: tuple[Expr, ...]) -> tuple[Expr, ...]:
-    parts = [ca.fmax(load - row.load, 0) / ca.fmax(load, row.load) for row, load in zip(rows, loads, strict=True)]
+def _linear(constraints: tuple[ContactConstraint, ...], loads: tuple[Expr, ...]) -> tuple[Expr, ...]:
+    parts = [
+        ca.fmax(load - constraint.load, 0) / ca.fmax(load, constraint.load)
+        for constraint, load in zip(constraints, loads, strict=True)
+    ]
     total = sum(parts) + BLUNT
-    arms = [ca.cross(row.terms[0].impulse_arm, row.impulse_normal) for row in rows]
+    arms = [ca.cross(constraint.terms[0].impulse_arm, constraint.impulse_normal) for constraint in constraints]
     middle = sum(part * arm for part, arm in zip(parts, arms, strict=True)) / total
     mean = sum(part * load for part, load in zip(parts, loads, strict=True)) / total
     torque, spread = ca.SX.zeros(3), ca.SX.zeros(3, 3)

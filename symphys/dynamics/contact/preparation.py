@@ -71,13 +71,13 @@ class Conditions:
 def prepare(
     settings: StepSettings, law: Law, contact: Contact, motions: Motions, duration: Expr, conditions: Conditions
 ) -> ContactConstraint:
-    """The row of a contact along the free motions of its moving terms, over a substep of ``duration`` [s]."""
+    """The constraint of a contact along the free motions of its moving terms, over a substep of ``duration`` [s]."""
     scheme, smoothing, half = settings.scheme, settings.smoothing, duration / 2
     suppressed, same, coupled = conditions.suppressed, conditions.same, conditions.coupled
     touch = _touch(settings, law, contact, motions, duration, conditions)
-    row_time = half + touch.leaving * (touch.time - half)
-    frame, applied = contact.geometry.frame(row_time), contact.geometry.frame(touch.leaving * touch.time)
-    terms = body_terms(motions, row_time, frame, applied)
+    instant = half + touch.leaving * (touch.time - half)
+    frame, applied = contact.geometry.frame(instant), contact.geometry.frame(touch.leaving * touch.time)
+    terms = body_terms(motions, instant, frame, applied)
     push, twist = symmetric_mobilities(terms, same)
     k_normal, *k_others = inverse_masses(terms, frame.normal, push, twist)
     slack = ca.if_else(suppressed, ANY, _slack(settings, contact, touch))
@@ -221,7 +221,7 @@ def _slack(settings: StepSettings, contact: Contact, touch: _Touch) -> Expr:
 def _normal_target(
     law: Law, contact: Contact, duration: Expr, touch: _Touch, inverse_mass: Expr, away: Expr, smoothing: Expr
 ) -> tuple[Expr, Expr]:
-    """(softness, target): the velocity that the normal row asks for at the middle of the step.
+    """(softness, target): the velocity that the normal constraint asks for at the middle of the step.
 
     Hit: the rebound carried from t* to the middle, b = max(u + n.f* (dt/2 - t*), 0). Not hit: ``away``, that of the
     free motion less what would close the gap that this leaves at the end.

@@ -37,7 +37,7 @@ class DeferredImpacts:
     plastic: Expr
 
 
-def defer_impacts(context: StepContext, x: State, duration: Expr, cuts: Sequence[Split]) -> DeferredImpacts:
+def defer_impacts(context: StepContext, x: State, duration: Expr, splits: Sequence[Split]) -> DeferredImpacts:
     """What must give no impulse within ``duration`` [s], the last substep of a step.
 
     That is what closes at speed but does not meet. And, where surfaces rebound or bodies can be hit off their centres,
@@ -58,7 +58,7 @@ def defer_impacts(context: StepContext, x: State, duration: Expr, cuts: Sequence
     for pair, contact, (fast, meets) in zip(pairs, contacts, hits, strict=True):
         waits = _passes(fast, meets)
         for body in sorted(first.keys() & set(bodies_of(pair))):
-            struck = [cut.struck[j] for cut in cuts for j, other in enumerate(pairs) if body in bodies_of(other)]
+            struck = [split.struck[j] for split in splits for j, other in enumerate(pairs) if body in bodies_of(other)]
             struck = struck if body in eccentric else []
             waits = _later(waits, fast, contact.time, first[body][0], tuple(struck))
             if (room := _room(world, pair, eccentric)) is not None:

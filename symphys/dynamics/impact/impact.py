@@ -42,10 +42,10 @@ TOUCHING = 1e-3
 
 @dataclass(frozen=True)
 class Split:
-    """Where a step is cut in two.
+    """Where a step is split in two.
 
     Attributes:
-        impact: 1 if the cut is an impact, 0 if there is none.
+        impact: 1 if the split is an impact, 0 if there is none.
         first: length of the first substep [s].
         fast: per pair: 1 if it closes at speed.
         struck: per pair: 1 if it meets at speed then.
@@ -62,7 +62,7 @@ class Split:
 def find_split(context: StepContext, x: State, duration: Expr, share: float) -> Split:
     """The first impact within ``duration`` [s], on paths under the persistent forces of the last step.
 
-    Without an impact the cut is at ``share`` of the duration.
+    Without an impact the split is at ``share`` of the duration.
     """
     contacts = detect_contacts(context, predicted_motions(context, x, duration), duration)
     fast = [strikes(context.settings, p.law, c) for p, c in zip(context.world.pairs, contacts, strict=True)]
@@ -92,7 +92,7 @@ def _earlier(earliest: tuple[Expr, Expr], closes: Expr, hit: Expr, time: Expr, d
 
 @traced
 def _until(earliest: Expr, first: Expr, dt: float) -> Expr:
-    """When the last of the impacts that share the cut may be; none may be left between its instant and the cut."""
+    """When the last of the impacts that share the split may be; none may be left between its instant and the split."""
     return ca.fmax(earliest, first) + TOGETHER * dt
 
 
@@ -108,7 +108,7 @@ def _late(earliest: Expr, struck: Expr, time: Expr) -> Expr:
 
 @traced
 def _inside(earliest: tuple[Expr, Expr], duration: Expr, share: float) -> Expr:
-    """The length of the substep before the cut; near an end it is shifted, not clamped, so that its slope stays.
+    """The length of the substep before the split; near an end it is shifted, not clamped, so that its slope stays.
 
     Surfaces that rounding has put beyond each other meet at a time below 0 (``touch.falls``).
     """
@@ -118,44 +118,34 @@ def _inside(earliest: tuple[Expr, Expr], duration: Expr, share: float) -> Expr:
     return ca.if_else(earliest[0], time + shift, share * duration)
 
 
-def resolve_impact(context: StepContext, x: State, cut: Split) -> Substep:
-    """The state after the impacts at ``cut``; leapfrog begins anew there, so ``lag`` is 0. Without one the same x."""
+def resolve_impact(context: StepContext, x: State, split: Split) -> Substep:
+    """The state after the impacts at ``split``; leapfrog begins anew there, so ``lag`` is 0. Without one the same x."""
     duration = ca.SX(context.settings.scheme.dt)
-    motions = [PredictedMotion.at_start(motion) for motion in predicted_motions(context, x, duration)]
+    motions = [motion.at_start() for motion in predicted_motions(context, x, duration)]
     contacts = detect_contacts(context, motions, duration)
-    momenta = tuple(_momentum(motion) for motion in motions)
+    momenta = tuple(Momentum(motion.velocity, motion.momentum_k) for motion in motions)
     trees = prepare_trees(context, motions, momenta, ca.SX(0))
-    rows = []
-    for pair, contact, struck in zip(context.world.pairs, contacts, cut.struck, strict=True):
+    constraints = []
+    for pair, contact, struck in zip(context.world.pairs, contacts, split.struck, strict=True):
         bodies = bodies_of(pair)
         moving = tuple(trees.motions[i] for i in bodies)
         coupled = may_couple(context.world, pair)
-        arguments = pair.law, contact, moving, struck, cut.impact, trees.same(bodies), coupled
-        rows.append(trees.row(bodies, _row(context.settings, *arguments)))
+        arguments = pair.law, contact, moving, struck, split.impact, trees.same(bodies), coupled
+        constraints.append(trees.placed(bodies, _constraint(context.settings, *arguments)))
     locks = locks_at(context, trees)
-    n, still = len(locks), (*(nothing for _, nothing in locks), *(ZERO for _ in rows))
-    every = (*(row for row, _ in locks), *rows)
+    n, still = len(locks), (*(nothing for _, nothing in locks), *(ZERO for _ in constraints))
+    every = (*(constraint for constraint, _ in locks), *constraints)
     solved = rebound(context, every, Solution(trees.states, still, still), motions, trees)
-    after = _with_velocities(context, x, motions, momenta_of(context, trees, solved.momenta), cut.impact)
-    _delay(context, after, rows, solved.impulses[n:], cut.late)
+    after = _with_velocities(context, x, motions, momenta_of(context, trees, solved.momenta), split.impact)
+    _delay(context, after, constraints, solved.impulses[n:], split.late)
     forces = (x[f"{pair.name}.force"] for pair in context.world.pairs)
-    ahead = tuple(_ahead(cut.impact, x["lag"], force) for force in forces)
+    ahead = tuple(split.impact * x["lag"] * force for force in forces)
     changes = tuple(zip(solved.impulses, solved.last, strict=True))
-    return Substep(after, tuple(rows), tuple(contacts), solved.impulses[n:], changes, ahead)
+    return Substep(after, tuple(constraints), tuple(contacts), solved.impulses[n:], changes, ahead)
 
 
 @traced
-def _momentum(motion: PredictedMotion) -> Momentum:
-    return Momentum(motion.velocity, motion.momentum_k)
-
-
-@traced
-def _ahead(impact: Expr, lag: Expr, force: Expr) -> Expr:
-    return impact * lag * force
-
-
-@traced
-def _row(
+def _constraint(
     settings: StepSettings,
     law: Law,
     contact: Contact,
@@ -165,7 +155,7 @@ def _row(
     same: bool,
     coupled: bool,
 ) -> ContactConstraint:
-    """The row of a contact at the instant of an impact: of it where ``struck``, of its bodies where they touch."""
+    """The constraint of a contact at an impact: where ``struck`` it rebounds, where it touches it holds."""
     now, scheme = ca.SX(0), settings.scheme
     touching = ca.logic_and(impact, contact.gap < TOUCHING * settings.reference * scheme.dt**2)
     velocity, _, normal = at_touch(contact, motions, now)
@@ -214,29 +204,29 @@ def _with_velocities(
 def _delay(
     context: StepContext,
     x: State,
-    rows: Sequence[PlacedConstraint],
+    constraints: Sequence[PlacedConstraint],
     impulses: Sequence[ContactImpulse],
     late: Sequence[Expr],
 ) -> None:
     """Take back what each impulse does to positions before its own instant, on bodies without joints.
 
-    Impacts of several bodies at one instant share a cut, but each has an instant with a slope of its own.
+    Impacts of several bodies at one instant share a split, but each has an instant with a slope of its own.
     """
     held = {index for joint in context.world.joints for index in joint.bodies}
-    for each, impulse, time in zip(rows, impulses, late, strict=True):
+    for each, impulse, time in zip(constraints, impulses, late, strict=True):
         for k, index in enumerate(each.bodies):
             names = tuple(f"{context.world.bodies[index].name}.{part}" for part in ("position", "orientation"))
             if index not in held:
                 pose = x[names[0]], x[names[1]]
-                x |= zip(names, _delayed(pose, each.row, k, impulse, time), strict=True)
+                x |= zip(names, _delayed(pose, each.constraint, k, impulse, time), strict=True)
 
 
 @traced
 def _delayed(
-    pose: tuple[Expr, Expr], row: ContactConstraint, k: int, impulse: ContactImpulse, time: Expr
+    pose: tuple[Expr, Expr], constraint: ContactConstraint, k: int, impulse: ContactImpulse, time: Expr
 ) -> tuple[Expr, Expr]:
-    term, (position, q) = row.terms[k], pose
-    push, twist = impulse.linear(row.impulse_normal), impulse.angular(row.impulse_normal)
+    term, (position, q) = constraint.terms[k], pose
+    push, twist = impulse.linear(constraint.impulse_normal), impulse.angular(constraint.impulse_normal)
     early = -time * term.sign
     turn = early * apply(term.inverse_inertia, ca.cross(term.impulse_arm, push) + twist)
     return position + early * term.inverse_mass * push, q + rotation.multiply(ca.vertcat(0, turn / 2), q)

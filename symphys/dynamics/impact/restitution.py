@@ -50,7 +50,7 @@ def eccentric_bodies(world: World) -> set[int]:
 
 def rebound(
     context: StepContext,
-    rows: tuple[PlacedConstraint, ...],
+    constraints: tuple[PlacedConstraint, ...],
     start: Solution,
     motions: Sequence[PredictedMotion],
     trees: KinematicTrees,
@@ -58,10 +58,10 @@ def rebound(
     """The impulses of an impact, and the momenta after it."""
     scheme = context.settings.scheme
     if not (scheme.energy_cap and eccentric_bodies(context.world)):
-        return iterate(context.world, scheme.sweeps, rows, start, motions)
-    dead = tuple(replace(each, row=_without_rebound(each.row)) for each in rows)
+        return iterate(context.world, scheme.sweeps, constraints, start, motions)
+    dead = tuple(replace(each, constraint=_without_rebound(each.constraint)) for each in constraints)
     plastic = iterate(context.world, scheme.sweeps, dead, start, motions)
-    newton = iterate(context.world, scheme.sweeps, rows, plastic, motions)
+    newton = iterate(context.world, scheme.sweeps, constraints, plastic, motions)
     sums: tuple[Expr, Expr, Expr] = (ca.SX(0), ca.SX(0), ca.SX(0))
     bodies = (momenta_of(context, trees, solution.momenta) for solution in (start, plastic, newton))
     for motion, *momenta in zip(motions, *bodies, strict=True):
@@ -75,10 +75,10 @@ def rebound(
 
 
 @traced
-def _without_rebound(row: Any) -> Any:
-    if not isinstance(row, ContactConstraint):
-        return row
-    return replace(row, target=ca.fmin(row.target, 0))
+def _without_rebound(constraint: Any) -> Any:
+    if not isinstance(constraint, ContactConstraint):
+        return constraint
+    return replace(constraint, target=ca.fmin(constraint.target, 0))
 
 
 @traced

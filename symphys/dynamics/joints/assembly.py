@@ -1,4 +1,4 @@
-"""Joints within a substep: their trees and rows, what these start from, and what is stored of what they gave."""
+"""Joints within a substep: their trees and constraints, what these start from, and what is stored of what they gave."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ class KinematicTrees:
     states: AllVelocities
     carriers: tuple[int, ...]
 
-    def row(self, bodies: tuple[int, ...], row: Any) -> PlacedConstraint:
-        """A row on these bodies."""
-        return PlacedConstraint(bodies, row, tuple(self.carriers[i] for i in bodies))
+    def placed(self, bodies: tuple[int, ...], constraint: Any) -> PlacedConstraint:
+        """A constraint on these bodies."""
+        return PlacedConstraint(bodies, constraint, tuple(self.carriers[i] for i in bodies))
 
     def same(self, bodies: tuple[int, ...]) -> bool:
         """Whether both are of one tree."""
@@ -100,14 +100,14 @@ def momenta_of(context: StepContext, trees: KinematicTrees, solved: AllVelocitie
 
 @dataclass(frozen=True)
 class JointConstraint:
-    """A row of a joint.
+    """A constraint of a joint.
 
     Attributes:
-        row: what sweeps, or the position pass, visit.
+        placed: what sweeps, or the position pass, visit.
         name, k: where the state keeps what it gave: component ``k`` of ``name``, all of it if None.
     """
 
-    row: PlacedConstraint
+    placed: PlacedConstraint
     name: str
     k: int | None = None
 
@@ -124,7 +124,7 @@ def joint_constraints(
         bare = tuple(paths[i] for i in joint.bodies)
         frames, same = joint_frames(joint, bare), trees.same(joint.bodies)
         if index not in places:
-            lock = trees.row(joint.bodies, lock_constraint(settings, frames, moving, substep, same))
+            lock = trees.placed(joint.bodies, lock_constraint(settings, frames, moving, substep, same))
             visited.append(JointConstraint(lock, f"{joint.name}.lock"))
             fitted += [] if joint.soft else [lock]
         for k in range(len(joint.kind.coordinates)) if joint.acting else ():
@@ -133,9 +133,9 @@ def joint_constraints(
             command = context.input(f"{joint.name}.command")
             command = ca.SX(0) if command is None else command[k]
             for part in joint.acting:
-                row = trees.row(joint.bodies, CONSTRAINTS[part](settings, joint, at, command, substep))
-                visited.append(JointConstraint(row, f"{joint.name}.{part}", k))
-                fitted += [row] if part in LIMITS else []
+                constraint = trees.placed(joint.bodies, CONSTRAINTS[part](settings, joint, at, command, substep))
+                visited.append(JointConstraint(constraint, f"{joint.name}.{part}", k))
+                fitted += [constraint] if part in LIMITS else []
     return visited, fitted
 
 
@@ -150,7 +150,7 @@ def _places(world: World, trees: KinematicTrees) -> dict[int, tuple[int, Expr]]:
 
 
 def locks_at(context: StepContext, trees: KinematicTrees) -> list[tuple[PlacedConstraint, JointImpulse]]:
-    """The rows of joints that close loops or give way, at an instant at which velocities change; and no impulse."""
+    """The constraints, without impulse, of joints that close loops or are soft, at the instant of an impact."""
     found, exact = [], tree_joints(context.world.joints)
     for index, joint in enumerate(context.world.joints):
         if index in exact:
@@ -158,28 +158,30 @@ def locks_at(context: StepContext, trees: KinematicTrees) -> list[tuple[PlacedCo
         moving = tuple(trees.motions[i] for i in joint.bodies)
         states = tuple(trees.states[trees.carriers[i]] for i in joint.bodies)
         frames = joint_frames(joint, moving)
-        row = lock_at_impact(frames, moving, states, trees.same(joint.bodies))
-        found.append((trees.row(joint.bodies, row), JointImpulse(ca.SX(joint.locked, 1))))
+        constraint = lock_at_impact(frames, moving, states, trees.same(joint.bodies))
+        found.append((trees.placed(joint.bodies, constraint), JointImpulse(ca.SX(joint.locked, 1))))
     return found
 
 
-def warm_started(context: StepContext, rows: Sequence[JointConstraint], x: State, kick: Expr) -> list[JointImpulse]:
+def warm_started(
+    context: StepContext, constraints: Sequence[JointConstraint], x: State, kick: Expr
+) -> list[JointImpulse]:
     """What the sweeps start from: the last step's forces over this substep's kick."""
     if not context.settings.scheme.warm_start:
-        return [JointImpulse(ca.SX(numbers_of(each.row.row), 1)) for each in rows]
-    return [_again(each.row.row, x[each.name], each.k, kick) for each in rows]
+        return [JointImpulse(ca.SX(numbers_of(each.placed.constraint), 1)) for each in constraints]
+    return [_again(each.placed.constraint, x[each.name], each.k, kick) for each in constraints]
 
 
-def numbers_of(row: LockConstraint | CoordinateConstraint) -> int:
-    """How many impulses a row gives."""
-    return row.error.leaf.rows if isinstance(row, LockConstraint) else 1
+def numbers_of(constraint: LockConstraint | CoordinateConstraint) -> int:
+    """How many impulses a constraint gives."""
+    return constraint.error.leaf.rows if isinstance(constraint, LockConstraint) else 1
 
 
 def own(stored: Expr, k: int | None) -> Expr:
-    """What is a row's of a stored column."""
+    """What is a constraint's of a stored column."""
     return stored if k is None else stored[k]
 
 
 @traced
-def _again(row: LockConstraint | CoordinateConstraint, stored: Expr, k: int | None, kick: Expr) -> JointImpulse:
-    return row.taken_up(kick * own(stored, k))
+def _again(constraint: LockConstraint | CoordinateConstraint, stored: Expr, k: int | None, kick: Expr) -> JointImpulse:
+    return constraint.taken_up(kick * own(stored, k))

@@ -1,4 +1,4 @@
-"""The row of one thing that acts along a coordinate of a joint: a motor, a limit, a spring.
+"""The constraint of one thing that acts along a coordinate of a joint: a motor, a limit, a spring.
 
 A sweep gives  impulse <- clip(keep impulse - slope rate - offset, low, high).  A velocity that is asked for with
 impulse bounds: keep 1, slope m, offset -m target, with m the effective mass. A law a + b rate of the force, solved for
@@ -34,8 +34,8 @@ class CoordinateConstraint:
     """What acts along one coordinate, as the sweeps see it; impulses in [N m s], or [N s] where it slides.
 
     Attributes:
-        terms: arms at the row's instant, and to the common point for impulses.
-        seen, given_along: the one direction at the row's instant, and of the impulse.
+        terms: arms at the constraint's instant, and to the common point for impulses.
+        seen, given_along: the one direction at the constraint's instant, and of the impulse.
         keep, slope, offset: see the module.
         low, high: bounds of the impulse; None where there is none.
         width: of the smoothed bounds [N m s].
@@ -100,11 +100,11 @@ class CoordinateConstraint:
 
 
 def towards(target: Expr, mobility: Expr) -> dict[str, Expr]:
-    """The coefficients of a row that asks for a velocity."""
+    """The coefficients of a constraint that asks for a velocity."""
     return {"keep": ca.SX(1), "slope": 1 / mobility, "offset": -target / mobility}
 
 
 def by_law(a: Expr, b: Expr, mobility: Expr) -> dict[str, Expr]:
-    """The coefficients of a row whose impulse is -(a + b rate)."""
+    """The coefficients of a constraint whose impulse is -(a + b rate)."""
     share = 1 / (1 + b * mobility)
     return {"keep": b * mobility * share, "slope": b * share, "offset": a * share}

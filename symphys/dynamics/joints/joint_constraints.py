@@ -1,10 +1,9 @@
-"""The rows of one joint over a substep: seen at its middle, given at its start, so that motion about it keeps energy.
+"""The constraints of one joint over a substep: evaluated at its middle, applied at its start, which keeps energy.
 
-Impulses act on one point of both terms. Rows and impulses both at the middle would cost a pendulum a fifth of its
-energy in five seconds. A rigid lock asks for no velocity at all, and the position pass takes back what is left of its
-error, of third order in a step. Asking for -error / dt (SHAKE) would do both at once, but feeds errors back through the
-forces that the sweeps start from, which is unstable as soon as these do not converge by half in a step: chains of four
-then burst.
+Impulses act on one point of both bodies. With both at the middle a pendulum would lose a fifth of its energy in five
+seconds. A rigid lock asks for zero velocity, and the position pass takes back what is left of its error, of third order
+in a step. Asking for -error / dt (SHAKE) would do both at once, but feeds errors back through the forces that the
+sweeps start from, which is unstable as soon as these do not converge by half in a step: chains of four then burst.
 """
 
 from __future__ import annotations
@@ -46,10 +45,10 @@ class SubstepTimes:
 
 @dataclass(frozen=True)
 class CoordinateTerms:
-    """What every row along a coordinate needs.
+    """What every constraint along a coordinate needs.
 
     Attributes:
-        terms, seen, given: as of any row.
+        terms, seen, given: as of any constraint.
         value: [rad] or [m].
         rate: at the middle of the substep, before any impulse of it.
         rate_now, rate_due: at its start, and at its middle if forces stay what they were.
@@ -155,10 +154,19 @@ def coordinate_terms(
         rate, k_of = speeds(terms, seen, momenta), mobility(terms, seen, place)
         return CoordinateTerms(terms, seen, given, value, rate, rate_now, rate_due, k_of, place, None)
     index, responses = place[0] + k, place[1]
-    row, gain = responses[index]
-    rate = ca.mtimes(row, momenta[0].numbers)
+    jacobian, response = responses[index]
+    rate = ca.mtimes(jacobian, momenta[0].numbers)
     return CoordinateTerms(
-        terms, seen, given, value, rate, rate_now, rate_due, ca.mtimes(row, gain), True, TreeCoordinate(row, gain)
+        terms,
+        seen,
+        given,
+        value,
+        rate,
+        rate_now,
+        rate_due,
+        ca.mtimes(jacobian, response),
+        True,
+        TreeCoordinate(jacobian, response),
     )
 
 
@@ -170,12 +178,12 @@ def motor_constraint(
     motor, width = joint.motor, settings.smoothing / at.mobility
     if isinstance(motor, TorqueMotor):
         torque = clip(command, -motor.torque, motor.torque, settings.smoothing)
-        return _row(at, by_law(-torque * substep.kick, ca.SX(0), at.mobility), None, None, width)
+        return _constraint(at, by_law(-torque * substep.kick, ca.SX(0), at.mobility), None, None, width)
     assert isinstance(motor, Servo | VelocityMotor)
     wanted = servo_velocity(motor, command, at.value, settings.smoothing) if isinstance(motor, Servo) else command
     target = clip(wanted, -motor.velocity, motor.velocity, settings.smoothing)
     most = motor.torque * substep.kick
-    return _row(at, towards(target, at.mobility), -most, most, width)
+    return _constraint(at, towards(target, at.mobility), -most, most, width)
 
 
 def servo_velocity(servo: Servo, command: Expr, value: Expr, smoothing: Expr) -> Expr:
@@ -195,7 +203,7 @@ def lower_limit(
     """
     left, strikes = at.value - joint.limits.lower, _strikes(settings, at, -at.rate_now)
     law = towards(-_room(left, strikes) / substep.duration, at.mobility)
-    return _row(at, law, ca.SX(0), None, settings.smoothing / at.mobility, left + TIE * strikes, strikes)
+    return _constraint(at, law, ca.SX(0), None, settings.smoothing / at.mobility, left + TIE * strikes, strikes)
 
 
 @traced
@@ -205,11 +213,11 @@ def upper_limit(
     """A limit from above."""
     left, strikes = joint.limits.upper - at.value, _strikes(settings, at, at.rate_now)
     law = towards(_room(left, strikes) / substep.duration, at.mobility)
-    return _row(at, law, None, ca.SX(0), settings.smoothing / at.mobility, left + TIE * strikes, strikes)
+    return _constraint(at, law, None, ca.SX(0), settings.smoothing / at.mobility, left + TIE * strikes, strikes)
 
 
 def _room(left: Expr, strikes: Expr) -> Expr:
-    """How far a limit may go within the substep; by rounding more where it strikes, see ``rows.TIE``."""
+    """How far a limit may go within the substep; by rounding more where it strikes, see ``constraints.TIE``."""
     return ca.if_else(left < -TIE, 0, left) + TIE * strikes
 
 
@@ -234,14 +242,14 @@ def spring_constraint(
     half = substep.kick * spring.damping / 2
     before = at.rate_now + (at.rate_due - at.rate_now) * (1 - 2 * substep.kick / substep.duration)
     pull = substep.kick * stiffness * (at.value - spring.rest) + half * before
-    return _row(at, by_law(pull, half, at.mobility), None, None, ca.SX(0))
+    return _constraint(at, by_law(pull, half, at.mobility), None, None, ca.SX(0))
 
 
 CONSTRAINTS = {"motor": motor_constraint, "lower": lower_limit, "upper": upper_limit, "spring": spring_constraint}
 """By what acts along a coordinate."""
 
 
-def _row(
+def _constraint(
     at: CoordinateTerms,
     law: dict[str, Expr],
     low: Expr | None,

@@ -50,7 +50,7 @@ class JointFrames:
         return first - half, second + half
 
     def terms(self, motions: Motions, seen: Expr, given: Expr) -> tuple[BodyTerm, ...]:
-        """The moving terms of rows that see the sockets at one time and give impulses at another."""
+        """The moving terms of constraints that see the sockets at one time and give impulses at another."""
         arms, impulse_arms = self.lever_arms(seen), self.common_arms(given)
         return tuple(
             BodyTerm(

@@ -16,7 +16,7 @@ Expr = Any
 
 @dataclass(frozen=True)
 class JointImpulse:
-    """Impulses (n,) on the first term [N s] or [N m s], along a row's directions."""
+    """Impulses (n,) on the first term [N s] or [N m s], along a constraint's directions."""
 
     numbers: Expr
 

@@ -1,4 +1,4 @@
-"""The row of what a joint locks: all of its directions at once, by the inverse of their effective mass."""
+"""The constraint of what a joint locks: all of its directions at once, by the inverse of their effective mass."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class LockConstraint:
     """What a joint locks, as the sweeps see it.
 
     Attributes:
-        terms: arms at the row's instant, and to the common point for impulses.
-        seen, given_along: directions at the row's instant, and of impulses.
+        terms: arms at the constraint's instant, and to the common point for impulses.
+        seen, given_along: directions at the constraint's instant, and of impulses.
         mass: (n, n) inverse of mobility and softness.
         softness: (n,) gamma of a joint that gives way, 0 if rigid.
-        target: (n,) velocities that the row asks for [m/s], [rad/s].
+        target: (n,) velocities that the constraint asks for [m/s], [rad/s].
         error: (n,) [m], [rad] at the start of the substep.
         axes: (3, 3) of the first socket at the start. Forces on a point are stored along these, so that they turn with
             the body: a rod's pull stays along the rod.

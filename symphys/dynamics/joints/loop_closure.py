@@ -30,19 +30,19 @@ class LoopPass:
     """What stays the same over the sweeps of the pass."""
 
     motions: tuple[PredictedMotion, ...]
-    rows: tuple[PlacedConstraint, ...]
+    constraints: tuple[PlacedConstraint, ...]
 
 
 def close_loops(
     sweeps: int,
     motions: tuple[PredictedMotion, ...],
-    rows: tuple[PlacedConstraint, ...],
+    constraints: tuple[PlacedConstraint, ...],
     along: Sequence[TreeDisplacement],
 ) -> ClosedLoops:
-    """Gauss-Seidel on displacements, over rows of locks and limits."""
-    looped = {each.carriers[0] for each in rows if isinstance(each.row, LockConstraint)}
+    """Gauss-Seidel on displacements, over constraints of locks and limits."""
+    looped = {each.carriers[0] for each in constraints if isinstance(each.constraint, LockConstraint)}
     still = tuple(_still(each) if i in looped else None for i, each in enumerate(along))
-    return repeat(sweeps, _fit_all, LoopPass(motions, rows), (tuple(along), still))
+    return repeat(sweeps, _fit_all, LoopPass(motions, constraints), (tuple(along), still))
 
 
 @traced
@@ -62,33 +62,33 @@ def displaced(jacobian: BodyJacobian | None, along: TreeDisplacement) -> Displac
 
 
 def _fit_all(fixed: LoopPass, state: ClosedLoops) -> ClosedLoops:
-    """One pass over all rows."""
+    """One pass over all constraints."""
     along, made = list(state[0]), list(state[1])
-    for each in fixed.rows:
+    for each in fixed.constraints:
         before = tuple(along[i] for i in each.carriers)
         parts = zip(each.bodies, before, strict=True)
         moved = tuple(displaced(fixed.motions[i].jacobian, own) for i, own in parts)
-        after = _fit(each.row, moved, before)
+        after = _fit(each.constraint, moved, before)
         for i, own in zip(each.carriers, after, strict=True):
             along[i] = own
         root = each.carriers[0]
-        if isinstance(each.row, LockConstraint):
+        if isinstance(each.constraint, LockConstraint):
             made[root] = _more(made[root], before[0], after[0])
     return tuple(along), tuple(made)
 
 
 @traced
 def _fit(
-    row: LockConstraint | CoordinateConstraint, moved: Displacements, along: tuple[TreeDisplacement, ...]
+    constraint: LockConstraint | CoordinateConstraint, moved: Displacements, along: tuple[TreeDisplacement, ...]
 ) -> tuple[TreeDisplacement, ...]:
     """Displacements after which the joint fits."""
-    push, twist = row.given_along.split(row.fitting(_relative(row, moved)))
-    if row.same:
+    push, twist = constraint.given_along.split(constraint.fitting(_relative(constraint, moved)))
+    if constraint.same:
         after = along[0]
-        for term in row.terms:
+        for term in constraint.terms:
             after = _pushed(term, after, push, twist)
-        return tuple(after for _ in row.terms)
-    return tuple(_pushed(term, own, push, twist) for term, own in zip(row.terms, along, strict=True))
+        return tuple(after for _ in constraint.terms)
+    return tuple(_pushed(term, own, push, twist) for term, own in zip(constraint.terms, along, strict=True))
 
 
 def _pushed(term: BodyTerm, along: TreeDisplacement, push: Expr, twist: Expr) -> TreeDisplacement:
@@ -114,10 +114,10 @@ def _more(
     return GeneralizedVelocities(made.numbers + after.numbers - before.numbers)
 
 
-def _relative(row: LockConstraint | CoordinateConstraint, moved: Displacements) -> Expr:
-    """Of the first term against the second along the row's directions, to third order in the rotation."""
+def _relative(constraint: LockConstraint | CoordinateConstraint, moved: Displacements) -> Expr:
+    """Of the first term against the second along the constraint's directions, to third order in the rotation."""
     linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
-    for term, shift in zip(row.terms, moved, strict=True):
+    for term, shift in zip(constraint.terms, moved, strict=True):
         linear += term.sign * (shift.linear + ca.cross(shift.angular, term.arm))
         angular += term.sign * shift.angular
-    return row.seen.forwards(linear, angular)
+    return constraint.seen.forwards(linear, angular)

@@ -62,11 +62,11 @@ def _struck(
     """Of each component: 1 if a contact or a limit of it is an impact, whose share of joint forces does not last."""
     found = {}
     for group in components(context.world):
-        meeting = tuple(each.row for each in contacts if group & set(each.bodies))
+        meeting = tuple(each.constraint for each in contacts if group & set(each.bodies))
         limits = tuple(
-            (each.row.row, impulse)
+            (each.placed.constraint, impulse)
             for each, impulse in zip(joints, given, strict=True)
-            if group & set(each.row.bodies) and each.name.rpartition(".")[2] in LIMITS
+            if group & set(each.placed.bodies) and each.name.rpartition(".")[2] in LIMITS
         )
         found[group] = _any_struck(meeting, limits)
     return found
@@ -74,29 +74,29 @@ def _struck(
 
 @traced
 def _any_struck(
-    rows: tuple[ContactConstraint, ...], limits: tuple[tuple[CoordinateConstraint, JointImpulse], ...]
+    constraints: tuple[ContactConstraint, ...], limits: tuple[tuple[CoordinateConstraint, JointImpulse], ...]
 ) -> Expr:
-    struck = [ca.fmax(row.struck, row.leaving > 0) for row in rows]
-    struck += [ca.logic_and(row.landing, impulse.numbers != 0) for row, impulse in limits]
+    struck = [ca.fmax(constraint.struck, constraint.leaving > 0) for constraint in constraints]
+    struck += [ca.logic_and(constraint.landing, impulse.numbers != 0) for constraint, impulse in limits]
     return ca.mmax(ca.vertcat(ca.SX(0), *struck))
 
 
 def _lasting_forces(
     context: StepContext,
-    rows: Sequence[JointConstraint],
+    constraints: Sequence[JointConstraint],
     given: Sequence[JointImpulse],
     struck: Struck,
     x: State,
     kick: Expr,
 ) -> State:
-    """Persistent forces of rows that sweeps visit.
+    """Persistent forces of constraints that sweeps visit.
 
     In a substep with an impact those of the last one stay: what held the impact is not to be told from them.
     """
     forces = dict[str, list[Expr]]()
-    for each, impulse in zip(rows, given, strict=True):
-        row, impact, old = each.row.row, of_body(struck, each.row.bodies[0]), x[each.name]
-        force = _lasting(row, impulse, old, each.k, impact, kick, context.shortest_kick)
+    for each, impulse in zip(constraints, given, strict=True):
+        constraint, impact, old = each.placed.constraint, of_body(struck, each.placed.bodies[0]), x[each.name]
+        force = _lasting(constraint, impulse, old, each.k, impact, kick, context.shortest_kick)
         forces.setdefault(each.name, []).append(force)
     return {name: _stacked(tuple(parts)) for name, parts in forces.items()}
 
@@ -108,7 +108,7 @@ def of_body(struck: Struck, body: int) -> Expr:
 
 @traced
 def _lasting(
-    row: LockConstraint | CoordinateConstraint,
+    constraint: LockConstraint | CoordinateConstraint,
     impulse: JointImpulse,
     old: Expr,
     k: int | None,
@@ -116,7 +116,7 @@ def _lasting(
     kick: Expr,
     shortest: float,
 ) -> Expr:
-    return ca.if_else(struck, own(old, k), row.carried(impulse) / ca.fmax(kick, shortest))
+    return ca.if_else(struck, own(old, k), constraint.carried(impulse) / ca.fmax(kick, shortest))
 
 
 @traced

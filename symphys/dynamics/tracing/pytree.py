@@ -39,6 +39,11 @@ class TracedMatrix:
     leaf: Leaf
     codes: tuple[Code, ...]
 
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.leaf.rows, self.leaf.columns
+
     __add__, __radd__ = traced(lambda a, b: a + b), traced(lambda a, b: b + a)
     __sub__, __rsub__ = traced(lambda a, b: a - b), traced(lambda a, b: b - a)
     __mul__, __rmul__ = traced(lambda a, b: a * b), traced(lambda a, b: b * a)
