@@ -139,7 +139,7 @@ def rms(differences: Array) -> float:
 
 def instructions(world: World, scheme: Scheme) -> int:
     """Of all pieces of a step."""
-    return sum(piece.function.n_instructions() for piece in trace_step(world, scheme, exact=True).pieces)
+    return sum(piece.function.n_instructions() for piece in trace_step(world, scheme, exact=True).calls)
 
 
 def studies() -> list[Study]:

@@ -90,7 +90,7 @@ def step_calls(world: World, scheme: Scheme, layout: Layout, x: Place, knob: Pla
     after, empty = x.later(), Place(0, 0)
     places = {slot: Place(after.offset + s.start, s.stop - s.start, x.stride) for slot, s in recording.results.items()}
     calls = []
-    for piece in recording.pieces:
+    for piece in recording.calls:
         for slot in piece.inputs:
             if slot.name in columns:
                 part = columns[slot.name]

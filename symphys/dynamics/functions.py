@@ -68,14 +68,14 @@ def report_function(
 
 @dataclass(frozen=True)
 class TracedStep:
-    """One time step as pieces.
+    """One time step as calls.
 
     Attributes:
-        pieces: in the order in which they are computed.
+        calls: in the order in which they are computed.
         results: which columns of the next state each slot named "next" holds.
     """
 
-    pieces: tuple[TracedCall, ...]
+    calls: tuple[TracedCall, ...]
     results: Mapping[TracedVector, slice]
 
 
@@ -86,7 +86,7 @@ def trace_step(
     parameters: Sequence[Any] = (),
     exact: bool = False,
 ) -> TracedStep:
-    """The step of ``step_function`` in pieces; their named slots are the parts of x, and "u", "p" and "smoothing".
+    """The step of ``step_function`` in calls; their named slots are the parts of x, and "u", "p" and "smoothing".
 
     ``exact`` is the step at smoothing 0 only: what the smoothing would add is left out.
     """
@@ -104,7 +104,7 @@ def trace_step(
     for names in owners.values():
         slot = recorder.give("next", [after[name] for name in names])
         results[slot] = slice(layout[names[0]].start, layout[names[-1]].stop)
-    return TracedStep(without_dead_code(recorder.pieces), results)
+    return TracedStep(without_dead_code(recorder.calls), results)
 
 
 def inline(world: World, arguments: Sequence[Expr]) -> InlineTracer:

@@ -35,12 +35,13 @@ class BodyState:
 
 @dataclass(frozen=True)
 class BodyJacobian:
-    """A body of a tree of joints: how it moves with the tree's n coordinates; see ``step.coordinates``.
+    """The Jacobian of a body of a kinematic tree with n generalized velocities, and its inverse-mass image.
 
     Attributes:
-        matrix: (6, n) velocity and angular velocity at mid-step for unit rates.
+        matrix: (6, n) velocity and angular velocity at mid-step for unit generalized velocities.
         inertia: (3, 3) world frame, at mid-step [kg m^2].
-        push, twist: (n, 3) what unit impulses at the centre of mass, and unit torque impulses, do to the rates.
+        impulse_response, torque_response: (n, 3) of the generalized velocities to unit impulses at the centre of mass,
+            and to unit torque impulses.
     """
 
     matrix: Expr

@@ -14,11 +14,11 @@ from symphys.dynamics.tracing.decorator import repeat, traced
 from symphys.dynamics.unknowns import (
     AllVelocities,
     AnyImpulse,
-    Constraint,
     GeneralizedVelocities,
     PlacedConstraint,
     Solution,
     Velocities,
+    VelocityConstraint,
 )
 from symphys.model.world import World
 
@@ -120,7 +120,7 @@ def apply_start(
 
 @traced
 def _project_run(
-    projections: tuple[tuple[Constraint, tuple[int, ...]], ...], states: AllVelocities, old: list[AnyImpulse]
+    projections: tuple[tuple[VelocityConstraint, tuple[int, ...]], ...], states: AllVelocities, old: list[AnyImpulse]
 ) -> tuple[AllVelocities, list[AnyImpulse]]:
     """One constraint after the other: each with the places of its bodies among the states."""
     momenta, given = list(states), []
@@ -133,5 +133,5 @@ def _project_run(
 
 
 @traced
-def _apply(constraint: Constraint, momenta: AllVelocities, impulse: AnyImpulse) -> AllVelocities:
+def _apply(constraint: VelocityConstraint, momenta: AllVelocities, impulse: AnyImpulse) -> AllVelocities:
     return constraint.apply(momenta, impulse)

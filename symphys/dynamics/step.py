@@ -16,7 +16,7 @@ import casadi as ca
 
 from symphys.dynamics.context import State, StepContext
 from symphys.dynamics.impact.deferred_impacts import defer_impacts
-from symphys.dynamics.impact.impact import Split, find_split, resolve_impact
+from symphys.dynamics.impact.impact import StepSplit, find_split, resolve_impact
 from symphys.dynamics.impact.restitution import eccentric_bodies
 from symphys.dynamics.substep import Substep, advance
 from symphys.model.world import Scheme, World
@@ -32,7 +32,7 @@ def take_step(context: StepContext, x: State) -> tuple[State, list[Substep]]:
     """The state after one step, and the substeps and impacts that led there."""
     left: Expr = ca.SX(context.settings.scheme.dt)
     count = splits_of(context.world, context.settings.scheme)
-    substeps, splits = list[Substep](), list[Split]()
+    substeps, splits = list[Substep](), list[StepSplit]()
 
     for k in range(count):
         # up to the first impact, equation (22); contacts that close fast give no impulse before it

@@ -57,8 +57,8 @@ def report(context: StepContext, substeps: list[Substep]) -> StepReport:
             residual = _larger_change(residual, new, old)
         impacts = tuple((each.bodies, each.constraint.struck, each.constraint.leaving) for each in substep.constraints)
         crowded = _crowded(_larger(crowded, substep.chained), impacts)
-        for meeting in _meetings(context.world, substep):
-            ambiguous = _ambiguous(ambiguous, meeting)
+        for contacts in _simultaneous(context.world, substep):
+            ambiguous = _ambiguous(ambiguous, contacts)
         for each, impulse in zip(substep.constraints, substep.impulses, strict=True):
             paradox = _pulls(paradox, each.constraint.paradox, impulse.normal)
     gaps = tuple(contact.gap for contact in substeps[0].contacts)
@@ -69,7 +69,7 @@ Met = tuple[Expr, Expr, Expr]
 """Normal (3,), normal impulse, whether the surfaces meet at speed."""
 
 
-def _meetings(world: World, substep: Substep) -> list[tuple[Met, Met]]:
+def _simultaneous(world: World, substep: Substep) -> list[tuple[Met, Met]]:
     """The contacts of one body with two others, two by two, of which one rebounds."""
     of: dict[int, list[int]] = {}
     for k, each in enumerate(substep.constraints):

@@ -48,10 +48,10 @@ class Substep:
     Attributes:
         x: the state at its end.
         constraints, contacts: of the pairs.
-        impulses: what each has given.
-        changes: of every constraint, joints too, what it has given and what it had before the final sweep.
-        ahead: (3,) each [N s]: what persistent forces had given to the true velocities ahead of the impulses of
-            sweeps. The next substep takes it off again, but after an impact, where leapfrog begins anew, it stays.
+        impulses: accumulated, of the pairs.
+        changes: of every constraint, joints too, its accumulated impulse, and that before the final sweep.
+        ahead: (3,) each [N s]: impulses of persistent forces over the lag, which the true velocities have ahead of the
+            sweeps'. The next substep takes them off again, except after an impact, where leapfrog begins anew.
         chained: 1 if impacts were left to the next step.
     """
 
@@ -164,7 +164,7 @@ def _moving_bodies(
 
 @traced
 def _times(duration: Expr, lag: Expr) -> tuple[Expr, Expr]:
-    """(over which impulses act as forces, how far the stored velocities will be ahead of the sweeps')."""
+    """(the time over which impulses act as forces, the next lag) [s]; equation 2."""
     return duration / 2 + lag, duration / 2
 
 

@@ -46,7 +46,7 @@ AnyImpulse = Any
 """``ContactImpulse`` of a contact, ``JointImpulse`` of a joint."""
 
 
-class Constraint(Protocol):
+class VelocityConstraint(Protocol):
     """What a sweep projects. Implementations are frozen dataclasses."""
 
     def project(self, momenta: AllVelocities, old: AnyImpulse) -> tuple[AllVelocities, AnyImpulse]:

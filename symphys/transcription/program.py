@@ -118,7 +118,7 @@ def step_calls(samples: Places, exact: bool) -> list[Call]:
     after = samples.x.later() if rollout.freeze is None else samples.layout.take(rollout.memory.size - 1)
     places: dict[TracedVector, Place] = {slot: _part(after, part) for slot, part in recording.results.items()}
     calls = []
-    for piece in recording.pieces:
+    for piece in recording.calls:
         for slot in piece.inputs:
             if slot.name in columns:
                 places[slot] = _part(samples.x, columns[slot.name])

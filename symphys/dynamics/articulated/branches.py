@@ -32,7 +32,7 @@ class Branch:
 
     Attributes:
         links: among those of the tree.
-        above: see ``branches``.
+        above: see ``schur_complement.Parents``.
         coordinates: among those of the tree.
     """
 
@@ -70,7 +70,7 @@ def branches_of(kinematic_tree: KinematicTree) -> tuple[Branch, ...]:
 
 @dataclass(frozen=True)
 class Tree:
-    """A tree at an instant, or between two: its structure, and the screws (6, count) of its links: see ``Axes``."""
+    """A kinematic tree at an instant, or between two, with the motion subspaces (6, count) of its links."""
 
     kinematic_tree: KinematicTree
     seen: Columns
@@ -82,14 +82,14 @@ class Tree:
         return branches_of(self.kinematic_tree)
 
     def axes(self, branch: Branch) -> MotionSubspaces:
-        """The screws of a branch and of the root."""
+        """The motion subspaces of a branch and of the root."""
         if self.given is None:
             return MotionSubspaces(branch.of(self.seen), self.seen[0])
         return MotionSubspaces(branch.of(self.seen), self.seen[0], branch.of(self.given), self.given[0])
 
     @property
     def impulses(self) -> Columns:
-        """The screws along which impulses count."""
+        """The motion subspaces at the time of the impulses."""
         return self.seen if self.given is None else self.given
 
 
@@ -110,13 +110,13 @@ class TreeRates:
 
 
 def axes_at(
-    kinematic_tree: KinematicTree, joints: spatial.Joints, courses: Sequence[PredictedPath], t: Expr, origin: Expr
+    kinematic_tree: KinematicTree, joints: spatial.Joints, body_paths: Sequence[PredictedPath], t: Expr, origin: Expr
 ) -> Columns:
-    """The screws of all links at time t."""
+    """The motion subspaces of all links at time t."""
     place = {link.body: k for k, link in enumerate(kinematic_tree.links)}
     found = []
-    for link, joint, course in zip(kinematic_tree.links, joints, courses, strict=True):
-        own = (course,) if link.parent is None else (course, courses[place[link.parent]])
+    for link, joint, body_path in zip(kinematic_tree.links, joints, body_paths, strict=True):
+        own = (body_path,) if link.parent is None else (body_path, body_paths[place[link.parent]])
         found.append(spatial.axes_of(joint, link.sign, own, t, origin))
     return tuple(found)
 
@@ -141,7 +141,7 @@ def solve(tree: Tree, matrix: TreeMatrix, momenta: Sequence[SpatialVector]) -> T
 
 @dataclass(frozen=True)
 class TreeMotion:
-    """Rates of the coordinates of each link (count,) and the screws of the bodies."""
+    """Rates of the coordinates of each link (count,) and the spatial velocities of the bodies."""
 
     rates: Columns
     screws: tuple[SpatialVector, ...]

@@ -51,7 +51,7 @@ class Deviation:
     """What a body's displacement has beside that along the coordinates.
 
     Attributes:
-        made: as a momentum times a time, see ``Made``.
+        made: as a momentum times a time, see ``JointCorrection``.
         screw: (6,) the same about the origin at the start.
     """
 
@@ -60,8 +60,8 @@ class Deviation:
 
 
 @dataclass(frozen=True)
-class Target:
-    """Where a body would come to along its screw: (3,) its centre of mass, (3,) its rotation, (4,) that taken back."""
+class TargetPose:
+    """The pose along the displacement: (3,) centre of mass, (3,) rotation vector, (4,) its inverse rotation."""
 
     position: Expr
     angular: Expr
@@ -117,7 +117,7 @@ def _kept(
     """The same without any momentum along the root's coordinates, so that what is conserved is so to rounding.
 
     A tree that floats is shifted; else, and for spin, the root's share of momenta changes: of momenta only those along
-    free motions count in the end (``articulate.consistent``), so it does not matter whose they are.
+    free motions count in the end (``forward_dynamics.consistent``), so it does not matter whose they are.
     """
     total, mass = _total(tuple(each.screw for each in beside), tuple(mass for mass, _ in bodies))
     if floats:
@@ -164,13 +164,13 @@ def _made(beside: Deviation, placed: BodyPlace, loops: SpatialVector) -> JointCo
 
 
 @traced
-def _aim(screw: SpatialVector, placed: BodyPlace, position: Expr) -> Target:
+def _aim(screw: SpatialVector, placed: BodyPlace, position: Expr) -> TargetPose:
     linear, angular = spatial.at_place(screw.parts, placed.place)
-    return Target(position + linear, angular, rotation.exponential(-angular))
+    return TargetPose(position + linear, angular, rotation.exponential(-angular))
 
 
 @traced
-def _beside(mass: Expr, counted: Expr, placed: BodyPlace, aim: Target, arrived: FinalPose) -> Deviation:
+def _beside(mass: Expr, counted: Expr, placed: BodyPlace, aim: TargetPose, arrived: FinalPose) -> Deviation:
     linear = arrived.position - aim.position
     more = rotation.multiply(arrived.turn, aim.back)
     small = 2 * ca.if_else(more[0] < 0, -more[1:4], more[1:4])

@@ -65,8 +65,8 @@ def consistent(
     """Velocity and angular velocity of each body: those that fit the joints and have the momenta along free motions."""
     zero, origin = ca.SX.zeros(3), poses[0][0]
     turned = [_rotation(q) for _, q in poses]
-    courses = [PredictedPath(p, r, zero, zero, zero, zero, NOW) for (p, _), r in zip(poses, turned, strict=True)]
-    tree = Tree(kinematic_tree, axes_at(kinematic_tree, joints, courses, NOW, origin))
+    body_paths = [PredictedPath(p, r, zero, zero, zero, zero, NOW) for (p, _), r in zip(poses, turned, strict=True)]
+    tree = Tree(kinematic_tree, axes_at(kinematic_tree, joints, body_paths, NOW, origin))
     parts = list(zip(inertials, poses, turned, momenta, strict=True))
     tensors = (world_inertia(inertia, r) for (_, inertia), _, r, _ in parts)
     inertias = [_inertia(mass, t, p, origin) for ((mass, _), (p, _), *_), t in zip(parts, tensors, strict=True)]
@@ -116,7 +116,7 @@ def _at_place(screw: SpatialVector, position: Expr, origin: Expr) -> Wrench:
 
 
 def _biases(tree: Tree, joints: spatial.Joints, now: TreeMotion) -> list[SpatialVector]:
-    """(6,) rates of change of the bodies' screws while the coordinates' rates do not change."""
+    """(6,) rates of change of the bodies' spatial vectors while the coordinates' rates do not change."""
     place = {link.body: k for k, link in enumerate(tree.kinematic_tree.links)}
     found: list[SpatialVector] = []
     for k, (link, joint) in enumerate(zip(tree.kinematic_tree.links, joints, strict=True)):
@@ -161,13 +161,13 @@ def _carried_by_child(link: Link, joint: Joint, coordinate: int) -> bool:
 
 
 def _carried(carrier: Expr, screw: Expr) -> Expr:
-    """(6,): how a screw that is fixed in a body changes as the body moves."""
+    """(6,): how a spatial vector fixed in a body changes as the body moves."""
     w, v = carrier[:3], carrier[3:]
     return ca.vertcat(ca.cross(w, screw[:3]), ca.cross(w, screw[3:]) + ca.cross(v, screw[:3]))
 
 
 def _at(change: Expr, screw: Expr, place: Expr) -> Wrench:
-    """Acceleration of the centre of mass, at ``place``, and angular acceleration: from a screw and its change."""
+    """Acceleration of the centre of mass, at ``place``, and angular acceleration, from a spatial velocity's rate."""
     velocity = spatial.at_place(screw, place)[0]
     return change[3:] + ca.cross(change[:3], place) + ca.cross(screw[:3], velocity), change[:3]
 

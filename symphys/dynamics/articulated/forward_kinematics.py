@@ -32,7 +32,7 @@ class FinalPose:
 
 @dataclass(frozen=True)
 class JointStart:
-    """A joint at the start of a substep, world frame, as seen from the parent of its link.
+    """A joint at the start of a substep, world frame, from the parent of its link to the link.
 
     Attributes:
         arms: (3,) from the centres of mass of the parent, or the world's origin, and of the link's body.
@@ -52,12 +52,12 @@ HERE = FinalPose(ca.SX.zeros(3), ca.SX([1, 0, 0, 0]))
 
 
 def joint_starts(
-    kinematic_tree: KinematicTree, joints: spatial.Joints, courses: Sequence[PredictedPath]
+    kinematic_tree: KinematicTree, joints: spatial.Joints, body_paths: Sequence[PredictedPath]
 ) -> tuple[JointStart | None, ...]:
     """Of each link; None for a root that floats."""
     place, found = {link.body: k for k, link in enumerate(kinematic_tree.links)}, list[JointStart | None]()
-    for link, joint, course in zip(kinematic_tree.links, joints, courses, strict=True):
-        own = (course,) if link.parent is None else (course, courses[place[link.parent]])
+    for link, joint, body_path in zip(kinematic_tree.links, joints, body_paths, strict=True):
+        own = (body_path,) if link.parent is None else (body_path, body_paths[place[link.parent]])
         found.append(None if joint is None else _joint_start(joint, link.sign, own))
     return tuple(found)
 
@@ -81,8 +81,8 @@ def final_poses(
 
 
 @traced
-def _joint_start(joint: Joint, sign: int, courses: tuple[PredictedPath, ...]) -> JointStart:
-    now, frames = ca.SX(0), joint_frames_on(joint, courses if sign > 0 else courses[::-1])
+def _joint_start(joint: Joint, sign: int, body_paths: tuple[PredictedPath, ...]) -> JointStart:
+    now, frames = ca.SX(0), joint_frames_on(joint, body_paths if sign > 0 else body_paths[::-1])
     placed, arms = frames.placed(now), tuple(arm.at(now) for arm in frames.arms)
     directions, slides = locked(joint, placed), joint.kind.slides
     held = 3 if slides is None else len(slides)

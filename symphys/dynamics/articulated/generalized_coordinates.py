@@ -1,10 +1,10 @@
-"""The velocities of a tree of bodies in the coordinates that its joints leave, and what impulses do to them.
+"""Generalized velocities of a kinematic tree, and their response to impulses (docs/time_step.md, equation 24).
 
-Velocities are seen at the middle of a substep and impulses given at its start, as rows of joints are (``joint_rows``):
-a body's velocity is ``see`` times the rates of the coordinates, with arms at the middle; impulses of locks, which act
-at the start on one point of both sides, do nothing along the free motions of the start. So
+Velocities are those at the middle of a substep and impulses act at its start, like those of joint constraints. A body's
+velocity is its Jacobian, with arms at the middle, times the generalized velocities. Impulses of locked directions act
+at the start on one point of both bodies, and do no work along the free motions of the start. So
 sum of free_motion . (momentum - free momentum) = sum of free_motion . impulses,  free motions being those of the start,
-holds whatever the locks give: joints are held exactly, and the sweeps know contacts, motors and limits only.
+holds whatever these impulses are: joints hold exactly, and the sweeps project contacts, motors and limits only.
 """
 
 from __future__ import annotations
@@ -75,11 +75,11 @@ def generalized_coordinates(
         reached: whether anything but the tree's own joints acts on the body.
         motions: what the bodies do.
         free: their momenta without any impulse of the substep.
-        middle: when velocities are seen [s].
+        middle: the time of the velocities [s].
     """
     origin = motions[0].position
-    courses = [motion.predicted_path() for motion in motions]
-    seen, given = (axes_at(kinematic_tree, joints, courses, t, origin) for t in (middle, ca.SX(0)))
+    body_paths = [motion.predicted_path() for motion in motions]
+    seen, given = (axes_at(kinematic_tree, joints, body_paths, t, origin) for t in (middle, ca.SX(0)))
     tree = Tree(kinematic_tree, seen, given)
     parts = [_counted(motion, momentum, origin, middle) for motion, momentum in zip(motions, free, strict=True)]
     bodies, inertias, momenta = zip(*parts, strict=True)
@@ -100,7 +100,7 @@ def acts(joint: Any) -> bool:
 
 
 def body_momenta(coordinates: GeneralizedCoordinates, rates: Any) -> tuple[Momentum, ...]:
-    """Of the bodies of a tree, from the rates that sweeps know of it."""
+    """Of the bodies of a tree, from its generalized velocities."""
     return tuple(_momentum(*each) for each in zip(_moving(coordinates, rates), coordinates.bodies, strict=True))
 
 
@@ -118,7 +118,7 @@ def _momentum(screw: SpatialVector, body: BodyPlace) -> Momentum:
 def _counted(
     motion: PredictedMotion, free: Momentum, origin: Expr, middle: Expr
 ) -> tuple[BodyPlace, SpatialInertia, SpatialVector]:
-    """A body at mid-step, its momentum at the start for what is seen at mid-step, and its free momentum."""
+    """A body at mid-step, its inertia from velocities at mid-step to momenta at the start, and its free momentum."""
     counted, place, inertia = motion.position - origin, motion.centre().at(middle) - origin, motion.inertia_at(middle)
     momentum = spatial.about_origin(counted, motion.mass * free.velocity, free.angular)
     return (
@@ -136,6 +136,6 @@ def _joined(numbering: Numbering, rates: TreeRates) -> Expr:
 @traced
 @traced
 def apart(numbering: Numbering, numbers: Expr) -> TreeRates:
-    """What sweeps know of a tree, by its root and branches."""
+    """Generalized velocities of a tree, by its root and branches."""
     r, *z = (numbers[list(each), 0] for each in numbering)
     return TreeRates(r, tuple(z))

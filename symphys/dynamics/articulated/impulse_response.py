@@ -1,4 +1,4 @@
-"""What impulses along the coordinates of a tree, and on its bodies, do to the numbers that sweeps know of it."""
+"""What impulses along the coordinates of a tree, and on its bodies, do to its generalized velocities."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Numbering = tuple[tuple[int, ...], ...]
 
 @dataclass(frozen=True)
 class BodyPlace:
-    """A body when velocities are seen: (3,) from the origin of the screws, (3, 3) inertia in the world frame."""
+    """A body at the time of the velocities: (3,) from the origin of spatial vectors, (3, 3) inertia, world frame."""
 
     place: Expr
     inertia: Expr
@@ -89,7 +89,7 @@ def _gain(k: int, n: int, places: Numbering, follows: Expr, given: tuple[Expr, E
 def body_jacobians(
     tree: Tree, matrix: TreeMatrix, bodies: Sequence[tuple[Expr, BodyPlace] | None]
 ) -> tuple[BodyJacobian | None, ...]:
-    """How bodies are held: of each link where impulses count (3,) and where velocities are seen; None if not asked."""
+    """The Jacobian of each link's body, from its place at the time of impulses (3,) and of velocities; None: none."""
     found: list[BodyJacobian | None] = [None for _ in bodies]
     (root, *_), n, given = numbering(tree), tree.kinematic_tree.size, tree.impulses
     if bodies[0] is not None:
@@ -127,7 +127,7 @@ def _branch_see(above: Parents, link: int, follows: Expr, axes: Columns, root: E
 
 
 def _at_place(columns: Expr, place: Expr) -> Expr:
-    """(6, k) screws as velocity at a place above angular velocity."""
+    """(6, k) spatial vectors as velocity at a place above angular velocity."""
     return ca.vertcat(columns[3:, :] - ca.mtimes(cross_matrix(place), columns[:3, :]), columns[:3, :])
 
 

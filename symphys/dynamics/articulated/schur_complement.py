@@ -22,12 +22,12 @@ Expr = Any
 Parents = tuple[int | None, ...]
 """For each link of a branch the place of its parent among them; None: the root of the tree."""
 Columns = tuple[Expr, ...]
-"""For each link the screws of its coordinates (6, count)."""
+"""For each link its motion subspace (6, count)."""
 
 
 @dataclass(frozen=True)
 class MotionSubspaces:
-    """The screws of a branch's links and of the root (6, count): how coordinates move them.
+    """The motion subspaces (6, count) of a branch's links and of the root (Featherstone's S).
 
     Attributes:
         seen, root_seen: at the time of the velocities.
@@ -41,7 +41,7 @@ class MotionSubspaces:
 
     @property
     def impulses(self) -> tuple[Columns, Expr]:
-        """The screws along which impulses count, of the links and of the root."""
+        """The motion subspaces at the time of the impulses, of the links and of the root."""
         if self.given is None or self.root_given is None:
             return self.seen, self.root_seen
         return self.given, self.root_given
@@ -66,14 +66,14 @@ class BranchMatrix:
 
 @dataclass(frozen=True)
 class SpatialVector:
-    """(6,): a velocity or a momentum about the origin, see ``screws``."""
+    """(6,): a velocity or a momentum about the origin; see ``spatial``."""
 
     parts: Expr
 
 
 @dataclass(frozen=True)
 class SpatialInertia:
-    """(6, 6): momentum for a screw."""
+    """(6, 6): momentum for a spatial vector."""
 
     matrix: Expr
 
@@ -118,7 +118,7 @@ def branch_matrix(above: Parents, inertias: Sequence[SpatialInertia], axes: Moti
 
 @traced
 def root_matrix(inertia: SpatialInertia, axes: tuple[Expr, Expr | None], branches: tuple[Expr, ...]) -> Factorisation:
-    """S, from the root's inertia, its screws as they are seen and given, and what branches add."""
+    """S, from the root's inertia, its motion subspaces for velocities and impulses, and the branches' shares."""
     seen, given = axes
     whole = ca.mtimes((seen if given is None else given).T, ca.mtimes(inertia.matrix, seen))
     for each in branches:
@@ -172,7 +172,7 @@ def summed_up(above: Parents, parts: Sequence[Expr]) -> tuple[list[Expr], Expr]:
 
 
 def summed_down(above: Parents, axes: Columns, rates: Expr, root: Expr) -> list[Expr]:
-    """(6,) for each link of a branch: its screw, from the rates of the branch's coordinates and the root's screw."""
+    """(6,) for each link of a branch: its spatial velocity, from the branch's rates and the root's spatial velocity."""
     found: list[Expr] = []
     start = 0
     for parent, columns in zip(above, axes, strict=True):

@@ -1,7 +1,7 @@
-"""Trees of bodies in screws: pairs (w, v) of an angular velocity and the velocity of the body's point at an origin.
+"""Spatial vectors (6,): (w, v), an angular velocity and the velocity of the body's point at an origin; momenta (l, p).
 
-The origin is where the root's centre of mass is at the start of a substep. Momenta about it are pairs (l, p) likewise,
-(6,) columns both. A coordinate's screw is how all that hangs on it moves for a unit rate, one for the whole subtree.
+The origin is the root's centre of mass at the start of a substep. The motion subspace of a joint (6, count) holds the
+spatial velocities of its subtree for unit rates of its coordinates.
 Featherstone, Rigid Body Dynamics Algorithms (2008), chapters 2 and 6; deviation: where velocities are seen at one time
 and momenta counted at another, inertias are not symmetric.
 """
@@ -26,11 +26,11 @@ Joints = Sequence[Joint | None]
 
 
 @traced
-def axes_of(joint: Joint | None, sign: int, courses: tuple[PredictedPath, ...], t: Expr, origin: Expr) -> Expr:
-    """(6, count): the screws of a link's coordinates at time t; ``courses`` of the link's body and of its parent's."""
+def axes_of(joint: Joint | None, sign: int, body_paths: tuple[PredictedPath, ...], t: Expr, origin: Expr) -> Expr:
+    """(6, count): the motion subspace of a link at time t; ``body_paths`` of the link's body and of its parent's."""
     if joint is None:
-        return floating(courses[0].centre().at(t) - origin)
-    frames = joint_frames_on(joint, courses if sign > 0 else courses[::-1])
+        return floating(body_paths[0].centre().at(t) - origin)
+    frames = joint_frames_on(joint, body_paths if sign > 0 else body_paths[::-1])
     point = joint_point(frames, t) - origin
     motions = free_motions_of(joint, frames.placed(t))
     return ca.horzcat(ca.SX(6, 0), *(sign * ca.vertcat(turn, slide + ca.cross(point, turn)) for slide, turn in motions))
@@ -60,7 +60,7 @@ def free_motions_of(joint: Joint, placed: PlacedFrames) -> list[tuple[Expr, Expr
 
 
 def inertia_of(mass: Expr, inertia: Expr, counted: Expr, seen: Expr) -> Expr:
-    """(6, 6): the momentum of a body about the origin for a screw, its centre of mass counted and seen at two places.
+    """(6, 6): spatial momentum for a spatial velocity, the centre of mass at two places: of momenta, of velocities.
 
     ``inertia``: (3, 3) about the centre of mass, world frame.
     """

@@ -43,8 +43,8 @@ def turned_by(orientation: tuple[Any, ...], vector: Offset) -> Offset:
     return (x, y, z)
 
 
-def axes(course: PredictedPath, shape: Shape) -> tuple[Parabola, Parabola, Parabola]:
-    """The courses of a shape's own axes, world frame."""
+def axes(body_path: PredictedPath, shape: Shape) -> tuple[Parabola, Parabola, Parabola]:
+    """The paths of a shape's own axes, world frame."""
     turn = UPRIGHT if isinstance(shape, Sphere) else shape.orientation
-    x, y, z = (course.arm(turned_by(turn, unit)) for unit in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+    x, y, z = (body_path.arm(turned_by(turn, unit)) for unit in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
     return x, y, z

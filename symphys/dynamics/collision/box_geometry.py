@@ -25,7 +25,7 @@ TINY_CHANGE = 1e-15
 
 @dataclass(frozen=True)
 class MovingBox:
-    """A box over the step: courses of its centre and its three axes, half sizes (3,) [m]."""
+    """A box over the step: paths of its centre and its three axes, half sizes (3,) [m]."""
 
     centre: Parabola
     axes: tuple[Parabola, Parabola, Parabola]
@@ -41,7 +41,7 @@ class MovingBox:
 
 @dataclass(frozen=True)
 class Face:
-    """A face over the step: courses of its centre, its outward normal and its two axes, half sizes along these."""
+    """A face over the step: paths of its centre, its outward normal and its two axes, half sizes along these."""
 
     centre: Parabola
     normal: Parabola
@@ -51,19 +51,19 @@ class Face:
     half_v: Expr
 
     def point(self, x: Expr, y: Expr) -> Parabola:
-        """The course of the point at x, y [m] from its centre."""
-        course: Parabola = self.centre + x * self.u + y * self.v
-        return course
+        """The path of the point at x, y [m] from its centre."""
+        body_path: Parabola = self.centre + x * self.u + y * self.v
+        return body_path
 
     def corners(self) -> list[Parabola]:
-        """The courses of its corners, in order around it."""
+        """The paths of its corners, in order around it."""
         signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
         return [self.point(su * self.half_u, sv * self.half_v) for su, sv in signs]
 
 
-def moving_box(box: Box, course: PredictedPath) -> MovingBox:
-    """A box that is carried along a course."""
-    return MovingBox(course.path(box.centre), axes(course, box), box.half_sizes)
+def moving_box(box: Box, body_path: PredictedPath) -> MovingBox:
+    """A box that is carried along a path."""
+    return MovingBox(body_path.path(box.centre), axes(body_path, box), box.half_sizes)
 
 
 def facing(box: MovingBox, direction: Expr, t: Expr) -> Face:
@@ -101,7 +101,7 @@ class Nearing:
     """How two boxes come to overlap, along the direction along which they do so last.
 
     Attributes:
-        direction: its course, from the second to the first.
+        direction: its path, from the second to the first.
         time: when they begin to overlap along it; 0 if they overlap from the start, the end of the step if never.
         distance: along it, at the start [m].
         apart: 1 if they never overlap along all directions at once.

@@ -80,7 +80,7 @@ class Contact:
 
 @dataclass(frozen=True)
 class FlippedGeometry:
-    """A meeting whose sides are exchanged."""
+    """A contact geometry whose sides are exchanged."""
 
     geometry: ContactGeometry
 

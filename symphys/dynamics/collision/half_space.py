@@ -41,9 +41,9 @@ class OnPlane:
         return ca.dot(self.normal, first.moved(self.centre, self.arm.start)) - self.offset - self.radius
 
 
-def ball_on_plane(course: PredictedPath, offset: Sequence[Any], radius: Expr, plane: Plane) -> Contact:
+def ball_on_plane(body_path: PredictedPath, offset: Sequence[Any], radius: Expr, plane: Plane) -> Contact:
     """The contact of a ball at body-frame ``offset`` with ``plane``."""
-    normal, path, dt = ca.vertcat(*plane.normal), course.path(offset), course.dt
+    normal, path, dt = ca.vertcat(*plane.normal), body_path.path(offset), body_path.dt
     gap = ca.dot(normal, path.start) - plane.offset - radius
     rate = ca.dot(normal, path.velocity)
     bend = ca.dot(normal, path.acceleration)
@@ -54,5 +54,5 @@ def ball_on_plane(course: PredictedPath, offset: Sequence[Any], radius: Expr, pl
         hit=end < 0,
         time=first_root(gap, rate, bend, dt),
         end=end,
-        geometry=OnPlane(normal, plane.offset, radius, course.arm(offset), path.start),
+        geometry=OnPlane(normal, plane.offset, radius, body_path.arm(offset), path.start),
     )

@@ -84,5 +84,5 @@ def ball_in_field(
     """The contact of a ball with a shape on b; ``path`` and ``arm`` of the ball's centre."""
     centre = b.path(shape.centre)
     arms = (arm, b.arm(shape.centre))
-    meeting = InField(field, radius, path - centre, arms, (path.start, centre.start), axes(b, shape))
-    return contact_along(meeting, b.dt, NEWTON_STEPS)
+    geometry = InField(field, radius, path - centre, arms, (path.start, centre.start), axes(b, shape))
+    return contact_along(geometry, b.dt, NEWTON_STEPS)

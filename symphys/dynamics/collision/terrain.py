@@ -108,10 +108,10 @@ def ball_on_terrain(offset: Sequence[Any], radius: Expr, terrain: Terrain, a: Pr
     contact, centre = None, path.start
     for _ in range(2):
         xy = nearest(surface, centre)
-        meeting = InField(
+        geometry = InField(
             Paraboloid(xy, *surface(xy)), radius, path, (a.arm(offset), STAYS), (path.start, STAYS.start), axes
         )
-        contact = contact_along(meeting, a.dt)
+        contact = contact_along(geometry, a.dt)
         centre = path.at(contact.time)
     assert contact is not None
     return contact

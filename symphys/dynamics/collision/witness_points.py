@@ -21,9 +21,9 @@ class Witness:
     """Points that two bodies carry, and a direction that turns with them.
 
     Attributes:
-        points: courses of the two points [m], world frame.
+        points: paths of the two points [m], world frame.
         arms: of the two points, from their bodies' centres of mass.
-        normal: course of a vector from the second surface to the first, of any length.
+        normal: path of a vector from the second surface to the first, of any length.
         radii: of balls about the points [m].
         off: 1 where the points are no candidates for contact.
         far: the gap [m] that such points are said to have.
@@ -61,7 +61,7 @@ class Witness:
 
 
 def steady(normal: Parabola, t: Expr, dt: Expr) -> Parabola:
-    """The course of a vector; one that changes by more than half of its length at ``t`` stays as it is then.
+    """The path of a vector; one that changes by more than half of its length at ``t`` stays as it is then.
 
     The common perpendicular of edges that are nearly parallel may turn right round within a step, or vanish.
     """

@@ -57,7 +57,7 @@ class BodyTerm:
     jacobian: PointJacobian | None = None
 
     def spin(self, m: Any) -> Expr:
-        """(3,) [rad/s], from what the sweeps know of the body."""
+        """(3,) [rad/s], from the velocities."""
         if self.jacobian is not None:
             return m.along(self.jacobian.angular)
         return apply(self.inverse_inertia, m.angular)
@@ -69,7 +69,7 @@ class BodyTerm:
         return m.velocity + ca.cross(self.spin(m), self.arm)
 
     def apply(self, m: Any, linear: Expr, angular: Expr) -> Any:
-        """What the sweeps know of the body after impulses on the first term."""
+        """The velocities of the body after impulses on the constraint's first body."""
         linear, angular = self.sign * linear, self.sign * angular
         if self.jacobian is not None:
             return GeneralizedVelocities(
@@ -85,7 +85,7 @@ class BodyTerm:
 def apply_impulse(
     terms: Sequence[BodyTerm], momenta: Sequence[Any], linear: Expr, angular: Expr, same: bool
 ) -> tuple[Any, ...]:
-    """Both terms after impulses on the first; ``same``: both are of one tree."""
+    """Both bodies after impulses on the first; ``same``: both are of one tree."""
     if not same:
         return tuple(term.apply(m, linear, angular) for term, m in zip(terms, momenta, strict=True))
     after = momenta[0]
@@ -103,7 +103,7 @@ def slip(terms: Sequence[BodyTerm], momenta: Sequence[Any]) -> Expr:
 
 
 def still(terms: Sequence[BodyTerm]) -> tuple[Any, ...]:
-    """What sweeps know of sides that do not move."""
+    """Velocities of bodies at rest."""
     zero = ca.SX.zeros(3)
     return tuple(
         Momentum(zero, zero)
@@ -114,7 +114,7 @@ def still(terms: Sequence[BodyTerm]) -> tuple[Any, ...]:
 
 
 def point_jacobian(motion: PredictedMotion, t: Expr, arm: Expr, impulse_arm: Expr) -> PointJacobian | None:
-    """The reach of a term at a constraint's instant."""
+    """The Jacobian of a term at a constraint's instant."""
     jacobian = motion.jacobian
     if jacobian is None:
         return None

@@ -88,7 +88,7 @@ class ContactConstraint:
 
     Attributes:
         law: of the pair.
-        terms: one or two moving terms.
+        terms: one or two bodies.
         normal: (3,) at the constraint's instant; the impulse's normal is ``impulse_normal``.
         impulse_normal: (3,).
         delassus_column: (3,) relative velocity of the touching points for a unit normal impulse [1/kg].
@@ -107,7 +107,7 @@ class ContactConstraint:
         struck: 1 if the surfaces meet at speed, else 0.
         width: of the smoothed normal projection [m/s]; 0 for fast approach.
         smoothing: smoothing [m/s].
-        same: whether both terms are of one tree of joints.
+        same: whether both bodies are of one tree of joints.
         coupling: where friction may act strongly on the normal velocity.
         paradox: 1 if the friction of the free slip would pull the surfaces together.
     """

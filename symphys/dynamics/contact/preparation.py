@@ -56,7 +56,7 @@ class Conditions:
         suppressed: 1 for a contact that gives no impulse.
         plastic: 1 where it does not rebound.
         force: (3,) with which the contact acted at the end of the last step [N].
-        same: whether both terms are of one tree of joints.
+        same: whether both bodies are of one tree of joints.
         coupled: whether friction may act strongly on the normal velocity.
     """
 
@@ -71,7 +71,7 @@ class Conditions:
 def prepare(
     settings: StepSettings, law: Law, contact: Contact, motions: Motions, duration: Expr, conditions: Conditions
 ) -> ContactConstraint:
-    """The constraint of a contact along the free motions of its moving terms, over a substep of ``duration`` [s]."""
+    """The constraint of a contact along the free motions of its bodies, over a substep of ``duration`` [s]."""
     scheme, smoothing, half = settings.scheme, settings.smoothing, duration / 2
     suppressed, same, coupled = conditions.suppressed, conditions.same, conditions.coupled
     touch = _touch(settings, law, contact, motions, duration, conditions)
@@ -169,7 +169,7 @@ def _parting(settings: StepSettings, contact: Contact, k_normal: Expr, load: Exp
 
 
 def closes_fast(settings: StepSettings, contact: Contact) -> Expr:
-    """1 if a contact closes at a speed that makes its meeting an impact: now, or as a tip that swings round."""
+    """1 if a contact closes at a speed that makes it an impact: now, or as a tip that swings round."""
     swings = contact.gap > settings.fast * contact.time + NEAR * settings.reference * settings.scheme.dt**2
     return ca.logic_or(contact.rate < -settings.fast, ca.logic_and(contact.hit, swings))
 
@@ -210,7 +210,7 @@ def _slack(settings: StepSettings, contact: Contact, touch: _Touch) -> Expr:
 
     Whether such an impact belongs to this substep or to the next is rounding's choice. Either way nothing but the
     impact may act: a constraint that holds the surfaces where they just touch would have half of its slope there.
-    Cuts are off the impact by the shortest substep at most.
+    Splits are off the impact by the shortest substep at most.
     """
     fast, speed = closes_fast(settings, contact), ca.fabs(contact.rate)
     lands = ca.logic_and(touch.hit, ca.logic_and(touch.leaving < 0.5, fast))

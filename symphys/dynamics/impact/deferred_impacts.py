@@ -10,7 +10,7 @@ import casadi as ca
 
 from symphys.dynamics.collision import Contact
 from symphys.dynamics.context import State, StepContext, StepSettings
-from symphys.dynamics.impact.impact import TOUCHING, Split, strikes
+from symphys.dynamics.impact.impact import TOUCHING, StepSplit, strikes
 from symphys.dynamics.impact.restitution import eccentric_bodies
 from symphys.dynamics.prediction import bodies_of, detect_contacts, predicted_motions
 from symphys.dynamics.tracing.decorator import traced
@@ -37,7 +37,7 @@ class DeferredImpacts:
     plastic: Expr
 
 
-def defer_impacts(context: StepContext, x: State, duration: Expr, splits: Sequence[Split]) -> DeferredImpacts:
+def defer_impacts(context: StepContext, x: State, duration: Expr, splits: Sequence[StepSplit]) -> DeferredImpacts:
     """What must give no impulse within ``duration`` [s], the last substep of a step.
 
     That is what closes at speed but does not meet. And, where surfaces rebound or bodies can be hit off their centres,

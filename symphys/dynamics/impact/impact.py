@@ -41,7 +41,7 @@ TOUCHING = 1e-3
 
 
 @dataclass(frozen=True)
-class Split:
+class StepSplit:
     """Where a step is split in two.
 
     Attributes:
@@ -59,7 +59,7 @@ class Split:
     late: tuple[Expr, ...]
 
 
-def find_split(context: StepContext, x: State, duration: Expr, share: float) -> Split:
+def find_split(context: StepContext, x: State, duration: Expr, share: float) -> StepSplit:
     """The first impact within ``duration`` [s], on paths under the persistent forces of the last step.
 
     Without an impact the split is at ``share`` of the duration.
@@ -73,12 +73,12 @@ def find_split(context: StepContext, x: State, duration: Expr, share: float) -> 
     until = _until(earliest[1], first, context.settings.scheme.dt)
     struck = [_is_struck(c, contact.hit, contact.time, until) for contact, c in zip(contacts, fast, strict=True)]
     late = [_late(earliest[1], s, contact.time) for contact, s in zip(contacts, struck, strict=True)]
-    return Split(earliest[0], first, tuple(fast), tuple(struck), tuple(late))
+    return StepSplit(earliest[0], first, tuple(fast), tuple(struck), tuple(late))
 
 
 @traced
 def strikes(settings: StepSettings, law: Law, contact: Contact) -> Expr:
-    """1 if a contact's meeting is an impact."""
+    """1 if a contact is an impact."""
     return ca.SX(0) if law.soft else closes_fast(settings, contact)
 
 
@@ -118,7 +118,7 @@ def _inside(earliest: tuple[Expr, Expr], duration: Expr, share: float) -> Expr:
     return ca.if_else(earliest[0], time + shift, share * duration)
 
 
-def resolve_impact(context: StepContext, x: State, split: Split) -> Substep:
+def resolve_impact(context: StepContext, x: State, split: StepSplit) -> Substep:
     """The state after the impacts at ``split``; leapfrog begins anew there, so ``lag`` is 0. Without one the same x."""
     duration = ca.SX(context.settings.scheme.dt)
     motions = [motion.at_start() for motion in predicted_motions(context, x, duration)]

@@ -41,7 +41,7 @@ class KinematicTrees:
     """The trees of a world over a substep.
 
     Attributes:
-        coordinates: in the order of ``linkages``.
+        coordinates: in the order of ``kinematic_trees``.
         motions: of all bodies, those of trees with how they are held.
         states: what the sweeps start from, without any impulse of the substep.
         carriers: for each body where the sweeps keep what they know of it.
@@ -81,7 +81,7 @@ def prepare_trees(
 
 
 def _touched(world: World) -> set[int]:
-    """Bodies on which contacts act, or joints that close loops or give way."""
+    """Bodies on which contacts act, or joints that close loops or are soft."""
     exact = tree_joints(world.joints)
     sides = {side.body for pair in world.pairs for side in (pair.first, pair.second)}
     loose = {body for k, joint in enumerate(world.joints) if k not in exact for body in joint.bodies}
@@ -103,7 +103,7 @@ class JointConstraint:
     """A constraint of a joint.
 
     Attributes:
-        placed: what sweeps, or the position pass, visit.
+        placed: what sweeps, or the position pass, project.
         name, k: where the state keeps what it gave: component ``k`` of ``name``, all of it if None.
     """
 
@@ -115,9 +115,9 @@ class JointConstraint:
 def joint_constraints(
     context: StepContext, trees: KinematicTrees, paths: Sequence[PredictedMotion], duration: Expr, kick: Expr
 ) -> tuple[list[JointConstraint], list[PlacedConstraint]]:
-    """(what the sweeps visit, what the position pass closes) of all joints over a substep."""
+    """(what the sweeps project, what the position pass closes) of all joints over a substep."""
     settings, substep = context.settings, SubstepTimes(duration, kick)
-    visited, fitted = list[JointConstraint](), list[PlacedConstraint]()
+    projected, fitted = list[JointConstraint](), list[PlacedConstraint]()
     places = _places(context.world, trees)
     for index, joint in enumerate(context.world.joints):
         moving = tuple(trees.motions[i] for i in joint.bodies)
@@ -125,7 +125,7 @@ def joint_constraints(
         frames, same = joint_frames(joint, bare), trees.same(joint.bodies)
         if index not in places:
             lock = trees.placed(joint.bodies, lock_constraint(settings, frames, moving, substep, same))
-            visited.append(JointConstraint(lock, f"{joint.name}.lock"))
+            projected.append(JointConstraint(lock, f"{joint.name}.lock"))
             fitted += [] if joint.soft else [lock]
         for k in range(len(joint.kind.coordinates)) if joint.acting else ():
             states = tuple(trees.states[trees.carriers[i]] for i in joint.bodies)
@@ -134,9 +134,9 @@ def joint_constraints(
             command = ca.SX(0) if command is None else command[k]
             for part in joint.acting:
                 constraint = trees.placed(joint.bodies, CONSTRAINTS[part](settings, joint, at, command, substep))
-                visited.append(JointConstraint(constraint, f"{joint.name}.{part}", k))
+                projected.append(JointConstraint(constraint, f"{joint.name}.{part}", k))
                 fitted += [constraint] if part in LIMITS else []
-    return visited, fitted
+    return projected, fitted
 
 
 def _places(world: World, trees: KinematicTrees) -> dict[int, tuple[int, Expr]]:

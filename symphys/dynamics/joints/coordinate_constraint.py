@@ -31,7 +31,7 @@ class TreeCoordinate:
 
 @dataclass(frozen=True)
 class CoordinateConstraint:
-    """What acts along one coordinate, as the sweeps see it; impulses in [N m s], or [N s] where it slides.
+    """What acts along one coordinate, prepared for the sweeps; impulses in [N m s], or [N s] where it slides.
 
     Attributes:
         terms: arms at the constraint's instant, and to the common point for impulses.
@@ -39,7 +39,7 @@ class CoordinateConstraint:
         keep, slope, offset: see the module.
         low, high: bounds of the impulse; None where there is none.
         width: of the smoothed bounds [N m s].
-        same: whether both terms are of one tree of joints.
+        same: whether both bodies are of one tree of joints.
         of_tree: where the coordinate is one of a tree's.
         left: how far a limit is away at the start [rad], [m]; None for what is none.
         inverse_mobility: effective mass.
@@ -62,7 +62,7 @@ class CoordinateConstraint:
     landing: Expr
 
     def fitting(self, moved: Expr) -> Expr:
-        """(1,): the impulse times a time that takes a limit back to where it is kept; see ``LockRow``."""
+        """(1,): the impulse times a time that takes a limit back to where it is kept; see ``LockConstraint``."""
         sign = 1 if self.low is not None else -1
         beyond = self.left + sign * moved
         return -sign * self.inverse_mobility * ca.fmin(beyond, 0)
@@ -82,7 +82,7 @@ class CoordinateConstraint:
         return JointImpulse(stored)
 
     def project(self, momenta: tuple[Any, ...], old: JointImpulse) -> tuple[tuple[Any, ...], JointImpulse]:
-        """See ``pgs.Solvable``."""
+        """See ``VelocityConstraint``."""
         rate = self.rate(momenta)
         new = self.keep * old.numbers - self.slope * rate - self.offset
         if self.low is not None:
@@ -92,7 +92,7 @@ class CoordinateConstraint:
         return self.apply(momenta, JointImpulse(new - old.numbers)), JointImpulse(new)
 
     def apply(self, momenta: tuple[Any, ...], impulse: JointImpulse) -> tuple[Any, ...]:
-        """See ``pgs.Solvable``."""
+        """See ``VelocityConstraint``."""
         if self.of_tree is None:
             return apply_impulse(self.terms, self.given_along, momenta, impulse.numbers, self.same)
         after = GeneralizedVelocities(momenta[0].numbers + ca.mtimes(self.of_tree.response, impulse.numbers))

@@ -53,7 +53,7 @@ class CoordinateTerms:
         rate: at the middle of the substep, before any impulse of it.
         rate_now, rate_due: at its start, and at its middle if forces stay what they were.
         mobility: inverse of the effective mass.
-        same, of_tree: see ``AxisRow``.
+        same, of_tree: see ``CoordinateConstraint``.
     """
 
     terms: tuple[BodyTerm, ...]
@@ -72,7 +72,7 @@ class CoordinateTerms:
 def lock_constraint(
     settings: StepSettings, frames: JointFrames, motions: Motions, substep: SubstepTimes, same: bool
 ) -> LockConstraint:
-    """What the joint locks; soft if it gives way (Catto, GDC 2011)."""
+    """The locked directions of a joint, rigid or soft (Catto, GDC 2011)."""
     joint, start, middle = frames.joint, ca.SX(0), substep.duration / 2
     now = frames.placed(start)
     terms, seen = frames.terms(motions, middle, start), locked(joint, frames.placed(middle))
@@ -134,8 +134,8 @@ def coordinate_terms(
     Args:
         frames: of the joint.
         k: which of its coordinates.
-        motions: of its moving terms.
-        momenta: what the sweeps know of them, before any impulse of the substep.
+        motions: of its bodies.
+        momenta: the velocities, before any impulse of the substep.
         duration: of the substep [s].
         place: of a joint of a tree: the index of its first coordinate, and the responses of the tree's coordinates;
             else whether both bodies are of one tree.

@@ -21,7 +21,7 @@ Expr = Any
 
 @dataclass(frozen=True)
 class JointFrames:
-    """The courses of both sockets' points and axes; arms from the centres of mass, the world's from its origin."""
+    """The paths of both sockets' points and axes; arms from the centres of mass, the world's from its origin."""
 
     joint: Joint
     centres: tuple[Parabola, Parabola]
@@ -50,7 +50,7 @@ class JointFrames:
         return first - half, second + half
 
     def terms(self, motions: Motions, seen: Expr, given: Expr) -> tuple[BodyTerm, ...]:
-        """The moving terms of constraints that see the sockets at one time and give impulses at another."""
+        """The bodies of constraints that see the sockets at one time and give impulses at another."""
         arms, impulse_arms = self.lever_arms(seen), self.common_arms(given)
         return tuple(
             BodyTerm(
@@ -67,24 +67,24 @@ class JointFrames:
 
 @traced
 def joint_frames(joint: Joint, motions: Motions) -> JointFrames:
-    """The sockets of a joint whose moving terms have these motions."""
+    """The sockets of a joint whose bodies have these motions."""
     return joint_frames_on(joint, [motion.predicted_path() for motion in motions])
 
 
-def joint_frames_on(joint: Joint, courses: Sequence[PredictedPath]) -> JointFrames:
-    """The sockets of a joint whose moving terms have these courses."""
-    courses = [*courses, *([at_rest(courses[0].dt)] if joint.second is None else [])]
+def joint_frames_on(joint: Joint, body_paths: Sequence[PredictedPath]) -> JointFrames:
+    """The sockets of a joint whose bodies have these paths."""
+    body_paths = [*body_paths, *([at_rest(body_paths[0].dt)] if joint.second is None else [])]
     axes = []
-    for course, socket in zip(courses, joint.sockets, strict=True):
+    for body_path, socket in zip(body_paths, joint.sockets, strict=True):
         turned = rotation.matrix(ca.SX(ca.vertcat(*socket.orientation)))
-        axes.append(tuple(course.arm(tuple(turned[i, j] for i in range(3))) for j in range(3)))
-    centres = courses[0].centre(), courses[1].centre()
-    arms = courses[0].arm(joint.sockets[0].point), courses[1].arm(joint.sockets[1].point)
+        axes.append(tuple(body_path.arm(tuple(turned[i, j] for i in range(3))) for j in range(3)))
+    centres = body_paths[0].centre(), body_paths[1].centre()
+    arms = body_paths[0].arm(joint.sockets[0].point), body_paths[1].arm(joint.sockets[1].point)
     return JointFrames(joint, centres, arms, (axes[0], axes[1]))
 
 
 def joint_frames_at(joint: Joint, poses: tuple[tuple[Expr, Expr], ...]) -> JointFrames:
-    """The sockets of a joint whose moving terms are at these positions and orientations."""
+    """The sockets of a joint whose bodies are at these positions and orientations."""
     zero = ca.SX.zeros(3)
     return joint_frames_on(
         joint, [PredictedPath(p, rotation.matrix(q), zero, zero, zero, zero, ca.SX(0)) for p, q in poses]

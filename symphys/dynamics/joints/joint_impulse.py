@@ -16,7 +16,7 @@ Expr = Any
 
 @dataclass(frozen=True)
 class JointImpulse:
-    """Impulses (n,) on the first term [N s] or [N m s], along a constraint's directions."""
+    """Impulses (n,) on the first body [N s] or [N m s], along a constraint's directions."""
 
     numbers: Expr
 
@@ -61,7 +61,7 @@ class Directions:
 
 
 def speeds(terms: tuple[BodyTerm, ...], directions: Directions, momenta: tuple[Any, ...]) -> Expr:
-    """(n,): how fast the first term moves against the second along the directions."""
+    """(n,): how fast the first body moves against the second along the directions."""
     linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
     for term, m in zip(terms, momenta, strict=True):
         linear += term.sign * term.speed(m)
@@ -72,7 +72,7 @@ def speeds(terms: tuple[BodyTerm, ...], directions: Directions, momenta: tuple[A
 def apply_impulse(
     terms: tuple[BodyTerm, ...], directions: Directions, momenta: tuple[Any, ...], numbers: Expr, same: bool
 ) -> tuple[Any, ...]:
-    """The momenta after impulses (n,); ``same``: both terms are of one tree of joints."""
+    """The momenta after impulses (n,); ``same``: both bodies are of one tree of joints."""
     return body_term.apply_impulse(terms, momenta, *directions.split(numbers), same)
 
 

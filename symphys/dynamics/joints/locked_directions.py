@@ -17,18 +17,18 @@ Expr = Any
 
 @dataclass(frozen=True)
 class LockConstraint:
-    """What a joint locks, as the sweeps see it.
+    """The locked directions of a joint, prepared for the sweeps.
 
     Attributes:
         terms: arms at the constraint's instant, and to the common point for impulses.
         seen, given_along: directions at the constraint's instant, and of impulses.
         mass: (n, n) inverse of mobility and softness.
-        softness: (n,) gamma of a joint that gives way, 0 if rigid.
+        softness: (n,) gamma of a joint that is soft, 0 if rigid.
         target: (n,) velocities that the constraint asks for [m/s], [rad/s].
         error: (n,) [m], [rad] at the start of the substep.
         axes: (3, 3) of the first socket at the start. Forces on a point are stored along these, so that they turn with
             the body: a rod's pull stays along the rod.
-        same: whether both terms are of one tree of joints.
+        same: whether both bodies are of one tree of joints.
     """
 
     terms: tuple[BodyTerm, ...]
@@ -56,13 +56,13 @@ class LockConstraint:
         return JointImpulse(stored if self.given_along.slides is not None else in_world(self.axes, stored))
 
     def project(self, momenta: tuple[Any, ...], old: JointImpulse) -> tuple[tuple[Any, ...], JointImpulse]:
-        """See ``pgs.Solvable``."""
+        """See ``VelocityConstraint``."""
         miss = speeds(self.terms, self.seen, momenta) - self.target + self.softness * old.numbers
         change = JointImpulse(-ca.mtimes(self.mass, miss))
         return self.apply(momenta, change), old.plus(change)
 
     def apply(self, momenta: tuple[Any, ...], impulse: JointImpulse) -> tuple[Any, ...]:
-        """See ``pgs.Solvable``."""
+        """See ``VelocityConstraint``."""
         return apply_impulse(self.terms, self.given_along, momenta, impulse.numbers, self.same)
 
 
@@ -72,7 +72,7 @@ def in_world(axes: Expr, stored: Expr) -> Expr:
 
 
 def inverse(k: Expr) -> Expr:
-    """(n, n): of a mobility, which is not symmetric where impulses are given with other arms than seen."""
+    """(n, n): of a mobility, which is not symmetric where arms of impulses and velocities differ."""
     n = k.size1()
     matrix = factorise([{j: k[i, j] for j in range(n)} for i in range(n)])
     columns = (matrix.solve({j: ca.SX(1)}) for j in range(n))

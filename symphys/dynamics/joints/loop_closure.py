@@ -115,7 +115,7 @@ def _more(
 
 
 def _relative(constraint: LockConstraint | CoordinateConstraint, moved: Displacements) -> Expr:
-    """Of the first term against the second along the constraint's directions, to third order in the rotation."""
+    """Of the first body against the second along the constraint's directions, to third order in the rotation."""
     linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
     for term, shift in zip(constraint.terms, moved, strict=True):
         linear += term.sign * (shift.linear + ca.cross(shift.angular, term.arm))

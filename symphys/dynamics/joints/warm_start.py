@@ -62,13 +62,13 @@ def _struck(
     """Of each component: 1 if a contact or a limit of it is an impact, whose share of joint forces does not last."""
     found = {}
     for group in components(context.world):
-        meeting = tuple(each.constraint for each in contacts if group & set(each.bodies))
+        touching = tuple(each.constraint for each in contacts if group & set(each.bodies))
         limits = tuple(
             (each.placed.constraint, impulse)
             for each, impulse in zip(joints, given, strict=True)
             if group & set(each.placed.bodies) and each.name.rpartition(".")[2] in LIMITS
         )
-        found[group] = _any_struck(meeting, limits)
+        found[group] = _any_struck(touching, limits)
     return found
 
 
@@ -89,7 +89,7 @@ def _lasting_forces(
     x: State,
     kick: Expr,
 ) -> State:
-    """Persistent forces of constraints that sweeps visit.
+    """Persistent forces of constraints that sweeps project.
 
     In a substep with an impact those of the last one stay: what held the impact is not to be told from them.
     """

@@ -92,7 +92,7 @@ def _reading(world: World, layout: Layout, joint: Joint, x: Expr) -> Reading:
 
 
 def _rate(frames: JointFrames, coordinate: Coordinate, motions: list[Motion]) -> Expr:
-    """How fast the first term moves against the second along a coordinate."""
+    """How fast the first body moves against the second along a coordinate."""
     linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
     for sign, arm, (velocity, spin) in zip((1, -1), frames.lever_arms(ca.SX(0)), motions, strict=False):
         linear += sign * (velocity + ca.cross(spin, arm))

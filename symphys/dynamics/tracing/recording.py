@@ -1,8 +1,8 @@
-"""A step as a list of small functions instead of one expression: each part that the step does is a piece.
+"""A step as a list of calls of small functions, instead of one expression.
 
-What a piece gives becomes fresh symbols, so that what follows depends on these and not on how they came about. Pieces
-of equal bodies, pairs and sweeps are equal functions, which a compiler then sees once. What is asked for twice, of the
-same numbers, is computed once.
+The results of a call are fresh symbols, so that later calls depend on these and not on how they were computed. Calls
+for equal bodies, pairs and sweeps are of equal functions, which a compiler then compiles once. Equal calls with equal
+arguments are recorded once.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ Expr = Any
 
 @dataclass(frozen=True)
 class TracedVector:
-    """TracedMatrix that lie side by side: a named part of the state or an argument of the step, or what a piece gave.
+    """TracedMatrix that lie side by side: a named part of the state or an argument of the step, or what a call gave.
 
     Attributes:
-        name: of an argument, or of a part of the next state; "" for what a piece gave.
+        name: of an argument, or of a part of the next state; "" for what a call gave.
         size: how many.
-        number: tells slots apart.
+        number: distinguishes them; the slot of the codes in ``pytree``.
     """
 
     name: str
@@ -38,7 +38,7 @@ class TracedVector:
 
 @dataclass(frozen=True)
 class TracedCall:
-    """An SX function from slots to slots."""
+    """A call of an SX function of vectors, which returns vectors."""
 
     function: ca.Function
     inputs: tuple[TracedVector, ...]
@@ -46,12 +46,12 @@ class TracedCall:
 
 
 class Recorder(Tracer):
-    """Collects the pieces of a step."""
+    """Records the calls of a step."""
 
     def __init__(self) -> None:
         """Nothing yet."""
         super().__init__()
-        self.pieces: list[TracedCall] = []
+        self.calls: list[TracedCall] = []
         self._slots: list[TracedVector] = []
         self._adopted: list[Expr] = []
         self._given: dict[tuple[int, tuple[int, ...]], Sequence[int]] = {}
@@ -61,7 +61,7 @@ class Recorder(Tracer):
         self._slots.append(TracedVector(name, symbols.numel(), self.take(symbols)))
 
     def give(self, name: str, values: Sequence[Expr]) -> TracedVector:
-        """A piece that puts values side by side."""
+        """A call that puts values side by side."""
         stacked = self.call(_side_by_side, (tuple(values),), {})
         slots: dict[int, int] = {}
         codes = [(slots.setdefault(c[0], len(slots)), c[1]) if isinstance(c, tuple) else c for c in stacked.codes]
@@ -72,17 +72,17 @@ class Recorder(Tracer):
         return self._slots[given]
 
     def repeat(self, count: int, once: Callable[[Any, T], T], context: Any, state: T) -> T:
-        """See ``Tracer``; as soon as it repeats itself its pieces are copied."""
+        """See ``Tracer``; as soon as it repeats itself its calls are copied."""
         before, template = state, list[TracedCall]()
         for _ in range(count):
             slots = self._alike(before, state)
             if template and slots is not None:
                 before, state = state, self._copy(template, slots, state)
-                template = self.pieces[-len(template) :]
+                template = self.calls[-len(template) :]
             else:
-                first = len(self.pieces)
+                first = len(self.calls)
                 before, state = state, once(context, state)
-                template = self.pieces[first:]
+                template = self.calls[first:]
         return state
 
     def _adopt(self, column: Expr) -> None:
@@ -113,10 +113,10 @@ class Recorder(Tracer):
 
     def _copy(self, template: list[TracedCall], slots: dict[int, int], after: T) -> T:
         """The state one time later: as ``template`` led to ``after``, its copy leads on from there."""
-        for piece in template:
-            inputs = [slots.get(slot.number, slot.number) for slot in piece.inputs]
-            given = self._add("", piece.function, inputs)
-            slots |= dict(zip((slot.number for slot in piece.outputs), given, strict=True))
+        for call in template:
+            inputs = [slots.get(slot.number, slot.number) for slot in call.inputs]
+            given = self._add("", call.function, inputs)
+            slots |= dict(zip((slot.number for slot in call.outputs), given, strict=True))
         leaves: list[Expr] = []
         shape = dismantle(after, leaves)
         renamed: T = rebuild(shape, (self._renamed(leaf, slots) for leaf in leaves))
@@ -141,7 +141,7 @@ class Recorder(Tracer):
         for k in range(function.n_out()):
             symbols = ca.SX.sym("kept", function.numel_out(k))
             self._slots.append(TracedVector(name, symbols.numel(), self.take(symbols)))
-        self.pieces.append(TracedCall(function, tuple(self._slots[k] for k in slots), tuple(self._slots[first:])))
+        self.calls.append(TracedCall(function, tuple(self._slots[k] for k in slots), tuple(self._slots[first:])))
         return range(first, len(self._slots))
 
 

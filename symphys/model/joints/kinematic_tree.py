@@ -1,6 +1,6 @@
 """Which bodies hang together by rigid joints, as trees: their velocities are those of coordinates that joints leave.
 
-Joints that close a loop or give way are no part of a tree; sweeps visit them as they visit contacts.
+Joints that close a loop or are soft are no part of a tree; sweeps project them as they project contacts.
 """
 
 from __future__ import annotations

@@ -51,7 +51,7 @@ def run(recording: TracedStep, layout: Layout, x: np.ndarray, u: np.ndarray, kno
     """The next state, piece by piece."""
     values: dict[TracedVector, np.ndarray] = {}
     after = np.zeros(layout.size)
-    for piece in recording.pieces:
+    for piece in recording.calls:
         for slot in piece.inputs:
             if slot.name in layout:
                 values[slot] = x[layout[slot.name]]
@@ -96,7 +96,7 @@ def test_equal_parts_share_their_functions() -> None:
         balls = [Body.ball(f"ball{i}", 0.1, 1.0) for i in range(count)]
         ground = make_world(balls, [Plane.ground()], Law(0.5, 0.5))
         apart = World(ground.bodies, ground.statics, tuple(p for p in ground.pairs if p.second.body is None))
-        return len({piece.function.__hash__() for piece in trace_step(apart, Scheme(sweeps=sweeps)).pieces})
+        return len({piece.function.__hash__() for piece in trace_step(apart, Scheme(sweeps=sweeps)).calls})
 
     assert distinct(20, 10) == distinct(2, 10) == distinct(2, 40)
 
@@ -114,7 +114,7 @@ def test_equal_parts_share_a_function_and_numbers_in_passing_are_no_part_of_it()
     with tracing(recorder):
         square, passed, constant = part({"a": x[0], "b": x[1]})
         again, *_ = part({"a": y[0], "b": y[1]})
-    first, second = recorder.pieces
+    first, second = recorder.calls
     assert first.function is second.function
     assert (first.outputs[0].size, first.inputs[0].name, second.inputs[0].name) == (1, "x", "y")
     assert recorder.value(passed).element_hash() == x[1].element_hash()
@@ -128,7 +128,7 @@ def test_members_of_a_tuple_look_alike_to_what_comes_next() -> None:
     with tracing(recorder):
         for pair in multiples(x):
             added(*pair)
-    _, first, second = recorder.pieces
+    _, first, second = recorder.calls
     assert first.function is second.function
     assert first.inputs[0] != second.inputs[0]
 
@@ -149,7 +149,7 @@ def test_what_is_asked_for_twice_is_computed_once() -> None:
     with tracing(recorder):
         first, second, other = (added(*pair) for pair in ((x[0], x[1]), (x[0], x[1]), (x[0], 2.0)))
     assert first == second != other
-    assert len(recorder.pieces) == 2
+    assert len(recorder.calls) == 2
 
 
 def test_arithmetic_between_traced_calls_is_traced() -> None:
@@ -160,10 +160,10 @@ def test_arithmetic_between_traced_calls_is_traced() -> None:
         a, b = added(x[0], b=1.0), added(x[0], b=x[1])
         results = [a - b, 1 - a, a * 2, ca.SX(3) / b, -b, a < b, a > 1]
     recorder.give("next", results)
-    memory = {slot: np.array([3.0, 5.0]) for slot in recorder.pieces[0].inputs}
-    for piece in recorder.pieces:
+    memory = {slot: np.array([3.0, 5.0]) for slot in recorder.calls[0].inputs}
+    for piece in recorder.calls:
         memory |= evaluate(piece, memory)
-    assert memory[recorder.pieces[-1].outputs[0]] == pytest.approx([-4, -3, 8, 3 / 8, -8, 1, 1])
+    assert memory[recorder.calls[-1].outputs[0]] == pytest.approx([-4, -3, 8, 3 / 8, -8, 1, 1])
 
 
 def test_a_traced_function_is_a_plain_one_without_a_tracer() -> None:
@@ -180,7 +180,7 @@ def test_what_nobody_reads_is_left_out() -> None:
         traced(lambda squares: ca.sin(squares))(squares)
         root, _ = traced(lambda squares: (ca.sqrt(squares[2]), ca.exp(squares[1])))(squares)
     recorder.give("next", [root])
-    left = without_dead_code(recorder.pieces)
+    left = without_dead_code(recorder.calls)
     assert [(piece.function.nnz_in(), piece.function.nnz_out()) for piece in left] == [(4, 1), (1, 1), (1, 1)]
     values = {left[0].inputs[0]: np.array([1.0, 2.0, 3.0, 4.0])}
     for piece in left:
@@ -201,13 +201,13 @@ def test_sweeps_that_change_places_are_right() -> None:
         turned = repeat(6, turn, 2.0, x)
     recorder.give("next", [turned])
     values = np.array([1.0, 2.0])
-    memory = {slot: values for piece in recorder.pieces for slot in piece.inputs if slot.name == "x"}
-    for piece in recorder.pieces:
+    memory = {slot: values for piece in recorder.calls for slot in piece.inputs if slot.name == "x"}
+    for piece in recorder.calls:
         memory |= evaluate(piece, memory)
     expected = values
     for _ in range(6):
         expected = np.array([expected[1] + 1, 2 * expected[0]])
-    assert memory[recorder.pieces[-1].outputs[0]] == pytest.approx(expected)
+    assert memory[recorder.calls[-1].outputs[0]] == pytest.approx(expected)
 
 
 def test_parameters_in_expressions_have_a_piece() -> None:

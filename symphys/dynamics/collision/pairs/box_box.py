@@ -38,8 +38,8 @@ class BoxApproach:
     """How two boxes come near each other.
 
     Attributes:
-        bodies: courses of the bodies that carry them.
-        normal: course of the direction that keeps them apart, from the second to the first.
+        bodies: paths of the bodies that carry them.
+        normal: path of the direction that keeps them apart, from the second to the first.
         time: when they are expected to meet [s].
         apart: 1 if they stay apart over the step.
         far: the gap that points have which are no candidates [m].

@@ -18,7 +18,7 @@ TINY_LENGTH = 1e-12
 
 @dataclass(frozen=True)
 class OnSphere:
-    """Two spheres: courses and arms of their centres, radii [m]."""
+    """Two spheres: paths and arms of their centres, radii [m]."""
 
     paths: tuple[Parabola, Parabola]
     arms: tuple[Parabola, Parabola]
