@@ -23,10 +23,10 @@ Expr = Any
 
 @dataclass(frozen=True)
 class TracedVector:
-    """TracedMatrix that lie side by side: a named part of the state or an argument of the step, or what a call gave.
+    """Contiguous numbers: a named part of the state, an argument of the step, or a result of a call.
 
     Attributes:
-        name: of an argument, or of a part of the next state; "" for what a call gave.
+        name: of an argument, or of a part of the next state; "" for a result of a call.
         size: how many.
         number: distinguishes them; the slot of the codes in ``pytree``.
     """
