@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 from symphys.dynamics.collision import collide
 from symphys.dynamics.collision.contact_geometry import Displacement
-from symphys.dynamics.collision.predicted_points import PredictedPath, at_rest
+from symphys.dynamics.collision.predicted_path import PredictedPath, at_rest
 from symphys.maths import rotation
 from symphys.model.shapes import Box, Capsule, Sphere, Surface
 

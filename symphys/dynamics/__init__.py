@@ -2,7 +2,12 @@
 
 from symphys.dynamics.functions import TracedStep, report_function, step_function, trace_step
 from symphys.dynamics.joints.warm_start import components
-from symphys.dynamics.observation.felt import accelerometer_bodies, accelerometers, body_quantities, felt_names
+from symphys.dynamics.observation.body_sensors import (
+    accelerometer_bodies,
+    accelerometers,
+    body_quantities,
+    body_quantity_names,
+)
 from symphys.dynamics.observation.joint_coordinates import (
     joint_quantities,
     joint_quantity_names,
@@ -19,8 +24,8 @@ __all__ = [
     "accelerometer_bodies",
     "accelerometers",
     "body_quantities",
+    "body_quantity_names",
     "components",
-    "felt_names",
     "gap_function",
     "joint_quantities",
     "joint_quantity_names",

@@ -12,18 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import casadi as ca
 
 from symphys.dynamics.contact.constraint import ContactConstraint, ContactImpulse
 from symphys.dynamics.motion import PredictedMotion, apply
 from symphys.dynamics.tracing.decorator import traced
-from symphys.dynamics.unknowns import Momentum, Velocities
+from symphys.dynamics.unknowns import Momentum, PlacedConstraint, Solution, Velocities
 from symphys.model.world import World
-
-if TYPE_CHECKING:
-    from symphys.dynamics.unknowns import PlacedConstraint, Solution
 
 Expr = Any
 """casadi SX"""

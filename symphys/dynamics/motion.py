@@ -12,7 +12,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics import free_rotation
-from symphys.dynamics.collision.predicted_points import PredictedPath
+from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.tracing.decorator import traced
 from symphys.maths import rotation
 from symphys.maths.rotation import turn

@@ -10,7 +10,7 @@ import casadi as ca
 
 from symphys.dynamics.articulated.forward_dynamics import accelerations, world_inertia
 from symphys.dynamics.collision import Contact, collide
-from symphys.dynamics.collision.predicted_points import at_rest
+from symphys.dynamics.collision.predicted_path import at_rest
 from symphys.dynamics.context import State, StepContext
 from symphys.dynamics.motion import BodyState, PredictedMotion, free_motion, momentum, motion_from
 from symphys.dynamics.tracing.decorator import traced

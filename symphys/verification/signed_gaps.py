@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.dynamics.collision import collide
-from symphys.dynamics.collision.predicted_points import PredictedPath, at_rest
+from symphys.dynamics.collision.predicted_path import PredictedPath, at_rest
 from symphys.maths import rotation
 from symphys.model.world import Pair
 from symphys.transcription import Rollout

@@ -18,7 +18,7 @@ from symphys.dynamics.articulated.schur_complement import (
     SpatialInertia,
     SpatialVector,
 )
-from symphys.dynamics.collision.predicted_points import PredictedPath
+from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.tracing.decorator import traced
 from symphys.model.joints import KinematicTree
 

@@ -14,7 +14,7 @@ import casadi as ca
 from symphys.dynamics.articulated import spatial
 from symphys.dynamics.articulated.branches import Tree, TreeMotion, axes_at, solve, tree_matrix, tree_motion
 from symphys.dynamics.articulated.schur_complement import SpatialInertia, SpatialVector, mirrored
-from symphys.dynamics.collision.predicted_points import PredictedPath
+from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.motion import PredictedMotion, in_world, inertia_matrix
 from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import Momentum

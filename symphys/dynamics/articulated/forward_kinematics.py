@@ -12,7 +12,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics.articulated import spatial
-from symphys.dynamics.collision.predicted_points import PredictedPath
+from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.joints.joint_frames import errors, joint_frames_on, locked
 from symphys.dynamics.tracing.decorator import traced
 from symphys.maths import rotation

@@ -13,7 +13,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.collision.predicted_points import PredictedPath
+from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.joints.joint_frames import JointFrames, joint_frames_on
 from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.rotation import cross_matrix

@@ -16,7 +16,7 @@ from symphys.dynamics.collision.pairs.sphere_capsule import sphere_capsule
 from symphys.dynamics.collision.pairs.sphere_plane import sphere_plane
 from symphys.dynamics.collision.pairs.sphere_sphere import sphere_sphere
 from symphys.dynamics.collision.pairs.terrain import box_terrain, capsule_terrain, sphere_terrain
-from symphys.dynamics.collision.predicted_points import PredictedPath
+from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.tracing.decorator import traced
 from symphys.model.shapes import Box, Capsule, Plane, Sphere, Surface, Terrain
 

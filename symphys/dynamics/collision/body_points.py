@@ -7,7 +7,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.collision.predicted_points import Parabola, PredictedPath
+from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.maths import rotation
 from symphys.model.shapes import UPRIGHT, Box, Capsule, Shape, Sphere
 from symphys.model.world import is_zero

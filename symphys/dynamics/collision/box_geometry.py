@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics.collision.body_points import axes
-from symphys.dynamics.collision.predicted_points import Parabola, PredictedPath, chosen
+from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath, chosen
 from symphys.dynamics.collision.witness_points import steady
 from symphys.model.shapes import Box
 

@@ -9,7 +9,7 @@ import casadi as ca
 
 from symphys.dynamics.collision.body_points import axes
 from symphys.dynamics.collision.contact_geometry import Contact, Displacement, Expr, Frame
-from symphys.dynamics.collision.predicted_points import Parabola, PredictedPath
+from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.dynamics.collision.time_of_impact import contact_along
 from symphys.model.shapes import Box, Capsule
 

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics.collision.contact_geometry import Contact, Displacement, Frame
-from symphys.dynamics.collision.predicted_points import Parabola
+from symphys.dynamics.collision.predicted_path import Parabola
 from symphys.dynamics.collision.time_of_impact import contact_along
 from symphys.maths.smoothing import length
 

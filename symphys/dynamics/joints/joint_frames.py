@@ -8,7 +8,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.collision.predicted_points import Parabola, PredictedPath, at_rest
+from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath, at_rest
 from symphys.dynamics.contact.body_term import BodyTerm, Motions, point_jacobian
 from symphys.dynamics.joints.joint_impulse import Directions
 from symphys.dynamics.tracing.decorator import traced

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.model.controllers import ControlLaw, Given, Linear, Net, Periodic
+from symphys.model.controllers import ControlLaw, Custom, Linear, Net, Periodic
 from symphys.problem.checks.memory import check_net
 from symphys.problem.feedback import Controller, Sensor
 from symphys.problem.quantities import Quantity, SlotError, read_slot
@@ -160,7 +160,7 @@ class Reader:
             if has != needs:
                 self.add("function", f"has {has} {what}; {needs} are needed")
                 return None
-        return Given(given)
+        return Custom(given)
 
     def numbers(self, kind: str, key: str, size: int, law: ControlLaw) -> Array:
         """(size,) the law's numbers at the start."""

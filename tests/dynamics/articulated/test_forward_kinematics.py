@@ -9,7 +9,7 @@ from contacts import numbers
 from linkage import chain, hanging
 
 from symphys.dynamics.articulated.forward_kinematics import final_poses, joint_starts
-from symphys.dynamics.collision.predicted_points import PredictedPath
+from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.joints.joint_frames import errors, joint_frames_at
 from symphys.maths import rotation
 from symphys.model.joints import kinematic_trees

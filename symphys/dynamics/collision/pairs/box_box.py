@@ -19,7 +19,7 @@ import casadi as ca
 
 from symphys.dynamics.collision.box_geometry import Face, Nearing, faces_and_edges, facing, moving_box, nearing
 from symphys.dynamics.collision.contact_geometry import Contact, flipped
-from symphys.dynamics.collision.predicted_points import Parabola, PredictedPath
+from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.dynamics.collision.witness_points import Witness, contact_of
 from symphys.model.shapes import Box
 

@@ -12,7 +12,7 @@ from symphys.dynamics.collision.contact_geometry import Contact, flipped
 from symphys.dynamics.collision.pairs.box_box import approach_of, edges_across
 from symphys.dynamics.collision.pairs.sphere_box import BoxField
 from symphys.dynamics.collision.pairs.sphere_capsule import CapsuleField
-from symphys.dynamics.collision.predicted_points import PredictedPath
+from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.collision.signed_distance import ball_in_field
 from symphys.model.shapes import Box, Capsule
 

@@ -11,7 +11,7 @@ import casadi as ca
 from symphys.dynamics.collision.body_points import axes, ends
 from symphys.dynamics.collision.contact_geometry import Contact, Expr, flipped
 from symphys.dynamics.collision.pairs.sphere_capsule import CapsuleField
-from symphys.dynamics.collision.predicted_points import Parabola, PredictedPath, chosen
+from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath, chosen
 from symphys.dynamics.collision.signed_distance import ball_in_field
 from symphys.dynamics.collision.time_of_impact import contact_along
 from symphys.dynamics.collision.witness_points import Witness, contact_of, steady

@@ -5,7 +5,7 @@ from __future__ import annotations
 from symphys.dynamics.collision.body_points import ends
 from symphys.dynamics.collision.contact_geometry import Contact
 from symphys.dynamics.collision.half_space import ball_on_plane
-from symphys.dynamics.collision.predicted_points import PredictedPath
+from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.model.shapes import Capsule, Plane
 
 

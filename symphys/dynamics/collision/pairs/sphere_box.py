@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from symphys.dynamics.collision.contact_geometry import Contact, Expr
-from symphys.dynamics.collision.predicted_points import PredictedPath
+from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.collision.signed_distance import ball_in_field
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.shapes import Box, Sphere

@@ -8,7 +8,7 @@ import casadi as ca
 
 from symphys.dynamics.collision.contact_geometry import Contact, Expr
 from symphys.dynamics.collision.pairs.sphere_sphere import direction, distance
-from symphys.dynamics.collision.predicted_points import PredictedPath
+from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.collision.signed_distance import ball_in_field
 from symphys.model.shapes import Capsule, Sphere
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from symphys.dynamics.collision.contact_geometry import Contact, Displacement, Expr, Frame
-from symphys.dynamics.collision.predicted_points import Parabola, PredictedPath
+from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.dynamics.collision.time_of_impact import NEWTON_STEPS, TINY_RATE, falls, no_later
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.shapes import Sphere

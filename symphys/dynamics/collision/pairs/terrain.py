@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from symphys.dynamics.collision.body_points import corners, ends
 from symphys.dynamics.collision.contact_geometry import Contact
-from symphys.dynamics.collision.predicted_points import PredictedPath
+from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.collision.terrain import ball_on_terrain
 from symphys.model.shapes import Box, Capsule, Sphere, Terrain
 
