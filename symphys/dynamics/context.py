@@ -16,7 +16,7 @@ Expr = Any
 """casadi SX, MX or DM"""
 
 SHORTEST_KICK = 1 / 8
-"""Of dt; see ``Scene.shortest_kick``."""
+"""Of dt; see ``StepContext.shortest_kick``."""
 SLOWEST = 1.0
 """[m/s^2] least reference acceleration: what counts as fast when there is no gravity."""
 
@@ -27,12 +27,12 @@ State = dict[str, Expr]
 
 @dataclass(frozen=True)
 class StepSettings:
-    """What every part of a step may need to know.
+    """Settings that every part of a step may use.
 
     Attributes:
         scheme: how the step is taken.
         gravity: (3,) [m/s^2].
-        smoothing: smoothing [m/s].
+        smoothing: s [m/s], see docs/time_step.md.
         reference: the acceleration [m/s^2] below which nothing counts as fast.
     """
 

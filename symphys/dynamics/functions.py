@@ -54,7 +54,7 @@ def step_function(
 def report_function(
     world: World, scheme: Scheme | None = None, inputs: Sequence[str] = (), parameters: Sequence[Any] = ()
 ) -> ca.Function:
-    """The same step with all of its ``Report``: (x, u, p, smoothing) -> (x_next, forces, gaps, .. paradox)."""
+    """The same step with all of its ``StepReport``: (x, u, p, smoothing) -> (x_next, forces, gaps, .. paradox)."""
     arguments = arguments_of(world, inputs, parameters)
     tracer, layout = inline(world, arguments), Layout(world)
     with tracing(tracer):

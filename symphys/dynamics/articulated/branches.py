@@ -1,4 +1,4 @@
-"""A tree's mass matrix branch by branch: what is done with a branch is a piece, so that equal branches share it."""
+"""A tree's mass matrix branch by branch: each branch has its own traced calls, which equal branches share."""
 
 from __future__ import annotations
 

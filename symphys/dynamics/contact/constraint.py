@@ -106,7 +106,7 @@ class ContactConstraint:
         slack: overlap at the end of the substep that counts as rounding [m].
         struck: 1 if the surfaces meet at speed, else 0.
         width: of the smoothed normal projection [m/s]; 0 for fast approach.
-        smoothing: smoothing [m/s].
+        smoothing: s [m/s], see docs/time_step.md.
         same: whether both bodies are of one tree of joints.
         coupling: where friction may act strongly on the normal velocity.
         paradox: 1 if the friction of the free slip would pull the surfaces together.

@@ -110,7 +110,7 @@ def _late(earliest: Expr, struck: Expr, time: Expr) -> Expr:
 def _inside(earliest: tuple[Expr, Expr], duration: Expr, share: float) -> Expr:
     """The length of the substep before the split; near an end it is shifted, not clamped, so that its slope stays.
 
-    Surfaces that rounding has put beyond each other meet at a time below 0 (``touch.falls``).
+    Surfaces that rounding has put beyond each other meet at a time below 0 (``time_of_impact.falls``).
     """
     least, time = SHORTEST * duration, earliest[1]
     early = least * (1 + ca.ceil(ca.fmax(-time, 0) / least))

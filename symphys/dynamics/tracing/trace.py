@@ -2,7 +2,7 @@
 
 The first time a traced function is called with arguments of some structure it is called with symbols in place of all
 that varies, and its result becomes a casadi function. From then on that function is called: by ``InlineTracer`` within
-one expression, by a ``Recorder`` as a piece of its own. Entries that are constants stay constants, so that
+one expression, by a ``Recorder`` as a call of its own. Entries that are constants stay constants, so that
 structural zeros cost nothing.
 
 Results lie in slots, columns of numbers; members of a tuple that are trees themselves have slots of their own, so that

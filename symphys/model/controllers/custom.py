@@ -14,7 +14,7 @@ Expr = Any
 
 @dataclass(frozen=True, eq=False)
 class Custom:
-    """u = function(sensed, time, weights); see ``ControlLaw``. The function must be expandable to scalar operations (SX)."""
+    """u = function(sensed, time, weights); see ``ControlLaw``. The function must expand to scalar operations (SX)."""
 
     function: ca.Function
 
