@@ -19,7 +19,7 @@ from scenes import Solid
 from table_robot import table_problem
 
 from symphys.dynamics import report_function
-from symphys.dynamics.contact.local_solver import STRONG, may_couple
+from symphys.dynamics.contact.coupling import STRONG, may_couple
 from symphys.model.shapes import Capsule, Plane
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Body, Law, Pair, Scheme, World, is_zero, make_world
@@ -27,7 +27,8 @@ from symphys.transcription import symbolic_rollout
 from symphys.transcription.simulation import recorder, simulate
 
 Array = NDArray[np.float64]
-coupled, phase, impact = (import_module(f"symphys.dynamics.{name}") for name in ("coupled", "phase", "impact"))
+HOMES = ("contact.coupling", "substep", "impact.impact")
+coupling, substep, impact = (import_module(f"symphys.dynamics.{name}") for name in HOMES)
 Run = tuple[float, Array, Array, Layout]
 """Instructions of a step, states (nx, steps + 1), residuals (steps,) [N s], where each quantity is."""
 
@@ -49,11 +50,11 @@ WHERE: dict[str, tuple[float, Callable[[World, Pair], bool]]] = {
 def solving(where: str) -> Iterator[None]:
     """The local solver at these contacts."""
     strong, chooses = WHERE[where]
-    coupled.STRONG, phase.may_couple, impact.may_couple = strong, chooses, chooses
+    coupling.STRONG, substep.may_couple, impact.may_couple = strong, chooses, chooses
     try:
         yield
     finally:
-        coupled.STRONG, phase.may_couple, impact.may_couple = STRONG, may_couple, may_couple
+        coupling.STRONG, substep.may_couple, impact.may_couple = STRONG, may_couple, may_couple
 
 
 def rolled(world: World, values: dict[str, Any], steps: int, sweeps: int, dt: float = 0.01) -> Run:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from robots import JointedScene
 from rolling import Walk
 
-from symphys.dynamics import reading_function, record_step
+from symphys.dynamics import reading_function, trace_step
 from symphys.model.state_layout import Layout
 from symphys.model.world import Scheme, World
 
@@ -139,7 +139,7 @@ def rms(differences: Array) -> float:
 
 def instructions(world: World, scheme: Scheme) -> int:
     """Of all pieces of a step."""
-    return sum(piece.function.n_instructions() for piece in record_step(world, scheme, exact=True).pieces)
+    return sum(piece.function.n_instructions() for piece in trace_step(world, scheme, exact=True).calls)
 
 
 def studies() -> list[Study]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from symphys.model.joints import HINGE, Joint, Link, Motor, Servo, Socket, Spring, linkages
+from symphys.model.joints import HINGE, Joint, Link, Motor, Servo, Socket, Spring, kinematic_trees
 from symphys.model.shapes import Plane, Sphere
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Body, Law, World, make_world
@@ -116,7 +116,7 @@ def state_of(world: World, coordinates: Mapping[str, Any], rates: Mapping[str, A
         root: of each tree that floats.
     """
     poses: dict[int, Pose] = {}
-    for link in (link for tree in linkages(world.joints) for link in tree.links):
+    for link in (link for tree in kinematic_trees(world.joints) for link in tree.links):
         if link.joint is None:
             poses[link.body] = root
             continue

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.codegen import FunctionCall, Kernel, MemoryLayout, Place, Program, compile_program
-from symphys.dynamics import record_step
-from symphys.model.state_layout import MemoryLayout as Columns
+from symphys.dynamics import trace_step
+from symphys.model.state_layout import Layout as Columns
 from symphys.model.world import Scheme, World
 
 Array = NDArray[np.float64]
@@ -86,11 +86,11 @@ class Rolling:
 
 def step_calls(world: World, scheme: Scheme, layout: MemoryLayout, x: Place, knob: Place) -> list[FunctionCall]:
     """The calls of one exact time step, from the states ``x`` to the next ones."""
-    columns, recording = Columns(world), record_step(world, scheme, exact=True)
+    columns, recording = Columns(world), trace_step(world, scheme, exact=True)
     after, empty = x.later(), Place(0, 0)
     places = {slot: Place(after.offset + s.start, s.stop - s.start, x.stride) for slot, s in recording.results.items()}
     calls = []
-    for piece in recording.pieces:
+    for piece in recording.calls:
         for slot in piece.inputs:
             if slot.name in columns:
                 part = columns[slot.name]

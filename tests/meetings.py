@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from symphys.dynamics.collision import collide
-from symphys.dynamics.collision.contact_geometry import Shift
-from symphys.dynamics.collision.predicted_points import Course, at_rest
+from symphys.dynamics.collision.contact_geometry import Displacement
+from symphys.dynamics.collision.predicted_path import PredictedPath, at_rest
 from symphys.maths import rotation
 from symphys.model.shapes import Box, Capsule, Sphere, Surface
 
@@ -37,10 +37,10 @@ def shape(kind: str, size: Any, place: Any) -> Any:
     return Box(tuple(numbers), centre, orientation)
 
 
-def course(motion: Any, dt: Any) -> Course:
+def course(motion: Any, dt: Any) -> PredictedPath:
     """A body's course from position, orientation, velocity, acceleration and the same of its turning."""
     p, q, v, a, w, alpha = (motion[i:j] for i, j in ((0, 3), (3, 7), (7, 10), (10, 13), (13, 16), (16, 19)))
-    return Course(p, rotation.matrix(q), v, a, w, alpha, dt)
+    return PredictedPath(p, rotation.matrix(q), v, a, w, alpha, dt)
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def rule(first: str, second: str, static: bool = False, surface: Surface | None 
     """(sizes, places, motions, dt) -> gap, rate, hit, time, normals, arms of the first, arms of the second."""
     symbols = arguments(first, second)
     found = contacts(first, second, symbols, static, surface)
-    frames = [contact.meeting.frame(contact.time) for contact in found]
+    frames = [contact.geometry.frame(contact.time) for contact in found]
     columns = [ca.vertcat(*(getattr(c, name) for c in found)) for name in ("gap", "rate", "hit", "time")]
     parts = zip(*((f.normal, *f.arms) for f in frames), strict=True)
     columns += [ca.horzcat(*(ca.densify(each) for each in column)).T for column in parts]
@@ -99,7 +99,7 @@ def later(first: str, second: str, static: bool = False, surface: Surface | None
     symbols = arguments(first, second)
     shifts = [ca.SX.sym("shift_a", 6), ca.SX.sym("shift_b", 6)]
     found = contacts(first, second, symbols, static, surface)
-    ends = [c.meeting.gap_after(*(Shift(s[:3], s[3:]) for s in shifts)) for c in found]
+    ends = [c.geometry.gap_after(*(Displacement(s[:3], s[3:]) for s in shifts)) for c in found]
     return ca.Function("later", [*symbols, *shifts], [ca.densify(ca.vertcat(*ends))])
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.tracing.trace import Pieces
+from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.state_layout import input_columns
 from symphys.model.world import Scheme, World
@@ -16,7 +16,7 @@ Expr = Any
 """casadi SX, MX or DM"""
 
 SHORTEST_KICK = 1 / 8
-"""Of dt; see ``Scene.shortest_kick``."""
+"""Of dt; see ``StepContext.shortest_kick``."""
 SLOWEST = 1.0
 """[m/s^2] least reference acceleration: what counts as fast when there is no gravity."""
 
@@ -26,19 +26,19 @@ State = dict[str, Expr]
 
 
 @dataclass(frozen=True)
-class Setting:
-    """What every part of a step may need to know.
+class StepSettings:
+    """Settings that every part of a step may use.
 
     Attributes:
         scheme: how the step is taken.
         gravity: (3,) [m/s^2].
-        knob: smoothing [m/s].
+        smoothing: s [m/s], see docs/time_step.md.
         reference: the acceleration [m/s^2] below which nothing counts as fast.
     """
 
     scheme: Scheme
     gravity: Expr
-    knob: Expr
+    smoothing: Expr
     reference: Expr
 
     @property
@@ -48,43 +48,40 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Scene:
+class StepContext:
     """What stays the same over a step.
 
     Attributes:
         world: what is simulated.
-        setting: how.
+        settings: how.
         inputs: names of the forces and torques that ``u`` stacks.
         u: what the inputs stack, constant over the step.
-        pieces: how the parts of the step are put together.
     """
 
     world: World
-    setting: Setting
+    settings: StepSettings
     inputs: tuple[str, ...]
     u: Expr
-    pieces: Pieces
 
-    def given(self, name: str) -> Expr | None:
+    def input(self, name: str) -> Expr | None:
         """The input of this name; None if there is none."""
         columns = input_columns(self.world, self.inputs).get(name)
         return None if columns is None else self.u[columns]
 
     @property
     def shortest_kick(self) -> float:
-        """[s]: impulses of a shorter stretch are stored as forces over this time; what an impact adds is no force."""
-        return SHORTEST_KICK * self.setting.scheme.dt
+        """[s]: impulses of a shorter substep are stored as forces over this time; what an impact adds is no force."""
+        return SHORTEST_KICK * self.settings.scheme.dt
 
 
-def make_scene(
-    world: World, scheme: Scheme | None, inputs: tuple[str, ...], u: Expr, knob: Expr, pieces: Pieces
-) -> Scene:
-    """The scene of a world."""
+def make_context(world: World, scheme: Scheme | None, inputs: tuple[str, ...], u: Expr, smoothing: Expr) -> StepContext:
+    """The context of a world."""
     gravity = ca.vertcat(*world.gravity)
-    setting = Setting(scheme or Scheme(), gravity, knob, pieces.do(reference, gravity))
-    return Scene(world, setting, inputs, u, pieces)
+    settings = StepSettings(scheme or Scheme(), gravity, smoothing, reference(gravity))
+    return StepContext(world, settings, inputs, u)
 
 
+@traced
 def reference(gravity: Expr) -> Expr:
     """|gravity|, or 1 m/s^2 if that is more."""
     return ca.fmax(ca.sqrt(ca.dot(gravity, gravity) + TINY_SQUARE), SLOWEST)

@@ -8,11 +8,13 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.context import Scene, State, make_scene
-from symphys.dynamics.step import report, take_step
-from symphys.dynamics.tracing.dead_code import trimmed
-from symphys.dynamics.tracing.recording import Piece, Recorder, Slot
-from symphys.dynamics.tracing.trace import Inline
+from symphys.dynamics.context import State, StepContext, make_context
+from symphys.dynamics.step import take_step
+from symphys.dynamics.step_report import report
+from symphys.dynamics.tracing.dead_code import without_dead_code
+from symphys.dynamics.tracing.decorator import tracing
+from symphys.dynamics.tracing.recording import Recorder, TracedCall, TracedVector
+from symphys.dynamics.tracing.trace import InlineTracer
 from symphys.model.state_layout import Layout, inputs_size
 from symphys.model.world import Scheme, World
 
@@ -38,55 +40,63 @@ def step_function(
     Returns:
         A function of x (see ``Layout``), u, p and smoothing [m/s] >= 0, where 0 is the exact step.
     """
-    arguments, scene, x = _flat(world, scheme, inputs, parameters)
-    after = _packed(scene, take_step(scene, x)[0])
-    step = ca.Function("step", arguments, [after], ["x", "u", "p", "smoothing"], ["x_next"])
+    arguments = arguments_of(world, inputs, parameters)
+    tracer, layout = inline(world, arguments), Layout(world)
+    with tracing(tracer):
+        after, _ = take_step(context_of(world, scheme, inputs, arguments), parts_of(layout, arguments[0]))
+    packed = _packed(layout, tracer, after)
+    step = ca.Function("step", arguments, [packed], ["x", "u", "p", "smoothing"], ["x_next"])
     if step.n_instructions() > MOST_INSTRUCTIONS:
         return step
-    return ca.Function("step", arguments, [ca.cse(after)], ["x", "u", "p", "smoothing"], ["x_next"])
+    return ca.Function("step", arguments, [ca.cse(packed)], ["x", "u", "p", "smoothing"], ["x_next"])
 
 
 def report_function(
     world: World, scheme: Scheme | None = None, inputs: Sequence[str] = (), parameters: Sequence[Any] = ()
 ) -> ca.Function:
-    """The same step with all of its ``Report``: (x, u, p, smoothing) -> (x_next, forces, gaps, .. paradox)."""
-    arguments, scene, x = _flat(world, scheme, inputs, parameters)
-    after, phases = take_step(scene, x)
-    r = report(scene, phases)
-    told = {field.name: scene.pieces.value(getattr(r, field.name)) for field in fields(r)}
-    outputs, names = [_packed(scene, after), *told.values()], ["x_next", *told]
+    """The same step with all of its ``StepReport``: (x, u, p, smoothing) -> (x_next, forces, gaps, .. paradox)."""
+    arguments = arguments_of(world, inputs, parameters)
+    tracer, layout = inline(world, arguments), Layout(world)
+    with tracing(tracer):
+        context = context_of(world, scheme, inputs, arguments)
+        after, substeps = take_step(context, parts_of(layout, arguments[0]))
+        r = report(context, substeps)
+    reported = {field.name: tracer.value(getattr(r, field.name)) for field in fields(r)}
+    outputs, names = [_packed(layout, tracer, after), *reported.values()], ["x_next", *reported]
     return ca.Function("report", arguments, outputs, ["x", "u", "p", "smoothing"], names)
 
 
 @dataclass(frozen=True)
-class Recording:
-    """One time step as pieces.
+class TracedStep:
+    """One time step as calls.
 
     Attributes:
-        pieces: in the order in which they are computed.
+        calls: in the order in which they are computed.
         results: which columns of the next state each slot named "next" holds.
     """
 
-    pieces: tuple[Piece, ...]
-    results: Mapping[Slot, slice]
+    calls: tuple[TracedCall, ...]
+    results: Mapping[TracedVector, slice]
 
 
-def record_step(
+def trace_step(
     world: World,
     scheme: Scheme | None = None,
     inputs: Sequence[str] = (),
     parameters: Sequence[Any] = (),
     exact: bool = False,
-) -> Recording:
-    """The step of ``step_function`` in pieces; their named slots are the parts of x, and "u", "p" and "smoothing".
+) -> TracedStep:
+    """The step of ``step_function`` in calls; their named slots are the parts of x, and "u", "p" and "smoothing".
 
-    ``exact`` is the step at smoothing 0 only: what the knob would add is left out.
+    ``exact`` is the step at smoothing 0 only: what the smoothing would add is left out.
     """
-    (x, u, p, knob), layout, recorder = arguments_of(world, inputs, parameters), Layout(world), Recorder()
-    for name, symbols in (("u", u), ("p", p), ("smoothing", knob), *parts_of(layout, x).items()):
+    x, u, p, smoothing = arguments_of(world, inputs, parameters)
+    layout, recorder = Layout(world), Recorder()
+    for name, symbols in (("u", u), ("p", p), ("smoothing", smoothing), *parts_of(layout, x).items()):
         recorder.argument(name, symbols)
-    scene = make_scene(world, scheme, tuple(inputs), u, ca.SX(0) if exact else knob, recorder)
-    after, _ = take_step(scene, parts_of(layout, x))
+    with tracing(recorder):
+        context = context_of(world, scheme, inputs, [x, u, p, ca.SX(0) if exact else smoothing])
+        after, _ = take_step(context, parts_of(layout, x))
     owners: dict[str, list[str]] = {}
     for name in layout.names():
         owners.setdefault(name.rpartition(".")[0], []).append(name)
@@ -94,29 +104,24 @@ def record_step(
     for names in owners.values():
         slot = recorder.give("next", [after[name] for name in names])
         results[slot] = slice(layout[names[0]].start, layout[names[-1]].stop)
-    return Recording(trimmed(recorder.pieces), results)
+    return TracedStep(without_dead_code(recorder.calls), results)
 
 
-def _flat(
-    world: World, scheme: Scheme | None, inputs: Sequence[str], parameters: Sequence[Any]
-) -> tuple[list[Expr], Scene, State]:
-    """The step's arguments, the scene of a step as one expression, and x in parts."""
-    arguments = arguments_of(world, inputs, parameters)
-    x, u, _, knob = arguments
-    scene = make_scene(world, scheme, tuple(inputs), u, knob, inline(world, arguments))
-    return arguments, scene, parts_of(Layout(world), x)
-
-
-def inline(world: World, arguments: Sequence[Expr]) -> Inline:
-    """Pieces that know x, u, p and smoothing; x by its parts, so that bodies alike share what they compute."""
-    (x, *others), pieces = arguments, Inline()
+def inline(world: World, arguments: Sequence[Expr]) -> InlineTracer:
+    """A tracer of functions of x, u, p and smoothing; x by its parts, so that equal bodies share what they compute."""
+    (x, *others), tracer = arguments, InlineTracer()
     for column in (*parts_of(Layout(world), x).values(), *others):
-        pieces.take(column)
-    return pieces
+        tracer.take(column)
+    return tracer
 
 
-def _packed(scene: Scene, x: State) -> Expr:
-    return Layout(scene.world).pack({name: scene.pieces.value(part) for name, part in x.items()})
+def context_of(world: World, scheme: Scheme | None, inputs: Sequence[str], arguments: Sequence[Expr]) -> StepContext:
+    """Of a step with these arguments."""
+    return make_context(world, scheme, tuple(inputs), arguments[1], arguments[3])
+
+
+def _packed(layout: Layout, tracer: InlineTracer, x: State) -> Expr:
+    return layout.pack({name: tracer.value(part) for name, part in x.items()})
 
 
 def parts_of(layout: Layout, x: Expr) -> State:

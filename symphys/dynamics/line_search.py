@@ -12,19 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.contact.constraint import ContactRow
-from symphys.dynamics.contact.projection import Impulse
-from symphys.dynamics.momentum import Momentum
-from symphys.dynamics.motion import Motion, apply
+from symphys.dynamics.contact.constraint import ContactConstraint, ContactImpulse
+from symphys.dynamics.motion import PredictedMotion, apply
+from symphys.dynamics.tracing.decorator import traced
+from symphys.dynamics.unknowns import Momentum, PlacedConstraint, Solution, Velocities
 from symphys.model.world import World
-
-if TYPE_CHECKING:
-    from symphys.dynamics.pgs import Row, Solution
-    from symphys.dynamics.tracing.trace import Pieces
 
 Expr = Any
 """casadi SX"""
@@ -43,16 +39,16 @@ SETTLED = 1e-10
 
 @dataclass(frozen=True)
 class Cluster:
-    """Bodies without joints that may lean on each other, and their rows, by index."""
+    """Bodies without joints that may lean on each other, and their constraints, by index."""
 
     bodies: tuple[int, ...]
-    rows: tuple[int, ...]
+    constraints: tuple[int, ...]
 
 
-def clusters(world: World, rows: Sequence[Row]) -> list[Cluster]:
+def clusters(world: World, constraints: Sequence[PlacedConstraint]) -> list[Cluster]:
     """Those of bodies that differ much in mass, or may: where a symbol decides it."""
     roots = list(range(len(world.bodies)))
-    for bodies in [row.bodies for row in rows] + [joint.bodies for joint in world.joints]:
+    for bodies in [constraint.bodies for constraint in constraints] + [joint.bodies for joint in world.joints]:
         for k in bodies[1:]:
             roots[_root(roots, k)] = _root(roots, bodies[0])
     groups: dict[int, set[int]] = {}
@@ -61,7 +57,9 @@ def clusters(world: World, rows: Sequence[Row]) -> list[Cluster]:
     held = {k for joint in world.joints for k in joint.bodies}
     apart = [group for group in groups.values() if _unequal(world, group) and not group & held]
     return [
-        Cluster(tuple(sorted(group)), tuple(k for k, row in enumerate(rows) if group & set(row.bodies)))
+        Cluster(
+            tuple(sorted(group)), tuple(k for k, constraint in enumerate(constraints) if group & set(constraint.bodies))
+        )
         for group in apart
     ]
 
@@ -82,26 +80,34 @@ def _unequal(world: World, group: set[int]) -> bool:
 
 
 def lengthened(
-    pieces: Pieces, cluster: Cluster, rows: Sequence[Row], motions: Sequence[Motion], before: Solution, now: Solution
+    cluster: Cluster,
+    constraints: Sequence[PlacedConstraint],
+    motions: Sequence[PredictedMotion],
+    before: Solution,
+    now: Solution,
 ) -> Solution:
     """The solution after the change of the last sweep, from ``before`` to ``now``, is repeated in part."""
     sums: tuple[Expr, Expr] = (ca.SX(0), ca.SX(0))
     longest: Expr = ca.SX(LONGEST)
     for k in cluster.bodies:
-        sums = pieces.do(_of_body, sums, motions[k], now.momenta[k], before.momenta[k])
-    for k in cluster.rows:
-        sums, longest = pieces.do(_of_row, sums, longest, rows[k].row, now.impulses[k], now.last[k])
-    share = pieces.do(_share, sums, longest)
+        sums = _of_body(sums, motions[k], now.momenta[k], before.momenta[k])
+    for k in cluster.constraints:
+        sums, longest = _of_constraint(sums, longest, constraints[k].constraint, now.impulses[k], now.last[k])
+    share = _share(sums, longest)
     momenta, impulses = list(now.momenta), list(now.impulses)
     for k in cluster.bodies:
-        momenta[k] = pieces.do(_repeated, share, now.momenta[k], before.momenta[k])
-    for k in cluster.rows:
-        impulses[k] = pieces.do(_given_again, share, now.impulses[k], now.last[k])
+        momenta[k] = _repeated(share, now.momenta[k], before.momenta[k])
+    for k in cluster.constraints:
+        impulses[k] = _given_again(share, now.impulses[k], now.last[k])
     return replace(now, momenta=tuple(momenta), impulses=tuple(impulses))
 
 
-def _of_body(sums: tuple[Expr, Expr], motion: Motion, now: Momentum, before: Momentum) -> tuple[Expr, Expr]:
-    """(what the energy gains along the change, its curvature), with a body's share."""
+@traced
+def _of_body(
+    sums: tuple[Expr, Expr], motion: PredictedMotion, now: Velocities, before: Velocities
+) -> tuple[Expr, Expr]:
+    """(what the energy responses along the change, its curvature), with a body's share."""
+    assert isinstance(now, Momentum) and isinstance(before, Momentum)
     moved, turned = now.velocity - before.velocity, now.angular - before.angular
     spun = apply(motion.inverse_mid, turned)
     slope = motion.mass * ca.dot(now.velocity, moved) + ca.dot(now.angular, spun)
@@ -109,26 +115,31 @@ def _of_body(sums: tuple[Expr, Expr], motion: Motion, now: Momentum, before: Mom
     return sums[0] + slope, sums[1] + motion.mass * ca.dot(moved, moved) + ca.dot(turned, spun) + settled
 
 
-def _of_row(
-    sums: tuple[Expr, Expr], longest: Expr, row: ContactRow, now: Impulse, before: Impulse
+@traced
+def _of_constraint(
+    sums: tuple[Expr, Expr], longest: Expr, constraint: ContactConstraint, now: ContactImpulse, before: ContactImpulse
 ) -> tuple[tuple[Expr, Expr], Expr]:
-    """The same less what the row's targets ask for; how often the change can be repeated."""
+    """The same less what the constraint's targets ask for; how often the change can be repeated."""
     press = now.normal - before.normal
-    asked = row.target * press + ca.dot(row.slip_target, now.tangent - before.tangent)
-    slope = sums[0] - asked + row.softness * now.normal * press
+    asked = constraint.target * press + ca.dot(constraint.slip_target, now.tangent - before.tangent)
+    slope = sums[0] - asked + constraint.softness * now.normal * press
     falls = ca.if_else(press < 0, now.normal / ca.fmax(-press, TINY), LONGEST)
-    return (slope, sums[1] + row.softness * press * press), ca.fmin(longest, falls)
+    return (slope, sums[1] + constraint.softness * press * press), ca.fmin(longest, falls)
 
 
+@traced
 def _share(sums: tuple[Expr, Expr], longest: Expr) -> Expr:
     return ca.fmin(ca.fmax(-sums[0] / sums[1], 0), longest)
 
 
-def _repeated(share: Expr, now: Momentum, before: Momentum) -> Momentum:
+@traced
+def _repeated(share: Expr, now: Velocities, before: Velocities) -> Momentum:
+    assert isinstance(now, Momentum) and isinstance(before, Momentum)
     return Momentum(
         now.velocity + share * (now.velocity - before.velocity), now.angular + share * (now.angular - before.angular)
     )
 
 
-def _given_again(share: Expr, now: Impulse, before: Impulse) -> Impulse:
+@traced
+def _given_again(share: Expr, now: ContactImpulse, before: ContactImpulse) -> ContactImpulse:
     return now.plus(now.minus(before).times(share))

@@ -12,7 +12,8 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics import free_rotation
-from symphys.dynamics.collision.predicted_points import Course
+from symphys.dynamics.collision.predicted_path import PredictedPath
+from symphys.dynamics.tracing.decorator import traced
 from symphys.maths import rotation
 from symphys.maths.rotation import turn
 
@@ -33,23 +34,24 @@ class BodyState:
 
 
 @dataclass(frozen=True)
-class Held:
-    """A body of a tree of joints: how it moves with the tree's n coordinates; see ``step.chart``.
+class BodyJacobian:
+    """The Jacobian of a body of a kinematic tree with n generalized velocities, and its inverse-mass image.
 
     Attributes:
-        see: (6, n) velocity and angular velocity at mid-step for unit rates.
+        matrix: (6, n) velocity and angular velocity at mid-step for unit generalized velocities.
         inertia: (3, 3) world frame, at mid-step [kg m^2].
-        push, twist: (n, 3) what unit impulses at the centre of mass, and unit torque impulses, do to the rates.
+        impulse_response, torque_response: (n, 3) of the generalized velocities to unit impulses at the centre of mass,
+            and to unit torque impulses.
     """
 
-    see: Expr
+    matrix: Expr
     inertia: Expr
-    push: Expr
-    twist: Expr
+    impulse_response: Expr
+    torque_response: Expr
 
 
 @dataclass(frozen=True)
-class Motion(Course):
+class PredictedMotion(PredictedPath):
     """A body's free motion over the step and the inertia that impulses meet.
 
     Attributes:
@@ -61,7 +63,7 @@ class Motion(Course):
         inverse_mid: inverse inertia at t_k + dt/2, world frame: scalar if isotropic, else (3, 3) [1/(kg m^2)].
         inverse_rate: its time derivative; None if isotropic.
         inertia_mid: (3, 3) inertia at t_k + dt/2, world frame [kg m^2].
-        held: if the body is part of a tree of joints.
+        jacobian: if the body is part of a tree of joints.
     """
 
     mass: Expr
@@ -74,11 +76,11 @@ class Motion(Course):
     inverse_mid: Expr
     inverse_rate: Expr | None
     inertia_mid: Expr
-    held: Held | None = None
+    jacobian: BodyJacobian | None = None
 
-    def course(self) -> Course:
+    def predicted_path(self) -> PredictedPath:
         """The motion without its inertia."""
-        return Course(**{field.name: getattr(self, field.name) for field in fields(Course)})
+        return PredictedPath(**{field.name: getattr(self, field.name) for field in fields(PredictedPath)})
 
     def inverse_inertia(self, t: Expr) -> Expr:
         """World-frame inverse inertia at time t in the step, to first order; scalar if isotropic."""
@@ -86,7 +88,8 @@ class Motion(Course):
             return self.inverse_mid
         return self.inverse_mid + (t - self.dt / 2) * self.inverse_rate
 
-    def at_start(self) -> Motion:
+    @traced
+    def at_start(self) -> PredictedMotion:
         """The same with the inertia of t = 0 at any time: for impulses there."""
         if self.inverse_rate is None:
             return self
@@ -144,7 +147,9 @@ def in_world(tensor: Expr, r_wb: Expr) -> Expr:
     return ca.triu2symm(ca.triu(ca.densify(ca.mtimes(r_wb, ca.mtimes(tensor, r_wb.T)))))
 
 
-def free_motion(mass: Expr, inertia: Expr, state: BodyState, gravity: Expr, dt: Expr, jointed: bool = False) -> Motion:
+def free_motion(
+    mass: Expr, inertia: Expr, state: BodyState, gravity: Expr, dt: Expr, jointed: bool = False
+) -> PredictedMotion:
     """The motion from ``state`` under gravity, force and torque, all constant over the step.
 
     ``jointed``: whether joints hold the body, so that it does not turn freely.
@@ -162,14 +167,14 @@ def motion_from(
     gravity: Expr,
     dt: Expr,
     jointed: bool = True,
-) -> Motion:
+) -> PredictedMotion:
     """The same from what ``state`` stands for, ``turning``: its rotation (3, 3) and angular velocity."""
     turned, w = turning
     acceleration = gravity + state.force / mass
     mid_momentum = state.angular_momentum + dt / 2 * state.torque
     middle = _middle(inertia, state.orientation, w if jointed else None, mid_momentum, dt / 2)
     inverse_mid, inertia_mid, inverse_rate = _inertias(inertia, middle, mid_momentum)
-    return Motion(
+    return PredictedMotion(
         position=state.position,
         rotation=turned,
         velocity=state.velocity,

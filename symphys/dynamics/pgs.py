@@ -1,130 +1,104 @@
-"""Projected Gauss-Seidel over the rows of contacts and joints, on linear velocities and angular momenta.
+"""Projected Gauss-Seidel over the constraints of contacts and joints, on linear velocities and angular momenta.
 
-Cost of a sweep: one visit to each row; nothing but V, L and the impulses is accumulated.
+Cost of a sweep: one projection of each constraint; only velocities, momenta and impulses are accumulated.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 from symphys.dynamics.line_search import EVERY, Cluster, clusters, lengthened
-from symphys.dynamics.momentum import Moved, Rates, States
-from symphys.dynamics.motion import Motion
-from symphys.dynamics.tracing.trace import Pieces
+from symphys.dynamics.motion import PredictedMotion
+from symphys.dynamics.tracing.decorator import repeat, traced
+from symphys.dynamics.unknowns import (
+    AllVelocities,
+    AnyImpulse,
+    GeneralizedVelocities,
+    PlacedConstraint,
+    Solution,
+    Velocities,
+    VelocityConstraint,
+)
 from symphys.model.world import World
 
-Given = Any
-"""What a row gives: ``impulse.Impulse`` of a contact, ``along.Along`` of a joint."""
-
-
-class Solvable(Protocol):
-    """What sweeps visit. Implementations are frozen dataclasses."""
-
-    def visit(self, momenta: States, old: Given) -> tuple[States, Given]:
-        """One projection: the momenta of the row's bodies and what the row has given since the sweeps began."""
-        ...
-
-    def given(self, momenta: States, impulse: Given) -> States:
-        """The momenta after an impulse."""
-        ...
-
 
 @dataclass(frozen=True)
-class Solution:
-    """What the sweeps have come to: of all bodies, of all rows, and of all rows before the last sweep."""
+class Acceleration:
+    """Constraints, the clusters of bodies that they connect, and the motions of bodies; see ``line_search``."""
 
-    momenta: States
-    impulses: tuple[Given, ...]
-    last: tuple[Given, ...]
-
-
-@dataclass(frozen=True)
-class Row:
-    """A row.
-
-    Attributes:
-        bodies: indices of those on its moving sides.
-        row: Solvable.
-        carriers: where the sweeps keep what they know of those bodies: at themselves, or at the root of their tree.
-    """
-
-    bodies: tuple[int, ...]
-    row: Any
-    carriers: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class Leaning:
-    """Rows, and the bodies that lean on each other by them, with their motions; see ``acceleration``."""
-
-    rows: tuple[Row, ...]
+    constraints: tuple[PlacedConstraint, ...]
     clusters: tuple[Cluster, ...]
-    motions: tuple[Motion, ...]
+    motions: tuple[PredictedMotion, ...]
 
 
-def relax(
-    pieces: Pieces, world: World, sweeps: int, rows: tuple[Row, ...], start: Solution, motions: Sequence[Motion]
+def iterate(
+    world: World,
+    sweeps: int,
+    constraints: tuple[PlacedConstraint, ...],
+    start: Solution,
+    motions: Sequence[PredictedMotion],
 ) -> Solution:
-    """All sweeps; among bodies that lean on each other with longer steps now and then."""
-    found = tuple(clusters(world, rows))
+    """The solution after all sweeps; in clusters of unequal bodies with a line search after some of them."""
+    found = tuple(clusters(world, constraints))
     if not found:
-        return pieces.repeat(sweeps, sweep, rows, start)
+        return repeat(sweeps, sweep, constraints, start)
     rounds = max((sweeps - 1) // EVERY, 0)
-    moved = pieces.repeat(rounds, _round, Leaning(rows, found, tuple(motions)), start)
-    return pieces.repeat(sweeps - rounds * EVERY, sweep, rows, moved)
+    moved = repeat(rounds, _round, Acceleration(constraints, found, tuple(motions)), start)
+    return repeat(sweeps - rounds * EVERY, sweep, constraints, moved)
 
 
-def _round(pieces: Pieces, leaning: Leaning, state: Solution) -> Solution:
+def _round(fixed: Acceleration, state: Solution) -> Solution:
     """Some sweeps, then a longer step along the last."""
-    before = pieces.repeat(EVERY - 1, sweep, leaning.rows, state)
-    now = sweep(pieces, leaning.rows, before)
-    for cluster in leaning.clusters:
-        now = lengthened(pieces, cluster, leaning.rows, leaning.motions, before, now)
+    before = repeat(EVERY - 1, sweep, fixed.constraints, state)
+    now = sweep(fixed.constraints, before)
+    for cluster in fixed.clusters:
+        now = lengthened(cluster, fixed.constraints, fixed.motions, before, now)
     return now
 
 
-def sweep(pieces: Pieces, rows: tuple[Row, ...], before: Solution) -> Solution:
-    """One pass over all rows."""
+def sweep(constraints: tuple[PlacedConstraint, ...], before: Solution) -> Solution:
+    """One pass over all constraints."""
     momenta, new = list(before.momenta), list(before.impulses)
-    for run in runs(rows, momenta):
-        carriers = tuple(dict.fromkeys(i for k in run for i in rows[k].carriers))
-        visits = tuple((rows[k].row, tuple(carriers.index(i) for i in rows[k].carriers)) for k in run)
-        visited, given = pieces.do(_visit, visits, tuple(momenta[i] for i in carriers), [new[k] for k in run])
-        for i, moved in zip(carriers, visited, strict=True):
+    for run in runs(constraints, momenta):
+        carriers = tuple(dict.fromkeys(i for k in run for i in constraints[k].carriers))
+        projections = tuple(
+            (constraints[k].constraint, tuple(carriers.index(i) for i in constraints[k].carriers)) for k in run
+        )
+        after, given = _project_run(projections, tuple(momenta[i] for i in carriers), [new[k] for k in run])
+        for i, moved in zip(carriers, after, strict=True):
             momenta[i] = moved
         for k, impulse in zip(run, given, strict=True):
             new[k] = impulse
     return Solution(tuple(momenta), tuple(new), before.impulses)
 
 
-def visiting_order(rows: Sequence[Row]) -> list[int]:
-    """Rows one after the other that share no body as far as may be: a processor works on several visits at once."""
+def projection_order(constraints: Sequence[PlacedConstraint]) -> list[int]:
+    """Consecutive constraints share no body where possible: a processor works on several projections at once."""
     order: list[int] = []
-    left = list(range(len(rows)))
+    left = list(range(len(constraints)))
     busy: set[int] = set()
     while left:
-        free = (k for k in left if busy.isdisjoint(rows[k].carriers))
+        free = (k for k in left if busy.isdisjoint(constraints[k].carriers))
         k = next(free, left[0])
-        busy = set(rows[k].carriers)
+        busy = set(constraints[k].carriers)
         left.remove(k)
         order.append(k)
     return order
 
 
-def runs(rows: Sequence[Row], momenta: Sequence[Moved]) -> list[list[int]]:
-    """The rows in visiting order, those of one tree of joints together: what is known of it is handed on within a run.
+def runs(constraints: Sequence[PlacedConstraint], momenta: Sequence[Velocities]) -> list[list[int]]:
+    """The constraints in the order of projection; runs of those on one kinematic tree are traced as one call.
 
-    A row joins the last run that shares a body with it, so that nothing is visited in another order than before.
+    A constraint joins the last run that shares a body with it, which does not change the order on any body.
     """
     found: list[list[int]] = []
     last: dict[int, int] = {}
-    for k in visiting_order(rows):
-        carriers = set(rows[k].carriers)
+    for k in projection_order(constraints):
+        carriers = set(constraints[k].carriers)
         latest = max((last[i] for i in carriers if i in last), default=-1)
-        within = len(carriers) == 1 and isinstance(momenta[min(carriers)], Rates)
-        if not (within and latest >= 0 and carriers == set(rows[found[latest][0]].carriers)):
+        within = len(carriers) == 1 and isinstance(momenta[min(carriers)], GeneralizedVelocities)
+        if not (within and latest >= 0 and carriers == set(constraints[found[latest][0]].carriers)):
             latest = len(found)
             found.append([])
         found[latest].append(k)
@@ -132,37 +106,32 @@ def runs(rows: Sequence[Row], momenta: Sequence[Moved]) -> list[list[int]]:
     return found
 
 
-def begin(pieces: Pieces, rows: Sequence[Row], momenta: States, impulses: Sequence[Given]) -> Solution:
-    """Give the impulses that the sweeps start from."""
+def apply_start(
+    constraints: Sequence[PlacedConstraint], momenta: AllVelocities, impulses: Sequence[AnyImpulse]
+) -> Solution:
+    """Apply the impulses that the sweeps start from."""
     started = list(momenta)
-    for each, impulse in zip(rows, impulses, strict=True):
-        spread(started, each, pieces.do(_give, each.row, of_bodies(started, each), impulse))
+    for each, impulse in zip(constraints, impulses, strict=True):
+        after = _apply(each.constraint, tuple(started[i] for i in each.carriers), impulse)
+        for i, momentum in zip(each.carriers, after, strict=True):
+            started[i] = momentum
     return Solution(tuple(started), tuple(impulses), tuple(impulses))
 
 
-def of_bodies(momenta: Sequence[Moved], row: Row) -> States:
-    """The momenta of the row's bodies."""
-    return tuple(momenta[i] for i in row.carriers)
-
-
-def spread(momenta: list[Moved], row: Row, changed: States) -> None:
-    """Put the momenta of the row's bodies back."""
-    for i, momentum in zip(row.carriers, changed, strict=True):
-        momenta[i] = momentum
-
-
-def _visit(
-    visits: tuple[tuple[Solvable, tuple[int, ...]], ...], states: States, old: list[Given]
-) -> tuple[States, list[Given]]:
-    """Visits one after the other: rows, and which of the states are those of their sides."""
+@traced
+def _project_run(
+    projections: tuple[tuple[VelocityConstraint, tuple[int, ...]], ...], states: AllVelocities, old: list[AnyImpulse]
+) -> tuple[AllVelocities, list[AnyImpulse]]:
+    """One constraint after the other: each with the places of its bodies among the states."""
     momenta, given = list(states), []
-    for (row, places), impulse in zip(visits, old, strict=True):
-        visited, new = row.visit(tuple(momenta[i] for i in places), impulse)
+    for (constraint, places), impulse in zip(projections, old, strict=True):
+        after, new = constraint.project(tuple(momenta[i] for i in places), impulse)
         given.append(new)
-        for i, moved in zip(places, visited, strict=True):
+        for i, moved in zip(places, after, strict=True):
             momenta[i] = moved
     return tuple(momenta), given
 
 
-def _give(row: Solvable, momenta: States, impulse: Given) -> States:
-    return row.given(momenta, impulse)
+@traced
+def _apply(constraint: VelocityConstraint, momenta: AllVelocities, impulse: AnyImpulse) -> AllVelocities:
+    return constraint.apply(momenta, impulse)

@@ -8,70 +8,76 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.articulated.configuration_update import Made, arrival
-from symphys.dynamics.articulated.forward_kinematics import Arrived
-from symphys.dynamics.collision.contact_geometry import UNMOVED, Contact, Shift
-from symphys.dynamics.contact.constraint import ContactRow, Side
-from symphys.dynamics.contact.projection import Impulse
-from symphys.dynamics.context import Scene
-from symphys.dynamics.joints.assembly import Trees
-from symphys.dynamics.joints.coordinate_constraint import AxisRow
-from symphys.dynamics.joints.loop_closure import Displaced, Shifts, close_loops, displaced
-from symphys.dynamics.momentum import Moved, Rates, States
-from symphys.dynamics.motion import Motion, apply
-from symphys.dynamics.pgs import Row
-from symphys.dynamics.tracing.trace import Pieces
-from symphys.model.joints import linkages
+from symphys.dynamics.articulated.configuration_update import JointCorrection, update_configuration
+from symphys.dynamics.articulated.forward_kinematics import FinalPose
+from symphys.dynamics.collision.contact_geometry import UNMOVED, Contact, Displacement
+from symphys.dynamics.contact.body_term import BodyTerm
+from symphys.dynamics.contact.constraint import ContactConstraint, ContactImpulse
+from symphys.dynamics.context import StepContext
+from symphys.dynamics.joints.assembly import KinematicTrees
+from symphys.dynamics.joints.coordinate_constraint import CoordinateConstraint
+from symphys.dynamics.joints.loop_closure import Displacements, TreeDisplacement, close_loops, displaced
+from symphys.dynamics.motion import PredictedMotion, apply
+from symphys.dynamics.tracing.decorator import repeat, traced
+from symphys.dynamics.unknowns import AllVelocities, GeneralizedVelocities, PlacedConstraint, Velocities
+from symphys.model.joints import kinematic_trees
 
 Expr = Any
 """casadi SX, MX or DM"""
 
 
 def displacements(
-    scene: Scene,
-    trees: Trees,
-    rows: Sequence[Row],
-    started: Sequence[Impulse],
-    solved: States,
-    given: Sequence[Impulse],
+    context: StepContext,
+    trees: KinematicTrees,
+    constraints: Sequence[PlacedConstraint],
+    started: Sequence[ContactImpulse],
+    solved: AllVelocities,
+    given: Sequence[ContactImpulse],
     duration: Expr,
-) -> list[Displaced]:
+) -> list[TreeDisplacement]:
     """Duration times the new velocities, less what impulses would have done before they act, at the carriers."""
-    do = scene.pieces.do
-    late = [do(_drift, motion, state, duration) for motion, state in zip(trees.motions, solved, strict=True)]
-    if not scene.setting.scheme.time_of_impact:
+    late = [_drift(motion, state, duration) for motion, state in zip(trees.motions, solved, strict=True)]
+    if not context.settings.scheme.time_of_impact:
         return late
-    for each, *impulses in zip(rows, started, given, strict=True):
-        for side, (body, carrier) in enumerate(zip(each.bodies, each.carriers, strict=True)):
-            late[carrier] = do(_delayed, late[carrier], each.row, side, impulses, trees.motions[body].inverse_mid)
+    for each, *impulses in zip(constraints, started, given, strict=True):
+        for term, (body, carrier) in enumerate(zip(each.bodies, each.carriers, strict=True)):
+            late[carrier] = _delayed(late[carrier], each.constraint, term, impulses, trees.motions[body].inverse_mid)
     return late
 
 
-def _drift(motion: Motion, state: Moved, duration: Expr) -> Displaced:
+@traced
+def _drift(motion: PredictedMotion, state: Velocities, duration: Expr) -> TreeDisplacement:
     if state is None:
         return None
-    if isinstance(state, Rates):
-        return Rates(duration * state.numbers)
-    return Shift(duration * state.velocity, duration * apply(motion.inverse_mid, state.angular))
+    if isinstance(state, GeneralizedVelocities):
+        return GeneralizedVelocities(duration * state.numbers)
+    return Displacement(duration * state.velocity, duration * apply(motion.inverse_mid, state.angular))
 
 
-def _delayed(late: Displaced, row: ContactRow, k: int, impulses: list[Impulse], turning: Expr) -> Displaced:
-    """The displacement less that which the impulse on side k would have caused before it acts.
+@traced
+def _delayed(
+    late: TreeDisplacement, constraint: ContactConstraint, k: int, impulses: list[ContactImpulse], turning: Expr
+) -> TreeDisplacement:
+    """The displacement less that which the impulse on term k would have caused before it acts.
 
     What goes on from the last step has acted all the time, whatever rounding makes of the gap.
     """
-    side, impulse = row.sides[k], impulses[1].minus(impulses[0].times(row.lasts))
-    force, twist = impulse.linear(row.impulse_normal), impulse.angular(row.impulse_normal)
-    early = row.delay * side.sign
-    if isinstance(late, Rates) and side.reach is not None:
-        return Rates(late.numbers - early * (ca.mtimes(side.reach.push, force) + ca.mtimes(side.reach.twist, twist)))
-    assert isinstance(late, Shift)
-    torque = ca.cross(side.impulse_arm, force) + twist
-    return Shift(late.linear - early * side.inverse_mass * force, late.angular - early * apply(turning, torque))
+    term, impulse = constraint.terms[k], impulses[1].minus(impulses[0].times(constraint.lasts))
+    force, twist = impulse.linear(constraint.impulse_normal), impulse.angular(constraint.impulse_normal)
+    early = constraint.delay * term.sign
+    if isinstance(late, GeneralizedVelocities) and term.jacobian is not None:
+        return GeneralizedVelocities(
+            late.numbers
+            - early
+            * (ca.mtimes(term.jacobian.impulse_response, force) + ca.mtimes(term.jacobian.torque_response, twist))
+        )
+    assert isinstance(late, Displacement)
+    torque = ca.cross(term.impulse_arm, force) + twist
+    return Displacement(late.linear - early * term.inverse_mass * force, late.angular - early * apply(turning, torque))
 
 
 @dataclass(frozen=True)
-class Closed:
+class Corrected:
     """What the pass comes to.
 
     Attributes:
@@ -80,55 +86,62 @@ class Closed:
         made: of each body of a tree what joints did to its displacement. Velocities are not touched.
     """
 
-    shifts: Mapping[int, Shift]
-    arrived: Mapping[int, Arrived]
-    made: Mapping[int, Made]
+    shifts: Mapping[int, Displacement]
+    arrived: Mapping[int, FinalPose]
+    made: Mapping[int, JointCorrection]
 
 
 def close_gaps(
-    scene: Scene,
-    trees: Trees,
-    rows: Sequence[tuple[Row, Contact, Impulse]],
-    joints: Sequence[Row],
-    moved: Sequence[Displaced],
-) -> Closed:
+    context: StepContext,
+    trees: KinematicTrees,
+    constraints: Sequence[tuple[PlacedConstraint, Contact, ContactImpulse]],
+    joints: Sequence[PlacedConstraint],
+    moved: Sequence[TreeDisplacement],
+) -> Corrected:
     """Gauss-Seidel on the displacements until no rigid contact overlaps, and those that last do not gape; then joints.
 
     What is on a tree is pushed along the tree's coordinates. Joints that close loops push along them too.
     """
-    do, scheme = scene.pieces.do, scene.setting.scheme
+    scheme = context.settings.scheme
     rigid = tuple(
-        (each, contact, do(_lasts, each.row, impulse)) for each, contact, impulse in rows if not each.row.law.soft
+        (each, contact, _lasts(each.constraint, impulse))
+        for each, contact, impulse in constraints
+        if not each.constraint.law.soft
     )
     limits = tuple(each for each in joints if _of_tree(each))
-    context = Passing(trees.motions, rigid, limits, scheme.push_out)
+    fixed = PositionPass(trees.motions, rigid, limits, scheme.push_out)
     before: Pushed = tuple(moved), tuple(ca.SX(0) for _ in rigid)
-    along, _ = scene.pieces.repeat(scheme.position_sweeps, _push_all, context, before)
+    along, _ = repeat(scheme.position_sweeps, _push_all, fixed, before)
     others = tuple(each for each in joints if not _of_tree(each))
-    along, by_loops = close_loops(scene.pieces, scheme.position_sweeps, trees.motions, others, along)
-    return _closed(scene, trees, along, by_loops)
+    along, by_loops = close_loops(scheme.position_sweeps, trees.motions, others, along)
+    return _closed(context, trees, along, by_loops)
 
 
-def _closed(scene: Scene, trees: Trees, along: Sequence[Displaced], by_loops: Sequence[Rates | None]) -> Closed:
-    shifts = {i: each for i, each in enumerate(along) if isinstance(each, Shift)}
-    arrived, made, joints = dict[int, Arrived](), dict[int, Made](), scene.world.joints
-    for tree, chart in zip(linkages(joints), trees.charts, strict=True):
+def _closed(
+    context: StepContext,
+    trees: KinematicTrees,
+    along: Sequence[TreeDisplacement],
+    by_loops: Sequence[GeneralizedVelocities | None],
+) -> Corrected:
+    shifts = {i: each for i, each in enumerate(along) if isinstance(each, Displacement)}
+    arrived, made, joints = dict[int, FinalPose](), dict[int, JointCorrection](), context.world.joints
+    for tree, coordinates in zip(kinematic_trees(joints), trees.coordinates, strict=True):
         ended = along[tree.root]
-        assert isinstance(ended, Rates)
+        assert isinstance(ended, GeneralizedVelocities)
         own = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
         motions = [trees.motions[i] for i in tree.bodies]
-        places, gained = arrival(scene.pieces, tree, own, chart, motions, ended, by_loops[tree.root])
+        places, gained = update_configuration(tree, own, coordinates, motions, ended, by_loops[tree.root])
         arrived |= zip(tree.bodies, places, strict=True)
         made |= zip(tree.bodies, gained, strict=True)
-    return Closed(shifts, arrived, made)
+    return Corrected(shifts, arrived, made)
 
 
-Pushed = tuple[tuple[Displaced, ...], tuple[Expr, ...]]
+Pushed = tuple[tuple[TreeDisplacement, ...], tuple[Expr, ...]]
 """What pushes did to bodies and trees; pushes of contacts."""
 
 
 @dataclass(frozen=True)
-class Passing:
+class PositionPass:
     """What stays the same over the sweeps of the pass over contacts.
 
     Attributes:
@@ -138,67 +151,70 @@ class Passing:
         share: of an overlap that a step takes back.
     """
 
-    motions: tuple[Motion, ...]
-    rigid: tuple[tuple[Row, Contact, Expr], ...]
-    limits: tuple[Row, ...]
+    motions: tuple[PredictedMotion, ...]
+    rigid: tuple[tuple[PlacedConstraint, Contact, Expr], ...]
+    limits: tuple[PlacedConstraint, ...]
     share: float
 
 
-def _of_tree(each: Row) -> bool:
-    return isinstance(each.row, AxisRow) and each.row.of_tree is not None
+def _of_tree(each: PlacedConstraint) -> bool:
+    return isinstance(each.constraint, CoordinateConstraint) and each.constraint.of_tree is not None
 
 
-def _lasts(row: ContactRow, impulse: Impulse) -> Expr:
+@traced
+def _lasts(constraint: ContactConstraint, impulse: ContactImpulse) -> Expr:
     """1 if a contact carried load and still does."""
-    return ca.logic_and(row.lasts, impulse.normal > row.load)
+    return ca.logic_and(constraint.lasts, impulse.normal > constraint.load)
 
 
-def _push_all(pieces: Pieces, context: Passing, state: Pushed) -> Pushed:
+def _push_all(fixed: PositionPass, state: Pushed) -> Pushed:
     """One pass over all rigid contacts and limits."""
     along, pushes = list(state[0]), list(state[1])
-    for k, (each, contact, lasts) in enumerate(context.rigid):
+    for k, (each, contact, lasts) in enumerate(fixed.rigid):
         own = tuple(along[i] for i in each.carriers)
-        moved = tuple(pieces.do(displaced, context.motions[i].held, a) for i, a in zip(each.bodies, own, strict=True))
-        after, pushes[k] = pieces.do(_push, each.row, contact, lasts, moved, own, pushes[k], context.share)
+        moved = tuple(displaced(fixed.motions[i].jacobian, a) for i, a in zip(each.bodies, own, strict=True))
+        after, pushes[k] = _push(each.constraint, contact, lasts, moved, own, pushes[k], fixed.share)
         for i, own_after in zip(each.carriers, after, strict=True):
             along[i] = own_after
-    for each in context.limits:
-        along[each.carriers[0]] = pieces.do(_back, each.row, along[each.carriers[0]])
+    for each in fixed.limits:
+        along[each.carriers[0]] = _back(each.constraint, along[each.carriers[0]])
     return tuple(along), tuple(pushes)
 
 
+@traced
 def _push(
-    row: ContactRow,
+    constraint: ContactConstraint,
     contact: Contact,
     lasts: Expr,
-    moved: Shifts,
-    along: tuple[Displaced, ...],
+    moved: Displacements,
+    along: tuple[TreeDisplacement, ...],
     old: Expr,
     share: float,
-) -> tuple[tuple[Displaced, ...], Expr]:
-    gap = contact.meeting.gap_after(moved[0], moved[1] if len(moved) > 1 else UNMOVED) + row.slack
-    free = old - share * gap * row.normal_mass * row.yields
+) -> tuple[tuple[TreeDisplacement, ...], Expr]:
+    gap = contact.geometry.gap_after(moved[0], moved[1] if len(moved) > 1 else UNMOVED) + constraint.slack
+    free = old - share * gap * constraint.normal_mass * constraint.separates
     # at 0 the slope is that of ``free``: a body that exactly touches is held by the surface
     new = ca.if_else(ca.logic_or(lasts, free >= 0), free, 0)
-    step = (new - old) * row.normal
-    if row.same:
+    step = (new - old) * constraint.normal
+    if constraint.same:
         after = along[0]
-        for side in row.sides:
-            after = _pushed(side, after, step)
-        return tuple(after for _ in row.sides), new
-    return tuple(_pushed(side, each, step) for side, each in zip(row.sides, along, strict=True)), new
+        for term in constraint.terms:
+            after = _pushed(term, after, step)
+        return tuple(after for _ in constraint.terms), new
+    return tuple(_pushed(term, each, step) for term, each in zip(constraint.terms, along, strict=True)), new
 
 
-def _pushed(side: Side, along: Displaced, step: Expr) -> Displaced:
-    if isinstance(along, Rates) and side.reach is not None:
-        return Rates(along.numbers + side.sign * apply(side.reach.push, step))
-    assert isinstance(along, Shift)
-    turn = apply(side.inverse_inertia, ca.cross(side.arm, step))
-    return Shift(along.linear + side.sign * side.inverse_mass * step, along.angular + side.sign * turn)
+def _pushed(term: BodyTerm, along: TreeDisplacement, step: Expr) -> TreeDisplacement:
+    if isinstance(along, GeneralizedVelocities) and term.jacobian is not None:
+        return GeneralizedVelocities(along.numbers + term.sign * apply(term.jacobian.impulse_response, step))
+    assert isinstance(along, Displacement)
+    turn = apply(term.inverse_inertia, ca.cross(term.arm, step))
+    return Displacement(along.linear + term.sign * term.inverse_mass * step, along.angular + term.sign * turn)
 
 
-def _back(row: AxisRow, along: Rates) -> Rates:
+@traced
+def _back(constraint: CoordinateConstraint, along: TreeDisplacement) -> GeneralizedVelocities:
     """The displacement along a tree's coordinates that takes a limit of one back to where it is kept."""
-    assert row.of_tree is not None
-    moved = ca.mtimes(row.of_tree.see, along.numbers)
-    return Rates(along.numbers + ca.mtimes(row.of_tree.gain, row.fitting(moved)))
+    assert isinstance(along, GeneralizedVelocities) and constraint.of_tree is not None
+    moved = ca.mtimes(constraint.of_tree.jacobian, along.numbers)
+    return GeneralizedVelocities(along.numbers + ca.mtimes(constraint.of_tree.response, constraint.fitting(moved)))

@@ -1,4 +1,4 @@
-"""How bodies move within a stretch before its impulses, and the contacts on their ways."""
+"""How bodies move within a substep before its impulses, and the contacts on their ways."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ import casadi as ca
 
 from symphys.dynamics.articulated.forward_dynamics import accelerations, world_inertia
 from symphys.dynamics.collision import Contact, collide
-from symphys.dynamics.collision.predicted_points import at_rest
-from symphys.dynamics.context import Scene, State
-from symphys.dynamics.motion import BodyState, Motion, free_motion, momentum, motion_from
-from symphys.model.joints import linkages
+from symphys.dynamics.collision.predicted_path import at_rest
+from symphys.dynamics.context import State, StepContext
+from symphys.dynamics.motion import BodyState, PredictedMotion, free_motion, momentum, motion_from
+from symphys.dynamics.tracing.decorator import traced
+from symphys.model.joints import kinematic_trees
 from symphys.model.state_layout import BODY_FIELDS
 from symphys.model.world import Pair, World
 
@@ -21,14 +22,14 @@ Expr = Any
 """casadi SX, MX or DM"""
 
 
-def look(scene: Scene, motions: Sequence[Motion], duration: Expr) -> list[Contact]:
+def detect_contacts(context: StepContext, motions: Sequence[PredictedMotion], duration: Expr) -> list[Contact]:
     """The contacts on the way: one for each pair."""
     found: list[Contact] = []
-    for (first, second), _ in groupby(scene.world.pairs, key=lambda pair: (pair.first, pair.second)):
-        surfaces = scene.world.surface(first), scene.world.surface(second)
-        a = motions[_index(first.body)].course()
-        b = at_rest(duration) if second.body is None else motions[second.body].course()
-        found += scene.pieces.do(collide, *surfaces, a, b)
+    for (first, second), _ in groupby(context.world.pairs, key=lambda pair: (pair.first, pair.second)):
+        surfaces = context.world.surface(first), context.world.surface(second)
+        a = motions[_index(first.body)].predicted_path()
+        b = at_rest(duration) if second.body is None else motions[second.body].predicted_path()
+        found += collide(*surfaces, a, b)
     return found
 
 
@@ -42,30 +43,32 @@ def bodies_of(pair: Pair) -> tuple[int, ...]:
     return tuple(side.body for side in (pair.first, pair.second) if side.body is not None)
 
 
-def free_motions(scene: Scene, x: State, duration: Expr) -> list[Motion]:
+def free_motions(context: StepContext, x: State, duration: Expr) -> list[PredictedMotion]:
     """Each body's free motion; the stored velocities are freed from the last half step's persistent forces."""
-    return _motions(scene, x, duration, -1, 0)
+    return _motions(context, x, duration, -1, 0)
 
 
-def expected_motions(scene: Scene, x: State, duration: Expr) -> list[Motion]:
+def predicted_motions(context: StepContext, x: State, duration: Expr) -> list[PredictedMotion]:
     """Each body's motion from its true velocity under the persistent forces of the last step, as joints let it."""
-    found, joints = _motions(scene, x, duration, 0, 1), scene.world.joints
-    gravity = scene.setting.gravity
-    for tree in linkages(joints):
+    found, joints = _motions(context, x, duration, 0, 1), context.world.joints
+    gravity = context.settings.gravity
+    for tree in kinematic_trees(joints):
         own = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
         motions = tuple(found[i] for i in tree.bodies)
-        wrenches = tuple(scene.pieces.do(_wrench, motion) for motion in motions)
-        for i, change in zip(tree.bodies, accelerations(scene.pieces, tree, own, motions, wrenches), strict=True):
-            tensor = scene.pieces.do(world_inertia, found[i].inertia, found[i].rotation)
-            found[i] = scene.pieces.do(_as_held, found[i], tensor, change, gravity)
+        wrenches = tuple(_wrench(motion) for motion in motions)
+        for i, change in zip(tree.bodies, accelerations(tree, own, motions, wrenches), strict=True):
+            tensor = world_inertia(found[i].inertia, found[i].rotation)
+            found[i] = _as_held(found[i], tensor, change, gravity)
     return found
 
 
-def _wrench(motion: Motion) -> tuple[Expr, Expr]:
+@traced
+def _wrench(motion: PredictedMotion) -> tuple[Expr, Expr]:
     return motion.mass * motion.acceleration, motion.torque
 
 
-def _as_held(motion: Motion, tensor: Expr, change: tuple[Expr, Expr], gravity: Expr) -> Motion:
+@traced
+def _as_held(motion: PredictedMotion, tensor: Expr, change: tuple[Expr, Expr], gravity: Expr) -> PredictedMotion:
     """The motion with the accelerations that joints leave."""
     w = motion.angular_velocity
     torque = ca.mtimes(tensor, change[1]) + ca.cross(w, ca.mtimes(tensor, w))
@@ -74,19 +77,20 @@ def _as_held(motion: Motion, tensor: Expr, change: tuple[Expr, Expr], gravity: E
     return motion_from(motion.mass, motion.inertia, state, (motion.rotation, w), gravity, motion.dt)
 
 
-def _motions(scene: Scene, x: State, duration: Expr, freed: int, share: int) -> list[Motion]:
+def _motions(context: StepContext, x: State, duration: Expr, freed: int, share: int) -> list[PredictedMotion]:
     """Motions with ``freed`` lags of the persistent forces in the velocities and ``share`` of them acting."""
     zero, lag = ca.SX.zeros(3), x["lag"]
-    motions, jointed = [], jointed_bodies(scene.world)
-    for index, body in enumerate(scene.world.bodies):
+    motions, jointed = [], jointed_bodies(context.world)
+    for index, body in enumerate(context.world.bodies):
         part = {name: x[f"{body.name}.{name}"] for name, _ in BODY_FIELDS}
-        given = (scene.given(f"{body.name}.{name}") for name in ("force", "torque"))
+        given = (context.input(f"{body.name}.{name}") for name in ("force", "torque"))
         push = tuple(zero if each is None else each for each in given)
         inertial, times = (body.mass, body.inertia), (freed, lag, share, duration)
-        motions.append(scene.pieces.do(_motion, inertial, part, push, scene.setting.gravity, times, index in jointed))
+        motions.append(_motion(inertial, part, push, context.settings.gravity, times, index in jointed))
     return motions
 
 
+@traced
 def _motion(
     inertial: tuple[Expr, Expr],
     part: dict[str, Expr],
@@ -94,7 +98,7 @@ def _motion(
     gravity: Expr,
     times: tuple[int, Expr, int, Expr],
     jointed: bool,
-) -> Motion:
+) -> PredictedMotion:
     (mass, inertia), (freed, lag, share, duration) = inertial, times
     turning = momentum(inertia, part["orientation"], part["angular_velocity"])
     kick = freed * lag

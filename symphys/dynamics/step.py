@@ -1,189 +1,66 @@
-"""A whole step: one stretch of dt, or two with the first impact between them.
+"""One time step: a substep of dt, or substeps with impacts between them (docs/time_step.md, section 9).
 
-A contact that lasts (a ball that rolls) changes its force when its body is struck (by a cushion). Within one stretch
-that force is one, as if the blow had come at the step's start: results then jump at step boundaries, and gradients
-are wrong at any step size. So where bodies have several contacts a step is cut at its first impact. There no time
-passes, only velocities change, and leapfrog starts anew. Without an impact the step is cut in the middle.
+A contact that lasts (a ball that rolls) changes its force when its body is struck (by a cushion). Within one substep
+forces are constant, as if the blow had come at its start: results then jump at step boundaries, and gradients are wrong
+at any step size. So where bodies have several contacts a step is split at its first impact. There no time passes, only
+velocities change, and leapfrog begins anew. Without an impact substeps have equal lengths.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
-from itertools import combinations
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.contact.constraint import ContactRow
-from symphys.dynamics.contact.projection import Impulse
-from symphys.dynamics.context import Scene, State
-from symphys.dynamics.impact.deferred_impacts import deferred
-from symphys.dynamics.impact.impact import Cut, collide_now, find_cut
+from symphys.dynamics.context import State, StepContext
+from symphys.dynamics.impact.deferred_impacts import defer_impacts
+from symphys.dynamics.impact.impact import StepSplit, find_split, resolve_impact
 from symphys.dynamics.impact.restitution import eccentric_bodies
-from symphys.dynamics.joints.joint_impulse import Along
-from symphys.dynamics.pgs import Given
-from symphys.dynamics.substep import Phase, advance
-from symphys.model.world import Pair, Scheme, World, is_zero
+from symphys.dynamics.substep import Substep, advance
+from symphys.model.world import Scheme, World
 
 Expr = Any
-"""casadi SX, MX or DM"""
+"""casadi SX"""
 
-CUTS_OFF_CENTRE = 2
+SPLITS_OFF_CENTRE = 2
 """Of a step where bodies may be hit off their centres: a box seldom lands on one corner alone."""
 
 
-ACROSS = 1e-3
-"""Cosine of normals up to which two impacts of a body do not act on each other."""
+def take_step(context: StepContext, x: State) -> tuple[State, list[Substep]]:
+    """The state after one step, and the substeps and impacts that led there."""
+    left: Expr = ca.SX(context.settings.scheme.dt)
+    count = splits_of(context.world, context.settings.scheme)
+    substeps, splits = list[Substep](), list[StepSplit]()
 
-
-@dataclass(frozen=True)
-class Report:
-    """What happened in a step; forces and gaps in the order of the world's pairs.
-
-    Attributes:
-        forces: (3 * pairs,) impulse / dt on each pair's first body [N], world frame.
-        gaps: (pairs,) at the start of the step [m].
-        residual: largest change of a normal or friction impulse in a last sweep [N s].
-        crowded: 1 if some body has two or more impacts at once (in one stretch), or impacts of a chain come late.
-        ambiguous: 1 if several bodies meet at one instant and rebound: rigid bodies have no one answer then.
-        paradox: 1 if friction pulls a sliding contact together, for which no sliding force may exist (Painleve).
-    """
-
-    forces: Expr
-    gaps: Expr
-    residual: Expr
-    crowded: Expr
-    ambiguous: Expr
-    paradox: Expr
-
-
-def take_step(scene: Scene, x: State) -> tuple[State, list[Phase]]:
-    """The state after one step, and the stretches and the impact that led there."""
-    scheme, dt = scene.setting.scheme, scene.setting.scheme.dt
-    count = cuts_of(scene.world, scheme)
-    if not count:
-        phase = advance(scene, x, ca.SX(dt))
-        return phase.x, [phase]
-    left, phases, cuts = ca.SX(dt), list[Phase](), list[Cut]()
     for k in range(count):
-        cut = find_cut(scene, x, left, 1 / (count - k + 1))
-        before = advance(scene, x, cut.first, spared=cut.fast)
-        struck = collide_now(scene, before.x, cut)
-        x, left = struck.x, scene.pieces.do(_rest, left, cut.first)
-        phases += [before, struck]
-        cuts.append(cut)
-    late = deferred(scene, x, left, cuts)
-    after = replace(advance(scene, x, left, late.spared, late.plastic), chained=late.chained)
-    return after.x, [*phases, after]
+        # up to the first impact, equation (22); contacts that close fast give no impulse before it
+        split = find_split(context, x, left, 1 / (count - k + 1))
+        before = advance(context, x, split.first, suppressed=split.fast)
+
+        # the impact: no time passes
+        impact = resolve_impact(context, before.x, split)
+
+        x, left = impact.x, left - split.first
+        substeps += [before, impact]
+        splits.append(split)
+
+    if not count:
+        last = advance(context, x, left)
+    else:
+        # the rest of the step; of several more impacts of a body all but the first wait for the next step
+        deferred = defer_impacts(context, x, left, splits)
+        last = advance(context, x, left, deferred.suppressed, deferred.plastic)
+        last = replace(last, chained=deferred.chained)
+    return last.x, [*substeps, last]
 
 
-def _rest(left: Expr, first: Expr) -> Expr:
-    return left - first
-
-
-def cuts_of(world: World, scheme: Scheme) -> int:
-    """How often a step is cut: not where it can change nothing, since all is central and no body has two pairs."""
+def splits_of(world: World, scheme: Scheme) -> int:
+    """How often a step is split; never where all contacts are central and no body has two pairs."""
     sides = Counter(i for pair in world.pairs for i in {pair.first.body, pair.second.body} if i is not None)
     if not scheme.time_of_impact or not (eccentric_bodies(world) & set(sides) or max(sides.values(), default=0) > 1):
         return 0
     if scheme.cuts is not None:
         return scheme.cuts
-    return CUTS_OFF_CENTRE if eccentric_bodies(world) else 1
-
-
-def report(scene: Scene, phases: list[Phase]) -> Report:
-    """What happened in a step, from its stretches."""
-    do = scene.pieces.do
-    forces = tuple(ca.SX.zeros(3) for _ in scene.world.pairs)
-    residual, crowded, ambiguous, paradox = ca.SX(0), ca.SX(0), ca.SX(0), ca.SX(0)
-    for phase in phases:
-        given = zip(forces, phase.rows, phase.impulses, strict=True)
-        forces = tuple(do(_added, force, each.row, impulse, scene.setting.scheme.dt) for force, each, impulse in given)
-        if phase.ahead:
-            forces = tuple(
-                do(_ahead, force, ahead, scene.setting.scheme.dt)
-                for force, ahead in zip(forces, phase.ahead, strict=True)
-            )
-        for new, old in phase.changes:
-            residual = do(_larger_change, residual, new, old)
-        crowded = do(_larger, crowded, phase.chained)
-        crowded = do(_crowded, crowded, tuple((each.bodies, each.row.struck, each.row.leaving) for each in phase.rows))
-        for meeting in _meetings(scene.world, phase):
-            ambiguous = do(_ambiguous, ambiguous, meeting)
-        for each, impulse in zip(phase.rows, phase.impulses, strict=True):
-            paradox = do(_pulls, paradox, each.row.paradox, impulse.normal)
-    gaps = tuple(contact.gap for contact in phases[0].contacts)
-    return Report(do(_stack, forces), do(_stack, gaps), residual, crowded, ambiguous, paradox)
-
-
-Met = tuple[Expr, Expr, Expr]
-"""Normal (3,), normal impulse, whether the surfaces meet at speed."""
-
-
-def _meetings(world: World, phase: Phase) -> list[tuple[Met, Met]]:
-    """The contacts of one body with two others, two by two, of which one rebounds."""
-    of: dict[int, list[int]] = {}
-    for k, each in enumerate(phase.rows):
-        for body in each.bodies:
-            of.setdefault(body, []).append(k)
-    found = []
-    for body, rows in of.items():
-        for i, j in combinations(rows, 2):
-            one, other = world.pairs[i], world.pairs[j]
-            apart = _partner(one, body) != _partner(other, body)
-            if apart and not (is_zero(one.law.restitution) and is_zero(other.law.restitution)):
-                a, b = ((phase.rows[k].row, phase.impulses[k].normal) for k in (i, j))
-                found.append(((a[0].normal, a[1], a[0].struck), (b[0].normal, b[1], b[0].struck)))
-    return found
-
-
-def _partner(pair: Pair, body: int) -> tuple[int | None, int]:
-    other = pair.second if pair.first.body == body else pair.first
-    return (other.body, 0) if other.body is not None else (None, other.shape)
-
-
-def _ambiguous(before: Expr, met: tuple[Met, Met]) -> Expr:
-    """1 if both give an impulse at one instant, one of them as an impact, and neither leaves the other as it is."""
-    (n, press, struck), (other, also, hit) = met
-    both = ca.logic_and(ca.logic_and(press > 0, also > 0), ca.logic_or(struck, hit))
-    return ca.fmax(before, ca.logic_and(both, ca.fabs(ca.dot(n, other)) > ACROSS))
-
-
-def _pulls(before: Expr, paradox: Expr, press: Expr) -> Expr:
-    return ca.fmax(before, ca.logic_and(paradox, press > 0))
-
-
-def _added(force: Expr, row: ContactRow, impulse: Impulse, dt: float) -> Expr:
-    return force + impulse.linear(row.impulse_normal) / dt
-
-
-def _ahead(force: Expr, ahead: Expr, dt: float) -> Expr:
-    return force + ahead / dt
-
-
-def _stack(columns: tuple[Expr, ...]) -> Expr:
-    return ca.densify(ca.vertcat(ca.SX(0, 1), *columns))
-
-
-def _larger_change(residual: Expr, new: Given, old: Given) -> Expr:
-    change = new.minus(old)
-    if isinstance(change, Along):
-        return ca.fmax(residual, ca.norm_inf(change.numbers))
-    return ca.fmax(residual, ca.fmax(ca.fabs(change.normal), ca.norm_inf(change.tangent)))
-
-
-def _larger(one: Expr, other: Expr) -> Expr:
-    return ca.fmax(one, other)
-
-
-def _crowded(before: Expr, rows: tuple[tuple[tuple[int, ...], Expr, Expr], ...]) -> Expr:
-    """1 if some body has two or more impacts in this stretch, or had before."""
-    counts: dict[int, Expr] = {}
-    for bodies, struck, leaving in rows:
-        for body in bodies:
-            counts[body] = counts.get(body, 0) + ca.fmax(struck, leaving > 0)
-    result = before
-    for count in counts.values():
-        result = ca.fmax(result, count >= 2)
-    return result
+    return SPLITS_OFF_CENTRE if eccentric_bodies(world) else 1

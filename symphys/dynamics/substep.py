@@ -1,4 +1,4 @@
-"""A stretch of time within a step: free motion, rows, sweeps, positions, and what is stored at its end."""
+"""A substep of time within a step: free motion, constraints, sweeps, positions, and what is stored at its end."""
 
 from __future__ import annotations
 
@@ -8,24 +8,29 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.articulated.forward_kinematics import Arrived
+from symphys.dynamics.articulated.forward_kinematics import FinalPose
 from symphys.dynamics.collision import Contact
-from symphys.dynamics.collision.contact_geometry import Shift
-from symphys.dynamics.contact.constraint import ContactRow
-from symphys.dynamics.contact.load_distribution import shared
-from symphys.dynamics.contact.local_solver import may_couple
+from symphys.dynamics.collision.contact_geometry import Displacement
+from symphys.dynamics.contact.constraint import ZERO, ContactConstraint, ContactImpulse
+from symphys.dynamics.contact.coupling import may_couple
+from symphys.dynamics.contact.load_distribution import distribute_loads
 from symphys.dynamics.contact.preparation import Conditions, prepare
-from symphys.dynamics.contact.projection import ZERO, Impulse
-from symphys.dynamics.context import Scene, State
+from symphys.dynamics.context import State, StepContext
 from symphys.dynamics.free_rotation import turned
-from symphys.dynamics.joints.assembly import JointRow, Trees, joint_rows, make_trees, momenta_of, resumed
-from symphys.dynamics.joints.loop_closure import Displaced
-from symphys.dynamics.joints.warm_start import fitting, hold, keep_up, kept
-from symphys.dynamics.momentum import Momenta, Momentum
-from symphys.dynamics.motion import Motion, angular_velocity, apply, isotropic
-from symphys.dynamics.pgs import Row, Solution, begin, relax
-from symphys.dynamics.position_correction import Closed, close_gaps, displacements
-from symphys.dynamics.prediction import bodies_of, expected_motions, free_motions, jointed_bodies, look
+from symphys.dynamics.joints.assembly import (
+    joint_constraints,
+    momenta_of,
+    prepare_trees,
+    warm_started,
+)
+from symphys.dynamics.joints.loop_closure import TreeDisplacement
+from symphys.dynamics.joints.warm_start import add_joint_forces, keep_momentum, lasting_forces, project_velocities
+from symphys.dynamics.motion import PredictedMotion, angular_velocity, apply, isotropic
+from symphys.dynamics.pgs import apply_start, iterate
+from symphys.dynamics.position_correction import Corrected, close_gaps, displacements
+from symphys.dynamics.prediction import bodies_of, detect_contacts, free_motions, jointed_bodies, predicted_motions
+from symphys.dynamics.tracing.decorator import traced
+from symphys.dynamics.unknowns import Momenta, Momentum, PlacedConstraint
 from symphys.maths import rotation
 from symphys.model.state_layout import BODY_FIELDS
 
@@ -37,163 +42,152 @@ NONE = ca.SX(0)
 
 
 @dataclass(frozen=True)
-class Phase:
-    """A stretch that has been advanced.
+class Substep:
+    """A substep that has been advanced.
 
     Attributes:
         x: the state at its end.
-        rows, contacts: of the pairs.
-        impulses: what each has given.
-        changes: of every row, joints too, what it has given and what it had before the final sweep.
-        ahead: (3,) each [N s]: what persistent forces had given to the true velocities ahead of the impulses of
-            sweeps. The next stretch takes it off again, but after an impact, where leapfrog begins anew, it stays.
+        constraints, contacts: of the pairs.
+        impulses: accumulated, of the pairs.
+        changes: of every constraint, joints too, its accumulated impulse, and that before the final sweep.
+        ahead: (3,) each [N s]: impulses of persistent forces over the lag, which the true velocities have ahead of the
+            sweeps'. The next substep takes them off again, except after an impact, where leapfrog begins anew.
         chained: 1 if impacts were left to the next step.
     """
 
     x: State
-    rows: tuple[Row, ...]
+    constraints: tuple[PlacedConstraint, ...]
     contacts: tuple[Contact, ...]
-    impulses: tuple[Impulse, ...]
+    impulses: tuple[ContactImpulse, ...]
     changes: tuple[tuple[Any, Any], ...]
     ahead: tuple[Expr, ...] = ()
     chained: Expr = NONE
 
 
-def advance(scene: Scene, x: State, duration: Expr, spared: Sequence[Expr] = (), plastic: Expr = NONE) -> Phase:
-    """The state after ``duration`` [s].
+def advance(
+    context: StepContext, x: State, duration: Expr, suppressed: Sequence[Expr] = (), plastic: Expr = NONE
+) -> Substep:
+    """The state after ``duration`` [s]; numbers are those of the equations in docs/time_step.md.
 
-    Pairs whose ``spared`` is 1 give no impulse, since the stretch ends as they meet. Where ``plastic`` is 1 nothing
+    Pairs whose ``suppressed`` is 1 give no impulse, since the substep ends as they meet. Where ``plastic`` is 1 nothing
     rebounds.
     """
-    kick, half = scene.pieces.do(_times, duration, x["lag"])
+    world, scheme = context.world, context.settings.scheme
+    kick, half = _times(duration, x["lag"])  # (2)
 
-    # free motion, in which impacts find their instant; what joints hold moves as the last step's forces say
-    motions = free_motions(scene, x, duration)
-    paths = expected_motions(scene, x, duration) if scene.world.joints else motions
-    contacts = look(scene, paths, duration)
+    # 1-2. predicted motion: free (1, 3, 4); of bodies with joints as the forces of the last step have it (5)
+    motions = free_motions(context, x, duration)
+    paths = predicted_motions(context, x, duration) if world.joints else motions
+    free = tuple(Momentum(motion.mid_velocity, motion.mid_momentum) for motion in motions)
+    trees = prepare_trees(context, paths, free, half)
 
-    # trees of joints, whose velocities are solved for in the coordinates that joints leave
-    free = tuple(scene.pieces.do(_mid_momentum, motion) for motion in motions)
-    trees = make_trees(scene, paths, free, half)
+    # 3. contacts along the predicted paths (6)
+    contacts = detect_contacts(context, paths, duration)
 
-    # rows: where, when and how the surfaces meet, what acts along the coordinates of joints
-    rows = _contact_rows(scene, x, trees, contacts, duration, spared or [ca.SX(0)] * len(contacts), plastic)
-    joints, fitted = joint_rows(scene, trees, paths, duration, kick)
+    # 4. constraints of contacts (7-13) and of joints (25, 26)
+    suppressed = suppressed or [ca.SX(0)] * len(contacts)
+    constraints = []
+    for pair, contact, off in zip(world.pairs, contacts, suppressed, strict=True):
+        bodies = bodies_of(pair)
+        moving = tuple(trees.motions[i] for i in bodies)
+        conditions = Conditions(off, plastic, x[f"{pair.name}.force"], trees.same(bodies), may_couple(world, pair))
+        constraint = prepare(context.settings, pair.law, contact, moving, duration, conditions)
+        constraints.append(trees.placed(bodies, constraint))
+    joints, fitted = joint_constraints(context, trees, paths, duration, kick)
 
-    # velocities: warm start, then sweeps
-    given = shared(scene, rows, _warm_start(scene, rows, x, kick))
-    solved, by_joints, impulses = _sweep(scene, trees, joints, rows, (*resumed(scene, joints, x, kick), *given))
-    momenta = momenta_of(scene, trees, solved.momenta)
+    # 5-6. velocities: warm start (16), then projections (14, 15, 17)
+    given = distribute_loads(context, constraints, _warm_start(context, constraints, x, kick))
+    every = (*(each.placed for each in joints), *constraints)
+    start = apply_start(every, trees.states, (*warm_started(context, joints, x, kick), *given))
+    solved = iterate(world, scheme.sweeps, every, start, trees.motions)
+    by_joints, impulses = solved.impulses[: len(joints)], solved.impulses[len(joints) :]
+    momenta = momenta_of(context, trees, solved.momenta)
 
-    # positions
-    moved = displacements(scene, trees, rows, given, solved.momenta, impulses, duration)
-    closed = close_gaps(scene, trees, list(zip(rows, contacts, impulses, strict=True)), fitted, moved)
+    # 7. positions: displacements (18), then what still overlaps (19)
+    moved = displacements(context, trees, constraints, given, solved.momenta, impulses, duration)
+    closed = close_gaps(context, trees, list(zip(constraints, contacts, impulses, strict=True)), fitted, moved)
+    poses, momenta = _poses(context, motions, moved, closed, momenta)
 
-    # the next state
+    # 8. what is stored: persistent forces (20), velocities (21)
     values: State = {"lag": half}
-    resting = _store_forces(scene, rows, impulses, kick, values)
-    poses, momenta = _poses(scene, motions, moved, closed, momenta)
-    if scene.world.joints:
-        struck, forces = kept(scene, rows, joints, by_joints, x, kick)
-        hold(scene, forces, poses, resting)
-        momenta = keep_up(scene, momenta, closed.made, struck, duration)
-        warm = scene.setting.scheme.warm_start
-        values |= forces if warm else {name: ca.SX.zeros(force.shape) for name, force in forces.items()}
-    values |= _moving_bodies(scene, motions, momenta, resting, poses)
-    return Phase(values, tuple(rows), tuple(contacts), impulses, tuple(zip(solved.impulses, solved.last, strict=True)))
-
-
-def _contact_rows(
-    scene: Scene,
-    x: State,
-    trees: Trees,
-    contacts: Sequence[Contact],
-    duration: Expr,
-    spared: Sequence[Expr],
-    plastic: Expr,
-) -> list[Row]:
-    rows = []
-    for pair, contact, off in zip(scene.world.pairs, contacts, spared, strict=True):
-        bodies, force = bodies_of(pair), x[f"{pair.name}.force"]
-        conditions = Conditions(off, plastic, force, trees.same(bodies), may_couple(scene.world, pair))
-        arguments = pair.law, contact, tuple(trees.motions[i] for i in bodies), duration, conditions
-        rows.append(trees.row(bodies, scene.pieces.do(prepare, scene.setting, *arguments)))
-    return rows
-
-
-def _sweep(
-    scene: Scene, trees: Trees, joints: Sequence[JointRow], rows: Sequence[Row], start: Sequence[Any]
-) -> tuple[Solution, tuple[Any, ...], tuple[Impulse, ...]]:
-    """What sweeps come to from these impulses; and of it the impulses of joints, and those of contacts."""
-    every = (*(each.row for each in joints), *rows)
-    state = begin(scene.pieces, every, trees.states, start)
-    solved = relax(scene.pieces, scene.world, scene.setting.scheme.sweeps, every, state, trees.motions)
-    return solved, solved.impulses[: len(joints)], solved.impulses[len(joints) :]
+    reactions = _store_forces(context, constraints, impulses, kick, values)
+    if world.joints:
+        struck, forces = lasting_forces(context, constraints, joints, by_joints, x, kick)
+        add_joint_forces(context, forces, poses, reactions)
+        momenta = keep_momentum(context, momenta, closed.made, struck, duration)
+        values |= forces if scheme.warm_start else {name: ca.SX.zeros(*force.shape) for name, force in forces.items()}
+    values |= _moving_bodies(context, motions, momenta, reactions, poses)
+    changes = tuple(zip(solved.impulses, solved.last, strict=True))
+    return Substep(values, tuple(constraints), tuple(contacts), impulses, changes)
 
 
 def _poses(
-    scene: Scene, motions: Sequence[Motion], moved: Sequence[Displaced], closed: Closed, momenta: Momenta
+    context: StepContext,
+    motions: Sequence[PredictedMotion],
+    moved: Sequence[TreeDisplacement],
+    closed: Corrected,
+    momenta: Momenta,
 ) -> tuple[list[tuple[Expr, Expr]], Momenta]:
-    """(position, orientation) of all bodies at the end of the stretch, and momenta that turn with pushes."""
+    """(position, orientation) of all bodies at the end of the substep, and momenta that turn with pushes."""
     poses, turned = list[tuple[Expr, Expr]](), list(momenta)
-    jointed = jointed_bodies(scene.world)
+    jointed = jointed_bodies(context.world)
     for k, motion in enumerate(motions):
         if k in closed.arrived:
-            poses.append(scene.pieces.do(_arrived, motion, closed.arrived[k]))
+            poses.append(_arrived(motion, closed.arrived[k]))
             continue
         shift = closed.shifts[k]
-        if k in jointed or isotropic(scene.world.bodies[k].inertia):
-            poses.append(scene.pieces.do(_pose, motion, shift))
+        if k in jointed or isotropic(context.world.bodies[k].inertia):
+            poses.append(_pose(motion, shift))
         else:
-            pose, turned[k] = scene.pieces.do(_free_pose, motion, moved[k], shift, momenta[k])
+            pose, turned[k] = _free_pose(motion, moved[k], shift, momenta[k])
             poses.append(pose)
     return poses, tuple(turned)
 
 
 def _moving_bodies(
-    scene: Scene,
-    motions: Sequence[Motion],
+    context: StepContext,
+    motions: Sequence[PredictedMotion],
     momenta: Momenta,
-    resting: Sequence[tuple[Expr, Expr]],
+    reactions: Sequence[tuple[Expr, Expr]],
     poses: Sequence[tuple[Expr, Expr]],
 ) -> State:
-    """The fields of all bodies at the end of the stretch."""
-    do, values = scene.pieces.do, State()
-    ended = [do(_end_momentum, *parts) for parts in zip(motions, momenta, resting, strict=True)]
-    apart = [do(_velocities, *parts) for parts in zip(motions, ended, poses, strict=True)]
-    moving = fitting(scene, ended, poses, apart)
-    for body, pose, velocities, reaction in zip(scene.world.bodies, poses, moving, resting, strict=True):
+    """The fields of all bodies at the end of the substep."""
+    values = State()
+    ended = [_end_momentum(*parts) for parts in zip(motions, momenta, reactions, strict=True)]
+    apart = [_velocities(*parts) for parts in zip(motions, ended, poses, strict=True)]
+    moving = project_velocities(context, ended, poses, apart)
+    for body, pose, velocities, reaction in zip(context.world.bodies, poses, moving, reactions, strict=True):
         stored = (*pose, *velocities, *reaction)
         values |= {f"{body.name}.{field}": value for (field, _), value in zip(BODY_FIELDS, stored, strict=True)}
     return values
 
 
-def _mid_momentum(motion: Motion) -> Momentum:
-    return Momentum(motion.mid_velocity, motion.mid_momentum)
-
-
+@traced
 def _times(duration: Expr, lag: Expr) -> tuple[Expr, Expr]:
-    """(over which impulses act as forces, how far the stored velocities will be ahead of the sweeps')."""
+    """(the time over which impulses act as forces, the next lag) [s]; equation 2."""
     return duration / 2 + lag, duration / 2
 
 
-def _warm_start(scene: Scene, rows: Sequence[Row], x: State, kick: Expr) -> list[Impulse]:
+def _warm_start(
+    context: StepContext, constraints: Sequence[PlacedConstraint], x: State, kick: Expr
+) -> list[ContactImpulse]:
     """The last step's persistent forces, over this step's kick, in this step's frames."""
-    if not scene.setting.scheme.warm_start:
-        return [ZERO for _ in rows]
+    if not context.settings.scheme.warm_start:
+        return [ZERO for _ in constraints]
     impulses = []
-    for pair, each in zip(scene.world.pairs, rows, strict=True):
+    for pair, each in zip(context.world.pairs, constraints, strict=True):
         force = x[f"{pair.name}.force"]
         torque = x[f"{pair.name}.torque"] if pair.law.spins else None
-        impulses.append(scene.pieces.do(_resumed, each.row.impulse_normal, kick, force, torque))
+        impulses.append(_resumed(each.constraint.impulse_normal, kick, force, torque))
     return impulses
 
 
-def _resumed(n: Expr, kick: Expr, force: Expr, torque: Expr | None) -> Impulse:
+@traced
+def _resumed(n: Expr, kick: Expr, force: Expr, torque: Expr | None) -> ContactImpulse:
     normal, tangent = _split(kick * force, n)
     if torque is None:
-        return Impulse(ca.fmax(normal, 0), tangent, ZERO.spin, ZERO.roll)
-    return Impulse(ca.fmax(normal, 0), tangent, *_split(kick * torque, n))
+        return ContactImpulse(ca.fmax(normal, 0), tangent, ZERO.spin, ZERO.roll)
+    return ContactImpulse(ca.fmax(normal, 0), tangent, *_split(kick * torque, n))
 
 
 def _split(impulse: Expr, n: Expr) -> tuple[Expr, Expr]:
@@ -203,46 +197,62 @@ def _split(impulse: Expr, n: Expr) -> tuple[Expr, Expr]:
 
 
 def _store_forces(
-    scene: Scene, rows: Sequence[Row], impulses: Sequence[Impulse], kick: Expr, values: State
+    context: StepContext,
+    constraints: Sequence[PlacedConstraint],
+    impulses: Sequence[ContactImpulse],
+    kick: Expr,
+    values: State,
 ) -> list[tuple[Expr, Expr]]:
     """Persistent contact forces (impacts left out) into ``values``; returns their sum on each body."""
-    pieces, scheme = scene.pieces, scene.setting.scheme
-    total = [(ca.SX.zeros(3), ca.SX.zeros(3)) for _ in scene.world.bodies]
-    for pair, each, impulse in zip(scene.world.pairs, rows, impulses, strict=True):
-        force, torque = pieces.do(_persistent, each.row, impulse, kick, scene.shortest_kick)
+    scheme = context.settings.scheme
+    total = [(ca.SX.zeros(3), ca.SX.zeros(3)) for _ in context.world.bodies]
+    for pair, each, impulse in zip(context.world.pairs, constraints, impulses, strict=True):
+        force, torque = _persistent(each.constraint, impulse, kick, context.shortest_kick)
         values[f"{pair.name}.force"] = force if scheme.warm_start else ca.SX.zeros(3)
         if pair.law.spins:
             values[f"{pair.name}.torque"] = torque if scheme.warm_start else ca.SX.zeros(3)
         for k, body in enumerate(each.bodies):
-            total[body] = pieces.do(_summed, total[body], each.row, k, force, torque)
+            total[body] = _summed(total[body], each.constraint, k, force, torque)
     return total
 
 
-def _persistent(row: ContactRow, impulse: Impulse, kick: Expr, shortest: float) -> tuple[Expr, Expr]:
-    share = (1 - row.leaving) * (1 - row.struck) / ca.fmax(kick, shortest)
-    return share * impulse.linear(row.impulse_normal), share * impulse.angular(row.impulse_normal)
+@traced
+def _persistent(
+    constraint: ContactConstraint, impulse: ContactImpulse, kick: Expr, shortest: float
+) -> tuple[Expr, Expr]:
+    share = (1 - constraint.leaving) * (1 - constraint.struck) / ca.fmax(kick, shortest)
+    return share * impulse.linear(constraint.impulse_normal), share * impulse.angular(constraint.impulse_normal)
 
 
-def _summed(total: tuple[Expr, Expr], row: ContactRow, k: int, force: Expr, torque: Expr) -> tuple[Expr, Expr]:
-    side = row.sides[k]
-    turning = ca.cross(side.impulse_arm, force) + torque
-    return total[0] + side.sign * force, total[1] + side.sign * turning
+@traced
+def _summed(
+    total: tuple[Expr, Expr], constraint: ContactConstraint, k: int, force: Expr, torque: Expr
+) -> tuple[Expr, Expr]:
+    term = constraint.terms[k]
+    turning = ca.cross(term.impulse_arm, force) + torque
+    return total[0] + term.sign * force, total[1] + term.sign * turning
 
 
-def _pose(motion: Motion, shift: Shift) -> tuple[Expr, Expr]:
+@traced
+def _pose(motion: PredictedMotion, shift: Displacement) -> tuple[Expr, Expr]:
     return motion.position + shift.linear, rotation.turn(motion.orientation, shift.angular)
 
 
-def _arrived(motion: Motion, arrived: Arrived) -> tuple[Expr, Expr]:
+@traced
+def _arrived(motion: PredictedMotion, arrived: FinalPose) -> tuple[Expr, Expr]:
     return arrived.position, rotation.unit(rotation.multiply(arrived.turn, motion.orientation))
 
 
-def _free_pose(motion: Motion, moved: Shift, shift: Shift, momentum: Momentum) -> tuple[tuple[Expr, Expr], Momentum]:
+@traced
+def _free_pose(
+    motion: PredictedMotion, moved: TreeDisplacement, shift: Displacement, momentum: Momentum
+) -> tuple[tuple[Expr, Expr], Momentum]:
     """Free rotation with the momentum after the impulses, less what these did too early, then pushes.
 
     A push turns the angular momentum with the body: about the axis of a slender body it would else become a spin, with
     energy from nowhere.
     """
+    assert isinstance(moved, Displacement)
     late = moved.angular - motion.dt * apply(motion.inverse_mid, momentum.angular)
     pushed = rotation.exponential(shift.angular - moved.angular)
     free = turned(motion.inertia, motion.orientation, momentum.angular, motion.dt)
@@ -250,14 +260,16 @@ def _free_pose(motion: Motion, moved: Shift, shift: Shift, momentum: Momentum) -
     return (motion.position + shift.linear, q), replace(momentum, angular=rotation.rotate(pushed, momentum.angular))
 
 
-def _end_momentum(motion: Motion, momentum: Momentum, resting: tuple[Expr, Expr]) -> Momentum:
-    """At the end of the stretch."""
-    half, (force, torque) = motion.dt / 2, resting
+@traced
+def _end_momentum(motion: PredictedMotion, momentum: Momentum, reactions: tuple[Expr, Expr]) -> Momentum:
+    """At the end of the substep."""
+    half, (force, torque) = motion.dt / 2, reactions
     return Momentum(
         momentum.velocity + half * (motion.acceleration + force / motion.mass),
         momentum.angular + half * (motion.torque + torque),
     )
 
 
-def _velocities(motion: Motion, momentum: Momentum, pose: tuple[Expr, Expr]) -> tuple[Expr, Expr]:
+@traced
+def _velocities(motion: PredictedMotion, momentum: Momentum, pose: tuple[Expr, Expr]) -> tuple[Expr, Expr]:
     return momentum.velocity, angular_velocity(motion.inertia, pose[1], momentum.angular)

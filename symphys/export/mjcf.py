@@ -33,7 +33,7 @@ from symphys.dynamics.motion import inertia_matrix
 from symphys.export.folder import ExportError
 from symphys.export.mjcf_joints import Start, actuators, freedoms, plain
 from symphys.export.mjcf_surfaces import geoms, pairs, text
-from symphys.model.joints import Link, linkages, tree_joints
+from symphys.model.joints import Link, kinematic_trees, tree_joints
 from symphys.model.joints.kinematic_tree import FLOATING
 from symphys.model.shapes import Terrain
 from symphys.model.world import Body, World, is_zero
@@ -83,7 +83,7 @@ def mjcf(world: World, initial: Mapping[str, Any], dt: float, name: str = "world
 
 def links_of(world: World) -> list[Link]:
     """Every body with the joint that holds it to its parent; one by itself floats."""
-    links = [link for tree in linkages(world.joints) for link in tree.links]
+    links = [link for tree in kinematic_trees(world.joints) for link in tree.links]
     held = {link.body for link in links}
     return links + [Link(k, None, None, 1, 0, FLOATING) for k in range(len(world.bodies)) if k not in held]
 

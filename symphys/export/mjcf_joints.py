@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.dynamics.joints.joint_frames import sockets_at
+from symphys.dynamics.joints.joint_frames import joint_frames_at
 from symphys.dynamics.observation.joint_coordinates import Reading, readings
 from symphys.export.mjcf_surfaces import text
 from symphys.maths import rotation
@@ -60,7 +60,7 @@ class Start:
     def directions(self, joint: Joint) -> list[Array]:
         """(3,) of each coordinate: about which, or along which, the first side moves, world frame."""
         poses = tuple((ca.SX(self.of(i, "position")), ca.SX(self.of(i, "orientation"))) for i in joint.bodies)
-        placed = sockets_at(joint, poses).placed(ca.SX(0))
+        placed = joint_frames_at(joint, poses).placed(ca.SX(0))
         return [plain(coordinate.axis(placed)) for coordinate in joint.kind.coordinates]
 
 

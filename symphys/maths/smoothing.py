@@ -50,12 +50,12 @@ def length(a: Expr) -> Expr:
     return ca.sqrt(ca.dot(a, a) + TINY_SQUARE)
 
 
-def onto_disc(y: Expr, radius: Expr, width: Expr, knob: Expr) -> Expr:
-    """The point of the disc |y| <= radius nearest to ``y``; with knob > 0 pulled inside over ``width``.
+def onto_disc(y: Expr, radius: Expr, width: Expr, smoothing: Expr) -> Expr:
+    """The point of the disc |y| <= radius nearest to ``y``; with smoothing > 0 pulled inside over ``width``.
 
     Exact: y radius / |y| outside, y inside. Smooth: y radius / (radius + positive(|y| - radius, width)).
     """
     norm = length(y)
-    smooth, outside = knob > 0, ca.dot(y, y) >= radius * radius
+    smooth, outside = smoothing > 0, ca.dot(y, y) >= radius * radius
     reach = ca.if_else(smooth, radius + positive(norm - radius, width) + 1e-30, norm)
     return y * ca.if_else(ca.logic_or(smooth, outside), radius / reach, 1)

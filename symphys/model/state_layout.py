@@ -3,7 +3,7 @@
 For each body: position (3) [m], orientation (4) [-] quaternion w x y z, velocity (3) [m/s] and angular_velocity (3)
 [rad/s] at t_k, world frame, and the force (3) [N] and torque (3) [N m] with which constraints act on it persistently.
 For each pair: force (3) [N] on its first body, and torque (3) [N m] if its law resists spinning. For each joint: if
-it closes a loop or gives way lock, the forces and torques of what it locks; and a number per coordinate for its motor,
+it closes a loop or is soft lock, the forces and torques of what it locks; and a number per coordinate for its motor,
 lower and upper limit and spring. Last ``lag`` [s].
 
 The velocities are the true ones at t_k: 0 at rest. The step needs them without the persistent forces of the last

@@ -140,13 +140,13 @@ class Scheme:
 
     Attributes:
         dt: time step [s].
-        sweeps: projected Gauss-Seidel sweeps over the velocity rows.
+        sweeps: projected Gauss-Seidel sweeps over the velocity constraints.
         position_sweeps: sweeps of the position pass, which removes penetration without adding velocity.
         push_out: share of a penetration that one step removes.
         warm_start: start each step from the contact forces of the last one.
         time_of_impact: resolve the instant of each impact inside the step; without it gradients through bounces
             are wrong at any step size.
-        cuts: where a body is part of several pairs, how often a step is cut at an impact, so that impacts are taken
+        cuts: where a body is part of several pairs, how often a step is split at an impact, so that impacts are taken
             one after the other and a blow changes the forces of lasting contacts from its instant on. Each cut adds
             up to 2.4 times the work of a step without any; without any, gradients of a ball that rolls into a cushion
             are wrong at any step size. None: 2 where a body may be hit off its centre, as boxes are, else 1.

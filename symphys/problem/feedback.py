@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.expression import Formula
-from symphys.model.controllers import Law
+from symphys.model.controllers import ControlLaw
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ class Controller:
     """
 
     name: str
-    law: Law
+    law: ControlLaw
     senses: tuple[str, ...]
     drives: tuple[tuple[str, int], ...]
     scale: Array = field(repr=False)

@@ -11,7 +11,13 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from symphys.dynamics import accelerometers, body_quantities, felt_names, joint_quantities, joint_quantity_names
+from symphys.dynamics import (
+    accelerometers,
+    body_quantities,
+    body_quantity_names,
+    joint_quantities,
+    joint_quantity_names,
+)
 from symphys.expression import Formula
 from symphys.model.state_layout import GIVEN, Layout, input_columns, input_sizes, inputs_size
 from symphys.model.world import World
@@ -125,7 +131,7 @@ def namespace(
     names.update(zip(parameters.names, parameters.symbols, strict=True))
     if not wanted.isdisjoint(joint_quantity_names(world)):
         names.update(joint_quantities(world, at.x))
-    if not wanted.isdisjoint(felt_names(world)):
+    if not wanted.isdisjoint(body_quantity_names(world)):
         names.update(body_quantities(world, at.x))
     names.update(accelerometers(world, at.x, memory.velocities(at.x), problem.simulation.dt))
     return names
@@ -134,7 +140,7 @@ def namespace(
 def moving_names(world: World) -> frozenset[str]:
     """The names that change within a step."""
     states = {f"{body.name}.{field}" for body in world.bodies for field in (*GIVEN, "accelerometer")}
-    return frozenset({"time", ALIVE, *states, *joint_quantity_names(world), *felt_names(world)})
+    return frozenset({"time", ALIVE, *states, *joint_quantity_names(world), *body_quantity_names(world)})
 
 
 def spans(variables: Sequence[Variable]) -> list[tuple[int, int]]:

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from symphys.codegen import Fading, FunctionCall, MemoryLayout, Place, Program
-from symphys.dynamics import Slot, record_step
+from symphys.dynamics import TracedVector, trace_step
 from symphys.expression import Formula
 from symphys.model.state_layout import Layout as Columns
 from symphys.problem import ALIVE
@@ -111,14 +111,14 @@ def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:
     """The calls of one time step, from ``x`` and ``u`` to the ``x`` after."""
     rollout = samples.rollout
     columns = Columns(rollout.world)
-    recording = record_step(
+    recording = trace_step(
         rollout.world, rollout.problem.simulation.scheme(), rollout.inputs, rollout.parameters.symbols, exact
     )
     arguments = {"u": samples.u, "p": samples.p, "smoothing": samples.knob}
     after = samples.x.later() if rollout.freeze is None else samples.layout.take(rollout.memory.size - 1)
-    places: dict[Slot, Place] = {slot: _part(after, part) for slot, part in recording.results.items()}
+    places: dict[TracedVector, Place] = {slot: _part(after, part) for slot, part in recording.results.items()}
     calls = []
-    for piece in recording.pieces:
+    for piece in recording.calls:
         for slot in piece.inputs:
             if slot.name in columns:
                 places[slot] = _part(samples.x, columns[slot.name])

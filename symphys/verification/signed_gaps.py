@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.dynamics.collision import collide
-from symphys.dynamics.collision.predicted_points import Course, at_rest
+from symphys.dynamics.collision.predicted_path import PredictedPath, at_rest
 from symphys.maths import rotation
 from symphys.model.world import Pair
 from symphys.transcription import Rollout
@@ -82,6 +82,6 @@ def meetings(rollout: Rollout) -> list[Meeting]:
     return found
 
 
-def _resting(pose: Expr, dt: float) -> Course:
+def _resting(pose: Expr, dt: float) -> PredictedPath:
     zero = ca.SX.zeros(3)
-    return Course(pose[:3], rotation.matrix(pose[3:]), zero, zero, zero, zero, ca.SX(dt))
+    return PredictedPath(pose[:3], rotation.matrix(pose[3:]), zero, zero, zero, zero, ca.SX(dt))

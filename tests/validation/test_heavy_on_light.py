@@ -11,8 +11,8 @@ import pytest
 
 from symphys.dynamics import step_function
 from symphys.dynamics.line_search import clusters
-from symphys.dynamics.pgs import Row
 from symphys.dynamics.prediction import bodies_of
+from symphys.dynamics.unknowns import PlacedConstraint
 from symphys.model.shapes import Box, Plane
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Body, Law, Scheme, World, make_world
@@ -70,9 +70,9 @@ def test_a_tower_that_grows_heavier() -> None:
     assert speed < 1e-6
 
 
-def rows(world: World) -> list[Row]:
+def rows(world: World) -> list[PlacedConstraint]:
     """One for each pair, without what it is made of."""
-    return [Row(bodies_of(pair), None, bodies_of(pair)) for pair in world.pairs]
+    return [PlacedConstraint(bodies_of(pair), None, bodies_of(pair)) for pair in world.pairs]
 
 
 def test_only_bodies_that_differ_in_mass_are_treated_so() -> None:

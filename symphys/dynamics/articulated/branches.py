@@ -1,4 +1,4 @@
-"""A tree's mass matrix limb by limb: what is done with a limb is a piece, so that equal limbs share it."""
+"""A tree's mass matrix branch by branch: each branch has its own traced calls, which equal branches share."""
 
 from __future__ import annotations
 
@@ -8,79 +8,88 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.articulated import schur_complement as limbs
-from symphys.dynamics.articulated import spatial as screws
-from symphys.dynamics.articulated.factorisation import Eliminated
-from symphys.dynamics.articulated.schur_complement import Above, Axes, Columns, Inertia, LimbMatrix, Screw
-from symphys.dynamics.collision.predicted_points import Course
-from symphys.dynamics.tracing.trace import Pieces
-from symphys.model.joints import Linkage
+from symphys.dynamics.articulated import schur_complement, spatial
+from symphys.dynamics.articulated.factorisation import Factorisation
+from symphys.dynamics.articulated.schur_complement import (
+    BranchMatrix,
+    Columns,
+    MotionSubspaces,
+    Parents,
+    SpatialInertia,
+    SpatialVector,
+)
+from symphys.dynamics.collision.predicted_path import PredictedPath
+from symphys.dynamics.tracing.decorator import traced
+from symphys.model.joints import KinematicTree
 
 Expr = Any
 """casadi SX"""
 
 
 @dataclass(frozen=True)
-class Limb:
+class Branch:
     """What hangs on one link that hangs on the root.
 
     Attributes:
         links: among those of the tree.
-        above: see ``limbs``.
+        above: see ``schur_complement.Parents``.
         coordinates: among those of the tree.
     """
 
     links: tuple[int, ...]
-    above: Above
+    above: Parents
     coordinates: tuple[int, ...]
 
     def of(self, parts: Sequence[Any]) -> tuple[Any, ...]:
-        """What is the limb's of something that every link of the tree has."""
+        """What is the branch's of something that every link of the tree has."""
         return tuple(parts[k] for k in self.links)
 
 
-def limbs_of(linkage: Linkage) -> tuple[Limb, ...]:
-    """The limbs of a tree."""
-    place = {link.body: k for k, link in enumerate(linkage.links)}
+def branches_of(kinematic_tree: KinematicTree) -> tuple[Branch, ...]:
+    """The branches of a tree."""
+    place = {link.body: k for k, link in enumerate(kinematic_tree.links)}
     members: list[list[int]] = []
-    limb_of: dict[int, list[int]] = {}
-    for k, link in enumerate(linkage.links[1:], 1):
+    branch_of: dict[int, list[int]] = {}
+    for k, link in enumerate(kinematic_tree.links[1:], 1):
         parent = place[link.parent] if link.parent is not None else 0
         if parent == 0:
             members.append([])
-        limb_of[k] = limb_of[parent] if parent else members[-1]
-        limb_of[k].append(k)
+        branch_of[k] = branch_of[parent] if parent else members[-1]
+        branch_of[k].append(k)
     found = []
     for links in members:
-        above = (linkage.links[k].parent for k in links)
+        above = (kinematic_tree.links[k].parent for k in links)
         parents = tuple(links.index(place[i]) if i is not None and place[i] else None for i in above)
-        own = (range(linkage.links[k].start, linkage.links[k].start + linkage.links[k].count) for k in links)
-        found.append(Limb(tuple(links), parents, tuple(j for each in own for j in each)))
+        own = (
+            range(kinematic_tree.links[k].start, kinematic_tree.links[k].start + kinematic_tree.links[k].count)
+            for k in links
+        )
+        found.append(Branch(tuple(links), parents, tuple(j for each in own for j in each)))
     return tuple(found)
 
 
 @dataclass(frozen=True)
 class Tree:
-    """A tree at an instant, or between two: its structure, and the screws (6, count) of its links: see ``Axes``."""
+    """A kinematic tree at an instant, or between two, with the motion subspaces (6, count) of its links."""
 
-    linkage: Linkage
+    kinematic_tree: KinematicTree
     seen: Columns
     given: Columns | None = None
 
     @property
-    def limbs(self) -> tuple[Limb, ...]:
-        """Its limbs."""
-        return limbs_of(self.linkage)
+    def branches(self) -> tuple[Branch, ...]:
+        """Its branches."""
+        return branches_of(self.kinematic_tree)
 
-    def axes(self, limb: Limb) -> Axes:
-        """The screws of a limb and of the root."""
+    def axes(self, branch: Branch) -> MotionSubspaces:
+        """The motion subspaces of a branch and of the root."""
         if self.given is None:
-            return Axes(limb.of(self.seen), self.seen[0])
-        return Axes(limb.of(self.seen), self.seen[0], limb.of(self.given), self.given[0])
+            return MotionSubspaces(branch.of(self.seen), self.seen[0])
+        return MotionSubspaces(branch.of(self.seen), self.seen[0], branch.of(self.given), self.given[0])
 
     @property
     def impulses(self) -> Columns:
-        """The screws along which impulses count."""
+        """The motion subspaces at the time of the impulses."""
         return self.seen if self.given is None else self.given
 
 
@@ -88,76 +97,80 @@ class Tree:
 class TreeMatrix:
     """The mass matrix of a tree, factored."""
 
-    limbs: tuple[LimbMatrix, ...]
-    root: Eliminated
+    branches: tuple[BranchMatrix, ...]
+    root: Factorisation
 
 
 @dataclass(frozen=True)
-class Solved:
-    """Rates r of a root, and what limbs do beside following it, z of each."""
+class TreeRates:
+    """Rates r of a root, and what branches do beside following it, z of each."""
 
     r: Expr
     z: tuple[Expr, ...]
 
 
 def axes_at(
-    pieces: Pieces, linkage: Linkage, joints: screws.Joints, courses: Sequence[Course], t: Expr, origin: Expr
+    kinematic_tree: KinematicTree, joints: spatial.Joints, body_paths: Sequence[PredictedPath], t: Expr, origin: Expr
 ) -> Columns:
-    """The screws of all links at time t."""
-    place = {link.body: k for k, link in enumerate(linkage.links)}
+    """The motion subspaces of all links at time t."""
+    place = {link.body: k for k, link in enumerate(kinematic_tree.links)}
     found = []
-    for link, joint, course in zip(linkage.links, joints, courses, strict=True):
-        own = (course,) if link.parent is None else (course, courses[place[link.parent]])
-        found.append(pieces.do(screws.axes_of, joint, link.sign, own, t, origin))
+    for link, joint, body_path in zip(kinematic_tree.links, joints, body_paths, strict=True):
+        own = (body_path,) if link.parent is None else (body_path, body_paths[place[link.parent]])
+        found.append(spatial.axes_of(joint, link.sign, own, t, origin))
     return tuple(found)
 
 
-def tree_matrix(pieces: Pieces, tree: Tree, inertias: Sequence[Inertia]) -> TreeMatrix:
+def tree_matrix(tree: Tree, inertias: Sequence[SpatialInertia]) -> TreeMatrix:
     """Of a tree, its bodies' inertias given."""
-    parts = tuple(pieces.do(limbs.limb_matrix, limb.above, limb.of(inertias), tree.axes(limb)) for limb in tree.limbs)
+    parts = tuple(
+        schur_complement.branch_matrix(branch.above, branch.of(inertias), tree.axes(branch)) for branch in tree.branches
+    )
     root = tree.seen[0], None if tree.given is None else tree.given[0]
-    return TreeMatrix(parts, pieces.do(limbs.root_matrix, inertias[0], root, tuple(part.at_root for part in parts)))
+    return TreeMatrix(parts, schur_complement.root_matrix(inertias[0], root, tuple(part.at_root for part in parts)))
 
 
-def solve(pieces: Pieces, tree: Tree, matrix: TreeMatrix, momenta: Sequence[Screw]) -> Solved:
+def solve(tree: Tree, matrix: TreeMatrix, momenta: Sequence[SpatialVector]) -> TreeRates:
     """The rates that momenta, or forces, of all bodies stand for."""
     given, found = tree.impulses, []
-    for limb, part in zip(tree.limbs, matrix.limbs, strict=True):
-        found.append(pieces.do(limbs.limb_load, limb.above, part, limb.of(given), given[0], limb.of(momenta)))
-    r = pieces.do(limbs.root_rates, matrix.root, given[0], momenta[0], tuple(push for _, push in found))
-    return Solved(r, tuple(z for z, _ in found))
+    for branch, part in zip(tree.branches, matrix.branches, strict=True):
+        found.append(schur_complement.branch_load(branch.above, part, branch.of(given), given[0], branch.of(momenta)))
+    r = schur_complement.root_rates(matrix.root, given[0], momenta[0], tuple(push for _, push in found))
+    return TreeRates(r, tuple(z for z, _ in found))
 
 
 @dataclass(frozen=True)
-class Moving:
-    """Rates of the coordinates of each link (count,) and the screws of the bodies."""
+class TreeMotion:
+    """Rates of the coordinates of each link (count,) and the spatial velocities of the bodies."""
 
     rates: Columns
-    screws: tuple[Screw, ...]
+    screws: tuple[SpatialVector, ...]
 
 
-def moving(pieces: Pieces, tree: Tree, matrix: TreeMatrix, rates: Solved) -> Moving:
+def tree_motion(tree: Tree, matrix: TreeMatrix, rates: TreeRates) -> TreeMotion:
     """How all bodies move."""
     n = len(tree.seen)
-    root = pieces.do(_root_moving, tree.seen[0], rates.r)
+    root = _root_moving(tree.seen[0], rates.r)
     turns, found = [rates.r] * n, [root] * n
-    for limb, part, z in zip(tree.limbs, matrix.limbs, rates.z, strict=True):
-        own, moved = pieces.do(_limb_moving, limb.above, part, limb.of(tree.seen), z, rates.r, root)
-        for k, rate, screw in zip(limb.links, own, moved, strict=True):
+    for branch, part, z in zip(tree.branches, matrix.branches, rates.z, strict=True):
+        own, moved = _branch_moving(branch.above, part, branch.of(tree.seen), z, rates.r, root)
+        for k, rate, screw in zip(branch.links, own, moved, strict=True):
             turns[k], found[k] = rate, screw
-    return Moving(tuple(turns), tuple(found))
+    return TreeMotion(tuple(turns), tuple(found))
 
 
-def _root_moving(axes: Expr, r: Expr) -> Screw:
-    return Screw(ca.mtimes(axes, r))
+@traced
+def _root_moving(axes: Expr, r: Expr) -> SpatialVector:
+    return SpatialVector(ca.mtimes(axes, r))
 
 
-def _limb_moving(
-    above: Above, matrix: LimbMatrix, axes: Columns, z: Expr, r: Expr, root: Screw
-) -> tuple[Columns, tuple[Screw, ...]]:
-    rates = limbs.limb_rates(matrix, z, r)
+@traced
+def _branch_moving(
+    above: Parents, matrix: BranchMatrix, axes: Columns, z: Expr, r: Expr, root: SpatialVector
+) -> tuple[Columns, tuple[SpatialVector, ...]]:
+    rates = schur_complement.branch_rates(matrix, z, r)
     ends = [0]
     for columns in axes:
         ends.append(ends[-1] + columns.size2())
-    moved = limbs.summed_down(above, axes, rates, root.parts)
-    return tuple(ca.vertsplit(rates, ends)), tuple(Screw(screw) for screw in moved)
+    moved = schur_complement.summed_down(above, axes, rates, root.parts)
+    return tuple(ca.vertsplit(rates, ends)), tuple(SpatialVector(screw) for screw in moved)

@@ -1,4 +1,4 @@
-"""The end of a stretch for a tree: poses that fit its joints, and the momenta that getting there stands for.
+"""The end of a substep for a tree: poses that fit its joints, and the momenta that getting there stands for.
 
 Displacements along the coordinates at mid-step leave the joints open by what is of third order in the step. Poses come
 from joint to joint instead (``kinematics``), and coordinates are corrected until what that adds to displacements, as
@@ -14,17 +14,17 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.articulated import spatial as screws
-from symphys.dynamics.articulated.branches import Solved, moving, solve
-from symphys.dynamics.articulated.forward_kinematics import Arrived, arrive, seats_of
-from symphys.dynamics.articulated.generalized_coordinates import Chart, apart
-from symphys.dynamics.articulated.impulse_response import Placed, numbering
-from symphys.dynamics.articulated.schur_complement import Screw
-from symphys.dynamics.momentum import Momentum, Rates
-from symphys.dynamics.motion import Motion
-from symphys.dynamics.tracing.trace import Pieces
+from symphys.dynamics.articulated import spatial
+from symphys.dynamics.articulated.branches import TreeRates, solve, tree_motion
+from symphys.dynamics.articulated.forward_kinematics import FinalPose, final_poses, joint_starts
+from symphys.dynamics.articulated.generalized_coordinates import GeneralizedCoordinates, apart
+from symphys.dynamics.articulated.impulse_response import BodyPlace, numbering
+from symphys.dynamics.articulated.schur_complement import SpatialVector
+from symphys.dynamics.motion import PredictedMotion
+from symphys.dynamics.tracing.decorator import traced
+from symphys.dynamics.unknowns import GeneralizedVelocities, Momentum
 from symphys.maths import rotation
-from symphys.model.joints import Linkage
+from symphys.model.joints import KinematicTree
 
 Expr = Any
 """casadi SX"""
@@ -34,7 +34,7 @@ CORRECTIONS = 2
 
 
 @dataclass(frozen=True)
-class Made:
+class JointCorrection:
     """What joints did to a body's displacement, as momenta times a time: a displacement, inertia times a rotation.
 
     Attributes:
@@ -47,105 +47,104 @@ class Made:
 
 
 @dataclass(frozen=True)
-class Beside:
+class Deviation:
     """What a body's displacement has beside that along the coordinates.
 
     Attributes:
-        made: as a momentum times a time, see ``Made``.
+        made: as a momentum times a time, see ``JointCorrection``.
         screw: (6,) the same about the origin at the start.
     """
 
     made: Momentum
-    screw: Screw
+    screw: SpatialVector
 
 
 @dataclass(frozen=True)
-class Aim:
-    """Where a body would come to along its screw: (3,) its centre of mass, (3,) its rotation, (4,) that taken back."""
+class TargetPose:
+    """The pose along the displacement: (3,) centre of mass, (3,) rotation vector, (4,) its inverse rotation."""
 
     position: Expr
     angular: Expr
     back: Expr
 
 
-def arrival(
-    pieces: Pieces,
-    linkage: Linkage,
-    joints: screws.Joints,
-    chart: Chart,
-    motions: Sequence[Motion],
-    along: Rates,
-    by_loops: Rates | None,
-) -> tuple[tuple[Arrived, ...], tuple[Made, ...]]:
+def update_configuration(
+    kinematic_tree: KinematicTree,
+    joints: spatial.Joints,
+    coordinates: GeneralizedCoordinates,
+    motions: Sequence[PredictedMotion],
+    along: GeneralizedVelocities,
+    by_loops: GeneralizedVelocities | None,
+) -> tuple[tuple[FinalPose, ...], tuple[JointCorrection, ...]]:
     """Where the bodies of a tree come to, and what joints did to their displacements.
 
     ``along``: displacements along the tree's numbers; ``by_loops``: what of them joints that close loops did.
     """
-    do, places, tree, matrix = pieces.do, [motion.position for motion in motions], chart.tree, chart.matrix
-    seats = seats_of(pieces, linkage, joints, [motion.course() for motion in motions])
-    numbers = do(apart, numbering(tree), along.numbers)
-    moved = moving(pieces, tree, matrix, numbers)
-    aims = [do(_aim, *each) for each in zip(moved.screws, chart.bodies, places, strict=True)]
-    bodies = [(motion.mass, do(_counted, motion.position, places[0])) for motion in motions]
+    places, tree, matrix = [motion.position for motion in motions], coordinates.tree, coordinates.matrix
+    starts = joint_starts(kinematic_tree, joints, [motion.predicted_path() for motion in motions])
+    numbers = apart(numbering(tree), along.numbers)
+    moved = tree_motion(tree, matrix, numbers)
+    aims = [_aim(*each) for each in zip(moved.screws, coordinates.bodies, places, strict=True)]
+    bodies = [(motion.mass, motion.position - places[0]) for motion in motions]
     for k in range(CORRECTIONS + 1):
-        arrived = arrive(pieces, linkage, joints, seats, places, moved.rates)
-        parts = zip(bodies, chart.bodies, aims, arrived, strict=True)
-        beside = tuple(do(_beside, *body, *each) for body, *each in parts)
+        arrived = final_poses(kinematic_tree, joints, starts, places, moved.rates)
+        beside = tuple(
+            _beside(*body, placed, aim, at)
+            for body, placed, aim, at in zip(bodies, coordinates.bodies, aims, arrived, strict=True)
+        )
         if k < CORRECTIONS:
-            numbers = do(_less, numbers, solve(pieces, tree, matrix, [each.screw for each in beside]))
-            moved = moving(pieces, tree, matrix, numbers)
-    arrived, beside = _kept(pieces, chart, joints[0] is None, bodies, arrived, beside)
+            numbers = _less(numbers, solve(tree, matrix, [each.screw for each in beside]))
+            moved = tree_motion(tree, matrix, numbers)
+    arrived, beside = _kept(coordinates, joints[0] is None, bodies, arrived, beside)
     if by_loops is None:
-        return arrived, tuple(Made(each.made) for each in beside)
-    loops = moving(pieces, tree, matrix, do(apart, numbering(tree), by_loops.numbers)).screws
-    return arrived, tuple(do(_made, *each) for each in zip(beside, chart.bodies, loops, strict=True))
+        return arrived, tuple(JointCorrection(each.made) for each in beside)
+    loops = tree_motion(tree, matrix, apart(numbering(tree), by_loops.numbers)).screws
+    return arrived, tuple(_made(*each) for each in zip(beside, coordinates.bodies, loops, strict=True))
 
 
-def _counted(position: Expr, origin: Expr) -> Expr:
-    return position - origin
-
-
-def _less(numbers: Solved, by: Solved) -> Solved:
-    return Solved(numbers.r - by.r, tuple(a - b for a, b in zip(numbers.z, by.z, strict=True)))
+@traced
+def _less(numbers: TreeRates, by: TreeRates) -> TreeRates:
+    return TreeRates(numbers.r - by.r, tuple(a - b for a, b in zip(numbers.z, by.z, strict=True)))
 
 
 def _kept(
-    pieces: Pieces,
-    chart: Chart,
+    coordinates: GeneralizedCoordinates,
     floats: bool,
     bodies: Sequence[tuple[Expr, Expr]],
-    arrived: Sequence[Arrived],
-    beside: Sequence[Beside],
-) -> tuple[tuple[Arrived, ...], tuple[Beside, ...]]:
+    arrived: Sequence[FinalPose],
+    beside: Sequence[Deviation],
+) -> tuple[tuple[FinalPose, ...], tuple[Deviation, ...]]:
     """The same without any momentum along the root's coordinates, so that what is conserved is so to rounding.
 
     A tree that floats is shifted; else, and for spin, the root's share of momenta changes: of momenta only those along
-    free motions count in the end (``articulate.consistent``), so it does not matter whose they are.
+    free motions count in the end (``forward_dynamics.consistent``), so it does not matter whose they are.
     """
-    do = pieces.do
-    total, mass = do(_total, tuple(each.screw for each in beside), tuple(mass for mass, _ in bodies))
+    total, mass = _total(tuple(each.screw for each in beside), tuple(mass for mass, _ in bodies))
     if floats:
-        moved = [do(_shifted, *each, total, mass) for each in zip(bodies, arrived, beside, strict=True)]
+        moved = [_shifted(*each, total, mass) for each in zip(bodies, arrived, beside, strict=True)]
         arrived, beside = (tuple(each) for each in zip(*moved, strict=True))
-        total = do(_total, tuple(each.screw for each in beside), ())[0]
-    root = do(_without, beside[0], chart.tree.impulses[0], total, bodies[0][0], floats)
+        total = _total(tuple(each.screw for each in beside), ())[0]
+    root = _without(beside[0], coordinates.tree.impulses[0], total, bodies[0][0], floats)
     return tuple(arrived), (root, *beside[1:])
 
 
-def _total(screws: tuple[Screw, ...], masses: tuple[Expr, ...]) -> tuple[Screw, Expr]:
-    return Screw(sum(each.parts for each in screws)), sum(masses)
+@traced
+def _total(screws: tuple[SpatialVector, ...], masses: tuple[Expr, ...]) -> tuple[SpatialVector, Expr]:
+    return SpatialVector(sum(each.parts for each in screws)), sum(masses)
 
 
+@traced
 def _shifted(
-    body: tuple[Expr, Expr], arrived: Arrived, beside: Beside, total: Screw, mass: Expr
-) -> tuple[Arrived, Beside]:
+    body: tuple[Expr, Expr], arrived: FinalPose, beside: Deviation, total: SpatialVector, mass: Expr
+) -> tuple[FinalPose, Deviation]:
     by = total.parts[3:] / mass
-    screw = beside.screw.parts - screws.about_origin(body[1], body[0] * by, ca.SX.zeros(3))
+    screw = beside.screw.parts - spatial.about_origin(body[1], body[0] * by, ca.SX.zeros(3))
     made = replace(beside.made, velocity=beside.made.velocity - by)
-    return replace(arrived, position=arrived.position - by), Beside(made, Screw(screw))
+    return replace(arrived, position=arrived.position - by), Deviation(made, SpatialVector(screw))
 
 
-def _without(beside: Beside, axes: Expr, total: Screw, mass: Expr, floats: bool) -> Beside:
+@traced
+def _without(beside: Deviation, axes: Expr, total: SpatialVector, mass: Expr, floats: bool) -> Deviation:
     """What is conserved about axes that turn and along those that slide, at right angles to each other."""
     if floats:
         return replace(beside, made=replace(beside.made, angular=beside.made.angular - total.parts[:3]))
@@ -158,20 +157,23 @@ def _without(beside: Beside, axes: Expr, total: Screw, mass: Expr, floats: bool)
     return replace(beside, made=made)
 
 
-def _made(beside: Beside, placed: Placed, loops: Screw) -> Made:
-    linear, angular = screws.at_place(loops.parts, placed.place)
-    return Made(beside.made, Momentum(linear, ca.mtimes(placed.inertia, angular)))
+@traced
+def _made(beside: Deviation, placed: BodyPlace, loops: SpatialVector) -> JointCorrection:
+    linear, angular = spatial.at_place(loops.parts, placed.place)
+    return JointCorrection(beside.made, Momentum(linear, ca.mtimes(placed.inertia, angular)))
 
 
-def _aim(screw: Screw, placed: Placed, position: Expr) -> Aim:
-    linear, angular = screws.at_place(screw.parts, placed.place)
-    return Aim(position + linear, angular, rotation.exponential(-angular))
+@traced
+def _aim(screw: SpatialVector, placed: BodyPlace, position: Expr) -> TargetPose:
+    linear, angular = spatial.at_place(screw.parts, placed.place)
+    return TargetPose(position + linear, angular, rotation.exponential(-angular))
 
 
-def _beside(mass: Expr, counted: Expr, placed: Placed, aim: Aim, arrived: Arrived) -> Beside:
+@traced
+def _beside(mass: Expr, counted: Expr, placed: BodyPlace, aim: TargetPose, arrived: FinalPose) -> Deviation:
     linear = arrived.position - aim.position
     more = rotation.multiply(arrived.turn, aim.back)
     small = 2 * ca.if_else(more[0] < 0, -more[1:4], more[1:4])
     # added to a rotation vector, to second order in that
     spin = ca.mtimes(placed.inertia, small - ca.cross(aim.angular, small) / 2)
-    return Beside(Momentum(linear, spin), Screw(screws.about_origin(counted, mass * linear, spin)))
+    return Deviation(Momentum(linear, spin), SpatialVector(spatial.about_origin(counted, mass * linear, spin)))

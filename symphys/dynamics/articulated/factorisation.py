@@ -15,7 +15,7 @@ Sparse = dict[int, Expr]
 
 
 @dataclass(frozen=True)
-class Eliminated:
+class Factorisation:
     """A square matrix whose entry (i, j) is zero unless i and j are on one path from the root, factored without pivots.
 
     Indices grow from the root to the leaves.
@@ -51,7 +51,7 @@ def reciprocal(x: Expr) -> Expr:
     return 2 / (2 * x)
 
 
-def eliminated(rows: Sequence[Mapping[int, Expr]], symmetric: bool = False) -> Eliminated:
+def factorise(rows: Sequence[Mapping[int, Expr]], symmetric: bool = False) -> Factorisation:
     """The factors of a matrix by its rows; of a symmetric one those of one half serve both."""
     left, n = [dict(row) for row in rows], len(rows)
     lower, upper, pivots = ca.SX(n, n), ca.SX(n, n), ca.SX(n, 1)
@@ -66,4 +66,4 @@ def eliminated(rows: Sequence[Mapping[int, Expr]], symmetric: bool = False) -> E
                 left[i][j] = left[i].get(j, 0) - lower[i, k] * left[k][j]
                 if symmetric:
                     left[j][i] = left[i][j]
-    return Eliminated(lower, upper, pivots)
+    return Factorisation(lower, upper, pivots)

@@ -11,125 +11,147 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.articulated import spatial as screws
-from symphys.dynamics.articulated.branches import Moving, Tree, axes_at, moving, solve, tree_matrix
-from symphys.dynamics.articulated.schur_complement import Inertia, Screw, mirrored
-from symphys.dynamics.collision.predicted_points import Course
-from symphys.dynamics.momentum import Momentum
-from symphys.dynamics.motion import Motion, in_world, inertia_matrix
-from symphys.dynamics.tracing.trace import Pieces
+from symphys.dynamics.articulated import spatial
+from symphys.dynamics.articulated.branches import Tree, TreeMotion, axes_at, solve, tree_matrix, tree_motion
+from symphys.dynamics.articulated.schur_complement import SpatialInertia, SpatialVector, mirrored
+from symphys.dynamics.collision.predicted_path import PredictedPath
+from symphys.dynamics.motion import PredictedMotion, in_world, inertia_matrix
+from symphys.dynamics.tracing.decorator import traced
+from symphys.dynamics.unknowns import Momentum
 from symphys.maths import rotation
-from symphys.model.joints import Joint, Link, Linkage
+from symphys.model.joints import Joint, KinematicTree, Link
 
 Expr = Any
 """casadi SX"""
 Wrench = tuple[Expr, Expr]
 """Force [N] and torque [N m] about the centre of mass; also linear and angular acceleration."""
 NOW = ca.SX(0)
+_rotation = traced(rotation.matrix)
 
 
 def accelerations(
-    pieces: Pieces, linkage: Linkage, joints: screws.Joints, motions: Sequence[Motion], wrenches: Sequence[Wrench]
+    kinematic_tree: KinematicTree,
+    joints: spatial.Joints,
+    motions: Sequence[PredictedMotion],
+    wrenches: Sequence[Wrench],
 ) -> tuple[Wrench, ...]:
     """Of the bodies of a tree, from their poses and velocities and all forces but the joints'."""
-    do, origin = pieces.do, motions[0].position
-    tree = Tree(linkage, axes_at(pieces, linkage, joints, [m.course() for m in motions], NOW, origin))
-    tensors = [do(world_inertia, m.inertia, m.rotation) for m in motions]
+    origin = motions[0].position
+    tree = Tree(kinematic_tree, axes_at(kinematic_tree, joints, [m.predicted_path() for m in motions], NOW, origin))
+    tensors = [world_inertia(m.inertia, m.rotation) for m in motions]
     bodies = [(m.mass, tensor, m.position, origin) for m, tensor in zip(motions, tensors, strict=True)]
-    matrix = tree_matrix(pieces, tree, [do(_inertia, *body) for body in bodies])
-    momenta = [do(_momentum, *body, m.velocity, m.angular_velocity) for body, m in zip(bodies, motions, strict=True)]
-    now = moving(pieces, tree, matrix, solve(pieces, tree, matrix, momenta))
-    biases = _biases(pieces, tree, joints, now)
-    states = list(zip(bodies, now.screws, biases, strict=True))
-    lacking = [do(_lacking, *body, *state, wrench) for (body, *state), wrench in zip(states, wrenches, strict=True)]
-    changes = moving(pieces, tree, matrix, solve(pieces, tree, matrix, lacking)).screws
+    matrix = tree_matrix(tree, [_inertia(*body) for body in bodies])
+    momenta = [_momentum(*body, m.velocity, m.angular_velocity) for body, m in zip(bodies, motions, strict=True)]
+    now = tree_motion(tree, matrix, solve(tree, matrix, momenta))
+    biases = _biases(tree, joints, now)
+    lacking = [
+        _lacking(*body, screw, bias, wrench)
+        for body, screw, bias, wrench in zip(bodies, now.screws, biases, wrenches, strict=True)
+    ]
+    changes = tree_motion(tree, matrix, solve(tree, matrix, lacking)).screws
     return tuple(
-        do(_accelerated, place, origin, *state, change)
-        for ((*_, place, origin), *state), change in zip(states, changes, strict=True)
+        _accelerated(motion.position, origin, screw, bias, change)
+        for motion, screw, bias, change in zip(motions, now.screws, biases, changes, strict=True)
     )
 
 
 def consistent(
-    pieces: Pieces,
-    linkage: Linkage,
-    joints: screws.Joints,
+    kinematic_tree: KinematicTree,
+    joints: spatial.Joints,
     inertials: Sequence[tuple[Expr, Expr]],
     poses: Sequence[tuple[Expr, Expr]],
     momenta: Sequence[Momentum],
 ) -> tuple[Wrench, ...]:
     """Velocity and angular velocity of each body: those that fit the joints and have the momenta along free motions."""
-    do, zero, origin = pieces.do, ca.SX.zeros(3), poses[0][0]
-    turned = [do(rotation.matrix, q) for _, q in poses]
-    courses = [Course(p, r, zero, zero, zero, zero, NOW) for (p, _), r in zip(poses, turned, strict=True)]
-    tree = Tree(linkage, axes_at(pieces, linkage, joints, courses, NOW, origin))
+    zero, origin = ca.SX.zeros(3), poses[0][0]
+    turned = [_rotation(q) for _, q in poses]
+    body_paths = [PredictedPath(p, r, zero, zero, zero, zero, NOW) for (p, _), r in zip(poses, turned, strict=True)]
+    tree = Tree(kinematic_tree, axes_at(kinematic_tree, joints, body_paths, NOW, origin))
     parts = list(zip(inertials, poses, turned, momenta, strict=True))
-    tensors = (do(world_inertia, inertia, r) for (_, inertia), _, r, _ in parts)
-    inertias = [do(_inertia, mass, t, p, origin) for ((mass, _), (p, _), *_), t in zip(parts, tensors, strict=True)]
-    counted = [do(_counted, mass, p, origin, momentum) for (mass, _), (p, _), _, momentum in parts]
-    matrix = tree_matrix(pieces, tree, inertias)
-    moved = moving(pieces, tree, matrix, solve(pieces, tree, matrix, counted)).screws
-    return tuple(do(_at_place, screw, p, origin) for screw, (p, _) in zip(moved, poses, strict=True))
+    tensors = (world_inertia(inertia, r) for (_, inertia), _, r, _ in parts)
+    inertias = [_inertia(mass, t, p, origin) for ((mass, _), (p, _), *_), t in zip(parts, tensors, strict=True)]
+    counted = [_counted(mass, p, origin, momentum) for (mass, _), (p, _), _, momentum in parts]
+    matrix = tree_matrix(tree, inertias)
+    moved = tree_motion(tree, matrix, solve(tree, matrix, counted)).screws
+    return tuple(_at_place(screw, p, origin) for screw, (p, _) in zip(moved, poses, strict=True))
 
 
-def _inertia(mass: Expr, tensor: Expr, position: Expr, origin: Expr) -> Inertia:
+@traced
+def _inertia(mass: Expr, tensor: Expr, position: Expr, origin: Expr) -> SpatialInertia:
     place = position - origin
-    return Inertia(mirrored(screws.inertia_of(mass, tensor, place, place)))
+    return SpatialInertia(mirrored(spatial.inertia_of(mass, tensor, place, place)))
 
 
-def _momentum(mass: Expr, tensor: Expr, position: Expr, origin: Expr, velocity: Expr, spin: Expr) -> Screw:
-    return Screw(screws.about_origin(position - origin, mass * velocity, ca.mtimes(tensor, spin)))
+@traced
+def _momentum(mass: Expr, tensor: Expr, position: Expr, origin: Expr, velocity: Expr, spin: Expr) -> SpatialVector:
+    return SpatialVector(spatial.about_origin(position - origin, mass * velocity, ca.mtimes(tensor, spin)))
 
 
-def _counted(mass: Expr, position: Expr, origin: Expr, momentum: Momentum) -> Screw:
-    return Screw(screws.about_origin(position - origin, mass * momentum.velocity, momentum.angular))
+@traced
+def _counted(mass: Expr, position: Expr, origin: Expr, momentum: Momentum) -> SpatialVector:
+    return SpatialVector(spatial.about_origin(position - origin, mass * momentum.velocity, momentum.angular))
 
 
+@traced
 def _lacking(
-    mass: Expr, tensor: Expr, position: Expr, origin: Expr, screw: Screw, bias: Screw, wrench: Wrench
-) -> Screw:
+    mass: Expr, tensor: Expr, position: Expr, origin: Expr, screw: SpatialVector, bias: SpatialVector, wrench: Wrench
+) -> SpatialVector:
     """What forces do beside what the motion needs as it is."""
     place, w = position - origin, screw.parts[:3]
     linear, angular = _at(bias.parts, screw.parts, place)
     turning = ca.mtimes(tensor, angular) + ca.cross(w, ca.mtimes(tensor, w))
-    return Screw(screws.about_origin(place, wrench[0] - mass * linear, wrench[1] - turning))
+    return SpatialVector(spatial.about_origin(place, wrench[0] - mass * linear, wrench[1] - turning))
 
 
-def _accelerated(position: Expr, origin: Expr, screw: Screw, bias: Screw, change: Screw) -> Wrench:
+@traced
+def _accelerated(
+    position: Expr, origin: Expr, screw: SpatialVector, bias: SpatialVector, change: SpatialVector
+) -> Wrench:
     return _at(change.parts + bias.parts, screw.parts, position - origin)
 
 
-def _at_place(screw: Screw, position: Expr, origin: Expr) -> Wrench:
-    return screws.at_place(screw.parts, position - origin)
+@traced
+def _at_place(screw: SpatialVector, position: Expr, origin: Expr) -> Wrench:
+    return spatial.at_place(screw.parts, position - origin)
 
 
-def _biases(pieces: Pieces, tree: Tree, joints: screws.Joints, now: Moving) -> list[Screw]:
-    """(6,) rates of change of the bodies' screws while the coordinates' rates do not change."""
-    place = {link.body: k for k, link in enumerate(tree.linkage.links)}
-    found: list[Screw] = []
-    for k, (link, joint) in enumerate(zip(tree.linkage.links, joints, strict=True)):
+def _biases(tree: Tree, joints: spatial.Joints, now: TreeMotion) -> list[SpatialVector]:
+    """(6,) rates of change of the bodies' spatial vectors while the coordinates' rates do not change."""
+    place = {link.body: k for k, link in enumerate(tree.kinematic_tree.links)}
+    found: list[SpatialVector] = []
+    for k, (link, joint) in enumerate(zip(tree.kinematic_tree.links, joints, strict=True)):
         if joint is None:
-            found.append(pieces.do(_floating_bias, now.screws[k]))
+            found.append(_floating_bias(now.screws[k]))
             continue
         parent = None if link.parent is None else place[link.parent]
         above, moved = (None, None) if parent is None else (found[parent], now.screws[parent])
         carriers = tuple(_carried_by_child(link, joint, j) for j in range(link.count))
-        found.append(pieces.do(_bias, carriers, tree.seen[k], now.rates[k], now.screws[k], moved, above))
+        found.append(_bias(carriers, tree.seen[k], now.rates[k], now.screws[k], moved, above))
     return found
 
 
-def _floating_bias(screw: Screw) -> Screw:
-    return Screw(ca.vertcat(ca.SX.zeros(3), ca.cross(screw.parts[3:], screw.parts[:3])))  # its centre is at the origin
+@traced
+def _floating_bias(screw: SpatialVector) -> SpatialVector:
+    return SpatialVector(
+        ca.vertcat(ca.SX.zeros(3), ca.cross(screw.parts[3:], screw.parts[:3]))
+    )  # its centre is at the origin
 
 
+@traced
 def _bias(
-    carriers: tuple[bool, ...], axes: Expr, rates: Expr, own: Screw, parent: Screw | None, above: Screw | None
-) -> Screw:
+    carriers: tuple[bool, ...],
+    axes: Expr,
+    rates: Expr,
+    own: SpatialVector,
+    parent: SpatialVector | None,
+    above: SpatialVector | None,
+) -> SpatialVector:
     total = ca.SX.zeros(6) if above is None else above.parts
     for j, by_child in enumerate(carriers):
         carrier = own if by_child else parent
         if carrier is not None:
             total = total + rates[j] * _carried(carrier.parts, axes[:, j])
-    return Screw(total)
+    return SpatialVector(total)
 
 
 def _carried_by_child(link: Link, joint: Joint, coordinate: int) -> bool:
@@ -138,18 +160,20 @@ def _carried_by_child(link: Link, joint: Joint, coordinate: int) -> bool:
     return first == (link.sign > 0)
 
 
-def _carried(moving: Expr, screw: Expr) -> Expr:
-    """(6,): how a screw that is fixed in a body changes as the body moves."""
-    w, v = moving[:3], moving[3:]
+def _carried(carrier: Expr, screw: Expr) -> Expr:
+    """(6,): how a spatial vector fixed in a body changes as the body moves."""
+    w, v = carrier[:3], carrier[3:]
     return ca.vertcat(ca.cross(w, screw[:3]), ca.cross(w, screw[3:]) + ca.cross(v, screw[:3]))
 
 
 def _at(change: Expr, screw: Expr, place: Expr) -> Wrench:
-    """Acceleration of the centre of mass, at ``place``, and angular acceleration: from a screw and its change."""
-    velocity = screws.at_place(screw, place)[0]
+    """Acceleration of the centre of mass, at ``place``, and angular acceleration, from a spatial velocity's rate."""
+    velocity = spatial.at_place(screw, place)[0]
     return change[3:] + ca.cross(change[:3], place) + ca.cross(screw[:3], velocity), change[:3]
 
 
+@traced
+@traced
 def world_inertia(inertia: Expr, turned: Expr) -> Expr:
     """(3, 3), world frame."""
     return in_world(inertia_matrix(inertia), turned)

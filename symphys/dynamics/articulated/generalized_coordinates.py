@@ -1,10 +1,10 @@
-"""The velocities of a tree of bodies in the coordinates that its joints leave, and what impulses do to them.
+"""Generalized velocities of a kinematic tree, and their response to impulses (docs/time_step.md, equation 24).
 
-Velocities are seen at the middle of a stretch and impulses given at its start, as rows of joints are (``joint_rows``):
-a body's velocity is ``see`` times the rates of the coordinates, with arms at the middle; impulses of locks, which act
-at the start on one point of both sides, do nothing along the free motions of the start. So
+Velocities are those at the middle of a substep and impulses act at its start, like those of joint constraints. A body's
+velocity is its Jacobian, with arms at the middle, times the generalized velocities. Impulses of locked directions act
+at the start on one point of both bodies, and do no work along the free motions of the start. So
 sum of free_motion . (momentum - free momentum) = sum of free_motion . impulses,  free motions being those of the start,
-holds whatever the locks give: joints are held exactly, and the sweeps know contacts, motors and limits only.
+holds whatever these impulses are: joints hold exactly, and the sweeps project contacts, motors and limits only.
 """
 
 from __future__ import annotations
@@ -15,78 +15,83 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.articulated import spatial as screws
-from symphys.dynamics.articulated.branches import Solved, Tree, TreeMatrix, axes_at, moving, solve, tree_matrix
-from symphys.dynamics.articulated.impulse_response import Gain, Numbering, Placed, gains_of, held_of, numbering, spread
-from symphys.dynamics.articulated.schur_complement import Inertia, Screw
-from symphys.dynamics.momentum import Momentum, Rates
-from symphys.dynamics.motion import Held, Motion, apply
-from symphys.dynamics.tracing.trace import Pieces
-from symphys.model.joints import Linkage
+from symphys.dynamics.articulated import spatial
+from symphys.dynamics.articulated.branches import Tree, TreeMatrix, TreeRates, axes_at, solve, tree_matrix, tree_motion
+from symphys.dynamics.articulated.impulse_response import (
+    BodyPlace,
+    Numbering,
+    Response,
+    body_jacobians,
+    coordinate_responses,
+    numbering,
+    spread,
+)
+from symphys.dynamics.articulated.schur_complement import SpatialInertia, SpatialVector
+from symphys.dynamics.motion import BodyJacobian, PredictedMotion, apply
+from symphys.dynamics.tracing.decorator import traced
+from symphys.dynamics.unknowns import GeneralizedVelocities, Momentum
+from symphys.model.joints import KinematicTree
 
 Expr = Any
 """casadi SX"""
 
 
 @dataclass(frozen=True)
-class Chart:
-    """A tree over a stretch.
+class GeneralizedCoordinates:
+    """A kinematic tree over a substep.
 
-    Sweeps know the rates of the root and what those of limbs have beside what they do as the root moves (``limbs``):
-    all here is by these numbers.
+    Its generalized velocities are the rates r of the root, and for each branch z, its rates beside those with which it
+    follows the root (``schur_complement``).
 
     Attributes:
-        free: them without any impulse of the stretch.
-        held: of each link: how its body moves with the rates, and what impulses on it do to them; None for bodies on
-            which nothing acts but the tree's own joints.
-        gains: of each coordinate; None where nothing acts along it.
-        tree, matrix: its screws and its mass matrix.
-        bodies: when velocities are seen.
+        free: generalized velocities without any impulse of the substep.
+        jacobians: of each link; None for bodies on which only the tree's own joints act.
+        responses: of each coordinate to a unit impulse along it; None where nothing acts along it.
+        tree, matrix: its motion subspaces and its mass matrix.
+        bodies: at the time of the velocities.
     """
 
-    free: Rates
-    held: tuple[Held | None, ...]
-    gains: tuple[Gain | None, ...]
+    free: GeneralizedVelocities
+    jacobians: tuple[BodyJacobian | None, ...]
+    responses: tuple[Response | None, ...]
     tree: Tree
     matrix: TreeMatrix
-    bodies: tuple[Placed, ...]
+    bodies: tuple[BodyPlace, ...]
 
 
-def make_chart(
-    pieces: Pieces,
-    linkage: Linkage,
-    joints: screws.Joints,
+def generalized_coordinates(
+    kinematic_tree: KinematicTree,
+    joints: spatial.Joints,
     reached: Sequence[bool],
-    motions: Sequence[Motion],
+    motions: Sequence[PredictedMotion],
     free: Sequence[Momentum],
     middle: Expr,
-) -> Chart:
-    """The chart of a tree.
+) -> GeneralizedCoordinates:
+    """The coordinates of a tree.
 
     Args:
-        pieces: how its parts are put together.
-        linkage: the tree.
+        kinematic_tree: the tree.
         joints: of its links, as are the other sequences.
         reached: whether anything but the tree's own joints acts on the body.
         motions: what the bodies do.
-        free: their momenta without any impulse of the stretch.
-        middle: when velocities are seen [s].
+        free: their momenta without any impulse of the substep.
+        middle: the time of the velocities [s].
     """
-    do, origin = pieces.do, motions[0].position
-    courses = [motion.course() for motion in motions]
-    seen, given = (axes_at(pieces, linkage, joints, courses, t, origin) for t in (middle, ca.SX(0)))
-    tree = Tree(linkage, seen, given)
-    parts = [do(_counted, motion, momentum, origin, middle) for motion, momentum in zip(motions, free, strict=True)]
+    origin = motions[0].position
+    body_paths = [motion.predicted_path() for motion in motions]
+    seen, given = (axes_at(kinematic_tree, joints, body_paths, t, origin) for t in (middle, ca.SX(0)))
+    tree = Tree(kinematic_tree, seen, given)
+    parts = [_counted(motion, momentum, origin, middle) for motion, momentum in zip(motions, free, strict=True)]
     bodies, inertias, momenta = zip(*parts, strict=True)
-    matrix = tree_matrix(pieces, tree, inertias)
-    rates = do(_joined, numbering(tree), solve(pieces, tree, matrix, momenta))
+    matrix = tree_matrix(tree, inertias)
+    rates = _joined(numbering(tree), solve(tree, matrix, momenta))
     places = [
-        (do(_place, motion, origin), body) if on else None
+        (motion.position - origin, body) if on else None
         for motion, body, on in zip(motions, bodies, reached, strict=True)
     ]
-    held = held_of(pieces, tree, matrix, places)
-    gains = gains_of(pieces, tree, matrix, [acts(joint) for joint in joints])
-    return Chart(Rates(rates), held, gains, tree, matrix, bodies)
+    jacobians = body_jacobians(tree, matrix, places)
+    responses = coordinate_responses(tree, matrix, [acts(joint) for joint in joints])
+    return GeneralizedCoordinates(GeneralizedVelocities(rates), jacobians, responses, tree, matrix, bodies)
 
 
 def acts(joint: Any) -> bool:
@@ -94,36 +99,43 @@ def acts(joint: Any) -> bool:
     return joint is not None and bool(joint.acting)
 
 
-def body_momenta(pieces: Pieces, chart: Chart, rates: Any) -> tuple[Momentum, ...]:
-    """Of the bodies of a tree, from the rates that sweeps know of it."""
-    return tuple(pieces.do(_momentum, *each) for each in zip(_moving(pieces, chart, rates), chart.bodies, strict=True))
+def body_momenta(coordinates: GeneralizedCoordinates, rates: Any) -> tuple[Momentum, ...]:
+    """Of the bodies of a tree, from its generalized velocities."""
+    return tuple(_momentum(*each) for each in zip(_moving(coordinates, rates), coordinates.bodies, strict=True))
 
 
-def _moving(pieces: Pieces, chart: Chart, rates: Any) -> tuple[Screw, ...]:
-    return moving(pieces, chart.tree, chart.matrix, pieces.do(apart, numbering(chart.tree), rates.numbers)).screws
+def _moving(coordinates: GeneralizedCoordinates, rates: Any) -> tuple[SpatialVector, ...]:
+    return tree_motion(coordinates.tree, coordinates.matrix, apart(numbering(coordinates.tree), rates.numbers)).screws
 
 
-def _momentum(screw: Screw, body: Placed) -> Momentum:
-    velocity, spin = screws.at_place(screw.parts, body.place)
+@traced
+def _momentum(screw: SpatialVector, body: BodyPlace) -> Momentum:
+    velocity, spin = spatial.at_place(screw.parts, body.place)
     return Momentum(velocity, apply(body.inertia, spin))
 
 
-def _place(motion: Motion, origin: Expr) -> Expr:
-    return motion.position - origin
-
-
-def _counted(motion: Motion, free: Momentum, origin: Expr, middle: Expr) -> tuple[Placed, Inertia, Screw]:
-    """A body at mid-step, its momentum at the start for what is seen at mid-step, and its free momentum."""
+@traced
+def _counted(
+    motion: PredictedMotion, free: Momentum, origin: Expr, middle: Expr
+) -> tuple[BodyPlace, SpatialInertia, SpatialVector]:
+    """A body at mid-step, its inertia from velocities at mid-step to momenta at the start, and its free momentum."""
     counted, place, inertia = motion.position - origin, motion.centre().at(middle) - origin, motion.inertia_at(middle)
-    momentum = screws.about_origin(counted, motion.mass * free.velocity, free.angular)
-    return Placed(place, inertia), Inertia(screws.inertia_of(motion.mass, inertia, counted, place)), Screw(momentum)
+    momentum = spatial.about_origin(counted, motion.mass * free.velocity, free.angular)
+    return (
+        BodyPlace(place, inertia),
+        SpatialInertia(spatial.inertia_of(motion.mass, inertia, counted, place)),
+        SpatialVector(momentum),
+    )
 
 
-def _joined(numbering: Numbering, rates: Solved) -> Expr:
+@traced
+def _joined(numbering: Numbering, rates: TreeRates) -> Expr:
     return spread(numbering, (rates.r, *rates.z))
 
 
-def apart(numbering: Numbering, numbers: Expr) -> Solved:
-    """What sweeps know of a tree, by its root and limbs."""
+@traced
+@traced
+def apart(numbering: Numbering, numbers: Expr) -> TreeRates:
+    """Generalized velocities of a tree, by its root and branches."""
     r, *z = (numbers[list(each), 0] for each in numbering)
-    return Solved(r, tuple(z))
+    return TreeRates(r, tuple(z))

@@ -1,4 +1,4 @@
-"""What impulses along the coordinates of a tree, and on its bodies, do to the numbers that sweeps know of it."""
+"""What impulses along the coordinates of a tree, and on its bodies, do to its generalized velocities."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics.articulated.branches import Tree, TreeMatrix
-from symphys.dynamics.articulated.factorisation import Eliminated
-from symphys.dynamics.articulated.schur_complement import Above, Columns, LimbMatrix, dense, paths, solved
-from symphys.dynamics.motion import Held
-from symphys.dynamics.tracing.trace import Pieces
+from symphys.dynamics.articulated.factorisation import Factorisation
+from symphys.dynamics.articulated.schur_complement import BranchMatrix, Columns, Parents, dense, paths, solved
+from symphys.dynamics.motion import BodyJacobian
+from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.rotation import cross_matrix
 
 Expr = Any
 """casadi SX"""
-Gain = tuple[Expr, Expr]
+Response = tuple[Expr, Expr]
 """The rate of a coordinate by the numbers (1, n), and what a unit impulse along it does to them (n,)."""
 Numbering = tuple[tuple[int, ...], ...]
-"""Which of the n numbers are those of the root, and of each limb."""
+"""Which of the n numbers are those of the root, and of each branch."""
 
 
 @dataclass(frozen=True)
-class Placed:
-    """A body when velocities are seen: (3,) from the origin of the screws, (3, 3) inertia in the world frame."""
+class BodyPlace:
+    """A body at the time of the velocities: (3,) from the origin of spatial vectors, (3, 3) inertia, world frame."""
 
     place: Expr
     inertia: Expr
@@ -33,7 +33,7 @@ class Placed:
 
 def numbering(tree: Tree) -> Numbering:
     """The numbers are in the order of the coordinates."""
-    return tuple(tree.linkage.links[0].coordinates), *(limb.coordinates for limb in tree.limbs)
+    return tuple(tree.kinematic_tree.links[0].coordinates), *(branch.coordinates for branch in tree.branches)
 
 
 def spread(places: Numbering, parts: Sequence[Expr], n: int | None = None) -> Expr:
@@ -47,22 +47,23 @@ def spread(places: Numbering, parts: Sequence[Expr], n: int | None = None) -> Ex
     return found
 
 
-def gains_of(pieces: Pieces, tree: Tree, matrix: TreeMatrix, acting: Sequence[bool]) -> tuple[Gain | None, ...]:
+def coordinate_responses(tree: Tree, matrix: TreeMatrix, acting: Sequence[bool]) -> tuple[Response | None, ...]:
     """Of all coordinates; None for those of links along which nothing acts."""
-    found, (root, *_), links = dict[int, Gain](), numbering(tree), tree.linkage.links
+    found, (root, *_), links = dict[int, Response](), numbering(tree), tree.kinematic_tree.links
     for k in root if acting[0] else ():
-        found[k] = pieces.do(_root_gain, k, tree.linkage.size, matrix.root)
-    for limb, part in zip(tree.limbs, matrix.limbs, strict=True):
-        wanted = [on for link, on in zip(limb.of(links), limb.of(acting), strict=True) for _ in link.coordinates]
-        for a, k in enumerate(limb.coordinates):
+        found[k] = _root_gain(k, tree.kinematic_tree.size, matrix.root)
+    for branch, part in zip(tree.branches, matrix.branches, strict=True):
+        wanted = [on for link, on in zip(branch.of(links), branch.of(acting), strict=True) for _ in link.coordinates]
+        for a, k in enumerate(branch.coordinates):
             if wanted[a]:
-                given = pieces.do(_limb_gain, a, part, matrix.root)
-                places = root, limb.coordinates
-                found[k] = pieces.do(_gain, a, tree.linkage.size, places, part.follows, given)
-    return tuple(found.get(k) for k in range(tree.linkage.size))
+                given = _branch_gain(a, part, matrix.root)
+                places = root, branch.coordinates
+                found[k] = _gain(a, tree.kinematic_tree.size, places, part.follows, given)
+    return tuple(found.get(k) for k in range(tree.kinematic_tree.size))
 
 
-def _root_gain(k: int, n: int, root: Eliminated) -> Gain:
+@traced
+def _root_gain(k: int, n: int, root: Factorisation) -> Response:
     row = ca.SX(1, n)
     row[0, k] = 1
     return row, spread(
@@ -70,50 +71,55 @@ def _root_gain(k: int, n: int, root: Eliminated) -> Gain:
     )
 
 
-def _limb_gain(k: int, matrix: LimbMatrix, root: Eliminated) -> tuple[Expr, Expr]:
-    """What a unit impulse along coordinate k of a limb does to the numbers of the root and of the limb."""
+@traced
+def _branch_gain(k: int, matrix: BranchMatrix, root: Factorisation) -> tuple[Expr, Expr]:
+    """What a unit impulse along coordinate k of a branch does to the numbers of the root and of the branch."""
     z = dense(matrix.block.solve({k: ca.SX(1)}), matrix.follows.size1())
     reaching: Expr = ca.mtimes(matrix.pushes, z)
     return solved(root, -reaching), z
 
 
-def _gain(k: int, n: int, places: Numbering, follows: Expr, given: tuple[Expr, Expr]) -> Gain:
+@traced
+def _gain(k: int, n: int, places: Numbering, follows: Expr, given: tuple[Expr, Expr]) -> Response:
     unit = ca.SX(follows.size1(), 1)
     unit[k] = 1
     return spread(places, (follows[k, :].T, unit), n).T, spread(places, given, n)
 
 
-def held_of(
-    pieces: Pieces, tree: Tree, matrix: TreeMatrix, bodies: Sequence[tuple[Expr, Placed] | None]
-) -> tuple[Held | None, ...]:
-    """How bodies are held: of each link where impulses count (3,) and where velocities are seen; None if not asked."""
-    found: list[Held | None] = [None for _ in bodies]
-    do, (root, *_), n, given = pieces.do, numbering(tree), tree.linkage.size, tree.impulses
+def body_jacobians(
+    tree: Tree, matrix: TreeMatrix, bodies: Sequence[tuple[Expr, BodyPlace] | None]
+) -> tuple[BodyJacobian | None, ...]:
+    """The Jacobian of each link's body, from its place at the time of impulses (3,) and of velocities; None: none."""
+    found: list[BodyJacobian | None] = [None for _ in bodies]
+    (root, *_), n, given = numbering(tree), tree.kinematic_tree.size, tree.impulses
     if bodies[0] is not None:
         counted, body = bodies[0]
-        parts = do(_root_see, tree.seen[0], body.place), do(_root_response, matrix.root, given[0], counted)
-        found[0] = do(_held, n, (root,), *parts, body.inertia)
-    for limb, part in zip(tree.limbs, matrix.limbs, strict=True):
-        for a, k in enumerate(limb.links):
+        parts = _root_see(tree.seen[0], body.place), _root_response(matrix.root, given[0], counted)
+        found[0] = _held(n, (root,), *parts, body.inertia)
+    for branch, part in zip(tree.branches, matrix.branches, strict=True):
+        for a, k in enumerate(branch.links):
             if (each := bodies[k]) is not None:
                 counted, body = each
-                see = do(_limb_see, limb.above, a, part.follows, limb.of(tree.seen), tree.seen[0], body.place)
-                response = do(_limb_response, limb.above, a, part, matrix.root, limb.of(given), given[0], counted)
-                found[k] = do(_held, n, (root, limb.coordinates), see, response, body.inertia)
+                see = _branch_see(branch.above, a, part.follows, branch.of(tree.seen), tree.seen[0], body.place)
+                response = _branch_response(branch.above, a, part, matrix.root, branch.of(given), given[0], counted)
+                found[k] = _held(n, (root, branch.coordinates), see, response, body.inertia)
     return tuple(found)
 
 
-def _held(n: int, places: Numbering, see: Columns, response: Columns, inertia: Expr) -> Held:
-    """From (6, k) of the root's and the limb's numbers, and from (k, 6), at their places."""
+@traced
+def _held(n: int, places: Numbering, see: Columns, response: Columns, inertia: Expr) -> BodyJacobian:
+    """From (6, k) of the root's and the branch's numbers, and from (k, 6), at their places."""
     numbers = spread(places, response, n)
-    return Held(spread(places, [part.T for part in see], n).T, inertia, numbers[:, :3], numbers[:, 3:])
+    return BodyJacobian(spread(places, [part.T for part in see], n).T, inertia, numbers[:, :3], numbers[:, 3:])
 
 
+@traced
 def _root_see(axes: Expr, place: Expr) -> Columns:
     return (_at_place(axes, place),)
 
 
-def _limb_see(above: Above, link: int, follows: Expr, axes: Columns, root: Expr, place: Expr) -> Columns:
+@traced
+def _branch_see(above: Parents, link: int, follows: Expr, axes: Columns, root: Expr, place: Expr) -> Columns:
     path, own = paths(above, axes)[link], _side_by_side(axes)
     columns = ca.SX(6, own.size2())
     columns[:, path] = own[:, path]
@@ -121,19 +127,21 @@ def _limb_see(above: Above, link: int, follows: Expr, axes: Columns, root: Expr,
 
 
 def _at_place(columns: Expr, place: Expr) -> Expr:
-    """(6, k) screws as velocity at a place above angular velocity."""
+    """(6, k) spatial vectors as velocity at a place above angular velocity."""
     return ca.vertcat(columns[3:, :] - ca.mtimes(cross_matrix(place), columns[:3, :]), columns[:3, :])
 
 
-def _root_response(root: Eliminated, axes: Expr, place: Expr) -> Columns:
+@traced
+def _root_response(root: Factorisation, axes: Expr, place: Expr) -> Columns:
     right: Expr = ca.mtimes(axes.T, _unit_impulses(place))
     return (ca.horzcat(*(solved(root, right[:, k]) for k in range(6))),)
 
 
-def _limb_response(
-    above: Above, link: int, matrix: LimbMatrix, root: Eliminated, axes: Columns, root_axes: Expr, place: Expr
+@traced
+def _branch_response(
+    above: Parents, link: int, matrix: BranchMatrix, root: Factorisation, axes: Columns, root_axes: Expr, place: Expr
 ) -> Columns:
-    """(m, 6), (n, 6): of the numbers of the root and of the limb."""
+    """(m, 6), (n, 6): of the numbers of the root and of the branch."""
     impulses, own = _unit_impulses(place), _side_by_side(axes)
     path, n = paths(above, axes)[link], own.size2()
     z = [dense(matrix.block.solve({k: ca.dot(own[:, k], impulses[:, i]) for k in path}), n) for i in range(6)]

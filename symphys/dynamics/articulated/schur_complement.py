@@ -1,9 +1,9 @@
-"""A tree's mass matrix with the limbs that hang on its root taken apart: what is done with each limb, and at the root.
+"""The Schur complement of a kinematic tree's mass matrix on its root: one block for each branch, and the root's.
 
-The rates of a limb are z + T r, with r those of the root and T = -M_ll^-1 M_lr: what it does as the root moves and
-nothing acts on it. In (r, z) limbs do not know of each other: an impulse b on one limb changes its z by M_ll^-1 b_l and
-r by S^-1 (b_r - M_rl z), S = M_rr + sum M_rl T, and no other limb. So what sweeps visit stays small however many limbs
-there are, and equal limbs share their functions.
+The rates of a branch are z + T r, with r those of the root and T = -M_ll^-1 M_lr: its motion as the root moves and
+nothing acts on it. In (r, z) the branches are decoupled: an impulse b on one branch changes its z by M_ll^-1 b_l and r
+by S^-1 (b_r - M_rl z), S = M_rr + sum M_rl T, and no other branch. So the cost of a projection does not depend on the
+number of branches, and equal branches share their functions.
 """
 
 from __future__ import annotations
@@ -14,19 +14,20 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.articulated.factorisation import Eliminated, Sparse, eliminated
+from symphys.dynamics.articulated.factorisation import Factorisation, Sparse, factorise
+from symphys.dynamics.tracing.decorator import traced
 
 Expr = Any
 """casadi SX"""
-Above = tuple[int | None, ...]
-"""For each link of a limb the place of its parent among them; None: the root of the tree."""
+Parents = tuple[int | None, ...]
+"""For each link of a branch the place of its parent among them; None: the root of the tree."""
 Columns = tuple[Expr, ...]
-"""For each link the screws of its coordinates (6, count)."""
+"""For each link its motion subspace (6, count)."""
 
 
 @dataclass(frozen=True)
-class Axes:
-    """The screws of a limb's links and of the root (6, count): how coordinates move them.
+class MotionSubspaces:
+    """The motion subspaces (6, count) of a branch's links and of the root (Featherstone's S).
 
     Attributes:
         seen, root_seen: at the time of the velocities.
@@ -40,15 +41,15 @@ class Axes:
 
     @property
     def impulses(self) -> tuple[Columns, Expr]:
-        """The screws along which impulses count, of the links and of the root."""
+        """The motion subspaces at the time of the impulses, of the links and of the root."""
         if self.given is None or self.root_given is None:
             return self.seen, self.root_seen
         return self.given, self.root_given
 
 
 @dataclass(frozen=True)
-class LimbMatrix:
-    """What a limb of n coordinates does on a root of m.
+class BranchMatrix:
+    """What a branch of n coordinates does on a root of m.
 
     Attributes:
         block: its own mass matrix.
@@ -57,28 +58,28 @@ class LimbMatrix:
         at_root: (m, m) what it adds to the mass matrix of the root.
     """
 
-    block: Eliminated
+    block: Factorisation
     follows: Expr
     pushes: Expr
     at_root: Expr
 
 
 @dataclass(frozen=True)
-class Screw:
-    """(6,): a velocity or a momentum about the origin, see ``screws``."""
+class SpatialVector:
+    """(6,): a velocity or a momentum about the origin; see ``spatial``."""
 
     parts: Expr
 
 
 @dataclass(frozen=True)
-class Inertia:
-    """(6, 6): momentum for a screw."""
+class SpatialInertia:
+    """(6, 6): momentum for a spatial vector."""
 
     matrix: Expr
 
 
-def paths(above: Above, axes: Columns) -> list[list[int]]:
-    """For each link of a limb the limb's coordinates that move it."""
+def paths(above: Parents, axes: Columns) -> list[list[int]]:
+    """For each link of a branch the branch's coordinates that move it."""
     found: list[list[int]] = []
     start = 0
     for parent, columns in zip(above, axes, strict=True):
@@ -88,8 +89,9 @@ def paths(above: Above, axes: Columns) -> list[list[int]]:
     return found
 
 
-def limb_matrix(above: Above, inertias: Sequence[Inertia], axes: Axes) -> LimbMatrix:
-    """Of a limb, its bodies' inertias given."""
+@traced
+def branch_matrix(above: Parents, inertias: Sequence[SpatialInertia], axes: MotionSubspaces) -> BranchMatrix:
+    """Of a branch, its bodies' inertias given."""
     symmetric, (given, root_given) = axes.given is None, axes.impulses
     total, base = summed_up(above, [inertia.matrix for inertia in inertias])
     seen_of: Expr = ca.horzcat(*axes.seen)
@@ -105,29 +107,31 @@ def limb_matrix(above: Above, inertias: Sequence[Inertia], axes: Axes) -> LimbMa
             for i in [i for i in path if i <= k]:
                 rows[i][k] = ca.dot(momentum, given_of[:, i])
                 rows[k][i] = rows[i][k] if symmetric or i == k else ca.dot(reaction, seen_of[:, i])
-    block = eliminated(rows, symmetric)
+    block = factorise(rows, symmetric)
     follows = ca.SX(n, m)
     for j in range(m):
         for k, value in block.solve({k: -pulls[k, j] for k in range(n)}).items():
             follows[k, j] = value
     at_root = ca.mtimes(root_given.T, ca.mtimes(base, axes.root_seen)) + ca.mtimes(pushes, follows)
-    return LimbMatrix(block, follows, pushes, mirrored(at_root) if symmetric else at_root)
+    return BranchMatrix(block, follows, pushes, mirrored(at_root) if symmetric else at_root)
 
 
-def root_matrix(inertia: Inertia, axes: tuple[Expr, Expr | None], limbs: tuple[Expr, ...]) -> Eliminated:
-    """S, from the root's inertia, its screws as they are seen and given, and what limbs add."""
+@traced
+def root_matrix(inertia: SpatialInertia, axes: tuple[Expr, Expr | None], branches: tuple[Expr, ...]) -> Factorisation:
+    """S, from the root's inertia, its motion subspaces for velocities and impulses, and the branches' shares."""
     seen, given = axes
     whole = ca.mtimes((seen if given is None else given).T, ca.mtimes(inertia.matrix, seen))
-    for each in limbs:
+    for each in branches:
         whole += each
     m = seen.size2()
-    return eliminated([{j: whole[i, j] for j in range(m)} for i in range(m)], given is None)
+    return factorise([{j: whole[i, j] for j in range(m)} for i in range(m)], given is None)
 
 
-def limb_load(
-    above: Above, matrix: LimbMatrix, given: Columns, root: Expr, momenta: Sequence[Screw]
+@traced
+def branch_load(
+    above: Parents, matrix: BranchMatrix, given: Columns, root: Expr, momenta: Sequence[SpatialVector]
 ) -> tuple[Expr, Expr]:
-    """(z (n,), what reaches the root (m,)) of momenta, or forces, of a limb's bodies."""
+    """(z (n,), what reaches the root (m,)) of momenta, or forces, of a branch's bodies."""
     total, base = summed_up(above, [momentum.parts for momentum in momenta])
     right, start = dict[int, Expr](), 0
     for columns, screw in zip(given, total, strict=True):
@@ -138,27 +142,28 @@ def limb_load(
     return z, ca.mtimes(root.T, base) - ca.mtimes(matrix.pushes, z)
 
 
-def root_rates(matrix: Eliminated, given: Expr, momentum: Screw, limbs: tuple[Expr, ...]) -> Expr:
-    """r (m,): of the root's own momentum and what limbs pass on."""
+@traced
+def root_rates(matrix: Factorisation, given: Expr, momentum: SpatialVector, branches: tuple[Expr, ...]) -> Expr:
+    """r (m,): of the root's own momentum and what branches pass on."""
     right = ca.mtimes(given.T, momentum.parts)
-    for each in limbs:
+    for each in branches:
         right += each
     return solved(matrix, right)
 
 
-def solved(matrix: Eliminated, right: Expr) -> Expr:
+def solved(matrix: Factorisation, right: Expr) -> Expr:
     """(n,) for a right hand side (n,)."""
     n = right.size1()
     return dense(matrix.solve({k: right[k] for k in range(n) if right.has_nz(k, 0)}), n)
 
 
-def limb_rates(matrix: LimbMatrix, z: Expr, r: Expr) -> Expr:
-    """(n,) of a limb's coordinates."""
+def branch_rates(matrix: BranchMatrix, z: Expr, r: Expr) -> Expr:
+    """(n,) of a branch's coordinates."""
     return z + ca.mtimes(matrix.follows, r)
 
 
-def summed_up(above: Above, parts: Sequence[Expr]) -> tuple[list[Expr], Expr]:
-    """For each link of a limb the sum over all that hangs on it, and the sum of all."""
+def summed_up(above: Parents, parts: Sequence[Expr]) -> tuple[list[Expr], Expr]:
+    """For each link of a branch the sum over all that hangs on it, and the sum of all."""
     total = list(parts)
     for k, parent in reversed(list(enumerate(above))):
         if parent is not None:
@@ -166,8 +171,8 @@ def summed_up(above: Above, parts: Sequence[Expr]) -> tuple[list[Expr], Expr]:
     return total, sum(total[k] for k, parent in enumerate(above) if parent is None)
 
 
-def summed_down(above: Above, axes: Columns, rates: Expr, root: Expr) -> list[Expr]:
-    """(6,) for each link of a limb: its screw, from the rates of the limb's coordinates and the root's screw."""
+def summed_down(above: Parents, axes: Columns, rates: Expr, root: Expr) -> list[Expr]:
+    """(6,) for each link of a branch: its spatial velocity, from the branch's rates and the root's spatial velocity."""
     found: list[Expr] = []
     start = 0
     for parent, columns in zip(above, axes, strict=True):

@@ -1,7 +1,7 @@
-"""Trees of bodies in screws: pairs (w, v) of an angular velocity and the velocity of the body's point at an origin.
+"""Spatial vectors (6,): (w, v), an angular velocity and the velocity of the body's point at an origin; momenta (l, p).
 
-The origin is where the root's centre of mass is at the start of a stretch. Momenta about it are pairs (l, p) likewise,
-(6,) columns both. A coordinate's screw is how all that hangs on it moves for a unit rate, one for the whole subtree.
+The origin is the root's centre of mass at the start of a substep. The motion subspace of a joint (6, count) holds the
+spatial velocities of its subtree for unit rates of its coordinates.
 Featherstone, Rigid Body Dynamics Algorithms (2008), chapters 2 and 6; deviation: where velocities are seen at one time
 and momenta counted at another, inertias are not symmetric.
 """
@@ -13,10 +13,11 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.collision.predicted_points import Course
-from symphys.dynamics.joints.joint_frames import Sockets, sockets_on
+from symphys.dynamics.collision.predicted_path import PredictedPath
+from symphys.dynamics.joints.joint_frames import JointFrames, joint_frames_on
+from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.rotation import cross_matrix
-from symphys.model.joints import Joint, Placed
+from symphys.model.joints import Joint, PlacedFrames
 
 Expr = Any
 """casadi SX"""
@@ -24,13 +25,14 @@ Joints = Sequence[Joint | None]
 """The joint of each link; None for a root that floats."""
 
 
-def axes_of(joint: Joint | None, sign: int, courses: tuple[Course, ...], t: Expr, origin: Expr) -> Expr:
-    """(6, count): the screws of a link's coordinates at time t; ``courses`` of the link's body and of its parent's."""
+@traced
+def axes_of(joint: Joint | None, sign: int, body_paths: tuple[PredictedPath, ...], t: Expr, origin: Expr) -> Expr:
+    """(6, count): the motion subspace of a link at time t; ``body_paths`` of the link's body and of its parent's."""
     if joint is None:
-        return floating(courses[0].centre().at(t) - origin)
-    sockets = sockets_on(joint, courses if sign > 0 else courses[::-1])
-    point = joint_point(sockets, t) - origin
-    motions = free_motions_of(joint, sockets.placed(t))
+        return floating(body_paths[0].centre().at(t) - origin)
+    frames = joint_frames_on(joint, body_paths if sign > 0 else body_paths[::-1])
+    point = joint_point(frames, t) - origin
+    motions = free_motions_of(joint, frames.placed(t))
     return ca.horzcat(ca.SX(6, 0), *(sign * ca.vertcat(turn, slide + ca.cross(point, turn)) for slide, turn in motions))
 
 
@@ -40,15 +42,15 @@ def floating(place: Expr) -> Expr:
     return ca.horzcat(ca.vertcat(zero, unit), ca.vertcat(unit, cross_matrix(place)))
 
 
-def joint_point(sockets: Sockets, t: Expr) -> Expr:
+def joint_point(frames: JointFrames, t: Expr) -> Expr:
     """(3,): midway between both sockets; at the first one's for what slides."""
-    first, second = (c + a for c, a in zip(sockets.centres, sockets.arms, strict=True))
-    if sockets.joint.kind.slides is not None:
+    first, second = (c + a for c, a in zip(frames.centres, frames.arms, strict=True))
+    if frames.joint.kind.slides is not None:
         return first.at(t)
     return (first.at(t) + second.at(t)) / 2
 
 
-def free_motions_of(joint: Joint, placed: Placed) -> list[tuple[Expr, Expr]]:
+def free_motions_of(joint: Joint, placed: PlacedFrames) -> list[tuple[Expr, Expr]]:
     """(displacement, rotation) (3,) each of the first side against the second, that a joint leaves free."""
     zero = ca.SX.zeros(3)
     if joint.kind.coordinates:
@@ -58,7 +60,7 @@ def free_motions_of(joint: Joint, placed: Placed) -> list[tuple[Expr, Expr]]:
 
 
 def inertia_of(mass: Expr, inertia: Expr, counted: Expr, seen: Expr) -> Expr:
-    """(6, 6): the momentum of a body about the origin for a screw, its centre of mass counted and seen at two places.
+    """(6, 6): spatial momentum for a spatial velocity, the centre of mass at two places: of momenta, of velocities.
 
     ``inertia``: (3, 3) about the centre of mass, world frame.
     """

@@ -16,12 +16,13 @@ from symphys.dynamics.collision.pairs.sphere_capsule import sphere_capsule
 from symphys.dynamics.collision.pairs.sphere_plane import sphere_plane
 from symphys.dynamics.collision.pairs.sphere_sphere import sphere_sphere
 from symphys.dynamics.collision.pairs.terrain import box_terrain, capsule_terrain, sphere_terrain
-from symphys.dynamics.collision.predicted_points import Course
+from symphys.dynamics.collision.predicted_path import PredictedPath
+from symphys.dynamics.tracing.decorator import traced
 from symphys.model.shapes import Box, Capsule, Plane, Sphere, Surface, Terrain
 
 __all__ = ["Contact", "collide"]
 
-Rule = Callable[[Any, Any, Course, Course], list[Contact]]
+Rule = Callable[[Any, Any, PredictedPath, PredictedPath], list[Contact]]
 
 RULES: dict[tuple[type, type], Rule] = {
     (Sphere, Plane): sphere_plane,
@@ -40,7 +41,8 @@ RULES: dict[tuple[type, type], Rule] = {
 """Which rule covers which surfaces; ``shapes.POINTS`` says how many points each returns."""
 
 
-def collide(first: Surface, second: Surface, a: Course, b: Course) -> list[Contact]:
+@traced
+def collide(first: Surface, second: Surface, a: PredictedPath, b: PredictedPath) -> list[Contact]:
     """The contacts of two surfaces, carried along a and b, in this step: one for each point."""
     rule = RULES.get((type(first), type(second)))
     if rule is not None:

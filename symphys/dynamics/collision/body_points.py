@@ -7,7 +7,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.collision.predicted_points import Course, Parabola
+from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.maths import rotation
 from symphys.model.shapes import UPRIGHT, Box, Capsule, Shape, Sphere
 from symphys.model.world import is_zero
@@ -43,8 +43,8 @@ def turned_by(orientation: tuple[Any, ...], vector: Offset) -> Offset:
     return (x, y, z)
 
 
-def axes(course: Course, shape: Shape) -> tuple[Parabola, Parabola, Parabola]:
-    """The courses of a shape's own axes, world frame."""
+def axes(body_path: PredictedPath, shape: Shape) -> tuple[Parabola, Parabola, Parabola]:
+    """The paths of a shape's own axes, world frame."""
     turn = UPRIGHT if isinstance(shape, Sphere) else shape.orientation
-    x, y, z = (course.arm(turned_by(turn, unit)) for unit in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+    x, y, z = (body_path.arm(turned_by(turn, unit)) for unit in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
     return x, y, z

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics.collision.body_points import axes
-from symphys.dynamics.collision.predicted_points import Course, Parabola, chosen
+from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath, chosen
 from symphys.dynamics.collision.witness_points import steady
 from symphys.model.shapes import Box
 
@@ -24,8 +24,8 @@ TINY_CHANGE = 1e-15
 
 
 @dataclass(frozen=True)
-class Block:
-    """A box over the step: courses of its centre and its three axes, half sizes (3,) [m]."""
+class MovingBox:
+    """A box over the step: paths of its centre and its three axes, half sizes (3,) [m]."""
 
     centre: Parabola
     axes: tuple[Parabola, Parabola, Parabola]
@@ -41,7 +41,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Face:
-    """A face over the step: courses of its centre, its outward normal and its two axes, half sizes along these."""
+    """A face over the step: paths of its centre, its outward normal and its two axes, half sizes along these."""
 
     centre: Parabola
     normal: Parabola
@@ -51,22 +51,22 @@ class Face:
     half_v: Expr
 
     def point(self, x: Expr, y: Expr) -> Parabola:
-        """The course of the point at x, y [m] from its centre."""
-        course: Parabola = self.centre + x * self.u + y * self.v
-        return course
+        """The path of the point at x, y [m] from its centre."""
+        body_path: Parabola = self.centre + x * self.u + y * self.v
+        return body_path
 
     def corners(self) -> list[Parabola]:
-        """The courses of its corners, in order around it."""
+        """The paths of its corners, in order around it."""
         signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
         return [self.point(su * self.half_u, sv * self.half_v) for su, sv in signs]
 
 
-def block(box: Box, course: Course) -> Block:
-    """A box that is carried along a course."""
-    return Block(course.path(box.centre), axes(course, box), box.half_sizes)
+def moving_box(box: Box, body_path: PredictedPath) -> MovingBox:
+    """A box that is carried along a path."""
+    return MovingBox(body_path.path(box.centre), axes(body_path, box), box.half_sizes)
 
 
-def facing(box: Block, direction: Expr, t: Expr) -> Face:
+def facing(box: MovingBox, direction: Expr, t: Expr) -> Face:
     """The face whose outward normal is nearest to ``direction`` at time t."""
     along = [ca.dot(axis.at(t), direction) for axis in box.axes]
     first = ca.logic_and(ca.fabs(along[0]) >= ca.fabs(along[1]), ca.fabs(along[0]) >= ca.fabs(along[2]))
@@ -91,7 +91,7 @@ def facing(box: Block, direction: Expr, t: Expr) -> Face:
     )
 
 
-def faces_and_edges(a: Block, b: Block) -> tuple[list[Parabola], list[Parabola]]:
+def faces_and_edges(a: MovingBox, b: MovingBox) -> tuple[list[Parabola], list[Parabola]]:
     """The directions along which two boxes can be apart: face normals of both, and edge across edge."""
     return [*a.axes, *b.axes], [one.cross(other) for one in a.axes for other in b.axes]
 
@@ -101,7 +101,7 @@ class Nearing:
     """How two boxes come to overlap, along the direction along which they do so last.
 
     Attributes:
-        direction: its course, from the second to the first.
+        direction: its path, from the second to the first.
         time: when they begin to overlap along it; 0 if they overlap from the start, the end of the step if never.
         distance: along it, at the start [m].
         apart: 1 if they never overlap along all directions at once.
@@ -113,7 +113,9 @@ class Nearing:
     apart: Expr
 
 
-def nearing(a: Block, b: Block, faces: list[Parabola], edges: list[Parabola], dt: Expr, radius: Expr = 0.0) -> Nearing:
+def nearing(
+    a: MovingBox, b: MovingBox, faces: list[Parabola], edges: list[Parabola], dt: Expr, radius: Expr = 0.0
+) -> Nearing:
     """How two boxes, the first of them grown by ``radius``, come to overlap; the first of equal directions."""
     ends = [places(a, b, faces, edges, t, radius) for t in (ca.SX(0), dt)]
     best, last, largest, first_exit = faces[0], ca.SX(-1), ca.SX(0), ca.SX(1)
@@ -138,7 +140,7 @@ def crossed(start: Expr, end: Expr) -> Expr:
 
 
 def places(
-    a: Block, b: Block, faces: list[Parabola], edges: list[Parabola], t: Expr, radius: Expr
+    a: MovingBox, b: MovingBox, faces: list[Parabola], edges: list[Parabola], t: Expr, radius: Expr
 ) -> list[tuple[Expr, Expr]]:
     """Along each direction at time t: how far the first box is from the second, and how near is overlapping [m]."""
     apart, found = (a.centre - b.centre).at(t), []

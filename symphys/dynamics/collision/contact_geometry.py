@@ -29,7 +29,7 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class Shift:
+class Displacement:
     """A body's displacement over the step: (3,) [m] and rotation vector (3,) [rad], world frame."""
 
     linear: Expr
@@ -40,18 +40,18 @@ class Shift:
         return point + self.linear + ca.cross(self.angular, arm)
 
 
-UNMOVED = Shift(ca.SX.zeros(3), ca.SX.zeros(3))
+UNMOVED = Displacement(ca.SX.zeros(3), ca.SX.zeros(3))
 """The displacement of what is static."""
 
 
-class Meeting(Protocol):
+class ContactGeometry(Protocol):
     """How a point of two surfaces lies at any time of the step. Implementations are frozen dataclasses."""
 
     def frame(self, t: Expr) -> Frame:
         """The frame at time t in the step."""
         ...
 
-    def gap_after(self, first: Shift, second: Shift) -> Expr:
+    def gap_after(self, first: Displacement, second: Displacement) -> Expr:
         """The gap [m] at the end of the step, given both sides' displacements."""
         ...
 
@@ -67,7 +67,7 @@ class Contact:
             falls into this step or the next must not change the motion.
         time: [s] of the first touch inside the step, in [0, dt].
         end: gap at the end of the step, on the free paths [m].
-        meeting: the geometry.
+        geometry: how it lies at any time.
     """
 
     gap: Expr
@@ -75,24 +75,24 @@ class Contact:
     hit: Expr
     time: Expr
     end: Expr
-    meeting: Meeting
+    geometry: ContactGeometry
 
 
 @dataclass(frozen=True)
-class Flipped:
-    """A meeting whose sides are exchanged."""
+class FlippedGeometry:
+    """A contact geometry whose sides are exchanged."""
 
-    meeting: Meeting
+    geometry: ContactGeometry
 
     def frame(self, t: Expr) -> Frame:
-        """See ``Meeting``."""
-        return self.meeting.frame(t).flipped()
+        """See ``ContactGeometry``."""
+        return self.geometry.frame(t).flipped()
 
-    def gap_after(self, first: Shift, second: Shift) -> Expr:
-        """See ``Meeting``."""
-        return self.meeting.gap_after(second, first)
+    def gap_after(self, first: Displacement, second: Displacement) -> Expr:
+        """See ``ContactGeometry``."""
+        return self.geometry.gap_after(second, first)
 
 
 def flipped(contact: Contact) -> Contact:
     """The contact with its sides exchanged."""
-    return replace(contact, meeting=Flipped(contact.meeting))
+    return replace(contact, geometry=FlippedGeometry(contact.geometry))

@@ -8,8 +8,8 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.collision.contact_geometry import Contact, Expr, Frame, Shift
-from symphys.dynamics.collision.predicted_points import Course, Parabola
+from symphys.dynamics.collision.contact_geometry import Contact, Displacement, Expr, Frame
+from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.dynamics.collision.time_of_impact import first_root
 from symphys.model.shapes import Plane
 
@@ -33,17 +33,17 @@ class OnPlane:
     centre: Expr
 
     def frame(self, t: Expr) -> Frame:
-        """See ``Meeting``."""
+        """See ``ContactGeometry``."""
         return Frame(self.normal, (self.arm.at(t) - self.radius * self.normal, ca.SX.zeros(3)))
 
-    def gap_after(self, first: Shift, second: Shift) -> Expr:
-        """See ``Meeting``."""
+    def gap_after(self, first: Displacement, second: Displacement) -> Expr:
+        """See ``ContactGeometry``."""
         return ca.dot(self.normal, first.moved(self.centre, self.arm.start)) - self.offset - self.radius
 
 
-def ball_on_plane(course: Course, offset: Sequence[Any], radius: Expr, plane: Plane) -> Contact:
+def ball_on_plane(body_path: PredictedPath, offset: Sequence[Any], radius: Expr, plane: Plane) -> Contact:
     """The contact of a ball at body-frame ``offset`` with ``plane``."""
-    normal, path, dt = ca.vertcat(*plane.normal), course.path(offset), course.dt
+    normal, path, dt = ca.vertcat(*plane.normal), body_path.path(offset), body_path.dt
     gap = ca.dot(normal, path.start) - plane.offset - radius
     rate = ca.dot(normal, path.velocity)
     bend = ca.dot(normal, path.acceleration)
@@ -54,5 +54,5 @@ def ball_on_plane(course: Course, offset: Sequence[Any], radius: Expr, plane: Pl
         hit=end < 0,
         time=first_root(gap, rate, bend, dt),
         end=end,
-        meeting=OnPlane(normal, plane.offset, radius, course.arm(offset), path.start),
+        geometry=OnPlane(normal, plane.offset, radius, body_path.arm(offset), path.start),
     )

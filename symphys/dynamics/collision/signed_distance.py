@@ -8,8 +8,8 @@ from typing import Protocol
 import casadi as ca
 
 from symphys.dynamics.collision.body_points import axes
-from symphys.dynamics.collision.contact_geometry import Contact, Expr, Frame, Shift
-from symphys.dynamics.collision.predicted_points import Course, Parabola
+from symphys.dynamics.collision.contact_geometry import Contact, Displacement, Expr, Frame
+from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.dynamics.collision.time_of_impact import contact_along
 from symphys.model.shapes import Box, Capsule
 
@@ -54,15 +54,15 @@ class InField:
         return self.field.distance(self._inside(self.path.at(t), t)) - self.radius
 
     def frame(self, t: Expr) -> Frame:
-        """See ``Meeting``."""
+        """See ``ContactGeometry``."""
         apart = self.path.at(t)
         point = self._inside(apart, t)
         normal = self._outside(self.field.normal(point), t)
         foot = apart - self.field.distance(point) * normal
         return Frame(normal, (self.arms[0].at(t) - self.radius * normal, self.arms[1].at(t) + foot))
 
-    def gap_after(self, first: Shift, second: Shift) -> Expr:
-        """See ``Meeting``."""
+    def gap_after(self, first: Displacement, second: Displacement) -> Expr:
+        """See ``ContactGeometry``."""
         ball = first.moved(self.starts[0], self.arms[0].start)
         centre = second.moved(self.starts[1], self.arms[1].start)
         apart = ball - centre - ca.cross(second.angular, ball - centre)
@@ -79,10 +79,10 @@ class InField:
 
 
 def ball_in_field(
-    path: Parabola, arm: Parabola, radius: Expr, shape: Capsule | Box, field: Field, b: Course
+    path: Parabola, arm: Parabola, radius: Expr, shape: Capsule | Box, field: Field, b: PredictedPath
 ) -> Contact:
     """The contact of a ball with a shape on b; ``path`` and ``arm`` of the ball's centre."""
     centre = b.path(shape.centre)
     arms = (arm, b.arm(shape.centre))
-    meeting = InField(field, radius, path - centre, arms, (path.start, centre.start), axes(b, shape))
-    return contact_along(meeting, b.dt, NEWTON_STEPS)
+    geometry = InField(field, radius, path - centre, arms, (path.start, centre.start), axes(b, shape))
+    return contact_along(geometry, b.dt, NEWTON_STEPS)

@@ -15,7 +15,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics.collision.contact_geometry import Contact, Expr
-from symphys.dynamics.collision.predicted_points import STAYS, Course, at_rest
+from symphys.dynamics.collision.predicted_path import STAYS, PredictedPath, at_rest
 from symphys.dynamics.collision.signed_distance import InField
 from symphys.dynamics.collision.time_of_impact import contact_along
 from symphys.model.shapes import Terrain
@@ -100,7 +100,7 @@ def solved(m: Expr, b: Expr) -> Expr:
     return ca.vertcat(m[1, 1] * b[0] - m[0, 1] * b[1], m[0, 0] * b[1] - m[1, 0] * b[0]) / determinant(m)
 
 
-def ball_on_terrain(offset: Sequence[Any], radius: Expr, terrain: Terrain, a: Course) -> Contact:
+def ball_on_terrain(offset: Sequence[Any], radius: Expr, terrain: Terrain, a: PredictedPath) -> Contact:
     """The contact of a ball at body-frame ``offset`` with terrain."""
     path, world = a.path(offset), at_rest(a.dt)
     axes = world.arm((1.0, 0.0, 0.0)), world.arm((0.0, 1.0, 0.0)), world.arm((0.0, 0.0, 1.0))
@@ -108,10 +108,10 @@ def ball_on_terrain(offset: Sequence[Any], radius: Expr, terrain: Terrain, a: Co
     contact, centre = None, path.start
     for _ in range(2):
         xy = nearest(surface, centre)
-        meeting = InField(
+        geometry = InField(
             Paraboloid(xy, *surface(xy)), radius, path, (a.arm(offset), STAYS), (path.start, STAYS.start), axes
         )
-        contact = contact_along(meeting, a.dt)
+        contact = contact_along(geometry, a.dt)
         centre = path.at(contact.time)
     assert contact is not None
     return contact

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import casadi as ca
 
-from symphys.dynamics.collision.contact_geometry import Contact, Meeting
+from symphys.dynamics.collision.contact_geometry import Contact, ContactGeometry
 from symphys.maths.smoothing import TINY_SQUARE
 
 Expr = Any
@@ -55,15 +55,15 @@ def within(t: Expr, dt: Expr) -> Expr:
     return no_later(ca.if_else(t < -ROUNDING * dt, 0, t), dt)
 
 
-class Timed(Meeting, Protocol):
-    """A meeting that knows its gap at any time."""
+class Timed(ContactGeometry, Protocol):
+    """A contact geometry with a gap at any time."""
 
     def gap(self, t: Expr) -> Expr:
         """[m] at time t in the step."""
         ...
 
 
-def contact_along(meeting: Timed, dt: Expr, newton_steps: int = NEWTON_STEPS) -> Contact:
+def contact_along(geometry: Timed, dt: Expr, newton_steps: int = NEWTON_STEPS) -> Contact:
     """The contact of surfaces whose gap is a function of time.
 
     The first root by the parabola that osculates at t = 0, then Newton steps. The gap of convex shapes in uniform
@@ -71,7 +71,7 @@ def contact_along(meeting: Timed, dt: Expr, newton_steps: int = NEWTON_STEPS) ->
     converge without overshooting. Where the parabola leads to beyond the nearest approach they begin at the tangent's
     root instead, which lies before it.
     """
-    at = gap_rate_bend(meeting)
+    at = gap_rate_bend(geometry)
     start, pace, curve = at(ca.SX(0))
     time, straight = first_root(start, pace, curve, dt), start / ca.fmax(-pace, TINY_RATE)
     for _ in range(newton_steps):
@@ -82,17 +82,17 @@ def contact_along(meeting: Timed, dt: Expr, newton_steps: int = NEWTON_STEPS) ->
     here, slope, _ = at(time)
     through = ca.logic_and(ca.logic_and(time > 0, time < dt), ca.logic_and(ca.fabs(here) < FOUND, slope < 0))
     end = at(dt)[0]
-    return Contact(start, pace, ca.fmax(end < 0, through), time, end, meeting)
+    return Contact(start, pace, ca.fmax(end < 0, through), time, end, geometry)
 
 
-def gap_rate_bend(meeting: Timed) -> Callable[[Expr], list[Expr]]:
+def gap_rate_bend(geometry: Timed) -> Callable[[Expr], list[Expr]]:
     """The gap and its two derivatives at a time.
 
-    They are worked out with symbols in place of the expressions that the meeting is made of: casadi would otherwise
+    They are worked out with symbols in place of the expressions that the geometry is made of: casadi would otherwise
     look through all that these depend on, each time.
     """
     t, symbols, values = ca.SX.sym("t"), list[Expr](), list[Expr]()
-    gap = on_symbols(meeting, symbols, values).gap(t)
+    gap = on_symbols(geometry, symbols, values).gap(t)
     rate = ca.gradient(gap, t)
     function = ca.Function("gap", [t, *symbols], [gap, rate, ca.gradient(rate, t)])
     return lambda time: list(function.call([time, *values]))

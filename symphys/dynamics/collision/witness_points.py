@@ -7,8 +7,8 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.collision.contact_geometry import Contact, Frame, Shift
-from symphys.dynamics.collision.predicted_points import Parabola
+from symphys.dynamics.collision.contact_geometry import Contact, Displacement, Frame
+from symphys.dynamics.collision.predicted_path import Parabola
 from symphys.dynamics.collision.time_of_impact import contact_along
 from symphys.maths.smoothing import length
 
@@ -21,9 +21,9 @@ class Witness:
     """Points that two bodies carry, and a direction that turns with them.
 
     Attributes:
-        points: courses of the two points [m], world frame.
+        points: paths of the two points [m], world frame.
         arms: of the two points, from their bodies' centres of mass.
-        normal: course of a vector from the second surface to the first, of any length.
+        normal: path of a vector from the second surface to the first, of any length.
         radii: of balls about the points [m].
         off: 1 where the points are no candidates for contact.
         far: the gap [m] that such points are said to have.
@@ -43,13 +43,13 @@ class Witness:
         return ca.dot(self._direction(t), (self.points[0] - self.points[1]).at(t)) - self.radii[0] - self.radii[1]
 
     def frame(self, t: Expr) -> Frame:
-        """See ``Meeting``. Both arms go to one point, midway between the surfaces: no spin comes from nowhere."""
+        """See ``ContactGeometry``. Both arms go to one point, midway between the surfaces, which adds no spin."""
         n, (a, b), (r_a, r_b) = self._direction(t), self.points, self.radii
         half = ((a - b).at(t) - (r_a + r_b) * n) / 2
         return Frame(n, (self.arms[0].at(t) - r_a * n - half, self.arms[1].at(t) + r_b * n + half))
 
-    def gap_after(self, first: Shift, second: Shift) -> Expr:
-        """See ``Meeting``."""
+    def gap_after(self, first: Displacement, second: Displacement) -> Expr:
+        """See ``ContactGeometry``."""
         (a, b), (arm_a, arm_b) = self.points, self.arms
         apart = first.moved(a.start, arm_a.start) - second.moved(b.start, arm_b.start)
         gap = ca.dot(self._direction(self.end), apart) - self.radii[0] - self.radii[1]
@@ -61,7 +61,7 @@ class Witness:
 
 
 def steady(normal: Parabola, t: Expr, dt: Expr) -> Parabola:
-    """The course of a vector; one that changes by more than half of its length at ``t`` stays as it is then.
+    """The path of a vector; one that changes by more than half of its length at ``t`` stays as it is then.
 
     The common perpendicular of edges that are nearly parallel may turn right round within a step, or vanish.
     """
@@ -79,5 +79,5 @@ def contact_of(witness: Witness) -> Contact:
         hit=ca.logic_and(met.hit, ca.logic_not(off)),
         time=ca.if_else(off, witness.end, met.time),
         end=ca.if_else(off, witness.far, met.end),
-        meeting=witness,
+        geometry=witness,
     )

@@ -1,137 +1,98 @@
-"""A contact as the sweeps see it, and the geometry that every kind of row needs."""
+"""The contact constraint: the projection of its impulse onto the law of contact.
+
+A projection takes the normal impulse, then the friction impulse (docs/time_step.md, section 5). At the tip of a rod
+friction changes the normal velocity more than the normal impulse does: mu W_nt > W_nn, with W the velocity of the
+touching points for unit impulses. Projections of the two impulses in turn then cycle. There both are found at once:
+the impulse that stops the slip if it lies in the cone of friction, else one on its edge,
+r = l (n + mu d), whose direction d is opposite to the slip that is left. (Acary and Brogliato, Numerical methods for
+nonsmooth dynamical systems, 2008, section 13.7, have such local solvers; the search for d by one step of projection and
+one of Newton's method in each projection is our own.) Where friction of this direction would pull the surfaces together
+(Painleve's paradox) no sliding impulse may exist, and sticking is preferred where it can be. A contact that opens
+without an impulse gives none.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.collision.contact_geometry import Contact, Frame
-from symphys.dynamics.contact import projection as impulse
-from symphys.dynamics.contact.local_solver import Coupling
-from symphys.dynamics.momentum import Momentum, Rates
-from symphys.dynamics.motion import Motion, apply
-from symphys.maths.rotation import cross_matrix
+from symphys.dynamics.contact import body_term
+from symphys.dynamics.contact.body_term import BodyTerm
+from symphys.dynamics.contact.coupling import Coupling
+from symphys.maths.smoothing import length, onto_disc, positive
 from symphys.model.world import Law
 
 Expr = Any
 """casadi SX, MX or DM"""
 
-Moving = tuple[Motion, ...]
-"""The motions of the sides that can move: of the first, or of both."""
-
 NEVER = ca.SX(0)
 UNREACHED = -1e6
-"""[m/s] a normal velocity that no row reaches: it gives no impulse."""
+"""[m/s] a normal velocity that no constraint reaches: it gives no impulse."""
+LEAST = 0.01
+"""Of W_nn: the least effective inverse mass of a sliding contact."""
+FLAT = 1e-12
+"""[m/s] below which the slope of the search for a direction says nothing."""
+FAR = 0.5
+"""[rad] longest step of that search."""
 
 
 @dataclass(frozen=True)
-class Reach:
-    """One side of a row on a tree of joints with n coordinates.
+class ContactImpulse:
+    """What a contact has given so far, on the pair's first body, world frame.
 
     Attributes:
-        see, spin: (3, n) velocity of the touching point and angular velocity for unit rates.
-        push, twist: (n, 3) what unit impulses at the point, and unit torque impulses, do to the rates.
+        normal: along the normal [N s], >= 0.
+        tangent: (3,) friction [N s].
+        spin: torque impulse about the normal [N m s].
+        roll: (3,) torque impulse across the normal [N m s].
     """
 
-    see: Expr
+    normal: Expr
+    tangent: Expr
     spin: Expr
-    push: Expr
-    twist: Expr
+    roll: Expr
 
+    def linear(self, n: Expr) -> Expr:
+        """(3,) [N s]."""
+        return n * self.normal + self.tangent
 
-@dataclass(frozen=True)
-class Side:
-    """One moving side of a row.
+    def angular(self, n: Expr) -> Expr:
+        """(3,) [N m s]: the torque impulse beside that of the linear one."""
+        return n * self.spin + self.roll
 
-    Attributes:
-        sign: +1 for the pair's first body, -1 for the second.
-        inverse_mass: [1/kg].
-        inverse_inertia: at the row's instant: scalar or (3, 3) [1/(kg m^2)].
-        arm: (3,) [m] at the row's instant.
-        impulse_arm: (3,) [m] where the impulse is applied.
-        reach: if the body is part of a tree of joints.
-    """
+    def plus(self, other: ContactImpulse) -> ContactImpulse:
+        """The sum."""
+        return ContactImpulse(
+            self.normal + other.normal, self.tangent + other.tangent, self.spin + other.spin, self.roll + other.roll
+        )
 
-    sign: int
-    inverse_mass: Expr
-    inverse_inertia: Expr
-    arm: Expr
-    impulse_arm: Expr
-    reach: Reach | None = None
+    def times(self, factor: Expr) -> ContactImpulse:
+        """A share of it."""
+        return ContactImpulse(factor * self.normal, factor * self.tangent, factor * self.spin, factor * self.roll)
 
-    def spin(self, m: Any) -> Expr:
-        """(3,) [rad/s], from what the sweeps know of the body."""
-        if self.reach is not None:
-            return m.along(self.reach.spin)
-        return apply(self.inverse_inertia, m.angular)
-
-    def speed(self, m: Any) -> Expr:
-        """(3,) [m/s] of the touching point."""
-        if self.reach is not None:
-            return m.along(self.reach.see)
-        return m.velocity + ca.cross(self.spin(m), self.arm)
-
-    def kicked(self, m: Any, linear: Expr, angular: Expr) -> Any:
-        """What the sweeps know of the body after impulses on the first side."""
-        linear, angular = self.sign * linear, self.sign * angular
-        if self.reach is not None:
-            return Rates(m.numbers + ca.mtimes(self.reach.push, linear) + ca.mtimes(self.reach.twist, angular))
-        return Momentum(
-            m.velocity + self.inverse_mass * linear, m.angular + ca.cross(self.impulse_arm, linear) + angular
+    def minus(self, other: ContactImpulse) -> ContactImpulse:
+        """The difference."""
+        return ContactImpulse(
+            self.normal - other.normal, self.tangent - other.tangent, self.spin - other.spin, self.roll - other.roll
         )
 
 
-def kicked(sides: Sequence[Side], momenta: Sequence[Any], linear: Expr, angular: Expr, same: bool) -> tuple[Any, ...]:
-    """Both sides after impulses on the first; ``same``: both are of one tree."""
-    if not same:
-        return tuple(side.kicked(m, linear, angular) for side, m in zip(sides, momenta, strict=True))
-    after = momenta[0]
-    for side in sides:
-        after = side.kicked(after, linear, angular)
-    return tuple(after for _ in sides)
-
-
-def slip(sides: Sequence[Side], momenta: Sequence[Any]) -> Expr:
-    """(3,) [m/s]: relative velocity of the touching points."""
-    total = ca.SX.zeros(3)
-    for side, m in zip(sides, momenta, strict=True):
-        total += side.sign * side.speed(m)
-    return total
-
-
-def still(sides: Sequence[Side]) -> tuple[Any, ...]:
-    """What sweeps know of sides that do not move."""
-    zero = ca.SX.zeros(3)
-    return tuple(
-        Momentum(zero, zero) if side.reach is None else Rates(ca.SX(side.reach.push.size1(), 1)) for side in sides
-    )
-
-
-def reach_of(motion: Motion, t: Expr, arm: Expr, impulse_arm: Expr) -> Reach | None:
-    """The reach of a side at a row's instant."""
-    held = motion.held
-    if held is None:
-        return None
-    turning = apply(motion.inverse_inertia(t), held.inertia)
-    spin = ca.mtimes(turning, held.see[3:, :])
-    see = held.see[:3, :] - ca.mtimes(cross_matrix(arm), spin)
-    return Reach(see, spin, held.push + ca.mtimes(held.twist, cross_matrix(impulse_arm)), held.twist)
+ZERO = ContactImpulse(ca.SX(0), ca.SX.zeros(3), ca.SX(0), ca.SX.zeros(3))
 
 
 @dataclass(frozen=True)
-class ContactRow:
-    """A contact as the sweeps see it.
+class ContactConstraint:
+    """A contact, prepared for the sweeps.
 
     Attributes:
         law: of the pair.
-        sides: one or two moving sides.
-        normal: (3,) at the row's instant; the impulse's normal is ``impulse_normal``.
+        terms: one or two bodies.
+        normal: (3,) at the constraint's instant; the impulse's normal is ``impulse_normal``.
         impulse_normal: (3,).
-        answer: (3,) velocity of the touching points against each other for a unit normal impulse [1/kg].
-        yields: 1 if such an impulse parts them, else 0: the contact gives none then.
+        delassus_column: (3,) relative velocity of the touching points for a unit normal impulse [1/kg].
+        separates: 1 if such an impulse separates them, else 0: the contact gives none then.
         normal_mass, tangent_mass: effective masses [kg], 1 / (k + gamma) and 1 / k; across the normal k is the
             largest eigenvalue, one number, so that sliding friction stays opposite to the slip.
         spin_mass, roll_mass: the same for torques [kg m^2].
@@ -142,21 +103,21 @@ class ContactRow:
         leaving: hit chi: the share of the contact that is an impact, in [0, 1].
         lasts: 1 if the contact carried load and goes on.
         load: the least normal impulse that counts as load [N s].
-        slack: overlap at the end of the stretch that counts as rounding [m].
+        slack: overlap at the end of the substep that counts as rounding [m].
         struck: 1 if the surfaces meet at speed, else 0.
         width: of the smoothed normal projection [m/s]; 0 for fast approach.
-        knob: smoothing [m/s].
-        same: whether both sides are of one tree of joints.
+        smoothing: s [m/s], see docs/time_step.md.
+        same: whether both bodies are of one tree of joints.
         coupling: where friction may act strongly on the normal velocity.
         paradox: 1 if the friction of the free slip would pull the surfaces together.
     """
 
     law: Law
-    sides: tuple[Side, ...]
+    terms: tuple[BodyTerm, ...]
     normal: Expr
     impulse_normal: Expr
-    answer: Expr
-    yields: Expr
+    delassus_column: Expr
+    separates: Expr
     normal_mass: Expr
     tangent_mass: Expr
     spin_mass: Expr
@@ -171,59 +132,130 @@ class ContactRow:
     slack: Expr
     struck: Expr
     width: Expr
-    knob: Expr
+    smoothing: Expr
     same: bool
     coupling: Coupling | None = None
     paradox: Expr = NEVER
 
     def slip(self, momenta: tuple[Any, ...]) -> Expr:
         """(3,) [m/s]: relative velocity of the touching points."""
-        return slip(self.sides, momenta)
+        return body_term.slip(self.terms, momenta)
 
-    def kicked(self, momenta: tuple[Any, ...], linear: Expr, angular: Expr) -> tuple[Any, ...]:
-        """The momenta of the row's bodies after impulses on the first side."""
-        return kicked(self.sides, momenta, linear, angular, self.same)
+    def apply(self, momenta: tuple[Any, ...], impulse: ContactImpulse) -> tuple[Any, ...]:
+        """The momenta of the bodies after an impulse."""
+        linear, angular = impulse.linear(self.impulse_normal), impulse.angular(self.impulse_normal)
+        return body_term.apply_impulse(self.terms, momenta, linear, angular, self.same)
 
-    def visit(self, momenta: tuple[Any, ...], old: impulse.Impulse) -> tuple[tuple[Any, ...], impulse.Impulse]:
-        """See ``pgs.Solvable``."""
-        return impulse.visit(self, momenta, old)
-
-    def given(self, momenta: tuple[Any, ...], given: impulse.Impulse) -> tuple[Any, ...]:
-        """See ``pgs.Solvable``."""
-        return impulse.give(self, momenta, given)
-
-
-def at_touch(contact: Contact, motions: Moving, t: Expr) -> tuple[Expr, Expr, Expr]:
-    """Relative velocity and acceleration (without the centripetal part) of the touching points at t*; the normal."""
-    frame = contact.meeting.frame(t)
-    velocity, acceleration = ca.SX.zeros(3), ca.SX.zeros(3)
-    for k, motion in enumerate(motions):
-        sign, arm, inverse = 1 - 2 * k, frame.arms[k], motion.inverse_inertia(t)
-        spin = apply(inverse, motion.momentum_k + t * motion.torque)
-        velocity += sign * (motion.velocity + t * motion.acceleration + ca.cross(spin, arm))
-        acceleration += sign * (motion.acceleration + ca.cross(apply(inverse, motion.torque), arm))
-    return velocity, acceleration, frame.normal
+    def project(self, momenta: tuple[Any, ...], old: ContactImpulse) -> tuple[tuple[Any, ...], ContactImpulse]:
+        """One projection of each of its impulses, one after the other."""
+        zero = ca.SX.zeros(3)
+        normal, tangent = _forces(self, self.slip(momenta), old)
+        momenta = self.apply(momenta, ContactImpulse(normal - old.normal, tangent - old.tangent, ca.SX(0), zero))
+        if not self.law.spins:
+            return momenta, ContactImpulse(normal, tangent, old.spin, old.roll)
+        spin, roll = _torques(self, momenta, old, normal)
+        momenta = self.apply(momenta, ContactImpulse(ca.SX(0), zero, spin - old.spin, roll - old.roll))
+        return momenta, ContactImpulse(normal, tangent, spin, roll)
 
 
-def make_sides(motions: Moving, row_time: Expr, frame: Frame, applied: Frame) -> tuple[Side, ...]:
-    """The sides of a row that is evaluated at ``row_time`` in ``frame`` and whose impulse acts in ``applied``."""
-    return tuple(
-        Side(
-            sign=1 - 2 * k,
-            inverse_mass=1 / motion.mass,
-            inverse_inertia=motion.inverse_inertia(row_time),
-            arm=frame.arms[k],
-            impulse_arm=applied.arms[k],
-            reach=reach_of(motion, row_time, frame.arms[k], applied.arms[k]),
-        )
-        for k, motion in enumerate(motions)
+def _forces(contact: ContactConstraint, slip: Expr, old: ContactImpulse) -> tuple[Expr, Expr]:
+    """The normal impulse and that of friction."""
+    if contact.coupling is not None:
+        exact = _solve(contact, contact.coupling, slip, old)
+        smoothed = _solve_smoothed(contact, contact.coupling, slip, old)
+        smooth = contact.smoothing > 0
+        return ca.if_else(smooth, smoothed[0], exact[0]), ca.if_else(smooth, smoothed[1], exact[1])
+    normal = _normal(contact, slip, old)
+    return normal, _tangent(contact, slip + contact.delassus_column * (normal - old.normal), old, normal)
+
+
+def _normal(contact: ContactConstraint, slip: Expr, old: ContactImpulse) -> Expr:
+    """ln <- max(ln - m (n.u - b + gamma ln), 0), m = 1 / (k + gamma)."""
+    wanted = ca.dot(contact.normal, slip) - contact.target + contact.softness * old.normal
+    return positive(old.normal - contact.normal_mass * wanted, contact.normal_mass * contact.width)
+
+
+def _tangent(contact: ContactConstraint, slip: Expr, old: ContactImpulse, normal: Expr) -> Expr:
+    """The friction impulse, onto the disc of radius mu ln."""
+    wanted = old.tangent - contact.tangent_mass * _across(slip - contact.slip_target, contact.normal)
+    return onto_disc(wanted, contact.law.friction * normal, contact.tangent_mass * contact.smoothing, contact.smoothing)
+
+
+def _torques(
+    contact: ContactConstraint, momenta: tuple[Any, ...], old: ContactImpulse, normal: Expr
+) -> tuple[Expr, Expr]:
+    """Torsional friction (an interval) and rolling friction (a disc), both limited by the normal impulse."""
+    n = contact.normal
+    spin_width, roll_width = contact.smoothing * contact.spin_mass, contact.smoothing * contact.roll_mass
+    rate = sum(term.sign * term.spin(m) for term, m in zip(contact.terms, momenta, strict=True))
+    twist = n * (old.spin - contact.spin_mass * ca.dot(n, rate))
+    spin = ca.dot(n, onto_disc(twist, contact.law.torsion * normal, spin_width, contact.smoothing))
+    wanted = old.roll - contact.roll_mass * _across(rate, n)
+    roll = onto_disc(wanted, contact.law.rolling * normal, roll_width, contact.smoothing)
+    return spin, roll
+
+
+def _solve(contact: ContactConstraint, coupling: Coupling, slip: Expr, old: ContactImpulse) -> tuple[Expr, Expr]:
+    """(normal impulse, friction impulse (3,)) after which the contact obeys its law, all else as it is.
+
+    Args:
+        contact: the contact.
+        coupling: of it.
+        slip: (3,) velocity of the touching points against each other [m/s].
+        old: what it has given so far, with which ``slip`` came about.
+    """
+    n, mu, w = contact.normal, contact.law.friction, coupling.mobility
+    given = n * old.normal + old.tangent
+    error = slip - n * (contact.target - contact.softness * old.normal) - contact.slip_target
+    stopping = given - ca.mtimes(coupling.inverse, error)
+    press = ca.dot(n, stopping)
+    hold = stopping - n * press
+    free = error - ca.mtimes(w, given)
+    closes = ca.dot(n, free) < 0
+    sticks = ca.logic_and(ca.logic_and(closes, press > 0), ca.dot(hold, hold) <= (mu * press) ** 2)
+
+    wanted = old.tangent - contact.tangent_mass * _across(error, n)
+    direction = _turned(wanted / length(wanted), free, w, n, mu)
+    load, _ = _load(direction, free, w, n, mu)
+    return ca.if_else(sticks, press, load), ca.if_else(sticks, hold, mu * load * direction)
+
+
+def _load(direction: Expr, free: Expr, w: Expr, n: Expr, mu: Expr) -> tuple[Expr, Expr]:
+    """The normal impulse of a contact that slides against ``direction``, and the velocity (3,) for a unit of it."""
+    response = ca.mtimes(w, n + mu * direction)
+    least = LEAST * ca.dot(n, ca.mtimes(w, n))
+    return ca.fmax(-ca.dot(n, free), 0) / ca.fmax(ca.dot(n, response), least), response
+
+
+def _turned(direction: Expr, free: Expr, w: Expr, n: Expr, mu: Expr) -> Expr:
+    """The direction after a step of Newton's method towards one that is opposite to the slip."""
+    load, response = _load(direction, free, w, n, mu)
+    aside, slip = ca.cross(n, direction), free + load * response
+    turning = ca.mtimes(w, aside)
+    lost = ca.dot(n, turning) / ca.fmax(ca.dot(n, response), LEAST * ca.dot(n, ca.mtimes(w, n)))
+    slope = mu * load * (ca.dot(aside, turning) - lost * ca.dot(aside, response)) - ca.dot(direction, slip)
+    step = ca.if_else(slope > FLAT, -ca.dot(aside, slip) / ca.fmax(slope, FLAT), 0)
+    step = ca.fmin(ca.fmax(step, -FAR), FAR)
+    found = direction + step * aside
+    return found / ca.sqrt(1 + step * step)
+
+
+def _solve_smoothed(
+    contact: ContactConstraint, coupling: Coupling, slip: Expr, old: ContactImpulse
+) -> tuple[Expr, Expr]:
+    """The same under the smoothed law: projections in turn, the normal one shortened so that they do not cycle.
+
+    Its width keeps the central path where it is without the shortening.
+    """
+    n, mass = contact.normal, coupling.sliding_mass
+    wanted = ca.dot(n, slip) - contact.target + contact.softness * old.normal
+    normal = positive(old.normal - mass * wanted, ca.sqrt(mass * contact.normal_mass) * contact.width)
+    slip = slip + contact.delassus_column * (normal - old.normal)
+    friction = old.tangent - contact.tangent_mass * _across(slip - contact.slip_target, n)
+    return normal, onto_disc(
+        friction, contact.law.friction * normal, contact.tangent_mass * contact.smoothing, contact.smoothing
     )
 
 
-def free_slip(sides: Sequence[Side], motions: Moving) -> Expr:
-    """(3,) [m/s]: relative velocity of the touching points at mid-step, before any impulse."""
-    total = ca.SX.zeros(3)
-    for side, motion in zip(sides, motions, strict=True):
-        spin = apply(side.inverse_inertia, motion.mid_momentum)
-        total += side.sign * (motion.mid_velocity + ca.cross(spin, side.arm))
-    return total
+def _across(a: Expr, n: Expr) -> Expr:
+    return a - n * ca.dot(n, a)

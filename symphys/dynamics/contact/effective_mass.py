@@ -7,7 +7,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.contact.constraint import Side, kicked, slip, still
+from symphys.dynamics.contact.body_term import BodyTerm, apply_impulse, slip, still
 from symphys.dynamics.motion import apply
 from symphys.maths.rotation import cross_matrix
 from symphys.maths.smoothing import TINY_SQUARE
@@ -23,60 +23,60 @@ between the two has a mobility below 0 along it.
 """
 
 
-def mobilities(sides: Sequence[Side], same: bool) -> tuple[Expr, Expr]:
+def mobilities(terms: Sequence[BodyTerm], same: bool) -> tuple[Expr, Expr]:
     """(3, 3) each: relative velocity for unit impulses at the point, relative spin for unit torque impulses."""
     push, twist = ca.SX.zeros(3, 3), ca.SX.zeros(3, 3)
-    for i, side in enumerate(sides):
-        inverse = apply(side.inverse_inertia, ca.SX.eye(3))
-        if side.reach is None:
-            arm = cross_matrix(side.arm)
-            push += side.inverse_mass * ca.SX.eye(3) - ca.mtimes(arm, ca.mtimes(inverse, arm))
+    for i, term in enumerate(terms):
+        inverse = apply(term.inverse_inertia, ca.SX.eye(3))
+        if term.jacobian is None:
+            arm = cross_matrix(term.arm)
+            push += term.inverse_mass * ca.SX.eye(3) - ca.mtimes(arm, ca.mtimes(inverse, arm))
             twist += inverse
             continue
-        push += HELD * side.inverse_mass * ca.SX.eye(3)
+        push += HELD * term.inverse_mass * ca.SX.eye(3)
         twist += HELD * inverse
-        for j, other in enumerate(sides):
-            if other.reach is not None and (same or i == j):
-                sign = side.sign * other.sign
-                push += sign * apply(side.reach.see, other.reach.push)
-                twist += sign * apply(side.reach.spin, other.reach.twist)
+        for j, other in enumerate(terms):
+            if other.jacobian is not None and (same or i == j):
+                sign = term.sign * other.sign
+                push += sign * apply(term.jacobian.linear, other.jacobian.impulse_response)
+                twist += sign * apply(term.jacobian.angular, other.jacobian.torque_response)
     return push, twist
 
 
-def answer_of(sides: Sequence[Side], n: Expr, same: bool) -> Expr:
+def delassus_column(terms: Sequence[BodyTerm], n: Expr, same: bool) -> Expr:
     """(3,) [1/kg]: the velocity of the touching points against each other for a unit impulse along n."""
-    return slip(sides, kicked(sides, still(sides), n, ca.SX.zeros(3), same))
+    return slip(terms, apply_impulse(terms, still(terms), n, ca.SX.zeros(3), same))
 
 
-def yields(sides: Sequence[Side], n: Expr, answer: Expr) -> Expr:
-    """1 if an impulse parts the surfaces: where joints turn far between its instant and the row's it may pull.
+def separates(terms: Sequence[BodyTerm], n: Expr, column: Expr) -> Expr:
+    """1 if an impulse parts the surfaces: where joints turn far between its instant and the constraint's it may pull.
 
     Sweeps would answer each pull by a stronger one: a shin that was struck, at 90 rad/s at 10 ms a step, sent its robot
     to 1e19 m/s within a step.
     """
-    if all(side.reach is None for side in sides):
+    if all(term.jacobian is None for term in terms):
         return ca.SX(1)
-    return ca.dot(n, answer) > HELD * sum(side.inverse_mass for side in sides)
+    return ca.dot(n, column) > HELD * sum(term.inverse_mass for term in terms)
 
 
-def symmetric_mobilities(sides: Sequence[Side], same: bool) -> tuple[Expr, Expr]:
+def symmetric_mobilities(terms: Sequence[BodyTerm], same: bool) -> tuple[Expr, Expr]:
     """Those of ``mobilities``, on trees their symmetric parts."""
-    push, twist = mobilities(sides, same)
-    if all(side.reach is None for side in sides):
+    push, twist = mobilities(terms, same)
+    if all(term.jacobian is None for term in terms):
         return push, twist
     return (push + push.T) / 2, (twist + twist.T) / 2
 
 
-def inverse_masses(sides: Sequence[Side], n: Expr, push: Expr, twist: Expr) -> tuple[Expr, Expr, Expr, Expr]:
+def inverse_masses(terms: Sequence[BodyTerm], n: Expr, push: Expr, twist: Expr) -> tuple[Expr, Expr, Expr, Expr]:
     """k along the normal, across it, and for torques about it and across it; from ``symmetric_mobilities``."""
-    if all(side.reach is None for side in sides):
+    if all(term.jacobian is None for term in terms):
         return along(push, n), across(push, n), along(twist, n), across(twist, n)
-    normal, least = along(push, n), HELD * sum(side.inverse_mass for side in sides)
+    normal, least = along(push, n), HELD * sum(term.inverse_mass for term in terms)
     return ca.if_else(normal < least, least, normal), across(push, n), along(twist, n), across(twist, n)
 
 
 def effective_masses(normal: Expr, tangent: Expr, spin: Expr, roll: Expr) -> dict[str, Expr]:
-    """The fields of a row from the inverse effective masses k; here they are inverted once, not in each sweep."""
+    """The fields of a constraint from the inverse effective masses k, which are inverted once, not in each sweep."""
     return {"normal_mass": 1 / normal, "tangent_mass": 1 / tangent, "spin_mass": 1 / spin, "roll_mass": 1 / roll}
 
 

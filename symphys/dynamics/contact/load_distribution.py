@@ -15,10 +15,10 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.contact.constraint import ContactRow
-from symphys.dynamics.contact.projection import Impulse
-from symphys.dynamics.context import Scene
-from symphys.dynamics.pgs import Row
+from symphys.dynamics.contact.constraint import ContactConstraint, ContactImpulse
+from symphys.dynamics.context import StepContext
+from symphys.dynamics.tracing.decorator import traced
+from symphys.dynamics.unknowns import PlacedConstraint
 from symphys.model.shapes import Plane, Terrain
 from symphys.model.world import Pair, World
 
@@ -31,13 +31,15 @@ BLUNT = 1e-12
 """Of the points' spread: directions in which they spread less share no torque."""
 
 
-def shared(scene: Scene, rows: Sequence[Row], impulses: Sequence[Impulse]) -> list[Impulse]:
+def distribute_loads(
+    context: StepContext, constraints: Sequence[PlacedConstraint], impulses: Sequence[ContactImpulse]
+) -> list[ContactImpulse]:
     """The impulses with normal parts that are linear across each face; what carries no load takes no part."""
     found = list(impulses)
-    if not scene.setting.scheme.load_sharing:
+    if not context.settings.scheme.load_sharing:
         return found
-    for group in faces(scene.world):
-        loads = scene.pieces.do(_linear, tuple(rows[k].row for k in group), tuple(found[k].normal for k in group))
+    for group in faces(context.world):
+        loads = _linear(tuple(constraints[k].constraint for k in group), tuple(found[k].normal for k in group))
         for k, load in zip(group, loads, strict=True):
             found[k] = replace(found[k], normal=load)
     return found
@@ -59,10 +61,14 @@ def _face(world: World, pair: Pair) -> Any:
     return (pair.first.body if isinstance(static, Plane) else pair.first), pair.second
 
 
-def _linear(rows: tuple[ContactRow, ...], loads: tuple[Expr, ...]) -> tuple[Expr, ...]:
-    parts = [ca.fmax(load - row.load, 0) / ca.fmax(load, row.load) for row, load in zip(rows, loads, strict=True)]
+@traced
+def _linear(constraints: tuple[ContactConstraint, ...], loads: tuple[Expr, ...]) -> tuple[Expr, ...]:
+    parts = [
+        ca.fmax(load - constraint.load, 0) / ca.fmax(load, constraint.load)
+        for constraint, load in zip(constraints, loads, strict=True)
+    ]
     total = sum(parts) + BLUNT
-    arms = [ca.cross(row.sides[0].impulse_arm, row.impulse_normal) for row in rows]
+    arms = [ca.cross(constraint.terms[0].impulse_arm, constraint.impulse_normal) for constraint in constraints]
     middle = sum(part * arm for part, arm in zip(parts, arms, strict=True)) / total
     mean = sum(part * load for part, load in zip(parts, loads, strict=True)) / total
     torque, spread = ca.SX.zeros(3), ca.SX.zeros(3, 3)

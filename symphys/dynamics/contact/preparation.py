@@ -1,4 +1,4 @@
-"""What the sweeps need to know of a contact over a stretch of time, worked out once.
+"""What the sweeps need to know of a contact over a substep of time, worked out once.
 
 Formulas: ARCHITECTURE.md, "The time step". Letters: t* instant of touch, s = dt - t* what is left of the step,
 n normal, r arms, v* velocity of approach at t*, f* relative acceleration of the touching points there,
@@ -14,16 +14,18 @@ import casadi as ca
 
 from symphys.dynamics.collision.contact_geometry import Contact
 from symphys.dynamics.collision.time_of_impact import TINY_RATE, TOUCH
-from symphys.dynamics.contact.constraint import UNREACHED, ContactRow, Moving, Side, at_touch, free_slip, make_sides
+from symphys.dynamics.contact.body_term import BodyTerm, Motions, at_touch, body_terms, free_slip
+from symphys.dynamics.contact.constraint import UNREACHED, ContactConstraint
+from symphys.dynamics.contact.coupling import coupling_of, pulls_together
 from symphys.dynamics.contact.effective_mass import (
-    answer_of,
+    delassus_column,
     effective_masses,
     inverse_masses,
+    separates,
     symmetric_mobilities,
-    yields,
 )
-from symphys.dynamics.contact.local_solver import coupling_of, pulls_together
-from symphys.dynamics.context import Setting
+from symphys.dynamics.context import StepSettings
+from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.smoothing import clip, positive
 from symphys.model.world import Law
 
@@ -37,76 +39,77 @@ MARGIN = 1e-4
 NEAR = 0.1
 """Of the distance a_ref dt^2: surfaces that carried load and are that near to each other go on touching."""
 TIE = 1e-11
-"""[m] surfaces that move at speed and are that near at the end of a stretch do not touch then; see ``_slack``."""
+"""[m] surfaces that move at speed and are that near at the end of a substep do not touch then; see ``_slack``."""
 ANY = 1e6
 """[m] more than any overlap: what gives no impulse is not pushed out either."""
 SHORTEST = 1e-6
-"""Of dt: the shortest stretch before or after an impact."""
+"""Of dt: the shortest substep before or after an impact."""
 LOADED = 1e-3
 """Of the weight of the effective mass: what counts as load. A smooth contact always carries a little."""
 
 
 @dataclass(frozen=True)
 class Conditions:
-    """What a stretch makes of a contact.
+    """What a substep makes of a contact.
 
     Attributes:
-        spared: 1 for a contact that gives no impulse.
+        suppressed: 1 for a contact that gives no impulse.
         plastic: 1 where it does not rebound.
         force: (3,) with which the contact acted at the end of the last step [N].
-        same: whether both sides are of one tree of joints.
+        same: whether both bodies are of one tree of joints.
         coupled: whether friction may act strongly on the normal velocity.
     """
 
-    spared: Expr
+    suppressed: Expr
     plastic: Expr
     force: Expr
     same: bool
     coupled: bool
 
 
+@traced
 def prepare(
-    setting: Setting, law: Law, contact: Contact, motions: Moving, duration: Expr, conditions: Conditions
-) -> ContactRow:
-    """The row of a contact along the free motions of its moving sides, over a stretch of ``duration`` [s]."""
-    scheme, knob, half = setting.scheme, setting.knob, duration / 2
-    spared, same, coupled = conditions.spared, conditions.same, conditions.coupled
-    touch = _touch(setting, law, contact, motions, duration, conditions)
-    row_time = half + touch.leaving * (touch.time - half)
-    frame, applied = contact.meeting.frame(row_time), contact.meeting.frame(touch.leaving * touch.time)
-    sides = make_sides(motions, row_time, frame, applied)
-    push, twist = symmetric_mobilities(sides, same)
-    k_normal, *k_others = inverse_masses(sides, frame.normal, push, twist)
-    slack = ca.if_else(spared, ANY, _slack(setting, contact, touch))
-    slip = free_slip(sides, motions)
+    settings: StepSettings, law: Law, contact: Contact, motions: Motions, duration: Expr, conditions: Conditions
+) -> ContactConstraint:
+    """The constraint of a contact along the free motions of its bodies, over a substep of ``duration`` [s]."""
+    scheme, smoothing, half = settings.scheme, settings.smoothing, duration / 2
+    suppressed, same, coupled = conditions.suppressed, conditions.same, conditions.coupled
+    touch = _touch(settings, law, contact, motions, duration, conditions)
+    instant = half + touch.leaving * (touch.time - half)
+    frame, applied = contact.geometry.frame(instant), contact.geometry.frame(touch.leaving * touch.time)
+    terms = body_terms(motions, instant, frame, applied)
+    push, twist = symmetric_mobilities(terms, same)
+    k_normal, *k_others = inverse_masses(terms, frame.normal, push, twist)
+    slack = ca.if_else(suppressed, ANY, _slack(settings, contact, touch))
+    slip = free_slip(terms, motions)
     free = ca.dot(frame.normal, slip)
     away = ca.fmin(free - (contact.end + slack) / duration, 0)
-    softness, target = _normal_target(law, contact, duration, touch, k_normal, away, knob)
+    softness, target = _normal_target(law, contact, duration, touch, k_normal, away, smoothing)
     landing = _landing(contact, duration, touch.time, target, free)
-    answer = answer_of(sides, applied.normal, same)
-    parts = yields(sides, frame.normal, answer)
-    weight, load = LOADED * setting.reference / k_normal, ca.dot(applied.normal, conditions.force)
-    lasts = _lasts(setting, law, contact, touch.leaving, load > weight)
-    target = ca.if_else(lasts, -_parting(setting, contact, k_normal, ca.fmax(load, weight), duration), target)
-    return ContactRow(
+    column = delassus_column(terms, applied.normal, same)
+    parts = separates(terms, frame.normal, column)
+    weight, load = LOADED * settings.reference / k_normal, ca.dot(applied.normal, conditions.force)
+    lasts = _lasts(settings, law, contact, touch.leaving, load > weight)
+    target = ca.if_else(lasts, -_parting(settings, contact, k_normal, ca.fmax(load, weight), duration), target)
+    return ContactConstraint(
         law=law,
-        sides=sides,
+        terms=terms,
         normal=frame.normal,
         impulse_normal=applied.normal,
-        answer=answer,
+        delassus_column=column,
         **effective_masses(k_normal + softness, *k_others),
         softness=softness,
-        yields=parts,
-        target=ca.if_else(ca.logic_or(spared, 1 - parts), UNREACHED, target),
+        separates=parts,
+        target=ca.if_else(ca.logic_or(suppressed, 1 - parts), UNREACHED, target),
         slip_target=touch.slip(half) if scheme.impact_friction else ca.SX.zeros(3),
-        delay=_delay(touch, landing, lasts, half, sides) if scheme.time_of_impact else ca.SX(0),
+        delay=_delay(touch, landing, lasts, half, terms) if scheme.time_of_impact else ca.SX(0),
         leaving=touch.leaving,
         lasts=lasts,
         load=weight * duration,
         slack=slack,
-        struck=ca.SX(0) if law.soft else ca.logic_and(touch.hit, closes_fast(setting, contact)),
-        width=width_of(setting, contact),
-        knob=knob,
+        struck=ca.SX(0) if law.soft else ca.logic_and(touch.hit, closes_fast(settings, contact)),
+        width=width_of(settings, contact),
+        smoothing=smoothing,
         same=same,
         coupling=coupling_of(push, frame.normal, law.friction, softness) if coupled else None,
         paradox=pulls_together(push, frame.normal, law.friction, slip) if coupled else ca.SX(0),
@@ -115,7 +118,7 @@ def prepare(
 
 @dataclass(frozen=True)
 class _Touch:
-    """What free motion and restitution make of a contact within a stretch.
+    """What free motion and restitution make of a contact within a substep.
 
     Attributes:
         time: at which the surfaces meet [s]; 0 without time of impact.
@@ -123,7 +126,7 @@ class _Touch:
         normal: (3,) there.
         pull: the acceleration along it [m/s^2].
         rebound: at which they would part [m/s].
-        hit: 1 if they meet within the stretch.
+        hit: 1 if they meet within the substep.
         leaving: chi: 1 if they are still apart when it ends, 0 if they have fallen back by then.
     """
 
@@ -136,63 +139,63 @@ class _Touch:
     leaving: Expr
 
     def slip(self, half: Expr) -> Expr:
-        """(3,): what of the slip at mid-stretch comes after the impact, at whose instant friction acts [m/s]."""
+        """(3,): what of the slip at mid-substep comes after the impact, at whose instant friction acts [m/s]."""
         return self.hit * self.leaving * (half - self.time) * (self.acceleration - self.normal * self.pull)
 
 
 def _touch(
-    setting: Setting, law: Law, contact: Contact, motions: Moving, duration: Expr, conditions: Conditions
+    settings: StepSettings, law: Law, contact: Contact, motions: Motions, duration: Expr, conditions: Conditions
 ) -> _Touch:
-    time = contact.time if setting.scheme.time_of_impact else ca.SX(0)
+    time = contact.time if settings.scheme.time_of_impact else ca.SX(0)
     velocity, acceleration, normal = at_touch(contact, motions, time)
     pull = ca.dot(normal, acceleration)
-    rebound = law.restitution * (1 - conditions.plastic) * positive(-ca.dot(normal, velocity), setting.knob)
+    rebound = law.restitution * (1 - conditions.plastic) * positive(-ca.dot(normal, velocity), settings.smoothing)
     hit = ca.if_else(
-        conditions.spared, 0, contact.hit
-    )  # at the end of a stretch rounding decides whether a spared one meets
-    chi = _leaves(rebound, pull, duration - time, setting.reference, setting.scheme.dt, setting.knob)
+        conditions.suppressed, 0, contact.hit
+    )  # at the end of a substep rounding decides whether a suppressed one meets
+    chi = _leaves(rebound, pull, duration - time, settings.reference, settings.scheme.dt, settings.smoothing)
     return _Touch(time, acceleration, normal, pull, rebound, hit, hit * chi)
 
 
-def _delay(touch: _Touch, landing: Expr, lasts: Expr, half: Expr, sides: tuple[Side, ...]) -> Expr:
+def _delay(touch: _Touch, landing: Expr, lasts: Expr, half: Expr, terms: tuple[BodyTerm, ...]) -> Expr:
     """How late the contact acts [s]. Lasting ones on trees: see ARCHITECTURE, "Feet that stand"."""
     delay = touch.hit * (touch.time + (1 - touch.leaving) * (landing - touch.time))
-    return ca.if_else(lasts, half, delay) if any(side.reach is not None for side in sides) else delay
+    return ca.if_else(lasts, half, delay) if any(term.jacobian is not None for term in terms) else delay
 
 
-def _parting(setting: Setting, contact: Contact, k_normal: Expr, load: Expr, duration: Expr) -> Expr:
+def _parting(settings: StepSettings, contact: Contact, k_normal: Expr, load: Expr, duration: Expr) -> Expr:
     """On the central path a load keeps surfaces parting at w^2 / (4 k load) [m/s]: less that, what lasts is at rest."""
-    return width_of(setting, contact) ** 2 / (4 * k_normal * load * duration)
+    return width_of(settings, contact) ** 2 / (4 * k_normal * load * duration)
 
 
-def closes_fast(setting: Setting, contact: Contact) -> Expr:
-    """1 if a contact closes at a speed that makes its meeting an impact: now, or as a tip that swings round."""
-    swings = contact.gap > setting.fast * contact.time + NEAR * setting.reference * setting.scheme.dt**2
-    return ca.logic_or(contact.rate < -setting.fast, ca.logic_and(contact.hit, swings))
+def closes_fast(settings: StepSettings, contact: Contact) -> Expr:
+    """1 if a contact closes at a speed that makes it an impact: now, or as a tip that swings round."""
+    swings = contact.gap > settings.fast * contact.time + NEAR * settings.reference * settings.scheme.dt**2
+    return ca.logic_or(contact.rate < -settings.fast, ca.logic_and(contact.hit, swings))
 
 
-def width_of(setting: Setting, contact: Contact) -> Expr:
-    """Of the smoothed projection [m/s]: the knob at rest, nothing for an impact."""
-    return setting.knob * ca.exp(-((contact.rate / setting.fast) ** 2))
+def width_of(settings: StepSettings, contact: Contact) -> Expr:
+    """Of the smoothed projection [m/s]: the smoothing at rest, nothing for an impact."""
+    return settings.smoothing * ca.exp(-((contact.rate / settings.fast) ** 2))
 
 
-def _leaves(rebound: Expr, pull: Expr, left: Expr, reference: Expr, dt: float, knob: Expr) -> Expr:
+def _leaves(rebound: Expr, pull: Expr, left: Expr, reference: Expr, dt: float, smoothing: Expr) -> Expr:
     """chi: 1 if the rebound is still off the surface when the step ends, 0 if it has fallen back by then."""
     fall = ca.fmax(-pull, reference) * left
-    return clip((2 * rebound - fall) / (fall + MARGIN * dt), 0, 1, knob)
+    return clip((2 * rebound - fall) / (fall + MARGIN * dt), 0, 1, smoothing)
 
 
-def _lasts(setting: Setting, law: Law, contact: Contact, leaving: Expr, loaded: Expr) -> Expr:
+def _lasts(settings: StepSettings, law: Law, contact: Contact, leaving: Expr, loaded: Expr) -> Expr:
     """1 if the surfaces carried load, are near each other and do not part. Smoothed contacts hover, up to a height."""
     if law.soft:
         return ca.SX(0)
-    dt = setting.scheme.dt
-    near = contact.gap < (NEAR * setting.reference * dt + setting.knob) * dt
+    dt = settings.scheme.dt
+    near = contact.gap < (NEAR * settings.reference * dt + settings.smoothing) * dt
     return ca.logic_and(ca.logic_and(near, loaded), leaving < 0.5)
 
 
 def _landing(contact: Contact, duration: Expr, time: Expr, target: Expr, free: Expr) -> Expr:
-    """The delay of an impulse after which the surfaces just touch at the end of the stretch.
+    """The delay of an impulse after which the surfaces just touch at the end of the substep.
 
     What holds a body that lands and stays acts from the touch on, not at it: with all of it at t* the body would end
     below the surface by a (t* - dt) t*/2, which for small gaps is large beside the gap. ``free`` is the normal velocity
@@ -202,23 +205,23 @@ def _landing(contact: Contact, duration: Expr, time: Expr, target: Expr, free: E
     return ca.fmin(ca.fmax(share, 0), time)
 
 
-def _slack(setting: Setting, contact: Contact, touch: _Touch) -> Expr:
-    """[m] an overlap at the end of the stretch that is rounding: that of an impact which falls on its very end.
+def _slack(settings: StepSettings, contact: Contact, touch: _Touch) -> Expr:
+    """[m] an overlap at the end of the substep that is rounding: that of an impact which falls on its very end.
 
-    Whether such an impact belongs to this stretch or to the next is rounding's choice. Either way nothing but the
+    Whether such an impact belongs to this substep or to the next is rounding's choice. Either way nothing but the
     impact may act: a constraint that holds the surfaces where they just touch would have half of its slope there.
-    Cuts are off the impact by the shortest stretch at most.
+    Splits are off the impact by the shortest substep at most.
     """
-    fast, speed = closes_fast(setting, contact), ca.fabs(contact.rate)
+    fast, speed = closes_fast(settings, contact), ca.fabs(contact.rate)
     lands = ca.logic_and(touch.hit, ca.logic_and(touch.leaving < 0.5, fast))
-    passes = ca.logic_and(ca.logic_or(fast, speed > setting.fast), ca.logic_not(lands))
-    return ca.if_else(passes, TIE + 2 * SHORTEST * setting.scheme.dt * speed, 0)
+    passes = ca.logic_and(ca.logic_or(fast, speed > settings.fast), ca.logic_not(lands))
+    return ca.if_else(passes, TIE + 2 * SHORTEST * settings.scheme.dt * speed, 0)
 
 
 def _normal_target(
-    law: Law, contact: Contact, duration: Expr, touch: _Touch, inverse_mass: Expr, away: Expr, knob: Expr
+    law: Law, contact: Contact, duration: Expr, touch: _Touch, inverse_mass: Expr, away: Expr, smoothing: Expr
 ) -> tuple[Expr, Expr]:
-    """(softness, target): the velocity that the normal row asks for at the middle of the step.
+    """(softness, target): the velocity that the normal constraint asks for at the middle of the step.
 
     Hit: the rebound carried from t* to the middle, b = max(u + n.f* (dt/2 - t*), 0). Not hit: ``away``, that of the
     free motion less what would close the gap that this leaves at the end.
@@ -226,7 +229,7 @@ def _normal_target(
     begins late in the step begins gently.
     """
     if not law.soft:
-        carried = positive(touch.rebound + touch.pull * (duration / 2 - touch.time), knob)
+        carried = positive(touch.rebound + touch.pull * (duration / 2 - touch.time), smoothing)
         return ca.SX(0), ca.if_else(contact.hit, carried, away)
     omega = 2 * ca.pi * law.frequency
     stiffness, damper = omega**2 / inverse_mass, 2 * law.damping * omega / inverse_mass

@@ -1,4 +1,4 @@
-"""Which impacts the last stretch of a step leaves to the next step."""
+"""Which impacts the last substep of a step leaves to the next step."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics.collision import Contact
-from symphys.dynamics.context import Scene, Setting, State
-from symphys.dynamics.impact.impact import TOUCHING, Cut, strikes
+from symphys.dynamics.context import State, StepContext, StepSettings
+from symphys.dynamics.impact.impact import TOUCHING, StepSplit, strikes
 from symphys.dynamics.impact.restitution import eccentric_bodies
-from symphys.dynamics.prediction import bodies_of, expected_motions, look
+from symphys.dynamics.prediction import bodies_of, detect_contacts, predicted_motions
+from symphys.dynamics.tracing.decorator import traced
 from symphys.model.shapes import Sphere
 from symphys.model.world import Law, Pair, World, is_zero
 
@@ -21,51 +22,51 @@ Expr = Any
 
 
 @dataclass(frozen=True)
-class Deferral:
-    """What the last stretch of a step leaves to the next.
+class DeferredImpacts:
+    """What the last substep of a step leaves to the next.
 
     Attributes:
-        spared: per pair: 1 if it must give no impulse.
+        suppressed: per pair: 1 if it must give no impulse.
         chained: 1 if one of them is an impact that comes late by that.
         plastic: 1 if a hit drives bodies together that have no room to wait: nothing rebounds then, since all at once
             from the velocities before would add energy.
     """
 
-    spared: tuple[Expr, ...]
+    suppressed: tuple[Expr, ...]
     chained: Expr
     plastic: Expr
 
 
-def deferred(scene: Scene, x: State, duration: Expr, cuts: Sequence[Cut]) -> Deferral:
-    """What must give no impulse within ``duration`` [s], the last stretch of a step.
+def defer_impacts(context: StepContext, x: State, duration: Expr, splits: Sequence[StepSplit]) -> DeferredImpacts:
+    """What must give no impulse within ``duration`` [s], the last substep of a step.
 
     That is what closes at speed but does not meet. And, where surfaces rebound or bodies can be hit off their centres,
     all but the first impact of a body: two at once would be resolved from the velocities before both, which can add
-    energy. So a blow that goes through a row of balls takes an impact a stretch, as in the row: the next ball is not
+    energy. So a blow that goes through a row of balls takes an impact a substep, as in the row: the next ball is not
     held back before it is hit.
     """
-    do, pairs, world = scene.pieces.do, scene.world.pairs, scene.world
-    contacts = look(scene, expected_motions(scene, x, duration), duration)
-    hits = [do(_hit, scene.setting, pair.law, contact) for pair, contact in zip(pairs, contacts, strict=True)]
+    pairs, world = context.world.pairs, context.world
+    contacts = detect_contacts(context, predicted_motions(context, x, duration), duration)
+    hits = [_hit(context.settings, pair.law, contact) for pair, contact in zip(pairs, contacts, strict=True)]
     eccentric, sides = eccentric_bodies(world), {k for pair in pairs for k in bodies_of(pair)}
     rebounds = {k for pair in pairs if not is_zero(pair.law.restitution) for k in bodies_of(pair)}
     first: dict[int, tuple[Expr, Expr]] = dict.fromkeys(sides & (eccentric | rebounds), (duration, ca.SX(0)))
     for pair, contact, (_, meets) in zip(pairs, contacts, hits, strict=True):
         for body in first.keys() & set(bodies_of(pair)):
-            first[body] = do(_sooner, first[body], meets, contact.time, contact.rate)
+            first[body] = _sooner(first[body], meets, contact.time, contact.rate)
     found, chained, plastic = list[Expr](), ca.SX(0), ca.SX(0)
     for pair, contact, (fast, meets) in zip(pairs, contacts, hits, strict=True):
-        waits = do(_passes, fast, meets)
+        waits = _passes(fast, meets)
         for body in sorted(first.keys() & set(bodies_of(pair))):
-            struck = [cut.struck[j] for cut in cuts for j, other in enumerate(pairs) if body in bodies_of(other)]
+            struck = [split.struck[j] for split in splits for j, other in enumerate(pairs) if body in bodies_of(other)]
             struck = struck if body in eccentric else []
-            waits = do(_later, waits, fast, contact.time, first[body][0], tuple(struck))
+            waits = _later(waits, fast, contact.time, first[body][0], tuple(struck))
             if (room := _room(world, pair, eccentric)) is not None:
                 before = waits, chained, plastic
-                waits, chained, plastic = do(_driven, scene.setting, before, fast, contact, first[body], duration, room)
+                waits, chained, plastic = _driven(context.settings, before, fast, contact, first[body], duration, room)
         found.append(waits)
-        chained = do(_chained, chained, waits, meets)
-    return Deferral(tuple(found), chained, plastic)
+        chained = _chained(chained, waits, meets)
+    return DeferredImpacts(tuple(found), chained, plastic)
 
 
 def _room(world: World, pair: Pair, eccentric: set[int]) -> Expr | None:
@@ -77,19 +78,22 @@ def _room(world: World, pair: Pair, eccentric: set[int]) -> Expr | None:
     return radii[0] if len(radii) == 1 else ca.fmin(*radii)
 
 
-def _hit(setting: Setting, law: Law, contact: Contact) -> tuple[Expr, Expr]:
+@traced
+def _hit(settings: StepSettings, law: Law, contact: Contact) -> tuple[Expr, Expr]:
     """(whether it closes at speed, whether it then meets)."""
-    fast = strikes(setting, law, contact)
+    fast = strikes(settings, law, contact)
     return fast, ca.logic_and(fast, contact.hit)
 
 
+@traced
 def _sooner(first: tuple[Expr, Expr], meets: Expr, time: Expr, rate: Expr) -> tuple[Expr, Expr]:
     """(when a body is first hit, the greatest speed at which it is), with one more contact looked at."""
     return ca.if_else(meets, ca.fmin(first[0], time), first[0]), ca.if_else(meets, ca.fmax(first[1], -rate), first[1])
 
 
+@traced
 def _driven(
-    setting: Setting,
+    settings: StepSettings,
     before: tuple[Expr, Expr, Expr],
     fast: Expr,
     contact: Contact,
@@ -102,20 +106,23 @@ def _driven(
     Its surfaces are apart, and the hit comes before they meet. It waits if they cannot go far into each other.
     """
     way = 2 * first[1] * duration
-    apart = ca.logic_and(contact.gap > TOUCHING * setting.reference * setting.scheme.dt**2, 1 - fast)
+    apart = ca.logic_and(contact.gap > TOUCHING * settings.reference * settings.scheme.dt**2, 1 - fast)
     driven = ca.logic_and(ca.logic_and(apart, first[1] > 0), contact.gap < way)
     waits = ca.logic_and(driven, way < room)
     return ca.fmax(before[0], waits), ca.fmax(before[1], driven), ca.fmax(before[2], ca.logic_and(driven, 1 - waits))
 
 
+@traced
 def _chained(before: Expr, waits: Expr, meets: Expr) -> Expr:
     return ca.fmax(before, ca.logic_and(waits, meets))
 
 
+@traced
 def _passes(fast: Expr, meets: Expr) -> Expr:
     return ca.logic_and(fast, ca.logic_not(meets))
 
 
+@traced
 def _later(waits: Expr, fast: Expr, time: Expr, first: Expr, struck: tuple[Expr, ...]) -> Expr:
     before = ca.mmax(ca.vertcat(*struck)) if struck else ca.SX(0)
     return ca.fmax(waits, ca.logic_and(fast, ca.logic_or(time > first, before)))

@@ -16,12 +16,20 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.contact.constraint import ContactRow
-from symphys.dynamics.context import Scene
-from symphys.dynamics.joints.assembly import Trees, momenta_of
-from symphys.dynamics.momentum import Momentum, Moved, Rates
-from symphys.dynamics.motion import Motion, apply, inverse_inertia
-from symphys.dynamics.pgs import Given, Row, Solution, relax
+from symphys.dynamics.contact.constraint import ContactConstraint
+from symphys.dynamics.context import StepContext
+from symphys.dynamics.joints.assembly import KinematicTrees, momenta_of
+from symphys.dynamics.motion import PredictedMotion, apply, inverse_inertia
+from symphys.dynamics.pgs import iterate
+from symphys.dynamics.tracing.decorator import traced
+from symphys.dynamics.unknowns import (
+    AnyImpulse,
+    GeneralizedVelocities,
+    Momentum,
+    PlacedConstraint,
+    Solution,
+    Velocities,
+)
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.shapes import Sphere
 from symphys.model.world import World, is_zero
@@ -40,33 +48,43 @@ def eccentric_bodies(world: World) -> set[int]:
     }
 
 
-def rebound(scene: Scene, rows: tuple[Row, ...], start: Solution, motions: Sequence[Motion], trees: Trees) -> Solution:
+def rebound(
+    context: StepContext,
+    constraints: tuple[PlacedConstraint, ...],
+    start: Solution,
+    motions: Sequence[PredictedMotion],
+    trees: KinematicTrees,
+) -> Solution:
     """The impulses of an impact, and the momenta after it."""
-    pieces, scheme = scene.pieces, scene.setting.scheme
-    if not (scheme.energy_cap and eccentric_bodies(scene.world)):
-        return relax(pieces, scene.world, scheme.sweeps, rows, start, motions)
-    dead = tuple(replace(each, row=pieces.do(_without_rebound, each.row)) for each in rows)
-    plastic = relax(pieces, scene.world, scheme.sweeps, dead, start, motions)
-    newton = relax(pieces, scene.world, scheme.sweeps, rows, plastic, motions)
+    scheme = context.settings.scheme
+    if not (scheme.energy_cap and eccentric_bodies(context.world)):
+        return iterate(context.world, scheme.sweeps, constraints, start, motions)
+    dead = tuple(replace(each, constraint=_without_rebound(each.constraint)) for each in constraints)
+    plastic = iterate(context.world, scheme.sweeps, dead, start, motions)
+    newton = iterate(context.world, scheme.sweeps, constraints, plastic, motions)
     sums: tuple[Expr, Expr, Expr] = (ca.SX(0), ca.SX(0), ca.SX(0))
-    bodies = (momenta_of(scene, trees, solution.momenta) for solution in (start, plastic, newton))
+    bodies = (momenta_of(context, trees, solution.momenta) for solution in (start, plastic, newton))
     for motion, *momenta in zip(motions, *bodies, strict=True):
-        sums = pieces.do(_energies, motion, momenta, sums)
-    share = pieces.do(_largest_share, sums)
+        sums = _energies(motion, momenta, sums)
+    share = _largest_share(sums)
     return Solution(
-        tuple(pieces.do(_between_states, share, a, b) for a, b in zip(plastic.momenta, newton.momenta, strict=True)),
-        tuple(pieces.do(_between, share, a, b) for a, b in zip(plastic.impulses, newton.impulses, strict=True)),
-        tuple(pieces.do(_between, share, a, b) for a, b in zip(plastic.last, newton.last, strict=True)),
+        tuple(_between_states(share, a, b) for a, b in zip(plastic.momenta, newton.momenta, strict=True)),
+        tuple(_between(share, a, b) for a, b in zip(plastic.impulses, newton.impulses, strict=True)),
+        tuple(_between(share, a, b) for a, b in zip(plastic.last, newton.last, strict=True)),
     )
 
 
-def _without_rebound(row: Any) -> Any:
-    if not isinstance(row, ContactRow):
-        return row
-    return replace(row, target=ca.fmin(row.target, 0))
+@traced
+def _without_rebound(constraint: Any) -> Any:
+    if not isinstance(constraint, ContactConstraint):
+        return constraint
+    return replace(constraint, target=ca.fmin(constraint.target, 0))
 
 
-def _energies(motion: Motion, momenta: list[Momentum], sums: tuple[Expr, Expr, Expr]) -> tuple[Expr, Expr, Expr]:
+@traced
+def _energies(
+    motion: PredictedMotion, momenta: list[Momentum], sums: tuple[Expr, Expr, Expr]
+) -> tuple[Expr, Expr, Expr]:
     """Coefficients of the change of kinetic energy, a s^2 + b s + c, at share s of the way to Newton's impulse."""
     before, plastic, newton = momenta
     turning = inverse_inertia(motion.inertia, motion.rotation)
@@ -81,6 +99,7 @@ def _energies(motion: Motion, momenta: list[Momentum], sums: tuple[Expr, Expr, E
     return a + product(way, way), b + 2 * product(way, plastic), c + change
 
 
+@traced
 def _largest_share(sums: tuple[Expr, Expr, Expr]) -> Expr:
     """The largest s in [0, 1] with a s^2 + b s + c <= 0, where c <= 0 up to rounding."""
     a, b, c = sums[0], sums[1], ca.fmin(sums[2], 0)
@@ -89,12 +108,13 @@ def _largest_share(sums: tuple[Expr, Expr, Expr]) -> Expr:
     return ca.if_else(a + b + c > 0, ca.fmin(share, 1), 1)
 
 
-def _between_states(share: Expr, plastic: Moved, newton: Moved) -> Moved:
+@traced
+def _between_states(share: Expr, plastic: Velocities, newton: Velocities) -> Velocities:
     if plastic is None or newton is None:
         return None
-    if isinstance(plastic, Rates):
-        assert isinstance(newton, Rates)
-        return Rates(plastic.numbers + share * (newton.numbers - plastic.numbers))
+    if isinstance(plastic, GeneralizedVelocities):
+        assert isinstance(newton, GeneralizedVelocities)
+        return GeneralizedVelocities(plastic.numbers + share * (newton.numbers - plastic.numbers))
     assert isinstance(newton, Momentum)
     return Momentum(
         plastic.velocity + share * (newton.velocity - plastic.velocity),
@@ -102,5 +122,6 @@ def _between_states(share: Expr, plastic: Moved, newton: Moved) -> Moved:
     )
 
 
-def _between(share: Expr, plastic: Given, newton: Given) -> Given:
+@traced
+def _between(share: Expr, plastic: AnyImpulse, newton: AnyImpulse) -> AnyImpulse:
     return plastic.plus(newton.minus(plastic).times(share))

@@ -1,4 +1,4 @@
-"""Joints within a stretch: their trees and rows, what these start from, and what is stored of what they gave."""
+"""Joints within a substep: their trees and constraints, what these start from, and what is stored of what they gave."""
 
 from __future__ import annotations
 
@@ -8,17 +8,27 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.articulated.generalized_coordinates import Chart, body_momenta, make_chart
-from symphys.dynamics.context import Scene, State
-from symphys.dynamics.joints.coordinate_constraint import AxisRow
-from symphys.dynamics.joints.joint_constraints import ROWS, Stretch, along_coordinate, lock_now, lock_row
-from symphys.dynamics.joints.joint_frames import sockets_of
-from symphys.dynamics.joints.joint_impulse import Along
-from symphys.dynamics.joints.locked_directions import LockRow
-from symphys.dynamics.momentum import Momenta, Moved, States
-from symphys.dynamics.motion import Motion
-from symphys.dynamics.pgs import Row
-from symphys.model.joints import carriers, linkages, tree_joints
+from symphys.dynamics.articulated.generalized_coordinates import (
+    GeneralizedCoordinates,
+    body_momenta,
+    generalized_coordinates,
+)
+from symphys.dynamics.context import State, StepContext
+from symphys.dynamics.joints.coordinate_constraint import CoordinateConstraint
+from symphys.dynamics.joints.joint_constraints import (
+    CONSTRAINTS,
+    SubstepTimes,
+    coordinate_terms,
+    lock_at_impact,
+    lock_constraint,
+)
+from symphys.dynamics.joints.joint_frames import joint_frames
+from symphys.dynamics.joints.joint_impulse import JointImpulse
+from symphys.dynamics.joints.locked_directions import LockConstraint
+from symphys.dynamics.motion import PredictedMotion
+from symphys.dynamics.tracing.decorator import traced
+from symphys.dynamics.unknowns import AllVelocities, Momenta, PlacedConstraint, Velocities
+from symphys.model.joints import carriers, kinematic_trees, tree_joints
 from symphys.model.world import World
 
 Expr = Any
@@ -27,146 +37,151 @@ LIMITS = ("lower", "upper")
 
 
 @dataclass(frozen=True)
-class Trees:
-    """The trees of a world over a stretch.
+class KinematicTrees:
+    """The trees of a world over a substep.
 
     Attributes:
-        charts: in the order of ``linkages``.
+        coordinates: in the order of ``kinematic_trees``.
         motions: of all bodies, those of trees with how they are held.
-        states: what the sweeps start from, without any impulse of the stretch.
+        states: what the sweeps start from, without any impulse of the substep.
         carriers: for each body where the sweeps keep what they know of it.
     """
 
-    charts: tuple[Chart, ...]
-    motions: tuple[Motion, ...]
-    states: States
+    coordinates: tuple[GeneralizedCoordinates, ...]
+    motions: tuple[PredictedMotion, ...]
+    states: AllVelocities
     carriers: tuple[int, ...]
 
-    def row(self, bodies: tuple[int, ...], row: Any) -> Row:
-        """A row on these bodies."""
-        return Row(bodies, row, tuple(self.carriers[i] for i in bodies))
+    def placed(self, bodies: tuple[int, ...], constraint: Any) -> PlacedConstraint:
+        """A constraint on these bodies."""
+        return PlacedConstraint(bodies, constraint, tuple(self.carriers[i] for i in bodies))
 
     def same(self, bodies: tuple[int, ...]) -> bool:
         """Whether both are of one tree."""
         return len(bodies) == 2 and self.carriers[bodies[0]] == self.carriers[bodies[1]]
 
 
-def make_trees(scene: Scene, motions: Sequence[Motion], free: Momenta, middle: Expr) -> Trees:
-    """The trees; ``free``: momenta of all bodies without any impulse of the stretch."""
-    joints, held = scene.world.joints, list(motions)
-    states: list[Moved] = list(free)
-    charts, touched = [], _touched(scene.world)
-    for tree in linkages(joints):
+def prepare_trees(
+    context: StepContext, motions: Sequence[PredictedMotion], free: Momenta, middle: Expr
+) -> KinematicTrees:
+    """The trees; ``free``: momenta of all bodies without any impulse of the substep."""
+    joints, moving = context.world.joints, list(motions)
+    states: list[Velocities] = list(free)
+    found, touched = list[GeneralizedCoordinates](), _touched(context.world)
+    for tree in kinematic_trees(joints):
         own = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
         reached = tuple(body in touched for body in tree.bodies)
         parts = tuple(motions[i] for i in tree.bodies), tuple(free[i] for i in tree.bodies)
-        chart = make_chart(scene.pieces, tree, own, reached, *parts, middle)
-        charts.append(chart)
-        for body, holds in zip(tree.bodies, chart.held, strict=True):
-            held[body], states[body] = replace(motions[body], held=holds), None
-        states[tree.root] = chart.free
-    return Trees(tuple(charts), tuple(held), tuple(states), carriers(len(motions), joints))
+        coordinates = generalized_coordinates(tree, own, reached, *parts, middle)
+        found.append(coordinates)
+        for body, jacobian in zip(tree.bodies, coordinates.jacobians, strict=True):
+            moving[body], states[body] = replace(motions[body], jacobian=jacobian), None
+        states[tree.root] = coordinates.free
+    return KinematicTrees(tuple(found), tuple(moving), tuple(states), carriers(len(motions), joints))
 
 
 def _touched(world: World) -> set[int]:
-    """Bodies on which contacts act, or joints that close loops or give way."""
+    """Bodies on which contacts act, or joints that close loops or are soft."""
     exact = tree_joints(world.joints)
     sides = {side.body for pair in world.pairs for side in (pair.first, pair.second)}
     loose = {body for k, joint in enumerate(world.joints) if k not in exact for body in joint.bodies}
     return {body for body in sides if body is not None} | loose
 
 
-def momenta_of(scene: Scene, trees: Trees, solved: States) -> Momenta:
+def momenta_of(context: StepContext, trees: KinematicTrees, solved: AllVelocities) -> Momenta:
     """Of all bodies."""
     found = list(solved)
-    for tree, chart in zip(linkages(scene.world.joints), trees.charts, strict=True):
-        momenta = body_momenta(scene.pieces, chart, solved[tree.root])
+    for tree, coordinates in zip(kinematic_trees(context.world.joints), trees.coordinates, strict=True):
+        momenta = body_momenta(coordinates, solved[tree.root])
         for body, momentum in zip(tree.bodies, momenta, strict=True):
             found[body] = momentum
     return tuple(found)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
-class JointRow:
-    """A row of a joint.
+class JointConstraint:
+    """A constraint of a joint.
 
     Attributes:
-        row: what sweeps, or the position pass, visit.
+        placed: what sweeps, or the position pass, project.
         name, k: where the state keeps what it gave: component ``k`` of ``name``, all of it if None.
     """
 
-    row: Row
+    placed: PlacedConstraint
     name: str
     k: int | None = None
 
 
-def joint_rows(
-    scene: Scene, trees: Trees, paths: Sequence[Motion], duration: Expr, kick: Expr
-) -> tuple[list[JointRow], list[Row]]:
-    """(what the sweeps visit, what the position pass closes) of all joints over a stretch."""
-    do, setting, stretch = scene.pieces.do, scene.setting, Stretch(duration, kick)
-    visited, fitted = list[JointRow](), list[Row]()
-    places = _places(scene.world, trees)
-    for index, joint in enumerate(scene.world.joints):
+def joint_constraints(
+    context: StepContext, trees: KinematicTrees, paths: Sequence[PredictedMotion], duration: Expr, kick: Expr
+) -> tuple[list[JointConstraint], list[PlacedConstraint]]:
+    """(what the sweeps project, what the position pass closes) of all joints over a substep."""
+    settings, substep = context.settings, SubstepTimes(duration, kick)
+    projected, fitted = list[JointConstraint](), list[PlacedConstraint]()
+    places = _places(context.world, trees)
+    for index, joint in enumerate(context.world.joints):
         moving = tuple(trees.motions[i] for i in joint.bodies)
         bare = tuple(paths[i] for i in joint.bodies)
-        sockets, same = do(sockets_of, joint, bare), trees.same(joint.bodies)
+        frames, same = joint_frames(joint, bare), trees.same(joint.bodies)
         if index not in places:
-            lock = trees.row(joint.bodies, do(lock_row, setting, sockets, moving, stretch, same))
-            visited.append(JointRow(lock, f"{joint.name}.lock"))
+            lock = trees.placed(joint.bodies, lock_constraint(settings, frames, moving, substep, same))
+            projected.append(JointConstraint(lock, f"{joint.name}.lock"))
             fitted += [] if joint.soft else [lock]
         for k in range(len(joint.kind.coordinates)) if joint.acting else ():
             states = tuple(trees.states[trees.carriers[i]] for i in joint.bodies)
-            at = do(along_coordinate, sockets, k, moving, states, duration, places.get(index, same))
-            command = scene.given(f"{joint.name}.command")
+            at = coordinate_terms(frames, k, moving, states, duration, places.get(index, same))
+            command = context.input(f"{joint.name}.command")
             command = ca.SX(0) if command is None else command[k]
             for part in joint.acting:
-                row = trees.row(joint.bodies, do(ROWS[part], setting, joint, at, command, stretch))
-                visited.append(JointRow(row, f"{joint.name}.{part}", k))
-                fitted += [row] if part in LIMITS else []
-    return visited, fitted
+                constraint = trees.placed(joint.bodies, CONSTRAINTS[part](settings, joint, at, command, substep))
+                projected.append(JointConstraint(constraint, f"{joint.name}.{part}", k))
+                fitted += [constraint] if part in LIMITS else []
+    return projected, fitted
 
 
-def _places(world: World, trees: Trees) -> dict[int, tuple[int, Expr]]:
-    """Of each joint of a tree: its first coordinate, and the tree's gains."""
+def _places(world: World, trees: KinematicTrees) -> dict[int, tuple[int, Expr]]:
+    """Of each joint of a tree: its first coordinate, and the tree's responses."""
     return {
-        link.joint: (link.start, chart.gains)
-        for tree, chart in zip(linkages(world.joints), trees.charts, strict=True)
+        link.joint: (link.start, coordinates.responses)
+        for tree, coordinates in zip(kinematic_trees(world.joints), trees.coordinates, strict=True)
         for link in tree.links
         if link.joint is not None
     }
 
 
-def locks_at(scene: Scene, trees: Trees) -> list[tuple[Row, Along]]:
-    """The rows of joints that close loops or give way, at an instant at which velocities change; and no impulse."""
-    found, exact = [], tree_joints(scene.world.joints)
-    for index, joint in enumerate(scene.world.joints):
+def locks_at(context: StepContext, trees: KinematicTrees) -> list[tuple[PlacedConstraint, JointImpulse]]:
+    """The constraints, without impulse, of joints that close loops or are soft, at the instant of an impact."""
+    found, exact = [], tree_joints(context.world.joints)
+    for index, joint in enumerate(context.world.joints):
         if index in exact:
             continue
         moving = tuple(trees.motions[i] for i in joint.bodies)
         states = tuple(trees.states[trees.carriers[i]] for i in joint.bodies)
-        sockets = scene.pieces.do(sockets_of, joint, moving)
-        row = scene.pieces.do(lock_now, sockets, moving, states, trees.same(joint.bodies))
-        found.append((trees.row(joint.bodies, row), Along(ca.SX(joint.locked, 1))))
+        frames = joint_frames(joint, moving)
+        constraint = lock_at_impact(frames, moving, states, trees.same(joint.bodies))
+        found.append((trees.placed(joint.bodies, constraint), JointImpulse(ca.SX(joint.locked, 1))))
     return found
 
 
-def resumed(scene: Scene, rows: Sequence[JointRow], x: State, kick: Expr) -> list[Along]:
-    """What the sweeps start from: the last step's forces over this stretch's kick."""
-    if not scene.setting.scheme.warm_start:
-        return [Along(ca.SX(numbers_of(each.row.row), 1)) for each in rows]
-    return [scene.pieces.do(_again, each.row.row, x[each.name], each.k, kick) for each in rows]
+def warm_started(
+    context: StepContext, constraints: Sequence[JointConstraint], x: State, kick: Expr
+) -> list[JointImpulse]:
+    """What the sweeps start from: the last step's forces over this substep's kick."""
+    if not context.settings.scheme.warm_start:
+        return [JointImpulse(ca.SX(numbers_of(each.placed.constraint), 1)) for each in constraints]
+    return [_again(each.placed.constraint, x[each.name], each.k, kick) for each in constraints]
 
 
-def numbers_of(row: LockRow | AxisRow) -> int:
-    """How many impulses a row gives."""
-    return row.error.leaf.rows if isinstance(row, LockRow) else 1
+def numbers_of(constraint: LockConstraint | CoordinateConstraint) -> int:
+    """How many impulses a constraint gives."""
+    return constraint.error.leaf.rows if isinstance(constraint, LockConstraint) else 1
 
 
 def own(stored: Expr, k: int | None) -> Expr:
-    """What is a row's of a stored column."""
+    """What is a constraint's of a stored column."""
     return stored if k is None else stored[k]
 
 
-def _again(row: LockRow | AxisRow, stored: Expr, k: int | None, kick: Expr) -> Along:
-    return row.taken_up(kick * own(stored, k))
+@traced
+def _again(constraint: LockConstraint | CoordinateConstraint, stored: Expr, k: int | None, kick: Expr) -> JointImpulse:
+    return constraint.taken_up(kick * own(stored, k))

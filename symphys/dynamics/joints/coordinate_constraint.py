@@ -1,4 +1,4 @@
-"""The row of one thing that acts along a coordinate of a joint: a motor, a limit, a spring.
+"""The constraint of one thing that acts along a coordinate of a joint: a motor, a limit, a spring.
 
 A sweep gives  impulse <- clip(keep impulse - slope rate - offset, low, high).  A velocity that is asked for with
 impulse bounds: keep 1, slope m, offset -m target, with m the effective mass. A law a + b rate of the force, solved for
@@ -12,9 +12,9 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.contact.constraint import Side
-from symphys.dynamics.joints.joint_impulse import Along, Directions, kicked, speeds
-from symphys.dynamics.momentum import Rates
+from symphys.dynamics.contact.body_term import BodyTerm
+from symphys.dynamics.joints.joint_impulse import Directions, JointImpulse, apply_impulse, speeds
+from symphys.dynamics.unknowns import GeneralizedVelocities
 from symphys.maths.smoothing import at_least, at_most
 
 Expr = Any
@@ -22,31 +22,31 @@ Expr = Any
 
 
 @dataclass(frozen=True)
-class OfTree:
-    """A coordinate of a tree: its rate (1, n) by what sweeps know, and what a unit impulse does to that (n,)."""
+class TreeCoordinate:
+    """A coordinate of a tree: its Jacobian (1, n), and the response (n,) of the velocities to a unit impulse."""
 
-    see: Expr
-    gain: Expr
+    jacobian: Expr
+    response: Expr
 
 
 @dataclass(frozen=True)
-class AxisRow:
-    """What acts along one coordinate, as the sweeps see it; impulses in [N m s], or [N s] where it slides.
+class CoordinateConstraint:
+    """What acts along one coordinate, prepared for the sweeps; impulses in [N m s], or [N s] where it slides.
 
     Attributes:
-        sides: arms at the row's instant, and to the common point for impulses.
-        seen, given_along: the one direction at the row's instant, and of the impulse.
+        terms: arms at the constraint's instant, and to the common point for impulses.
+        seen, given_along: the one direction at the constraint's instant, and of the impulse.
         keep, slope, offset: see the module.
         low, high: bounds of the impulse; None where there is none.
         width: of the smoothed bounds [N m s].
-        same: whether both sides are of one tree of joints.
+        same: whether both bodies are of one tree of joints.
         of_tree: where the coordinate is one of a tree's.
         left: how far a limit is away at the start [rad], [m]; None for what is none.
         inverse_mobility: effective mass.
         landing: 1 for a limit that is struck: its impulse is an impact, not a force.
     """
 
-    sides: tuple[Side, ...]
+    terms: tuple[BodyTerm, ...]
     seen: Directions
     given_along: Directions
     keep: Expr
@@ -56,13 +56,13 @@ class AxisRow:
     high: Expr | None
     width: Expr
     same: bool
-    of_tree: OfTree | None
+    of_tree: TreeCoordinate | None
     left: Expr | None
     inverse_mobility: Expr
     landing: Expr
 
     def fitting(self, moved: Expr) -> Expr:
-        """(1,): the impulse times a time that takes a limit back to where it is kept; see ``LockRow``."""
+        """(1,): the impulse times a time that takes a limit back to where it is kept; see ``LockConstraint``."""
         sign = 1 if self.low is not None else -1
         beyond = self.left + sign * moved
         return -sign * self.inverse_mobility * ca.fmin(beyond, 0)
@@ -70,41 +70,41 @@ class AxisRow:
     def rate(self, momenta: tuple[Any, ...]) -> Expr:
         """Of the coordinate."""
         if self.of_tree is None:
-            return speeds(self.sides, self.seen, momenta)
-        return momenta[0].along(self.of_tree.see)
+            return speeds(self.terms, self.seen, momenta)
+        return momenta[0].along(self.of_tree.jacobian)
 
-    def carried(self, impulse: Along) -> Expr:
+    def carried(self, impulse: JointImpulse) -> Expr:
         """(1,): what is stored of an impulse; also of a force."""
         return impulse.numbers
 
-    def taken_up(self, stored: Expr) -> Along:
+    def taken_up(self, stored: Expr) -> JointImpulse:
         """The impulse that is stored so."""
-        return Along(stored)
+        return JointImpulse(stored)
 
-    def visit(self, momenta: tuple[Any, ...], old: Along) -> tuple[tuple[Any, ...], Along]:
-        """See ``pgs.Solvable``."""
+    def project(self, momenta: tuple[Any, ...], old: JointImpulse) -> tuple[tuple[Any, ...], JointImpulse]:
+        """See ``VelocityConstraint``."""
         rate = self.rate(momenta)
         new = self.keep * old.numbers - self.slope * rate - self.offset
         if self.low is not None:
             new = at_least(new, self.low, self.width)
         if self.high is not None:
             new = at_most(new, self.high, self.width)
-        return self.given(momenta, Along(new - old.numbers)), Along(new)
+        return self.apply(momenta, JointImpulse(new - old.numbers)), JointImpulse(new)
 
-    def given(self, momenta: tuple[Any, ...], impulse: Along) -> tuple[Any, ...]:
-        """See ``pgs.Solvable``."""
+    def apply(self, momenta: tuple[Any, ...], impulse: JointImpulse) -> tuple[Any, ...]:
+        """See ``VelocityConstraint``."""
         if self.of_tree is None:
-            return kicked(self.sides, self.given_along, momenta, impulse.numbers, self.same)
-        after = Rates(momenta[0].numbers + ca.mtimes(self.of_tree.gain, impulse.numbers))
-        return tuple(after for _ in self.sides)
+            return apply_impulse(self.terms, self.given_along, momenta, impulse.numbers, self.same)
+        after = GeneralizedVelocities(momenta[0].numbers + ca.mtimes(self.of_tree.response, impulse.numbers))
+        return tuple(after for _ in self.terms)
 
 
 def towards(target: Expr, mobility: Expr) -> dict[str, Expr]:
-    """The coefficients of a row that asks for a velocity."""
+    """The coefficients of a constraint that asks for a velocity."""
     return {"keep": ca.SX(1), "slope": 1 / mobility, "offset": -target / mobility}
 
 
 def by_law(a: Expr, b: Expr, mobility: Expr) -> dict[str, Expr]:
-    """The coefficients of a row whose impulse is -(a + b rate)."""
+    """The coefficients of a constraint whose impulse is -(a + b rate)."""
     share = 1 / (1 + b * mobility)
     return {"keep": b * mobility * share, "slope": b * share, "offset": a * share}

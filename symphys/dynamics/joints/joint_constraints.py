@@ -1,10 +1,9 @@
-"""The rows of one joint over a stretch: seen at its middle, given at its start, so that motion about it keeps energy.
+"""The constraints of one joint over a substep: evaluated at its middle, applied at its start, which keeps energy.
 
-Impulses act on one point of both sides. Rows and impulses both at the middle would cost a pendulum a fifth of its
-energy in five seconds. A rigid lock asks for no velocity at all, and the position pass takes back what is left of its
-error, of third order in a step. Asking for -error / dt (SHAKE) would do both at once, but feeds errors back through the
-forces that the sweeps start from, which is unstable as soon as these do not converge by half in a step: chains of four
-then burst.
+Impulses act on one point of both bodies. With both at the middle a pendulum would lose a fifth of its energy in five
+seconds. A rigid lock asks for zero velocity, and the position pass takes back what is left of its error, of third order
+in a step. Asking for -error / dt (SHAKE) would do both at once, but feeds errors back through the forces that the
+sweeps start from, which is unstable as soon as these do not converge by half in a step: chains of four then burst.
 """
 
 from __future__ import annotations
@@ -14,14 +13,15 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.contact.constraint import Moving, Side
+from symphys.dynamics.contact.body_term import BodyTerm, Motions
 from symphys.dynamics.contact.preparation import TIE
-from symphys.dynamics.context import Setting
-from symphys.dynamics.joints.coordinate_constraint import AxisRow, OfTree, by_law, towards
-from symphys.dynamics.joints.joint_frames import Sockets, errors, free, locked
+from symphys.dynamics.context import StepSettings
+from symphys.dynamics.joints.coordinate_constraint import CoordinateConstraint, TreeCoordinate, by_law, towards
+from symphys.dynamics.joints.joint_frames import JointFrames, errors, free, locked
 from symphys.dynamics.joints.joint_impulse import Directions, mobility, speeds
-from symphys.dynamics.joints.locked_directions import LockRow, inverse
-from symphys.dynamics.momentum import Momentum
+from symphys.dynamics.joints.locked_directions import LockConstraint, inverse
+from symphys.dynamics.tracing.decorator import traced
+from symphys.dynamics.unknowns import Momentum
 from symphys.maths.smoothing import clip
 from symphys.model.joints import Joint, Servo, TorqueMotor, VelocityMotor
 
@@ -36,27 +36,27 @@ REACHED = 1e-4
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """Its length and the time over which forces act as impulses in it [s]; see ``phase``."""
+class SubstepTimes:
+    """Its length and the time over which forces act as impulses in it [s]; see ``substep``."""
 
     duration: Expr
     kick: Expr
 
 
 @dataclass(frozen=True)
-class AlongCoordinate:
-    """What every row along a coordinate needs.
+class CoordinateTerms:
+    """What every constraint along a coordinate needs.
 
     Attributes:
-        sides, seen, given: as of any row.
+        terms, seen, given: as of any constraint.
         value: [rad] or [m].
-        rate: at the middle of the stretch, before any impulse of it.
+        rate: at the middle of the substep, before any impulse of it.
         rate_now, rate_due: at its start, and at its middle if forces stay what they were.
         mobility: inverse of the effective mass.
-        same, of_tree: see ``AxisRow``.
+        same, of_tree: see ``CoordinateConstraint``.
     """
 
-    sides: tuple[Side, ...]
+    terms: tuple[BodyTerm, ...]
     seen: Directions
     given: Directions
     value: Expr
@@ -65,45 +65,49 @@ class AlongCoordinate:
     rate_due: Expr
     mobility: Expr
     same: bool
-    of_tree: OfTree | None
+    of_tree: TreeCoordinate | None
 
 
-def lock_row(setting: Setting, sockets: Sockets, motions: Moving, stretch: Stretch, same: bool) -> LockRow:
-    """What the joint locks; soft if it gives way (Catto, GDC 2011)."""
-    joint, start, middle = sockets.joint, ca.SX(0), stretch.duration / 2
-    now = sockets.placed(start)
-    sides, seen = sockets.sides(motions, middle, start), locked(joint, sockets.placed(middle))
-    k, error = regular_mobility(sides, seen, same), errors(joint, now)
-    share, softness = _softness(joint, ca.diag(k), setting.scheme.dt)
-    return LockRow(
-        sides=sides,
+@traced
+def lock_constraint(
+    settings: StepSettings, frames: JointFrames, motions: Motions, substep: SubstepTimes, same: bool
+) -> LockConstraint:
+    """The locked directions of a joint, rigid or soft (Catto, GDC 2011)."""
+    joint, start, middle = frames.joint, ca.SX(0), substep.duration / 2
+    now = frames.placed(start)
+    terms, seen = frames.terms(motions, middle, start), locked(joint, frames.placed(middle))
+    k, error = regular_mobility(terms, seen, same), errors(joint, now)
+    share, softness = _softness(joint, ca.diag(k), settings.scheme.dt)
+    return LockConstraint(
+        terms=terms,
         seen=seen,
         given_along=locked(joint, now),
         mass=inverse(k + ca.diag(softness)),
         softness=softness,
-        target=-share * error / setting.scheme.dt,
+        target=-share * error / settings.scheme.dt,
         error=error,
         axes=now.a,
         same=same,
     )
 
 
-def lock_now(sockets: Sockets, motions: Moving, momenta: tuple[Any, ...], same: bool) -> LockRow:
+@traced
+def lock_at_impact(frames: JointFrames, motions: Motions, momenta: tuple[Any, ...], same: bool) -> LockConstraint:
     """What the joint locks, at the instant of an impact: it changes no velocity unless something else does."""
     now = ca.SX(0)
-    placed = sockets.placed(now)
-    sides, seen = sockets.sides(motions, now, now), locked(sockets.joint, placed)
-    k = regular_mobility(sides, seen, same)
+    placed = frames.placed(now)
+    terms, seen = frames.terms(motions, now, now), locked(frames.joint, placed)
+    k = regular_mobility(terms, seen, same)
     zero = ca.SX(k.size1(), 1)
-    return LockRow(sides, seen, seen, inverse(k), zero, speeds(sides, seen, momenta), zero, placed.a, same)
+    return LockConstraint(terms, seen, seen, inverse(k), zero, speeds(terms, seen, momenta), zero, placed.a, same)
 
 
-def regular_mobility(sides: tuple[Side, ...], seen: Directions, same: bool) -> Expr:
+def regular_mobility(terms: tuple[BodyTerm, ...], seen: Directions, same: bool) -> Expr:
     """(n, n): with a trace of what a tree locks already, as the hinges of a parallelogram do."""
-    k = mobility(sides, seen, same)
-    if all(side.reach is None for side in sides):
+    k = mobility(terms, seen, same)
+    if all(term.jacobian is None for term in terms):
         return k
-    apart = tuple(replace(side, reach=None) for side in sides)
+    apart = tuple(replace(term, jacobian=None) for term in terms)
     return k + REDUNDANT * ca.diag(ca.diag(mobility(apart, seen, False)))
 
 
@@ -116,116 +120,145 @@ def _softness(joint: Joint, mobilities: Expr, dt: float) -> tuple[Expr, Expr]:
     return dt * stiffness / (damper + dt * stiffness), 1 / (dt * (damper + dt * stiffness))
 
 
-def along_coordinate(
-    sockets: Sockets, k: int, motions: Moving, momenta: tuple[Any, ...], duration: Expr, place: tuple[int, Any] | bool
-) -> AlongCoordinate:
-    """Coordinate ``k`` of a joint over a stretch.
+@traced
+def coordinate_terms(
+    frames: JointFrames,
+    k: int,
+    motions: Motions,
+    momenta: tuple[Any, ...],
+    duration: Expr,
+    place: tuple[int, Any] | bool,
+) -> CoordinateTerms:
+    """Coordinate ``k`` of a joint over a substep.
 
     Args:
-        sockets: of the joint.
+        frames: of the joint.
         k: which of its coordinates.
-        motions: of its moving sides.
-        momenta: what the sweeps know of them, before any impulse of the stretch.
-        duration: of the stretch [s].
-        place: of a joint of a tree: the index of its first coordinate and gains of the tree's chart; else whether both
-            sides are of one tree.
+        motions: of its bodies.
+        momenta: the velocities, before any impulse of the substep.
+        duration: of the substep [s].
+        place: of a joint of a tree: the index of its first coordinate, and the responses of the tree's coordinates;
+            else whether both bodies are of one tree.
     """
-    start, middle, coordinate = ca.SX(0), duration / 2, sockets.joint.kind.coordinates[k]
-    now, sides = sockets.placed(start), sockets.sides(motions, middle, start)
-    seen, given = free(coordinate, sockets.placed(middle)), free(coordinate, now)
+    start, middle, coordinate = ca.SX(0), duration / 2, frames.joint.kind.coordinates[k]
+    now, terms = frames.placed(start), frames.terms(motions, middle, start)
+    seen, given = free(coordinate, frames.placed(middle)), free(coordinate, now)
     before = tuple(Momentum(m.velocity, m.momentum_k) for m in motions)
     due = tuple(Momentum(m.mid_velocity, m.mid_momentum) for m in motions)
-    rate_now = speeds(tuple(replace(s, reach=None) for s in sockets.sides(motions, start, start)), given, before)
-    rate_due = speeds(tuple(replace(s, reach=None) for s in sides), seen, due)
+    rate_now = speeds(
+        tuple(replace(term, jacobian=None) for term in frames.terms(motions, start, start)), given, before
+    )
+    rate_due = speeds(tuple(replace(term, jacobian=None) for term in terms), seen, due)
     value = coordinate.value(now)
     if isinstance(place, bool):
-        rate, k_of = speeds(sides, seen, momenta), mobility(sides, seen, place)
-        return AlongCoordinate(sides, seen, given, value, rate, rate_now, rate_due, k_of, place, None)
-    index, gains = place[0] + k, place[1]
-    row, gain = gains[index]
-    rate = ca.mtimes(row, momenta[0].numbers)
-    return AlongCoordinate(
-        sides, seen, given, value, rate, rate_now, rate_due, ca.mtimes(row, gain), True, OfTree(row, gain)
+        rate, k_of = speeds(terms, seen, momenta), mobility(terms, seen, place)
+        return CoordinateTerms(terms, seen, given, value, rate, rate_now, rate_due, k_of, place, None)
+    index, responses = place[0] + k, place[1]
+    jacobian, response = responses[index]
+    rate = ca.mtimes(jacobian, momenta[0].numbers)
+    return CoordinateTerms(
+        terms,
+        seen,
+        given,
+        value,
+        rate,
+        rate_now,
+        rate_due,
+        ca.mtimes(jacobian, response),
+        True,
+        TreeCoordinate(jacobian, response),
     )
 
 
-def motor_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr, stretch: Stretch) -> AxisRow:
-    """A motor; the bounds of its torque are rounded off over what the knob makes of an effective mass."""
-    motor, width = joint.motor, setting.knob / at.mobility
+@traced
+def motor_constraint(
+    settings: StepSettings, joint: Joint, at: CoordinateTerms, command: Expr, substep: SubstepTimes
+) -> CoordinateConstraint:
+    """A motor; the bounds of its torque are rounded off over what the smoothing makes of an effective mass."""
+    motor, width = joint.motor, settings.smoothing / at.mobility
     if isinstance(motor, TorqueMotor):
-        torque = clip(command, -motor.torque, motor.torque, setting.knob)
-        return _row(at, by_law(-torque * stretch.kick, ca.SX(0), at.mobility), None, None, width)
+        torque = clip(command, -motor.torque, motor.torque, settings.smoothing)
+        return _constraint(at, by_law(-torque * substep.kick, ca.SX(0), at.mobility), None, None, width)
     assert isinstance(motor, Servo | VelocityMotor)
-    wanted = servo_velocity(motor, command, at.value, setting.knob) if isinstance(motor, Servo) else command
-    target = clip(wanted, -motor.velocity, motor.velocity, setting.knob)
-    most = motor.torque * stretch.kick
-    return _row(at, towards(target, at.mobility), -most, most, width)
+    wanted = servo_velocity(motor, command, at.value, settings.smoothing) if isinstance(motor, Servo) else command
+    target = clip(wanted, -motor.velocity, motor.velocity, settings.smoothing)
+    most = motor.torque * substep.kick
+    return _constraint(at, towards(target, at.mobility), -most, most, width)
 
 
-def servo_velocity(servo: Servo, command: Expr, value: Expr, knob: Expr) -> Expr:
-    """What a servo aims at, but for its bounds; rounding off its range changes velocities by the knob."""
+def servo_velocity(servo: Servo, command: Expr, value: Expr, smoothing: Expr) -> Expr:
+    """What a servo aims at, but for its bounds; rounding off its range changes velocities by the smoothing."""
     if servo.range is not None:
-        command = clip(command, -servo.range, servo.range, knob / servo.gain)
+        command = clip(command, -servo.range, servo.range, smoothing / servo.gain)
     return servo.gain * (command - value)
 
 
-def lower_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr, stretch: Stretch) -> AxisRow:
-    """A limit from below: it may be reached within the stretch, not passed, and pushes only.
+@traced
+def lower_limit(
+    settings: StepSettings, joint: Joint, at: CoordinateTerms, command: Expr, substep: SubstepTimes
+) -> CoordinateConstraint:
+    """A limit from below: it may be reached within the substep, not passed, and pushes only.
 
     What is beyond it is taken back by the position pass, without velocity.
     """
-    left, strikes = at.value - joint.limits.lower, _strikes(setting, at, -at.rate_now)
-    law = towards(-_room(left, strikes) / stretch.duration, at.mobility)
-    return _row(at, law, ca.SX(0), None, setting.knob / at.mobility, left + TIE * strikes, strikes)
+    left, strikes = at.value - joint.limits.lower, _strikes(settings, at, -at.rate_now)
+    law = towards(-_room(left, strikes) / substep.duration, at.mobility)
+    return _constraint(at, law, ca.SX(0), None, settings.smoothing / at.mobility, left + TIE * strikes, strikes)
 
 
-def upper_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr, stretch: Stretch) -> AxisRow:
+@traced
+def upper_limit(
+    settings: StepSettings, joint: Joint, at: CoordinateTerms, command: Expr, substep: SubstepTimes
+) -> CoordinateConstraint:
     """A limit from above."""
-    left, strikes = joint.limits.upper - at.value, _strikes(setting, at, at.rate_now)
-    law = towards(_room(left, strikes) / stretch.duration, at.mobility)
-    return _row(at, law, None, ca.SX(0), setting.knob / at.mobility, left + TIE * strikes, strikes)
+    left, strikes = joint.limits.upper - at.value, _strikes(settings, at, at.rate_now)
+    law = towards(_room(left, strikes) / substep.duration, at.mobility)
+    return _constraint(at, law, None, ca.SX(0), settings.smoothing / at.mobility, left + TIE * strikes, strikes)
 
 
 def _room(left: Expr, strikes: Expr) -> Expr:
-    """How far a limit may go within the stretch; by rounding more where it strikes, see ``rows.TIE``."""
+    """How far a limit may go within the substep; by rounding more where it strikes, see ``constraints.TIE``."""
     return ca.if_else(left < -TIE, 0, left) + TIE * strikes
 
 
-def _strikes(setting: Setting, at: AlongCoordinate, closing: Expr) -> Expr:
+def _strikes(settings: StepSettings, at: CoordinateTerms, closing: Expr) -> Expr:
     """1 if a limit is reached at speed: faster than what acts in two steps brings about."""
-    return closing > 4 * ca.fabs(at.rate - at.rate_now) + REACHED / setting.scheme.dt
+    return closing > 4 * ca.fabs(at.rate - at.rate_now) + REACHED / settings.scheme.dt
 
 
-def spring_row(setting: Setting, joint: Joint, at: AlongCoordinate, command: Expr, stretch: Stretch) -> AxisRow:
+@traced
+def spring_constraint(
+    settings: StepSettings, joint: Joint, at: CoordinateTerms, command: Expr, substep: SubstepTimes
+) -> CoordinateConstraint:
     """A spring and damper.
 
     The spring acts with k / (1 + (w dt)^2 / 3), w^2 = k / m: of second order, keeps energy and is stable at any k. The
     damper acts on the mean of the rates before and after: with all that acted in the step before, else what falls on it
     from then to now would count twice, an error of first order.
     """
-    spring, dt = joint.spring, setting.scheme.dt
+    spring, dt = joint.spring, settings.scheme.dt
     assert spring is not None
     stiffness = spring.stiffness / (1 + spring.stiffness * at.mobility * dt * dt / 3)
-    half = stretch.kick * spring.damping / 2
-    before = at.rate_now + (at.rate_due - at.rate_now) * (1 - 2 * stretch.kick / stretch.duration)
-    pull = stretch.kick * stiffness * (at.value - spring.rest) + half * before
-    return _row(at, by_law(pull, half, at.mobility), None, None, ca.SX(0))
+    half = substep.kick * spring.damping / 2
+    before = at.rate_now + (at.rate_due - at.rate_now) * (1 - 2 * substep.kick / substep.duration)
+    pull = substep.kick * stiffness * (at.value - spring.rest) + half * before
+    return _constraint(at, by_law(pull, half, at.mobility), None, None, ca.SX(0))
 
 
-ROWS = {"motor": motor_row, "lower": lower_row, "upper": upper_row, "spring": spring_row}
+CONSTRAINTS = {"motor": motor_constraint, "lower": lower_limit, "upper": upper_limit, "spring": spring_constraint}
 """By what acts along a coordinate."""
 
 
-def _row(
-    at: AlongCoordinate,
+def _constraint(
+    at: CoordinateTerms,
     law: dict[str, Expr],
     low: Expr | None,
     high: Expr | None,
     width: Expr,
     left: Expr | None = None,
     landing: Expr = NEVER,
-) -> AxisRow:
+) -> CoordinateConstraint:
     bounds = {"low": low, "high": high, "width": width, "left": left, "landing": landing}
-    return AxisRow(
-        at.sides, at.seen, at.given, **law, **bounds, same=at.same, of_tree=at.of_tree, inverse_mobility=1 / at.mobility
+    return CoordinateConstraint(
+        at.terms, at.seen, at.given, **law, **bounds, same=at.same, of_tree=at.of_tree, inverse_mobility=1 / at.mobility
     )

@@ -1,4 +1,4 @@
-"""Where the sockets of a joint are during a stretch, and the directions that follow."""
+"""Where the sockets of a joint are during a substep, and the directions that follow."""
 
 from __future__ import annotations
 
@@ -8,30 +8,31 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.collision.predicted_points import Course, Parabola, at_rest
-from symphys.dynamics.contact.constraint import Moving, Side, reach_of
+from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath, at_rest
+from symphys.dynamics.contact.body_term import BodyTerm, Motions, point_jacobian
 from symphys.dynamics.joints.joint_impulse import Directions
+from symphys.dynamics.tracing.decorator import traced
 from symphys.maths import rotation
-from symphys.model.joints import Coordinate, Joint, Placed
+from symphys.model.joints import Coordinate, Joint, PlacedFrames
 
 Expr = Any
 """casadi SX"""
 
 
 @dataclass(frozen=True)
-class Sockets:
-    """The courses of both sockets' points and axes; arms from the centres of mass, the world's from its origin."""
+class JointFrames:
+    """The paths of both sockets' points and axes; arms from the centres of mass, the world's from its origin."""
 
     joint: Joint
     centres: tuple[Parabola, Parabola]
     arms: tuple[Parabola, Parabola]
     axes: tuple[tuple[Parabola, ...], tuple[Parabola, ...]]
 
-    def placed(self, t: Expr) -> Placed:
+    def placed(self, t: Expr) -> PlacedFrames:
         """Both sockets at time t."""
         a, b = (ca.horzcat(*(axis.at(t) for axis in axes)) for axes in self.axes)
         first, second = (centre + arm for centre, arm in zip(self.centres, self.arms, strict=True))
-        return Placed(a, b, (first - second).at(t))
+        return PlacedFrames(a, b, (first - second).at(t))
 
     def lever_arms(self, t: Expr) -> tuple[Expr, Expr]:
         """(3,) each: from the centres of mass to the sockets; to the first one's for what slides."""
@@ -48,46 +49,49 @@ class Sockets:
         half = self.placed(t).apart / 2
         return first - half, second + half
 
-    def sides(self, motions: Moving, seen: Expr, given: Expr) -> tuple[Side, ...]:
-        """The moving sides of rows that see the sockets at one time and give impulses at another."""
+    def terms(self, motions: Motions, seen: Expr, given: Expr) -> tuple[BodyTerm, ...]:
+        """The bodies of constraints that see the sockets at one time and give impulses at another."""
         arms, impulse_arms = self.lever_arms(seen), self.common_arms(given)
         return tuple(
-            Side(
+            BodyTerm(
                 1 - 2 * k,
                 1 / motion.mass,
                 motion.inverse_inertia(seen),
                 arms[k],
                 impulse_arms[k],
-                reach_of(motion, seen, arms[k], impulse_arms[k]),
+                point_jacobian(motion, seen, arms[k], impulse_arms[k]),
             )
             for k, motion in enumerate(motions)
         )
 
 
-def sockets_of(joint: Joint, motions: Moving) -> Sockets:
-    """The sockets of a joint whose moving sides have these motions."""
-    return sockets_on(joint, [motion.course() for motion in motions])
+@traced
+def joint_frames(joint: Joint, motions: Motions) -> JointFrames:
+    """The sockets of a joint whose bodies have these motions."""
+    return joint_frames_on(joint, [motion.predicted_path() for motion in motions])
 
 
-def sockets_on(joint: Joint, courses: Sequence[Course]) -> Sockets:
-    """The sockets of a joint whose moving sides have these courses."""
-    courses = [*courses, *([at_rest(courses[0].dt)] if joint.second is None else [])]
+def joint_frames_on(joint: Joint, body_paths: Sequence[PredictedPath]) -> JointFrames:
+    """The sockets of a joint whose bodies have these paths."""
+    body_paths = [*body_paths, *([at_rest(body_paths[0].dt)] if joint.second is None else [])]
     axes = []
-    for course, socket in zip(courses, joint.sockets, strict=True):
+    for body_path, socket in zip(body_paths, joint.sockets, strict=True):
         turned = rotation.matrix(ca.SX(ca.vertcat(*socket.orientation)))
-        axes.append(tuple(course.arm(tuple(turned[i, j] for i in range(3))) for j in range(3)))
-    centres = courses[0].centre(), courses[1].centre()
-    arms = courses[0].arm(joint.sockets[0].point), courses[1].arm(joint.sockets[1].point)
-    return Sockets(joint, centres, arms, (axes[0], axes[1]))
+        axes.append(tuple(body_path.arm(tuple(turned[i, j] for i in range(3))) for j in range(3)))
+    centres = body_paths[0].centre(), body_paths[1].centre()
+    arms = body_paths[0].arm(joint.sockets[0].point), body_paths[1].arm(joint.sockets[1].point)
+    return JointFrames(joint, centres, arms, (axes[0], axes[1]))
 
 
-def sockets_at(joint: Joint, poses: tuple[tuple[Expr, Expr], ...]) -> Sockets:
-    """The sockets of a joint whose moving sides are at these positions and orientations."""
+def joint_frames_at(joint: Joint, poses: tuple[tuple[Expr, Expr], ...]) -> JointFrames:
+    """The sockets of a joint whose bodies are at these positions and orientations."""
     zero = ca.SX.zeros(3)
-    return sockets_on(joint, [Course(p, rotation.matrix(q), zero, zero, zero, zero, ca.SX(0)) for p, q in poses])
+    return joint_frames_on(
+        joint, [PredictedPath(p, rotation.matrix(q), zero, zero, zero, zero, ca.SX(0)) for p, q in poses]
+    )
 
 
-def locked(joint: Joint, placed: Placed) -> Directions:
+def locked(joint: Joint, placed: PlacedFrames) -> Directions:
     """The directions that a joint locks."""
     slides, turns = joint.kind.slides, joint.kind.turns
     return Directions(
@@ -96,14 +100,14 @@ def locked(joint: Joint, placed: Placed) -> Directions:
     )
 
 
-def errors(joint: Joint, placed: Placed) -> Expr:
+def errors(joint: Joint, placed: PlacedFrames) -> Expr:
     """(n,): how far the joint is from what it locks [m], [rad]."""
     slides, turns = joint.kind.slides, joint.kind.turns
     off = placed.apart if slides is None else ca.vertcat(*(ca.dot(placed.b[:, j], placed.apart) for j in slides))
     return ca.vertcat(off, *(ca.dot(placed.a[:, i], placed.b[:, j]) for i, j in turns))
 
 
-def free(coordinate: Coordinate, placed: Placed) -> Directions:
+def free(coordinate: Coordinate, placed: PlacedFrames) -> Directions:
     """The direction of a coordinate."""
     axis = coordinate.axis(placed).T
     return Directions(ca.SX(0, 3), axis) if coordinate.turns else Directions(axis, ca.SX(0, 3))

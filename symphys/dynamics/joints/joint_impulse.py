@@ -7,30 +7,30 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.contact import constraint as row
-from symphys.dynamics.contact.constraint import Side
+from symphys.dynamics.contact import body_term
+from symphys.dynamics.contact.body_term import BodyTerm
 
 Expr = Any
 """casadi SX"""
 
 
 @dataclass(frozen=True)
-class Along:
-    """Impulses (n,) on the first side [N s] or [N m s], along a row's directions."""
+class JointImpulse:
+    """Impulses (n,) on the first body [N s] or [N m s], along a constraint's directions."""
 
     numbers: Expr
 
-    def plus(self, other: Along) -> Along:
+    def plus(self, other: JointImpulse) -> JointImpulse:
         """The sum."""
-        return Along(self.numbers + other.numbers)
+        return JointImpulse(self.numbers + other.numbers)
 
-    def minus(self, other: Along) -> Along:
+    def minus(self, other: JointImpulse) -> JointImpulse:
         """The difference."""
-        return Along(self.numbers - other.numbers)
+        return JointImpulse(self.numbers - other.numbers)
 
-    def times(self, factor: Expr) -> Along:
+    def times(self, factor: Expr) -> JointImpulse:
         """A share of it."""
-        return Along(factor * self.numbers)
+        return JointImpulse(factor * self.numbers)
 
 
 @dataclass(frozen=True)
@@ -60,28 +60,28 @@ class Directions:
         return linear, ca.mtimes(self.turns.T, numbers[m:, 0])
 
 
-def speeds(sides: tuple[Side, ...], directions: Directions, momenta: tuple[Any, ...]) -> Expr:
-    """(n,): how fast the first side moves against the second along the directions."""
+def speeds(terms: tuple[BodyTerm, ...], directions: Directions, momenta: tuple[Any, ...]) -> Expr:
+    """(n,): how fast the first body moves against the second along the directions."""
     linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
-    for side, m in zip(sides, momenta, strict=True):
-        linear += side.sign * side.speed(m)
-        angular += side.sign * side.spin(m)
+    for term, m in zip(terms, momenta, strict=True):
+        linear += term.sign * term.speed(m)
+        angular += term.sign * term.spin(m)
     return directions.forwards(linear, angular)
 
 
-def kicked(
-    sides: tuple[Side, ...], directions: Directions, momenta: tuple[Any, ...], numbers: Expr, same: bool
+def apply_impulse(
+    terms: tuple[BodyTerm, ...], directions: Directions, momenta: tuple[Any, ...], numbers: Expr, same: bool
 ) -> tuple[Any, ...]:
-    """The momenta after impulses (n,); ``same``: both sides are of one tree of joints."""
-    return row.kicked(sides, momenta, *directions.split(numbers), same)
+    """The momenta after impulses (n,); ``same``: both bodies are of one tree of joints."""
+    return body_term.apply_impulse(terms, momenta, *directions.split(numbers), same)
 
 
-def mobility(sides: tuple[Side, ...], directions: Directions, same: bool) -> Expr:
+def mobility(terms: tuple[BodyTerm, ...], directions: Directions, same: bool) -> Expr:
     """(n, n): the velocities along the directions that unit impulses along them bring about."""
     n = (3 if directions.slides is None else directions.slides.size1()) + directions.turns.size1()
     columns = []
     for k in range(n):
         unit = ca.SX(n, 1)
         unit[k] = 1
-        columns.append(speeds(sides, directions, kicked(sides, directions, row.still(sides), unit, same)))
+        columns.append(speeds(terms, directions, apply_impulse(terms, directions, body_term.still(terms), unit, same)))
     return ca.horzcat(*columns)

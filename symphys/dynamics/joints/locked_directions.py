@@ -1,4 +1,4 @@
-"""The row of what a joint locks: all of its directions at once, by the inverse of their effective mass."""
+"""The constraint of what a joint locks: all of its directions at once, by the inverse of their effective mass."""
 
 from __future__ import annotations
 
@@ -7,31 +7,31 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.articulated.factorisation import eliminated
-from symphys.dynamics.contact.constraint import Side
-from symphys.dynamics.joints.joint_impulse import Along, Directions, kicked, speeds
+from symphys.dynamics.articulated.factorisation import factorise
+from symphys.dynamics.contact.body_term import BodyTerm
+from symphys.dynamics.joints.joint_impulse import Directions, JointImpulse, apply_impulse, speeds
 
 Expr = Any
 """casadi SX"""
 
 
 @dataclass(frozen=True)
-class LockRow:
-    """What a joint locks, as the sweeps see it.
+class LockConstraint:
+    """The locked directions of a joint, prepared for the sweeps.
 
     Attributes:
-        sides: arms at the row's instant, and to the common point for impulses.
-        seen, given_along: directions at the row's instant, and of impulses.
+        terms: arms at the constraint's instant, and to the common point for impulses.
+        seen, given_along: directions at the constraint's instant, and of impulses.
         mass: (n, n) inverse of mobility and softness.
-        softness: (n,) gamma of a joint that gives way, 0 if rigid.
-        target: (n,) velocities that the row asks for [m/s], [rad/s].
-        error: (n,) [m], [rad] at the start of the stretch.
+        softness: (n,) gamma of a joint that is soft, 0 if rigid.
+        target: (n,) velocities that the constraint asks for [m/s], [rad/s].
+        error: (n,) [m], [rad] at the start of the substep.
         axes: (3, 3) of the first socket at the start. Forces on a point are stored along these, so that they turn with
             the body: a rod's pull stays along the rod.
-        same: whether both sides are of one tree of joints.
+        same: whether both bodies are of one tree of joints.
     """
 
-    sides: tuple[Side, ...]
+    terms: tuple[BodyTerm, ...]
     seen: Directions
     given_along: Directions
     mass: Expr
@@ -45,25 +45,25 @@ class LockRow:
         """(n,): displacements by the directions moved to impulses times a time that close what is then left open."""
         return -ca.mtimes(self.mass, self.error + moved)
 
-    def carried(self, impulse: Along) -> Expr:
+    def carried(self, impulse: JointImpulse) -> Expr:
         """(n,): what is stored of an impulse; also of a force."""
         if self.given_along.slides is not None:
             return impulse.numbers
         return ca.vertcat(ca.mtimes(self.axes.T, impulse.numbers[:3, 0]), impulse.numbers[3:, 0])
 
-    def taken_up(self, stored: Expr) -> Along:
+    def taken_up(self, stored: Expr) -> JointImpulse:
         """The impulse that is stored so."""
-        return Along(stored if self.given_along.slides is not None else in_world(self.axes, stored))
+        return JointImpulse(stored if self.given_along.slides is not None else in_world(self.axes, stored))
 
-    def visit(self, momenta: tuple[Any, ...], old: Along) -> tuple[tuple[Any, ...], Along]:
-        """See ``pgs.Solvable``."""
-        miss = speeds(self.sides, self.seen, momenta) - self.target + self.softness * old.numbers
-        change = Along(-ca.mtimes(self.mass, miss))
-        return self.given(momenta, change), old.plus(change)
+    def project(self, momenta: tuple[Any, ...], old: JointImpulse) -> tuple[tuple[Any, ...], JointImpulse]:
+        """See ``VelocityConstraint``."""
+        miss = speeds(self.terms, self.seen, momenta) - self.target + self.softness * old.numbers
+        change = JointImpulse(-ca.mtimes(self.mass, miss))
+        return self.apply(momenta, change), old.plus(change)
 
-    def given(self, momenta: tuple[Any, ...], impulse: Along) -> tuple[Any, ...]:
-        """See ``pgs.Solvable``."""
-        return kicked(self.sides, self.given_along, momenta, impulse.numbers, self.same)
+    def apply(self, momenta: tuple[Any, ...], impulse: JointImpulse) -> tuple[Any, ...]:
+        """See ``VelocityConstraint``."""
+        return apply_impulse(self.terms, self.given_along, momenta, impulse.numbers, self.same)
 
 
 def in_world(axes: Expr, stored: Expr) -> Expr:
@@ -72,8 +72,8 @@ def in_world(axes: Expr, stored: Expr) -> Expr:
 
 
 def inverse(k: Expr) -> Expr:
-    """(n, n): of a mobility, which is not symmetric where impulses are given with other arms than seen."""
+    """(n, n): of a mobility, which is not symmetric where arms of impulses and velocities differ."""
     n = k.size1()
-    matrix = eliminated([{j: k[i, j] for j in range(n)} for i in range(n)])
+    matrix = factorise([{j: k[i, j] for j in range(n)} for i in range(n)])
     columns = (matrix.solve({j: ca.SX(1)}) for j in range(n))
     return ca.horzcat(*(ca.vertcat(*(column[i] for i in range(n))) for column in columns))

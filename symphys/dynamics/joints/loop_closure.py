@@ -8,97 +8,116 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.collision.contact_geometry import Shift
-from symphys.dynamics.contact.constraint import Side
-from symphys.dynamics.joints.coordinate_constraint import AxisRow
-from symphys.dynamics.joints.locked_directions import LockRow
-from symphys.dynamics.momentum import Rates
-from symphys.dynamics.motion import Held, Motion, apply
-from symphys.dynamics.pgs import Row
-from symphys.dynamics.tracing.trace import Pieces
+from symphys.dynamics.collision.contact_geometry import Displacement
+from symphys.dynamics.contact.body_term import BodyTerm
+from symphys.dynamics.joints.coordinate_constraint import CoordinateConstraint
+from symphys.dynamics.joints.locked_directions import LockConstraint
+from symphys.dynamics.motion import BodyJacobian, PredictedMotion, apply
+from symphys.dynamics.tracing.decorator import repeat, traced
+from symphys.dynamics.unknowns import GeneralizedVelocities, PlacedConstraint
 
 Expr = Any
 """casadi SX"""
-Shifts = tuple[Shift, ...]
-Displaced = Shift | Rates | None
+Displacements = tuple[Displacement, ...]
+TreeDisplacement = Displacement | GeneralizedVelocities | None
 """Of a body; of a tree along its coordinates, at its root; None for other bodies of a tree."""
-Fitted = tuple[tuple[Displaced, ...], tuple[Rates | None, ...]]
+ClosedLoops = tuple[tuple[TreeDisplacement, ...], tuple[GeneralizedVelocities | None, ...]]
 """Displacements, and of each tree with loops what their locks did to them."""
 
 
 @dataclass(frozen=True)
-class Fitting:
+class LoopPass:
     """What stays the same over the sweeps of the pass."""
 
-    motions: tuple[Motion, ...]
-    rows: tuple[Row, ...]
+    motions: tuple[PredictedMotion, ...]
+    constraints: tuple[PlacedConstraint, ...]
 
 
 def close_loops(
-    pieces: Pieces, sweeps: int, motions: tuple[Motion, ...], rows: tuple[Row, ...], along: Sequence[Displaced]
-) -> Fitted:
-    """Gauss-Seidel on displacements, over rows of locks and limits."""
-    looped = {each.carriers[0] for each in rows if isinstance(each.row, LockRow)}
-    still = tuple(pieces.do(_still, each) if i in looped else None for i, each in enumerate(along))
-    return pieces.repeat(sweeps, _fit_all, Fitting(motions, rows), (tuple(along), still))
+    sweeps: int,
+    motions: tuple[PredictedMotion, ...],
+    constraints: tuple[PlacedConstraint, ...],
+    along: Sequence[TreeDisplacement],
+) -> ClosedLoops:
+    """Gauss-Seidel on displacements, over constraints of locks and limits."""
+    looped = {each.carriers[0] for each in constraints if isinstance(each.constraint, LockConstraint)}
+    still = tuple(_still(each) if i in looped else None for i, each in enumerate(along))
+    return repeat(sweeps, _fit_all, LoopPass(motions, constraints), (tuple(along), still))
 
 
-def _still(along: Rates) -> Rates:
-    return Rates(ca.SX(along.numbers.size1(), 1))
+@traced
+def _still(along: TreeDisplacement) -> GeneralizedVelocities:
+    assert isinstance(along, GeneralizedVelocities)
+    return GeneralizedVelocities(ca.SX(along.numbers.size1(), 1))
 
 
-def displaced(held: Held | None, along: Displaced) -> Shift:
+@traced
+def displaced(jacobian: BodyJacobian | None, along: TreeDisplacement) -> Displacement:
     """A body's displacement."""
-    if held is not None and isinstance(along, Rates):
-        more = apply(held.see, along.numbers)
-        return Shift(more[:3], more[3:])
-    assert isinstance(along, Shift)
+    if jacobian is not None and isinstance(along, GeneralizedVelocities):
+        more = apply(jacobian.matrix, along.numbers)
+        return Displacement(more[:3], more[3:])
+    assert isinstance(along, Displacement)
     return along
 
 
-def _fit_all(pieces: Pieces, context: Fitting, state: Fitted) -> Fitted:
-    """One pass over all rows."""
+def _fit_all(fixed: LoopPass, state: ClosedLoops) -> ClosedLoops:
+    """One pass over all constraints."""
     along, made = list(state[0]), list(state[1])
-    for each in context.rows:
+    for each in fixed.constraints:
         before = tuple(along[i] for i in each.carriers)
         parts = zip(each.bodies, before, strict=True)
-        moved = tuple(pieces.do(displaced, context.motions[i].held, own) for i, own in parts)
-        after = pieces.do(_fit, each.row, moved, before)
+        moved = tuple(displaced(fixed.motions[i].jacobian, own) for i, own in parts)
+        after = _fit(each.constraint, moved, before)
         for i, own in zip(each.carriers, after, strict=True):
             along[i] = own
         root = each.carriers[0]
-        if isinstance(each.row, LockRow):
-            made[root] = pieces.do(_more, made[root], before[0], after[0])
+        if isinstance(each.constraint, LockConstraint):
+            made[root] = _more(made[root], before[0], after[0])
     return tuple(along), tuple(made)
 
 
-def _fit(row: LockRow | AxisRow, moved: Shifts, along: tuple[Displaced, ...]) -> tuple[Displaced, ...]:
+@traced
+def _fit(
+    constraint: LockConstraint | CoordinateConstraint, moved: Displacements, along: tuple[TreeDisplacement, ...]
+) -> tuple[TreeDisplacement, ...]:
     """Displacements after which the joint fits."""
-    push, twist = row.given_along.split(row.fitting(_relative(row, moved)))
-    if row.same:
+    push, twist = constraint.given_along.split(constraint.fitting(_relative(constraint, moved)))
+    if constraint.same:
         after = along[0]
-        for side in row.sides:
-            after = _pushed(side, after, push, twist)
-        return tuple(after for _ in row.sides)
-    return tuple(_pushed(side, own, push, twist) for side, own in zip(row.sides, along, strict=True))
+        for term in constraint.terms:
+            after = _pushed(term, after, push, twist)
+        return tuple(after for _ in constraint.terms)
+    return tuple(_pushed(term, own, push, twist) for term, own in zip(constraint.terms, along, strict=True))
 
 
-def _pushed(side: Side, along: Displaced, push: Expr, twist: Expr) -> Displaced:
-    if isinstance(along, Rates) and side.reach is not None:
-        return Rates(along.numbers + side.sign * (apply(side.reach.push, push) + apply(side.reach.twist, twist)))
-    assert isinstance(along, Shift)
-    turn = apply(side.inverse_inertia, ca.cross(side.impulse_arm, push) + twist)
-    return Shift(along.linear + side.sign * side.inverse_mass * push, along.angular + side.sign * turn)
+def _pushed(term: BodyTerm, along: TreeDisplacement, push: Expr, twist: Expr) -> TreeDisplacement:
+    if isinstance(along, GeneralizedVelocities) and term.jacobian is not None:
+        return GeneralizedVelocities(
+            along.numbers
+            + term.sign * (apply(term.jacobian.impulse_response, push) + apply(term.jacobian.torque_response, twist))
+        )
+    assert isinstance(along, Displacement)
+    turn = apply(term.inverse_inertia, ca.cross(term.impulse_arm, push) + twist)
+    return Displacement(along.linear + term.sign * term.inverse_mass * push, along.angular + term.sign * turn)
 
 
-def _more(made: Rates, before: Rates, after: Rates) -> Rates:
-    return Rates(made.numbers + after.numbers - before.numbers)
+@traced
+def _more(
+    made: GeneralizedVelocities | None, before: TreeDisplacement, after: TreeDisplacement
+) -> GeneralizedVelocities:
+    assert (
+        isinstance(made, GeneralizedVelocities)
+        and isinstance(before, GeneralizedVelocities)
+        and isinstance(after, GeneralizedVelocities)
+    )
+    return GeneralizedVelocities(made.numbers + after.numbers - before.numbers)
 
 
-def _relative(row: LockRow | AxisRow, moved: Shifts) -> Expr:
-    """Of the first side against the second along the row's directions, to third order in the rotation."""
+def _relative(constraint: LockConstraint | CoordinateConstraint, moved: Displacements) -> Expr:
+    """Of the first body against the second along the constraint's directions, to third order in the rotation."""
     linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
-    for side, shift in zip(row.sides, moved, strict=True):
-        linear += side.sign * (shift.linear + ca.cross(shift.angular, side.arm))
-        angular += side.sign * shift.angular
-    return row.seen.forwards(linear, angular)
+    for term, shift in zip(constraint.terms, moved, strict=True):
+        linear += term.sign * (shift.linear + ca.cross(shift.angular, term.arm))
+        angular += term.sign * shift.angular
+    return constraint.seen.forwards(linear, angular)

@@ -1,4 +1,4 @@
-"""What joints gave in a stretch: what is kept of it, and what it does to bodies where the next one begins."""
+"""What joints gave in a substep: what is kept of it, and what it does to bodies where the next one begins."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.articulated.configuration_update import Made
+from symphys.dynamics.articulated.configuration_update import JointCorrection
 from symphys.dynamics.articulated.forward_dynamics import consistent
-from symphys.dynamics.contact.constraint import ContactRow
-from symphys.dynamics.context import Scene, State
-from symphys.dynamics.joints.assembly import LIMITS, JointRow, own
-from symphys.dynamics.joints.coordinate_constraint import AxisRow
-from symphys.dynamics.joints.joint_frames import free, locked, sockets_at
-from symphys.dynamics.joints.joint_impulse import Along
-from symphys.dynamics.joints.locked_directions import LockRow, in_world
-from symphys.dynamics.momentum import Momenta, Momentum
-from symphys.dynamics.pgs import Row
-from symphys.model.joints import Joint, linkages, tree_joints
+from symphys.dynamics.contact.constraint import ContactConstraint
+from symphys.dynamics.context import State, StepContext
+from symphys.dynamics.joints.assembly import LIMITS, JointConstraint, own
+from symphys.dynamics.joints.coordinate_constraint import CoordinateConstraint
+from symphys.dynamics.joints.joint_frames import free, joint_frames_at, locked
+from symphys.dynamics.joints.joint_impulse import JointImpulse
+from symphys.dynamics.joints.locked_directions import LockConstraint, in_world
+from symphys.dynamics.tracing.decorator import traced
+from symphys.dynamics.unknowns import Momenta, Momentum, PlacedConstraint
+from symphys.model.joints import Joint, kinematic_trees, tree_joints
 from symphys.model.world import World
 
 Expr = Any
@@ -40,47 +40,65 @@ def components(world: World) -> list[frozenset[int]]:
     return found
 
 
-def kept(
-    scene: Scene, contacts: Sequence[Row], joints: Sequence[JointRow], given: Sequence[Along], x: State, kick: Expr
+def lasting_forces(
+    context: StepContext,
+    contacts: Sequence[PlacedConstraint],
+    joints: Sequence[JointConstraint],
+    given: Sequence[JointImpulse],
+    x: State,
+    kick: Expr,
 ) -> tuple[Struck, State]:
     """Which components an impact struck; and the forces of ``joints``, which gave ``given``, that last."""
-    struck = _struck(scene, contacts, joints, given)
-    return struck, _lasting_forces(scene, joints, given, struck, x, kick)
+    struck = _struck(context, contacts, joints, given)
+    return struck, _lasting_forces(context, joints, given, struck, x, kick)
 
 
-def _struck(scene: Scene, contacts: Sequence[Row], joints: Sequence[JointRow], given: Sequence[Along]) -> Struck:
+def _struck(
+    context: StepContext,
+    contacts: Sequence[PlacedConstraint],
+    joints: Sequence[JointConstraint],
+    given: Sequence[JointImpulse],
+) -> Struck:
     """Of each component: 1 if a contact or a limit of it is an impact, whose share of joint forces does not last."""
     found = {}
-    for group in components(scene.world):
-        meeting = tuple(each.row for each in contacts if group & set(each.bodies))
+    for group in components(context.world):
+        touching = tuple(each.constraint for each in contacts if group & set(each.bodies))
         limits = tuple(
-            (each.row.row, impulse)
+            (each.placed.constraint, impulse)
             for each, impulse in zip(joints, given, strict=True)
-            if group & set(each.row.bodies) and each.name.rpartition(".")[2] in LIMITS
+            if group & set(each.placed.bodies) and each.name.rpartition(".")[2] in LIMITS
         )
-        found[group] = scene.pieces.do(_any_struck, meeting, limits)
+        found[group] = _any_struck(touching, limits)
     return found
 
 
-def _any_struck(rows: tuple[ContactRow, ...], limits: tuple[tuple[AxisRow, Along], ...]) -> Expr:
-    struck = [ca.fmax(row.struck, row.leaving > 0) for row in rows]
-    struck += [ca.logic_and(row.landing, impulse.numbers != 0) for row, impulse in limits]
+@traced
+def _any_struck(
+    constraints: tuple[ContactConstraint, ...], limits: tuple[tuple[CoordinateConstraint, JointImpulse], ...]
+) -> Expr:
+    struck = [ca.fmax(constraint.struck, constraint.leaving > 0) for constraint in constraints]
+    struck += [ca.logic_and(constraint.landing, impulse.numbers != 0) for constraint, impulse in limits]
     return ca.mmax(ca.vertcat(ca.SX(0), *struck))
 
 
 def _lasting_forces(
-    scene: Scene, rows: Sequence[JointRow], given: Sequence[Along], struck: Struck, x: State, kick: Expr
+    context: StepContext,
+    constraints: Sequence[JointConstraint],
+    given: Sequence[JointImpulse],
+    struck: Struck,
+    x: State,
+    kick: Expr,
 ) -> State:
-    """Persistent forces of rows that sweeps visit.
+    """Persistent forces of constraints that sweeps project.
 
-    In a stretch with an impact those of the last one stay: what held the impact is not to be told from them.
+    In a substep with an impact those of the last one stay: what held the impact is not to be told from them.
     """
-    kept = dict[str, list[Expr]]()
-    for each, impulse in zip(rows, given, strict=True):
-        row, impact, old = each.row.row, of_body(struck, each.row.bodies[0]), x[each.name]
-        force = scene.pieces.do(_lasting, row, impulse, old, each.k, impact, kick, scene.shortest_kick)
-        kept.setdefault(each.name, []).append(force)
-    return {name: scene.pieces.do(_stacked, tuple(parts)) for name, parts in kept.items()}
+    forces = dict[str, list[Expr]]()
+    for each, impulse in zip(constraints, given, strict=True):
+        constraint, impact, old = each.placed.constraint, of_body(struck, each.placed.bodies[0]), x[each.name]
+        force = _lasting(constraint, impulse, old, each.k, impact, kick, context.shortest_kick)
+        forces.setdefault(each.name, []).append(force)
+    return {name: _stacked(tuple(parts)) for name, parts in forces.items()}
 
 
 def of_body(struck: Struck, body: int) -> Expr:
@@ -88,39 +106,48 @@ def of_body(struck: Struck, body: int) -> Expr:
     return next(impact for group, impact in struck.items() if body in group)
 
 
+@traced
 def _lasting(
-    row: LockRow | AxisRow, impulse: Along, old: Expr, k: int | None, struck: Expr, kick: Expr, shortest: float
+    constraint: LockConstraint | CoordinateConstraint,
+    impulse: JointImpulse,
+    old: Expr,
+    k: int | None,
+    struck: Expr,
+    kick: Expr,
+    shortest: float,
 ) -> Expr:
-    return ca.if_else(struck, own(old, k), row.carried(impulse) / ca.fmax(kick, shortest))
+    return ca.if_else(struck, own(old, k), constraint.carried(impulse) / ca.fmax(kick, shortest))
 
 
+@traced
 def _stacked(parts: tuple[Expr, ...]) -> Expr:
     return ca.vertcat(*parts)
 
 
-def hold(scene: Scene, forces: State, poses: Poses, total: Total) -> None:
+def add_joint_forces(context: StepContext, forces: State, poses: Poses, total: Total) -> None:
     """Adds to ``total`` what joint forces do to bodies at these poses: those at which the next step begins.
 
     What the joints of trees lock is left out: it does nothing along the free motions of the tree.
     """
-    exact = tree_joints(scene.world.joints)
-    for index, joint in enumerate(scene.world.joints):
+    exact = tree_joints(context.world.joints)
+    for index, joint in enumerate(context.world.joints):
         held = tuple(poses[i] for i in joint.bodies)
         names = joint.acting if index in exact else ("lock", *joint.acting)
         if not names:
             continue
         parts = tuple((part, forces[f"{joint.name}.{part}"]) for part in names)
-        found = scene.pieces.do(_on_bodies, joint, held, parts)
+        found = _on_bodies(joint, held, parts)
         for body, wrench in zip(joint.bodies, found, strict=True):
-            total[body] = scene.pieces.do(_added, total[body], wrench)
+            total[body] = _added(total[body], wrench)
 
 
+@traced
 def _on_bodies(
     joint: Joint, poses: tuple[tuple[Expr, Expr], ...], parts: tuple[tuple[str, Expr], ...]
 ) -> tuple[tuple[Expr, Expr], ...]:
     """Force and torque on each moving side."""
-    sockets, now = sockets_at(joint, poses), ca.SX(0)
-    placed, arms = sockets.placed(now), sockets.common_arms(now)
+    frames, now = joint_frames_at(joint, poses), ca.SX(0)
+    placed, arms = frames.placed(now), frames.common_arms(now)
     linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
     for part, numbers in parts:
         if part == "lock" and joint.kind.slides is None:
@@ -135,23 +162,27 @@ def _on_bodies(
     return (first, second)[: len(poses)]
 
 
+@traced
 def _added(total: tuple[Expr, Expr], wrench: tuple[Expr, Expr]) -> tuple[Expr, Expr]:
     return total[0] + wrench[0], total[1] + wrench[1]
 
 
-def keep_up(scene: Scene, momenta: Momenta, made: Mapping[int, Made], struck: Struck, duration: Expr) -> Momenta:
+def keep_momentum(
+    context: StepContext, momenta: Momenta, made: Mapping[int, JointCorrection], struck: Struck, duration: Expr
+) -> Momenta:
     """The momenta, with those that the displacements by joints stand for (as SHAKE has it), so that spin is kept.
 
-    Not those by loops in a stretch with an impact, where they make up for impulses that act late. They are no part of
+    Not those by loops in a substep with an impact, where they make up for impulses that act late. They are no part of
     the forces that the next sweeps start from.
     """
-    found, dt = list(momenta), scene.setting.scheme.dt
+    found, dt = list(momenta), context.settings.scheme.dt
     for i, more in made.items():
-        found[i] = scene.pieces.do(_kept_up, momenta[i], more, of_body(struck, i), duration, dt)
+        found[i] = _kept_up(momenta[i], more, of_body(struck, i), duration, dt)
     return tuple(found)
 
 
-def _kept_up(momentum: Momentum, made: Made, impact: Expr, duration: Expr, dt: float) -> Momentum:
+@traced
+def _kept_up(momentum: Momentum, made: JointCorrection, impact: Expr, duration: Expr, dt: float) -> Momentum:
     velocity, angular = made.by_tree.velocity, made.by_tree.angular
     if made.by_loops is not None:
         velocity += ca.if_else(impact, 0, made.by_loops.velocity)
@@ -160,23 +191,23 @@ def _kept_up(momentum: Momentum, made: Made, impact: Expr, duration: Expr, dt: f
     return Momentum(momentum.velocity + share * velocity, momentum.angular + share * angular)
 
 
-def fitting(
-    scene: Scene, momenta: Sequence[Momentum], poses: Poses, velocities: Sequence[tuple[Expr, Expr]]
+def project_velocities(
+    context: StepContext, momenta: Sequence[Momentum], poses: Poses, velocities: Sequence[tuple[Expr, Expr]]
 ) -> list[tuple[Expr, Expr]]:
     """Velocities and angular velocities; those of trees as they fit their joints at these poses.
 
     Args:
-        scene: what is simulated.
+        context: what is simulated.
         momenta: of the bodies.
         poses: of the bodies.
         velocities: of bodies that are not part of a tree.
     """
-    found, joints = list(velocities), scene.world.joints
-    for tree in linkages(joints):
+    found, joints = list(velocities), context.world.joints
+    for tree in kinematic_trees(joints):
         along = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
-        bodies = [scene.world.bodies[i] for i in tree.bodies]
+        bodies = [context.world.bodies[i] for i in tree.bodies]
         inertials = tuple((body.mass, body.inertia) for body in bodies)
         parts = tuple(poses[i] for i in tree.bodies), tuple(momenta[i] for i in tree.bodies)
-        for i, fits in zip(tree.bodies, consistent(scene.pieces, tree, along, inertials, *parts), strict=True):
+        for i, fits in zip(tree.bodies, consistent(tree, along, inertials, *parts), strict=True):
             found[i] = fits
     return found

@@ -8,7 +8,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.joints.joint_frames import Sockets, errors, free, sockets_at
+from symphys.dynamics.joints.joint_frames import JointFrames, errors, free, joint_frames_at
 from symphys.model.joints import Coordinate, Joint
 from symphys.model.state_layout import Layout
 from symphys.model.world import World
@@ -78,9 +78,9 @@ def _reading(world: World, layout: Layout, joint: Joint, x: Expr) -> Reading:
     names, coordinates = [world.bodies[i].name for i in joint.bodies], joint.kind.coordinates
     poses = tuple((x[layout[f"{name}.position"]], x[layout[f"{name}.orientation"]]) for name in names)
     motions = [(x[layout[f"{name}.velocity"]], x[layout[f"{name}.angular_velocity"]]) for name in names]
-    sockets = sockets_at(joint, poses)
-    placed, held = sockets.placed(ca.SX(0)), 3 if joint.kind.slides is None else len(joint.kind.slides)
-    rates = [_rate(sockets, coordinate, motions) for coordinate in coordinates]
+    frames = joint_frames_at(joint, poses)
+    placed, held = frames.placed(ca.SX(0)), 3 if joint.kind.slides is None else len(joint.kind.slides)
+    rates = [_rate(frames, coordinate, motions) for coordinate in coordinates]
     torque = x[layout[f"{joint.name}.motor"]] if joint.driven else ca.SX.zeros(len(coordinates))
     return Reading(
         value=ca.vertcat(ca.SX(0, 1), *(coordinate.value(placed) for coordinate in coordinates)),
@@ -91,10 +91,10 @@ def _reading(world: World, layout: Layout, joint: Joint, x: Expr) -> Reading:
     )
 
 
-def _rate(sockets: Sockets, coordinate: Coordinate, motions: list[Motion]) -> Expr:
-    """How fast the first side moves against the second along a coordinate."""
+def _rate(frames: JointFrames, coordinate: Coordinate, motions: list[Motion]) -> Expr:
+    """How fast the first body moves against the second along a coordinate."""
     linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
-    for sign, arm, (velocity, spin) in zip((1, -1), sockets.lever_arms(ca.SX(0)), motions, strict=False):
+    for sign, arm, (velocity, spin) in zip((1, -1), frames.lever_arms(ca.SX(0)), motions, strict=False):
         linear += sign * (velocity + ca.cross(spin, arm))
         angular += sign * spin
-    return free(coordinate, sockets.placed(ca.SX(0))).forwards(linear, angular)
+    return free(coordinate, frames.placed(ca.SX(0))).forwards(linear, angular)

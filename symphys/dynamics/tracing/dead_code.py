@@ -1,4 +1,4 @@
-"""Pieces without the numbers that nobody reads: parts give all that somebody may want, each world reads some of it."""
+"""Dead-code elimination: traced calls without the results, and the entries of results, that no later call uses."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.tracing.recording import Piece, Slot
+from symphys.dynamics.tracing.recording import TracedCall, TracedVector
 
 Expr = Any
 """casadi SX"""
@@ -16,62 +16,62 @@ Words = tuple[int, ...]
 """Places in a slot, in order."""
 
 
-def trimmed(pieces: Sequence[Piece]) -> tuple[Piece, ...]:
-    """Pieces that give the same named slots; what lies in the others lies closer together."""
-    return _Trimming(pieces).pieces()
+def without_dead_code(calls: Sequence[TracedCall]) -> tuple[TracedCall, ...]:
+    """The calls with the same named results; other vectors hold only the entries that are used."""
+    return _Trimming(calls).calls()
 
 
 class _Trimming:
-    """Which words of each slot are read, and the functions that are left."""
+    """The entries of each vector that are used, and the functions that are left."""
 
-    def __init__(self, pieces: Sequence[Piece]) -> None:
-        self._pieces = pieces
-        self._read: dict[Slot, set[int]] = {}
+    def __init__(self, calls: Sequence[TracedCall]) -> None:
+        self._calls = calls
+        self._read: dict[TracedVector, set[int]] = {}
         self._needs: dict[tuple[int, tuple[Words, ...]], list[set[int]]] = {}
         self._functions: dict[Any, ca.Function] = {}
-        for piece in reversed(pieces):
-            for slot, words in zip(piece.inputs, self._needed(piece), strict=True):
+        for call in reversed(calls):
+            for slot, words in zip(call.inputs, self._needed(call), strict=True):
                 self._read.setdefault(slot, set()).update(words)
 
-    def pieces(self) -> tuple[Piece, ...]:
+    def calls(self) -> tuple[TracedCall, ...]:
         """Those of which something is read."""
-        return tuple(self._trimmed(piece) for piece in self._pieces if any(map(self._kept, piece.outputs)))
+        return tuple(self._trimmed(call) for call in self._calls if any(map(self._kept, call.outputs)))
 
-    def _kept(self, slot: Slot) -> Words:
+    def _kept(self, slot: TracedVector) -> Words:
         return tuple(range(slot.size)) if slot.name else tuple(sorted(self._read.get(slot, ())))
 
-    def _needed(self, piece: Piece) -> list[set[int]]:
-        """The words of its inputs that a piece needs for what is read of it."""
-        key = piece.function.__hash__(), tuple(map(self._kept, piece.outputs))
+    def _needed(self, call: TracedCall) -> list[set[int]]:
+        """The words of its inputs that a call needs for what is read of it."""
+        key = call.function.__hash__(), tuple(map(self._kept, call.outputs))
         if key not in self._needs:
-            symbols: list[Expr] = [ca.SX.sym("a", slot.size) for slot in piece.inputs]
-            found = _symbols_of(_results(piece.function, symbols, key[1]))
+            symbols: list[Expr] = [ca.SX.sym("a", slot.size) for slot in call.inputs]
+            found = _symbols_of(_results(call.function, symbols, key[1]))
             self._needs[key] = [
                 {k for k, entry in enumerate(column.nonzeros()) if entry.element_hash() in found} for column in symbols
             ]
         return self._needs[key]
 
-    def _trimmed(self, piece: Piece) -> Piece:
-        inputs = [slot for slot, words in zip(piece.inputs, self._needed(piece), strict=True) if words]
-        outputs = [slot for slot in piece.outputs if self._kept(slot)]
-        return Piece(self._function(piece), tuple(map(self._closer, inputs)), tuple(map(self._closer, outputs)))
+    def _trimmed(self, call: TracedCall) -> TracedCall:
+        inputs = [slot for slot, words in zip(call.inputs, self._needed(call), strict=True) if words]
+        outputs = [slot for slot in call.outputs if self._kept(slot)]
+        return TracedCall(self._function(call), tuple(map(self._closer, inputs)), tuple(map(self._closer, outputs)))
 
-    def _closer(self, slot: Slot) -> Slot:
+    def _closer(self, slot: TracedVector) -> TracedVector:
         return slot if slot.name else replace(slot, size=len(self._kept(slot)))
 
-    def _function(self, piece: Piece) -> ca.Function:
+    def _function(self, call: TracedCall) -> ca.Function:
         """The function from what is kept of the inputs to what is kept of the outputs."""
-        kept, given = tuple(map(self._kept, piece.inputs)), tuple(map(self._kept, piece.outputs))
-        key = piece.function.__hash__(), kept, given
+        kept, given = tuple(map(self._kept, call.inputs)), tuple(map(self._kept, call.outputs))
+        key = call.function.__hash__(), kept, given
         if key not in self._functions:
             symbols, columns = [], []
-            for slot, words, needed in zip(piece.inputs, kept, self._needed(piece), strict=True):
+            for slot, words, needed in zip(call.inputs, kept, self._needed(call), strict=True):
                 column = ca.SX(slot.size, 1)
                 if needed:
                     symbols.append(ca.SX.sym("a", len(words)))
                     column[list(words)] = symbols[-1]
                 columns.append(ca.densify(column))
-            results = [result for result in _results(piece.function, columns, given) if result.numel()]
+            results = [result for result in _results(call.function, columns, given) if result.numel()]
             self._functions[key] = ca.Function("piece", symbols, results)
         return self._functions[key]
 

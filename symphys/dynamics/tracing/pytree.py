@@ -10,6 +10,8 @@ from typing import Any
 
 import casadi as ca
 
+from symphys.dynamics.tracing.decorator import traced
+
 Expr = Any
 """casadi SX"""
 
@@ -28,11 +30,27 @@ Code = float | tuple[int, int]
 
 
 @dataclass(frozen=True)
-class Numbers:
-    """A matrix by its entries' codes, column by column; what lies between two parts of a step."""
+class TracedMatrix:
+    """A matrix between two traced calls, by the codes of its entries, column by column.
+
+    Arithmetic with it is traced; functions of casadi are called in traced functions.
+    """
 
     leaf: Leaf
     codes: tuple[Code, ...]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.leaf.rows, self.leaf.columns
+
+    __add__, __radd__ = traced(lambda a, b: a + b), traced(lambda a, b: b + a)
+    __sub__, __rsub__ = traced(lambda a, b: a - b), traced(lambda a, b: b - a)
+    __mul__, __rmul__ = traced(lambda a, b: a * b), traced(lambda a, b: b * a)
+    __truediv__, __rtruediv__ = traced(lambda a, b: a / b), traced(lambda a, b: b / a)
+    __lt__, __gt__ = traced(lambda a, b: a < b), traced(lambda a, b: a > b)
+    __neg__ = traced(lambda a: -a)
+    __getitem__ = traced(lambda a, index: a[index])
 
 
 @dataclass(frozen=True)
@@ -55,7 +73,7 @@ def dismantle(tree: Any, leaves: list[Expr]) -> Hashable:
     Whatever is neither a matrix nor a fork (numbers, texts, functions) belongs to the shape.
     """
     kind = type(tree)
-    if kind is Numbers:
+    if kind is TracedMatrix:
         leaves.append(tree)
         return tree.leaf  # type: ignore[no-any-return]
     if kind is list or kind is tuple:

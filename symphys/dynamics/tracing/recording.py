@@ -1,20 +1,20 @@
-"""A step as a list of small functions instead of one expression: each part that the step does is a piece.
+"""A step as a list of calls of small functions, instead of one expression.
 
-What a piece gives becomes fresh symbols, so that what follows depends on these and not on how they came about. Pieces
-of equal bodies, pairs and sweeps are equal functions, which a compiler then sees once. What is asked for twice, of the
-same numbers, is computed once.
+The results of a call are fresh symbols, so that later calls depend on these and not on how they were computed. Calls
+for equal bodies, pairs and sweeps are of equal functions, which a compiler then compiles once. Equal calls with equal
+arguments are recorded once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import casadi as ca
 
-from symphys.dynamics.tracing.pytree import Code, Numbers, dismantle, outline, rebuild
-from symphys.dynamics.tracing.trace import Once, Pieces
+from symphys.dynamics.tracing.pytree import Code, TracedMatrix, dismantle, outline, rebuild
+from symphys.dynamics.tracing.trace import Tracer
 
 T = TypeVar("T")
 Expr = Any
@@ -22,13 +22,13 @@ Expr = Any
 
 
 @dataclass(frozen=True)
-class Slot:
-    """Numbers that lie side by side: a named part of the state or an argument of the step, or what a piece gave.
+class TracedVector:
+    """Contiguous numbers: a named part of the state, an argument of the step, or a result of a call.
 
     Attributes:
-        name: of an argument, or of a part of the next state; "" for what a piece gave.
+        name: of an argument, or of a part of the next state; "" for a result of a call.
         size: how many.
-        number: tells slots apart.
+        number: distinguishes them; the slot of the codes in ``pytree``.
     """
 
     name: str
@@ -37,52 +37,52 @@ class Slot:
 
 
 @dataclass(frozen=True)
-class Piece:
-    """An SX function from slots to slots."""
+class TracedCall:
+    """A call of an SX function of vectors, which returns vectors."""
 
     function: ca.Function
-    inputs: tuple[Slot, ...]
-    outputs: tuple[Slot, ...]
+    inputs: tuple[TracedVector, ...]
+    outputs: tuple[TracedVector, ...]
 
 
-class Recorder(Pieces):
-    """Collects the pieces of a step."""
+class Recorder(Tracer):
+    """Records the calls of a step."""
 
     def __init__(self) -> None:
         """Nothing yet."""
         super().__init__()
-        self.pieces: list[Piece] = []
-        self._slots: list[Slot] = []
+        self.calls: list[TracedCall] = []
+        self._slots: list[TracedVector] = []
         self._adopted: list[Expr] = []
         self._given: dict[tuple[int, tuple[int, ...]], Sequence[int]] = {}
 
     def argument(self, name: str, symbols: Expr) -> None:
         """A slot for an argument of the step."""
-        self._slots.append(Slot(name, symbols.numel(), self.take(symbols)))
+        self._slots.append(TracedVector(name, symbols.numel(), self.take(symbols)))
 
-    def give(self, name: str, values: Sequence[Expr]) -> Slot:
-        """A piece that puts values side by side."""
-        tree = self.do(_side_by_side, tuple(values))
+    def give(self, name: str, values: Sequence[Expr]) -> TracedVector:
+        """A call that puts values side by side."""
+        stacked = self.call(_side_by_side, (tuple(values),), {})
         slots: dict[int, int] = {}
-        codes = [(slots.setdefault(c[0], len(slots)), c[1]) if isinstance(c, tuple) else c for c in tree.codes]
+        codes = [(slots.setdefault(c[0], len(slots)), c[1]) if isinstance(c, tuple) else c for c in stacked.codes]
         symbols = [ca.SX.sym("a", self._slots[k].size) for k in slots]
         entries = [ca.SX(c) if isinstance(c, float) else symbols[c[0]][c[1]] for c in codes]
         function = self.shared(ca.Function("piece", symbols, [ca.vertcat(*entries)]))
         (given,) = self._add(name, function, list(slots))
         return self._slots[given]
 
-    def repeat(self, count: int, once: Once[T], context: Any, state: T) -> T:
-        """See ``Pieces``; as soon as it repeats itself its pieces are copied."""
-        before, template = state, list[Piece]()
+    def repeat(self, count: int, once: Callable[[Any, T], T], context: Any, state: T) -> T:
+        """See ``Tracer``; as soon as it repeats itself its calls are copied."""
+        before, template = state, list[TracedCall]()
         for _ in range(count):
             slots = self._alike(before, state)
             if template and slots is not None:
                 before, state = state, self._copy(template, slots, state)
-                template = self.pieces[-len(template) :]
+                template = self.calls[-len(template) :]
             else:
-                first = len(self.pieces)
-                before, state = state, once(self, context, state)
-                template = self.pieces[first:]
+                first = len(self.calls)
+                before, state = state, once(context, state)
+                template = self.calls[first:]
         return state
 
     def _adopt(self, column: Expr) -> None:
@@ -111,27 +111,27 @@ class Recorder(Pieces):
                 return None
         return slots if len(old) == len(new) else None
 
-    def _copy(self, template: list[Piece], slots: dict[int, int], after: T) -> T:
+    def _copy(self, template: list[TracedCall], slots: dict[int, int], after: T) -> T:
         """The state one time later: as ``template`` led to ``after``, its copy leads on from there."""
-        for piece in template:
-            inputs = [slots.get(slot.number, slot.number) for slot in piece.inputs]
-            given = self._add("", piece.function, inputs)
-            slots |= dict(zip((slot.number for slot in piece.outputs), given, strict=True))
+        for call in template:
+            inputs = [slots.get(slot.number, slot.number) for slot in call.inputs]
+            given = self._add("", call.function, inputs)
+            slots |= dict(zip((slot.number for slot in call.outputs), given, strict=True))
         leaves: list[Expr] = []
         shape = dismantle(after, leaves)
         renamed: T = rebuild(shape, (self._renamed(leaf, slots) for leaf in leaves))
         return renamed
 
-    def _renamed(self, leaf: Expr, slots: dict[int, int]) -> Numbers:
-        codes = leaf.codes if isinstance(leaf, Numbers) else self._codes(leaf)
+    def _renamed(self, leaf: Expr, slots: dict[int, int]) -> TracedMatrix:
+        codes = leaf.codes if isinstance(leaf, TracedMatrix) else self._codes(leaf)
         new = [c if isinstance(c, float) else (slots.get(c[0], c[0]), c[1]) for c in codes]
-        return Numbers(leaf.leaf if isinstance(leaf, Numbers) else outline(leaf), tuple(new))
+        return TracedMatrix(leaf.leaf if isinstance(leaf, TracedMatrix) else outline(leaf), tuple(new))
 
     def _codes_of(self, tree: Any) -> list[Code]:
         """The codes of all entries of a tree, in order."""
         leaves: list[Expr] = []
         dismantle(tree, leaves)
-        return [c for leaf in leaves for c in (leaf.codes if isinstance(leaf, Numbers) else self._codes(leaf))]
+        return [c for leaf in leaves for c in (leaf.codes if isinstance(leaf, TracedMatrix) else self._codes(leaf))]
 
     def _size(self, code: tuple[int, int]) -> int:
         return self._slots[code[0]].size
@@ -140,8 +140,8 @@ class Recorder(Pieces):
         first = len(self._slots)
         for k in range(function.n_out()):
             symbols = ca.SX.sym("kept", function.numel_out(k))
-            self._slots.append(Slot(name, symbols.numel(), self.take(symbols)))
-        self.pieces.append(Piece(function, tuple(self._slots[k] for k in slots), tuple(self._slots[first:])))
+            self._slots.append(TracedVector(name, symbols.numel(), self.take(symbols)))
+        self.calls.append(TracedCall(function, tuple(self._slots[k] for k in slots), tuple(self._slots[first:])))
         return range(first, len(self._slots))
 
 

@@ -1,28 +1,29 @@
-"""The step's parts as functions that are built once: equal parts of equal structure share one casadi function.
+"""The calls of a step as functions that are built once: equal calls of equal structure share one casadi function.
 
-The step says ``pieces.do(part, *arguments)`` where ``part`` is a Python function of trees of expressions. The first
-time it is called with symbols in place of all that varies, and what it gives becomes a casadi function. From then on
-that function is called: by ``Inline`` within one expression, by a ``Recorder`` as a piece of its own. Numbers that are
-constants stay constants, so that what is zero costs nothing. A part must depend on its arguments alone.
+The first time a traced function is called with arguments of some structure it is called with symbols in place of all
+that varies, and its result becomes a casadi function. From then on that function is called: by ``InlineTracer`` within
+one expression, by a ``Recorder`` as a call of its own. Entries that are constants stay constants, so that
+structural zeros cost nothing.
 
-What parts give lies in slots, columns of numbers; members of a tuple that are trees themselves have slots of their own,
-so that what comes next sees each of them alike. Between parts a tree's matrices are ``Numbers``, which say where
-their entries lie; only inside a part they are expressions. Arithmetic therefore belongs into parts.
+Results lie in slots, columns of numbers; members of a tuple that are trees themselves have slots of their own, so that
+later calls have the same structure for each of them. Between calls a tree's matrices are ``TracedMatrix``, which store
+where their entries lie.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import casadi as ca
 
+from symphys.dynamics.tracing.decorator import tracing
 from symphys.dynamics.tracing.pytree import (
     Code,
     Leaf,
-    Numbers,
+    TracedMatrix,
     dismantle,
     leaves_of,
     matrix,
@@ -34,29 +35,28 @@ from symphys.dynamics.tracing.pytree import (
 T = TypeVar("T")
 Expr = Any
 """casadi SX"""
-Once = Callable[["Pieces", Any, T], T]
 
 
 @dataclass(frozen=True)
 class Template:
-    """A part as a casadi function.
+    """A traced function for arguments of one structure, as a casadi function.
 
     Attributes:
-        function: of the slots in ``used``, gives columns of what has to be computed; None if that is nothing.
+        function: of the slots in ``used``, returns columns of what has to be computed; None if that is nothing.
         used: which of the slots that the arguments lie in.
-        shape: of the tree that the part gives.
+        shape: of the tree that it returns.
         matrices: of that tree, in order. A code's slot is one of those that the arguments lie in, or -1, -2 .. for the
-            first, the second .. that the function gives.
+            first, the second .. that the function returns.
     """
 
     function: ca.Function | None
     used: tuple[int, ...]
     shape: Any
-    matrices: tuple[Numbers, ...]
+    matrices: tuple[TracedMatrix, ...]
 
 
-class Pieces(ABC):
-    """How the parts of a step are put together."""
+class Tracer(ABC):
+    """Calls traced functions; see ``decorator``."""
 
     def __init__(self) -> None:
         """Nothing yet."""
@@ -66,9 +66,11 @@ class Pieces(ABC):
         self._templates: dict[Hashable, Template] = {}
         self._functions: dict[str, ca.Function] = {}
 
-    @abstractmethod
-    def repeat(self, count: int, once: Once[T], context: Any, state: T) -> T:
-        """The state after ``count`` times ``state = once(pieces, context, state)``."""
+    def repeat(self, count: int, once: Callable[[Any, T], T], context: Any, state: T) -> T:
+        """The state after ``count`` times ``state = once(context, state)``."""
+        for _ in range(count):
+            state = once(context, state)
+        return state
 
     @abstractmethod
     def _apply(self, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
@@ -88,26 +90,26 @@ class Pieces(ABC):
 
     def value(self, leaf: Expr) -> Expr:
         """A leaf of a tree as an expression."""
-        if not isinstance(leaf, Numbers):
+        if not isinstance(leaf, TracedMatrix):
             return leaf
         entries = [ca.SX(c) if isinstance(c, float) else self._entries[c[0]][c[1]] for c in leaf.codes]
         return matrix(leaf.leaf, entries)
 
-    def do(self, part: Callable[..., T], *arguments: Any) -> T:
-        """``part(*arguments)``."""
+    def call(self, function: Callable[..., T], arguments: tuple[Any, ...], named: dict[str, Any]) -> T:
+        """``function(*arguments, **named)``."""
         leaves: list[Expr] = []
-        shape = dismantle(arguments, leaves)
+        shape = dismantle((arguments, named), leaves)
         slots: dict[int, int] = {}
         known: list[tuple[Code, ...]] = []
         for leaf in leaves:
-            codes = leaf.codes if isinstance(leaf, Numbers) else self._codes(leaf)
+            codes = leaf.codes if isinstance(leaf, TracedMatrix) else self._codes(leaf)
             known.append(
                 tuple([c if isinstance(c, float) else (slots.setdefault(c[0], len(slots)), c[1]) for c in codes])
             )
-        key = (part, shape, tuple(known), tuple([self._columns[slot].numel() for slot in slots]))
+        key = (function, shape, tuple(known), tuple([self._columns[slot].numel() for slot in slots]))
         template = self._templates.get(key)
         if template is None:
-            template = self._templates[key] = self._build(part, shape, known, [self._columns[slot] for slot in slots])
+            template = self._templates[key] = self._build(function, shape, known, slots)
         tree: T = self._fill(template, list(slots))
         return tree
 
@@ -119,18 +121,20 @@ class Pieces(ABC):
             self._adopt(ca.vertcat(*fresh))
         return tuple(float(e) if e.is_constant() else self._homes[e.element_hash()] for e in entries)
 
-    def _build(self, part: Callable[..., Any], shape: Any, known: Sequence[Any], columns: Sequence[Expr]) -> Template:
-        """The template of a part for arguments of this structure."""
-        symbols = [ca.SX.sym("a", column.numel()) for column in columns]
+    def _build(self, function: Callable[..., Any], shape: Any, known: Sequence[Any], slots: Iterable[int]) -> Template:
+        """The template of a function for arguments of this structure."""
+        symbols = [ca.SX.sym("a", self._columns[slot].numel()) for slot in slots]
         entries: list[list[Expr]] = [symbol.nonzeros() for symbol in symbols]
         outlines: list[Leaf] = []
         leaves_of(shape, outlines)
-        arguments = (
+        expressions = (
             matrix(leaf, [ca.SX(c) if isinstance(c, float) else entries[c[0]][c[1]] for c in codes])
             for leaf, codes in zip(outlines, known, strict=True)
         )
         results: list[Expr] = []
-        result_shape = dismantle(part(*rebuild(shape, arguments)), results)
+        arguments, named = rebuild(shape, expressions)
+        with tracing(None):
+            result_shape = dismantle(function(*arguments, **named), results)
         given = _Given(entries)
         leaves = zip(map(self.value, results), slots_of(result_shape), strict=True)
         matrices = tuple(given.placed(leaf, slot) for leaf, slot in leaves)
@@ -139,8 +143,8 @@ class Pieces(ABC):
         columns = ca.cse([ca.vertcat(*column) for column in given.columns.values()])
         needed = {symbol.element_hash() for symbol in ca.symvar(ca.vertcat(*columns))}
         used = [k for k, column in enumerate(entries) if any(e.element_hash() in needed for e in column)]
-        function = self.shared(ca.Function("piece", [symbols[k] for k in used], columns))
-        return Template(function, tuple(used), result_shape, matrices)
+        built = self.shared(ca.Function("piece", [symbols[k] for k in used], columns))
+        return Template(built, tuple(used), result_shape, matrices)
 
     def shared(self, function: ca.Function) -> ca.Function:
         """A function, or an equal one that was there before."""
@@ -151,20 +155,14 @@ class Pieces(ABC):
         if template.function is not None:
             slots = [*slots, *reversed(self._apply(template.function, [slots[k] for k in template.used]))]
         filled = (
-            Numbers(m.leaf, tuple([c if isinstance(c, float) else (slots[c[0]], c[1]) for c in m.codes]))
+            TracedMatrix(m.leaf, tuple([c if isinstance(c, float) else (slots[c[0]], c[1]) for c in m.codes]))
             for m in template.matrices
         )
         return rebuild(template.shape, filled)
 
 
-class Inline(Pieces):
-    """All parts in one expression."""
-
-    def repeat(self, count: int, once: Once[T], context: Any, state: T) -> T:
-        """See ``Pieces``."""
-        for _ in range(count):
-            state = once(self, context, state)
-        return state
+class InlineTracer(Tracer):
+    """All calls in one expression."""
 
     def _adopt(self, column: Expr) -> None:
         self.take(column)
@@ -184,9 +182,9 @@ class _Given:
         self.columns: dict[int, list[Expr]] = {}
         self._homes = {e.element_hash(): (k, j) for k, column in enumerate(entries) for j, e in enumerate(column)}
 
-    def placed(self, matrix: Expr, slot: int) -> Numbers:
+    def placed(self, matrix: Expr, slot: int) -> TracedMatrix:
         """The codes of a matrix, whose numbers go to a slot if they lie nowhere yet."""
-        return Numbers(outline(matrix), tuple([self._code(number, slot) for number in matrix.nonzeros()]))
+        return TracedMatrix(outline(matrix), tuple([self._code(number, slot) for number in matrix.nonzeros()]))
 
     def _code(self, number: Expr, slot: int) -> Code:
         if number.is_constant():

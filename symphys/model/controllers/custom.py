@@ -13,26 +13,26 @@ Expr = Any
 
 
 @dataclass(frozen=True, eq=False)
-class Given:
-    """u = function(sensed, time, weights); see ``Law``. The function must be expandable to scalar operations (SX)."""
+class Custom:
+    """u = function(sensed, time, weights); see ``ControlLaw``. The function must expand to scalar operations (SX)."""
 
     function: ca.Function
 
     @property
     def senses(self) -> int:
-        """See ``Law``."""
+        """See ``ControlLaw``."""
         return int(self.function.numel_in(0))
 
     @property
     def outputs(self) -> int:
-        """See ``Law``."""
+        """See ``ControlLaw``."""
         return int(self.function.numel_out(0))
 
     @property
     def sizes(self) -> Mapping[str, int]:
-        """See ``Law``."""
+        """See ``ControlLaw``."""
         return {"weights": int(self.function.numel_in(2))}
 
     def act(self, sensed: Expr, time: Expr, numbers: Mapping[str, Expr]) -> Expr:
-        """See ``Law``."""
+        """See ``ControlLaw``."""
         return self.function(sensed, time, numbers["weights"])

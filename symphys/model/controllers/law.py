@@ -9,7 +9,7 @@ Expr = Any
 """casadi SX or MX"""
 
 
-class Law(Protocol):
+class ControlLaw(Protocol):
     """Outputs of m numbers from n that are sensed and from the time."""
 
     @property

@@ -14,18 +14,18 @@ Expr = Any
 
 @dataclass(frozen=True)
 class Linear:
-    """u = K o + b; see ``Law``. ``gains`` holds K row by row (m n,), ``offsets`` b (m,)."""
+    """u = K o + b; see ``ControlLaw``. ``gains`` holds K row by row (m n,), ``offsets`` b (m,)."""
 
     senses: int
     outputs: int
 
     @property
     def sizes(self) -> Mapping[str, int]:
-        """See ``Law``."""
+        """See ``ControlLaw``."""
         return {"gains": self.outputs * self.senses, "offsets": self.outputs}
 
     def act(self, sensed: Expr, time: Expr, numbers: Mapping[str, Expr]) -> Expr:
-        """See ``Law``."""
+        """See ``ControlLaw``."""
         return rows_times(numbers["gains"], sensed, self.outputs) + numbers["offsets"]
 
 

@@ -36,7 +36,7 @@ class Layer(NamedTuple):
 
 @dataclass(frozen=True)
 class Net:
-    """A multi-layer perceptron; see ``Law``.
+    """A multi-layer perceptron; see ``ControlLaw``.
 
     Its numbers are one column, ``weights``: for each layer the matrix row by row, then its biases; last, with ``skip``,
     a matrix that leads from what is sensed straight to the outputs, row by row.
@@ -59,7 +59,7 @@ class Net:
 
     @property
     def sizes(self) -> Mapping[str, int]:
-        """See ``Law``."""
+        """See ``ControlLaw``."""
         layers = tuple(self.layers())
         return {"weights": layers[-1].biases.stop + (self.outputs * self.senses if self.skip else 0)}
 
@@ -80,7 +80,7 @@ class Net:
             start = end
 
     def act(self, sensed: Expr, time: Expr, numbers: Mapping[str, Expr]) -> Expr:
-        """See ``Law``."""
+        """See ``ControlLaw``."""
         weights, value = numbers["weights"], sensed
         for layer in self.layers():
             value = activated(layer.activation, raw(layer, weights, value))

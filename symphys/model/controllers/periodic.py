@@ -14,7 +14,7 @@ Expr = Any
 
 @dataclass(frozen=True)
 class Periodic:
-    """u = b + sum over h = 1 .. harmonics of s_h sin(2 pi h f t) + c_h cos(2 pi h f t); see ``Law``.
+    """u = b + sum over h = 1 .. harmonics of s_h sin(2 pi h f t) + c_h cos(2 pi h f t); see ``ControlLaw``.
 
     ``frequency`` f [Hz], ``offsets`` b (m,), ``sines`` and ``cosines`` (m harmonics,): s_1, s_2, ... one after the
     other. Nothing is sensed.
@@ -26,12 +26,12 @@ class Periodic:
 
     @property
     def sizes(self) -> Mapping[str, int]:
-        """See ``Law``."""
+        """See ``ControlLaw``."""
         count = self.outputs * self.harmonics
         return {"frequency": 1, "offsets": self.outputs, "sines": count, "cosines": count}
 
     def act(self, sensed: Expr, time: Expr, numbers: Mapping[str, Expr]) -> Expr:
-        """See ``Law``."""
+        """See ``ControlLaw``."""
         result = numbers["offsets"]
         for h in range(self.harmonics):
             phase = 2 * ca.pi * (h + 1) * numbers["frequency"] * time

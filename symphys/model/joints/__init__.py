@@ -4,8 +4,8 @@ from symphys.model.joints.ball import BALL
 from symphys.model.joints.fixed import FIXED
 from symphys.model.joints.hinge import HINGE
 from symphys.model.joints.joint import Joint, Limits, Socket, Spring
-from symphys.model.joints.kind import Coordinate, Kind, Placed
-from symphys.model.joints.kinematic_tree import Link, Linkage, carriers, linkages, tree_joints
+from symphys.model.joints.kind import Coordinate, Kind, PlacedFrames
+from symphys.model.joints.kinematic_tree import KinematicTree, Link, carriers, kinematic_trees, tree_joints
 from symphys.model.joints.motor import Motor, Servo, TorqueMotor, VelocityMotor
 from symphys.model.joints.slider import SLIDER
 from symphys.model.joints.universal import UNIVERSAL
@@ -22,17 +22,17 @@ __all__ = [
     "Coordinate",
     "Joint",
     "Kind",
+    "KinematicTree",
     "Limits",
     "Link",
-    "Linkage",
     "Motor",
-    "Placed",
+    "PlacedFrames",
     "Servo",
     "Socket",
     "Spring",
     "TorqueMotor",
     "VelocityMotor",
     "carriers",
-    "linkages",
+    "kinematic_trees",
     "tree_joints",
 ]

@@ -6,13 +6,13 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.model.joints.kind import Coordinate, Kind, Placed
+from symphys.model.joints.kind import Coordinate, Kind, PlacedFrames
 
 Expr = Any
 """casadi SX, MX or DM"""
 
 
-def angle(placed: Placed) -> Expr:
+def angle(placed: PlacedFrames) -> Expr:
     """In [-pi, pi] [rad]: of the first side's y and z against the second's, about x."""
     a, b = placed.a, placed.b
     cos = ca.dot(a[:, 1], b[:, 1]) + ca.dot(a[:, 2], b[:, 2])
@@ -20,7 +20,7 @@ def angle(placed: Placed) -> Expr:
     return ca.atan2(sin, cos)
 
 
-def axis(placed: Placed) -> Expr:
+def axis(placed: PlacedFrames) -> Expr:
     """X of the second side."""
     return placed.b[:, 0]
 

@@ -55,7 +55,7 @@ class Joint:
         first, second: indices of bodies; second None: the world. Coordinates are those of the first against the second.
         sockets: of the first and of the second.
         motor, limits, spring: along every coordinate.
-        frequency, damping: [Hz] and damping ratio of a joint that gives way (Catto, GDC 2011); 0 is a rigid one.
+        frequency, damping: [Hz] and damping ratio of a joint that is soft (Catto, GDC 2011); 0 is a rigid one.
     """
 
     name: str
@@ -76,7 +76,7 @@ class Joint:
 
     @property
     def soft(self) -> bool:
-        """Whether it gives way; a matter of structure, so never a symbol's value."""
+        """Whether it is soft; a matter of structure, so never a symbol's value."""
         return not (isinstance(self.frequency, int | float) and self.frequency == 0)
 
     @property

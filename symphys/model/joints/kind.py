@@ -15,7 +15,7 @@ Expr = Any
 
 
 @dataclass(frozen=True)
-class Placed:
+class PlacedFrames:
     """Both sockets of a joint in the world.
 
     Attributes:
@@ -42,8 +42,8 @@ class Coordinate:
 
     name: str
     turns: bool
-    value: Callable[[Placed], Expr]
-    axis: Callable[[Placed], Expr]
+    value: Callable[[PlacedFrames], Expr]
+    axis: Callable[[PlacedFrames], Expr]
     fixed_in_first: bool = False
 
 

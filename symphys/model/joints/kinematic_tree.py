@@ -1,6 +1,6 @@
 """Which bodies hang together by rigid joints, as trees: their velocities are those of coordinates that joints leave.
 
-Joints that close a loop or give way are no part of a tree; sweeps visit them as they visit contacts.
+Joints that close a loop or are soft are no part of a tree; sweeps project them as they project contacts.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Link:
 
 
 @dataclass(frozen=True)
-class Linkage:
+class KinematicTree:
     """A tree of two bodies or more, or of one that is held by the world; parents come before children."""
 
     links: tuple[Link, ...]
@@ -61,7 +61,7 @@ class Linkage:
         return self.links[-1].start + self.links[-1].count
 
 
-def linkages(joints: Sequence[Joint]) -> tuple[Linkage, ...]:
+def kinematic_trees(joints: Sequence[Joint]) -> tuple[KinematicTree, ...]:
     """The trees of a world with these joints."""
     seen: set[int] = set()
     found = []
@@ -69,19 +69,19 @@ def linkages(joints: Sequence[Joint]) -> tuple[Linkage, ...]:
         if root not in seen:
             links = tuple(_grown(joints, root))
             seen |= {link.body for link in links}
-            found.append(Linkage(links))
+            found.append(KinematicTree(links))
     return tuple(found)
 
 
 def tree_joints(joints: Sequence[Joint]) -> frozenset[int]:
     """The indices of joints that trees hold exactly."""
-    return frozenset(link.joint for tree in linkages(joints) for link in tree.links if link.joint is not None)
+    return frozenset(link.joint for tree in kinematic_trees(joints) for link in tree.links if link.joint is not None)
 
 
 def carriers(count: int, joints: Sequence[Joint]) -> tuple[int, ...]:
     """For each of ``count`` bodies where the sweeps keep its velocities: at the root of its tree, or at itself."""
     found = list(range(count))
-    for tree in linkages(joints):
+    for tree in kinematic_trees(joints):
         for body in tree.bodies:
             found[body] = tree.root
     return tuple(found)

@@ -6,18 +6,18 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.model.joints.kind import Coordinate, Kind, Placed
+from symphys.model.joints.kind import Coordinate, Kind, PlacedFrames
 
 Expr = Any
 """casadi SX, MX or DM"""
 
 
-def position(placed: Placed) -> Expr:
+def position(placed: PlacedFrames) -> Expr:
     """[m] along x."""
     return ca.dot(placed.apart, placed.b[:, 0])
 
 
-def axis(placed: Placed) -> Expr:
+def axis(placed: PlacedFrames) -> Expr:
     """X of the second side."""
     return placed.b[:, 0]
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.maths import rotation
-from symphys.model.joints import Placed
+from symphys.model.joints import PlacedFrames
 from symphys.problem.parametric.joints import WORLD, JointPlan
 from symphys.problem.reading.faults import Faults
 from symphys.problem.tables.joint_frames import pose
@@ -108,14 +108,14 @@ def side(start: str, cut: JointPlan, tree: Tree) -> list[str]:
     return list(found)
 
 
-def sockets(plan: JointPlan, state: State) -> tuple[Placed, Array]:
+def sockets(plan: JointPlan, state: State) -> tuple[PlacedFrames, Array]:
     """Both sockets in the world, and (3,) [m] where the second is."""
     axes, points = [], []
     for name, socket in zip((plan.first, plan.second or WORLD), plan.sockets, strict=True):
         lies = pose(name, state)
         axes.append(lies.axes @ np.array(rotation.matrix(np.array(socket.orientation)), float))
         points.append(lies.to_world(np.array(socket.point)))
-    return Placed(axes[0], axes[1], points[0] - points[1]), points[1]
+    return PlacedFrames(axes[0], axes[1], points[0] - points[1]), points[1]
 
 
 def carry_body(name: str, base: str, motion: Motion, state: State) -> None:

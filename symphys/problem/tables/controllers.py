@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.model.controllers import Given, Law, Linear, Net, Periodic
+from symphys.model.controllers import ControlLaw, Custom, Linear, Net, Periodic
 from symphys.problem.checks.memory import check_net
 from symphys.problem.feedback import Controller, Sensor
 from symphys.problem.quantities import Quantity, SlotError, read_slot
@@ -123,7 +123,7 @@ class Reader:
         self.faults.add(self.place, f"{start} one of {', '.join(KINDS.values())}")
         return None
 
-    def law(self, kind: str, senses: int, outputs: int) -> Law | None:
+    def law(self, kind: str, senses: int, outputs: int) -> ControlLaw | None:
         """How outputs follow; None where it cannot be."""
         table = self.table
         if kind == "function":
@@ -142,7 +142,7 @@ class Reader:
         fits = check_net((*self.place, "net", "hidden"), law.sizes["weights"], self.varied, self.faults)
         return law if fits else None
 
-    def function(self, senses: int, outputs: int) -> Law | None:
+    def function(self, senses: int, outputs: int) -> ControlLaw | None:
         """The function that Python gives, if its sizes fit."""
         given = self.functions.get(self.table.name)
         if given is None:
@@ -160,9 +160,9 @@ class Reader:
             if has != needs:
                 self.add("function", f"has {has} {what}; {needs} are needed")
                 return None
-        return Given(given)
+        return Custom(given)
 
-    def numbers(self, kind: str, key: str, size: int, law: Law) -> Array:
+    def numbers(self, kind: str, key: str, size: int, law: ControlLaw) -> Array:
         """(size,) the law's numbers at the start."""
         table = getattr(self.table, kind)
         if isinstance(table, NetTable) and isinstance(law, Net):

@@ -96,7 +96,7 @@ def sloped(first: str, second: str, terrain: bool = False) -> tuple[ca.Function,
     surface = Terrain("waves", lambda x, y: 0.1 * ca.sin(3 * x) * ca.cos(2 * y)) if terrain else None
     symbols = arguments(first, second)
     found = contacts(first, second, symbols, False, surface)
-    frames = [c.meeting.frame(c.time) for c in found]
+    frames = [c.geometry.frame(c.time) for c in found]
     numbers = [ca.vertcat(c.gap, c.rate, c.time, f.normal, *f.arms) for c, f in zip(found, frames, strict=True)]
     z, result = ca.vertcat(*symbols), ca.densify(ca.horzcat(*numbers))
     way = ca.SX.sym("way", z.numel())

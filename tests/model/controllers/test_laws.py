@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from symphys.model.controllers import Law, Linear, Net, Periodic
+from symphys.model.controllers import ControlLaw, Linear, Net, Periodic
 
 Array = NDArray[np.float64]
 RNG = np.random.default_rng(4)
 
 
-def act(law: Law, sensed: Array, time: float, numbers: Mapping[str, Array]) -> Array:
+def act(law: ControlLaw, sensed: Array, time: float, numbers: Mapping[str, Array]) -> Array:
     """The outputs as numbers, by way of SX."""
     symbols = {key: ca.SX.sym(key, size) for key, size in law.sizes.items()}
     o, t = ca.SX.sym("o", law.senses), ca.SX.sym("t")
@@ -24,7 +24,7 @@ def act(law: Law, sensed: Array, time: float, numbers: Mapping[str, Array]) -> A
     return np.array(function(sensed, time, *(numbers[key] for key in symbols))).ravel()
 
 
-def numbers_for(law: Law) -> dict[str, Array]:
+def numbers_for(law: ControlLaw) -> dict[str, Array]:
     """Random ones."""
     return {key: RNG.standard_normal(size) for key, size in law.sizes.items()}
 

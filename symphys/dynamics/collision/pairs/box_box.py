@@ -17,9 +17,9 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.collision.box_geometry import Face, Nearing, block, faces_and_edges, facing, nearing
+from symphys.dynamics.collision.box_geometry import Face, Nearing, faces_and_edges, facing, moving_box, nearing
 from symphys.dynamics.collision.contact_geometry import Contact, flipped
-from symphys.dynamics.collision.predicted_points import Course, Parabola
+from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.dynamics.collision.witness_points import Witness, contact_of
 from symphys.model.shapes import Box
 
@@ -34,18 +34,18 @@ FLAT = 1e-9
 
 
 @dataclass(frozen=True)
-class Approach:
+class BoxApproach:
     """How two boxes come near each other.
 
     Attributes:
-        bodies: courses of the bodies that carry them.
-        normal: course of the direction that keeps them apart, from the second to the first.
+        bodies: paths of the bodies that carry them.
+        normal: path of the direction that keeps them apart, from the second to the first.
         time: when they are expected to meet [s].
         apart: 1 if they stay apart over the step.
         far: the gap that points have which are no candidates [m].
     """
 
-    bodies: tuple[Course, Course]
+    bodies: tuple[PredictedPath, PredictedPath]
     normal: Parabola
     time: Expr
     apart: Expr
@@ -57,19 +57,19 @@ class Approach:
         met = contact_of(Witness(points, arms, normal, (radius, 0.0), ca.logic_not(on), self.far, self.bodies[0].dt))
         return replace(met, hit=ca.logic_and(met.hit, ca.logic_not(self.apart)))
 
-    def flipped(self) -> Approach:
+    def flipped(self) -> BoxApproach:
         """Seen from the other box."""
         return replace(self, bodies=(self.bodies[1], self.bodies[0]), normal=-1 * self.normal)
 
 
-def approach_of(near: Nearing, bodies: tuple[Course, Course], size: Expr) -> Approach:
+def approach_of(near: Nearing, bodies: tuple[PredictedPath, PredictedPath], size: Expr) -> BoxApproach:
     """Of two boxes of a size."""
-    return Approach(bodies, near.direction, near.time, near.apart, ca.fmax(near.distance, 0) + size)
+    return BoxApproach(bodies, near.direction, near.time, near.apart, ca.fmax(near.distance, 0) + size)
 
 
-def box_box(first: Box, second: Box, a: Course, b: Course) -> list[Contact]:
+def box_box(first: Box, second: Box, a: PredictedPath, b: PredictedPath) -> list[Contact]:
     """Sixteen points: the corners of each face over the other, and where their edges cross."""
-    one, other = block(first, a), block(second, b)
+    one, other = moving_box(first, a), moving_box(second, b)
     near = nearing(one, other, *faces_and_edges(one, other), a.dt)
     approach = approach_of(near, (a, b), sum(first.half_sizes) + sum(second.half_sizes))
     normal, time = approach.normal.at(near.time), near.time
@@ -81,7 +81,7 @@ def box_box(first: Box, second: Box, a: Course, b: Course) -> list[Contact]:
     ]
 
 
-def corners_over(face: Face, ground: Face, approach: Approach) -> list[Contact]:
+def corners_over(face: Face, ground: Face, approach: BoxApproach) -> list[Contact]:
     """The corners of a face over the other."""
     found, t = [], approach.time
     for corner in face.corners():
@@ -99,7 +99,7 @@ def held(x: Expr, half: Expr) -> Expr:
     return ca.fmin(ca.fmax(x, -half), half)
 
 
-def edges_across(corners: list[Parabola], ground: Face, approach: Approach, radius: Expr = 0.0) -> list[Contact]:
+def edges_across(corners: list[Parabola], ground: Face, approach: BoxApproach, radius: Expr = 0.0) -> list[Contact]:
     """Where the edges between corners, a closed polygon or a single edge, enter and leave the region over a face."""
     flat = [seen_along(corner.at(approach.time), ground, approach) for corner in corners]
     found = []
@@ -117,7 +117,7 @@ def edges_across(corners: list[Parabola], ground: Face, approach: Approach, radi
     return found
 
 
-def seen_along(point: Expr, ground: Face, approach: Approach) -> tuple[Expr, Expr]:
+def seen_along(point: Expr, ground: Face, approach: BoxApproach) -> tuple[Expr, Expr]:
     """Where a point lies on a face's plane, seen along the normal of the approach."""
     t, n = approach.time, approach.normal.at(approach.time)
     away, upright = point - ground.centre.at(t), ground.normal.at(t)

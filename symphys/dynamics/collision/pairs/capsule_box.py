@@ -7,21 +7,24 @@ the capsule.
 from __future__ import annotations
 
 from symphys.dynamics.collision.body_points import axes, ends
-from symphys.dynamics.collision.box_geometry import Block, block, facing, nearing
+from symphys.dynamics.collision.box_geometry import MovingBox, facing, moving_box, nearing
 from symphys.dynamics.collision.contact_geometry import Contact, flipped
 from symphys.dynamics.collision.pairs.box_box import approach_of, edges_across
 from symphys.dynamics.collision.pairs.sphere_box import BoxField
 from symphys.dynamics.collision.pairs.sphere_capsule import CapsuleField
-from symphys.dynamics.collision.predicted_points import Course
+from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.collision.signed_distance import ball_in_field
 from symphys.model.shapes import Box, Capsule
 
 
-def capsule_box(capsule: Capsule, box: Box, a: Course, b: Course) -> list[Contact]:
+def capsule_box(capsule: Capsule, box: Box, a: PredictedPath, b: PredictedPath) -> list[Contact]:
     """Eight points: the round ends, the side across the box's face, the corners of that face."""
     field, tips = BoxField(box.half_sizes), ends(capsule)
     found = [ball_in_field(a.path(end), a.arm(end), capsule.radius, box, field, b) for end in tips]
-    rod, other = Block(a.path(capsule.centre), axes(a, capsule), (0.0, 0.0, capsule.half_length)), block(box, b)
+    rod, other = (
+        MovingBox(a.path(capsule.centre), axes(a, capsule), (0.0, 0.0, capsule.half_length)),
+        moving_box(box, b),
+    )
     edges = [rod.axes[2].cross(edge) for edge in other.axes]
     near = nearing(rod, other, list(other.axes), edges, a.dt, capsule.radius)
     approach = approach_of(near, (a, b), capsule.half_length + sum(box.half_sizes))

@@ -11,7 +11,7 @@ import casadi as ca
 from symphys.dynamics.collision.body_points import axes, ends
 from symphys.dynamics.collision.contact_geometry import Contact, Expr, flipped
 from symphys.dynamics.collision.pairs.sphere_capsule import CapsuleField
-from symphys.dynamics.collision.predicted_points import Course, Parabola, chosen
+from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath, chosen
 from symphys.dynamics.collision.signed_distance import ball_in_field
 from symphys.dynamics.collision.time_of_impact import contact_along
 from symphys.dynamics.collision.witness_points import Witness, contact_of, steady
@@ -22,7 +22,7 @@ PARALLEL = 1e-6
 """Square of the sine of the angle below which axes count as parallel."""
 
 
-def capsule_capsule(first: Capsule, second: Capsule, a: Course, b: Course) -> list[Contact]:
+def capsule_capsule(first: Capsule, second: Capsule, a: PredictedPath, b: PredictedPath) -> list[Contact]:
     """Five points: the ends of the first, the ends of the second, and between."""
     return [
         *on_capsule(first, second, a, b),
@@ -31,13 +31,13 @@ def capsule_capsule(first: Capsule, second: Capsule, a: Course, b: Course) -> li
     ]
 
 
-def on_capsule(first: Capsule, second: Capsule, a: Course, b: Course) -> list[Contact]:
+def on_capsule(first: Capsule, second: Capsule, a: PredictedPath, b: PredictedPath) -> list[Contact]:
     """The round ends of the first against the second."""
     field = CapsuleField(second.radius, second.half_length)
     return [ball_in_field(a.path(end), a.arm(end), first.radius, second, field, b) for end in ends(first)]
 
 
-def crossing(first: Capsule, second: Capsule, a: Course, b: Course) -> Contact:
+def crossing(first: Capsule, second: Capsule, a: PredictedPath, b: PredictedPath) -> Contact:
     """The contact between the ends of both; off where the nearest points are ends or the axes parallel."""
     centres, lines = (a.path(first.centre), b.path(second.centre)), (axes(a, first)[2], axes(b, second)[2])
     apart, across = centres[0] - centres[1], lines[0].cross(lines[1])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from symphys.dynamics.collision.contact_geometry import Contact, Expr
-from symphys.dynamics.collision.predicted_points import Course
+from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.collision.signed_distance import ball_in_field
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.shapes import Box, Sphere
@@ -49,7 +49,7 @@ class BoxField:
         return ca.vertcat(x, y, ca.logic_not(ca.logic_or(x, y)))
 
 
-def sphere_box(sphere: Sphere, box: Box, a: Course, b: Course) -> list[Contact]:
+def sphere_box(sphere: Sphere, box: Box, a: PredictedPath, b: PredictedPath) -> list[Contact]:
     """One point."""
     path, arm = a.path(sphere.centre), a.arm(sphere.centre)
     return [ball_in_field(path, arm, sphere.radius, box, BoxField(box.half_sizes), b)]

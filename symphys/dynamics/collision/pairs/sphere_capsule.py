@@ -8,7 +8,7 @@ import casadi as ca
 
 from symphys.dynamics.collision.contact_geometry import Contact, Expr
 from symphys.dynamics.collision.pairs.sphere_sphere import direction, distance
-from symphys.dynamics.collision.predicted_points import Course
+from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.collision.signed_distance import ball_in_field
 from symphys.model.shapes import Capsule, Sphere
 
@@ -33,7 +33,7 @@ class CapsuleField:
         return ca.vertcat(point[0], point[1], point[2] - along)
 
 
-def sphere_capsule(sphere: Sphere, capsule: Capsule, a: Course, b: Course) -> list[Contact]:
+def sphere_capsule(sphere: Sphere, capsule: Capsule, a: PredictedPath, b: PredictedPath) -> list[Contact]:
     """One point."""
     field = CapsuleField(capsule.radius, capsule.half_length)
     return [ball_in_field(a.path(sphere.centre), a.arm(sphere.centre), sphere.radius, capsule, field, b)]

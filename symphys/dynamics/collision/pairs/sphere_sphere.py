@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from symphys.dynamics.collision.contact_geometry import Contact, Expr, Frame, Shift
-from symphys.dynamics.collision.predicted_points import Course, Parabola
+from symphys.dynamics.collision.contact_geometry import Contact, Displacement, Expr, Frame
+from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.dynamics.collision.time_of_impact import NEWTON_STEPS, TINY_RATE, falls, no_later
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.shapes import Sphere
@@ -18,26 +18,26 @@ TINY_LENGTH = 1e-12
 
 @dataclass(frozen=True)
 class OnSphere:
-    """Two spheres: courses and arms of their centres, radii [m]."""
+    """Two spheres: paths and arms of their centres, radii [m]."""
 
     paths: tuple[Parabola, Parabola]
     arms: tuple[Parabola, Parabola]
     radii: tuple[Expr, Expr]
 
     def frame(self, t: Expr) -> Frame:
-        """See ``Meeting``."""
+        """See ``ContactGeometry``."""
         (a, b), (arm_a, arm_b), (r_a, r_b) = self.paths, self.arms, self.radii
         normal = direction((a - b).at(t))
         return Frame(normal, (arm_a.at(t) - r_a * normal, arm_b.at(t) + r_b * normal))
 
-    def gap_after(self, first: Shift, second: Shift) -> Expr:
-        """See ``Meeting``."""
+    def gap_after(self, first: Displacement, second: Displacement) -> Expr:
+        """See ``ContactGeometry``."""
         (a, b), (arm_a, arm_b) = self.paths, self.arms
         apart = first.moved(a.start, arm_a.start) - second.moved(b.start, arm_b.start)
         return distance(apart) - self.radii[0] - self.radii[1]
 
 
-def sphere_sphere(ball_a: Sphere, ball_b: Sphere, a: Course, b: Course) -> list[Contact]:
+def sphere_sphere(ball_a: Sphere, ball_b: Sphere, a: PredictedPath, b: PredictedPath) -> list[Contact]:
     """One point."""
     paths = a.path(ball_a.centre), b.path(ball_b.centre)
     path, reach = paths[0] - paths[1], ball_a.radius + ball_b.radius
@@ -48,7 +48,7 @@ def sphere_sphere(ball_a: Sphere, ball_b: Sphere, a: Course, b: Course) -> list[
             hit=_meets(path, reach, a.dt),
             time=first_touch(path, reach, a.dt),
             end=distance(path.at(a.dt)) - reach,
-            meeting=OnSphere(paths, (a.arm(ball_a.centre), b.arm(ball_b.centre)), (ball_a.radius, ball_b.radius)),
+            geometry=OnSphere(paths, (a.arm(ball_a.centre), b.arm(ball_b.centre)), (ball_a.radius, ball_b.radius)),
         )
     ]
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from symphys.dynamics import prediction as paths
 from symphys.dynamics import step_function
+from symphys.dynamics.collision import RULES
 from symphys.dynamics.observation.queries import gap_function
 from symphys.model.shapes import Box, Plane
 from symphys.model.state_layout import initial_state
@@ -26,13 +26,13 @@ def boxes(count: int) -> World:
 @pytest.mark.parametrize("make", [gap_function, step_function])
 def test_boxes_alike_are_built_once(make: Callable[[World], object], monkeypatch: pytest.MonkeyPatch) -> None:
     built: list[int] = []
-    collide = paths.collide
+    rule = RULES[Box, Plane]
 
     def counted(*arguments: Any) -> Any:
         built.append(1)
-        return collide(*arguments)
+        return rule(*arguments)
 
-    monkeypatch.setattr(paths, "collide", counted)
+    monkeypatch.setitem(RULES, (Box, Plane), counted)
     make(boxes(2))
     of_two = len(built)
     make(boxes(9))

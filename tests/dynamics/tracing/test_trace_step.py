@@ -8,10 +8,10 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symphys.dynamics import Piece, Recording, Slot, record_step, step_function
-from symphys.dynamics.tracing.dead_code import trimmed
+from symphys.dynamics import TracedCall, TracedStep, TracedVector, step_function, trace_step
+from symphys.dynamics.tracing.dead_code import without_dead_code
+from symphys.dynamics.tracing.decorator import repeat, traced, tracing
 from symphys.dynamics.tracing.recording import Recorder
-from symphys.dynamics.tracing.trace import Pieces
 from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Body, Law, Scheme, World, make_world
@@ -41,17 +41,17 @@ def shapes() -> World:
     return World(world.bodies, world.statics, tuple(p for p in world.pairs if p.name.split(":")[0] in kept))
 
 
-def evaluate(piece: Piece, values: dict[Slot, np.ndarray]) -> dict[Slot, np.ndarray]:
+def evaluate(piece: TracedCall, values: dict[TracedVector, np.ndarray]) -> dict[TracedVector, np.ndarray]:
     """What a piece gives."""
     results = piece.function.call([ca.DM(values[slot]) for slot in piece.inputs])
     return {slot: np.array(ca.DM(result)).ravel() for slot, result in zip(piece.outputs, results, strict=True)}
 
 
-def run(recording: Recording, layout: Layout, x: np.ndarray, u: np.ndarray, knob: float, p: Any = ()) -> np.ndarray:
+def run(recording: TracedStep, layout: Layout, x: np.ndarray, u: np.ndarray, knob: float, p: Any = ()) -> np.ndarray:
     """The next state, piece by piece."""
-    values: dict[Slot, np.ndarray] = {}
+    values: dict[TracedVector, np.ndarray] = {}
     after = np.zeros(layout.size)
-    for piece in recording.pieces:
+    for piece in recording.calls:
         for slot in piece.inputs:
             if slot.name in layout:
                 values[slot] = x[layout[slot.name]]
@@ -76,7 +76,7 @@ def test_pieces_give_the_whole_step_of_other_shapes() -> None:
 def compare(world: World, scheme: Scheme) -> None:
     """Twelve steps, pushed about, with and without smoothing."""
     layout = Layout(world)
-    whole, pieces = step_function(world, scheme, INPUTS), record_step(world, scheme, INPUTS)
+    whole, pieces = step_function(world, scheme, INPUTS), trace_step(world, scheme, INPUTS)
     rng = np.random.default_rng(1)
     x = np.array(initial_state(world, {f"{b.name}.position": [0.25 * i, 0, 0.1] for i, b in enumerate(world.bodies)}))
     x = x.ravel()
@@ -96,7 +96,7 @@ def test_equal_parts_share_their_functions() -> None:
         balls = [Body.ball(f"ball{i}", 0.1, 1.0) for i in range(count)]
         ground = make_world(balls, [Plane.ground()], Law(0.5, 0.5))
         apart = World(ground.bodies, ground.statics, tuple(p for p in ground.pairs if p.second.body is None))
-        return len({piece.function.__hash__() for piece in record_step(apart, Scheme(sweeps=sweeps)).pieces})
+        return len({piece.function.__hash__() for piece in trace_step(apart, Scheme(sweeps=sweeps)).calls})
 
     assert distinct(20, 10) == distinct(2, 10) == distinct(2, 40)
 
@@ -107,12 +107,14 @@ def test_equal_parts_share_a_function_and_numbers_in_passing_are_no_part_of_it()
     recorder.argument("x", x)
     recorder.argument("y", y)
 
+    @traced
     def part(tree: dict[str, ca.SX]) -> tuple[ca.SX, ca.SX, ca.SX]:
         return tree["a"] ** 2, tree["b"], ca.SX(3)
 
-    square, passed, constant = recorder.do(part, {"a": x[0], "b": x[1]})
-    again, *_ = recorder.do(part, {"a": y[0], "b": y[1]})
-    first, second = recorder.pieces
+    with tracing(recorder):
+        square, passed, constant = part({"a": x[0], "b": x[1]})
+        again, *_ = part({"a": y[0], "b": y[1]})
+    first, second = recorder.calls
     assert first.function is second.function
     assert (first.outputs[0].size, first.inputs[0].name, second.inputs[0].name) == (1, "x", "y")
     assert recorder.value(passed).element_hash() == x[1].element_hash()
@@ -123,14 +125,20 @@ def test_equal_parts_share_a_function_and_numbers_in_passing_are_no_part_of_it()
 def test_members_of_a_tuple_look_alike_to_what_comes_next() -> None:
     recorder, x = Recorder(), ca.SX.sym("x", 4)
     recorder.argument("x", x)
-    pairs = recorder.do(lambda x: ((2 * x[0], 3 * x[1]), (4 * x[2], 5 * x[3])), x)
-    for pair in pairs:
-        recorder.do(added, *pair)
-    _, first, second = recorder.pieces
+    with tracing(recorder):
+        for pair in multiples(x):
+            added(*pair)
+    _, first, second = recorder.calls
     assert first.function is second.function
     assert first.inputs[0] != second.inputs[0]
 
 
+@traced
+def multiples(x: ca.SX) -> tuple[tuple[ca.SX, ca.SX], ...]:
+    return ((2 * x[0], 3 * x[1]), (4 * x[2], 5 * x[3]))
+
+
+@traced
 def added(a: ca.SX, b: ca.SX) -> ca.SX:
     return a + b
 
@@ -138,20 +146,41 @@ def added(a: ca.SX, b: ca.SX) -> ca.SX:
 def test_what_is_asked_for_twice_is_computed_once() -> None:
     recorder, x = Recorder(), ca.SX.sym("x", 2)
     recorder.argument("x", x)
-    first, second, other = (recorder.do(added, *pair) for pair in ((x[0], x[1]), (x[0], x[1]), (x[0], 2.0)))
+    with tracing(recorder):
+        first, second, other = (added(*pair) for pair in ((x[0], x[1]), (x[0], x[1]), (x[0], 2.0)))
     assert first == second != other
-    assert len(recorder.pieces) == 2
+    assert len(recorder.calls) == 2
+
+
+def test_arithmetic_between_traced_calls_is_traced() -> None:
+    """Operators of a traced matrix are parts of their own, on either side; so are named arguments."""
+    recorder, x = Recorder(), ca.SX.sym("x", 2)
+    recorder.argument("x", x)
+    with tracing(recorder):
+        a, b = added(x[0], b=1.0), added(x[0], b=x[1])
+        results = [a - b, 1 - a, a * 2, ca.SX(3) / b, -b, a < b, a > 1]
+    recorder.give("next", results)
+    memory = {slot: np.array([3.0, 5.0]) for slot in recorder.calls[0].inputs}
+    for piece in recorder.calls:
+        memory |= evaluate(piece, memory)
+    assert memory[recorder.calls[-1].outputs[0]] == pytest.approx([-4, -3, 8, 3 / 8, -8, 1, 1])
+
+
+def test_a_traced_function_is_a_plain_one_without_a_tracer() -> None:
+    assert added(2.0, 3.0) == 5.0
+    assert float(repeat(6, turn, 2.0, ca.DM([1, 2]))[0]) == 15.0
 
 
 def test_what_nobody_reads_is_left_out() -> None:
     """Of a record of four words one is read, by way of a part of which one result is read; another part not at all."""
     recorder, x = Recorder(), ca.SX.sym("x", 4)
     recorder.argument("x", x)
-    squares = recorder.do(lambda x: x * x, x)
-    recorder.do(lambda squares: ca.sin(squares), squares)
-    root, _ = recorder.do(lambda squares: (ca.sqrt(squares[2]), ca.exp(squares[1])), squares)
+    with tracing(recorder):
+        squares = traced(lambda x: x * x)(x)
+        traced(lambda squares: ca.sin(squares))(squares)
+        root, _ = traced(lambda squares: (ca.sqrt(squares[2]), ca.exp(squares[1])))(squares)
     recorder.give("next", [root])
-    left = trimmed(recorder.pieces)
+    left = without_dead_code(recorder.calls)
     assert [(piece.function.nnz_in(), piece.function.nnz_out()) for piece in left] == [(4, 1), (1, 1), (1, 1)]
     values = {left[0].inputs[0]: np.array([1.0, 2.0, 3.0, 4.0])}
     for piece in left:
@@ -159,11 +188,8 @@ def test_what_nobody_reads_is_left_out() -> None:
     assert values[left[-1].outputs[0]] == pytest.approx([3.0])
 
 
-def turn(pieces: Pieces, factor: float, state: ca.SX) -> ca.SX:
-    return pieces.do(turned, factor, state)
-
-
-def turned(factor: float, state: ca.SX) -> ca.SX:
+@traced
+def turn(factor: float, state: ca.SX) -> ca.SX:
     return ca.vertcat(state[1] + 1, factor * state[0])
 
 
@@ -171,22 +197,24 @@ def test_sweeps_that_change_places_are_right() -> None:
     """Each number moves to another place every time."""
     recorder, x = Recorder(), ca.SX.sym("x", 2)
     recorder.argument("x", x)
-    recorder.give("next", [recorder.repeat(6, turn, 2.0, x)])
+    with tracing(recorder):
+        turned = repeat(6, turn, 2.0, x)
+    recorder.give("next", [turned])
     values = np.array([1.0, 2.0])
-    memory = {slot: values for piece in recorder.pieces for slot in piece.inputs if slot.name == "x"}
-    for piece in recorder.pieces:
+    memory = {slot: values for piece in recorder.calls for slot in piece.inputs if slot.name == "x"}
+    for piece in recorder.calls:
         memory |= evaluate(piece, memory)
     expected = values
     for _ in range(6):
         expected = np.array([expected[1] + 1, 2 * expected[0]])
-    assert memory[recorder.pieces[-1].outputs[0]] == pytest.approx(expected)
+    assert memory[recorder.calls[-1].outputs[0]] == pytest.approx(expected)
 
 
 def test_parameters_in_expressions_have_a_piece() -> None:
     """A mass that follows from a radius is computed, once a step."""
     radius = ca.SX.sym("radius")
     world = make_world([Body.ball("ball", radius, 1000 * radius**3)], [Plane.ground()])
-    recording = record_step(world, parameters=[radius])
+    recording = trace_step(world, parameters=[radius])
     assert run(recording, Layout(world), *start(world), 0.0, np.array([0.1])) == pytest.approx(
         np.array(step_function(world, parameters=[radius])(start(world)[0], [], 0.1, 0)).ravel()
     )

@@ -1,4 +1,4 @@
-"""Known courses inside a step: where a body and its points are, as parabolas of the time t in [0, dt]."""
+"""Known paths inside a step: where a body and its points are, as parabolas of the time t in [0, dt]."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Expr = Any
 
 @dataclass(frozen=True)
 class Parabola:
-    """A vector's course over the step: start + t velocity + t^2/2 acceleration, (3,) each."""
+    """A vector's path over the step: start + t velocity + t^2/2 acceleration, (3,) each."""
 
     start: Expr
     velocity: Expr
@@ -31,21 +31,21 @@ class Parabola:
         return self.velocity + t * self.acceleration
 
     def __add__(self, other: Parabola) -> Parabola:
-        """The course of the sum."""
+        """The path of the sum."""
         return Parabola(
             self.start + other.start, self.velocity + other.velocity, self.acceleration + other.acceleration
         )
 
     def __sub__(self, other: Parabola) -> Parabola:
-        """The course of the difference."""
+        """The path of the difference."""
         return self + -1 * other
 
     def __rmul__(self, factor: Expr) -> Parabola:
-        """The course of a multiple."""
+        """The path of a multiple."""
         return Parabola(factor * self.start, factor * self.velocity, factor * self.acceleration)
 
     def cross(self, other: Parabola) -> Parabola:
-        """The course of the cross product, to second order."""
+        """The path of the cross product, to second order."""
         bend = ca.cross(self.acceleration, other.start) + ca.cross(self.start, other.acceleration)
         return Parabola(
             ca.cross(self.start, other.start),
@@ -55,11 +55,11 @@ class Parabola:
 
 
 STAYS = Parabola(ca.SX.zeros(3), ca.SX.zeros(3), ca.SX.zeros(3))
-"""The course of a vector that is zero."""
+"""The path of a vector that is zero."""
 
 
 def chosen(condition: Expr, one: Parabola, other: Parabola) -> Parabola:
-    """The first course where the condition is 1, else the other."""
+    """The first path where the condition is 1, else the other."""
     return Parabola(
         ca.if_else(condition, one.start, other.start),
         ca.if_else(condition, one.velocity, other.velocity),
@@ -68,7 +68,7 @@ def chosen(condition: Expr, one: Parabola, other: Parabola) -> Parabola:
 
 
 @dataclass(frozen=True)
-class Course:
+class PredictedPath:
     """A body's pose over the step.
 
     Attributes:
@@ -88,7 +88,7 @@ class Course:
     dt: Expr
 
     def arm(self, offset: Sequence[Any]) -> Parabola:
-        """The course of the body-frame vector ``offset``, in world coordinates."""
+        """The path of the body-frame vector ``offset``, in world coordinates."""
         if all(is_zero(c) for c in offset):
             return STAYS
         arm = ca.mtimes(self.rotation, ca.vertcat(*offset))
@@ -97,15 +97,15 @@ class Course:
         return Parabola(arm, swing, bend)
 
     def centre(self) -> Parabola:
-        """The course of the centre of mass."""
+        """The path of the centre of mass."""
         return Parabola(self.position, self.velocity, self.acceleration)
 
     def path(self, offset: Sequence[Any]) -> Parabola:
-        """The course of the body's point at body-frame ``offset`` from the centre of mass."""
+        """The path of the body's point at body-frame ``offset`` from the centre of mass."""
         return self.centre() + self.arm(offset)
 
 
-def at_rest(dt: Expr) -> Course:
-    """The course of what is static: its frame is the world's."""
+def at_rest(dt: Expr) -> PredictedPath:
+    """The path of what is static: its frame is the world's."""
     zero = ca.SX.zeros(3)
-    return Course(zero, ca.SX.eye(3), zero, zero, zero, zero, dt)
+    return PredictedPath(zero, ca.SX.eye(3), zero, zero, zero, zero, dt)

@@ -13,7 +13,7 @@ from symphys.model.world import World
 
 Expr = Any
 """casadi SX, MX or DM"""
-FELT = ("gyro", "contact_force")
+BODY_QUANTITIES = ("gyro", "contact_force")
 
 
 def body_quantities(world: World, x: Expr) -> dict[str, Expr]:
@@ -55,9 +55,9 @@ def accelerometers(world: World, x: Expr, before: Mapping[str, Expr], dt: float)
     return named
 
 
-def felt_names(world: World) -> list[str]:
+def body_quantity_names(world: World) -> list[str]:
     """The names of ``body_quantities``."""
-    return [f"{body.name}.{field}" for body in world.bodies for field in FELT]
+    return [f"{body.name}.{field}" for body in world.bodies for field in BODY_QUANTITIES]
 
 
 def accelerometer_bodies(world: World, names: Sequence[str] | frozenset[str]) -> tuple[str, ...]:

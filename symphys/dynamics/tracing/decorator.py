@@ -1,0 +1,65 @@
+"""``traced`` functions: within ``with tracing(tracer):`` the tracer calls them once, as functions of symbols.
+
+Physics calls a traced function like any other. While a step is traced, equal calls (the same function, arguments of
+the same structure) share one casadi function, and what lies between two calls is a ``TracedMatrix``. Without a tracer,
+and within a function that is being traced, a call is a plain Python call on casadi expressions. A traced function must
+depend on its arguments alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import wraps
+from typing import Any, ParamSpec, Protocol, TypeVar
+
+P = ParamSpec("P")
+T = TypeVar("T")
+C = TypeVar("C")
+
+
+class Tracing(Protocol):
+    """What traces the calls of a step."""
+
+    def call(self, function: Callable[..., T], arguments: tuple[Any, ...], named: dict[str, Any]) -> T:
+        """``function(*arguments, **named)``."""
+        ...
+
+    def repeat(self, count: int, once: Callable[[Any, T], T], context: Any, state: T) -> T:
+        """The state after ``count`` times ``state = once(context, state)``."""
+        ...
+
+
+_TRACER: ContextVar[Tracing | None] = ContextVar("tracer", default=None)
+
+
+@contextmanager
+def tracing(tracer: Tracing | None) -> Iterator[None]:
+    """Traced functions are called through ``tracer``; None: they are called plainly."""
+    token = _TRACER.set(tracer)
+    try:
+        yield
+    finally:
+        _TRACER.reset(token)
+
+
+def traced(function: Callable[P, T]) -> Callable[P, T]:
+    """The function (or method of a dataclass), called through the current tracer."""
+
+    @wraps(function)
+    def call(*arguments: P.args, **named: P.kwargs) -> T:
+        tracer = _TRACER.get()
+        return function(*arguments, **named) if tracer is None else tracer.call(function, arguments, named)
+
+    return call
+
+
+def repeat(count: int, once: Callable[[C, T], T], context: C, state: T) -> T:
+    """The state after ``count`` times ``state = once(context, state)``; a tracer copies what repeats itself."""
+    tracer = _TRACER.get()
+    if tracer is not None:
+        return tracer.repeat(count, once, context, state)
+    for _ in range(count):
+        state = once(context, state)
+    return state

@@ -1,0 +1,82 @@
+"""What the sweeps solve for: velocities of bodies and kinematic trees, and impulses of constraints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import casadi as ca
+
+Expr = Any
+"""casadi SX"""
+
+
+@dataclass(frozen=True)
+class Momentum:
+    """The sweeps' unknowns of one body at mid-step: velocity (3,) [m/s], angular momentum (3,) [N m s]."""
+
+    velocity: Expr
+    angular: Expr
+
+
+@dataclass(frozen=True)
+class GeneralizedVelocities:
+    """The sweeps' unknowns of a tree of bodies at mid-step: rates (n,) of its coordinates [m/s], [rad/s]."""
+
+    numbers: Expr
+
+    def along(self, matrix: Expr) -> Expr:
+        """(m,): ``matrix`` (m, n) times the rates; added in pairs, so that no term waits for all others."""
+        rows = []
+        for i in range(matrix.size1()):
+            terms = [matrix[i, j] * self.numbers[j] for j in range(matrix.size2()) if matrix.has_nz(i, j)]
+            while len(terms) > 1:
+                terms = [sum(terms[k + 1 : k + 2], terms[k]) for k in range(0, len(terms), 2)]
+            rows.append(terms[0] if terms else ca.SX(0))
+        return ca.vertcat(*rows)
+
+
+Velocities = Momentum | GeneralizedVelocities | None
+"""Of a body; of a tree, at its root; None for the other bodies of a tree."""
+Momenta = tuple[Momentum, ...]
+AllVelocities = tuple[Velocities, ...]
+
+
+AnyImpulse = Any
+"""``ContactImpulse`` of a contact, ``JointImpulse`` of a joint."""
+
+
+class VelocityConstraint(Protocol):
+    """What a sweep projects. Implementations are frozen dataclasses."""
+
+    def project(self, momenta: AllVelocities, old: AnyImpulse) -> tuple[AllVelocities, AnyImpulse]:
+        """One projection: the momenta of the bodies, and the accumulated impulse after it."""
+        ...
+
+    def apply(self, momenta: AllVelocities, impulse: AnyImpulse) -> AllVelocities:
+        """The momenta after an impulse."""
+        ...
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Momenta of all bodies, accumulated impulses of all constraints, and these before the last sweep."""
+
+    momenta: AllVelocities
+    impulses: tuple[AnyImpulse, ...]
+    last: tuple[AnyImpulse, ...]
+
+
+@dataclass(frozen=True)
+class PlacedConstraint:
+    """A constraint and the bodies that it acts on.
+
+    Attributes:
+        bodies: indices of those that can move.
+        constraint: see ``Constraint``.
+        carriers: where the velocities of these bodies are stored: at themselves, or at the root of their tree.
+    """
+
+    bodies: tuple[int, ...]
+    constraint: Any
+    carriers: tuple[int, ...]

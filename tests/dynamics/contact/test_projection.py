@@ -1,0 +1,60 @@
+"""Projections of one contact converge to the law: nothing pulls, friction stays in its cone and opposes the slip."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+from contacts import contact_of, momenta_of, numbers, terms_of
+
+from symphys.dynamics.contact.constraint import ZERO
+from symphys.dynamics.contact.coupling import coupling_of
+from symphys.dynamics.contact.effective_mass import mobilities
+from symphys.model.world import Law
+
+MANY = 200
+
+
+@pytest.mark.parametrize("coupled", [False, True])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_contact_obeys_its_law(seed: int, coupled: bool) -> None:
+    """0 <= normal and u_n >= target, one of them with equality; |tangent| <= mu normal, against the slip if equal."""
+    rng = np.random.default_rng(seed)
+    terms, momenta, mu = terms_of(rng), momenta_of(rng), 0.4
+    normal, target = ca.SX([0, 0, 1]), 0.3 * rng.normal()
+    coupling = coupling_of(mobilities(terms, False)[0], normal, mu, ca.SX(0)) if coupled else None
+    contact = contact_of(terms, Law(friction=mu), target=ca.SX(target), coupling=coupling)
+    impulse = ZERO
+    for _ in range(MANY):
+        momenta, impulse = contact.project(momenta, impulse)
+    slip, press, tangent = numbers(contact.slip(momenta)), float(numbers(impulse.normal)), numbers(impulse.tangent)
+    assert press >= 0 and slip[2] >= target - 1e-9
+    assert press * (slip[2] - target) == pytest.approx(0, abs=1e-9)
+    assert np.linalg.norm(tangent) <= mu * press + 1e-12
+    assert np.dot(tangent, slip) == pytest.approx(-mu * press * np.linalg.norm(slip[:2]), abs=1e-8)
+
+
+def test_torques_stay_within_their_limits() -> None:
+    """Torsion about the normal and rolling across it, each limited by the normal impulse."""
+    rng = np.random.default_rng(1)
+    momenta = momenta_of(rng)
+    contact = contact_of(terms_of(rng), Law(torsion=0.02, rolling=0.01), target=ca.SX(2.0))
+    impulse = ZERO
+    for _ in range(MANY):
+        momenta, impulse = contact.project(momenta, impulse)
+    press = float(numbers(impulse.normal))
+    assert press > 0
+    assert abs(float(numbers(impulse.spin))) <= 0.02 * press + 1e-12
+    assert np.linalg.norm(numbers(impulse.roll)) <= 0.01 * press + 1e-12
+
+
+def test_smoothing_ends_on_the_central_path() -> None:
+    """Normal times (u_n - target) is width^2 normal_mass / 4 for a frictionless contact."""
+    rng, width = np.random.default_rng(2), 0.1
+    momenta = momenta_of(rng)
+    contact = contact_of(terms_of(rng), Law(friction=0.0), width=ca.SX(width), smoothing=ca.SX(width))
+    impulse = ZERO
+    for _ in range(MANY):
+        momenta, impulse = contact.project(momenta, impulse)
+    product = float(numbers(impulse.normal)) * numbers(contact.slip(momenta))[2]
+    assert product == pytest.approx(width**2 * float(numbers(contact.normal_mass)) / 4)
