@@ -131,7 +131,6 @@ def test_the_table_has_no_other_rooms() -> None:
     assert {room(name) for name in modules()} - FACADE == set(ROOMS)
 
 
-@pytest.mark.xfail(reason="the layout is new")
 def test_no_module_imports_itself_by_a_detour() -> None:
     """A package counts as the modules that its __init__ imports."""
     graph = {name: imported(name) & modules().keys() - {name} for name in modules()}
@@ -149,7 +148,6 @@ def test_folders_are_small() -> None:
     assert {str(folder.relative_to(ROOT)): size for folder, size in sizes.items() if size > MOST_MODULES} == {}
 
 
-@pytest.mark.xfail(reason="the layout is new")
 def test_public_classes_have_names_of_their_own() -> None:
     homes: dict[str, list[str]] = {}
     for name, path in modules().items():

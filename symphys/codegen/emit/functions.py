@@ -19,7 +19,7 @@ Key = tuple[object, ...]
 
 
 @dataclass
-class FunctionTable:
+class DistinctFunctions:
     """What is to be compiled, in the order of its numbers, and what is known about each casadi Function."""
 
     listed: list[tuple[Graph, Form]] = field(default_factory=list)

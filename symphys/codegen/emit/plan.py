@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.codegen.emit.functions import FunctionTable
+from symphys.codegen.emit.functions import DistinctFunctions
 from symphys.codegen.emit.writer import Form
 from symphys.codegen.graph.activity import Activity, CallActivity
 from symphys.codegen.graph.adjoint import Mask
@@ -46,7 +46,7 @@ def plan(program: Program, seeded: Sequence[str], word: int = 64) -> Plan:
         seeded: names of the outputs that are differentiated.
         word: bytes of one word of a whole block: lanes times the size of a number.
     """
-    functions = FunctionTable()
+    functions = DistinctFunctions()
     prologue, body, epilogue = phases = (
         _reaches(program.prologue, 1, functions),
         _reaches(program.body, program.steps, functions),
@@ -92,12 +92,12 @@ class _Pull:
     inputs: Mask
     outputs: Mask
 
-    def reads(self, functions: FunctionTable) -> list[NDArray[np.int64]]:
+    def reads(self, functions: DistinctFunctions) -> list[NDArray[np.int64]]:
         """The words of the memory that it reads."""
         used = functions.arguments(self.graph)
         return [words for i, words in enumerate(self.reach.inputs) if i in used]
 
-    def entry(self, functions: FunctionTable) -> list[int]:
+    def entry(self, functions: DistinctFunctions) -> list[int]:
         """Its table entry."""
         call, tape = self.reach.call, self.reach.tape
         primal = [*call.inputs, *([tape.place] if tape else [])]
@@ -106,7 +106,7 @@ class _Pull:
         return functions.entry(tape.functions.adjoint if tape else self.graph, form, places)
 
 
-def _reaches(calls: Sequence[FunctionCall], steps: int, functions: FunctionTable) -> list[_Reach]:
+def _reaches(calls: Sequence[FunctionCall], steps: int, functions: DistinctFunctions) -> list[_Reach]:
     return [
         _Reach(
             call,
@@ -118,20 +118,20 @@ def _reaches(calls: Sequence[FunctionCall], steps: int, functions: FunctionTable
     ]
 
 
-def _push(call: FunctionCall, functions: FunctionTable, tape: _Tape | None = None) -> list[int]:
+def _push(call: FunctionCall, functions: DistinctFunctions, tape: _Tape | None = None) -> list[int]:
     form = Form(primal=len(call.inputs), adds=call.accumulate)
     graph = tape.functions.forward if tape else functions.forward(call.function)
     return functions.entry(graph, form, [*call.inputs, *call.outputs, *([tape.place] if tape else [])])
 
 
-def _pull(reach: _Reach, activity: Activity, functions: FunctionTable) -> _Pull | None:
+def _pull(reach: _Reach, activity: Activity, functions: DistinctFunctions) -> _Pull | None:
     inputs, outputs = activity.marks(reach.inputs), activity.marks(reach.outputs)
     if not any(inputs) or not any(outputs):
         return None
     return _Pull(reach, functions.adjoint(reach.call.function, inputs, outputs), inputs, outputs)
 
 
-def _again(program: Program, body: Sequence[_Reach], pulls: Sequence[_Pull], functions: FunctionTable) -> list[_Reach]:
+def _again(program: Program, body: Sequence[_Reach], pulls: Sequence[_Pull], functions: DistinctFunctions) -> list[_Reach]:
     """The calls that must be run again before the adjoints of a step: those whose scratch is read."""
     scratch = program.scratch()
     needed = np.zeros(program.size, dtype=bool)
@@ -149,7 +149,7 @@ def _again(program: Program, body: Sequence[_Reach], pulls: Sequence[_Pull], fun
 
 
 def _put_on_tape(
-    program: Program, pulls: Sequence[_Pull], again: Sequence[_Reach], functions: FunctionTable, room: int
+    program: Program, pulls: Sequence[_Pull], again: Sequence[_Reach], functions: DistinctFunctions, room: int
 ) -> int:
     """Give the calls that are run again a tape if all then still fits into ``room`` words; returns its words."""
     end = program.size
