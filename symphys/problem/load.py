@@ -20,6 +20,7 @@ from symphys.problem.include.placing import placed
 from symphys.problem.model import NOTHING, Array, Problem, Simulation, Variable
 from symphys.problem.parametric.collision_filter import Meetings
 from symphys.problem.parametric.forward_kinematics import carry
+from symphys.problem.parametric.parts import Part
 from symphys.problem.parametric.reposition import check_anchors
 from symphys.problem.parametric.world import WorldPlan
 from symphys.problem.quantities import Quantity, quantities, weight_quantities
@@ -204,7 +205,8 @@ def read_plan(document: Document, faults: Faults) -> tuple[WorldPlan, dict[str, 
     """The world's plan and the state of every body at the start."""
     bodies = tuple(read_body(index, table, faults) for index, table in enumerate(document.body))
     statics = read_statics(document, [table.position for table in document.body], faults)
-    names = [part.name for part in (*bodies, *statics)]
+    parts: tuple[Part, ...] = (*bodies, *statics)
+    names = [part.name for part in parts]
     shared = list(dict.fromkeys(group for _, group in groups(document)))
     check_mates(bodies, names, shared, document, faults)
     pairs = read_pairs(document.pair, names, shared, faults)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from symphys.model.shapes import Box, Fixture, Plane, Shape, Sphere, Static, Terrain
+from symphys.model.shapes import Fixture, Plane, Shape, Static, Terrain
 from symphys.model.world import Body
 from symphys.problem import Problem
 from symphys.results.scene_joints import joint_entry
@@ -70,13 +70,9 @@ def parameters(problem: Problem, z: Mapping[str, Array]) -> dict[str, Any]:
 
 
 def solid(shape: Shape) -> dict[str, Any]:
-    """A shape as JSON: sizes as in problem files, ``centre`` (3,), and ``orientation`` (4,) w x y z."""
-    if isinstance(shape, Sphere):
-        return {"kind": "sphere", "radius": float(shape.radius), "centre": plain(shape.centre)}
-    placed = {"centre": plain(shape.centre), "orientation": plain(shape.orientation)}
-    if isinstance(shape, Box):
-        return {"kind": "box", "size": [2 * half for half in plain(shape.half_sizes)], **placed}
-    return {"kind": "capsule", "radius": float(shape.radius), "length": 2 * float(shape.half_length), **placed}
+    """A shape as JSON: sizes as in problem files, ``centre`` (3,), and ``orientation`` (4,) w x y z unless round."""
+    sizes = {key: plain(size) if isinstance(size, tuple) else float(size) for key, size in shape.sizes.items()}
+    return {"kind": shape.kind, **sizes, **{key: plain(numbers) for key, numbers in shape.placement.items()}}
 
 
 def plain(vector: Any) -> list[float]:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from symphys.findings import values
+from symphys.model.shapes import SHAPES
 from symphys.results import text_files as tables
 from symphys.results.drawable import LARGEST, small
 from symphys.results.joint_records import make_joints
@@ -43,18 +44,19 @@ def make_solids(shapes: object) -> tuple[Solid, ...]:
 
 
 def make_solid(entry: dict[str, object]) -> Solid | None:
-    """A sphere, a box or a capsule; None if it has no size and place that can be drawn."""
-    kind = entry.get("kind", "sphere")
-    radius, half = values.number(entry.get("radius")), np.zeros(3)
-    if kind == "box":
-        radius, half = 0.0, values.vector(entry.get("size")) / 2
-    elif kind == "capsule":
-        half = np.array([0.0, 0.0, values.number(entry.get("length")) / 2])
-    sizes = half if kind == "box" else np.array([radius, *half[2:]]) if kind == "capsule" else np.array([radius])
-    centre = values.vector(entry.get("centre"))
-    if kind not in ("sphere", "box", "capsule") or not (small([*sizes, *centre]) and (sizes > 0).all()):
+    """One of the shapes; None if it has no size and place that can be drawn."""
+    shape, centre = SHAPES.get(str(entry.get("kind", "sphere"))), values.vector(entry.get("centre"))
+    if shape is None:
         return None
-    return Solid(radius, half, centre, make_orientation(entry.get("orientation")))
+    sizes = {
+        key.name: values.number(entry.get(key.name)) if key.count == 1 else values.vector(entry.get(key.name))
+        for key in shape.size_keys
+    }
+    whole = np.concatenate([np.atleast_1d(size) for size in sizes.values()])
+    if not (small([*whole, *centre]) and (whole > 0).all()):
+        return None
+    radius, half = shape.from_sizes(sizes, tuple(centre), UPRIGHT).rounded_box
+    return Solid(radius, np.array(half), centre, make_orientation(entry.get("orientation")))
 
 
 def make_orientation(value: object) -> Array:

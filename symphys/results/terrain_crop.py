@@ -10,7 +10,6 @@ import numpy as np
 
 from symphys.model.shapes import Terrain
 from symphys.model.world import Body, World
-from symphys.problem.parametric.sizes import extent
 from symphys.shooting import Array
 
 MOST = 49
@@ -44,7 +43,7 @@ def window(world: World, places: Array) -> Window:
 
 def size(body: Body) -> float:
     """From a body's centre of mass to the farthest point of its surface, at most [m]."""
-    return max((float(np.linalg.norm(shape.centre)) + extent(shape) for shape in body.shapes), default=0.0)
+    return max((float(np.linalg.norm(shape.centre)) + shape.extent for shape in body.shapes), default=0.0)
 
 
 def sample(terrain: Terrain, near: Window) -> dict[str, Any]:

@@ -99,7 +99,7 @@ def test_a_robot_stands_twice_with_prefixes(load_both: Load) -> None:
         ("left_torso", "left_shin"),
         (None, "left_torso"),
     ]
-    assert problem.plan.bodies[1].mates == {"left_floor"}
+    assert problem.plan.bodies[1].collides_with == {"left_floor"}
     assert problem.plan.bodies[2].group == "right_robot"
     assert [variable.slots[0].name for variable in problem.variables] == ["left_knee.command", "right_knee.command"]
     assert [(cost.name, cost.formula.text) for cost in problem.costs] == [

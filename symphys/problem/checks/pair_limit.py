@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from symphys.model.shapes import Box, Capsule, Sphere
+from symphys.model.shapes import Sphere
 from symphys.problem.parametric.collision_filter import Census, Kin, Meetings
-from symphys.problem.parametric.parts import BlockPlan, BodyPlan, PlanePlan
+from symphys.problem.parametric.parts import BodyPlan
 from symphys.problem.reading.faults import Faults
 
 MOST_POINTS = 2000
 """Points of contact that are looked at in every step."""
 LISTED = 3
-WORDS = {Sphere: "spheres", Capsule: "capsules", Box: "boxes"}
 
 
 def check_crowd(meetings: Meetings, faults: Faults) -> None:
@@ -40,7 +39,7 @@ def too_many(meetings: Meetings, census: Census) -> str:
         "let fewer of them meet: give them a group, and say who touches whom by collides_with or by a [[pair]] with "
         "collide = false"
     )
-    if any(isinstance(surface, Box | Capsule) for a, _ in census.shares for surface in sets[a][0].part.surfaces):
+    if any(not isinstance(surface, Sphere) for a, _ in census.shares for surface in sets[a][0].part.surfaces):
         remedy += "; or take spheres in place of boxes and capsules"
     return f"{count} points of contact in every step are too many, {MOST_POINTS} are allowed ({listed}); {remedy}"
 
@@ -56,7 +55,7 @@ def called(members: Sequence[Kin]) -> str:
     if count == 1:
         return part.name
     if isinstance(part, BodyPlan):
-        word = WORDS[type(part.shapes[0])] if len(part.shapes) == 1 else "compounds"
+        word = part.shapes[0].plural if len(part.shapes) == 1 else "compounds"
     else:
-        word = "planes" if isinstance(part, PlanePlan) else "blocks" if isinstance(part, BlockPlan) else "terrains"
+        word = part.static.plural
     return f"{count} {word} of {part.group}" if part.group else f"{count} {word}"

@@ -13,21 +13,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.model.shapes import Box, Capsule, Plane, Sphere, Surface, Terrain, contact_points
+from symphys.model.shapes import SURFACES, points_of_kinds
 from symphys.problem.parametric.parts import BodyPlan, PairPlan, Part
 
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-KINDS: tuple[Surface, ...] = (
-    Sphere(1.0),
-    Capsule(1.0, 1.0),
-    Box((1.0, 1.0, 1.0)),
-    Plane("plane"),
-    Terrain("terrain", max),
-)
-"""One of each kind of surface."""
-TYPES = tuple(type(kind) for kind in KINDS)
+KINDS = tuple(SURFACES.values())
+"""All kinds of surfaces."""
 ENOUGH_ROWS = 256
 """Where there are more kin than this and already too many points, the rest need not be counted."""
 
@@ -80,12 +73,14 @@ class Meetings:
     def __init__(self, parts: Sequence[Part], tables: Sequence[PairPlan]) -> None:
         """Sort the parts into kin."""
         self.parts, self.tables = parts, tables
-        mentioned = {name for part in parts for name in part.mates or ()}
+        mentioned = {name for part in parts for name in part.collides_with or ()}
         mentioned |= {name for table in tables for name in table.between}
         found: dict[object, list[int]] = {}
         for index, part in enumerate(parts):
             own = part.name if part.name in mentioned else None
-            found.setdefault((kinds(part), isinstance(part, BodyPlan), part.group, part.mates, own), []).append(index)
+            found.setdefault((kinds(part), isinstance(part, BodyPlan), part.group, part.collides_with, own), []).append(
+                index
+            )
         self.kin = [Kin(parts[m[0]], m, np.array(kinds(parts[m[0]]), np.int64)) for m in found.values()]
         self.sets: dict[object, list[Kin]] = {}
         for kin in self.kin:
@@ -96,7 +91,7 @@ class Meetings:
         found = Census()
         numbers = np.array([len(kin.members) for kin in self.kin])
         surfaces = np.array([kin.surfaces for kin in self.kin])
-        points = np.array([[contact_points(a, b) for b in KINDS] for a in KINDS])
+        points = np.array([[points_of_kinds(a, b) for b in KINDS] for a in KINDS])
         missing = (points == 0).astype(np.int64)
         places = {id(kin): place for place, members in enumerate(self.sets.values()) for kin in members}
         place = np.array([places[id(kin)] for kin in self.kin])
@@ -136,11 +131,11 @@ class Meetings:
 
     def _lets(self, c: int) -> Mask:
         """Whom ``c`` lets touch it."""
-        mates = self.kin[c].part.mates
-        if mates is None:
+        named = self.kin[c].part.collides_with
+        if named is None:
             return np.ones(len(self.kin), bool)
         mask = np.zeros(len(self.kin), bool)
-        for name in mates:
+        for name in named:
             mask[self._named.get(name, [])] = True
         return mask
 
@@ -182,17 +177,17 @@ class Meetings:
     @cached_property
     def _wanted(self) -> dict[str, list[int]]:
         """The kin that list a name or group in collides_with."""
-        return gather((name, c) for c, kin in enumerate(self.kin) for name in kin.part.mates or ())
+        return gather((name, c) for c, kin in enumerate(self.kin) for name in kin.part.collides_with or ())
 
     @cached_property
     def _free(self) -> Mask:
-        return np.array([kin.part.mates is None for kin in self.kin])
+        return np.array([kin.part.collides_with is None for kin in self.kin])
 
 
 def kinds(part: Part) -> tuple[int, ...]:
     """(kinds,) how many surfaces of each kind a part has."""
     counts = Counter(type(surface) for surface in part.surfaces)
-    return tuple(counts[kind] for kind in TYPES)
+    return tuple(counts[kind] for kind in KINDS)
 
 
 def own_names(part: Part) -> tuple[str, ...]:

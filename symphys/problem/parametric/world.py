@@ -19,7 +19,7 @@ from symphys.model.shapes import Scalar, Static
 from symphys.model.world import Body, Law, Pair, Side, World, points_of
 from symphys.problem.parametric.collision_filter import Meetings
 from symphys.problem.parametric.joints import JointPlan
-from symphys.problem.parametric.parts import COMBINE, VARIABLE, BodyPlan, PairPlan, Part, StaticPlan, Value
+from symphys.problem.parametric.parts import COMBINE, VARIABLE, BodyPlan, PairPlan, ParametricStatic, Part, Value
 
 Array = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ class WorldPlan:
     """
 
     bodies: tuple[BodyPlan, ...]
-    statics: tuple[StaticPlan, ...]
+    statics: tuple[ParametricStatic, ...]
     pairs: tuple[PairPlan, ...]
     contact: Law
     gravity: tuple[float, float, float]
@@ -64,7 +64,7 @@ class WorldPlan:
             return overrides[name] if count == 1 else tuple(overrides[name][i] for i in range(count))
 
         bodies = tuple(plan.body(overrides, value) for plan in self.bodies)
-        statics = tuple(plan.static(value) for plan in self.statics)
+        statics = tuple(plan.valued(value) for plan in self.statics)
         places = {body.name: index for index, body in enumerate(bodies)}
         joints = tuple(plan.joint(places, value) for plan in self.joints)
         return World(bodies, statics, self._pairs(bodies, statics, value), value("gravity"), joints)
@@ -110,8 +110,8 @@ class WorldPlan:
 
     def lets(self, a: str, b: str) -> bool:
         """Whether ``a`` lets ``b`` touch it, as far as collides_with goes."""
-        mates, other = self._named[a].mates, self._named[b]
-        return mates is None or b in mates or other.group in mates
+        named, other = self._named[a].collides_with, self._named[b]
+        return named is None or b in named or other.group in named
 
     def pair(self, a: str, b: str) -> PairPlan | None:
         """The [[pair]] table that holds for the two surfaces, if there is one."""

@@ -61,7 +61,6 @@ Pair = Annotated[list[float], PlainValidator(checks.vector(2)), WithJsonSchema(v
 Ends = Annotated[list[float], PlainValidator(checks.ends), WithJsonSchema(vector_schema(2))]
 Coordinates = Annotated[list[float], PlainValidator(checks.coordinates), WithJsonSchema(coordinates_schema())]
 Size = Annotated[list[float], PlainValidator(checks.positive(3)), WithJsonSchema(positive_schema(3))]
-Length = Annotated[float, PlainValidator(checks.length), WithJsonSchema({"type": "number", "exclusiveMinimum": 0})]
 Spacing = Annotated[
     list[float],
     PlainValidator(checks.spacing),

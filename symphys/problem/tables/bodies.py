@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.model.shapes import Shape
-from symphys.problem.checks.inertia import centre_of_mass, complaint, volume
+from symphys.problem.checks.inertia import centre_of_mass, complaint
 from symphys.problem.checks.magnitude import check_magnitudes
 from symphys.problem.parametric.parts import COMBINE, BodyPlan
-from symphys.problem.parametric.sizes import extent
 from symphys.problem.reading.faults import Faults
 from symphys.problem.schema.physics import BodyTable, SurfaceTable
 from symphys.problem.tables.shapes import read_orientation, read_shape
@@ -31,7 +30,7 @@ def read_body(index: int, table: BodyTable, faults: Faults) -> BodyPlan:
     hollow = single is not None and single.hollow
     density = read_density(place, table, hollow, faults)
     check_inertia(place, table, shapes, faults)
-    mass = table.mass or (density or 0.0) * sum(volume(shape) for shape in shapes)
+    mass = table.mass or (density or 0.0) * sum(shape.volume for shape in shapes)
     plan = BodyPlan(
         name=table.name,
         mass=mass,
@@ -40,7 +39,7 @@ def read_body(index: int, table: BodyTable, faults: Faults) -> BodyPlan:
         hollow=hollow,
         inertia=frozen(table.inertia),
         states=states(table),
-        mates=None if table.collides_with is None else frozenset(table.collides_with),
+        collides_with=None if table.collides_with is None else frozenset(table.collides_with),
         group=table.group,
     )
     if len(faults.issues) == before:
@@ -70,7 +69,7 @@ def check_inertia(place: tuple[str, int], table: BodyTable, shapes: Sequence[Sha
     elif shapes:
         centre = centre_of_mass(shapes)
         off = float(np.linalg.norm(centre))
-        size = max(hypot(*shape.centre) + extent(shape) for shape in shapes)
+        size = max(hypot(*shape.centre) + shape.extent for shape in shapes)
         if not off <= OFF_CENTRE * size:
             key = "spheres" if table.shape.spheres else "parts"
             listed = ", ".join(f"{c:.6g}" for c in centre)

@@ -7,8 +7,8 @@ from math import isfinite
 
 import numpy as np
 
-from symphys.model.shapes import Sphere
-from symphys.problem.parametric.parts import BlockPlan, PlanePlan, StaticPlan
+from symphys.model.shapes import Fixture, Plane, Sphere
+from symphys.problem.parametric.parts import ParametricStatic
 from symphys.problem.reading.faults import Faults
 from symphys.problem.schema import Document
 from symphys.problem.schema.physics import BlockTable, GroundTable, PlaneTable
@@ -17,7 +17,7 @@ from symphys.problem.tables.shapes import read_orientation, read_solid, three
 from symphys.problem.tables.terrain import read_terrain
 
 
-def read_statics(document: Document, starts: Sequence[Sequence[float]], faults: Faults) -> tuple[StaticPlan, ...]:
+def read_statics(document: Document, starts: Sequence[Sequence[float]], faults: Faults) -> tuple[ParametricStatic, ...]:
     """The ground, if there is one, then planes, blocks and terrain; ``starts``: where bodies are at first."""
     ground = () if document.ground is None else (read_ground(document.ground),)
     planes = tuple(read_plane(i, table, faults) for i, table in enumerate(document.plane))
@@ -26,12 +26,12 @@ def read_statics(document: Document, starts: Sequence[Sequence[float]], faults: 
     return (*ground, *planes, *blocks, *terrain)
 
 
-def read_ground(table: GroundTable) -> PlanePlan:
+def read_ground(table: GroundTable) -> ParametricStatic:
     """The horizontal plane called ground."""
-    return PlanePlan("ground", (0.0, 0.0, 1.0), table.height, states(table), table.group)
+    return ParametricStatic(Plane.ground(table.height), states(table), table.group)
 
 
-def read_plane(index: int, table: PlaneTable, faults: Faults) -> PlanePlan:
+def read_plane(index: int, table: PlaneTable, faults: Faults) -> ParametricStatic:
     """One plane."""
     place = ("plane", index)
     length = float(np.linalg.norm(table.normal))
@@ -42,12 +42,13 @@ def read_plane(index: int, table: PlaneTable, faults: Faults) -> PlanePlan:
     if (table.point is None) == (table.offset is None):
         faults.add((*place, "offset"), "give either a point of the plane or its offset along the normal")
     offset = table.offset if table.point is None else float(normal @ np.array(table.point))
-    return PlanePlan(table.name, three(normal.tolist()), offset or 0.0, states(table), table.group)
+    plane = Plane(table.name, three(normal.tolist()), offset or 0.0)
+    return ParametricStatic(plane, states(table), table.group)
 
 
-def read_block(index: int, table: BlockTable, faults: Faults) -> BlockPlan:
+def read_block(index: int, table: BlockTable, faults: Faults) -> ParametricStatic:
     """One static solid."""
     place = ("block", index)
     orientation = read_orientation((*place, "orientation"), table.orientation, faults)
     shape = read_solid((*place, "shape"), table.shape, table.position, orientation, faults)
-    return BlockPlan(table.name, shape or Sphere(1.0), states(table), table.group)
+    return ParametricStatic(Fixture(table.name, shape or Sphere(1.0)), states(table), table.group)

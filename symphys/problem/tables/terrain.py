@@ -10,7 +10,8 @@ import casadi as ca
 
 from symphys.expression import Formula, FormulaError, parse
 from symphys.model.heightfield import Heightfield
-from symphys.problem.parametric.parts import TerrainPlan
+from symphys.model.shapes import Terrain
+from symphys.problem.parametric.parts import ParametricStatic
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.physics import TerrainTable
 from symphys.problem.tables.bodies import states
@@ -36,7 +37,9 @@ def flat(x: Any, y: Any) -> Any:
     return 0 * x * y
 
 
-def read_terrain(index: int, table: TerrainTable, starts: Sequence[Sequence[float]], faults: Faults) -> TerrainPlan:
+def read_terrain(
+    index: int, table: TerrainTable, starts: Sequence[Sequence[float]], faults: Faults
+) -> ParametricStatic:
     """One terrain; ``starts``: where bodies are at first, so that a formula can be tried there."""
     place = ("terrain", index)
     height: Callable[[Any, Any], Any] | None = None
@@ -50,7 +53,7 @@ def read_terrain(index: int, table: TerrainTable, starts: Sequence[Sequence[floa
         rows = tuple(tuple(row) for row in table.heights or ())
         (dx, dy), (x, y) = table.spacing, table.origin or (0.0, 0.0)
         height = Heightfield(rows, (dx, dy), (x, y))
-    return TerrainPlan(table.name, height or flat, states(table), table.group)
+    return ParametricStatic(Terrain(table.name, height or flat), states(table), table.group)
 
 
 def read_formula(

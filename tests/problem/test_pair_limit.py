@@ -12,12 +12,12 @@ import pytest
 
 from symphys.errors import ProblemError
 from symphys.model import shapes
-from symphys.model.shapes import Box, Capsule, Plane, Sphere, Terrain, contact_points
+from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain, contact_points
 from symphys.model.world import Law
 from symphys.problem import Problem
 from symphys.problem.checks.pair_limit import MOST_POINTS
 from symphys.problem.parametric.collision_filter import KINDS, Meetings
-from symphys.problem.parametric.parts import BlockPlan, BodyPlan, PairPlan, Part, PlanePlan
+from symphys.problem.parametric.parts import BodyPlan, PairPlan, ParametricStatic, Part
 from symphys.problem.parametric.world import WorldPlan
 
 Load = Callable[..., Problem]
@@ -73,7 +73,7 @@ def test_the_most_that_is_allowed(load: Load, refused: Refused) -> None:
 def plans(count: int, **keys: object) -> list[Part]:
     """Boxes b0, b1, ...; ``keys`` for all, functions of the index among them."""
     chosen = [{key: value(i) if callable(value) else value for key, value in keys.items()} for i in range(count)]
-    usual = {"mates": None, "group": None}
+    usual = {"collides_with": None, "group": None}
     return [
         BodyPlan(f"b{i}", 1.0, None, (Box((1.0, 1.0, 1.0)),), False, 1.0, {}, **{**usual, **own})  # type: ignore[arg-type]
         for i, own in enumerate(chosen)
@@ -84,20 +84,20 @@ def plans(count: int, **keys: object) -> list[Part]:
     "parts",
     [
         plans(50_000),
-        plans(50_000, group=lambda i: f"g{i % 7}", mates=lambda i: frozenset({f"g{i % 5}"})),
-        plans(20_000, mates=lambda i: frozenset({f"b{(i + 1) % 20_000}", f"b{(i - 1) % 20_000}"})),
+        plans(50_000, group=lambda i: f"g{i % 7}", collides_with=lambda i: frozenset({f"g{i % 5}"})),
+        plans(20_000, collides_with=lambda i: frozenset({f"b{(i + 1) % 20_000}", f"b{(i - 1) % 20_000}"})),
     ],
     ids=["free", "groups", "chain"],
 )
 def test_tens_of_thousands_are_counted_at_once(parts: list[Part]) -> None:
     began = time.perf_counter()
-    census = Meetings([*parts, PlanePlan("ground", (0, 0, 1), 0.0, {})], []).census(MOST_POINTS)
+    census = Meetings([*parts, ParametricStatic(Plane.ground(), {})], []).census(MOST_POINTS)
     assert time.perf_counter() - began < 2
     assert census.points > MOST_POINTS
 
 
 def random_parts(rng: np.random.Generator) -> tuple[list[Part], list[PairPlan]]:
-    """A few bodies and statics with random groups, mates and tables."""
+    """A few bodies and statics with random groups, named and tables."""
     groups = [None, "g", "h"]
     surfaces = [Sphere(1.0), Box((1.0, 1.0, 1.0)), Capsule(1.0, 1.0)]
     names = [f"b{i}" for i in range(6)] + ["plane", "block"]
@@ -108,10 +108,10 @@ def random_parts(rng: np.random.Generator) -> tuple[list[Part], list[PairPlan]]:
     parts: list[Part] = []
     for name in names[:6]:
         held = tuple(surfaces[k] for k in rng.integers(0, 3, rng.integers(0, 3)))
-        mates = some(["g", "h", *(other for other in names if other != name)]) if rng.random() < 0.5 else None
-        parts.append(BodyPlan(name, 1.0, None, held, False, 1.0, {}, mates, groups[rng.integers(3)]))
-    parts.append(PlanePlan("plane", (0, 0, 1), 0.0, {}, groups[rng.integers(3)]))
-    parts.append(BlockPlan("block", Box((1.0, 1.0, 1.0)), {}, groups[rng.integers(3)]))
+        named = some(["g", "h", *(other for other in names if other != name)]) if rng.random() < 0.5 else None
+        parts.append(BodyPlan(name, 1.0, None, held, False, 1.0, {}, named, groups[rng.integers(3)]))
+    parts.append(ParametricStatic(Plane("plane"), {}, groups[rng.integers(3)]))
+    parts.append(ParametricStatic(Fixture("block", Box((1.0, 1.0, 1.0))), {}, groups[rng.integers(3)]))
     tables = {frozenset(str(n) for n in rng.choice([*names, "g", "h"], 2)) for _ in range(rng.integers(0, 6))}
     kept = [table for table in sorted(tables, key=sorted) if len(table) == 2 or table <= {"g", "h"}]
     return parts, [PairPlan("-".join(sorted(table)), table, bool(rng.random() < 0.4), {}) for table in kept]
@@ -147,8 +147,8 @@ def test_kin_meet_as_their_members_do(seed: int) -> None:
 
 
 def test_every_kind_of_surface_is_counted() -> None:
-    assert {type(kind) for kind in KINDS} == {Sphere, Capsule, Box, Plane, Terrain}
-    assert {kind for both in shapes.POINTS for kind in both} == {type(kind) for kind in KINDS}
+    assert set(KINDS) == {Sphere, Capsule, Box, Plane, Terrain}
+    assert {kind for both in shapes.POINTS for kind in both} == set(KINDS)
 
 
 def test_surfaces_that_no_rule_covers(
