@@ -23,9 +23,9 @@ from symphys.solvers import SOLVERS
 
 CHANGES: dict[str, dict[str, Any]] = {
     "nothing changed": {},
-    "forget 0: exact gradients": {"forget": 0.0},
-    "forget 2": {"forget": 2.0},
-    "forget 20": {"forget": 20.0},
+    "forget 0: exact gradients": {"adjoint_discount": 0.0},
+    "forget 2": {"adjoint_discount": 2.0},
+    "forget 20": {"adjoint_discount": 20.0},
     "clip inf: plain mean": {"clip": inf},
     "samples 8": {"samples": 8},
     "width 0: one situation": {"width": 0.0},

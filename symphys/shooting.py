@@ -136,13 +136,13 @@ class Situations(Protocol):
         ...
 
     def gradient(
-        self, Z: Array, drawn: Drawn, smoothing: float, forget: float = 0.0, horizon: float = math.inf
+        self, Z: Array, drawn: Drawn, smoothing: float, adjoint_discount: float = 0.0, horizon: float = math.inf
     ) -> Values:
         """These and the gradients of the merits.
 
-        With ``forget`` [1/s] above 0 the adjoint of the state falls like exp(-forget t) on its way back, and ends where
-        a motion was over: no derivative, but what descends where derivatives explode. After ``horizon`` [s] nothing
-        moves, and what is summed over time is 0: what is computed takes so much less time.
+        With ``adjoint_discount`` [1/s] above 0 the adjoint of the state falls like exp(-adjoint_discount t) on its
+        way back, and ends where a motion was over: no derivative, but what descends where derivatives explode. After
+        ``horizon`` [s] nothing moves, and what is summed over time is 0: what is computed takes so much less time.
         """
         ...
 

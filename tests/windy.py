@@ -35,7 +35,7 @@ class Winds:
         return Values(merit, merit, np.zeros((len(merit), 0)), alive=1.0 - over)
 
     def gradient(
-        self, Z: Array, drawn: Drawn, smoothing: float, forget: float = 0.0, horizon: float = np.inf
+        self, Z: Array, drawn: Drawn, smoothing: float, adjoint_discount: float = 0.0, horizon: float = np.inf
     ) -> Values:
         self.asked.append(drawn.grid)
         self.horizons.append(horizon)

@@ -23,7 +23,7 @@ from symphys.solvers.randomized.aggregation import evolution
 from symphys.solvers.randomized.descent import LASTING, Descent, DescentOptions, Found, State, stage_of
 from symphys.solvers.randomized.validation import NOISE, comparing, first
 
-NOT_FINITE = "not one pair of a batch is finite: bound the variables, lower `sigma`, or add [fall]"
+NOT_FINITE = "not one pair of a batch is finite: bound the variables, lower `sigma`, or add [termination]"
 
 
 @dataclass(frozen=True)

@@ -2,17 +2,18 @@
 
 Each iteration evaluates gradients in a batch of situations, the problem's own first, then takes a step of Adam along
 the mean of the gradients, each shortened by itself before (``clip``): a few situations in which small changes explode
-would drown all others. ``forget`` lets adjoints fade on their way back, at the price of a bias. A batch of its own,
-drawn once, decides which point is kept, since the path crosses regions that look good in a few situations only.
+would drown all others. ``adjoint_discount`` lets adjoints fade on their way back, at the price of a bias. A batch of
+its own, drawn once, decides which point is kept, since the path crosses regions that look good in a few situations
+only.
 
 Motions that are over before their time add nothing to a gradient after that, so ``fallen`` lets what they say of the
-time before count more; that they were over is seen by the validation batch, through the cost of [fall].
+time before count more; that they were over is seen by the validation batch, through the cost of [termination].
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -28,7 +29,7 @@ from symphys.solvers.randomized.aggregation import Average, average, evolution, 
 from symphys.solvers.randomized.descent import LASTING, Descent, DescentOptions, Found, State, stage_of
 from symphys.solvers.randomized.validation import NOISE, comparing, first
 
-NOT_FINITE = "not one situation of a batch is finite: bound the variables, lower `rate`, or add [fall]"
+NOT_FINITE = "not one situation of a batch is finite: bound the variables, lower `rate`, or add [termination]"
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class StochasticOptions(DescentOptions):
 
     Attributes:
         clip: largest norm of each situation's scaled gradient; inf: none.
-        forget: [1/s] how fast adjoints fade on their way back; 0: not at all.
+        adjoint_discount: [1/s] how fast adjoints fade on their way back; 0: not at all.
         fallen: weight of a motion that was over before its time.
         horizons: [s] shorter motions that gradients begin with, one after the other.
         growth: share of the iterations that these take together.
@@ -48,7 +49,7 @@ class StochasticOptions(DescentOptions):
     __pydantic_config__: ClassVar[dict[str, object]] = {"extra": "forbid"}
 
     clip: float = 1.0
-    forget: float = 2.0
+    adjoint_discount: float = field(default=2.0, metadata={"formerly": "forget"})
     fallen: float = 5.0
     horizons: tuple[float, ...] = ()
     growth: float = 0.5
@@ -58,7 +59,7 @@ class StochasticOptions(DescentOptions):
     def __post_init__(self) -> None:
         """ValueError that names the option and says what would be valid."""
         super().__post_init__()
-        at_least(0, forget=self.forget)
+        at_least(0, adjoint_discount=self.adjoint_discount)
         require(self.clip > 0, "clip", "above 0")
         require(self.fallen > 0, "fallen", "above 0")
         require(0 < self.sigma < math.inf, "sigma", "above 0")
@@ -109,7 +110,7 @@ class Pathwise(Descent[StochasticOptions]):
         options, meter = self.options, self.meter
         meter.counts.gradients += options.samples
         horizon = options.horizon(state.iteration)
-        return self.situations.gradient(state.z[None], drawn, meter.smoothing, options.forget, horizon)
+        return self.situations.gradient(state.z[None], drawn, meter.smoothing, options.adjoint_discount, horizon)
 
     def mixed(self, state: State, drawn: Drawn, found: Average) -> Array:
         """The gradient that the step is made of."""

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from symphys.codegen.backends import BEST
-from symphys.problem import Problem, require_solvable, require_solvers, validate_options
+from symphys.problem import Problem, recorded_options, require_solvable, require_solvers, validate_options
 from symphys.runs.config import Config, make_config
 from symphys.runs.folder import RunFolder
 from symphys.solvers import SOLVERS, solver
@@ -69,7 +68,7 @@ def make_jobs(
         check_tables(problem)
         for name in solvers or problem.solvers or fitting(problem):
             options = solver_options(problem, name)
-            plain = dataclasses.asdict(options)
+            plain = recorded_options(options)
             for seed in seeds:
                 config = make_config(problem.name, problem.identity, name, seed, settings, plain, backend)
                 folder = RunFolder.of(out, problem.name, name, seed)

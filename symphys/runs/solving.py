@@ -24,7 +24,7 @@ from symphys.runs.stages import guess_record, stage_records
 from symphys.shooting import Array, ShootingProblem
 from symphys.solvers import Monitor, Outcome, Status, TraceRow, solver
 from symphys.trajectory import Trajectory
-from symphys.transcription import Check, Record, Transcription, Verdict
+from symphys.transcription import Assessment, Criterion, Record, Transcription
 
 SMOOTHED = (
     "what the solver's smoothed rollout meets, the exact one does not: lower the smoothing, or add a stage at 0, "
@@ -44,7 +44,7 @@ class Judgement:
         advice: the solver's and what the rollout adds.
     """
 
-    verdict: Verdict | None
+    verdict: Assessment | None
     trajectory: Trajectory | None
     trust: dict[str, Any] | None
     advice: str
@@ -168,14 +168,14 @@ def record(
     )
 
 
-def judged(verdict: Verdict | None) -> Judged:
+def judged(verdict: Assessment | None) -> Judged:
     """What is known of how the exact rollout does."""
     if verdict is None:
         return Judged(np.nan, np.nan, met=False, checked=False)
     return Judged(verdict.objective, verdict.worst, verdict.solved, bool(verdict.checks))
 
 
-def check_record(check: Check) -> CheckRecord:
+def check_record(check: Criterion) -> CheckRecord:
     """A check as JSON."""
     return CheckRecord(
         kind=check.kind,

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.transcription import Record, Transcription, first_derivative_fault, first_fault
+from symphys.transcription import Record, Transcription, first_non_finite, first_non_finite_derivative
 from symphys.verification import gradient, refinement, smoothing
 from symphys.verification import sensitivity_growth as growth
 from symphys.verification.contacts import slides
-from symphys.verification.near_misses import misses
+from symphys.verification.near_misses import near_misses
 from symphys.verification.survey import survey
 
 Array = NDArray[np.float64]
@@ -38,7 +38,7 @@ def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: No
     tell("sweeping the sensitivity back through time")
     grown = growth.growth(transcription, record)
     tell("looking for near misses")
-    near = misses(transcription, record)
+    near = near_misses(transcription, record)
     tell("smoothing, and adding up energy and momentum")
     motion = survey(transcription, record)
     return {
@@ -57,8 +57,8 @@ def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: No
 def _fault(transcription: Transcription, record: Record, compared: list[dict[str, Any]]) -> str:
     verdict = transcription.judge(record.z)
     told = [verdict.objective, *verdict.costs.values(), *(check.error for check in verdict.checks)]
-    if not np.isfinite([*told, *record.course.x.ravel()]).all():
-        return first_fault(transcription.rollout, record.course)
+    if not np.isfinite([*told, *record.arrays.x.ravel()]).all():
+        return first_non_finite(transcription.rollout, record.arrays)
     if not np.isfinite([row["scale"] for row in compared]).all():
-        return first_derivative_fault(transcription.rollout, record.course)
+        return first_non_finite_derivative(transcription.rollout, record.arrays)
     return ""

@@ -30,7 +30,7 @@ def joint_work(rollout: Rollout, record: Record) -> tuple[Array, Array]:
     only the last force is known: torque motors act with it all along, others are taken to get there in even steps. Of
     a servo that goes from one bound to the other within a step that is wrong by up to twice its work.
     """
-    layout, x = Layout(rollout.world), record.course.x
+    layout, x = Layout(rollout.world), record.arrays.x
     total, gross, lag = np.zeros(rollout.steps), np.zeros(rollout.steps), x[:, layout["lag"]]
     for joint, _, rate in coordinates(rollout, record):
         for part in (part for part in WORKING if part in joint.acting):
@@ -75,4 +75,4 @@ def coordinates(rollout: Rollout, record: Record) -> Iterator[tuple[Joint, Array
 
 def number(rollout: Rollout, record: Record, value: Any) -> float:
     """A number of the world, which a parameter may be."""
-    return float(ca.Function("number", [parameters(rollout)], [ca.SX(value)])(record.course.p))
+    return float(ca.Function("number", [parameters(rollout)], [ca.SX(value)])(record.arrays.p))

@@ -58,7 +58,7 @@ def backwards(transcription: Transcription, record: Record, ends: Array) -> Iter
     Yields:
         Derivatives in the same order and units; of an orientation only its rotation is changed, not its length.
     """
-    rollout, x = transcription.rollout, record.course.x
+    rollout, x = transcription.rollout, record.arrays.x
     columns, units = state_columns(rollout), state_units(rollout, record)
     whole = np.zeros((x.shape[1], ends.shape[1]))
     whole[columns] = ends * units[:, None]

@@ -16,7 +16,7 @@ from symphys.model.shapes import Sphere, Surface
 from symphys.model.world import is_zero
 from symphys.transcription import Record, Rollout
 from symphys.verification.bodies import bodies
-from symphys.verification.signed_gaps import Meeting, meetings
+from symphys.verification.signed_gaps import SurfacePair, surface_pairs
 
 Array = NDArray[np.float64]
 
@@ -39,12 +39,12 @@ def passages(rollout: Rollout, record: Record) -> dict[str, Any]:
     """
     size, worst = bodies(rollout, record).size, 0.0
     found: dict[str, Any] = {"passed": 0.0, "passed_at": None}
-    for meeting in meetings(rollout):
+    for meeting in surface_pairs(rollout):
         if meeting.pair.law.soft:
             continue
         own = float(min(size[body] for body in meeting.bodies))
         for k, places in _fast_steps(meeting, record, own):
-            gaps = meeting.least(_between(meeting, record, k, places), record.course.p)
+            gaps = meeting.least(_between(meeting, record, k, places), record.arrays.p)
             depth, at = float(-gaps.min()), float(places[int(gaps.argmin())])
             if depth / own > worst:
                 worst = depth / own
@@ -53,7 +53,7 @@ def passages(rollout: Rollout, record: Record) -> dict[str, Any]:
     return found
 
 
-def _fast_steps(meeting: Meeting, record: Record, size: float) -> list[tuple[int, Array]]:
+def _fast_steps(meeting: SurfacePair, record: Record, size: float) -> list[tuple[int, Array]]:
     """The steps in which the bodies move fast as seen from each other, and shares of the step to look at."""
     way = np.linalg.norm(np.diff(relative(meeting, record), axis=0), axis=1)
     outside = record.motion.contact_gap[:-1, list(meeting.columns)].min(axis=1) > -FAST * size
@@ -65,13 +65,13 @@ def _fast_steps(meeting: Meeting, record: Record, size: float) -> list[tuple[int
     return [(int(k), np.linspace(0, 1, int(counts[k]) + 1)[1:]) for k in np.flatnonzero(fast)]
 
 
-def relative(meeting: Meeting, record: Record) -> Array:
+def relative(meeting: SurfacePair, record: Record) -> Array:
     """(N + 1, 3) [m]: the first body's place, as seen from the second."""
     place = record.motion.position
     return place[:, meeting.first] - (0 if meeting.second is None else place[:, meeting.second])
 
 
-def _balls(meeting: Meeting) -> bool:
+def _balls(meeting: SurfacePair) -> bool:
     """Whether turning changes nothing."""
     sides = [side for side in (meeting.pair.first, meeting.pair.second) if side.body is not None]
     return all(_is_ball(meeting.rollout.world.surface(side)) for side in sides)
@@ -82,7 +82,7 @@ def _is_ball(surface: Surface) -> bool:
     return isinstance(surface, Sphere) and all(is_zero(component) for component in surface.centre)
 
 
-def _between(meeting: Meeting, record: Record, k: int, places: Array) -> Array:
+def _between(meeting: SurfacePair, record: Record, k: int, places: Array) -> Array:
     """(m, 2, 7): poses of both bodies at these shares of step k."""
     poses = np.zeros((len(places), 2, 7))
     poses[:, :, 3] = 1

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from symphys.model.shapes import Sphere
-from symphys.problem.parametric.collision_filter import Census, Kin, Meetings
-from symphys.problem.parametric.parts import BodyPlan
+from symphys.problem.parametric.collision_filter import BodyClass, CollisionFilter, PairCount
+from symphys.problem.parametric.parts import ParametricBody
 from symphys.problem.reading.faults import Faults
 
 MOST_POINTS = 2000
@@ -14,7 +14,7 @@ MOST_POINTS = 2000
 LISTED = 3
 
 
-def check_crowd(meetings: Meetings, faults: Faults) -> None:
+def check_pair_limit(meetings: CollisionFilter, faults: Faults) -> None:
     """Every point where two surfaces may touch is looked at in every step, so there must not be too many."""
     census = meetings.census(MOST_POINTS)
     if census.points > MOST_POINTS:
@@ -29,7 +29,7 @@ def check_crowd(meetings: Meetings, faults: Faults) -> None:
         )
 
 
-def too_many(meetings: Meetings, census: Census) -> str:
+def too_many(meetings: CollisionFilter, census: PairCount) -> str:
     """How many points there are, where most come from, and what to do."""
     sets = list(meetings.sets.values())
     largest = census.shares.most_common(LISTED)
@@ -44,17 +44,17 @@ def too_many(meetings: Meetings, census: Census) -> str:
     return f"{count} points of contact in every step are too many, {MOST_POINTS} are allowed ({listed}); {remedy}"
 
 
-def between(a: Sequence[Kin], b: Sequence[Kin], same: bool) -> str:
+def between(a: Sequence[BodyClass], b: Sequence[BodyClass], same: bool) -> str:
     """``40 boxes against each other``, ``40 boxes against ground``."""
     return f"{called(a)} against {'each other' if same else called(b)}"
 
 
-def called(members: Sequence[Kin]) -> str:
+def called(members: Sequence[BodyClass]) -> str:
     """A part by its name, several by their number and kind."""
     count, part = sum(len(kin.members) for kin in members), members[0].part
     if count == 1:
         return part.name
-    if isinstance(part, BodyPlan):
+    if isinstance(part, ParametricBody):
         word = part.shapes[0].plural if len(part.shapes) == 1 else "compounds"
     else:
         word = part.static.plural

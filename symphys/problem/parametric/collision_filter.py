@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.model.shapes import SURFACES, points_of_kinds
-from symphys.problem.parametric.parts import BodyPlan, PairPlan, Part
+from symphys.problem.parametric.parts import PairRule, ParametricBody, Part
 
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -26,7 +26,7 @@ ENOUGH_ROWS = 256
 
 
 @dataclass(frozen=True)
-class Kin:
+class BodyClass:
     """Parts that meet the same others, with the same shapes.
 
     Attributes:
@@ -42,11 +42,11 @@ class Kin:
     @property
     def moves(self) -> bool:
         """Whether they are bodies."""
-        return isinstance(self.part, BodyPlan)
+        return isinstance(self.part, ParametricBody)
 
 
 @dataclass
-class Census:
+class PairCount:
     """The candidates for contact.
 
     Attributes:
@@ -67,10 +67,10 @@ class Census:
         self.shares.update({(one, other): int(sums[other]) for other in np.flatnonzero(sums).tolist()})
 
 
-class Meetings:
+class CollisionFilter:
     """The parts of a world, bodies first, and which of them may meet."""
 
-    def __init__(self, parts: Sequence[Part], tables: Sequence[PairPlan]) -> None:
+    def __init__(self, parts: Sequence[Part], tables: Sequence[PairRule]) -> None:
         """Sort the parts into kin."""
         self.parts, self.tables = parts, tables
         mentioned = {name for part in parts for name in part.collides_with or ()}
@@ -78,17 +78,17 @@ class Meetings:
         found: dict[object, list[int]] = {}
         for index, part in enumerate(parts):
             own = part.name if part.name in mentioned else None
-            found.setdefault((kinds(part), isinstance(part, BodyPlan), part.group, part.collides_with, own), []).append(
-                index
-            )
-        self.kin = [Kin(parts[m[0]], m, np.array(kinds(parts[m[0]]), np.int64)) for m in found.values()]
-        self.sets: dict[object, list[Kin]] = {}
+            found.setdefault(
+                (kinds(part), isinstance(part, ParametricBody), part.group, part.collides_with, own), []
+            ).append(index)
+        self.kin = [BodyClass(parts[m[0]], m, np.array(kinds(parts[m[0]]), np.int64)) for m in found.values()]
+        self.sets: dict[object, list[BodyClass]] = {}
         for kin in self.kin:
             self.sets.setdefault((kinds(kin.part), kin.moves, kin.part.group), []).append(kin)
 
-    def census(self, most: int) -> Census:
+    def census(self, most: int) -> PairCount:
         """Count the points; beyond ``most`` the count may stop early."""
-        found = Census()
+        found = PairCount()
         numbers = np.array([len(kin.members) for kin in self.kin])
         surfaces = np.array([kin.surfaces for kin in self.kin])
         points = np.array([[points_of_kinds(a, b) for b in KINDS] for a in KINDS])

@@ -32,7 +32,7 @@ def stated(states: Mapping[str, float]) -> dict[str, Numbers]:
 
 
 @dataclass(frozen=True)
-class BodyPlan:
+class ParametricBody:
     """A body.
 
     Attributes:
@@ -69,7 +69,7 @@ class BodyPlan:
             own |= self.shapes[0].sizes
         return {f"{self.name}.{key}": numbers for key, numbers in (own | stated(self.states)).items()}
 
-    def body(self, overrides: Mapping[str, Any], value: Value) -> Body:
+    def valued(self, overrides: Mapping[str, Any], value: Value) -> Body:
         """The body with its parameters' values; a mass given by density follows the size unless overridden."""
         mass = value(f"{self.name}.mass")
         if len(self.shapes) != 1:
@@ -130,11 +130,11 @@ class ParametricStatic:
         return self.static.with_parameters({key: value(f"{self.name}.{key}") for key in self.static.parameters})
 
 
-Part = BodyPlan | ParametricStatic
+Part = ParametricBody | ParametricStatic
 
 
 @dataclass(frozen=True)
-class PairPlan:
+class PairRule:
     """What a [[pair]] table states between two surfaces or groups; ``states`` may hold frequency and damping too.
 
     ``between`` has one name where a group meets itself.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import MISSING, Field, fields
+from dataclasses import MISSING, Field, asdict, fields
 from math import isnan
 from typing import Any, TypeVar, get_type_hints
 
@@ -13,6 +13,7 @@ from pydantic_core import to_json
 from symphys.errors import Issue, ProblemError, SymphysError
 from symphys.problem.reading.faults import Faults
 from symphys.problem.reading.messages import report
+from symphys.problem.schema.types import deprecated
 from symphys.suggest import hint, quote
 
 Options = TypeVar("Options")
@@ -32,6 +33,11 @@ def validate_options(cls: type[Options], table: Mapping[str, object], file: str,
     """
     faults = Faults(file, {where: table})
     given = read_options(options_model(cls), table, where, faults)
+    for name, old in former_names(cls).items():
+        if name in given and old in given:
+            faults.add((where, old), f"is the old name of {name}, which is given too; leave one of the two out")
+        elif old in given:
+            given[name] = given.pop(old)
     faults.stop_if_any()
     try:
         return cls(**given)
@@ -70,10 +76,23 @@ def require_solvers(tables: Iterable[str], asked: Iterable[str], known: Iterable
         raise ProblemError(file, issues)
 
 
+def former_names(cls: type[Any]) -> dict[str, str]:
+    """Old names of options, which files may go on using: metadata ``formerly`` of the dataclass's fields."""
+    return {field.name: field.metadata["formerly"] for field in fields(cls) if "formerly" in field.metadata}
+
+
+def recorded_options(options: Any) -> dict[str, Any]:
+    """Options as config.json records them: under their old names, so that a finished run stays the same run."""
+    old = former_names(type(options))
+    return {old.get(name, name): value for name, value in asdict(options).items()}
+
+
 def options_model(cls: type[Any]) -> type[BaseModel]:
     """The pydantic model of a dataclass: the same keys, kinds and defaults, strict and without others."""
     kinds = get_type_hints(cls, include_extras=True)
     entries: dict[str, Any] = {field.name: (kinds[field.name], default(field)) for field in fields(cls) if field.init}
+    for name, old in former_names(cls).items():
+        entries[old] = (kinds[name] | None, deprecated(name))
     return create_model(
         cls.__name__, __config__=ConfigDict(extra="forbid", strict=True), __doc__=cls.__doc__, **entries
     )

@@ -6,19 +6,19 @@ from typing import Annotated
 
 from pydantic import Field
 
-from symphys.problem.schema.types import Coordinates, Identifier, Label, NonNegative, Positive, Table, Texts
+from symphys.problem.schema.types import Coordinates, Identifier, Label, NonNegative, Positive, SchemaTable, Texts
 
 Below = Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False)]
 
 
-class GridTable(Table):
+class DiscretisationTable(SchemaTable):
     """Another way to compute the same motion; what is left out is that of [simulation]."""
 
     dt: Positive | None = Field(default=None, description="time step [s]")
     sweeps: Annotated[int, Field(ge=1, le=10_000)] | None = Field(default=None, description="of the contact solver")
 
 
-class ScenarioTable(Table):
+class ScenarioTable(SchemaTable):
     """Something that differs from situation to situation: numbers, the pose of a robot, or the time step."""
 
     name: Identifier = Field(description="for messages and reports")
@@ -43,6 +43,6 @@ class ScenarioTable(Table):
     velocity: NonNegative = Field(
         default=0.0, description="of a robot: its bodies move alike, at most so fast along each axis [m/s]"
     )
-    simulation: GridTable | None = Field(
+    simulation: DiscretisationTable | None = Field(
         default=None, description="{ dt = 0.005 }: some situations are computed with another time step, or more sweeps"
     )

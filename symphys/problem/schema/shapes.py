@@ -8,7 +8,7 @@ from pydantic import Field, PlainValidator, WithJsonSchema, create_model
 
 from symphys.model.shapes import SHAPES, SizeKey, Sphere
 from symphys.problem.schema import checks
-from symphys.problem.schema.types import Orientation, Positive, Size, Table, Vector
+from symphys.problem.schema.types import Orientation, Positive, SchemaTable, Size, Vector
 
 MOST_PARTS = 1000
 UPRIGHT = "quaternion [w, x, y, z], or { roll_deg, pitch_deg, yaw_deg }"
@@ -27,15 +27,15 @@ def value_of(key: SizeKey) -> Any:
     ]
 
 
-def one_of_the_shapes() -> type[Table]:
+def one_of_the_shapes() -> type[SchemaTable]:
     """A table with an optional table of sizes for each shape."""
     fields: dict[str, Any] = {}
     for kind, shape in SHAPES.items():
         sizes: dict[str, Any] = {k.name: (value_of(k), Field(description=k.description)) for k in shape.size_keys}
         name = f"Solid{kind.capitalize()}Table"
-        table = create_model(name, __base__=Table, __doc__=shape.summary, __module__=__name__, **sizes)
+        table = create_model(name, __base__=SchemaTable, __doc__=shape.summary, __module__=__name__, **sizes)
         fields[kind] = (table | None, Field(default=None, description=shape.example))
-    return create_model("OneShapeTable", __base__=Table, __module__=__name__, **fields)
+    return create_model("OneShapeTable", __base__=SchemaTable, __module__=__name__, **fields)
 
 
 class SolidTable(one_of_the_shapes()):  # type: ignore[misc]
@@ -49,14 +49,14 @@ class PartTable(SolidTable):
     orientation: Orientation = Field(default=[1.0, 0.0, 0.0, 0.0], description=UPRIGHT)
 
 
-class PlacedSphereTable(Table):
+class PlacedSphereTable(SchemaTable):
     """One sphere of a compound of spheres."""
 
     radius: Positive = Field(description="[m]")
     centre: Vector = Field(default=[0.0, 0.0, 0.0], description="[m], from the centre of mass, in the body's frame")
 
 
-class SphereTable(Table):
+class SphereTable(SchemaTable):
     """A sphere about the centre of mass."""
 
     radius: Positive = Field(description="[m]")

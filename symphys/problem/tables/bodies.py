@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from symphys.model.shapes import Shape
 from symphys.problem.checks.inertia import centre_of_mass, complaint
 from symphys.problem.checks.magnitude import check_magnitudes
-from symphys.problem.parametric.parts import COMBINE, BodyPlan
+from symphys.problem.parametric.parts import COMBINE, ParametricBody
 from symphys.problem.reading.faults import Faults
 from symphys.problem.schema.physics import BodyTable, SurfaceTable
 from symphys.problem.tables.shapes import read_orientation, read_shape
@@ -21,8 +21,8 @@ OFF_CENTRE = 1e-6
 """How far a compound's centre of mass may be from the body's origin, relative to the size of the compound."""
 
 
-def read_body(index: int, table: BodyTable, faults: Faults) -> BodyPlan:
-    """The plan of one body; notes a mass or inertia that is missing, doubled or impossible."""
+def read_body(index: int, table: BodyTable, faults: Faults) -> ParametricBody:
+    """One body; notes a mass or inertia that is missing, doubled or impossible."""
     place = ("body", index)
     before = len(faults.issues)
     shapes = read_shape(place, table.shape, faults)
@@ -31,7 +31,7 @@ def read_body(index: int, table: BodyTable, faults: Faults) -> BodyPlan:
     density = read_density(place, table, hollow, faults)
     check_inertia(place, table, shapes, faults)
     mass = table.mass or (density or 0.0) * sum(shape.volume for shape in shapes)
-    plan = BodyPlan(
+    body = ParametricBody(
         name=table.name,
         mass=mass,
         density=density if len(shapes) == 1 else None,
@@ -43,8 +43,8 @@ def read_body(index: int, table: BodyTable, faults: Faults) -> BodyPlan:
         group=table.group,
     )
     if len(faults.issues) == before:
-        check_magnitudes(place, table, plan, faults)
-    return plan
+        check_magnitudes(place, table, body, faults)
+    return body
 
 
 def read_density(place: tuple[str, int], table: BodyTable, hollow: bool, faults: Faults) -> float | None:

@@ -46,14 +46,16 @@ def read_controllers(
         varied: names of quantities that variables set.
     """
     widths = {sensor.name: sensor.size for sensor in sensors}
-    readers = [Reader(index, table, widths, known, functions, faults, varied) for index, table in enumerate(tables)]
+    readers = [
+        ControllerReader(index, table, widths, known, functions, faults, varied) for index, table in enumerate(tables)
+    ]
     found = [reader.read() for reader in readers]
     for name in functions.keys() - {table.name for table in tables if table.function is not None}:
         faults.add(("controller",), f'Python gives a function {quote(name)}, but no controller "{name}" has function')
     return tuple(controller for controller in found if controller)
 
 
-class Reader:
+class ControllerReader:
     """Reads one table; every complaint lands below its place."""
 
     def __init__(

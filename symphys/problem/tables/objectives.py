@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Aims:
+class Objectives:
     """All that should come out."""
 
     costs: tuple[Cost, ...]
@@ -30,14 +30,16 @@ class Aims:
     outputs: tuple[Output, ...]
 
 
-def read_aims(document: Document, simulation: Simulation, sample: Mapping[str, Any], faults: Faults) -> Aims:
+def read_objectives(
+    document: Document, simulation: Simulation, sample: Mapping[str, Any], faults: Faults
+) -> Objectives:
     """Every aim; ``sample`` has a value for each name that a formula may use."""
-    reader = Reader(simulation, sample, faults)
+    reader = ObjectiveReader(simulation, sample, faults)
     costs = [reader.cost(index, table) for index, table in enumerate(document.cost)]
     targets = [reader.target(index, table) for index, table in enumerate(document.target)]
     constraints = [reader.constraint(index, table) for index, table in enumerate(document.constraint)]
     outputs = [reader.output(index, table) for index, table in enumerate(document.output)]
-    return Aims(
+    return Objectives(
         tuple(cost for cost in costs if cost),
         tuple(target for target in targets if target),
         tuple(constraint for constraint in constraints if constraint),
@@ -45,7 +47,7 @@ def read_aims(document: Document, simulation: Simulation, sample: Mapping[str, A
     )
 
 
-class Reader:
+class ObjectiveReader:
     """Reads one table at a time; None stands for one with a faulty formula."""
 
     def __init__(self, simulation: Simulation, sample: Mapping[str, Any], faults: Faults) -> None:

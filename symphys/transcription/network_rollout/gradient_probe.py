@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.transcription.network_rollout.evaluator import LargeEvaluator
-from symphys.transcription.network_rollout.forward_backward import Backward, aim_arguments
+from symphys.transcription.network_rollout.forward_backward import BackwardPass, objective_arguments
 
 Array = NDArray[np.float64]
 
@@ -16,17 +16,22 @@ class LargeProbe:
 
     def __init__(self, evaluator: LargeEvaluator) -> None:
         """By the nets and steps of an evaluator."""
-        self._evaluator, self._made = evaluator, evaluator.made
+        self._evaluator, self._context = evaluator, evaluator.context
 
     def values(self, Z: Array) -> Array:
         """See ``Probe``."""
-        ways = (self._evaluator.way(z, 0.0) for z in Z)
-        return np.array([float(self._made.aims.probe.call(aim_arguments(self._made, way, 0))[0]) for way in ways])
+        motions = (self._evaluator.forward_pass(z, 0.0) for z in Z)
+        return np.array(
+            [
+                float(self._context.objectives.probe.call(objective_arguments(self._context, motion, 0))[0])
+                for motion in motions
+            ]
+        )
 
     def gradient(self, z: Array) -> Array:
         """See ``Probe``."""
         evaluator = self._evaluator
-        nets, way = evaluator.nets_at(z), evaluator.way(z, 0.0)
-        slopes = self._made.aims.probe_slopes
-        small, weights = Backward(self._made, evaluator.stage, nets, way, 0.0, slopes).run()
-        return self._made.split.joined(small[0], weights)
+        nets, motion = evaluator.nets_at(z), evaluator.forward_pass(z, 0.0)
+        slopes = self._context.objectives.probe_slopes
+        small, weights = BackwardPass(self._context, evaluator.batch_step, nets, motion, 0.0, slopes).run()
+        return self._context.partition.joined(small[0], weights)

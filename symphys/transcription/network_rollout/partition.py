@@ -66,7 +66,7 @@ class Weights:
 
 
 @dataclass(frozen=True)
-class Split:
+class Partition:
     """A problem taken apart.
 
     Attributes:
@@ -95,7 +95,7 @@ class Split:
         return gradient
 
 
-def split(problem: Problem) -> Split:
+def partition(problem: Problem) -> Partition:
     """Take a problem apart; ProblemError if its formulas look at the weights of large nets."""
     nets = large_nets(problem)
     names = {name for controller in nets for name in controller.weights}
@@ -105,7 +105,7 @@ def split(problem: Problem) -> Split:
     others = tuple(controller for controller in problem.controllers if controller not in nets)
     rest = replace(problem, variables=tuple(v for v, _ in kept), controllers=others)
     rollout = symbolic_rollout(rest, input_names(problem))
-    return Split(
+    return Partition(
         rollout=rollout,
         small=np.concatenate([np.zeros(0, int), *(np.arange(*span) for _, span in kept)]),
         n=sum(v.guess.size for v in problem.variables),

@@ -18,7 +18,7 @@ from symphys.transcription.randomization.sampler import Sampler
 Array = NDArray[np.float64]
 
 
-class KernelSituations:
+class ScenarioEvaluator:
     """See ``Situations``: a sampler and a kernel for each grid."""
 
     def __init__(self, grids: Sequence[str], samplers: Sequence[Sampler], kernels: Sequence[Kernel]) -> None:
@@ -39,10 +39,12 @@ class KernelSituations:
         outputs = kernel.forward(joined(Z, drawn), [smoothing])
         return replace(values(outputs), probe=probed(kernel, outputs))
 
-    def gradient(self, Z: Array, drawn: Drawn, smoothing: float, forget: float = 0.0, horizon: float = inf) -> Values:
+    def gradient(
+        self, Z: Array, drawn: Drawn, smoothing: float, adjoint_discount: float = 0.0, horizon: float = inf
+    ) -> Values:
         """See ``Situations``."""
         simulation = self.samplers[drawn.grid].problem.simulation
-        loss = 1 - exp(-forget * simulation.dt)
+        loss = 1 - exp(-adjoint_discount * simulation.dt)
         spared = max(0, simulation.steps - round(min(horizon, simulation.duration) / simulation.dt))
         outputs, slopes = self.kernels[drawn.grid].gradient(joined(Z, drawn), [1.0], [smoothing], loss, spared)
         return values(outputs, np.ascontiguousarray(slopes[:, : Z.shape[1]]))
@@ -51,7 +53,7 @@ class KernelSituations:
 class NominalEvaluator(WithoutResiduals):
     """Evaluates points in the problem's own situation; see ``Evaluator``."""
 
-    def __init__(self, situations: KernelSituations) -> None:
+    def __init__(self, situations: ScenarioEvaluator) -> None:
         """By the same kernels."""
         self.situations = situations
 

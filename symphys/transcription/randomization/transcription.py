@@ -10,7 +10,7 @@ from symphys.codegen.backends import PRECISIONS, build_kernel, described
 from symphys.problem import Problem
 from symphys.shooting import Nlp
 from symphys.transcription.program import rollout_program
-from symphys.transcription.randomization.evaluator import KernelSituations, NominalEvaluator
+from symphys.transcription.randomization.evaluator import NominalEvaluator, ScenarioEvaluator
 from symphys.transcription.randomization.sampler import Sampler
 from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.transcription import Transcription
@@ -18,7 +18,7 @@ from symphys.transcription.transcription import Transcription
 WITHOUT = "there is no evaluation in other situations"
 
 
-def with_situations(
+def with_scenarios(
     plain: Transcription, problem: Problem, exact: bool, backend: str, threads: int | None
 ) -> Transcription:
     """``plain``, which is of the problem without its scenarios, with kernels that know them in place of its backend.
@@ -42,11 +42,11 @@ def with_situations(
     return replace(plain, problem=problem, shooting=shooting, backend=replace(told, cached=cached))
 
 
-def _situations(problem: Problem, exact: bool, backend: str, threads: int) -> KernelSituations:
+def _situations(problem: Problem, exact: bool, backend: str, threads: int) -> ScenarioEvaluator:
     assert problem.scenarios is not None, "nothing differs"
     grids = {"": problem.simulation, **{grid.name: grid.simulation for grid in problem.scenarios.grids}}
     samplers = [Sampler(replace(problem, simulation=simulation)) for simulation in grids.values()]
-    return KernelSituations(list(grids), samplers, [_kernel(each, exact, backend, threads) for each in samplers])
+    return ScenarioEvaluator(list(grids), samplers, [_kernel(each, exact, backend, threads) for each in samplers])
 
 
 def _kernel(sampler: Sampler, exact: bool, backend: str, threads: int) -> Kernel:
