@@ -15,8 +15,8 @@ For some things MuJoCo has laws of its own:
 - A velocity motor likewise becomes a velocity actuator with that kv.
 
 Such actuators are stiff, hence the integrator ``implicitfast``. What has no counterpart is refused: restitution,
-contacts and joints that give way, joints that close a loop, terrain. Variables and aims are no part of a model, and
-commands are its ctrl, 0 at the start.
+contacts and joints that give way, joints that close a loop, terrain. Variables and objectives are no part of a
+model, and commands are its ctrl, 0 at the start.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ class Keyframe:
         self.qvel: list[float] = []
 
     def bodies(self, parent: int | None) -> Iterator[Element]:
-        """The bodies that hang on one, or on the world, with all that hangs on them."""
+        """The children of a body, or of the world, with their subtrees."""
         for link in self.links:
             if link.parent == parent:
                 yield self.body(link)

@@ -117,7 +117,7 @@ def error_lines(problem: Problem) -> list[str]:
 
 
 def output_lines(problem: Problem) -> list[str]:
-    """One line a number that is told."""
+    """One line an output."""
     return _placed("outputs", [(1, output.label) for output in problem.outputs])
 
 

@@ -143,7 +143,7 @@ def build(
     check_anchors(parametric, variables, faults)
     scenarios = read_scenarios(document.scenario, known, parametric, simulation, variables, faults)
     faults.stop_if_any()
-    termination, objectives = read_goals(
+    termination, objectives = read_termination_and_objectives(
         document, simulation, parametric, at_guess(parametric, known, variables), variables, faults
     )
     return Problem(
@@ -185,7 +185,7 @@ def read_control(
     return sensors, controllers
 
 
-def read_goals(
+def read_termination_and_objectives(
     document: Document,
     simulation: Simulation,
     parametric: ParametricWorld,
@@ -193,7 +193,7 @@ def read_goals(
     variables: Sequence[Variable],
     faults: Faults,
 ) -> tuple[Termination | None, Objectives]:
-    """What is asked for; ``start`` is as the guess has it, and must be one that can be."""
+    """Termination and objectives; ``start`` is as the guess has it, and must be one that can be."""
     check_overlap(parametric, start, faults)
     check_joints(parametric, start, faults)
     sensed = sensor_names(parametric, start)

@@ -192,11 +192,11 @@ class RandomizedQuantity:
 
     Attributes:
         name: as in the file.
-        kind: of what is drawn.
-        slots: what is drawn.
+        kind: of what is sampled.
+        slots: what is sampled.
         factor: half the width of the factors; 0: none.
         shift: (components,) half the width of what is added.
-        alike: whether all numbers share one draw.
+        alike: whether all numbers share one random number.
         lasts: [s] of inputs, how long they act; 0: always.
         lower, upper: (components,) each slot, what is physical.
     """
@@ -218,7 +218,7 @@ class RandomizedPose:
 
     Attributes:
         name: as in the file.
-        bodies: all that hangs together.
+        bodies: all that joints connect.
         joints: its rigid hinges that close no loop.
         tilt, bend: half the widths of turns about each axis of the world, and of the joints [rad].
         velocity: half the width of each component [m/s].

@@ -20,7 +20,7 @@ Expr = Any
 
 
 MIDDLE, START = 0.5, 0.0
-"""When a linear control is looked at in a step: forces act over it, motors as an impulse at its start (leapfrog)."""
+"""When a linear control is sampled in a step: forces act over it, motors as an impulse at its start (leapfrog)."""
 
 
 @dataclass(frozen=True)

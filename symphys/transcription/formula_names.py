@@ -81,7 +81,7 @@ def input_names(problem: Problem) -> tuple[str, ...]:
 
 
 def instant(world: World, inputs: Sequence[str], parameters: Parameters, memory: SensorMemory, n: int) -> Instant:
-    """Symbols for all that may be looked at; ``n``: length of z."""
+    """Symbols for all that a formula may depend on; ``n``: length of z."""
     return Instant(
         ca.SX.sym("x", memory.size),
         ca.SX.sym("u", inputs_size(world, inputs)),

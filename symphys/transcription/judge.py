@@ -40,7 +40,7 @@ class Criterion:
 
 @dataclass(frozen=True)
 class Assessment:
-    """Objective, each cost, each check and each number that is told of one candidate, by name."""
+    """Objective, each cost, each check and each output of one candidate, by name."""
 
     objective: float
     costs: dict[str, float]
@@ -71,5 +71,5 @@ def assessment(problem: Problem, objective: float, costs: Array, errors: Array, 
             Criterion("goal", "objective", objective, problem.goal, float(goal_error(objective, problem.goal)))
         )
     named = {cost.name: float(value) for cost, value in zip(problem.costs, costs, strict=True)}
-    told = {output.label: float(value) for output, value in zip(problem.outputs, outputs, strict=True)}
-    return Assessment(objective, named, tuple(checks), told)
+    reported = {output.label: float(value) for output, value in zip(problem.outputs, outputs, strict=True)}
+    return Assessment(objective, named, tuple(checks), reported)

@@ -105,13 +105,13 @@ def _joints(rollout: Rollout, x: Array, u: Array, p: Array) -> dict[str, Any]:
 
 
 def _commands(rollout: Rollout, u: Array, counts: list[int]) -> Array:
-    """(N, coordinates of all joints): what their motors were told."""
+    """(N, coordinates of all joints): the commands of their motors."""
     columns = input_columns(rollout.world, rollout.inputs)
-    told = [
+    commands = [
         u[:, columns[name]] if (name := f"{joint.name}.command") in columns else np.zeros((rollout.steps, count))
         for joint, count in zip(rollout.world.joints, counts, strict=True)
     ]
-    return np.concatenate([np.zeros((rollout.steps, 0)), *told], axis=1)
+    return np.concatenate([np.zeros((rollout.steps, 0)), *commands], axis=1)
 
 
 def _split(columns: Array, counts: list[int]) -> Array:

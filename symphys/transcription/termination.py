@@ -1,4 +1,4 @@
-"""The state after a step of a motion that may be over: from a fall on, nothing changes."""
+"""Early termination: the state after a step of a motion that may be over; from then on nothing changes."""
 
 from __future__ import annotations
 

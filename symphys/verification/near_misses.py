@@ -1,7 +1,7 @@
 """Near misses and glancing touches: places where a small change of z makes a touch, or loses one.
 
 There the motion jumps, while gradient and differences at z agree with each other. Two surfaces that never touch are
-looked at where they come closest. Of two that touch, the bodies are followed from the step of the first touch on as if
+examined where they come closest. Of two that touch, the bodies are followed from the step of the first touch on as if
 they flew on through each other; how deep they would get is by how much they touch. The derivative by z of that distance
 says what change of the variables would close it.
 """
@@ -28,9 +28,9 @@ Expr = Any
 """casadi SX"""
 
 MOST = 4
-"""Pairs of surfaces that are looked at: those that come closest, and those that touch first."""
+"""Pairs of surfaces that are examined: those that come closest, and those that touch first."""
 AROUND = 16
-"""Instants that are looked at in each step around the closest."""
+"""Instants that are computed in each step around the closest."""
 LONGEST = 100
 """Steps that a flight through each other is followed for."""
 FINENESS = 16
@@ -41,7 +41,7 @@ FINENESS = 16
 class ClosestApproach:
     """How near two surfaces come: ``gap`` (negative: how deep) at ``after`` [s] behind the state of step ``k``."""
 
-    meeting: SurfacePair
+    pair: SurfacePair
     k: int
     after: float
     gap: float
@@ -71,7 +71,7 @@ def near_misses(transcription: Transcription, record: Record) -> list[dict[str, 
 
 
 def _pulled(transcription: Transcription, record: Record, some: Sequence[ClosestApproach]) -> Array | None:
-    """(n, DIRECTIONS): derivatives of these gaps by z; as many at once as ``growth`` sweeps, whose adjoint serves."""
+    """(n, DIRECTIONS): derivatives of these gaps by z; as many at once as ``sensitivity_growth`` sweeps."""
     states: dict[int, Array] = {}
     by_p = np.zeros((record.arrays.p.size, DIRECTIONS))
     for column, approach in enumerate(some):
@@ -87,7 +87,7 @@ def _row(approach: ClosestApproach, blocks: Sequence[Block], slope: Array, dt: f
     spreads = float(np.linalg.norm(np.concatenate([p * b.spread for p, b in zip(parts, blocks, strict=True)])))
     most, gap = int(np.argmax(effects)), abs(approach.gap)
     return {
-        "contact": approach.meeting.name,
+        "contact": approach.pair.name,
         "touches": approach.gap < 0,
         "time": approach.k * dt + approach.after,
         "gap": gap,
@@ -112,13 +112,13 @@ def _closest(rollout: Rollout, record: Record) -> list[ClosestApproach]:
     return [approach for approach in found if approach.gap > 0]
 
 
-def _around(meeting: SurfacePair, record: Record, k: int) -> ClosestApproach:
+def _around(pair: SurfacePair, record: Record, k: int) -> ClosestApproach:
     """The closest in the steps before and after an instant."""
-    dt, choices = meeting.rollout.dt, []
-    for step in range(max(k - 1, 0), min(k + 1, meeting.rollout.steps)):
+    dt, choices = pair.rollout.dt, []
+    for step in range(max(k - 1, 0), min(k + 1, pair.rollout.steps)):
         after = np.linspace(0, 1, AROUND + 1) * dt
-        gaps = meeting.least(_flown(meeting, record, step, after), record.arrays.p)
-        choices.append(ClosestApproach(meeting, step, float(after[gaps.argmin()]), float(gaps.min())))
+        gaps = pair.least(_flown(pair, record, step, after), record.arrays.p)
+        choices.append(ClosestApproach(pair, step, float(after[gaps.argmin()]), float(gaps.min())))
     return min(choices, key=lambda approach: approach.gap)
 
 
@@ -134,12 +134,12 @@ def _touches(rollout: Rollout, record: Record) -> list[ClosestApproach]:
     return [approach for approach in found if approach is not None]
 
 
-def _through(meeting: SurfacePair, record: Record, k: int) -> ClosestApproach | None:
+def _through(pair: SurfacePair, record: Record, k: int) -> ClosestApproach | None:
     """The deepest on the way through; None where the way does not come out again."""
-    rollout = meeting.rollout
+    rollout = pair.rollout
     steps = min(LONGEST, rollout.steps - k)
     after = np.arange(steps * FINENESS + 1) * rollout.dt / FINENESS
-    gaps = meeting.least(_flown(meeting, record, k, after), record.arrays.p)
+    gaps = pair.least(_flown(pair, record, k, after), record.arrays.p)
     inside = gaps < 0
     if not inside.any():
         return None
@@ -148,7 +148,7 @@ def _through(meeting: SurfacePair, record: Record, k: int) -> ClosestApproach | 
     if not leaves.size:
         return None
     deepest = enters + int(gaps[enters : enters + leaves[0]].argmin())
-    return ClosestApproach(meeting, k, float(after[deepest]), float(gaps[deepest]))
+    return ClosestApproach(pair, k, float(after[deepest]), float(gaps[deepest]))
 
 
 def _acting(record: Record) -> NDArray[np.bool_]:
@@ -156,15 +156,15 @@ def _acting(record: Record) -> NDArray[np.bool_]:
     return np.asarray(np.abs(record.motion.contact_force).sum(axis=2) > 0)
 
 
-def _flown(meeting: SurfacePair, record: Record, k: int, after: Array) -> Array:
+def _flown(pair: SurfacePair, record: Record, k: int, after: Array) -> Array:
     """(m, 2, 7): poses of both bodies ``after`` (m,) [s], as they fly on from state k."""
     fly, motion = _flight(), record.motion
     poses = np.zeros((len(after), 2, 7))
     poses[:, :, 3] = 1
-    for side, body in enumerate(meeting.bodies):
+    for side, body in enumerate(pair.bodies):
         state = np.concatenate([getattr(motion, field)[k, body] for field in GIVEN])
         many = np.tile(state[:, None], len(after))
-        bend = np.tile(_acceleration(record, meeting.rollout.dt, k, body)[:, None], len(after))
+        bend = np.tile(_acceleration(record, pair.rollout.dt, k, body)[:, None], len(after))
         poses[:, side] = np.array(fly.map(len(after))(many, bend, after[None])).T
     return poses
 
@@ -184,21 +184,21 @@ def _flight() -> ca.Function:
 
 def _slopes(approach: ClosestApproach, record: Record) -> tuple[Array, Array]:
     """Derivatives of the gap by state k (nx,) and by p (np,)."""
-    meeting, rollout = approach.meeting, approach.meeting.rollout
+    pair, rollout = approach.pair, approach.pair.rollout
     layout, fly = Layout(rollout.world), _flight()
-    p, states = ca.SX.sym("p", record.arrays.p.size), [ca.SX.sym("state", 13) for _ in meeting.bodies]
+    p, states = ca.SX.sym("p", record.arrays.p.size), [ca.SX.sym("state", 13) for _ in pair.bodies]
     poses = [
         fly(state, ca.DM(_acceleration(record, rollout.dt, approach.k, body)), approach.after)
-        for state, body in zip(states, meeting.bodies, strict=True)
+        for state, body in zip(states, pair.bodies, strict=True)
     ]
-    gaps = meeting.gaps(poses[0], poses[1] if len(poses) == 2 else ca.DM([0, 0, 0, 1, 0, 0, 0]), p)
-    given = [np.concatenate([getattr(record.motion, f)[approach.k, body] for f in GIVEN]) for body in meeting.bodies]
+    gaps = pair.gaps(poses[0], poses[1] if len(poses) == 2 else ca.DM([0, 0, 0, 1, 0, 0, 0]), p)
+    given = [np.concatenate([getattr(record.motion, f)[approach.k, body] for f in GIVEN]) for body in pair.bodies]
     values = ca.Function("values", [*states, p], [gaps])(*given, record.arrays.p)
     least = gaps[int(np.argmin(np.array(values)))]
     slope = ca.Function("slope", [*states, p], [ca.gradient(least, ca.vertcat(*states, p))])(*given, record.arrays.p)
     found, by_x = np.array(slope).ravel(), np.zeros(record.arrays.x.shape[1])
-    for side, body in enumerate(meeting.bodies):
+    for side, body in enumerate(pair.bodies):
         name = rollout.world.bodies[body].name
         for field, part in zip(GIVEN, ((0, 3), (3, 7), (7, 10), (10, 13)), strict=True):
             by_x[layout[f"{name}.{field}"]] = found[13 * side + part[0] : 13 * side + part[1]]
-    return by_x, found[13 * len(meeting.bodies) :]
+    return by_x, found[13 * len(pair.bodies) :]

@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 
 from symphys.transcription import Record, Transcription
-from symphys.verification.budget import budget
+from symphys.verification.balance import balance
 from symphys.verification.contacts import contacts
-from symphys.verification.tunnelling import passages
+from symphys.verification.tunnelling import tunnelling
 
 
-@np.errstate(invalid="ignore", over="ignore", divide="ignore")  # numbers that are not finite are told as such
+@np.errstate(invalid="ignore", over="ignore", divide="ignore")  # numbers that are not finite are reported as such
 def survey(transcription: Transcription, record: Record) -> dict[str, Any]:
-    """Energy and momentum, contacts, and who went through whom; it takes little beside a solve.
+    """Energy and momentum, contacts, and tunnelling; it takes little beside a solve.
 
     Each module says what its numbers are.
     """
     rollout = transcription.rollout
-    return {**budget(rollout, record), **contacts(rollout, record), **passages(rollout, record)}
+    return {**balance(rollout, record), **contacts(rollout, record), **tunnelling(rollout, record)}

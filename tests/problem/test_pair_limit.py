@@ -91,9 +91,9 @@ def plans(count: int, **keys: object) -> list[Part]:
 )
 def test_tens_of_thousands_are_counted_at_once(parts: list[Part]) -> None:
     began = time.perf_counter()
-    census = CollisionFilter([*parts, ParametricStatic(Plane.ground(), {})], []).census(MOST_POINTS)
+    count = CollisionFilter([*parts, ParametricStatic(Plane.ground(), {})], []).count(MOST_POINTS)
     assert time.perf_counter() - began < 2
-    assert census.points > MOST_POINTS
+    assert count.points > MOST_POINTS
 
 
 def random_parts(rng: np.random.Generator) -> tuple[list[Part], list[PairRule]]:
@@ -126,8 +126,8 @@ def contradicts(plan: ParametricWorld, a: Part, b: Part) -> bool:
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_kin_meet_as_their_members_do(seed: int) -> None:
-    """Counting and listing by kin gives what looking at every two parts gives."""
+def test_classes_meet_as_their_members_do(seed: int) -> None:
+    """Counting and listing by classes gives what looking at every two parts gives."""
     parts, tables = random_parts(np.random.default_rng(seed))
     bodies = tuple(part for part in parts if isinstance(part, ParametricBody))
     statics = tuple(part for part in parts if not isinstance(part, ParametricBody))
@@ -140,9 +140,9 @@ def test_kin_meet_as_their_members_do(seed: int) -> None:
         meet = i < len(bodies) and plan.lets(a.name, b.name) and plan.lets(b.name, a.name)
         if meet and (table is None or table.collide) and a.surfaces and b.surfaces:
             expected.append((i, j))
-    assert list(plan.meetings) == expected
+    assert list(plan.collision_pairs) == expected
     points = sum(contact_points(s, t) for i, j in expected for s in parts[i].surfaces for t in parts[j].surfaces)
-    assert CollisionFilter(parts, tables).census(MOST_POINTS).points == points
+    assert CollisionFilter(parts, tables).count(MOST_POINTS).points == points
     assert len(plan.world({}).pairs) == points
 
 

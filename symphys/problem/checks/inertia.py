@@ -74,7 +74,7 @@ def negligible(product: Scalar, diagonal: Sequence[Scalar]) -> bool:
     return is_zero(product)
 
 
-def complaint(value: float | Sequence[float] | Sequence[Sequence[float]]) -> str:
+def inertia_fault(value: float | Sequence[float] | Sequence[Sequence[float]]) -> str:
     """Why no rigid body has this inertia; empty if one has."""
     given = np.asarray(value, float)
     if given.ndim == 2 and not np.allclose(given, given.T, rtol=ROUNDING, atol=ROUNDING * np.abs(given).max()):

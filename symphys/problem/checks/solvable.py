@@ -1,4 +1,4 @@
-"""Whether there is anything to solve: a file may also hold a world alone, which can be simulated and drawn."""
+"""Whether there is anything to solve: a file may also hold a world alone, which can be simulated and rendered."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from symphys.problem.model import Problem
 
 
 def require_solvable(problem: Problem) -> None:
-    """ProblemError if nothing may vary, or if nothing is asked for, with what to add."""
+    """ProblemError if nothing may vary, or if there is no objective, with what to add."""
     body = next(iter(problem.initial)).split(".")[0]
     issues = []
     if not problem.variables:

@@ -22,7 +22,7 @@ from symphys.problem.tables.joint_frames import MEET
 
 Array = NDArray[np.float64]
 OVERLAP = 1e-3
-"""Deepest overlap at the start [m]; more would be pushed out in the first steps, which nobody means."""
+"""Deepest overlap at the start [m]; more would be pushed out in the first steps, which is never meant."""
 
 
 def at_guess(

@@ -109,7 +109,7 @@ def source(file: str, text: str, table: IncludeTable, faults: Faults) -> SourceF
     written = parse_toml(Path(file), text)
     found = dict[str, Any]()
     for key, value in written.items():
-        reason = complaint(key, value, faults.file)
+        reason = key_fault(key, value, faults.file)
         if reason:
             faults.add_at(SourceLocation(file, written, (key,)), reason)
         elif key not in OWN:
@@ -117,7 +117,7 @@ def source(file: str, text: str, table: IncludeTable, faults: Faults) -> SourceF
     return SourceFile(file, written, prefixed(found, table.prefix) if table.prefix else found, table)
 
 
-def complaint(key: str, value: object, problem: str) -> str:
+def key_fault(key: str, value: object, problem: str) -> str:
     """What is wrong with a table or key at the top of an included file; empty if nothing."""
     if key in OF_THE_PROBLEM:
         return f"belongs to a whole problem; move it to {problem}, which includes this file"

@@ -1,4 +1,4 @@
-"""Joints that do not start at 0: bodies are carried from where they lie in the file to where the start puts them."""
+"""Forward kinematics of the start: where joints with a ``start`` put the bodies of the file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from symphys.problem.tables.joint_frames import pose
 Array = NDArray[np.float64]
 State = dict[str, Array]
 Tree = Mapping[str, Mapping[str, str]]
-"""What rigid joints that close no loop hold to each body, and to the world: by the names of the joints."""
+"""A spanning tree of rigid joints: what each body, and the world, is held to: by the names of the joints."""
 
 
 @dataclass(frozen=True)
@@ -33,12 +33,12 @@ class Displacement:
 def forward_kinematics(joints: Sequence[ParametricJoint], initial: Mapping[str, Array], faults: Faults) -> State:
     """The state at the start with every joint at its ``start``; see ``Problem.initial``.
 
-    Sockets are where the bodies lie in the file. A joint with a start moves its second body in the table, and all that
-    hangs on it, as one; if the world holds that side, it moves the other side, the other way. Since a joint changes
+    Sockets are where the bodies lie in the file. A joint with a start moves its second body in the table, and its
+    subtree, as one; if the world holds that side, it moves the other side, the other way. Since a joint changes
     nothing within either side, the order of joints does not matter.
 
-    Velocities are those of the file, carried too: the motion against the side that stays is turned along, so that rates
-    of joints are what they were, and what moves or spins as a whole goes on doing so. Zero stays zero.
+    Velocities are those of the file, transformed too: the motion against the side that stays is turned along, so that
+    rates of joints are what they were, and what moves or spins as a whole goes on doing so. Zero stays zero.
 
     Args:
         joints: all joints.
@@ -61,7 +61,7 @@ def forward_kinematics(joints: Sequence[ParametricJoint], initial: Mapping[str, 
 
 
 def spanning_tree(joints: Sequence[ParametricJoint]) -> Tree:
-    """As many rigid joints as close no loop, those with a start first."""
+    """A spanning tree of the rigid joints, those with a start first."""
     roots: dict[str, str] = {}
 
     def root(name: str) -> str:
@@ -80,7 +80,7 @@ def spanning_tree(joints: Sequence[ParametricJoint]) -> Tree:
 
 
 def move(joint: ParametricJoint, tree: Tree, state: State) -> None:
-    """Carry one side of a joint to its start, in place."""
+    """Move one side of a joint to its start, in place."""
     moved, base, sign = subtree(joint.first, joint, tree), joint.second or WORLD, 1.0
     if WORLD in moved:
         moved, base, sign = subtree(base, joint, tree), joint.first, -1.0
@@ -97,7 +97,7 @@ def move(joint: ParametricJoint, tree: Tree, state: State) -> None:
 
 
 def subtree(start: str, cut: ParametricJoint, tree: Tree) -> list[str]:
-    """The bodies that hang together with one, were the joint ``cut`` not there; with the world if that holds them."""
+    """The bodies that the tree without the joint ``cut`` connects to one; among them the world, if it does so."""
     found, queue = {start: None}, [start]
     while queue:
         for name, other in tree[queue.pop()].items():
@@ -119,7 +119,7 @@ def sockets(joint: ParametricJoint, state: State) -> tuple[Placed, Array]:
 
 
 def displace(name: str, base: str, motion: Displacement, state: State) -> None:
-    """Carry a body, in place; ``base`` is what it moves against."""
+    """Displace a body, in place; ``base`` is what it moves against."""
     axes = np.array(rotation.matrix(motion.turn), float)
     before = state[f"{name}.position"]
     after = motion.pivot + axes @ (before - motion.pivot) + motion.shift

@@ -1,4 +1,4 @@
-"""The plans of a world's parts: bodies, static surfaces and [[pair]] tables, with numbers that may be replaced."""
+"""The parts of a parametric world: bodies, static surfaces and [[pair]] tables, with numbers that may be replaced."""
 
 from __future__ import annotations
 

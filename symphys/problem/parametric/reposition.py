@@ -1,4 +1,4 @@
-"""Anchors that vary: what a joint carries moves along with it, and who stands on the ground goes on doing so."""
+"""Repositioning for anchors that vary: a subtree moves with its joint, and a robot goes on standing on the ground."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def anchored(parametric: ParametricWorld, names: Iterable[str]) -> tuple[Paramet
 def reposition(parametric: ParametricWorld, anchors: Mapping[str, Expr], state: State) -> dict[str, Expr]:
     """The state at the start where joints have these anchors, by the names of parameters, (3,) [m].
 
-    A joint shifts its second body in the table, and all that hangs on it, as one; if the world holds that side, it
+    A joint shifts its second body in the table, and its subtree, as one; if the world holds that side, it
     shifts the other one, the other way. Then a robot that nothing holds is lifted until its lowest point is as high
     above what stands still as before. Velocities are those of one rigid body with what stays.
     """
@@ -48,7 +48,7 @@ def reposition(parametric: ParametricWorld, anchors: Mapping[str, Expr], state: 
 
 
 def shift(joint: ParametricJoint, anchor: Expr, tree: Tree, state: dict[str, Expr]) -> None:
-    """Carry one side along, in place."""
+    """Shift one side, in place."""
     base = joint.second or WORLD
     moved, stays, sign = subtree(joint.first, joint, tree), base, 1.0
     if WORLD in moved:
@@ -88,7 +88,7 @@ def lift(parametric: ParametricWorld, robot: Sequence[str], before: State, state
 
 
 def check_anchors(parametric: ParametricWorld, variables: Sequence[Variable], faults: Faults) -> None:
-    """What a varied anchor carries must be determined: its joint closes no loop and does not give way."""
+    """The subtree that a varied anchor moves must be determined: its joint closes no loop and does not give way."""
     for index, variable in enumerate(variables):
         for joint in anchored(parametric, (slot.name for slot in variable.slots)):
             if joint.frequency or joint.second in around(joint, parametric.joints):
@@ -98,7 +98,7 @@ def check_anchors(parametric: ParametricWorld, variables: Sequence[Variable], fa
 
 
 def around(cut: ParametricJoint, joints: Sequence[ParametricJoint]) -> set[str | None]:
-    """What hangs together with the first body of a joint without it; None: the world."""
+    """The bodies that joints connect to the first body of a joint without that joint; None: the world."""
     found: set[str | None] = {cut.first}
     while True:
         ends = [{joint.first, joint.second} for joint in joints if joint.name != cut.name]

@@ -75,7 +75,7 @@ class ParametricWorld:
         return (*self.bodies, *self.statics)
 
     @cached_property
-    def meetings(self) -> tuple[tuple[int, int], ...]:
+    def collision_pairs(self) -> tuple[tuple[int, int], ...]:
         """Every two parts that may touch, as places in ``parts``: each lets the other, and nothing forbids it."""
         return tuple(CollisionFilter(self.parts, (*self.pairs, *self.jointed)).pairs())
 
@@ -86,10 +86,10 @@ class ParametricWorld:
 
     def _pairs(self, bodies: tuple[Body, ...], statics: tuple[Static, ...], value: Value) -> tuple[Pair, ...]:
         """As ``world.all_pairs`` has them: first what is against statics, then what is against later bodies."""
-        laws = {(i, j): self.law(self.parts[i].name, self.parts[j].name, value) for i, j in self.meetings}
+        laws = {(i, j): self.law(self.parts[i].name, self.parts[j].name, value) for i, j in self.collision_pairs}
         sides = [[Side(i, k) for k in range(len(body.shapes))] for i, body in enumerate(bodies)]
         sides += [[Side(None, k)] for k in range(len(statics))]
-        both = [(a, b, laws[i, j]) for i, j in self.meetings for a in sides[i] for b in sides[j]]
+        both = [(a, b, laws[i, j]) for i, j in self.collision_pairs for a in sides[i] for b in sides[j]]
 
         def place(entry: tuple[Side, Side, Law]) -> tuple[int, ...]:
             a, b, _ = entry

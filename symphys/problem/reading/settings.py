@@ -11,7 +11,7 @@ from symphys.problem.schema import Document
 from symphys.suggest import hint, quote
 
 OPENED = ("simulation", "world", "contact", "objective", "solver")
-"""Tables that a setting may open; it adds no body, surface, variable or aim."""
+"""Tables that a setting may open; it adds no body, surface, variable or objective."""
 
 RENAMED = {"fall": "termination", "forget": "adjoint_discount"}
 """Old names of keys; a setting may use either name, whichever the file has."""

@@ -46,7 +46,7 @@ def validate_options(cls: type[Options], table: Mapping[str, object], file: str,
 
 
 def read_options(model: type[BaseModel], table: Mapping[str, object], where: str, faults: Faults) -> dict[str, Any]:
-    """The values that the table gives, in the kinds of the model; empty after a complaint."""
+    """The values that the table gives, in the kinds of the model; empty after a fault."""
     for key, value in table.items():
         if any(isinstance(item, float) and isnan(item) for item in (value if isinstance(value, list) else [value])):
             faults.add((where, key), "must be a number, not nan")
@@ -65,11 +65,11 @@ def read_options(model: type[BaseModel], table: Mapping[str, object], where: str
 def require_solvers(tables: Iterable[str], asked: Iterable[str], known: Iterable[str], file: str) -> None:
     """ProblemError if a [solver.NAME] table, or a name that the file's ``solvers`` asks for, is that of no solver."""
     names = list(known)
-    told = [(f"solver.{name}", name) for name in tables]
-    told += [(f"solvers[{k}]", name) for k, name in enumerate(asked)]
+    named = [(f"solver.{name}", name) for name in tables]
+    named += [(f"solvers[{k}]", name) for k, name in enumerate(asked)]
     issues = [
         Issue(where, f"there is no solver {quote(name)}; {hint(name, names)}")
-        for where, name in told
+        for where, name in named
         if name not in names
     ]
     if issues:

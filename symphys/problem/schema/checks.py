@@ -167,7 +167,7 @@ def nested(bound: bool) -> Callable[[object], Any]:
 
 
 def smoothing(value: object) -> list[float]:
-    """The stages of the smoothing knob, from large to small; a number is one stage."""
+    """The stages of the smoothing, from large to small; a number is one stage."""
     stages: list[float] = []
     for stage in value if isinstance(value, list) else [value]:
         if not is_number(stage):

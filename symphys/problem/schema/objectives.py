@@ -87,7 +87,7 @@ class ConstraintTable(SchemaTable):
 
 
 class OutputTable(SchemaTable):
-    """A number that is told: while solvers work, in results and in reports. Nothing depends on it."""
+    """A number that is reported: while solvers work, in results and in reports. Nothing depends on it."""
 
     name: Label
     at: Instant = Field(default="end", description='"end" or a time [s]')

@@ -1,4 +1,4 @@
-"""Tables that say how situations vary: what no solver chooses, and what must work all the same."""
+"""Tables of domain randomization: what no solver chooses, and for which a solution must work all the same."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class DiscretisationTable(SchemaTable):
 
 
 class ScenarioTable(SchemaTable):
-    """Something that differs from situation to situation: numbers, the pose of a robot, or the time step."""
+    """Something that differs from sample to sample: numbers, the pose of a robot, or the time step."""
 
     name: Identifier = Field(description="for messages and reports")
     sets: Texts | None = Field(
@@ -31,9 +31,9 @@ class ScenarioTable(SchemaTable):
     shift: Coordinates | None = Field(
         default=None, description="plus a number drawn evenly from -shift to shift; one number, or one a component"
     )
-    alike: bool = Field(default=False, description="one draw for all numbers, instead of one for each")
+    alike: bool = Field(default=False, description="one random number for all, instead of one for each")
     lasts: Positive | None = Field(
-        default=None, description="[s]: a force, torque or command acts so long, from an instant that is drawn, too"
+        default=None, description="[s]: a force, torque or command acts so long, from an instant that is random, too"
     )
     robot: Label | None = Field(default=None, description="a body: the pose of all that joints hold together with it")
     tilt: NonNegative = Field(default=0.0, description="of a robot: turned about each axis by at most so much [rad]")
@@ -44,5 +44,5 @@ class ScenarioTable(SchemaTable):
         default=0.0, description="of a robot: its bodies move alike, at most so fast along each axis [m/s]"
     )
     simulation: DiscretisationTable | None = Field(
-        default=None, description="{ dt = 0.005 }: some situations are computed with another time step, or more sweeps"
+        default=None, description="{ dt = 0.005 }: some samples are computed with another time step, or more sweeps"
     )

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.model.shapes import Shape
-from symphys.problem.checks.inertia import centre_of_mass, complaint
+from symphys.problem.checks.inertia import centre_of_mass, inertia_fault
 from symphys.problem.checks.magnitude import check_magnitudes
 from symphys.problem.parametric.parts import COMBINE, ParametricBody
 from symphys.problem.reading.faults import Faults
@@ -61,7 +61,7 @@ def read_density(place: tuple[str, int], table: BodyTable, hollow: bool, faults:
 def check_inertia(place: tuple[str, int], table: BodyTable, shapes: Sequence[Shape], faults: Faults) -> None:
     """A given inertia must be possible; one that is not given must follow from the shape."""
     if table.inertia is not None:
-        reason = complaint(table.inertia)
+        reason = inertia_fault(table.inertia)
         if reason:
             faults.add((*place, "inertia"), reason)
     elif table.shape is None:

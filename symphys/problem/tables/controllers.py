@@ -56,7 +56,7 @@ def read_controllers(
 
 
 class ControllerReader:
-    """Reads one table; every complaint lands below its place."""
+    """Reads one table; every fault is noted below its place."""
 
     def __init__(
         self,

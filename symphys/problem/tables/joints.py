@@ -65,7 +65,7 @@ def check_loops(joints: Sequence[ParametricJoint | None], faults: Faults) -> Non
 
 
 class JointReader:
-    """Reads one table; every complaint lands below its place."""
+    """Reads one table; every fault is noted below its place."""
 
     def __init__(
         self, index: int, table: JointTable, bodies: Sequence[str], initial: Mapping[str, Array], faults: Faults

@@ -33,7 +33,7 @@ class Objectives:
 def read_objectives(
     document: Document, simulation: Simulation, sample: Mapping[str, Any], faults: Faults
 ) -> Objectives:
-    """Every aim; ``sample`` has a value for each name that a formula may use."""
+    """All of them; ``sample`` has a value for each name that a formula may use."""
     reader = ObjectiveReader(simulation, sample, faults)
     costs = [reader.cost(index, table) for index, table in enumerate(document.cost)]
     targets = [reader.target(index, table) for index, table in enumerate(document.target)]
@@ -93,7 +93,7 @@ class ObjectiveReader:
         return found and Target(table.name, found[0], table.at, table.tolerance, table.weight)
 
     def output(self, index: int, table: OutputTable) -> Output | None:
-        """One number that is told."""
+        """One output."""
         place = ("output", index)
         check_moment(table.at, self.simulation, (*place, "at"), self.faults)
         found = self.formula((*place, "value"), table.value, table.at)

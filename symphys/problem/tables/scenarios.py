@@ -89,7 +89,7 @@ class ScenarioReader:
             self.grid(place, table.name, table.simulation)
 
     def numbers(self, place: Place, table: ScenarioTable) -> None:
-        """Numbers that are drawn."""
+        """Numbers that are sampled."""
         try:
             slots = tuple(read_slot(text, self.known) for text in table.sets or ())
         except SlotError as error:
@@ -145,7 +145,7 @@ class ScenarioReader:
                     return
 
     def pose(self, place: Place, table: ScenarioTable, robot: str) -> None:
-        """A robot whose pose is drawn."""
+        """A robot whose pose is sampled."""
         bodies = [body.name for body in self.parametric.bodies]
         if robot not in bodies:
             self.faults.add((*place, "robot"), f"there is no body {quote(robot)}; {hint(robot, bodies)}")

@@ -42,7 +42,7 @@ def read_shape(place: Place, table: ShapeTable | None, faults: Faults) -> tuple[
 
 
 def read_part(place: Place, table: PartTable, faults: Faults) -> Shape | None:
-    """One part of a compound; None after a complaint."""
+    """One part of a compound; None after a fault."""
     orientation = read_orientation((*place, "orientation"), table.orientation, faults)
     return read_solid(place, table, table.centre, orientation, faults)
 
@@ -50,7 +50,7 @@ def read_part(place: Place, table: PartTable, faults: Faults) -> Shape | None:
 def read_solid(
     place: Place, table: SolidTable, centre: Sequence[float], orientation: Array, faults: Faults
 ) -> Shape | None:
-    """The one shape of a table; None after a complaint."""
+    """The one shape of a table; None after a fault."""
     given = [key for key in KINDS if getattr(table, key) is not None]
     if len(given) != 1:
         faults.add(place, f"{wanted(given)} one of {listed(KINDS, 'and')}: {EXAMPLES}")

@@ -59,7 +59,7 @@ def read_terrain(
 def read_formula(
     place: Place, table: TerrainTable, text: str, starts: Sequence[Sequence[float]], faults: Faults
 ) -> FormulaHeight | None:
-    """The height by a formula; None after a complaint."""
+    """The height by a formula; None after a fault."""
     for key in GRID_KEYS:
         if getattr(table, key) is not None:
             faults.add((*place, key), "belongs to a grid of heights; a formula needs none")

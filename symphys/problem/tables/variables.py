@@ -22,7 +22,7 @@ WEIGHTS = 0.1
 
 
 class VariableReader:
-    """Reads one table; every complaint lands below its place."""
+    """Reads one table; every fault is noted below its place."""
 
     def __init__(self, index: int, table: VariableTable, known: Mapping[str, Quantity], faults: Faults) -> None:
         """Keep what all steps need."""
@@ -62,7 +62,7 @@ class VariableReader:
         return variable
 
     def slots(self) -> tuple[VariableSlot, ...]:
-        """What is set; empty after a complaint."""
+        """What is set; empty after a fault."""
         found = []
         for text in self.table.sets:
             try:

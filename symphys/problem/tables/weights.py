@@ -26,7 +26,7 @@ def random_weights(net: Net, spread: float, seed: int) -> Array:
 
 
 def read_weights(faults: Faults, place: Place, name: str, net: Net) -> Array:
-    """(w,) from a .npy file, whose path is relative to the file that names it; zeros after a complaint."""
+    """(w,) from a .npy file, whose path is relative to the file that names it; zeros after a fault."""
     path = Path(faults.origin(place).file).parent / name
     count = net.sizes["weights"]
     try:

@@ -1,4 +1,4 @@
-"""What sensors need to know of the step before: commands and velocities, carried along behind the world's state."""
+"""What sensors need to know of the step before: commands and velocities, stored behind the world's state."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class SensorMemory:
         world: what is simulated.
         inputs: names of the inputs that are remembered.
         bodies: names of the bodies whose velocity is remembered.
-        terminates: whether there is ``alive`` at the end: 1 until a fall, 0 from then on; ``after`` leaves it out.
+        terminates: whether the last column is ``alive``: 1 until the termination, 0 from then on; ``after`` omits it.
     """
 
     world: World
@@ -76,13 +76,13 @@ class SensorMemory:
 def memory_of(problem: Problem, world: World) -> SensorMemory:
     """What the sensors of a problem, and its accelerometers, make necessary."""
     sensed = frozenset[str]().union(*(formula.names for sensor in problem.sensors for formula in sensor.formulas))
-    aims: list[Cost | Target | Constraint | Output] = [
+    objectives: list[Cost | Target | Constraint | Output] = [
         *problem.costs,
         *problem.targets,
         *problem.constraints,
         *problem.outputs,
     ]
-    asked = frozenset[str]().union(*(aim.formula.names for aim in aims))
+    asked = frozenset[str]().union(*(each.formula.names for each in objectives))
     inputs = tuple(name for name in input_sizes(world) if name in sensed)
     margin = problem.termination.margin.names if problem.termination else frozenset[str]()
     bodies = accelerometer_bodies(world, sensed | asked | margin)

@@ -137,7 +137,7 @@ def _cause(found: NonFiniteOperation | None, names: Sequence[Columns], results: 
 
 
 def _instants(rollout: Rollout) -> Iterator[tuple[str, Asked, int, int]]:
-    """(kind, what is asked, number of the state, number of the inputs) of every look at a formula; see ``Rollout``."""
+    """(kind, objective, number of the state, number of the inputs) of every evaluation of a formula."""
     problem, steps = rollout.problem, rollout.steps
     groups = (
         ("cost", problem.costs),

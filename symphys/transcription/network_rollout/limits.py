@@ -21,16 +21,16 @@ def refuse_large(problem: Problem, nets: Sequence[Controller], most: int, what: 
 def refuse_formulas(problem: Problem, names: Sequence[str]) -> None:
     """ProblemError if a formula looks at the weights of large nets, by these names of variables or numbers."""
     issues = [
-        Issue(f'{kind} "{aim.name}"', f"looks at {name}, the weights of a net that is too large for formulas")
-        for kind, aim in _aims(problem)
+        Issue(f'{kind} "{each.name}"', f"looks at {name}, the weights of a net that is too large for formulas")
+        for kind, each in _formulas(problem)
         for name in names
-        if name in aim.formula.names
+        if name in each.formula.names
     ]
     if issues:
         raise ProblemError(problem.file, issues)
 
 
-def _aims(problem: Problem) -> Iterator[tuple[str, Cost | Target | Constraint | Output]]:
+def _formulas(problem: Problem) -> Iterator[tuple[str, Cost | Target | Constraint | Output]]:
     yield from (("cost", cost) for cost in problem.costs)
     yield from (("target", target) for target in problem.targets)
     yield from (("constraint", constraint) for constraint in problem.constraints)

@@ -30,7 +30,7 @@ class ScenarioEvaluator:
         return Drawn(grid, self.samplers[grid].draw(rng, count, width))
 
     def nominal(self, count: int) -> Drawn:
-        """The problem's own situation, ``count`` times."""
+        """The nominal sample, ``count`` times."""
         return Drawn(0, np.tile(self.samplers[0].nominal, (count, 1)))
 
     def value(self, Z: Array, drawn: Drawn, smoothing: float) -> Values:
@@ -51,7 +51,7 @@ class ScenarioEvaluator:
 
 
 class NominalEvaluator(WithoutResiduals):
-    """Evaluates points in the problem's own situation; see ``Evaluator``."""
+    """Evaluates points in the nominal sample; see ``Evaluator``."""
 
     def __init__(self, situations: ScenarioEvaluator) -> None:
         """By the same kernels."""

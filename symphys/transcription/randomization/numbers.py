@@ -1,4 +1,4 @@
-"""Numbers that differ from situation to situation, as variables that no solver chooses."""
+"""Numbers that differ from sample to sample, as variables that no solver chooses."""
 
 from __future__ import annotations
 

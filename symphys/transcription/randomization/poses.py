@@ -1,4 +1,4 @@
-"""The pose of a robot, which differs from situation to situation."""
+"""The pose of a robot, which differs from sample to sample."""
 
 from __future__ import annotations
 

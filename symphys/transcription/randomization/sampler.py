@@ -1,4 +1,4 @@
-"""Draws situations: the numbers that differ, one row each."""
+"""Samples of scenarios: the numbers that differ, one row each."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 class Sampler:
-    """The situations of a problem, on one grid of time.
+    """Samples of a problem's scenarios, on one grid of time.
 
     Attributes:
         problem: with a variable for all that differs, behind its own.

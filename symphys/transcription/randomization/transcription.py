@@ -15,7 +15,7 @@ from symphys.transcription.randomization.sampler import Sampler
 from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.transcription import Transcription
 
-WITHOUT = "there is no evaluation in other situations"
+WITHOUT = "there is no evaluation of samples of scenarios"
 
 
 def with_scenarios(
@@ -28,21 +28,21 @@ def with_scenarios(
     began = perf_counter()
     try:
         if backend not in PRECISIONS:
-            raise KernelUnavailable(f"the backend {backend} has no situations")
-        situations = _situations(problem, exact, backend, processors() if threads is None else threads)
+            raise KernelUnavailable(f"the backend {backend} has no scenarios")
+        situations = _evaluator(problem, exact, backend, processors() if threads is None else threads)
     except (KernelUnavailable, ProgramError) as error:
-        told = replace(plain.backend, note=f"{WITHOUT}: {error}")
-        return replace(plain, problem=problem, backend=told)
+        description = replace(plain.backend, note=f"{WITHOUT}: {error}")
+        return replace(plain, problem=problem, backend=description)
     shooting = replace(
         plain.shooting, evaluator=NominalEvaluator(situations), situations=situations, squares=False, nlp=Nlp(None)
     )
     grids = f"{len(situations.kernels)} discretisations" if len(situations.kernels) > 1 else ""
-    told = described(situations.kernels[0], perf_counter() - began, note=grids)
+    description = described(situations.kernels[0], perf_counter() - began, note=grids)
     cached = all(kernel.report.cached for kernel in situations.kernels)
-    return replace(plain, problem=problem, shooting=shooting, backend=replace(told, cached=cached))
+    return replace(plain, problem=problem, shooting=shooting, backend=replace(description, cached=cached))
 
 
-def _situations(problem: Problem, exact: bool, backend: str, threads: int) -> ScenarioEvaluator:
+def _evaluator(problem: Problem, exact: bool, backend: str, threads: int) -> ScenarioEvaluator:
     assert problem.scenarios is not None, "nothing differs"
     grids = {"": problem.simulation, **{grid.name: grid.simulation for grid in problem.scenarios.grids}}
     samplers = [Sampler(replace(problem, simulation=simulation)) for simulation in grids.values()]

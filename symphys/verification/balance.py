@@ -28,10 +28,10 @@ Expr = Any
 MOST_SAMPLES = 400
 MOST_GAINS = 5
 GAIN = 1e-6
-"""Of the largest kinetic energy: what a contact must add in a step to be told."""
+"""Of the largest kinetic energy: what a contact must add in a step to be reported."""
 
 
-def budget(rollout: Rollout, record: Record) -> dict[str, Any]:
+def balance(rollout: Rollout, record: Record) -> dict[str, Any]:
     """What became of energy and momentum.
 
     Returns:
@@ -75,7 +75,7 @@ def budget(rollout: Rollout, record: Record) -> dict[str, Any]:
 
 
 def momentum_gap(rollout: Rollout, record: Record) -> float:
-    """The largest unexplained change of momentum in a step, of bodies or what hangs together; see ``budget``.
+    """The largest unexplained change of momentum in a step, of bodies or groups that joints connect; see ``balance``.
 
     Momenta are those of the leapfrog: without what persistent forces, half a step ahead, have done already.
     """
