@@ -1,8 +1,7 @@
 """Problem files: reading, validation, and the model that everything after works with."""
 
-from symphys.problem.checks.solvable import require_solvable
 from symphys.problem.feedback import Controller, Sensor
-from symphys.problem.load import load_problem
+from symphys.problem.load import load_problem, require_solvable
 from symphys.problem.model import (
     ALIVE,
     Constraint,

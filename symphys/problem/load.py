@@ -10,6 +10,7 @@ from typing import Any
 import casadi as ca
 from pydantic import ValidationError
 
+from symphys.errors import Issue, ProblemError
 from symphys.model.state_layout import input_sizes
 from symphys.problem.checks.memory import check_rollout
 from symphys.problem.checks.pair_limit import check_pair_limit
@@ -37,11 +38,10 @@ from symphys.problem.tables.contact import (
     read_contact,
     read_pairs,
 )
-from symphys.problem.tables.controllers import read_controllers
+from symphys.problem.tables.controllers import read_controllers, read_sensors
 from symphys.problem.tables.joints import read_joints
 from symphys.problem.tables.objectives import Objectives, read_objectives
 from symphys.problem.tables.scenarios import read_scenarios
-from symphys.problem.tables.sensors import read_sensors
 from symphys.problem.tables.simulation import read_simulation
 from symphys.problem.tables.statics import read_statics
 from symphys.problem.tables.termination import read_termination, with_termination_cost
@@ -231,3 +231,23 @@ def stop_when_met(document: Document, objectives: Objectives) -> bool:
     if document.objective.stop is not None:
         return document.objective.stop == "met"
     return document.objective.goal is not None or (bool(objectives.targets) and not objectives.costs)
+
+
+def require_solvable(problem: Problem) -> None:
+    """ProblemError if nothing may vary, or if there is no objective, with what to add."""
+    body = next(iter(problem.initial)).split(".")[0]
+    issues = []
+    if not problem.variables:
+        example = f'[[variable]] with name = "start", sets = "{body}.velocity"'
+        issues.append(
+            Issue("variable", f"there is none, so a solver has nothing to choose; add, for instance, {example}")
+        )
+    if not (problem.costs or problem.targets or problem.constraints):
+        example = f'[[target]] with name = "there", value = "{body}.position - [1, 0, 0]", tolerance = 0.01'
+        issues.append(
+            Issue(
+                "target", f"there is none, and no cost or constraint: nothing to aim at; add, for instance, {example}"
+            )
+        )
+    if issues:
+        raise ProblemError(problem.file, issues)

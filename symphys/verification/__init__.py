@@ -3,7 +3,6 @@
 Its numbers are explained in words by ``symphys.findings``.
 """
 
-from symphys.verification.examination import examine
-from symphys.verification.survey import survey
+from symphys.verification.examination import examine, survey
 
 __all__ = ["examine", "survey"]

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from symphys.transcription import Record, Transcription, first_non_finite, first_non_finite_derivative
 from symphys.verification import gradient, refinement, smoothing
-from symphys.verification.contacts import slides
+from symphys.verification.balance import balance
+from symphys.verification.contacts import contacts, slides
 from symphys.verification.near_misses import near_misses
 from symphys.verification.sensitivity_growth import sensitivity_growth
-from symphys.verification.survey import survey
+from symphys.verification.tunnelling import tunnelling
 
 Array = NDArray[np.float64]
 Tell = Callable[[str], None]
@@ -62,3 +63,13 @@ def _fault(transcription: Transcription, record: Record, compared: list[dict[str
     if not np.isfinite([row["scale"] for row in compared]).all():
         return first_non_finite_derivative(transcription.rollout, record.arrays)
     return ""
+
+
+@np.errstate(invalid="ignore", over="ignore", divide="ignore")  # numbers that are not finite are reported as such
+def survey(transcription: Transcription, record: Record) -> dict[str, Any]:
+    """Energy and momentum, contacts, and tunnelling; it takes little beside a solve.
+
+    Each module says what its numbers are.
+    """
+    rollout = transcription.rollout
+    return {**balance(rollout, record), **contacts(rollout, record), **tunnelling(rollout, record)}

@@ -7,7 +7,7 @@ product a layer and segment. So memory holds states, and the values of a net for
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -187,3 +187,27 @@ class BackwardPass:
         if k in self.at_x:
             before = before + self.at_x[k]
         return before, given, np.zeros_like(sensed)
+
+
+def back(
+    context: RolloutContext,
+    batch_step: BatchStep,
+    nets: Sequence[Layers],
+    motion: ForwardPass,
+    smoothing: float,
+    ends: Array,
+) -> Iterator[Array]:
+    """See ``Transcription.back``; of the first robot of a pass."""
+    count, dt = ends.shape[1], context.rollout.dt
+    nx, nu = motion.x.shape[2], motion.u.shape[2]
+    sense, x = context.sense.reverse(count), ends.T
+    blank = {name: np.zeros((count, size)) for name, size in batch_step.sizes.items()}
+    for k in reversed(range(len(motion.u))):
+        seeds = np.concatenate([(blank | {"after": x})[name] for name in batch_step.seeded], axis=1)
+        _, slopes = batch_step.gradient(np.tile(rows(motion, k, dt)[:1], (count, 1)), seeds, [smoothing])
+        given, sensed = slopes[:, nx : nx + nu], np.zeros((count, motion.sensed.shape[2]))
+        for net, columns, place in zip(nets, context.columns, context.partition.places, strict=True):
+            sensed[:, columns] += net.pull(net.forward(motion.sensed[k][:1, columns]), given @ place)[0]
+        through = sense(motion.x[k, 0], motion.p[0], k * dt, motion.sensed[k, 0], sensed.T)[0]
+        x = slopes[:, :nx] + np.array(through).T
+        yield x.T

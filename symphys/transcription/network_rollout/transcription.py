@@ -22,10 +22,8 @@ from symphys.transcription.functions import ExpressionFunctions
 from symphys.transcription.gradient_probe import Probe
 from symphys.transcription.judge import Assessment, assessment
 from symphys.transcription.network_rollout.context import KernelStep, RolloutContext, make_context
-from symphys.transcription.network_rollout.evaluator import LargeEvaluator
-from symphys.transcription.network_rollout.forward_backward import ForwardPass, objective_arguments
-from symphys.transcription.network_rollout.gradient_probe import LargeProbe
-from symphys.transcription.network_rollout.sensitivity import back
+from symphys.transcription.network_rollout.evaluator import LargeEvaluator, LargeProbe
+from symphys.transcription.network_rollout.forward_backward import ForwardPass, back, objective_arguments
 from symphys.transcription.objective import limits
 from symphys.transcription.simulation import Record, simulate
 from symphys.transcription.transcription import Transcription, fastest
