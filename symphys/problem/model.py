@@ -244,13 +244,13 @@ class Discretisation:
 class Scenarios:
     """Domain randomization: all that differs from sample to sample."""
 
-    varied: tuple[RandomizedQuantity, ...] = ()
-    posed: tuple[RandomizedPose, ...] = ()
-    grids: tuple[Discretisation, ...] = ()
+    quantities: tuple[RandomizedQuantity, ...] = ()
+    poses: tuple[RandomizedPose, ...] = ()
+    discretisations: tuple[Discretisation, ...] = ()
 
     def __iter__(self) -> Iterator[RandomizedQuantity | RandomizedPose | Discretisation]:
         """One after the other."""
-        return chain(self.varied, self.posed, self.grids)
+        return chain(self.quantities, self.poses, self.discretisations)
 
     def __bool__(self) -> bool:
         """Whether there is anything."""

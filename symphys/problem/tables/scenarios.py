@@ -49,7 +49,7 @@ def read_scenarios(
     reader = ScenarioReader(known, parametric, simulation, taken, faults)
     for index, table in enumerate(tables):
         reader.read(index, table)
-    return Scenarios(tuple(reader.varied), tuple(reader.posed), tuple(reader.grids))
+    return Scenarios(tuple(reader.quantities), tuple(reader.poses), tuple(reader.discretisations))
 
 
 class ScenarioReader:
@@ -71,9 +71,9 @@ class ScenarioReader:
             taken,
             faults,
         )
-        self.varied: list[RandomizedQuantity] = []
-        self.posed: list[RandomizedPose] = []
-        self.grids: list[Discretisation] = []
+        self.quantities: list[RandomizedQuantity] = []
+        self.poses: list[RandomizedPose] = []
+        self.discretisations: list[Discretisation] = []
 
     def read(self, index: int, table: ScenarioTable) -> None:
         """One table."""
@@ -112,7 +112,7 @@ class ScenarioReader:
         lower, upper = (np.stack(ends) for ends in zip(*(limits(slot, self.known) for slot in slots), strict=True))
         self.check_physical((*place, "shift"), slots, spread, lower, upper)
         factor, lasts = table.factor or 0.0, table.lasts or 0.0
-        self.varied.append(
+        self.quantities.append(
             RandomizedQuantity(table.name, kind, slots, factor, spread, table.alike, lasts, lower, upper)
         )
 
@@ -164,7 +164,7 @@ class ScenarioReader:
         if not (tilt or bend or table.velocity):
             self.faults.add((*place, "tilt"), "give tilt, joints or velocity, or several of them")
         joints = bending(self.parametric.joints, whole)
-        self.posed.append(RandomizedPose(table.name, tuple(whole), joints, float(tilt), float(bend), table.velocity))
+        self.poses.append(RandomizedPose(table.name, tuple(whole), joints, float(tilt), float(bend), table.velocity))
 
     def grid(self, place: Place, name: str, table: DiscretisationTable) -> None:
         """Another discretisation."""
@@ -173,7 +173,7 @@ class ScenarioReader:
             self.faults.add((*place, "simulation"), "give dt, sweeps or both")
         if table.dt is not None:
             check_steps(self.simulation.duration, table.dt, self.faults, (*place, "simulation", "dt"))
-        self.grids.append(Discretisation(name, replace(self.simulation, **given)))
+        self.discretisations.append(Discretisation(name, replace(self.simulation, **given)))
 
 
 def together(body: str, joints: Sequence[ParametricJoint]) -> list[str]:

@@ -27,9 +27,9 @@ class Sampler:
         scenarios = problem.scenarios
         assert scenarios is not None, "nothing differs"
         self._parts: list[QuantitySampler | PoseSampler] = [
-            QuantitySampler(problem, varied) for varied in scenarios.varied
+            QuantitySampler(problem, varied) for varied in scenarios.quantities
         ]
-        self._parts += [PoseSampler(problem, posed) for posed in scenarios.posed]
+        self._parts += [PoseSampler(problem, posed) for posed in scenarios.poses]
         own = tuple(variable for part in self._parts for variable in part.variables)
         self.problem = replace(problem, variables=(*problem.variables, *own), scenarios=None)
         self.nominal = np.concatenate([np.zeros(0), *(variable.guess for variable in own)])

@@ -15,7 +15,7 @@ from symphys.transcription.randomization.sampler import Sampler
 from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.transcription import Transcription
 
-WITHOUT = "there is no evaluation of samples of scenarios"
+WITHOUT = "there is no evaluation in other situations"
 
 
 def with_scenarios(
@@ -28,7 +28,7 @@ def with_scenarios(
     began = perf_counter()
     try:
         if backend not in PRECISIONS:
-            raise KernelUnavailable(f"the backend {backend} has no scenarios")
+            raise KernelUnavailable(f"the backend {backend} has no situations")
         situations = _evaluator(problem, exact, backend, processors() if threads is None else threads)
     except (KernelUnavailable, ProgramError) as error:
         description = replace(plain.backend, note=f"{WITHOUT}: {error}")
@@ -44,7 +44,7 @@ def with_scenarios(
 
 def _evaluator(problem: Problem, exact: bool, backend: str, threads: int) -> ScenarioEvaluator:
     assert problem.scenarios is not None, "nothing differs"
-    grids = {"": problem.simulation, **{grid.name: grid.simulation for grid in problem.scenarios.grids}}
+    grids = {"": problem.simulation, **{grid.name: grid.simulation for grid in problem.scenarios.discretisations}}
     samplers = [Sampler(replace(problem, simulation=simulation)) for simulation in grids.values()]
     return ScenarioEvaluator(list(grids), samplers, [_kernel(each, exact, backend, threads) for each in samplers])
 
