@@ -2,7 +2,7 @@
 
     python benchmarks/robot_growth.py
 
-Sixteen random gradients with respect to the torso's place and velocity at the end go back through all steps, made as
+Sixteen random gradients with respect to the torso's place and velocity at the end go back through all steps, context as
 long as one after each; the growth is the product of what the longest gained in each, in decades. 10 ms, 20 sweeps.
 """
 
@@ -17,7 +17,7 @@ from table_robot import table_problem
 from symphys.codegen import Kernel, compile_program
 from symphys.model.state_layout import Layout
 from symphys.transcription import symbolic_rollout
-from symphys.transcription.network_rollout.step_program import Aims, stage_program, start_function
+from symphys.transcription.network_rollout.step_program import RolloutObjectives, start_function, step_program
 from symphys.transcription.rollout import Rollout
 
 Array = NDArray[np.float64]
@@ -28,12 +28,14 @@ STEEP = 10.0
 
 
 def main() -> None:
-    """One line for each way."""
+    """One line for each motion."""
     for toi, cuts, stride in ((False, 0, 0.1), (True, 0, 0.1), (True, 1, 0.1), (False, 0, 0.0), (True, 0, 0.0)):
         growth = np.log10(grown(*rollout_of(toi, cuts, stride)))
-        way = f"instants of touch {'exact' if toi else 'ignored'}, {cuts} cuts, {'trotting' if stride else 'standing'}"
+        motion = (
+            f"instants of touch {'exact' if toi else 'ignored'}, {cuts} cuts, {'trotting' if stride else 'standing'}"
+        )
         steep = f"{np.sum(growth > np.log10(STEEP))} steps of {STEPS} more than tenfold"
-        print(f"{way:<50} 10^{growth.sum():5.1f}; {steep}, at most {10 ** growth.max():.0f}", flush=True)
+        print(f"{motion:<50} 10^{growth.sum():5.1f}; {steep}, at most {10 ** growth.max():.0f}", flush=True)
 
 
 def rollout_of(toi: bool, cuts: int, stride: float) -> tuple[Rollout, Kernel]:
@@ -41,7 +43,9 @@ def rollout_of(toi: bool, cuts: int, stride: float) -> tuple[Rollout, Kernel]:
     problem = table_problem([], STEPS, stride=stride, toi=toi)
     simulation = replace(problem.simulation, cuts=cuts)
     rollout = symbolic_rollout(replace(problem, simulation=simulation))
-    return rollout, compile_program(stage_program(rollout, Aims(rollout), [], False), seeded=["after"], threads=1)
+    return rollout, compile_program(
+        step_program(rollout, RolloutObjectives(rollout), [], False), seeded=["after"], threads=1
+    )
 
 
 def grown(rollout: Rollout, kernel: Kernel) -> Array:

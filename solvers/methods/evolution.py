@@ -27,7 +27,7 @@ from symphys.solvers.randomized.descent import (
 )
 from symphys.solvers.randomized.validation import NOISE, first_sample, rate_by_validation
 
-NOT_FINITE = "not one pair of a batch is finite: bound the variables, lower `sigma`, or add [fall]"
+NOT_FINITE = "not one pair of a batch is finite: bound the variables, lower `sigma`, or add [termination]"
 
 
 @dataclass(frozen=True)

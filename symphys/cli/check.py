@@ -112,8 +112,8 @@ def describe(problem: Problem) -> list[str]:
         for thing in things:
             formula = " ".join(thing.formula.text.split())
             lines.append(f"  {kind:<12} {thing.name}: {formula} ({moment(thing.at)})")
-    if problem.fall is not None:
-        lines.append(f"  over         where {' '.join(problem.fall.margin.text.split())} < 0")
+    if problem.termination is not None:
+        lines.append(f"  over         where {' '.join(problem.termination.margin.text.split())} < 0")
     if problem.scenarios is not None:
         lines.append(f"  differs      {listed(each.name for each in problem.scenarios)}")
     return lines

@@ -19,7 +19,7 @@ from symphys.findings.contacts import sliding
 from symphys.findings.examination import Examination
 from symphys.findings.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN, Judged
 from symphys.findings.numerics import GRADIENT, GRID, reach
-from symphys.transcription import Verdict
+from symphys.transcription import Assessment
 
 COLOURS = {GOOD: "green", FAIR: "yellow", BAD: "red", UNKNOWN: "dim"}
 WORDS = {text: COLOURS[level] for words in (MARKS, VERDICTS) for level, text in words.items()} | {
@@ -39,7 +39,7 @@ class Examined:
     trust: Examination
 
     @classmethod
-    def of(cls, verdict: Verdict, trust: Mapping[str, Any]) -> Examined:
+    def of(cls, verdict: Assessment, trust: Mapping[str, Any]) -> Examined:
         """From a verdict and what ``symphys.verification.examination`` has found."""
         goal = any(check.kind == "goal" for check in verdict.checks)
         costs = math.nan if goal else sum(verdict.costs.values())

@@ -15,8 +15,8 @@ For some things MuJoCo has laws of its own:
 - A velocity motor likewise becomes a velocity actuator with that kv.
 
 Such actuators are stiff, hence the integrator ``implicitfast``. What has no counterpart is refused: restitution,
-contacts and joints that give way, joints that close a loop, terrain. Variables and aims are no part of a model, and
-commands are its ctrl, 0 at the start.
+contacts and joints that give way, joints that close a loop, terrain. Variables and objectives are no part of a
+model, and commands are its ctrl, 0 at the start.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from symphys.dynamics.motion import inertia_matrix
 from symphys.export.folder import ExportError
-from symphys.export.mjcf_joints import Start, actuators, freedoms, plain
+from symphys.export.mjcf_joints import StartState, actuators, freedoms, plain
 from symphys.export.mjcf_surfaces import geoms, pairs, text
 from symphys.model.joints import Link, kinematic_trees, tree_joints
 from symphys.model.joints.kinematic_tree import FLOATING
@@ -64,7 +64,7 @@ def mjcf(world: World, initial: Mapping[str, Any], dt: float, name: str = "world
     Raises:
         ExportError: names all that MJCF cannot say.
     """
-    start = Start(world, initial)
+    start = StartState(world, initial)
     require_expressible(start, name)
     model = Element("mujoco", model=name)
     SubElement(model, "compiler", angle="radian", inertiafromgeom="false")
@@ -91,14 +91,14 @@ def links_of(world: World) -> list[Link]:
 class Keyframe:
     """Bodies as nested elements, and the numbers of the start in the order in which MuJoCo meets their joints."""
 
-    def __init__(self, start: Start, links: list[Link]) -> None:
+    def __init__(self, start: StartState, links: list[Link]) -> None:
         """Nothing written so far."""
         self.start, self.links = start, links
         self.qpos: list[float] = []
         self.qvel: list[float] = []
 
     def bodies(self, parent: int | None) -> Iterator[Element]:
-        """The bodies that hang on one, or on the world, with all that hangs on them."""
+        """The children of a body, or of the world, with their subtrees."""
         for link in self.links:
             if link.parent == parent:
                 yield self.body(link)
@@ -117,7 +117,7 @@ class Keyframe:
         return element
 
 
-def relative(start: Start, link: Link) -> dict[str, str]:
+def relative(start: StartState, link: Link) -> dict[str, str]:
     """Position and orientation of a body at the start, in the frame of its parent."""
     p, q = start.of(link.body, "position"), start.of(link.body, "orientation")
     if link.parent is not None:
@@ -136,7 +136,7 @@ def moments(body: Body) -> dict[str, str]:
     return {"fullinertia": text([*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2]])}
 
 
-def require_expressible(start: Start, name: str) -> None:
+def require_expressible(start: StartState, name: str) -> None:
     """ExportError with all that has no counterpart, and what can be done."""
     lines = [f"{name}: MJCF cannot say this: {listed(found)}: {why}" for why, found in refusals(start) if found]
     if lines:
@@ -149,7 +149,7 @@ def listed(names: Sequence[str]) -> str:
     return ", ".join(names[:LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
-def refusals(start: Start) -> Iterator[tuple[str, list[str]]]:
+def refusals(start: StartState) -> Iterator[tuple[str, list[str]]]:
     """Reasons, and the names of what they hold for."""
     world, trees = start.world, tree_joints(start.world.joints)
     contacts = {pair.name.partition(":")[0]: pair.law for pair in world.pairs}
@@ -166,7 +166,7 @@ def refusals(start: Start) -> Iterator[tuple[str, list[str]]]:
     yield "a joint that does not fit its bodies at the start; move them until its sockets meet", apart
 
 
-def gap(start: Start, joint: str) -> float:
+def gap(start: StartState, joint: str) -> float:
     """How far the sockets of a joint are apart, or turned, as far as it holds them [m], [rad]."""
     reading = start.readings[joint]
     return float(max(plain(reading.separation)[0], plain(reading.tilt)[0]))

@@ -28,7 +28,7 @@ UNBOUNDED = 1e10
 
 
 @dataclass(frozen=True)
-class Start:
+class StartState:
     """A world at the start.
 
     Attributes:
@@ -78,7 +78,7 @@ class Freedom:
     qvel: Array
 
 
-def freedoms(start: Start, link: Link) -> list[Freedom]:
+def freedoms(start: StartState, link: Link) -> list[Freedom]:
     """What a body may do against its parent, in MuJoCo's order: what is next to the parent comes first."""
     turned = start.axes(link.body).T
     if link.joint is None:
@@ -96,7 +96,7 @@ def freedoms(start: Start, link: Link) -> list[Freedom]:
     return found[:: link.sign]
 
 
-def coordinate(start: Start, joint: Joint, k: int, link: Link, turned: Array) -> Freedom:
+def coordinate(start: StartState, joint: Joint, k: int, link: Link, turned: Array) -> Freedom:
     """One coordinate of a joint; where the child is its second side, it moves against the axis."""
     reading = start.readings[joint.name]
     value, rate = plain(reading.value)[[k]], plain(reading.rate)[[k]]

@@ -6,8 +6,10 @@ from collections.abc import Iterable
 from typing import Any
 from xml.etree.ElementTree import Element
 
-from symphys.model.shapes import Box, Capsule, Plane, Shape, Sphere, Terrain, surface
+from symphys.model.shapes import Plane, Shape, Terrain, surface
 from symphys.model.world import Law, Side, World, is_zero, side_name
+
+MJCF_PLACEMENT = {"centre": "pos", "orientation": "quat"}
 
 
 def text(numbers: Iterable[Any]) -> str:
@@ -38,11 +40,8 @@ def half_space(plane: Plane) -> dict[str, str]:
 
 def solid(shape: Shape) -> dict[str, str]:
     """Kind, sizes and place."""
-    if isinstance(shape, Sphere):
-        return {"type": "sphere", "size": text([shape.radius]), "pos": text(shape.centre)}
-    sizes = (shape.radius, shape.half_length) if isinstance(shape, Capsule) else shape.half_sizes
-    kind = "box" if isinstance(shape, Box) else "capsule"
-    return {"type": kind, "size": text(sizes), "pos": text(shape.centre), "quat": text(shape.orientation)}
+    placed = {MJCF_PLACEMENT[key]: text(numbers) for key, numbers in shape.placement.items()}
+    return {"type": shape.kind, "size": text(shape.mjcf_size), **placed}
 
 
 def pairs(world: World) -> Element:

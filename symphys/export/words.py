@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from symphys.model.joints import Joint, Servo, TorqueMotor, VelocityMotor
 from symphys.model.state_layout import Layout, input_columns, input_size
 from symphys.model.world import World
-from symphys.problem import Problem, Slot, Variable
+from symphys.problem import Problem, Variable, VariableSlot
 from symphys.transcription import Transcription
 from symphys.transcription.rollout import Rollout
 
@@ -76,7 +76,7 @@ def _sets(problem: Problem, world: World, variable: Variable) -> str:
     return slots + knots
 
 
-def _slot(problem: Problem, world: World, slot: Slot) -> str:
+def _slot(problem: Problem, world: World, slot: VariableSlot) -> str:
     """What a slot sets."""
     known = {**problem.initial, **problem.parameters}
     whole = len(known[slot.name]) if slot.name in known else input_size(world, slot.name)
@@ -117,7 +117,7 @@ def error_lines(problem: Problem) -> list[str]:
 
 
 def output_lines(problem: Problem) -> list[str]:
-    """One line a number that is told."""
+    """One line an output."""
     return _placed("outputs", [(1, output.label) for output in problem.outputs])
 
 

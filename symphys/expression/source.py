@@ -48,7 +48,7 @@ def read(line: str) -> ast.expr:
             warnings.simplefilter("error")  # the tokeniser warns of such things as 1if
             root = ast.parse(line, mode="eval").body
     except SyntaxError as error:
-        raise FormulaError(f"cannot read the formula {quote(line)}: {complaint(error)}") from None
+        raise FormulaError(f"cannot read the formula {quote(line)}: {syntax_fault(error)}") from None
     except (RecursionError, MemoryError):
         raise FormulaError(f"the formula {quote(line)} is nested too deep; {MAX_DEPTH} levels are allowed") from None
     except (ValueError, OverflowError, Warning) as error:
@@ -57,7 +57,7 @@ def read(line: str) -> ast.expr:
     return root
 
 
-def complaint(error: SyntaxError) -> str:
+def syntax_fault(error: SyntaxError) -> str:
     """The parser's message with the column, without Python's advice to programmers."""
     reason = (error.msg or "invalid syntax").split(". Perhaps")[0].split(";")[0]
     return f"{reason} at column {error.offset}" if error.offset else reason

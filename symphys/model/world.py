@@ -12,13 +12,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from symphys.model.joints import Joint
-from symphys.model.shapes import Scalar, Shape, Sphere, Static, Surface, contact_points, surface
+from symphys.model.shapes import SOLID_SPHERE, Scalar, Shape, Sphere, Static, Surface, contact_points, surface
 
 Vector = Sequence[Any]
 """three of them"""
 
 GRAVITY = (0.0, 0.0, -9.81)
-SOLID_SPHERE = 2 / 5
 HOLLOW_SPHERE = 2 / 3
 
 

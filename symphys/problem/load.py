@@ -10,18 +10,20 @@ from typing import Any
 import casadi as ca
 from pydantic import ValidationError
 
+from symphys.errors import Issue, ProblemError
 from symphys.model.state_layout import input_sizes
 from symphys.problem.checks.memory import check_rollout
-from symphys.problem.checks.pair_limit import check_crowd
+from symphys.problem.checks.pair_limit import check_pair_limit
 from symphys.problem.checks.start import at_guess, check_joints, check_overlap, formula_names, sensor_names
 from symphys.problem.feedback import Controller, Sensor
 from symphys.problem.include.files import with_included
 from symphys.problem.include.placing import placed
-from symphys.problem.model import NOTHING, Array, Problem, Simulation, Variable
-from symphys.problem.parametric.collision_filter import Meetings
-from symphys.problem.parametric.forward_kinematics import carry
+from symphys.problem.model import ALIVE, NOTHING, Array, Problem, Simulation, Termination, Variable
+from symphys.problem.parametric.collision_filter import CollisionFilter
+from symphys.problem.parametric.forward_kinematics import forward_kinematics
+from symphys.problem.parametric.parts import Part
 from symphys.problem.parametric.reposition import check_anchors
-from symphys.problem.parametric.world import WorldPlan
+from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.quantities import Quantity, quantities, weight_quantities
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.reading.messages import report
@@ -30,20 +32,19 @@ from symphys.problem.reading.source import parse_toml, read_source
 from symphys.problem.schema import Document
 from symphys.problem.tables.bodies import read_body, read_state
 from symphys.problem.tables.contact import (
+    check_collides_with,
     check_laws,
-    check_mates,
     check_varied,
     read_contact,
     read_pairs,
 )
-from symphys.problem.tables.controllers import read_controllers
+from symphys.problem.tables.controllers import read_controllers, read_sensors
 from symphys.problem.tables.joints import read_joints
-from symphys.problem.tables.objectives import Aims, read_aims
+from symphys.problem.tables.objectives import Objectives, read_objectives
 from symphys.problem.tables.scenarios import read_scenarios
-from symphys.problem.tables.sensors import read_sensors
 from symphys.problem.tables.simulation import read_simulation
 from symphys.problem.tables.statics import read_statics
-from symphys.problem.tables.termination import ALIVE, Fall, costs_of_falling, read_fall
+from symphys.problem.tables.termination import read_termination, with_termination_cost
 from symphys.problem.tables.variables import read_variables
 
 MEMBERS = ("body", "plane", "block", "terrain")
@@ -108,6 +109,8 @@ def check_names(document: Document, faults: Faults) -> None:
                 text = f'"{name}" is already the name of another {" or ".join(kinds)}'
                 faults.add(place, text + faults.elsewhere(place, seen[name]))
             seen.setdefault(name, place)
+    if document.termination is not None and document.fall is not None:
+        faults.add(("fall",), "is the old name of [termination], which is given too; leave one of the two out")
     owners = {table.name: (key, k) for key in SHARED_NAMES for k, table in enumerate(getattr(document, key))}
     for place, group in groups(document):
         if group in owners:
@@ -128,19 +131,21 @@ def build(
 ) -> Problem:
     """The problem; each stage needs the ones before without fault."""
     simulation = read_simulation(document.simulation, faults)
-    plan, initial = read_plan(document, faults)
+    parametric, initial = read_world(document, faults)
     faults.stop_if_any()
-    check_laws(plan, faults)
-    known = quantities(initial, plan.parameters(), input_sizes(plan.world({})))
-    sensors, controllers = read_control(document, plan, known, functions, faults)
+    check_laws(parametric, faults)
+    known = quantities(initial, parametric.parameters(), input_sizes(parametric.world({})))
+    sensors, controllers = read_control(document, parametric, known, functions, faults)
     known |= weight_quantities(controllers)
     variables = read_variables(document.variable, known, simulation, faults)
-    check_rollout(plan, simulation, variables, faults)
-    check_varied(plan, variables, faults)
-    check_anchors(plan, variables, faults)
-    scenarios = read_scenarios(document.scenario, known, plan, simulation, variables, faults)
+    check_rollout(parametric, simulation, variables, faults)
+    check_varied(parametric, variables, faults)
+    check_anchors(parametric, variables, faults)
+    scenarios = read_scenarios(document.scenario, known, parametric, simulation, variables, faults)
     faults.stop_if_any()
-    fall, aims = read_asked(document, simulation, plan, at_guess(plan, known, variables), variables, faults)
+    termination, objectives = read_termination_and_objectives(
+        document, simulation, parametric, at_guess(parametric, known, variables), variables, faults
+    )
     return Problem(
         name=path.stem,
         title=document.title or path.stem,
@@ -148,31 +153,31 @@ def build(
         file=str(path),
         text=text,
         simulation=simulation,
-        plan=plan,
+        parametric=parametric,
         initial=initial,
-        parameters=plan.parameters(),
+        parameters=parametric.parameters(),
         variables=variables,
-        **vars(aims),
+        **vars(objectives),
         goal=document.objective.goal,
-        stop_when_met=stop_when_met(document, aims),
+        stop_when_met=stop_when_met(document, objectives),
         solver_tables=document.solver,
         sensors=sensors,
         controllers=controllers,
         solvers=None if document.solvers is None else tuple(dict.fromkeys(document.solvers)),
-        fall=fall,
+        termination=termination,
         scenarios=scenarios or None,
     )
 
 
 def read_control(
     document: Document,
-    plan: WorldPlan,
+    parametric: ParametricWorld,
     known: Mapping[str, Quantity],
     functions: Mapping[str, ca.Function],
     faults: Faults,
 ) -> tuple[tuple[Sensor, ...], tuple[Controller, ...]]:
     """Sensors and controllers without fault."""
-    sensors = read_sensors(document.sensor, sensor_names(plan, at_guess(plan, known, ())), faults)
+    sensors = read_sensors(document.sensor, sensor_names(parametric, at_guess(parametric, known, ())), faults)
     faults.stop_if_any()
     varied = {name.partition("[")[0].strip() for table in document.variable for name in table.sets}
     controllers = read_controllers(document.controller, sensors, known, functions, faults, varied)
@@ -180,48 +185,69 @@ def read_control(
     return sensors, controllers
 
 
-def read_asked(
+def read_termination_and_objectives(
     document: Document,
     simulation: Simulation,
-    plan: WorldPlan,
+    parametric: ParametricWorld,
     start: Mapping[str, Array],
     variables: Sequence[Variable],
     faults: Faults,
-) -> tuple[Fall | None, Aims]:
-    """What is asked for; ``start`` is as the guess has it, and must be one that can be."""
-    check_overlap(plan, start, faults)
-    check_joints(plan, start, faults)
-    fall = read_fall(document.fall, sensor_names(plan, start), input_sizes(plan.world({})), faults)
-    alive = {} if document.fall is None else {ALIVE: ca.DM(1)}
-    aims = read_aims(document, simulation, formula_names(plan, start, variables) | alive, faults)
-    if document.fall is not None:
-        aims = replace(aims, costs=costs_of_falling(document.fall, aims.costs, faults))
+) -> tuple[Termination | None, Objectives]:
+    """Termination and objectives; ``start`` is as the guess has it, and must be one that can be."""
+    check_overlap(parametric, start, faults)
+    check_joints(parametric, start, faults)
+    sensed = sensor_names(parametric, start)
+    termination = read_termination(document, sensed, input_sizes(parametric.world({})), faults)
+    names = formula_names(parametric, start, variables) | ({} if document.ending[1] is None else {ALIVE: ca.DM(1)})
+    objectives = read_objectives(document, simulation, names, faults)
+    objectives = replace(objectives, costs=with_termination_cost(document, objectives.costs, faults))
     faults.stop_if_any()
-    return fall, aims
+    return termination, objectives
 
 
-def read_plan(document: Document, faults: Faults) -> tuple[WorldPlan, dict[str, Array]]:
-    """The world's plan and the state of every body at the start."""
+def read_world(document: Document, faults: Faults) -> tuple[ParametricWorld, dict[str, Array]]:
+    """The world's parametric and the state of every body at the start."""
     bodies = tuple(read_body(index, table, faults) for index, table in enumerate(document.body))
     statics = read_statics(document, [table.position for table in document.body], faults)
-    names = [part.name for part in (*bodies, *statics)]
+    parts: tuple[Part, ...] = (*bodies, *statics)
+    names = [part.name for part in parts]
     shared = list(dict.fromkeys(group for _, group in groups(document)))
-    check_mates(bodies, names, shared, document, faults)
+    check_collides_with(bodies, names, shared, document, faults)
     pairs = read_pairs(document.pair, names, shared, faults)
     initial: dict[str, Array] = {}
     for index, table in enumerate(document.body):
         initial |= read_state(table, index, faults)
     joints = read_joints(document.joint, [body.name for body in bodies], initial, faults)
     if not faults.issues:
-        initial = carry(joints, initial, faults)
+        initial = forward_kinematics(joints, initial, faults)
     x, y, z = document.world.gravity
-    plan = WorldPlan(bodies, statics, pairs, read_contact(document.contact), (x, y, z), joints)
-    check_crowd(Meetings(plan.parts, (*pairs, *plan.jointed)), faults)
-    return plan, initial
+    parametric = ParametricWorld(bodies, statics, pairs, read_contact(document.contact), (x, y, z), joints)
+    check_pair_limit(CollisionFilter(parametric.parts, (*pairs, *parametric.jointed)), faults)
+    return parametric, initial
 
 
-def stop_when_met(document: Document, aims: Aims) -> bool:
+def stop_when_met(document: Document, objectives: Objectives) -> bool:
     """As the file says; else True with a goal, or with targets and no costs, which leave nothing to improve."""
     if document.objective.stop is not None:
         return document.objective.stop == "met"
-    return document.objective.goal is not None or (bool(aims.targets) and not aims.costs)
+    return document.objective.goal is not None or (bool(objectives.targets) and not objectives.costs)
+
+
+def require_solvable(problem: Problem) -> None:
+    """ProblemError if nothing may vary, or if there is no objective, with what to add."""
+    body = next(iter(problem.initial)).split(".")[0]
+    issues = []
+    if not problem.variables:
+        example = f'[[variable]] with name = "start", sets = "{body}.velocity"'
+        issues.append(
+            Issue("variable", f"there is none, so a solver has nothing to choose; add, for instance, {example}")
+        )
+    if not (problem.costs or problem.targets or problem.constraints):
+        example = f'[[target]] with name = "there", value = "{body}.position - [1, 0, 0]", tolerance = 0.01'
+        issues.append(
+            Issue(
+                "target", f"there is none, and no cost or constraint: nothing to aim at; add, for instance, {example}"
+            )
+        )
+    if issues:
+        raise ProblemError(problem.file, issues)

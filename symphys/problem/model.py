@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields
+from itertools import chain
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,42 +15,28 @@ from numpy.typing import NDArray
 from symphys.expression import Formula
 from symphys.model.world import Scheme, World
 from symphys.problem.feedback import Controller, Sensor
-from symphys.problem.parametric.world import WorldPlan
-
-if TYPE_CHECKING:
-    from symphys.problem.randomization import Scenarios
-    from symphys.problem.tables.termination import Fall
+from symphys.problem.parametric.joints import ParametricJoint
+from symphys.problem.parametric.world import ParametricWorld
 
 Array = NDArray[np.float64]
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 Kind = Literal["initial", "parameter", "control", "weight"]
+ALIVE = "alive"
+"""In formulas: 1 until the motion is over, 0 from then on."""
 
 
-@dataclass(frozen=True)
-class Simulation:
-    """How time passes.
+@dataclass(frozen=True, kw_only=True)
+class Simulation(Scheme):
+    """How time passes: the switches of the time step, and for how long.
 
     Attributes:
         duration: [s], a whole number of steps.
-        dt: time step [s].
-        sweeps, position_sweeps, warm_start, push_out: as in world.Scheme.
-        time_of_impact, impact_friction, cuts, energy_cap, load_sharing: likewise.
-        smoothing: [m/s] stages of the knob that solvers use, decreasing, at least one; 0 is the exact contact law.
+        smoothing: [m/s] stages of the smoothing that solvers use, decreasing, at least one; 0 is the exact contact law.
     """
 
     duration: float
-    dt: float
-    sweeps: int
-    position_sweeps: int
-    warm_start: bool
     smoothing: tuple[float, ...]
-    push_out: float = 1.0
-    time_of_impact: bool = True
-    impact_friction: bool = True
-    cuts: int | None = None
-    energy_cap: bool = True
-    load_sharing: bool = True
 
     @property
     def steps(self) -> int:
@@ -57,23 +44,12 @@ class Simulation:
         return round(self.duration / self.dt)
 
     def scheme(self) -> Scheme:
-        """The switches of the time step."""
-        return Scheme(
-            dt=self.dt,
-            sweeps=self.sweeps,
-            position_sweeps=self.position_sweeps,
-            push_out=self.push_out,
-            warm_start=self.warm_start,
-            time_of_impact=self.time_of_impact,
-            impact_friction=self.impact_friction,
-            cuts=self.cuts,
-            energy_cap=self.energy_cap,
-            load_sharing=self.load_sharing,
-        )
+        """The switches of the time step alone."""
+        return Scheme(**{each.name: getattr(self, each.name) for each in fields(Scheme)})
 
 
 @dataclass(frozen=True)
-class Slot:
+class VariableSlot:
     """Where a variable's components go.
 
     Attributes:
@@ -102,7 +78,7 @@ class Variable:
 
     name: str
     kind: Kind
-    slots: tuple[Slot, ...]
+    slots: tuple[VariableSlot, ...]
     knots: int
     interpolation: Literal["constant", "linear"]
     guess: Array
@@ -179,7 +155,7 @@ class Constraint:
 
 @dataclass(frozen=True)
 class Output:
-    """A number that is told.
+    """A number that is reported.
 
     Attributes:
         name: as in the file.
@@ -200,6 +176,88 @@ class Output:
 
 
 @dataclass(frozen=True)
+class Termination:
+    """Where a motion is over before its time: from then on nothing moves.
+
+    Attributes:
+        margin: of a number of the state; over where it is below 0.
+    """
+
+    margin: Formula
+
+
+@dataclass(frozen=True)
+class RandomizedQuantity:
+    """Numbers that are sampled: (components,) each slot.
+
+    Attributes:
+        name: as in the file.
+        kind: of what is sampled.
+        slots: what is sampled.
+        factor: half the width of the factors; 0: none.
+        shift: (components,) half the width of what is added.
+        alike: whether all numbers share one random number.
+        lasts: [s] of inputs, how long they act; 0: always.
+        lower, upper: (components,) each slot, what is physical.
+    """
+
+    name: str
+    kind: Kind
+    slots: tuple[VariableSlot, ...]
+    factor: float
+    shift: Array
+    alike: bool
+    lasts: float
+    lower: Array
+    upper: Array
+
+
+@dataclass(frozen=True)
+class RandomizedPose:
+    """A robot whose pose is sampled, then lifted until it overlaps nothing that stands still.
+
+    Attributes:
+        name: as in the file.
+        bodies: all that joints connect.
+        joints: its rigid hinges that close no loop.
+        tilt, bend: half the widths of turns about each axis of the world, and of the joints [rad].
+        velocity: half the width of each component [m/s].
+    """
+
+    name: str
+    bodies: tuple[str, ...]
+    joints: tuple[ParametricJoint, ...]
+    tilt: float
+    bend: float
+    velocity: float
+
+
+@dataclass(frozen=True)
+class Discretisation:
+    """Another discretisation."""
+
+    name: str
+    simulation: Simulation
+
+
+@dataclass(frozen=True)
+class Scenarios:
+    """Domain randomization: all that differs from sample to sample."""
+
+    quantities: tuple[RandomizedQuantity, ...] = ()
+    poses: tuple[RandomizedPose, ...] = ()
+    discretisations: tuple[Discretisation, ...] = ()
+
+    def __iter__(self) -> Iterator[RandomizedQuantity | RandomizedPose | Discretisation]:
+        """One after the other."""
+        return chain(self.quantities, self.poses, self.discretisations)
+
+    def __bool__(self) -> bool:
+        """Whether there is anything."""
+        return any(True for _ in self)
+
+
+@dataclass(frozen=True)
 class Problem:
     """A validated problem.
 
@@ -209,7 +267,7 @@ class Problem:
         file: the path as given.
         text: the source, with the texts of included files, so that it can be loaded again without them.
         simulation: how time passes.
-        plan: bodies, planes and their laws, from which ``world`` builds.
+        parametric: the world whose parameters may be replaced, from which ``world`` builds.
         initial: for every body ``<body>.position`` (3,) [m], ``.orientation`` (4,) unit quaternion w x y z,
             ``.velocity`` (3,) [m/s], ``.angular_velocity`` (3,) [rad/s]; world frame.
         parameters: every physical parameter by name with its value in the file, (k,).
@@ -219,9 +277,9 @@ class Problem:
         solvers: the names of those that the problem is for, as the file has them; None for all.
         solver_tables: the raw [solver.NAME] tables by NAME.
         sensors, controllers: in the file's order.
-        fall: where a motion is over before its time; None: nowhere.
-        scenarios: what differs from situation to situation; None: nothing.
-        outputs: numbers that are told, in the file's order.
+        termination: where a motion is over before its time; None: nowhere.
+        scenarios: what differs from sample to sample; None: nothing.
+        outputs: numbers that are reported, in the file's order.
     """
 
     name: str
@@ -230,7 +288,7 @@ class Problem:
     file: str
     text: str = field(repr=False)
     simulation: Simulation
-    plan: WorldPlan = field(repr=False)
+    parametric: ParametricWorld = field(repr=False)
     initial: dict[str, Array]
     parameters: dict[str, Array]
     variables: tuple[Variable, ...]
@@ -243,7 +301,7 @@ class Problem:
     sensors: tuple[Sensor, ...] = ()
     controllers: tuple[Controller, ...] = ()
     solvers: tuple[str, ...] | None = None
-    fall: Fall | None = None
+    termination: Termination | None = None
     scenarios: Scenarios | None = None
     outputs: tuple[Output, ...] = ()
 
@@ -265,4 +323,4 @@ class Problem:
             overrides: parameter names to floats or casadi symbols; three of them in a sequence for gravity.
                 KeyError for a name that is no parameter.
         """
-        return self.plan.world(overrides)
+        return self.parametric.world(overrides)

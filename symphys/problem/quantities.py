@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.problem.feedback import Controller
-from symphys.problem.model import Kind, Slot
+from symphys.problem.model import Kind, VariableSlot
 from symphys.suggest import hint, quote
 
 Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ def weight_quantities(controllers: Iterable[Controller]) -> dict[str, Quantity]:
     return {name: Quantity("weight", value) for controller in controllers for name, value in controller.weights.items()}
 
 
-def read_slot(text: str, known: Mapping[str, Quantity]) -> Slot:
+def read_slot(text: str, known: Mapping[str, Quantity]) -> VariableSlot:
     """The slot that ``ball.force[0:2]`` means; SlotError says why it means none."""
     match = SLOT.fullmatch(text)
     if not match:
@@ -71,17 +71,17 @@ def read_slot(text: str, known: Mapping[str, Quantity]) -> Slot:
     if start is None and stop is None and colon is None:
         if "[" in text:
             raise SlotError(f"{quote(text)} has an empty index")
-        return Slot(name, tuple(range(count)))
+        return VariableSlot(name, tuple(range(count)))
     for end in (start, stop):
         if end is not None and not -count <= int(end) <= count - (colon is None):
             raise SlotError(f"{quote(text)} reaches beyond {name}, which has {count} components, 0 to {count - 1}")
     indices = range(count)
     if colon is None:
-        return Slot(name, (indices[int(start or 0)],))
+        return VariableSlot(name, (indices[int(start or 0)],))
     chosen = indices[slice(int(start) if start else None, int(stop) if stop else None)]
     if not chosen:
         raise SlotError(f"{quote(text)} is an empty range")
-    return Slot(name, tuple(chosen))
+    return VariableSlot(name, tuple(chosen))
 
 
 def unknown(name: str, known: Mapping[str, Quantity]) -> str:
@@ -101,7 +101,7 @@ def physical(name: str, kind: Kind) -> tuple[float, float]:
     return (0.0, inf) if kind == "parameter" and key in ACTING else LIMITS.get(key, (-inf, inf))
 
 
-def limits(slot: Slot, known: Mapping[str, Quantity]) -> tuple[Array, Array]:
+def limits(slot: VariableSlot, known: Mapping[str, Quantity]) -> tuple[Array, Array]:
     """(components,) twice: the bounds that hold where the file states none."""
     key = slot.name.rpartition(".")[2]
     low, high = (np.full(len(slot.components), limit) for limit in physical(slot.name, known[slot.name].kind))

@@ -5,6 +5,7 @@ What cannot be read, or is too large to draw, is left out of the picture.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import numpy as np
 
 from symphys import json_values as values
 from symphys.json_values import Array, Text
+from symphys.model.shapes import SHAPES
 from symphys.results.drawable import LARGEST, small
 from symphys.results.scene_joints import SceneJoint
 from symphys.results.text_files import read_table
@@ -24,19 +26,28 @@ UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 class Solid:
     """All points within ``radius`` of an inner box: a sphere, whose box is a point, a capsule, a line, or a box.
 
-    In the file: ``kind``, and sizes as in problem files.
-
     Attributes:
         radius: [m]; 0 for a box.
         half: (3,) half sizes of the inner box along its own axes [m].
         centre: (3,) [m], in the body's frame; in the world for what stands still.
         orientation: (4,) unit quaternion w x y z.
+        kind: of the shape, as problem files call it.
+        sizes: of the shape, by the names of problem files: a number or (3,) [m].
     """
 
     radius: float = 0.0
     half: Array = field(default_factory=lambda: np.zeros(3))
     centre: Array = field(default_factory=lambda: np.zeros(3))
     orientation: Array = field(default_factory=lambda: np.array(UPRIGHT))
+    kind: str = "sphere"
+    sizes: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, kind: str, sizes: Mapping[str, Any], centre: Array, orientation: Array) -> Solid:
+        """The solid that a shape of this kind draws."""
+        whole = {key: tuple(size) if isinstance(size, np.ndarray) else size for key, size in sizes.items()}
+        radius, half = SHAPES[kind].from_sizes(whole, tuple(centre), UPRIGHT).rounded_box
+        return cls(float(radius), np.array(half, float), centre, orientation, kind, sizes)
 
     @property
     def girth(self) -> float:
@@ -54,29 +65,27 @@ class Solid:
         return not self.half.any()
 
     def to_json(self) -> dict[str, Any]:
-        """One of ``shapes``."""
-        if self.is_ball:
-            return {"kind": "sphere", "radius": self.radius, "centre": self.centre.tolist()}
-        placed = {"centre": self.centre.tolist(), "orientation": self.orientation.tolist()}
-        if self.radius == 0:
-            return {"kind": "box", "size": (2 * self.half).tolist(), **placed}
-        return {"kind": "capsule", "radius": self.radius, "length": 2 * float(self.half[2]), **placed}
+        """One of ``shapes``: kind, sizes as in problem files, centre and, unless round, orientation."""
+        sizes = {key: size.tolist() if isinstance(size, np.ndarray) else size for key, size in self.sizes.items()}
+        turned = {"orientation": self.orientation.tolist()} if SHAPES[self.kind].turns else {}
+        return {"kind": self.kind, **sizes, "centre": self.centre.tolist(), **turned}
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> Solid | None:
-        """A sphere, a box or a capsule; None if it has no size and place that can be drawn."""
+        """One of the shapes; None if it has no size and place that can be drawn."""
         entry = values.table(value)
-        kind = entry.get("kind", "sphere")
-        radius, half = values.number(entry.get("radius")), np.zeros(3)
-        if kind == "box":
-            radius, half = 0.0, values.vector(entry.get("size")) / 2
-        elif kind == "capsule":
-            half = np.array([0.0, 0.0, values.number(entry.get("length")) / 2])
-        sizes = half if kind == "box" else np.array([radius, *half[2:]]) if kind == "capsule" else np.array([radius])
-        centre = values.vector(entry.get("centre"))
-        if kind not in ("sphere", "box", "capsule") or not (small([*sizes, *centre]) and (sizes > 0).all()):
+        kind, centre = str(entry.get("kind", "sphere")), values.vector(entry.get("centre"))
+        if kind not in SHAPES:
             return None
-        return cls(radius, half, centre, _orientation(entry.get("orientation")))
+        keys = {key.name: key.count for key in SHAPES[kind].size_keys}
+        sizes = {
+            name: values.number(entry.get(name)) if count == 1 else values.vector(entry.get(name))
+            for name, count in keys.items()
+        }
+        whole = np.concatenate([np.atleast_1d(size) for size in sizes.values()])
+        if not (small([*whole, *centre]) and (whole > 0).all()):
+            return None
+        return cls.of(kind, sizes, centre, _orientation(entry.get("orientation")))
 
 
 def _orientation(value: object) -> Array:

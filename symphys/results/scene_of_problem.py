@@ -10,10 +10,9 @@ import casadi as ca
 import numpy as np
 
 from symphys.model.joints import Joint, Motor, Servo, TorqueMotor, VelocityMotor
-from symphys.model.shapes import Box, Fixture, Plane, Scalar, Shape, Sphere, Terrain
+from symphys.model.shapes import Fixture, Plane, Scalar, Shape, Terrain
 from symphys.model.world import Body, World
 from symphys.problem import Problem
-from symphys.problem.parametric.sizes import extent
 from symphys.results.scene import Scene, SceneBody, SceneFixture, ScenePlane, SceneTerrain, Solid
 from symphys.results.scene_joints import SceneCoordinate, SceneJoint, SceneMotor, SceneSocket
 from symphys.shooting import Array
@@ -68,12 +67,8 @@ def parameters(problem: Problem, z: Mapping[str, Array]) -> dict[str, Any]:
 
 def make_solid(shape: Shape) -> Solid:
     """A shape with numbers, no symbols."""
-    if isinstance(shape, Sphere):
-        return Solid(float(shape.radius), centre=plain(shape.centre))
-    if isinstance(shape, Box):
-        return Solid(0.0, plain(shape.half_sizes), plain(shape.centre), plain(shape.orientation))
-    half = np.array([0.0, 0.0, float(shape.half_length)])
-    return Solid(float(shape.radius), half, plain(shape.centre), plain(shape.orientation))
+    sizes = {key: plain(size) if isinstance(size, tuple) else float(size) for key, size in shape.sizes.items()}
+    return Solid.of(shape.kind, sizes, plain(shape.centre), plain(shape.orientation))
 
 
 def make_joint(joint: Joint, bodies: Sequence[str]) -> SceneJoint:
@@ -137,7 +132,7 @@ def crop(world: World, places: Array) -> TerrainCrop:
 
 def size(body: Body) -> float:
     """From a body's centre of mass to the farthest point of its surface, at most [m]."""
-    return max((float(np.linalg.norm(shape.centre)) + extent(shape) for shape in body.shapes), default=0.0)
+    return max((float(np.linalg.norm(shape.centre)) + shape.extent for shape in body.shapes), default=0.0)
 
 
 def sample(terrain: Terrain, near: TerrainCrop) -> SceneTerrain:

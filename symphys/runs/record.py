@@ -29,7 +29,7 @@ from symphys.runs.job import Job
 from symphys.shooting import Array
 from symphys.solvers import Counts, Outcome, StageResult, TraceRow
 from symphys.trajectory import Trajectory
-from symphys.transcription import Transcription, Verdict
+from symphys.transcription import Assessment, Transcription
 
 JUDGED = frozenset(("objective", "costs", "outputs", "checks"))
 """What is not known where the exact rollout cannot be simulated."""
@@ -47,7 +47,7 @@ class Judgement:
         advice: the solver's and what the rollout adds.
     """
 
-    verdict: Verdict | None
+    verdict: Assessment | None
     trajectory: Trajectory | None
     trust: dict[str, Any] | None
     advice: str
@@ -95,7 +95,7 @@ def failure(job: Job, message: str) -> Result:
     return Result(**provenance(job), solved=False, status="failed", advice=message, absent=REACHED)
 
 
-def judged(verdict: Verdict | None) -> Judged:
+def judged(verdict: Assessment | None) -> Judged:
     """What is known of how the exact rollout does."""
     if verdict is None:
         return Judged(np.nan, np.nan, met=False, checked=False)

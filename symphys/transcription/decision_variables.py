@@ -11,7 +11,7 @@ import numpy as np
 
 from symphys.model.state_layout import initial_state, input_columns, inputs_size
 from symphys.model.world import World
-from symphys.problem import Problem, Variable, follow
+from symphys.problem import Problem, Variable, reposition
 from symphys.shooting import VariableBlock
 from symphys.transcription.formula_names import Parameters, spans
 
@@ -20,11 +20,11 @@ Expr = Any
 
 
 MIDDLE, START = 0.5, 0.0
-"""When a linear control is looked at in a step: forces act over it, motors as an impulse at its start (leapfrog)."""
+"""When a linear control is sampled in a step: forces act over it, motors as an impulse at its start (leapfrog)."""
 
 
 @dataclass(frozen=True)
-class Start:
+class RolloutStart:
     """x0 (nx,) without memory, u (nu, N) as variables give it and p (np,), as expressions of z."""
 
     x0: Expr
@@ -40,7 +40,7 @@ def blocks(problem: Problem) -> tuple[VariableBlock, ...]:
     )
 
 
-def start_of(problem: Problem, world: World, inputs: Sequence[str], parameters: Parameters, z: Expr) -> Start:
+def start_of(problem: Problem, world: World, inputs: Sequence[str], parameters: Parameters, z: Expr) -> RolloutStart:
     """The rollout's start as a function of z."""
     initial = {name: ca.MX(ca.DM(value)) for name, value in problem.initial.items()}
     physical = {name: ca.MX(value) for name, value in zip(parameters.names, parameters.nominal, strict=True)}
@@ -56,8 +56,8 @@ def start_of(problem: Problem, world: World, inputs: Sequence[str], parameters: 
     varied = {slot.name for variable in problem.variables for slot in variable.slots}
     initial |= {name: _unit(initial[name]) for name in varied if name.endswith(".orientation")}
     anchors = {name: physical[name] for name in sorted(varied & physical.keys()) if name.endswith(".anchor")}
-    initial = follow(problem.plan, anchors, initial)
-    return Start(initial_state(world, initial), u, ca.vertcat(ca.MX(0, 1), *physical.values()))
+    initial = reposition(problem.parametric, anchors, initial)
+    return RolloutStart(initial_state(world, initial), u, ca.vertcat(ca.MX(0, 1), *physical.values()))
 
 
 def _replace(value: Expr, components: Sequence[int], part: Expr) -> Expr:

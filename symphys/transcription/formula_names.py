@@ -22,7 +22,7 @@ from symphys.expression import Formula
 from symphys.model.state_layout import GIVEN, Layout, input_columns, input_sizes, inputs_size
 from symphys.model.world import World
 from symphys.problem import ALIVE, Problem, Variable
-from symphys.transcription.feedback.sensor_memory import Memory
+from symphys.transcription.feedback.sensor_memory import SensorMemory
 
 Expr = Any
 """casadi SX or MX"""
@@ -86,8 +86,8 @@ def input_names(problem: Problem) -> tuple[str, ...]:
     return tuple(dict.fromkeys([*set_, *driven]))
 
 
-def instant(world: World, inputs: Sequence[str], parameters: Parameters, memory: Memory, n: int) -> Instant:
-    """Symbols for all that may be looked at; ``n``: length of z."""
+def instant(world: World, inputs: Sequence[str], parameters: Parameters, memory: SensorMemory, n: int) -> Instant:
+    """Symbols for all that a formula may depend on; ``n``: length of z."""
     return Instant(
         ca.SX.sym("x", memory.size),
         ca.SX.sym("u", inputs_size(world, inputs)),
@@ -98,7 +98,12 @@ def instant(world: World, inputs: Sequence[str], parameters: Parameters, memory:
 
 
 def compile_formula(
-    problem: Problem, world: World, inputs: Sequence[str], parameters: Parameters, memory: Memory, formula: Formula
+    problem: Problem,
+    world: World,
+    inputs: Sequence[str],
+    parameters: Parameters,
+    memory: SensorMemory,
+    formula: Formula,
 ) -> ca.Function:
     """A formula as a casadi function of (x, u, p, time, z); x with its memory."""
     at = instant(world, inputs, parameters, memory, sum(v.guess.size for v in problem.variables))
@@ -114,14 +119,14 @@ def namespace(
     world: World,
     inputs: Sequence[str],
     parameters: Parameters,
-    memory: Memory,
+    memory: SensorMemory,
     at: Instant,
     wanted: frozenset[str],
 ) -> dict[str, Expr]:
     """What names mean at an instant, variables aside; of what takes work to express only what is wanted."""
     layout = Layout(world)
     names: dict[str, Expr] = {"time": at.time}
-    if memory.falls:
+    if memory.terminates:
         names[ALIVE] = at.x[memory.columns[ALIVE]]
     for body in world.bodies:
         names.update({f"{body.name}.{field}": at.x[layout[f"{body.name}.{field}"]] for field in GIVEN})

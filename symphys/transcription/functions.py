@@ -18,7 +18,7 @@ class ExpressionFunctions:
         """Nothing is made yet."""
         self._rollout, self._terms = rollout, asked
         self._merit = asked.objective + asked.penalties
-        self._common, self._told = [asked.objective, asked.errors], asked.outputs
+        self._common, self._outputs = [asked.objective, asked.errors], asked.outputs
 
     @property
     def squares(self) -> Any:
@@ -29,20 +29,20 @@ class ExpressionFunctions:
     @cached_property
     def value(self) -> ca.Function:
         """-> (merit, objective, errors, outputs)."""
-        return self._function("value", [self._merit, *self._common, self._told])
+        return self._function("value", [self._merit, *self._common, self._outputs])
 
     @cached_property
     def gradient(self) -> ca.Function:
         """-> (merit, objective, errors, d merit / dz (n,), outputs)."""
         slopes = ca.gradient(self._merit, self._rollout.z)
-        return self._function("gradient", [self._merit, *self._common, slopes, self._told])
+        return self._function("gradient", [self._merit, *self._common, slopes, self._outputs])
 
     @cached_property
     def residuals(self) -> ca.Function | None:
         """-> (r, objective, errors, outputs)."""
         if self.squares is None:
             return None
-        return self._function("residuals", [self.squares, *self._common, self._told])
+        return self._function("residuals", [self.squares, *self._common, self._outputs])
 
     @cached_property
     def jacobian(self) -> ca.Function | None:
@@ -50,7 +50,7 @@ class ExpressionFunctions:
         if self.squares is None:
             return None
         slopes = ca.jacobian(self.squares, self._rollout.z)
-        return self._function("jacobian", [self.squares, *self._common, slopes, self._told])
+        return self._function("jacobian", [self.squares, *self._common, slopes, self._outputs])
 
     @cached_property
     def nlp(self) -> ca.Function:

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Check:
+class Criterion:
     """One thing that should hold.
 
     Attributes:
@@ -39,12 +39,12 @@ class Check:
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """Objective, each cost, each check and each number that is told of one candidate, by name."""
+class Assessment:
+    """Objective, each cost, each check and each output of one candidate, by name."""
 
     objective: float
     costs: dict[str, float]
-    checks: tuple[Check, ...]
+    checks: tuple[Criterion, ...]
     outputs: dict[str, float]
 
     @property
@@ -59,15 +59,17 @@ class Verdict:
         return max(ratios, key=lambda ratio: inf if isnan(ratio) else ratio, default=nan)
 
 
-def verdict(problem: Problem, objective: float, costs: Array, errors: Array, outputs: Array) -> Verdict:
+def assessment(problem: Problem, objective: float, costs: Array, errors: Array, outputs: Array) -> Assessment:
     """The verdict from the numbers of the exact rollout; the arrays as in ``Terms``."""
     checks = []
     held = [("target", t.name, t.tolerance) for t in problem.targets]
     held += [("constraint", c.name, c.tolerance) for c in problem.constraints]
     for (kind, name, tolerance), ratio in zip(held, errors, strict=False):
-        checks.append(Check(kind, name, float(ratio) * tolerance, tolerance, float(ratio)))
+        checks.append(Criterion(kind, name, float(ratio) * tolerance, tolerance, float(ratio)))
     if problem.goal is not None:
-        checks.append(Check("goal", "objective", objective, problem.goal, float(goal_error(objective, problem.goal))))
+        checks.append(
+            Criterion("goal", "objective", objective, problem.goal, float(goal_error(objective, problem.goal)))
+        )
     named = {cost.name: float(value) for cost, value in zip(problem.costs, costs, strict=True)}
-    told = {output.label: float(value) for output, value in zip(problem.outputs, outputs, strict=True)}
-    return Verdict(objective, named, tuple(checks), told)
+    reported = {output.label: float(value) for output, value in zip(problem.outputs, outputs, strict=True)}
+    return Assessment(objective, named, tuple(checks), reported)

@@ -52,8 +52,8 @@ class Terms:
         penalties: scalar: quadratic penalties of violated constraints.
         errors: (e,) error / tolerance of each target, constraint and the goal: met where <= 1.
         constraints: (c,) values, with ``lower`` and ``upper`` (c,) as numbers and ``names`` one an entry.
-        outputs: (o,) what is told.
-        means: (a,) the value of every formula, its mean over time where it is looked at always: what is differentiated
+        outputs: (o,) as reported.
+        means: (a,) the value of every formula, its mean over time where it is evaluated always: what is differentiated
             to examine a gradient, since it means the same on any time grid and its slope does not vanish at a solution.
     """
 
@@ -76,14 +76,16 @@ def terms(rollout: Sampled) -> Terms:
     costs = [_cost(rollout, cost) for cost in problem.costs]
     targets = [(target, rollout.at(target.formula, target.at)) for target in problem.targets]
     limits = [_Limit(rollout, constraint) for constraint in problem.constraints]
-    aims = [np.sqrt(target.weight) * value for target, value in targets]
-    objective = sum((cost.value for cost in costs), ca.MX(0)) + sum((ca.sumsqr(aim) for aim in aims), ca.MX(0))
+    residuals = [np.sqrt(target.weight) * value for target, value in targets]
+    objective = sum((cost.value for cost in costs), ca.MX(0)) + sum(
+        (ca.sumsqr(residual) for residual in residuals), ca.MX(0)
+    )
     errors = [_miss(target, value) for target, value in targets] + [limit.error for limit in limits]
     if problem.goal is not None:
         errors.append(goal_error(objective, problem.goal))
     squares = [cost.residual for cost in costs]
     penalties = [limit.penalty for limit in limits]
-    whole = None if any(r is None for r in squares) else _stack([*squares, *aims, *penalties])
+    whole = None if any(r is None for r in squares) else _stack([*squares, *residuals, *penalties])
     return Terms(
         costs=_stack([cost.value for cost in costs]),
         objective=objective,

@@ -22,18 +22,18 @@ Expr = Any
 """casadi MX"""
 
 
-class Samples:
+class ProgramSamples:
     """A rollout's values where a problem asks for them, as symbols (MX), and the calls that compute them.
 
     Stands in for ``Rollout`` where costs, targets and constraints are put together; see its methods.
     """
 
     def __init__(self, rollout: Rollout) -> None:
-        """Places for z, knob, times, parameters, inputs and states."""
+        """Places for z, smoothing, times, parameters, inputs and states."""
         self.rollout, self.problem, self.steps, self.dt = rollout, rollout.problem, rollout.steps, rollout.dt
         self.layout = MemoryLayout()
         nx, nu, np_ = (int(part.shape[0]) for part in (rollout.x0, rollout.given, rollout.p))
-        self.z, self.knob = self.layout.take(int(rollout.z.shape[0])), self.layout.take(1)
+        self.z, self.smoothing = self.layout.take(int(rollout.z.shape[0])), self.layout.take(1)
         self.p, self.given = self.layout.take(np_), self.layout.series(nu, self.steps)
         self.u = self.given if rollout.feedback is None else self.layout.series(nu, self.steps)
         self.x = self.layout.series(nx, self.steps + 1)
@@ -85,7 +85,7 @@ def rollout_program(rollout: Rollout, exact: bool = False) -> Program:
 
     ``exact`` is for smoothing 0 only, whatever is given: it has less to compute.
     """
-    samples = Samples(rollout)
+    samples = ProgramSamples(rollout)
     asked = terms(samples)
     body = [*control_calls(rollout, samples), *step_calls(samples, exact)]
     epilogue, outputs = _epilogue(samples, asked)
@@ -96,7 +96,7 @@ def rollout_program(rollout: Rollout, exact: bool = False) -> Program:
     return Program(
         size=samples.layout.size,
         z=samples.z,
-        knob=samples.knob,
+        knob=samples.smoothing,
         steps=rollout.steps,
         outputs=outputs,
         prologue=(_prologue(samples),),
@@ -114,8 +114,8 @@ def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:
     recording = trace_step(
         rollout.world, rollout.problem.simulation.scheme(), rollout.inputs, rollout.parameters.symbols, exact
     )
-    arguments = {"u": samples.u, "p": samples.p, "smoothing": samples.knob}
-    after = samples.x.later() if rollout.freeze is None else samples.layout.take(rollout.memory.size - 1)
+    arguments = {"u": samples.u, "p": samples.p, "smoothing": samples.smoothing}
+    after = samples.x.later() if rollout.termination is None else samples.layout.take(rollout.memory.size - 1)
     places: dict[TracedVector, Place] = {slot: _part(after, part) for slot, part in recording.results.items()}
     calls = []
     for piece in recording.calls:
@@ -130,15 +130,15 @@ def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:
         calls.append(FunctionCall(piece.function, inputs, outputs))
     if after.size > columns.size:
         calls.append(_remember(samples, _part(after, slice(columns.size, None))))
-    if rollout.freeze is not None:
-        calls.append(FunctionCall(rollout.freeze, (samples.x, after, samples.p), (samples.x.later(),)))
+    if rollout.termination is not None:
+        calls.append(FunctionCall(rollout.termination, (samples.x, after, samples.p), (samples.x.later(),)))
     return calls
 
 
-def _alive(samples: Samples) -> Place | None:
+def _alive(samples: ProgramSamples) -> Place | None:
     """Whether a motion is not over at each step; None where it never is."""
     memory = samples.rollout.memory
-    return _part(samples.x, memory.columns[ALIVE]) if memory.falls else None
+    return _part(samples.x, memory.columns[ALIVE]) if memory.terminates else None
 
 
 def _remember(samples: Places, result: Place) -> FunctionCall:
@@ -155,7 +155,7 @@ def _part(place: Place, columns: slice) -> Place:
     return Place(place.offset + start, stop - start, place.stride)
 
 
-def _prologue(samples: Samples) -> FunctionCall:
+def _prologue(samples: ProgramSamples) -> FunctionCall:
     rollout = samples.rollout
     start = start_of(samples.problem, rollout.world, rollout.inputs, rollout.parameters, rollout.z)
     results = [ca.densify(ca.vec(part)) for part in (rollout.memory.start(start.x0), start.u, start.p)]
@@ -164,7 +164,7 @@ def _prologue(samples: Samples) -> FunctionCall:
     return FunctionCall(function, (samples.z,), (samples.x.still(), u, samples.p))
 
 
-def _epilogue(samples: Samples, asked: Terms) -> tuple[FunctionCall, dict[str, Place]]:
+def _epilogue(samples: ProgramSamples, asked: Terms) -> tuple[FunctionCall, dict[str, Place]]:
     parts = {
         "merit": asked.objective + asked.penalties,
         "objective": asked.objective,

@@ -16,7 +16,7 @@ from symphys.model.world import World
 from symphys.problem import Problem
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.feedback.controllers import Control
-from symphys.transcription.feedback.sensor_memory import Memory, memory_of
+from symphys.transcription.feedback.sensor_memory import SensorMemory, memory_of
 from symphys.transcription.formula_names import (
     Parameters,
     compile_formula,
@@ -24,7 +24,7 @@ from symphys.transcription.formula_names import (
     moving_names,
     varied_parameters,
 )
-from symphys.transcription.termination import freeze_function
+from symphys.transcription.termination import termination_function
 
 Expr = Any
 """casadi MX"""
@@ -51,7 +51,7 @@ class Rollout:
     world: World
     inputs: tuple[str, ...]
     parameters: Parameters
-    memory: Memory
+    memory: SensorMemory
     z: Expr
     smoothing: Expr
     x0: Expr
@@ -69,20 +69,20 @@ class Rollout:
         if self.memory.size == step.size1_in(0):
             return step
         x, u = ca.MX.sym("x", self.memory.size), ca.MX.sym("u", step.size1_in(1))
-        p, knob = ca.MX.sym("p", step.size1_in(2)), ca.MX.sym("smoothing")
-        after, *others = call(step, x[: step.size1_in(0)], u, p, knob)
+        p, smoothing = ca.MX.sym("p", step.size1_in(2)), ca.MX.sym("smoothing")
+        after, *others = call(step, x[: step.size1_in(0)], u, p, smoothing)
         whole: Expr = ca.vertcat(after, self.memory.after(x, u, self.inputs))
-        if self.freeze is not None:
-            whole = self.freeze(x, whole, p)
-        return ca.Function(step.name(), [x, u, p, knob], [whole, *others]).expand()
+        if self.termination is not None:
+            whole = self.termination(x, whole, p)
+        return ca.Function(step.name(), [x, u, p, smoothing], [whole, *others]).expand()
 
     @cached_property
-    def freeze(self) -> ca.Function | None:
+    def termination(self) -> ca.Function | None:
         """See ``freeze_function``; None where nothing falls."""
         problem = self.problem
-        if problem.fall is None:
+        if problem.termination is None:
             return None
-        return freeze_function(problem, problem.fall, self.world, self.inputs, self.parameters, self.memory)
+        return termination_function(problem, problem.termination, self.world, self.inputs, self.parameters, self.memory)
 
     @cached_property
     def control(self) -> Control:
@@ -107,10 +107,10 @@ class Rollout:
         if self.feedback is None:
             return step
         x, given = ca.MX.sym("x", self.memory.size), ca.MX.sym("given", step.size1_in(1) + 1)
-        p, knob = ca.MX.sym("p", step.size1_in(2)), ca.MX.sym("smoothing")
+        p, smoothing = ca.MX.sym("p", step.size1_in(2)), ca.MX.sym("smoothing")
         u = self.feedback(x, given[:-1], p, given[-1])
-        results = call(step, x, u, p, knob)
-        return ca.Function(f"closed_{step.name()}", [x, given, p, knob], [*results, u])
+        results = call(step, x, u, p, smoothing)
+        return ca.Function(f"closed_{step.name()}", [x, given, p, smoothing], [*results, u])
 
     def rolled(self, step: ca.Function) -> tuple[Expr, Expr, list[Expr]]:
         """States (nx, N + 1), inputs (nu, N) and what else a step gives, N columns each; ``step`` is not closed."""

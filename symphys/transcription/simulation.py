@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from symphys.dynamics import reading_function, report_function
 from symphys.model.state_layout import GIVEN, Layout, input_columns
 from symphys.trajectory import NotFinite, Trajectory
-from symphys.transcription.nan_tracing.steps import Course, first_fault
+from symphys.transcription.nan_tracing.steps import RolloutArrays, first_non_finite
 from symphys.transcription.rollout import Rollout
 
 Array = NDArray[np.float64]
@@ -24,7 +24,7 @@ class Record:
     """A rollout of ``z`` (n,): all of its states and arguments, and the motion in them."""
 
     z: Array
-    course: Course
+    arrays: RolloutArrays
     motion: Trajectory
 
 
@@ -40,12 +40,12 @@ def simulate(rollout: Rollout, record: Callable[..., Any], z: Array, smoothing: 
     """The rollout of z; NotFinite, which says where and why, if it has none."""
     x, u, given, p, *happened = (np.array(part).T for part in record(z, smoothing))
     z = np.asarray(z, float)
-    course = Course(z, smoothing, x, u, given, p.ravel())
+    arrays = RolloutArrays(z, smoothing, x, u, given, p.ravel())
     motion = _trajectory(rollout, x, u, p.ravel(), *happened)
     try:
-        return Record(z, course, motion.require_finite())
+        return Record(z, arrays, motion.require_finite())
     except NotFinite as error:
-        raise NotFinite(f"{error}; {first_fault(rollout, course)}") from None
+        raise NotFinite(f"{error}; {first_non_finite(rollout, arrays)}") from None
 
 
 def _trajectory(
@@ -105,13 +105,13 @@ def _joints(rollout: Rollout, x: Array, u: Array, p: Array) -> dict[str, Any]:
 
 
 def _commands(rollout: Rollout, u: Array, counts: list[int]) -> Array:
-    """(N, coordinates of all joints): what their motors were told."""
+    """(N, coordinates of all joints): the commands of their motors."""
     columns = input_columns(rollout.world, rollout.inputs)
-    told = [
+    commands = [
         u[:, columns[name]] if (name := f"{joint.name}.command") in columns else np.zeros((rollout.steps, count))
         for joint, count in zip(rollout.world.joints, counts, strict=True)
     ]
-    return np.concatenate([np.zeros((rollout.steps, 0)), *told], axis=1)
+    return np.concatenate([np.zeros((rollout.steps, 0)), *commands], axis=1)
 
 
 def _split(columns: Array, counts: list[int]) -> Array:

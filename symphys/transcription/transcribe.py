@@ -13,7 +13,7 @@ from symphys.transcription.functions import ExpressionFunctions
 from symphys.transcription.network_rollout import has_large_nets, require_small_nets, transcribe_large
 from symphys.transcription.objective import limits, terms
 from symphys.transcription.program import rollout_program
-from symphys.transcription.randomization import with_situations
+from symphys.transcription.randomization import with_scenarios
 from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.transcription import Transcription
 
@@ -23,14 +23,14 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
 
     Args:
         problem: what to solve.
-        exact: whether smoothing 0 is all that will be asked for; kernels then leave the knob out.
+        exact: whether smoothing 0 is all that will be asked for; kernels then leave the smoothing out.
         backend: what evaluates it, a name of ``symphys.codegen.backends.NAMES``.
         threads: that share a batch; None: one for each processor.
     """
     if problem.scenarios is not None:
         require_small_nets(problem, "a problem with scenarios")
         plain = transcribe(replace(problem, scenarios=None), exact, "casadi", threads)
-        return with_situations(plain, problem, exact, backend, threads)
+        return with_scenarios(plain, problem, exact, backend, threads)
     if has_large_nets(problem):
         return transcribe_large(problem, exact, backend, threads)
     began = perf_counter()

@@ -17,13 +17,13 @@ from symphys.shooting import ShootingProblem
 from symphys.trajectory import Trajectory
 from symphys.transcription.functions import ExpressionFunctions, function_of
 from symphys.transcription.gradient_probe import ExpressionProbe, Probe
-from symphys.transcription.judge import Verdict, verdict
+from symphys.transcription.judge import Assessment, assessment
 from symphys.transcription.objective import Terms
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.simulation import Record, recorder, simulate
 
 Array = NDArray[np.float64]
-Judge = Callable[..., Verdict]
+Judge = Callable[..., Assessment]
 """(z, smoothing = 0) -> verdict."""
 PRICING_CALLS = 5
 """How often a function is timed; the fastest call counts."""
@@ -46,7 +46,7 @@ class Transcription:
     backend: Description
     build_seconds: float
 
-    def judge(self, z: Array, smoothing: float = 0.0) -> Verdict:
+    def judge(self, z: Array, smoothing: float = 0.0) -> Assessment:
         """How ``z`` does in the exact rollout, or in a smoothed one."""
         return self._judge(z, smoothing)
 
@@ -81,12 +81,12 @@ class Transcription:
 
     def back(self, record: Record, ends: Array) -> Iterator[Array]:
         """Derivatives of ends . x_N, with ``ends`` (nx, m), with respect to x_N-1, x_N-2 ... x_0: (nx, m) each."""
-        course, step = record.course, self.rollout.closed
+        arrays, step = record.arrays, self.rollout.closed
         backward, adjoint = self._backward(ends.shape[1]), ends
         results = [np.zeros(step.numel_out(i)) for i in range(step.n_out())]
         inert = [np.zeros((len(result), ends.shape[1])) for result in results[1:]]
         for k in reversed(range(self.rollout.steps)):
-            adjoint = np.array(backward(*course.closed_arguments(k, self.rollout), *results, adjoint, *inert)[0])
+            adjoint = np.array(backward(*arrays.closed_arguments(k, self.rollout), *results, adjoint, *inert)[0])
             yield adjoint
 
     def pull(self, record: Record, states: Mapping[int, Array], parameters: Array) -> Array | None:
@@ -100,16 +100,16 @@ class Transcription:
         Returns:
             None for problems with large nets, of which that is not known.
         """
-        course, step, count = record.course, self.rollout.closed, parameters.shape[1]
+        arrays, step, count = record.arrays, self.rollout.closed, parameters.shape[1]
         backward, adjoint = self._backward(count), np.zeros((step.size1_in(0), count))
         results = [np.zeros(step.numel_out(i)) for i in range(step.n_out())]
         inert = [np.zeros((len(result), count)) for result in results[1:]]
-        inputs = np.zeros((*course.given.shape, count))
+        inputs = np.zeros((*arrays.given.shape, count))
         for k in reversed(range(max(states) + 1)):
             adjoint = adjoint + states.get(k, 0)
             if k == 0:
                 break
-            arguments = course.closed_arguments(k - 1, self.rollout)
+            arguments = arrays.closed_arguments(k - 1, self.rollout)
             adjoint, given, p = (np.array(part) for part in backward(*arguments, *results, adjoint, *inert)[:3])
             inputs[k - 1] = given[: inputs.shape[1]]
             parameters = parameters + p
@@ -151,9 +151,9 @@ def judge_of(rollout: Rollout, asked: Terms) -> Judge:
     """A judge of candidates by the exact rollout, without the functions that solvers need."""
     numbers = function_of(rollout, "judge", [asked.objective, asked.costs, asked.errors, asked.outputs])
 
-    def judge(z: Array, smoothing: float = 0.0) -> Verdict:
+    def judge(z: Array, smoothing: float = 0.0) -> Assessment:
         objective, *parts = (np.array(part).ravel() for part in numbers(z, smoothing))
-        return verdict(rollout.problem, float(objective[0]), *parts)
+        return assessment(rollout.problem, float(objective[0]), *parts)
 
     return judge
 

@@ -30,7 +30,7 @@ def bodies(rollout: Rollout, record: Record) -> Bodies:
     mass = ca.vertcat(*(ca.SX(body.mass) for body in world.bodies))
     inertia = ca.vertcat(*(ca.trace(inertia_matrix(body.inertia)) / 3 for body in world.bodies))
     results = [mass, ca.sqrt(inertia / mass), ca.vertcat(*(ca.SX(g) for g in world.gravity))]
-    numbers = ca.Function("bodies", [parameters(rollout)], results)(record.course.p)
+    numbers = ca.Function("bodies", [parameters(rollout)], results)(record.arrays.p)
     return Bodies(*(np.array(part).ravel() for part in numbers))
 
 

@@ -85,8 +85,8 @@ def slip_speeds(rollout: Rollout, record: Record) -> Array:
     """(N, C) [m/s]: how fast the surfaces of a contact move across its normal at the start of each step."""
     scheme = rollout.problem.simulation.scheme()
     slip = slip_function(rollout.world, scheme, rollout.inputs, rollout.parameters.symbols).map(rollout.steps)
-    course = record.course
-    return np.array(slip(plain(rollout, course.x)[:-1].T, course.u.T, np.tile(course.p[:, None], rollout.steps))).T
+    arrays = record.arrays
+    return np.array(slip(plain(rollout, arrays.x)[:-1].T, arrays.u.T, np.tile(arrays.p[:, None], rollout.steps))).T
 
 
 def _deepest(rollout: Rollout, motion: Trajectory) -> dict[str, Any]:

@@ -8,18 +8,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.transcription import Record, Transcription, first_derivative_fault, first_fault
+from symphys.transcription import Record, Transcription, first_non_finite, first_non_finite_derivative
 from symphys.verification import gradient, refinement, smoothing
-from symphys.verification import sensitivity_growth as growth
-from symphys.verification.contacts import slides
-from symphys.verification.near_misses import misses
-from symphys.verification.survey import survey
+from symphys.verification.balance import balance
+from symphys.verification.contacts import contacts, slides
+from symphys.verification.near_misses import near_misses
+from symphys.verification.sensitivity_growth import sensitivity_growth
+from symphys.verification.tunnelling import tunnelling
 
 Array = NDArray[np.float64]
 Tell = Callable[[str], None]
 
 
-@np.errstate(invalid="ignore", over="ignore")  # numbers that are not finite are told as such
+@np.errstate(invalid="ignore", over="ignore")  # numbers that are not finite are reported as such
 def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: None) -> dict[str, Any]:
     """The "trust" object of a result, for the exact rollout of ``z`` (n,).
 
@@ -36,9 +37,9 @@ def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: No
     tell("refining the time step and the sweeps")
     finer = refinement.refine(transcription, z)
     tell("sweeping the sensitivity back through time")
-    grown = growth.growth(transcription, record)
+    grown = sensitivity_growth(transcription, record)
     tell("looking for near misses")
-    near = misses(transcription, record)
+    near = near_misses(transcription, record)
     tell("smoothing, and adding up energy and momentum")
     motion = survey(transcription, record)
     return {
@@ -56,9 +57,19 @@ def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: No
 
 def _fault(transcription: Transcription, record: Record, compared: list[dict[str, Any]]) -> str:
     verdict = transcription.judge(record.z)
-    told = [verdict.objective, *verdict.costs.values(), *(check.error for check in verdict.checks)]
-    if not np.isfinite([*told, *record.course.x.ravel()]).all():
-        return first_fault(transcription.rollout, record.course)
+    numbers = [verdict.objective, *verdict.costs.values(), *(check.error for check in verdict.checks)]
+    if not np.isfinite([*numbers, *record.arrays.x.ravel()]).all():
+        return first_non_finite(transcription.rollout, record.arrays)
     if not np.isfinite([row["scale"] for row in compared]).all():
-        return first_derivative_fault(transcription.rollout, record.course)
+        return first_non_finite_derivative(transcription.rollout, record.arrays)
     return ""
+
+
+@np.errstate(invalid="ignore", over="ignore", divide="ignore")  # numbers that are not finite are reported as such
+def survey(transcription: Transcription, record: Record) -> dict[str, Any]:
+    """Energy and momentum, contacts, and tunnelling; it takes little beside a solve.
+
+    Each module says what its numbers are.
+    """
+    rollout = transcription.rollout
+    return {**balance(rollout, record), **contacts(rollout, record), **tunnelling(rollout, record)}

@@ -19,7 +19,7 @@ DIFFERENCE_STEPS = (1e-4, 1e-5, 1e-6)
 EVERY_COMPONENT = 12
 """Variables up to this size are differenced component by component, larger ones along as many random directions."""
 NOTICED = 1e-4
-"""Relative error of central differences from which each side is looked at by itself."""
+"""Relative error of central differences from which each side is examined by itself."""
 
 
 def compare_gradient(transcription: Transcription, z: Array) -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""What joints do in the budgets of energy and momentum."""
+"""What joints add to the balance of energy and momentum."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ def joint_work(rollout: Rollout, record: Record) -> tuple[Array, Array]:
     only the last force is known: torque motors act with it all along, others are taken to get there in even steps. Of
     a servo that goes from one bound to the other within a step that is wrong by up to twice its work.
     """
-    layout, x = Layout(rollout.world), record.course.x
+    layout, x = Layout(rollout.world), record.arrays.x
     total, gross, lag = np.zeros(rollout.steps), np.zeros(rollout.steps), x[:, layout["lag"]]
     for joint, _, rate in coordinates(rollout, record):
         for part in (part for part in WORKING if part in joint.acting):
             force = x[:, layout[f"{joint.name}.{part}"]]
-            told = part == "motor" and isinstance(joint.motor, TorqueMotor)
-            ahead = lag[:-1] + (rollout.dt if told else rollout.dt / 2 + lag[1:])
+            is_torque = part == "motor" and isinstance(joint.motor, TorqueMotor)
+            ahead = lag[:-1] + (rollout.dt if is_torque else rollout.dt / 2 + lag[1:])
             impulse = rollout.dt * force[:-1] + ahead * (force[1:] - force[:-1])
             work = impulse * (rate[:-1] + rate[1:]) / 2
             total += work.sum(axis=1)
-            gross += 0 if told else np.abs(work).sum(axis=1)
+            gross += 0 if is_torque else np.abs(work).sum(axis=1)
     return total, gross
 
 
@@ -58,7 +58,7 @@ def uncounted(rollout: Rollout, record: Record) -> Mask:
 
 
 def floating(rollout: Rollout) -> list[list[int]]:
-    """The bodies that hang together by joints, where none of them is held by the world."""
+    """Groups of bodies that joints connect, where none of them is held by the world."""
     world = rollout.world
     held = {joint.first for joint in world.joints if joint.second is None}
     return [sorted(group) for group in components(world) if not group & held]
@@ -75,4 +75,4 @@ def coordinates(rollout: Rollout, record: Record) -> Iterator[tuple[Joint, Array
 
 def number(rollout: Rollout, record: Record, value: Any) -> float:
     """A number of the world, which a parameter may be."""
-    return float(ca.Function("number", [parameters(rollout)], [ca.SX(value)])(record.course.p))
+    return float(ca.Function("number", [parameters(rollout)], [ca.SX(value)])(record.arrays.p))

@@ -1,7 +1,7 @@
 """Near misses and glancing touches: places where a small change of z makes a touch, or loses one.
 
 There the motion jumps, while gradient and differences at z agree with each other. Two surfaces that never touch are
-looked at where they come closest. Of two that touch, the bodies are followed from the step of the first touch on as if
+examined where they come closest. Of two that touch, the bodies are followed from the step of the first touch on as if
 they flew on through each other; how deep they would get is by how much they touch. The derivative by z of that distance
 says what change of the variables would close it.
 """
@@ -21,16 +21,16 @@ from symphys.model.state_layout import GIVEN, Layout
 from symphys.shooting import VariableBlock
 from symphys.transcription import Record, Rollout, Transcription
 from symphys.verification.sensitivity_growth import DIRECTIONS
-from symphys.verification.signed_gaps import Meeting, meetings
+from symphys.verification.signed_gaps import SurfacePair, surface_pairs
 
 Array = NDArray[np.float64]
 Expr = Any
 """casadi SX"""
 
 MOST = 4
-"""Pairs of surfaces that are looked at: those that come closest, and those that touch first."""
+"""Pairs of surfaces that are examined: those that come closest, and those that touch first."""
 AROUND = 16
-"""Instants that are looked at in each step around the closest."""
+"""Instants that are computed in each step around the closest."""
 LONGEST = 100
 """Steps that a flight through each other is followed for."""
 FINENESS = 16
@@ -38,16 +38,16 @@ FINENESS = 16
 
 
 @dataclass(frozen=True)
-class Approach:
+class ClosestApproach:
     """How near two surfaces come: ``gap`` (negative: how deep) at ``after`` [s] behind the state of step ``k``."""
 
-    meeting: Meeting
+    pair: SurfacePair
     k: int
     after: float
     gap: float
 
 
-def misses(transcription: Transcription, record: Record) -> list[dict[str, Any]]:
+def near_misses(transcription: Transcription, record: Record) -> list[dict[str, Any]]:
     """The closest misses and the shallowest touches.
 
     Returns:
@@ -70,24 +70,24 @@ def misses(transcription: Transcription, record: Record) -> list[dict[str, Any]]
     return rows
 
 
-def _pulled(transcription: Transcription, record: Record, some: Sequence[Approach]) -> Array | None:
-    """(n, DIRECTIONS): derivatives of these gaps by z; as many at once as ``growth`` sweeps, whose adjoint serves."""
+def _pulled(transcription: Transcription, record: Record, some: Sequence[ClosestApproach]) -> Array | None:
+    """(n, DIRECTIONS): derivatives of these gaps by z; as many at once as ``sensitivity_growth`` sweeps."""
     states: dict[int, Array] = {}
-    by_p = np.zeros((record.course.p.size, DIRECTIONS))
+    by_p = np.zeros((record.arrays.p.size, DIRECTIONS))
     for column, approach in enumerate(some):
         by_x, by_p[:, column] = _slopes(approach, record)
-        states.setdefault(approach.k, np.zeros((record.course.x.shape[1], DIRECTIONS)))[:, column] = by_x
+        states.setdefault(approach.k, np.zeros((record.arrays.x.shape[1], DIRECTIONS)))[:, column] = by_x
     return transcription.pull(record, states, by_p)
 
 
-def _row(approach: Approach, blocks: Sequence[VariableBlock], slope: Array, dt: float) -> dict[str, Any]:
+def _row(approach: ClosestApproach, blocks: Sequence[VariableBlock], slope: Array, dt: float) -> dict[str, Any]:
     """``slope`` (n,): of the gap."""
     parts = [slope[block.start : block.stop] for block in blocks]
     effects = [float(np.linalg.norm(part * block.scale)) for part, block in zip(parts, blocks, strict=True)]
     spreads = float(np.linalg.norm(np.concatenate([p * b.spread for p, b in zip(parts, blocks, strict=True)])))
     most, gap = int(np.argmax(effects)), abs(approach.gap)
     return {
-        "contact": approach.meeting.name,
+        "contact": approach.pair.name,
         "touches": approach.gap < 0,
         "time": approach.k * dt + approach.after,
         "gap": gap,
@@ -102,42 +102,44 @@ def _ratio(gap: float, effect: float) -> float:
     return gap / effect if effect > 0 else np.inf
 
 
-def _closest(rollout: Rollout, record: Record) -> list[Approach]:
+def _closest(rollout: Rollout, record: Record) -> list[ClosestApproach]:
     """Where surfaces that never touch come closest, the nearest first."""
     gaps, acting = record.motion.contact_gap[:-1], _acting(record)
-    near = [each for each in meetings(rollout) if not acting[:, list(each.columns)].any()]
+    near = [each for each in surface_pairs(rollout) if not acting[:, list(each.columns)].any()]
     least = [gaps[:, list(each.columns)].min(axis=1) for each in near]
     order = np.argsort([float(np.min(each)) for each in least], kind="stable")[:MOST]
     found = (_around(near[i], record, int(least[i].argmin())) for i in order)
     return [approach for approach in found if approach.gap > 0]
 
 
-def _around(meeting: Meeting, record: Record, k: int) -> Approach:
+def _around(pair: SurfacePair, record: Record, k: int) -> ClosestApproach:
     """The closest in the steps before and after an instant."""
-    dt, choices = meeting.rollout.dt, []
-    for step in range(max(k - 1, 0), min(k + 1, meeting.rollout.steps)):
+    dt, choices = pair.rollout.dt, []
+    for step in range(max(k - 1, 0), min(k + 1, pair.rollout.steps)):
         after = np.linspace(0, 1, AROUND + 1) * dt
-        gaps = meeting.least(_flown(meeting, record, step, after), record.course.p)
-        choices.append(Approach(meeting, step, float(after[gaps.argmin()]), float(gaps.min())))
+        gaps = pair.least(_flown(pair, record, step, after), record.arrays.p)
+        choices.append(ClosestApproach(pair, step, float(after[gaps.argmin()]), float(gaps.min())))
     return min(choices, key=lambda approach: approach.gap)
 
 
-def _touches(rollout: Rollout, record: Record) -> list[Approach]:
+def _touches(rollout: Rollout, record: Record) -> list[ClosestApproach]:
     """How deep surfaces would get that fly into each other and out again, for bodies without joints."""
     acting, held = _acting(record), {body for joint in rollout.world.joints for body in (joint.first, joint.second)}
-    touching = [each for each in meetings(rollout) if acting[:, list(each.columns)].any() and not held & {*each.bodies}]
+    touching = [
+        each for each in surface_pairs(rollout) if acting[:, list(each.columns)].any() and not held & {*each.bodies}
+    ]
     starts = [int(acting[:, list(each.columns)].any(axis=1).argmax()) for each in touching]
     first = sorted(range(len(starts)), key=lambda i: starts[i])[:MOST]
     found = (_through(touching[i], record, starts[i]) for i in first if starts[i] > 0)
     return [approach for approach in found if approach is not None]
 
 
-def _through(meeting: Meeting, record: Record, k: int) -> Approach | None:
+def _through(pair: SurfacePair, record: Record, k: int) -> ClosestApproach | None:
     """The deepest on the way through; None where the way does not come out again."""
-    rollout = meeting.rollout
+    rollout = pair.rollout
     steps = min(LONGEST, rollout.steps - k)
     after = np.arange(steps * FINENESS + 1) * rollout.dt / FINENESS
-    gaps = meeting.least(_flown(meeting, record, k, after), record.course.p)
+    gaps = pair.least(_flown(pair, record, k, after), record.arrays.p)
     inside = gaps < 0
     if not inside.any():
         return None
@@ -146,7 +148,7 @@ def _through(meeting: Meeting, record: Record, k: int) -> Approach | None:
     if not leaves.size:
         return None
     deepest = enters + int(gaps[enters : enters + leaves[0]].argmin())
-    return Approach(meeting, k, float(after[deepest]), float(gaps[deepest]))
+    return ClosestApproach(pair, k, float(after[deepest]), float(gaps[deepest]))
 
 
 def _acting(record: Record) -> NDArray[np.bool_]:
@@ -154,15 +156,15 @@ def _acting(record: Record) -> NDArray[np.bool_]:
     return np.asarray(np.abs(record.motion.contact_force).sum(axis=2) > 0)
 
 
-def _flown(meeting: Meeting, record: Record, k: int, after: Array) -> Array:
+def _flown(pair: SurfacePair, record: Record, k: int, after: Array) -> Array:
     """(m, 2, 7): poses of both bodies ``after`` (m,) [s], as they fly on from state k."""
     fly, motion = _flight(), record.motion
     poses = np.zeros((len(after), 2, 7))
     poses[:, :, 3] = 1
-    for side, body in enumerate(meeting.bodies):
+    for side, body in enumerate(pair.bodies):
         state = np.concatenate([getattr(motion, field)[k, body] for field in GIVEN])
         many = np.tile(state[:, None], len(after))
-        bend = np.tile(_acceleration(record, meeting.rollout.dt, k, body)[:, None], len(after))
+        bend = np.tile(_acceleration(record, pair.rollout.dt, k, body)[:, None], len(after))
         poses[:, side] = np.array(fly.map(len(after))(many, bend, after[None])).T
     return poses
 
@@ -180,23 +182,23 @@ def _flight() -> ca.Function:
     return ca.Function("flight", [state, bend, time], [ca.vertcat(place, rotation.turn(state[3:7], time * state[10:]))])
 
 
-def _slopes(approach: Approach, record: Record) -> tuple[Array, Array]:
+def _slopes(approach: ClosestApproach, record: Record) -> tuple[Array, Array]:
     """Derivatives of the gap by state k (nx,) and by p (np,)."""
-    meeting, rollout = approach.meeting, approach.meeting.rollout
+    pair, rollout = approach.pair, approach.pair.rollout
     layout, fly = Layout(rollout.world), _flight()
-    p, states = ca.SX.sym("p", record.course.p.size), [ca.SX.sym("state", 13) for _ in meeting.bodies]
+    p, states = ca.SX.sym("p", record.arrays.p.size), [ca.SX.sym("state", 13) for _ in pair.bodies]
     poses = [
         fly(state, ca.DM(_acceleration(record, rollout.dt, approach.k, body)), approach.after)
-        for state, body in zip(states, meeting.bodies, strict=True)
+        for state, body in zip(states, pair.bodies, strict=True)
     ]
-    gaps = meeting.gaps(poses[0], poses[1] if len(poses) == 2 else ca.DM([0, 0, 0, 1, 0, 0, 0]), p)
-    given = [np.concatenate([getattr(record.motion, f)[approach.k, body] for f in GIVEN]) for body in meeting.bodies]
-    values = ca.Function("values", [*states, p], [gaps])(*given, record.course.p)
+    gaps = pair.gaps(poses[0], poses[1] if len(poses) == 2 else ca.DM([0, 0, 0, 1, 0, 0, 0]), p)
+    given = [np.concatenate([getattr(record.motion, f)[approach.k, body] for f in GIVEN]) for body in pair.bodies]
+    values = ca.Function("values", [*states, p], [gaps])(*given, record.arrays.p)
     least = gaps[int(np.argmin(np.array(values)))]
-    slope = ca.Function("slope", [*states, p], [ca.gradient(least, ca.vertcat(*states, p))])(*given, record.course.p)
-    found, by_x = np.array(slope).ravel(), np.zeros(record.course.x.shape[1])
-    for side, body in enumerate(meeting.bodies):
+    slope = ca.Function("slope", [*states, p], [ca.gradient(least, ca.vertcat(*states, p))])(*given, record.arrays.p)
+    found, by_x = np.array(slope).ravel(), np.zeros(record.arrays.x.shape[1])
+    for side, body in enumerate(pair.bodies):
         name = rollout.world.bodies[body].name
         for field, part in zip(GIVEN, ((0, 3), (3, 7), (7, 10), (10, 13)), strict=True):
             by_x[layout[f"{name}.{field}"]] = found[13 * side + part[0] : 13 * side + part[1]]
-    return by_x, found[13 * len(meeting.bodies) :]
+    return by_x, found[13 * len(pair.bodies) :]

@@ -22,7 +22,7 @@ DIRECTIONS = 4
 MOST_SAMPLES = 200
 
 
-def growth(transcription: Transcription, record: Record) -> dict[str, list[float]]:
+def sensitivity_growth(transcription: Transcription, record: Record) -> dict[str, list[float]]:
     """The sensitivity of the end along the horizon.
 
     Returns:
@@ -53,12 +53,12 @@ def backwards(transcription: Transcription, record: Record, ends: Array) -> Iter
     Args:
         transcription: of the problem.
         record: an exact rollout.
-        ends: (n, m) directions of the final state, ordered like ``state_columns``, in the units of ``growth``.
+        ends: (n, m) directions of the final state, ordered like ``state_columns``, in its units.
 
     Yields:
         Derivatives in the same order and units; of an orientation only its rotation is changed, not its length.
     """
-    rollout, x = transcription.rollout, record.course.x
+    rollout, x = transcription.rollout, record.arrays.x
     columns, units = state_columns(rollout), state_units(rollout, record)
     whole = np.zeros((x.shape[1], ends.shape[1]))
     whole[columns] = ends * units[:, None]

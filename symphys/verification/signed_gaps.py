@@ -24,7 +24,7 @@ Expr = Any
 
 
 @dataclass(frozen=True, eq=False)
-class Meeting:
+class SurfacePair:
     """Two surfaces that may touch.
 
     Attributes:
@@ -72,13 +72,13 @@ class Meeting:
         return least
 
 
-def meetings(rollout: Rollout) -> list[Meeting]:
+def surface_pairs(rollout: Rollout) -> list[SurfacePair]:
     """All of them, in the order of the world's pairs."""
     found = []
     numbered = enumerate(rollout.world.pairs)
     for _, group in groupby(numbered, key=lambda entry: (entry[1].first, entry[1].second)):
         columns, pairs = zip(*group, strict=True)
-        found.append(Meeting(rollout, pairs[0].name.partition(":")[0], tuple(columns), pairs[0]))
+        found.append(SurfacePair(rollout, pairs[0].name.partition(":")[0], tuple(columns), pairs[0]))
     return found
 
 

@@ -21,9 +21,9 @@ Load = Callable[..., Problem]
 
 def test_included_tables_come_first(load_both: Load) -> None:
     problem = load_both()
-    assert [body.name for body in problem.plan.bodies] == ["torso", "shin", "ball"]
-    assert [joint.name for joint in problem.plan.joints] == ["knee", "rail"]
-    assert problem.plan.contact.friction == 0.3
+    assert [body.name for body in problem.parametric.bodies] == ["torso", "shin", "ball"]
+    assert [joint.name for joint in problem.parametric.joints] == ["knee", "rail"]
+    assert problem.parametric.contact.friction == 0.3
     assert (problem.title, problem.variables[0].name, problem.costs[0].name) == ("main", "bend", "effort")
 
 
@@ -42,7 +42,7 @@ def test_it_is_as_if_all_were_in_one_file(load_both: Load, tmp_path: Path) -> No
 def test_settings_reach_included_tables(load_both: Load) -> None:
     settings = {"body.torso.mass": 7, "contact.friction": 0.9, "include.0.position": [0, 0, 2]}
     problem = load_both(settings=settings)
-    assert (problem.parameters["torso.mass"].tolist(), problem.plan.contact.friction) == ([7], 0.9)
+    assert (problem.parameters["torso.mass"].tolist(), problem.parametric.contact.friction) == ([7], 0.9)
     assert problem.initial["torso.position"].tolist() == [0, 0, 3]
 
 
@@ -88,19 +88,19 @@ def test_a_robot_stands_twice_with_prefixes(load_both: Load) -> None:
     )
     text = MAIN.replace('robot.toml"', twice, 1).replace("knee.angle - 0.5", "left_knee.angle + right_bend[1] - 0.5")
     problem = load_both(problem=(MAIN, text))
-    assert [body.name for body in problem.plan.bodies] == [
+    assert [body.name for body in problem.parametric.bodies] == [
         "left_torso",
         "left_shin",
         "right_torso",
         "right_shin",
         "ball",
     ]
-    assert [(joint.second, joint.first) for joint in problem.plan.joints[:2]] == [
+    assert [(joint.second, joint.first) for joint in problem.parametric.joints[:2]] == [
         ("left_torso", "left_shin"),
         (None, "left_torso"),
     ]
-    assert problem.plan.bodies[1].mates == {"left_floor"}
-    assert problem.plan.bodies[2].group == "right_robot"
+    assert problem.parametric.bodies[1].collides_with == {"left_floor"}
+    assert problem.parametric.bodies[2].group == "right_robot"
     assert [variable.slots[0].name for variable in problem.variables] == ["left_knee.command", "right_knee.command"]
     assert [(cost.name, cost.formula.text) for cost in problem.costs] == [
         ("left_effort", "left_knee.command"),
@@ -111,7 +111,7 @@ def test_a_robot_stands_twice_with_prefixes(load_both: Load) -> None:
 def test_shipped_robots_are_found_from_anywhere(load_both: Load) -> None:
     text = MAIN.replace("parts/robot.toml", "robots/arm.toml").replace("knee.angle", "elbow.angle")
     problem = load_both(problem=(MAIN, text))
-    assert "forearm" in [body.name for body in problem.plan.bodies]
+    assert "forearm" in [body.name for body in problem.parametric.bodies]
 
 
 def test_an_absolute_path_and_a_file_beside_go_before_shipped_ones(load_both: Load, tmp_path: Path) -> None:
@@ -119,12 +119,12 @@ def test_an_absolute_path_and_a_file_beside_go_before_shipped_ones(load_both: Lo
     other = tmp_path / "robots" / "arm.toml"
     other.write_text(ROBOT, encoding="utf-8")
     for file in ("robots/arm.toml", str(other)):
-        assert load_both(problem=("parts/robot.toml", file)).plan.bodies[0].name == "torso"
+        assert load_both(problem=("parts/robot.toml", file)).parametric.bodies[0].name == "torso"
 
 
 def test_terrain_stays_where_it_is(load_both: Load) -> None:
     problem = load_both(robot=("[[plane]]", '[[terrain]]\nname = "hills"\nheight = "0.1 * x"\n[[plane]]'))
-    assert [part.name for part in problem.plan.statics] == ["floor", "post", "hills"]
+    assert [part.name for part in problem.parametric.statics] == ["floor", "post", "hills"]
 
 
 def test_prefixes_reach_tables_of_any_kind() -> None:

@@ -35,7 +35,7 @@ def test_what_is_kept_goes_before_what_is_there(load_both: Load, tmp_path: Path)
     copy = tmp_path / "problem.toml"
     copy.write_text(load_both().text, encoding="utf-8")
     (tmp_path / "parts" / "robot.toml").write_text("changed since", encoding="utf-8")
-    assert load_problem(copy).plan.bodies[0].name == "torso"
+    assert load_problem(copy).parametric.bodies[0].name == "torso"
 
 
 def test_faults_of_what_is_kept(load_both: Load, tmp_path: Path) -> None:

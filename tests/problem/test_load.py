@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from symphys.model.world import Scheme
-from symphys.problem import Problem, Slot
+from symphys.problem import Problem, VariableSlot
 
 Load = Callable[..., Problem]
 
@@ -77,7 +77,7 @@ def test_variables(load: Load) -> None:
     throw, push = load().variables
     assert (throw.kind, throw.slots, throw.components, throw.knots) == (
         "initial",
-        (Slot("ball.velocity", (0, 1, 2)),),
+        (VariableSlot("ball.velocity", (0, 1, 2)),),
         3,
         1,
     )
@@ -87,7 +87,7 @@ def test_variables(load: Load) -> None:
     np.testing.assert_array_equal(throw.spread, [0.1, 0.1, 0.1])
     assert (push.kind, push.slots, push.knots, push.interpolation) == (
         "control",
-        (Slot("marble.force", (0, 1)),),
+        (VariableSlot("marble.force", (0, 1)),),
         4,
         "constant",
     )
@@ -108,7 +108,7 @@ def test_guess_is_spread_over_knots(load: Load, keys: str, expected: list[float]
 
 def test_one_component_takes_one_number_per_knot(load: Load) -> None:
     problem = load(("marble.force[0:2]", "marble.force[-1]"), ("knots = 4", "knots = 4\nguess = [1, 2, 3, 4]"))
-    assert problem.variables[1].slots == (Slot("marble.force", (2,)),)
+    assert problem.variables[1].slots == (VariableSlot("marble.force", (2,)),)
     np.testing.assert_array_equal(problem.variables[1].guess, [1, 2, 3, 4])
 
 

@@ -9,7 +9,7 @@ from typing import Literal
 import pytest
 
 from symphys.errors import ProblemError
-from symphys.problem import require_solvers, validate_options
+from symphys.problem import json_schema, require_solvers, validate_options
 
 
 class Method(Enum):
@@ -103,3 +103,28 @@ def test_names_of_solvers() -> None:
         require_solvers(["cma", "gradeint"], [], ["cma", "gradient"], "file.toml")
     with pytest.raises(ProblemError, match=r'solvers\[1\]: there is no solver "cmaes"; did you mean "cma"'):
         require_solvers([], ["gradient", "cmaes"], ["cma", "gradient"], "file.toml")
+
+
+@dataclass(frozen=True)
+class Renamed:
+    adjoint_discount: float = field(default=2.0, metadata={"was": "forget"})
+
+
+def renamed(table: dict[str, object]) -> Renamed:
+    return validate_options(Renamed, table, "file.toml", "solver.gradient")
+
+
+def test_old_names_go_on_working() -> None:
+    assert renamed({"forget": 5}) == renamed({"adjoint_discount": 5}) == Renamed(5.0)
+    with pytest.raises(
+        ProblemError, match=r"solver.gradient.forget: is the old name of adjoint_discount, which is given"
+    ):
+        renamed({"forget": 5, "adjoint_discount": 5})
+
+
+def test_the_schema_marks_old_names_as_deprecated() -> None:
+    schema = json_schema({"gradient": Renamed})
+    marked = schema["$defs"]["Renamed"]["properties"]
+    assert marked["forget"]["deprecated"] is True
+    assert "deprecated" not in marked["adjoint_discount"]
+    assert schema["properties"]["fall"]["deprecated"] is True

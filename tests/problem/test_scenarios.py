@@ -76,7 +76,7 @@ def test_without_tables_there_is_none(load: Load) -> None:
 def test_numbers(load: Load) -> None:
     found = load(table('sets = ["torso.mass", "leg.mass"]', "factor = 0.1", "alike = true")).scenarios
     assert found is not None
-    (varied,) = found.varied
+    (varied,) = found.quantities
     assert (varied.kind, varied.factor, varied.alike, varied.lasts) == ("parameter", 0.1, True, 0)
     assert [slot.name for slot in varied.slots] == ["torso.mass", "leg.mass"]
 
@@ -84,13 +84,13 @@ def test_numbers(load: Load) -> None:
 def test_pushes_last_for_a_while(load: Load) -> None:
     found = load(table('sets = "torso.force[0:2]"', "shift = [30, 20]", "lasts = 0.2")).scenarios
     assert found is not None
-    assert (found.varied[0].lasts, found.varied[0].shift.tolist()) == (0.2, [30, 20])
+    assert (found.quantities[0].lasts, found.quantities[0].shift.tolist()) == (0.2, [30, 20])
 
 
 def test_robots_are_all_that_hangs_together(load: Load) -> None:
     found = load(table('robot = "torso"', "tilt_deg = 90", "joints = 0.1")).scenarios
     assert found is not None
-    (posed,) = found.posed
+    (posed,) = found.poses
     assert (posed.bodies, [joint.name for joint in posed.joints]) == (("torso", "leg"), ["hip"])
     assert (posed.tilt, posed.bend) == (pytest.approx(np.pi / 2), 0.1)
 
@@ -98,7 +98,7 @@ def test_robots_are_all_that_hangs_together(load: Load) -> None:
 def test_grids_differ_where_they_say_so(load: Load) -> None:
     problem = load(table("simulation = { dt = 0.005 }"))
     assert problem.scenarios is not None
-    (grid,) = problem.scenarios.grids
+    (grid,) = problem.scenarios.discretisations
     assert (grid.simulation.steps, grid.simulation.sweeps) == (200, problem.simulation.sweeps)
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from symphys.maths import rotation
 from symphys.model.shapes import Box, Capsule, Shape, Sphere
 from symphys.problem import Problem
-from symphys.problem.checks.inertia import moments, specific, volume
+from symphys.problem.checks.inertia import specific
 
 Array = NDArray[np.float64]
 Load = Callable[..., Problem]
@@ -62,14 +62,14 @@ def integrated(shapes: tuple[Shape, ...]) -> tuple[float, Array]:
 )
 def test_volume_and_inertia_are_those_of_integrals(shapes: tuple[Shape, ...]) -> None:
     held, expected = integrated(shapes)
-    assert sum(volume(shape) for shape in shapes) == pytest.approx(held, rel=0.02)
+    assert sum(shape.volume for shape in shapes) == pytest.approx(held, rel=0.02)
     np.testing.assert_allclose(np.array(specific(shapes), float), expected, atol=0.005 * np.trace(expected))
 
 
 def test_a_capsule_lies_between_sphere_and_rod() -> None:
     """In the limits I = 2/5 r^2, and h^2/3 for a rod of half length h."""
-    np.testing.assert_allclose(moments(Capsule(1.0, 1e-9)), 2 / 5, rtol=1e-8)
-    assert moments(Capsule(1e-9, 1.0))[0] == pytest.approx(1 / 3)
+    np.testing.assert_allclose(Capsule(1.0, 1e-9).moments, 2 / 5, rtol=1e-8)
+    assert Capsule(1e-9, 1.0).moments[0] == pytest.approx(1 / 3)
 
 
 def test_a_box(load: Load) -> None:
@@ -88,7 +88,7 @@ def test_a_capsule(load: Load) -> None:
     body = problem.world().bodies[0]
     assert body.shapes == (CAPSULE,)
     assert body.mass == pytest.approx(100 * np.pi * 0.01 * (0.5 + 4 / 3 * 0.1))
-    np.testing.assert_allclose(body.inertia, body.mass * np.array(moments(CAPSULE)))
+    np.testing.assert_allclose(body.inertia, body.mass * np.array(CAPSULE.moments))
 
 
 def test_a_compound_of_all(load: Load) -> None:
@@ -106,9 +106,9 @@ def test_a_compound_of_all(load: Load) -> None:
     assert (first.half_sizes, first.centre, second.centre) == ((0.1, 0.2, 0.3), (0.3, 0, 0), (-0.3, 0, 0))
     assert first.orientation == pytest.approx(second.orientation)
     assert ball == Sphere(0.1)
-    masses = [10 * volume(shape) for shape in body.shapes]
+    masses = [10 * shape.volume for shape in body.shapes]
     assert body.mass == pytest.approx(sum(masses))
-    along, across = moments(bar)[2] * masses[3], moments(bar)[0] * masses[3]
+    along, across = bar.moments[2] * masses[3], bar.moments[0] * masses[3]
     boxes = 2 * masses[0] * np.array([0.04 + 0.36, 0.16 + 0.36, 0.16 + 0.04]) / 12  # turned by a quarter: x and y swap
     boxes[0] = 2 * masses[0] * (0.04 + 0.36) / 12
     boxes += 2 * masses[0] * 0.09 * np.array([0, 1, 1])
@@ -140,7 +140,7 @@ def test_mass_and_inertia_follow_the_sizes(load: Load) -> None:
     expected = 4 / 12 * np.array([0.25 + 0.36, 0.09 + 0.36, 0.09 + 0.25])
     assert values(by_mass, size=[0.3, 0.5, 0.6], mass=4) == pytest.approx([4, *expected])
     rod = load(text=thing("{ capsule = { radius = 0.1, length = 0.5 } }"))
-    expected = 3 * np.array(moments(Capsule(0.2, 0.3)))
+    expected = 3 * np.array(Capsule(0.2, 0.3).moments)
     assert values(rod, radius=0.2, length=0.6) == pytest.approx([3, *expected])
 
 

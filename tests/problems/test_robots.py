@@ -99,7 +99,7 @@ def test_left_is_right_and_front_is_hind(robot: Robot, name: str) -> None:
     """Mirrored bodies have mirrored places and equal masses and inertias; mirrored joints equal motors and starts."""
     problem = robot(name)
     bodies = {body.name: body for body in problem.world().bodies}
-    joints = {plan.name: plan for plan in problem.plan.joints}
+    joints = {plan.name: plan for plan in problem.parametric.joints}
     for part in {body[3:] for body in bodies if body[:2] in LEGS}:
         places = [problem.initial[f"{leg}_{part}.position"] for leg in LEGS]
         assert places[0] == pytest.approx(places[1] * [1, -1, 1])
@@ -120,7 +120,7 @@ def test_the_table_robot_has_108_rows(robot: Robot) -> None:
     locked = sum(joint.locked for joint in world.joints)
     assert (locked, len([joint for joint in world.joints if joint.driven]), 3 * len(world.pairs)) == (80, 16, 12)
     for leg in LEGS:
-        axes = [plan.sockets[1].orientation for plan in robot("table_robot").plan.joints if plan.name[:2] == leg]
+        axes = [plan.sockets[1].orientation for plan in robot("table_robot").parametric.joints if plan.name[:2] == leg]
         assert len(axes) == 4
 
 
@@ -135,7 +135,7 @@ def test_the_gait_robot_is_that_of_the_journal(robot: Robot) -> None:
         tibia = (0.375, (0.05, 0.05, 0.15), (0, 0, 0.125 - centre))
         check_inertia(bodies[f"{leg}_tibia"], [tibia], [(ball, (0, 0, 0.05 - centre))])
         assert robot("gait_robot").initial[f"{leg}_tibia.position"][2] == pytest.approx(centre, abs=1e-7)
-    motor = robot("gait_robot").plan.joints[0].motor
+    motor = robot("gait_robot").parametric.joints[0].motor
     assert tuple(vars(motor).values()) == pytest.approx((50, 4, np.deg2rad(1440), np.deg2rad(45)))
 
 

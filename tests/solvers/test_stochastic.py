@@ -99,7 +99,7 @@ def test_samples_that_are_not_finite_are_left_out_and_logged() -> None:
     assert any("not finite" in line for line in lines)
     assert SOLVE(windy(spread=np.nan), np.ones(2), options(samples=1)).status is Status.BUDGET
     spoilt = SOLVE(windy(storm=-1, badly=np.nan), np.ones(2), options())
-    assert spoilt.status is Status.NOT_FINITE and "[fall]" in spoilt.advice
+    assert spoilt.status is Status.NOT_FINITE and "[termination]" in spoilt.advice
 
 
 def test_without_a_scenario_it_is_not_for_this_problem() -> None:

@@ -135,7 +135,7 @@ def test_all_controllers_add_up(tmp_path: Path) -> None:
     made = transcribe(problem, backend="casadi")
     z = points(made)[0]
     record = made.record(z)
-    course, motion, blocks = record.course, record.motion, made.shooting.by_block(z)
+    course, motion, blocks = record.arrays, record.motion, made.shooting.by_block(z)
     angle, place = motion.joint_value[:, 1, 0], motion.joint_value[:, 0, 0]
     state = np.stack([place, motion.joint_rate[:, 0, 0], angle, motion.joint_rate[:, 1, 0]], axis=1)
     knots = np.repeat(blocks["knots"].ravel(), 20)

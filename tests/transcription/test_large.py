@@ -119,9 +119,9 @@ def both(
     return within, beside
 
 
-def points(made: Transcription) -> Array:
+def points(context: Transcription) -> Array:
     """(2, n) near the guess."""
-    start = made.shooting.start(0)
+    start = context.shooting.start(0)
     return start + 0.05 * np.random.default_rng(5).standard_normal((2, start.size))
 
 
@@ -147,7 +147,7 @@ def test_robots_share_weights(both: tuple[Transcription, LargeTranscription], mo
     beside = both[1]
     evaluator = beside.shooting.evaluator
     assert isinstance(evaluator, LargeEvaluator)
-    parts = evaluator.made.split
+    parts = evaluator.context.partition
     z = points(beside)[0]
     Z = np.tile(z[parts.small], (19, 1)) + 0.01 * np.random.default_rng(1).standard_normal((19, len(parts.small)))
     whole = np.tile(z, (19, 1))
@@ -173,7 +173,7 @@ def test_judge_and_motion(both: tuple[Transcription, LargeTranscription]) -> Non
     z = points(within)[0]
     a, b = within.judge(z), beside.judge(z)
     assert a.objective == pytest.approx(b.objective, rel=1e-12)
-    motions = [made.simulate(z).arrays() for made in both]
+    motions = [context.simulate(z).arrays() for context in both]
     for name, values in motions[0].items():
         if values.dtype.kind == "f":
             assert np.allclose(values, motions[1][name], rtol=1e-9, atol=1e-9, equal_nan=True), name
@@ -182,7 +182,7 @@ def test_judge_and_motion(both: tuple[Transcription, LargeTranscription]) -> Non
 def test_examination(both: tuple[Transcription, LargeTranscription]) -> None:
     """``check`` says the same of both: gradient, refinements, growth through the nets, energy."""
     z = points(both[0])[0]
-    a, b = (examine(made, z) for made in both)
+    a, b = (examine(context, z) for context in both)
     assert max(row["error"] for row in b["gradient"]) < 1e-6
     assert [row["scale"] for row in b["gradient"]] == pytest.approx([row["scale"] for row in a["gradient"]], rel=1e-7)
     for one, other in zip(a["refined"], b["refined"], strict=True):
@@ -198,7 +198,7 @@ def test_single_precision_of_nets(both: tuple[Transcription, LargeTranscription]
     beside = both[1]
     single = transcribe(beside.problem, backend="simd32")
     Z = points(beside)
-    a, b = (made.shooting.evaluator.gradient(Z, 0.0) for made in (beside, single))
+    a, b = (context.shooting.evaluator.gradient(Z, 0.0) for context in (beside, single))
     assert a.gradient is not None and b.gradient is not None
     assert np.allclose(a.gradient, b.gradient, atol=1e-4 * np.abs(a.gradient).max())
     assert not np.array_equal(a.gradient, b.gradient)
@@ -215,11 +215,11 @@ def test_nets_on_a_device(
     there = transcribe(beside.problem, backend="cuda")
     assert (there.backend.name, there.backend.note) == ("cuda", "nets by matrix products")
     Z = points(beside)
-    a, b = (made.shooting.evaluator.gradient(Z, 0.0) for made in (beside, there))
+    a, b = (context.shooting.evaluator.gradient(Z, 0.0) for context in (beside, there))
     assert a.gradient is not None and b.gradient is not None
     assert np.array_equal(a.merit, b.merit)
     assert np.allclose(a.gradient, b.gradient, rtol=0, atol=1e-11 * np.abs(a.gradient).max())
-    one, other = (examine(made, Z[0]) for made in (beside, there))
+    one, other = (examine(context, Z[0]) for context in (beside, there))
     assert max(row["error"] for row in other["gradient"]) < 1e-6
     assert other["growth"]["factor"] == pytest.approx(one["growth"]["factor"], rel=1e-7)
 

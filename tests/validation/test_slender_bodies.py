@@ -18,7 +18,6 @@ from symphys.maths import rotation
 from symphys.model.shapes import Box, Capsule, Plane, Shape
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Body, Law, Scheme, World, make_world
-from symphys.problem.checks.inertia import moments
 
 Array = NDArray[np.float64]
 THROWN: dict[str, Shape] = {
@@ -109,7 +108,7 @@ def test_any_tensor_turns_alike() -> None:
 def wall(name: str, count: int) -> tuple[World, Array, ca.Function]:
     """A body and a wall; its principal moments; ``count`` steps of 10 ms side by side."""
     shape = THROWN[name]
-    inertia = tuple(float(moment) for moment in moments(shape))
+    inertia = tuple(float(moment) for moment in shape.moments)
     world = make_world([Body("b", 1.0, inertia, (shape,))], [Plane("wall", (-1, 0, 0), -1.0)], Law(0.5, 0.5), (0, 0, 0))
     return world, np.array(inertia), step_function(world, Scheme(dt=0.01)).map(count)
 

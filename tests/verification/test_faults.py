@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from symphys.trajectory import NotFinite
-from symphys.transcription import first_derivative_fault, first_fault
-from symphys.transcription.nan_tracing.operations import blame
+from symphys.transcription import first_non_finite, first_non_finite_derivative
+from symphys.transcription.nan_tracing.operations import non_finite_operation
 from symphys.verification import examine
 
 THROW = """
@@ -103,8 +103,8 @@ def test_a_derivative_of_a_step_that_is_not_finite(make):
     x, u, p, knob = (ca.SX.sym(name, step.size1_in(i)) for i, name in enumerate("xups"))
     bent = step(x, u, p, knob) + ca.sqrt(x[1])
     throw.rollout.__dict__["step"] = ca.Function("step", [x, u, p, knob], [bent])
-    assert first_fault(throw.rollout, record.course) == ""
-    fault = first_derivative_fault(throw.rollout, record.course)
+    assert first_non_finite(throw.rollout, record.arrays) == ""
+    fault = first_non_finite_derivative(throw.rollout, record.arrays)
     assert fault.startswith("the derivative of the step from t = 0.18 s to 0.2 s is not finite: ")
     assert "ball.position" in fault
 
@@ -114,14 +114,14 @@ def test_blame_follows_the_number_that_reaches_the_result():
     x = ca.SX.sym("x", 2)
     taken = ca.if_else(x[0] > 0, x[1] + 1, 1 / x[0])
     f = ca.Function("f", [x], [taken, ca.log(x[1] - 2) * x[0]])
-    assert blame(f, [np.array([1.0, 3.0])]) is None
-    found = blame(f, [np.array([0.0, 3.0])])
+    assert non_finite_operation(f, [np.array([1.0, 3.0])]) is None
+    found = non_finite_operation(f, [np.array([0.0, 3.0])])
     assert (found.operation, found.arguments, found.result) == ("1 / 0", ((0, 0),), (0, 0))
-    found = blame(f, [np.array([1.0, 1.0])])
+    found = non_finite_operation(f, [np.array([1.0, 1.0])])
     assert (found.operation, found.arguments, found.result) == ("log(-1)", ((0, 1),), (1, 0))
 
 
 def test_blame_of_an_argument():
     x = ca.SX.sym("x", 2)
-    found = blame(ca.Function("f", [x], [x[0] * 2 + x[1]]), [np.array([1.0, np.nan])])
+    found = non_finite_operation(ca.Function("f", [x], [x[0] * 2 + x[1]]), [np.array([1.0, np.nan])])
     assert (found.operation, found.arguments) == ("", ((0, 1),))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from symphys.transcription import Record, Transcription
-from symphys.verification.budget import budget
+from symphys.verification.balance import balance
 
 Make = Callable[..., Transcription]
 
@@ -134,7 +134,7 @@ tolerance = 0.1
 
 def found(made: Transcription) -> tuple[Record, dict[str, Any]]:
     record = made.record(made.shooting.start(0))
-    return record, budget(made.rollout, record)
+    return record, balance(made.rollout, record)
 
 
 def gained(energy: dict[str, list[float]]) -> float:

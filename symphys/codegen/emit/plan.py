@@ -131,7 +131,9 @@ def _pull(reach: _Reach, activity: Activity, functions: DistinctFunctions) -> _P
     return _Pull(reach, functions.adjoint(reach.call.function, inputs, outputs), inputs, outputs)
 
 
-def _again(program: Program, body: Sequence[_Reach], pulls: Sequence[_Pull], functions: DistinctFunctions) -> list[_Reach]:
+def _again(
+    program: Program, body: Sequence[_Reach], pulls: Sequence[_Pull], functions: DistinctFunctions
+) -> list[_Reach]:
     """The calls that must be run again before the adjoints of a step: those whose scratch is read."""
     scratch = program.scratch()
     needed = np.zeros(program.size, dtype=bool)

@@ -1,8 +1,8 @@
 """A rollout as data: calls of small functions on places of a flat memory, with a loop over time.
 
 A program is checked once, when it is made: sizes, one writer a word, nothing read before it is written. Times in that
-check are those of calls: inputs at -1, then prologue, body of each step, epilogue. Scratch (what the body writes without
-stride) is new in each step, so its times are those of step 0, and so are the times of what reads it.
+check are those of calls: inputs at -1, then prologue, body of each step, epilogue. Scratch (what the body writes
+without stride) is new in each step, so its times are those of step 0, and so are the times of what reads it.
 """
 
 from __future__ import annotations

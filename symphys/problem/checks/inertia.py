@@ -1,4 +1,4 @@
-"""Inertia of bodies: of solid shapes and compounds of them, and whether a given one is that of any real body."""
+"""Inertia of bodies: of compounds of solid shapes, and whether a given one is that of any real body."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.maths import rotation
-from symphys.model.shapes import UPRIGHT, Box, Scalar, Shape, Sphere
-from symphys.model.world import SOLID_SPHERE, is_zero
+from symphys.model.shapes import UPRIGHT, Scalar, Shape
+from symphys.model.world import is_zero
 
 Array = NDArray[np.float64]
 Tensor = list[list[Scalar]]
@@ -21,36 +21,11 @@ NOISE = 1e-14
 """Products of inertia below this share of the trace are rounding."""
 
 
-def volume(shape: Shape) -> Scalar:
-    """Of a solid shape [m^3]; sizes may be symbols."""
-    if isinstance(shape, Box):
-        a, b, c = shape.half_sizes
-        return 8 * a * b * c
-    r = shape.radius
-    ball = 4 / 3 * np.pi * r * r * r
-    return ball if isinstance(shape, Sphere) else ball + 2 * np.pi * r * r * shape.half_length
-
-
-def moments(shape: Shape) -> tuple[Scalar, Scalar, Scalar]:
-    """Inertia per mass [m^2] of a solid shape about its own centre, along its own axes."""
-    if isinstance(shape, Box):
-        a, b, c = (half * half / 3 for half in shape.half_sizes)
-        return b + c, a + c, a + b
-    r = shape.radius
-    ball = SOLID_SPHERE * r * r
-    if isinstance(shape, Sphere):
-        return ball, ball, ball
-    h = shape.half_length
-    ends = 2 * r / (2 * r + 3 * h)
-    across = ends * (ball + h * h + 3 / 4 * r * h) + (1 - ends) * (r * r / 4 + h * h / 3)
-    return across, across, ends * ball + (1 - ends) * r * r / 2
-
-
 def shares(shapes: Sequence[Shape]) -> list[Scalar]:
     """The share of each shape in the mass, for equal density."""
     if len(shapes) == 1:
         return [1.0]
-    volumes = [volume(shape) for shape in shapes]
+    volumes = [shape.volume for shape in shapes]
     whole = sum(volumes)
     if whole == 0:
         return [np.nan] * len(shapes)
@@ -66,7 +41,7 @@ def specific(shapes: Sequence[Shape]) -> Tensor:
     """Inertia per mass [m^2] of solid shapes of equal density about the body's origin; sizes may be symbols."""
     total: Tensor = [[0.0] * 3 for _ in range(3)]
     for share, shape in zip(shares(shapes), shapes, strict=True):
-        own, c, turned = moments(shape), shape.centre, axes(shape)
+        own, c, turned = shape.moments, shape.centre, axes(shape)
         arm = sum(x * x for x in c)
         for i in range(3):
             for j in range(3):
@@ -77,7 +52,7 @@ def specific(shapes: Sequence[Shape]) -> Tensor:
 
 def axes(shape: Shape) -> list[list[float]]:
     """(3, 3): a shape's own axes as columns, body frame."""
-    if isinstance(shape, Sphere) or shape.orientation == UPRIGHT:
+    if shape.orientation == UPRIGHT:
         return [[float(i == j) for j in range(3)] for i in range(3)]
     found: list[list[float]] = np.array(rotation.matrix(shape.orientation)).tolist()
     return found
@@ -99,7 +74,7 @@ def negligible(product: Scalar, diagonal: Sequence[Scalar]) -> bool:
     return is_zero(product)
 
 
-def complaint(value: float | Sequence[float] | Sequence[Sequence[float]]) -> str:
+def inertia_fault(value: float | Sequence[float] | Sequence[Sequence[float]]) -> str:
     """Why no rigid body has this inertia; empty if one has."""
     given = np.asarray(value, float)
     if given.ndim == 2 and not np.allclose(given, given.T, rtol=ROUNDING, atol=ROUNDING * np.abs(given).max()):

@@ -17,21 +17,21 @@ from pathlib import Path
 
 from symphys.model.state_layout import Layout
 from symphys.problem.model import Simulation, Variable
-from symphys.problem.parametric.world import WorldPlan
+from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.reading.faults import Faults, Place
 
 LOOP, RECORD, NUMBER, WEIGHT = 500, 128, 300, 40
 """Bytes: of a state in a loop of steps; of a state and step; of a number in a variable; of a weight of a net."""
 LIMITS = (Path("/sys/fs/cgroup/memory.max"), Path("/sys/fs/cgroup/memory/memory.limit_in_bytes"))
-"""Where Linux tells what a group of processes may use: version 2, version 1."""
+"""Where Linux states what a group of processes may use: version 2, version 1."""
 GIB = 2.0**30
 
 
 def available() -> float:
-    """Bytes of the machine's memory, or what the processes of this group may use of it; inf where nobody tells."""
+    """Bytes of the machine's memory, or what the processes of this group may use of it; inf where that is unknown."""
     try:
         found = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    except (AttributeError, ValueError, OSError):  # not every system tells
+    except (AttributeError, ValueError, OSError):  # not every system states it
         found = inf
     return min([found, *(limit(path) for path in LIMITS)])
 
@@ -58,9 +58,11 @@ def check_net(place: Place, weights: int, varied: bool, faults: Faults) -> bool:
     return need <= have
 
 
-def check_rollout(plan: WorldPlan, simulation: Simulation, variables: Sequence[Variable], faults: Faults) -> None:
+def check_rollout(
+    parametric: ParametricWorld, simulation: Simulation, variables: Sequence[Variable], faults: Faults
+) -> None:
     """Notes steps and knots that there is no memory for."""
-    states, have = Layout(plan.world({})).size, available()
+    states, have = Layout(parametric.world({})).size, available()
     need = steps_need(states, simulation.steps)
     if need > have:
         text = f"{simulation.steps} steps of {states} states take about {shown(need)} of memory, {shown(have)} can be"

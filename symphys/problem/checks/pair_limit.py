@@ -1,28 +1,27 @@
-"""Whether a world has no more candidates for contact than a time step can carry, and none that nobody computes."""
+"""The pair limit: no more points of contact than a time step can compute, and none without a rule."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from symphys.model.shapes import Box, Capsule, Sphere
-from symphys.problem.parametric.collision_filter import Census, Kin, Meetings
-from symphys.problem.parametric.parts import BlockPlan, BodyPlan, PlanePlan
+from symphys.model.shapes import Sphere
+from symphys.problem.parametric.collision_filter import BodyClass, CollisionFilter, PairCount
+from symphys.problem.parametric.parts import ParametricBody
 from symphys.problem.reading.faults import Faults
 
 MOST_POINTS = 2000
-"""Points of contact that are looked at in every step."""
+"""Points of contact that are computed in every step."""
 LISTED = 3
-WORDS = {Sphere: "spheres", Capsule: "capsules", Box: "boxes"}
 
 
-def check_crowd(meetings: Meetings, faults: Faults) -> None:
-    """Every point where two surfaces may touch is looked at in every step, so there must not be too many."""
-    census = meetings.census(MOST_POINTS)
-    if census.points > MOST_POINTS:
-        faults.stop(("body",), too_many(meetings, census))
-    if census.uncovered:
-        listed = ", ".join(f"{a} and {b}" for a, b in census.uncovered[:LISTED])
-        more = f" and {len(census.uncovered) - LISTED} more" if len(census.uncovered) > LISTED else ""
+def check_pair_limit(candidates: CollisionFilter, faults: Faults) -> None:
+    """Every point where two surfaces may touch is computed in every step, so there must not be too many."""
+    counted = candidates.count(MOST_POINTS)
+    if counted.points > MOST_POINTS:
+        faults.stop(("body",), too_many(candidates, counted))
+    if counted.uncovered:
+        listed = ", ".join(f"{a} and {b}" for a, b in counted.uncovered[:LISTED])
+        more = f" and {len(counted.uncovered) - LISTED} more" if len(counted.uncovered) > LISTED else ""
         faults.stop(
             ("body",),
             f"contact of such shapes is not known: {listed}{more}; let them pass through each other, by collides_with "
@@ -30,33 +29,33 @@ def check_crowd(meetings: Meetings, faults: Faults) -> None:
         )
 
 
-def too_many(meetings: Meetings, census: Census) -> str:
+def too_many(candidates: CollisionFilter, counted: PairCount) -> str:
     """How many points there are, where most come from, and what to do."""
-    sets = list(meetings.sets.values())
-    largest = census.shares.most_common(LISTED)
+    sets = list(candidates.sets.values())
+    largest = counted.shares.most_common(LISTED)
     listed = ", ".join(f"{between(sets[a], sets[b], a == b)}: {count}" for (a, b), count in largest)
-    count = f"{census.points}" if census.whole else f"more than {census.points}"
+    count = f"{counted.points}" if counted.whole else f"more than {counted.points}"
     remedy = (
         "let fewer of them meet: give them a group, and say who touches whom by collides_with or by a [[pair]] with "
         "collide = false"
     )
-    if any(isinstance(surface, Box | Capsule) for a, _ in census.shares for surface in sets[a][0].part.surfaces):
+    if any(not isinstance(surface, Sphere) for a, _ in counted.shares for surface in sets[a][0].part.surfaces):
         remedy += "; or take spheres in place of boxes and capsules"
     return f"{count} points of contact in every step are too many, {MOST_POINTS} are allowed ({listed}); {remedy}"
 
 
-def between(a: Sequence[Kin], b: Sequence[Kin], same: bool) -> str:
+def between(a: Sequence[BodyClass], b: Sequence[BodyClass], same: bool) -> str:
     """``40 boxes against each other``, ``40 boxes against ground``."""
     return f"{called(a)} against {'each other' if same else called(b)}"
 
 
-def called(members: Sequence[Kin]) -> str:
+def called(members: Sequence[BodyClass]) -> str:
     """A part by its name, several by their number and kind."""
-    count, part = sum(len(kin.members) for kin in members), members[0].part
+    count, part = sum(len(each.members) for each in members), members[0].part
     if count == 1:
         return part.name
-    if isinstance(part, BodyPlan):
-        word = WORDS[type(part.shapes[0])] if len(part.shapes) == 1 else "compounds"
+    if isinstance(part, ParametricBody):
+        word = part.shapes[0].plural if len(part.shapes) == 1 else "compounds"
     else:
-        word = "planes" if isinstance(part, PlanePlan) else "blocks" if isinstance(part, BlockPlan) else "terrains"
+        word = part.static.plural
     return f"{count} {word} of {part.group}" if part.group else f"{count} {word}"

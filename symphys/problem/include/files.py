@@ -11,26 +11,26 @@ from typing import Any, TypeVar, get_origin
 
 from pydantic import ValidationError
 
-from symphys.problem.include.merge import Merged, Source, merge
+from symphys.problem.include.merge import MergedFiles, SourceFile, merge
 from symphys.problem.include.prefix import prefixed
-from symphys.problem.reading.faults import Faults, Origin
+from symphys.problem.reading.faults import Faults, SourceLocation
 from symphys.problem.reading.messages import report
 from symphys.problem.reading.source import MAX_BYTES, parse_toml, read_source, refuse
 from symphys.problem.reading.value_texts import shown
-from symphys.problem.schema import Document, Table
+from symphys.problem.schema import Document, SchemaTable
 from symphys.problem.schema.include import MOST_INCLUDES, IncludedTable, IncludeTable
 from symphys.problems import parts
 from symphys.suggest import hint, quote
 
-OF_THE_PROBLEM = ("simulation", "fall", "objective", "solver", "solvers")
+OF_THE_PROBLEM = ("simulation", "termination", "fall", "objective", "solver", "solvers")
 FURTHER = ("include", "included")
 OWN = ("title", "description")
 """What an included file says about itself alone."""
 LISTS = [name for name, field in Document.model_fields.items() if get_origin(field.annotation) is list]
-Model = TypeVar("Model", bound=Table)
+Model = TypeVar("Model", bound=SchemaTable)
 
 
-def with_included(path: Path, text: str, data: dict[str, Any]) -> Merged:
+def with_included(path: Path, text: str, data: dict[str, Any]) -> MergedFiles:
     """A problem file together with what it includes.
 
     Args:
@@ -42,7 +42,7 @@ def with_included(path: Path, text: str, data: dict[str, Any]) -> Merged:
         ProblemError: names the file in which something is wrong, table and key.
     """
     if not data.get("include"):
-        return Merged(data, text)
+        return MergedFiles(data, text)
     faults = Faults(str(path), data)
     tables = read_tables(data, "include", IncludeTable, faults)
     kept = {table.file: table.text for table in read_tables(data, "included", IncludedTable, faults)}
@@ -58,7 +58,7 @@ def with_included(path: Path, text: str, data: dict[str, Any]) -> Merged:
     whole = text if kept else text + appendix(texts)
     if len(whole.encode()) > MAX_BYTES:
         raise refuse(path, f"with the files that it includes, it is larger than {MAX_BYTES // 1_000_000} MB")
-    return merge([*sources, Source(str(path), data, data)], LISTS, whole, faults)
+    return merge([*sources, SourceFile(str(path), data, data)], LISTS, whole, faults)
 
 
 def read_tables(data: Mapping[str, Any], key: str, model: type[Model], faults: Faults) -> list[Model]:
@@ -104,20 +104,20 @@ def exists(file: Path) -> bool:
         return False
 
 
-def source(file: str, text: str, table: IncludeTable, faults: Faults) -> Source:
+def source(file: str, text: str, table: IncludeTable, faults: Faults) -> SourceFile:
     """The tables of an included file; notes those that it may not have."""
     written = parse_toml(Path(file), text)
     found = dict[str, Any]()
     for key, value in written.items():
-        reason = complaint(key, value, faults.file)
+        reason = key_fault(key, value, faults.file)
         if reason:
-            faults.add_at(Origin(file, written, (key,)), reason)
+            faults.add_at(SourceLocation(file, written, (key,)), reason)
         elif key not in OWN:
             found[key] = value
-    return Source(file, written, prefixed(found, table.prefix) if table.prefix else found, table)
+    return SourceFile(file, written, prefixed(found, table.prefix) if table.prefix else found, table)
 
 
-def complaint(key: str, value: object, problem: str) -> str:
+def key_fault(key: str, value: object, problem: str) -> str:
     """What is wrong with a table or key at the top of an included file; empty if nothing."""
     if key in OF_THE_PROBLEM:
         return f"belongs to a whole problem; move it to {problem}, which includes this file"
@@ -135,7 +135,7 @@ def complaint(key: str, value: object, problem: str) -> str:
     return ""
 
 
-def check_twice(sources: list[Source], faults: Faults) -> None:
+def check_twice(sources: list[SourceFile], faults: Faults) -> None:
     """A file that is included twice needs different prefixes."""
     seen: dict[tuple[str, str], int] = {}
     for index, one in enumerate(sources):

@@ -6,12 +6,12 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from symphys.problem.reading.faults import Faults, Origin
+from symphys.problem.reading.faults import Faults, SourceLocation
 from symphys.problem.schema.include import IncludeTable
 
 
 @dataclass(frozen=True)
-class Source:
+class SourceFile:
     """A file.
 
     Attributes:
@@ -28,7 +28,7 @@ class Source:
 
 
 @dataclass
-class Merged:
+class MergedFiles:
     """A problem together with what it includes.
 
     Attributes:
@@ -40,7 +40,7 @@ class Merged:
 
     data: dict[str, Any]
     text: str
-    origins: dict[tuple[str | int, ...], Origin] = field(default_factory=dict)
+    origins: dict[tuple[str | int, ...], SourceLocation] = field(default_factory=dict)
     moves: list[tuple[IncludeTable, dict[str, range]]] = field(default_factory=list)
 
     @property
@@ -49,7 +49,7 @@ class Merged:
         return {key for _, ranges in self.moves for key in ranges}
 
 
-def merge(sources: Sequence[Source], lists: Collection[str], text: str, faults: Faults) -> Merged:
+def merge(sources: Sequence[SourceFile], lists: Collection[str], text: str, faults: Faults) -> MergedFiles:
     """All tables, in the order of the files; notes keys that two files give differently.
 
     Args:
@@ -58,7 +58,7 @@ def merge(sources: Sequence[Source], lists: Collection[str], text: str, faults: 
         text: of all.
         faults: gets what does not fit together.
     """
-    merged = Merged({}, text)
+    merged = MergedFiles({}, text)
     for source in sources:
         ranges = dict[str, range]()
         for key, value in source.data.items():
@@ -74,21 +74,21 @@ def merge(sources: Sequence[Source], lists: Collection[str], text: str, faults: 
     return merged
 
 
-def append(merged: Merged, source: Source, key: str, entries: Sequence[Any]) -> range:
+def append(merged: MergedFiles, source: SourceFile, key: str, entries: Sequence[Any]) -> range:
     """Put the tables of a list after those that are there; where they then are."""
     known = merged.data.setdefault(key, [])
     start = len(known)
     known.extend(entries)
     for index in range(len(entries)):
-        merged.origins[key, start + index] = Origin(source.file, source.written, (key, index))
+        merged.origins[key, start + index] = SourceLocation(source.file, source.written, (key, index))
     return range(start, len(known))
 
 
-def overlay(merged: Merged, source: Source, key: str, table: Mapping[str, Any], faults: Faults) -> None:
+def overlay(merged: MergedFiles, source: SourceFile, key: str, table: Mapping[str, Any], faults: Faults) -> None:
     """Add the keys of a table to those that are there."""
     known = merged.data.setdefault(key, {})
     for name, value in table.items():
-        origin = Origin(source.file, source.written, (key, name))
+        origin = SourceLocation(source.file, source.written, (key, name))
         if name not in known:
             known[name], merged.origins[key, name] = value, origin
         elif known[name] != value:

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.problem.include.merge import Merged
+from symphys.problem.include.merge import MergedFiles
 from symphys.problem.parametric.joints import WORLD
 from symphys.problem.reading.faults import Faults, Place
-from symphys.problem.schema import Document, Table
+from symphys.problem.schema import Document, SchemaTable
 from symphys.problem.schema.include import IncludeTable
 from symphys.problem.schema.joints import JointTable
 from symphys.problem.schema.physics import BlockTable, BodyTable, PlaneTable, TerrainTable
@@ -21,7 +21,7 @@ from symphys.problem.tables.shapes import read_orientation, turned
 Array = NDArray[np.float64]
 
 
-def placed(document: Document, merged: Merged, faults: Faults) -> Document:
+def placed(document: Document, merged: MergedFiles, faults: Faults) -> Document:
     """The document with the tables of included files where these were put.
 
     Bodies, joints, planes and blocks move. The ground stays, and so does what variables set and formulas say. Terrain
@@ -29,7 +29,7 @@ def placed(document: Document, merged: Merged, faults: Faults) -> Document:
     """
     changed = {key: list(getattr(document, key)) for key in MOVES}
     for include, ranges in merged.moves:
-        shift = Shift(include, faults)
+        shift = Placement(include, faults)
         if not shift.moves:
             continue
         for key, move in MOVES.items():
@@ -39,7 +39,7 @@ def placed(document: Document, merged: Merged, faults: Faults) -> Document:
 
 
 @dataclass(frozen=True)
-class Shift:
+class Placement:
     """A turn about the z axis of the world, then a shift."""
 
     include: IncludeTable
@@ -67,7 +67,7 @@ class Shift:
             return given
         return turned(read_orientation((*place, "orientation"), given, self.faults), 2, self.include.yaw_deg).tolist()
 
-    def body(self, place: Place, table: BodyTable) -> Table:
+    def body(self, place: Place, table: BodyTable) -> SchemaTable:
         """A body, with its velocities."""
         update = {
             "position": self.point(table.position),
@@ -77,7 +77,7 @@ class Shift:
         }
         return table.model_copy(update=update)
 
-    def block(self, place: Place, table: BlockTable) -> Table:
+    def block(self, place: Place, table: BlockTable) -> SchemaTable:
         """A static solid."""
         update = {
             "position": self.point(table.position),
@@ -85,7 +85,7 @@ class Shift:
         }
         return table.model_copy(update=update)
 
-    def plane(self, place: Place, table: PlaneTable) -> Table:
+    def plane(self, place: Place, table: PlaneTable) -> SchemaTable:
         """A static wall."""
         update: dict[str, Any] = {"normal": self.direction(table.normal)}
         if table.point is not None:
@@ -96,7 +96,7 @@ class Shift:
             update["offset"] = table.offset + along
         return table.model_copy(update=update)
 
-    def joint(self, place: Place, table: JointTable) -> Table:
+    def joint(self, place: Place, table: JointTable) -> SchemaTable:
         """A joint: its point, axes, and an anchor on the world."""
         update: dict[str, Any] = {}
         if table.point is not None:
@@ -113,17 +113,17 @@ class Shift:
             update["universal"] = table.universal.model_copy(update={"axes": axes})
         return table.model_copy(update=update)
 
-    def terrain(self, place: Place, table: TerrainTable) -> Table:
+    def terrain(self, place: Place, table: TerrainTable) -> SchemaTable:
         """Terrain stays."""
         text = "terrain cannot be moved; include this file without position and yaw_deg, or take the terrain out of it"
         self.faults.add(place, text)
         return table
 
 
-MOVES: dict[str, Callable[[Shift, Place, Any], Table]] = {
-    "body": Shift.body,
-    "joint": Shift.joint,
-    "plane": Shift.plane,
-    "block": Shift.block,
-    "terrain": Shift.terrain,
+MOVES: dict[str, Callable[[Placement, Place, Any], SchemaTable]] = {
+    "body": Placement.body,
+    "joint": Placement.joint,
+    "plane": Placement.plane,
+    "block": Placement.block,
+    "terrain": Placement.terrain,
 }

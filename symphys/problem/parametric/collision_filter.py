@@ -1,6 +1,7 @@
-"""Who may meet whom: counted and listed by kin, parts of the world that no rule of the file tells apart.
+"""The collision filter: which parts of a world may touch which, counted and listed by classes of equal parts.
 
-Tens of thousands of bodies are few kin, so that their pairs are counted without being looked at one by one.
+Parts are of one class if no rule of the file distinguishes them. Tens of thousands of bodies are a few classes, so
+that their pairs are counted without a loop over all pairs.
 """
 
 from __future__ import annotations
@@ -13,28 +14,21 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.model.shapes import Box, Capsule, Plane, Sphere, Surface, Terrain, contact_points
-from symphys.problem.parametric.parts import BodyPlan, PairPlan, Part
+from symphys.model.shapes import SURFACES, points_of_kinds
+from symphys.problem.parametric.parts import PairRule, ParametricBody, Part
 
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-KINDS: tuple[Surface, ...] = (
-    Sphere(1.0),
-    Capsule(1.0, 1.0),
-    Box((1.0, 1.0, 1.0)),
-    Plane("plane"),
-    Terrain("terrain", max),
-)
-"""One of each kind of surface."""
-TYPES = tuple(type(kind) for kind in KINDS)
+KINDS = tuple(SURFACES.values())
+"""All kinds of surfaces."""
 ENOUGH_ROWS = 256
-"""Where there are more kin than this and already too many points, the rest need not be counted."""
+"""Where there are more classes than this and already too many points, the rest need not be counted."""
 
 
 @dataclass(frozen=True)
-class Kin:
-    """Parts that meet the same others, with the same shapes.
+class BodyClass:
+    """Parts (bodies, or static surfaces) with the same shapes that may touch the same others.
 
     Attributes:
         part: the first of them.
@@ -49,18 +43,18 @@ class Kin:
     @property
     def moves(self) -> bool:
         """Whether they are bodies."""
-        return isinstance(self.part, BodyPlan)
+        return isinstance(self.part, ParametricBody)
 
 
 @dataclass
-class Census:
-    """The candidates for contact.
+class PairCount:
+    """How many points of contact there are to compute.
 
     Attributes:
-        points: how many are to be looked at in every step.
+        points: how many are computed in every step.
         whole: whether all were counted.
-        shares: points by the two sets of parts that they are between, as places in ``Meetings.sets``.
-        uncovered: (a, b) examples of parts that may meet with surfaces that no rule covers.
+        shares: points by the two sets of parts that they are between, as places in ``CollisionFilter.sets``.
+        uncovered: (a, b) examples of parts that may touch with surfaces that no rule covers.
     """
 
     points: int = 0
@@ -74,32 +68,33 @@ class Census:
         self.shares.update({(one, other): int(sums[other]) for other in np.flatnonzero(sums).tolist()})
 
 
-class Meetings:
-    """The parts of a world, bodies first, and which of them may meet."""
+class CollisionFilter:
+    """The parts of a world, bodies first, and which of them may touch."""
 
-    def __init__(self, parts: Sequence[Part], tables: Sequence[PairPlan]) -> None:
-        """Sort the parts into kin."""
+    def __init__(self, parts: Sequence[Part], tables: Sequence[PairRule]) -> None:
+        """Sort the parts into classes."""
         self.parts, self.tables = parts, tables
-        mentioned = {name for part in parts for name in part.mates or ()}
+        mentioned = {name for part in parts for name in part.collides_with or ()}
         mentioned |= {name for table in tables for name in table.between}
         found: dict[object, list[int]] = {}
         for index, part in enumerate(parts):
             own = part.name if part.name in mentioned else None
-            found.setdefault((kinds(part), isinstance(part, BodyPlan), part.group, part.mates, own), []).append(index)
-        self.kin = [Kin(parts[m[0]], m, np.array(kinds(parts[m[0]]), np.int64)) for m in found.values()]
-        self.sets: dict[object, list[Kin]] = {}
-        for kin in self.kin:
-            self.sets.setdefault((kinds(kin.part), kin.moves, kin.part.group), []).append(kin)
+            key = (kinds(part), isinstance(part, ParametricBody), part.group, part.collides_with, own)
+            found.setdefault(key, []).append(index)
+        self.classes = [BodyClass(parts[m[0]], m, np.array(kinds(parts[m[0]]), np.int64)) for m in found.values()]
+        self.sets: dict[object, list[BodyClass]] = {}
+        for each in self.classes:
+            self.sets.setdefault((kinds(each.part), each.moves, each.part.group), []).append(each)
 
-    def census(self, most: int) -> Census:
+    def count(self, most: int) -> PairCount:
         """Count the points; beyond ``most`` the count may stop early."""
-        found = Census()
-        numbers = np.array([len(kin.members) for kin in self.kin])
-        surfaces = np.array([kin.surfaces for kin in self.kin])
-        points = np.array([[contact_points(a, b) for b in KINDS] for a in KINDS])
+        found = PairCount()
+        numbers = np.array([len(each.members) for each in self.classes])
+        surfaces = np.array([each.surfaces for each in self.classes])
+        points = np.array([[points_of_kinds(a, b) for b in KINDS] for a in KINDS])
         missing = (points == 0).astype(np.int64)
-        places = {id(kin): place for place, members in enumerate(self.sets.values()) for kin in members}
-        place = np.array([places[id(kin)] for kin in self.kin])
+        places = {id(each): place for place, members in enumerate(self.sets.values()) for each in members}
+        place = np.array([places[id(each)] for each in self.classes])
         for c, met in self._rows():
             pairs = numbers[c] * numbers[met]
             pairs[met == c] = numbers[c] * (numbers[c] - 1) // 2
@@ -114,47 +109,47 @@ class Meetings:
         return found
 
     def pairs(self) -> list[tuple[int, int]]:
-        """Every two parts that may meet and have surfaces, as places among the parts, in their order."""
+        """Every two parts that may touch and have surfaces, as places among the parts, in their order."""
         found = []
         for c, met in self._rows():
             for d in met.tolist():
-                if not (self.kin[c].surfaces.any() and self.kin[d].surfaces.any()):
+                if not (self.classes[c].surfaces.any() and self.classes[d].surfaces.any()):
                     continue
-                both = ((i, j) for i in self.kin[c].members for j in self.kin[d].members)
+                both = ((i, j) for i in self.classes[c].members for j in self.classes[d].members)
                 found += [(min(i, j), max(i, j)) for i, j in both if d != c or i < j]
         return sorted(found)
 
     def _example(self, c: int, d: int) -> tuple[str, str]:
-        return self.kin[c].part.name, self.parts[self.kin[d].members[-1]].name
+        return self.classes[c].part.name, self.parts[self.classes[d].members[-1]].name
 
     def _rows(self) -> Iterator[tuple[int, Ints]]:
-        """For each kin of bodies, what it may meet of itself and later kin, among which are all static ones."""
-        for c, kin in enumerate(self.kin):
-            if kin.moves:
+        """For each class of bodies, which of itself and of later classes, all static ones among them, it may touch."""
+        for c, each in enumerate(self.classes):
+            if each.moves:
                 met = np.flatnonzero(self._lets(c) & self._let(c) & self._collide(c))
                 yield c, met[met >= c]
 
     def _lets(self, c: int) -> Mask:
-        """Whom ``c`` lets touch it."""
-        mates = self.kin[c].part.mates
-        if mates is None:
-            return np.ones(len(self.kin), bool)
-        mask = np.zeros(len(self.kin), bool)
-        for name in mates:
+        """Which classes ``c`` lists in collides_with."""
+        named = self.classes[c].part.collides_with
+        if named is None:
+            return np.ones(len(self.classes), bool)
+        mask = np.zeros(len(self.classes), bool)
+        for name in named:
             mask[self._named.get(name, [])] = True
         return mask
 
     def _let(self, c: int) -> Mask:
-        """Who lets ``c`` touch it."""
+        """Which classes list ``c`` in collides_with."""
         mask = self._free.copy()
-        for name in own_names(self.kin[c].part):
+        for name in own_names(self.classes[c].part):
             mask[self._wanted.get(name, [])] = True
         return mask
 
     def _collide(self, c: int) -> Mask:
-        """With whom the [[pair]] tables let ``c`` collide; those that name more surfaces hold."""
-        mask = np.ones(len(self.kin), bool)
-        own = own_names(self.kin[c].part)
+        """With which classes the [[pair]] tables let ``c`` collide; those that name more surfaces hold."""
+        mask = np.ones(len(self.classes), bool)
+        own = own_names(self.classes[c].part)
         for place in sorted({place for name in own for place in self._stated.get(name, [])}):
             _, a, b, collide = self._ranked[place]
             for mine, other in ((a, b), (b, a)):
@@ -176,23 +171,23 @@ class Meetings:
 
     @cached_property
     def _named(self) -> dict[str, list[int]]:
-        """The kin that a name or a group means."""
-        return gather((name, c) for c, kin in enumerate(self.kin) for name in own_names(kin.part))
+        """The classes that a name or a group means."""
+        return gather((name, c) for c, each in enumerate(self.classes) for name in own_names(each.part))
 
     @cached_property
     def _wanted(self) -> dict[str, list[int]]:
-        """The kin that list a name or group in collides_with."""
-        return gather((name, c) for c, kin in enumerate(self.kin) for name in kin.part.mates or ())
+        """The classes that list a name or group in collides_with."""
+        return gather((name, c) for c, each in enumerate(self.classes) for name in each.part.collides_with or ())
 
     @cached_property
     def _free(self) -> Mask:
-        return np.array([kin.part.mates is None for kin in self.kin])
+        return np.array([each.part.collides_with is None for each in self.classes])
 
 
 def kinds(part: Part) -> tuple[int, ...]:
     """(kinds,) how many surfaces of each kind a part has."""
     counts = Counter(type(surface) for surface in part.surfaces)
-    return tuple(counts[kind] for kind in TYPES)
+    return tuple(counts[kind] for kind in KINDS)
 
 
 def own_names(part: Part) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Joints that do not start at 0: bodies are carried from where they lie in the file to where the start puts them."""
+"""Forward kinematics of the start: where joints with a ``start`` put the bodies of the file."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 
 from symphys.maths import rotation
 from symphys.model.joints import PlacedFrames
-from symphys.problem.parametric.joints import WORLD, JointPlan
+from symphys.problem.parametric.joints import WORLD, ParametricJoint
 from symphys.problem.reading.faults import Faults
 from symphys.problem.tables.joint_frames import pose
 
 Array = NDArray[np.float64]
 State = dict[str, Array]
 Tree = Mapping[str, Mapping[str, str]]
-"""What rigid joints that close no loop hold to each body, and to the world: by the names of the joints."""
+"""A spanning tree of rigid joints: what each body, and the world, is held to: by the names of the joints."""
 
 
 @dataclass(frozen=True)
-class Motion:
+class Displacement:
     """A turn about a pivot (3,) [m] by a unit quaternion (4,), then a shift (3,) [m]; world frame."""
 
     pivot: Array
@@ -30,38 +30,38 @@ class Motion:
     turn: Array
 
 
-def carry(plans: Sequence[JointPlan], initial: Mapping[str, Array], faults: Faults) -> State:
+def forward_kinematics(joints: Sequence[ParametricJoint], initial: Mapping[str, Array], faults: Faults) -> State:
     """The state at the start with every joint at its ``start``; see ``Problem.initial``.
 
-    Sockets are where the bodies lie in the file. A joint with a start moves its second body in the table, and all that
-    hangs on it, as one; if the world holds that side, it moves the other side, the other way. Since a joint changes
+    Sockets are where the bodies lie in the file. A joint with a start moves its second body in the table, and its
+    subtree, as one; if the world holds that side, it moves the other side, the other way. Since a joint changes
     nothing within either side, the order of joints does not matter.
 
-    Velocities are those of the file, carried too: the motion against the side that stays is turned along, so that rates
-    of joints are what they were, and what moves or spins as a whole goes on doing so. Zero stays zero.
+    Velocities are those of the file, transformed too: the motion against the side that stays is turned along, so that
+    rates of joints are what they were, and what moves or spins as a whole goes on doing so. Zero stays zero.
 
     Args:
-        plans: all joints.
+        joints: all joints.
         initial: the state as the file has it.
         faults: gets a start of a joint that gives way, or closes a loop of joints with a start.
     """
     state = {name: value.copy() for name, value in initial.items()}
-    if not any(plan.start for plan in plans):
+    if not any(joint.start for joint in joints):
         return state
-    tree = spanning(plans)
-    for index, plan in enumerate(plans):
-        if plan.start and plan.name not in tree[plan.first]:
-            reason = "gives way" if plan.frequency else "closes a loop"
+    tree = spanning_tree(joints)
+    for index, joint in enumerate(joints):
+        if joint.start and joint.name not in tree[joint.first]:
+            reason = "gives way" if joint.frequency else "closes a loop"
             key = "start" if faults.data["joint"][index].get("start") is not None else "start_deg"
             text = f"this joint {reason}, so it begins where the other joints put it; leave this out"
             faults.add(("joint", index, key), text)
-        elif plan.start:
-            move(plan, tree, state)
+        elif joint.start:
+            move(joint, tree, state)
     return state
 
 
-def spanning(plans: Sequence[JointPlan]) -> Tree:
-    """As many rigid joints as close no loop, those with a start first."""
+def spanning_tree(joints: Sequence[ParametricJoint]) -> Tree:
+    """A spanning tree of the rigid joints, those with a start first."""
     roots: dict[str, str] = {}
 
     def root(name: str) -> str:
@@ -70,56 +70,56 @@ def spanning(plans: Sequence[JointPlan]) -> Tree:
         return name
 
     found: dict[str, dict[str, str]] = defaultdict(dict)
-    for plan in sorted(plans, key=lambda plan: not plan.start):
-        a, b = root(plan.first), root(plan.second or WORLD)
-        if a != b and not plan.frequency:
+    for joint in sorted(joints, key=lambda joint: not joint.start):
+        a, b = root(joint.first), root(joint.second or WORLD)
+        if a != b and not joint.frequency:
             roots[a] = b
-            first, second = plan.first, plan.second or WORLD
-            found[first][plan.name], found[second][plan.name] = second, first
+            first, second = joint.first, joint.second or WORLD
+            found[first][joint.name], found[second][joint.name] = second, first
     return found
 
 
-def move(plan: JointPlan, tree: Tree, state: State) -> None:
-    """Carry one side of a joint to its start, in place."""
-    moved, base, sign = side(plan.first, plan, tree), plan.second or WORLD, 1.0
+def move(joint: ParametricJoint, tree: Tree, state: State) -> None:
+    """Move one side of a joint to its start, in place."""
+    moved, base, sign = subtree(joint.first, joint, tree), joint.second or WORLD, 1.0
     if WORLD in moved:
-        moved, base, sign = side(base, plan, tree), plan.first, -1.0
-    for coordinate, value in zip(plan.kind.coordinates, plan.start, strict=True):
-        placed, pivot = sockets(plan, state)
+        moved, base, sign = subtree(base, joint, tree), joint.first, -1.0
+    for coordinate, value in zip(joint.kind.coordinates, joint.start, strict=True):
+        placed, pivot = sockets(joint, state)
         axis, angle = np.asarray(coordinate.axis(placed), float), sign * value * coordinate.turns
-        motion = Motion(
+        motion = Displacement(
             pivot=pivot,
             shift=(sign * value - angle) * axis,
             turn=np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * axis]),
         )
         for name in moved:
-            carry_body(name, base, motion, state)
+            displace(name, base, motion, state)
 
 
-def side(start: str, cut: JointPlan, tree: Tree) -> list[str]:
-    """The bodies that hang together with one, were the joint ``cut`` not there; with the world if that holds them."""
+def subtree(start: str, cut: ParametricJoint, tree: Tree) -> list[str]:
+    """The bodies that the tree without the joint ``cut`` connects to one; among them the world, if it does so."""
     found, queue = {start: None}, [start]
     while queue:
-        for joint, other in tree[queue.pop()].items():
-            if joint != cut.name and other not in found:
+        for name, other in tree[queue.pop()].items():
+            if name != cut.name and other not in found:
                 found[other] = None
                 if other != WORLD:
                     queue.append(other)
     return list(found)
 
 
-def sockets(plan: JointPlan, state: State) -> tuple[PlacedFrames, Array]:
+def sockets(joint: ParametricJoint, state: State) -> tuple[PlacedFrames, Array]:
     """Both sockets in the world, and (3,) [m] where the second is."""
     axes, points = [], []
-    for name, socket in zip((plan.first, plan.second or WORLD), plan.sockets, strict=True):
+    for name, socket in zip((joint.first, joint.second or WORLD), joint.sockets, strict=True):
         lies = pose(name, state)
         axes.append(lies.axes @ np.array(rotation.matrix(np.array(socket.orientation)), float))
         points.append(lies.to_world(np.array(socket.point)))
     return PlacedFrames(axes[0], axes[1], points[0] - points[1]), points[1]
 
 
-def carry_body(name: str, base: str, motion: Motion, state: State) -> None:
-    """Carry a body, in place; ``base`` is what it moves against."""
+def displace(name: str, base: str, motion: Displacement, state: State) -> None:
+    """Displace a body, in place; ``base`` is what it moves against."""
     axes = np.array(rotation.matrix(motion.turn), float)
     before = state[f"{name}.position"]
     after = motion.pivot + axes @ (before - motion.pivot) + motion.shift

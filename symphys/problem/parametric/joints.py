@@ -1,4 +1,4 @@
-"""The plan of a joint, with numbers that may be replaced."""
+"""The parametric of a joint, with numbers that may be replaced."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from dataclasses import dataclass, fields, replace
 from typing import TypeVar
 
 from symphys.model.joints import Joint, Kind, Limits, Motor, Socket, Spring
-from symphys.problem.parametric.parts import Numbers, PairPlan, Value
+from symphys.problem.parametric.parts import Numbers, PairRule, Value
 
 WORLD = "world"
 Part = TypeVar("Part", bound=Motor | Spring)
 
 
 @dataclass(frozen=True)
-class JointPlan:
+class ParametricJoint:
     """A joint.
 
     Attributes:
@@ -43,11 +43,11 @@ class JointPlan:
     start: tuple[float, ...] = ()
 
     @property
-    def apart(self) -> PairPlan | None:
+    def apart(self) -> PairRule | None:
         """That its bodies do not touch each other, as a [[pair]] table would say it; None where they may."""
         if self.collide or self.second is None:
             return None
-        return PairPlan(f"{self.second}-{self.first}", frozenset((self.first, self.second)), False, {})
+        return PairRule(f"{self.second}-{self.first}", frozenset((self.first, self.second)), False, {})
 
     @property
     def anchor(self) -> str:
@@ -60,7 +60,7 @@ class JointPlan:
         found = {f"{self.name}.{key}": getattr(part, key) for part in parts for key in given(part)}
         return found | {self.anchor: self.sockets[1].point}
 
-    def joint(self, places: Mapping[str, int], value: Value) -> Joint:
+    def valued(self, places: Mapping[str, int], value: Value) -> Joint:
         """The joint with its parameters' values; ``places`` has the indices of bodies."""
         return Joint(
             name=self.name,

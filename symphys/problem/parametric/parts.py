@@ -1,4 +1,4 @@
-"""The plans of a world's parts: bodies, static surfaces and [[pair]] tables, with numbers that may be replaced."""
+"""The parts of a parametric world: bodies, static surfaces and [[pair]] tables, with numbers that may be replaced."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from functools import cached_property
 from math import prod
 from typing import Any, ClassVar
 
-from symphys.model.shapes import Fixture, Plane, Scalar, Shape, Sphere, Static, Surface, Terrain
+from symphys.model.shapes import Scalar, Shape, Sphere, Static, Surface
 from symphys.model.world import Body
-from symphys.problem.checks.inertia import Tensor, simplest, specific, volume
-from symphys.problem.parametric.sizes import resized, sizes
+from symphys.problem.checks.inertia import Tensor, simplest, specific
 
 Numbers = float | tuple[float, ...]
 Value = Callable[[str], Any]
@@ -33,7 +32,7 @@ def stated(states: Mapping[str, float]) -> dict[str, Numbers]:
 
 
 @dataclass(frozen=True)
-class BodyPlan:
+class ParametricBody:
     """A body.
 
     Attributes:
@@ -44,7 +43,7 @@ class BodyPlan:
         hollow: whether a single sphere is a shell.
         inertia: [kg m^2] as given; None: from mass and shape.
         states: coefficients that its surface states, by name.
-        mates: names of the surfaces and groups that it may touch; None: all.
+        collides_with: names of the surfaces and groups that it may touch; None: all.
         group: that it belongs to.
     """
 
@@ -55,7 +54,7 @@ class BodyPlan:
     hollow: bool
     inertia: Any
     states: Mapping[str, float]
-    mates: frozenset[str] | None
+    collides_with: frozenset[str] | None
     group: str | None = None
 
     @property
@@ -67,19 +66,19 @@ class BodyPlan:
         """Parameter names and values."""
         own: dict[str, Numbers] = {"mass": self.mass}
         if len(self.shapes) == 1:
-            own |= sizes(self.shapes[0])
+            own |= self.shapes[0].sizes
         return {f"{self.name}.{key}": numbers for key, numbers in (own | stated(self.states)).items()}
 
-    def body(self, overrides: Mapping[str, Any], value: Value) -> Body:
+    def valued(self, overrides: Mapping[str, Any], value: Value) -> Body:
         """The body with its parameters' values; a mass given by density follows the size unless overridden."""
         mass = value(f"{self.name}.mass")
         if len(self.shapes) != 1:
             return Body(self.name, mass, self._inertia(mass, self._specific), self.shapes)
-        own = {key: f"{self.name}.{key}" for key in sizes(self.shapes[0])}
-        shape = resized(self.shapes[0], {key: value(name) for key, name in own.items()})
+        own = {key: f"{self.name}.{key}" for key in self.shapes[0].sizes}
+        shape = self.shapes[0].resized({key: value(name) for key, name in own.items()})
         varied = any(name in overrides for name in own.values())
         if self.density is not None and varied and f"{self.name}.mass" not in overrides:
-            mass = self.density * volume(shape)
+            mass = self.density * shape.volume
         if self.inertia is None and isinstance(shape, Sphere) and not any(shape.centre):
             return replace(Body.ball(self.name, shape.radius, mass, self.hollow), shapes=(shape,))
         return Body(self.name, mass, self._inertia(mass, specific((shape,)) if varied else self._specific), (shape,))
@@ -98,85 +97,44 @@ class BodyPlan:
 
 
 @dataclass(frozen=True)
-class PlanePlan:
-    """A static plane: unit normal (3,), offset [m], the coefficients that it states, and its group."""
+class ParametricStatic:
+    """A static surface.
 
-    name: str
-    normal: tuple[float, float, float]
-    offset: float
+    Attributes:
+        static: as the file has it.
+        states: coefficients that its surface states, by name.
+        group: that it belongs to.
+    """
+
+    static: Static
     states: Mapping[str, float]
     group: str | None = None
-    mates: ClassVar[None] = None
+    collides_with: ClassVar[None] = None
+
+    @property
+    def name(self) -> str:
+        """Unique among bodies, static surfaces and groups."""
+        return self.static.name
 
     @property
     def surfaces(self) -> tuple[Surface, ...]:
         """What may be touched."""
-        return (Plane(self.name, self.normal, self.offset),)
+        return (self.static.surface,)
 
     def parameters(self) -> dict[str, Numbers]:
         """Parameter names and values."""
-        return {f"{self.name}.{key}": number for key, number in ({"offset": self.offset} | stated(self.states)).items()}
+        return {f"{self.name}.{key}": number for key, number in (self.static.parameters | stated(self.states)).items()}
 
-    def static(self, value: Value) -> Static:
-        """The plane with its parameters' values."""
-        return Plane(self.name, self.normal, value(f"{self.name}.offset"))
+    def valued(self, value: Value) -> Static:
+        """The surface with its parameters' values."""
+        return self.static.with_parameters({key: value(f"{self.name}.{key}") for key in self.static.parameters})
 
 
-@dataclass(frozen=True)
-class BlockPlan:
-    """A static solid: its shape in world coordinates, the coefficients that it states, and its group."""
-
-    name: str
-    shape: Shape
-    states: Mapping[str, float]
-    group: str | None = None
-    mates: ClassVar[None] = None
-
-    @property
-    def surfaces(self) -> tuple[Surface, ...]:
-        """What may be touched."""
-        return (self.shape,)
-
-    def parameters(self) -> dict[str, Numbers]:
-        """Parameter names and values."""
-        own: dict[str, Numbers] = {"position": self.shape.centre}
-        return {f"{self.name}.{key}": numbers for key, numbers in (own | stated(self.states)).items()}
-
-    def static(self, value: Value) -> Static:
-        """The fixture with its parameters' values."""
-        return Fixture(self.name, replace(self.shape, centre=value(f"{self.name}.position")))
+Part = ParametricBody | ParametricStatic
 
 
 @dataclass(frozen=True)
-class TerrainPlan:
-    """Static ground of varying height: ``height(x, y)`` [m], the coefficients that it states, and its group."""
-
-    name: str
-    height: Callable[[Any, Any], Any]
-    states: Mapping[str, float]
-    group: str | None = None
-    mates: ClassVar[None] = None
-
-    @property
-    def surfaces(self) -> tuple[Surface, ...]:
-        """What may be touched."""
-        return (Terrain(self.name, self.height),)
-
-    def parameters(self) -> dict[str, Numbers]:
-        """Parameter names and values."""
-        return {f"{self.name}.{key}": number for key, number in stated(self.states).items()}
-
-    def static(self, value: Value) -> Static:
-        """The terrain."""
-        return Terrain(self.name, self.height)
-
-
-StaticPlan = PlanePlan | BlockPlan | TerrainPlan
-Part = BodyPlan | StaticPlan
-
-
-@dataclass(frozen=True)
-class PairPlan:
+class PairRule:
     """What a [[pair]] table states between two surfaces or groups; ``states`` may hold frequency and damping too.
 
     ``between`` has one name where a group meets itself.

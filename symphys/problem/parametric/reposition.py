@@ -1,4 +1,4 @@
-"""Anchors that vary: what a joint carries moves along with it, and who stands on the ground goes on doing so."""
+"""Repositioning for anchors that vary: a subtree moves with its joint, and a robot goes on standing on the ground."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from symphys.dynamics import gap_function
 from symphys.maths import rotation
 from symphys.model.state_layout import initial_state
 from symphys.problem.model import Variable
-from symphys.problem.parametric.forward_kinematics import Tree, side, spanning
-from symphys.problem.parametric.joints import WORLD, JointPlan
-from symphys.problem.parametric.world import WorldPlan
+from symphys.problem.parametric.forward_kinematics import Tree, spanning_tree, subtree
+from symphys.problem.parametric.joints import WORLD, ParametricJoint
+from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.reading.faults import Faults
 
 Expr = Any
@@ -23,36 +23,36 @@ Expr = Any
 State = Mapping[str, Expr]
 
 
-def anchored(plan: WorldPlan, names: Iterable[str]) -> tuple[JointPlan, ...]:
+def anchored(parametric: ParametricWorld, names: Iterable[str]) -> tuple[ParametricJoint, ...]:
     """The joints whose anchors are among these parameters."""
     found = set(names)
-    return tuple(joint for joint in plan.joints if joint.anchor in found)
+    return tuple(joint for joint in parametric.joints if joint.anchor in found)
 
 
-def follow(plan: WorldPlan, anchors: Mapping[str, Expr], state: State) -> dict[str, Expr]:
+def reposition(parametric: ParametricWorld, anchors: Mapping[str, Expr], state: State) -> dict[str, Expr]:
     """The state at the start where joints have these anchors, by the names of parameters, (3,) [m].
 
-    A joint shifts its second body in the table, and all that hangs on it, as one; if the world holds that side, it
+    A joint shifts its second body in the table, and its subtree, as one; if the world holds that side, it
     shifts the other one, the other way. Then a robot that nothing holds is lifted until its lowest point is as high
     above what stands still as before. Velocities are those of one rigid body with what stays.
     """
-    joints = anchored(plan, anchors)
+    joints = anchored(parametric, anchors)
     if not joints:
         return dict(state)
-    tree, found = spanning(plan.joints), dict(state)
+    tree, found = spanning_tree(parametric.joints), dict(state)
     for joint in joints:
         shift(joint, anchors[joint.anchor], tree, found)
     for robot in robots(joints, tree):
-        lift(plan, robot, state, found)
+        lift(parametric, robot, state, found)
     return found
 
 
-def shift(joint: JointPlan, anchor: Expr, tree: Tree, state: dict[str, Expr]) -> None:
-    """Carry one side along, in place."""
+def shift(joint: ParametricJoint, anchor: Expr, tree: Tree, state: dict[str, Expr]) -> None:
+    """Shift one side, in place."""
     base = joint.second or WORLD
-    moved, stays, sign = side(joint.first, joint, tree), base, 1.0
+    moved, stays, sign = subtree(joint.first, joint, tree), base, 1.0
     if WORLD in moved:
-        moved, stays, sign = side(base, joint, tree), joint.first, -1.0
+        moved, stays, sign = subtree(base, joint, tree), joint.first, -1.0
     by = sign * (anchor - ca.DM(joint.sockets[1].point))
     if base != WORLD:
         by = ca.mtimes(rotation.matrix(state[f"{base}.orientation"]), by)
@@ -62,43 +62,43 @@ def shift(joint: JointPlan, anchor: Expr, tree: Tree, state: dict[str, Expr]) ->
             state[f"{body}.velocity"] = state[f"{body}.velocity"] + ca.cross(state[f"{stays}.angular_velocity"], by)
 
 
-def robots(joints: Sequence[JointPlan], tree: Tree) -> list[list[str]]:
+def robots(joints: Sequence[ParametricJoint], tree: Tree) -> list[list[str]]:
     """The bodies of each robot that one of the joints is a part of and the world does not hold."""
     found: list[list[str]] = []
     for joint in joints:
-        whole = list(dict.fromkeys([*side(joint.first, joint, tree), *side(joint.second or WORLD, joint, tree)]))
+        whole = list(dict.fromkeys([*subtree(joint.first, joint, tree), *subtree(joint.second or WORLD, joint, tree)]))
         if WORLD not in whole and not any(joint.first in other for other in found):
             found.append(whole)
     return found
 
 
-def lift(plan: WorldPlan, robot: Sequence[str], before: State, state: dict[str, Expr]) -> None:
+def lift(parametric: ParametricWorld, robot: Sequence[str], before: State, state: dict[str, Expr]) -> None:
     """Move a robot against gravity until its lowest point is as high as before, in place."""
-    world = plan.world({})
+    world = parametric.world({})
     own = {index for index, body in enumerate(world.bodies) if body.name in robot}
     pairs = [k for k, pair in enumerate(world.pairs) if pair.second.body is None and pair.first.body in own]
-    size = float(np.linalg.norm(plan.gravity))
+    size = float(np.linalg.norm(parametric.gravity))
     if not pairs or not size:
         return
     gaps = gap_function(world)
     lowest = [reduce(ca.fmin, [gaps(initial_state(world, each))[k] for k in pairs]) for each in (before, state)]
     for body in robot:
-        up = ca.DM(plan.gravity) / -size
+        up = ca.DM(parametric.gravity) / -size
         state[f"{body}.position"] = state[f"{body}.position"] + (lowest[0] - lowest[1]) * up
 
 
-def check_anchors(plan: WorldPlan, variables: Sequence[Variable], faults: Faults) -> None:
-    """What a varied anchor carries must be determined: its joint closes no loop and does not give way."""
+def check_anchors(parametric: ParametricWorld, variables: Sequence[Variable], faults: Faults) -> None:
+    """The subtree that a varied anchor moves must be determined: its joint closes no loop and does not give way."""
     for index, variable in enumerate(variables):
-        for joint in anchored(plan, (slot.name for slot in variable.slots)):
-            if joint.frequency or joint.second in around(joint, plan.joints):
+        for joint in anchored(parametric, (slot.name for slot in variable.slots)):
+            if joint.frequency or joint.second in around(joint, parametric.joints):
                 reason = "gives way" if joint.frequency else "is part of a loop"
                 text = f"{joint.anchor} cannot vary: the joint {reason}, so that what it carries is not determined"
                 faults.add(("variable", index, "sets"), text)
 
 
-def around(cut: JointPlan, joints: Sequence[JointPlan]) -> set[str | None]:
-    """What hangs together with the first body of a joint without it; None: the world."""
+def around(cut: ParametricJoint, joints: Sequence[ParametricJoint]) -> set[str | None]:
+    """The bodies that joints connect to the first body of a joint without that joint; None: the world."""
     found: set[str | None] = {cut.first}
     while True:
         ends = [{joint.first, joint.second} for joint in joints if joint.name != cut.name]

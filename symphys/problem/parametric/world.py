@@ -1,4 +1,4 @@
-"""The plan of a world: bodies, statics and who touches whom under which law, with numbers that may be replaced.
+"""The parametric of a world: bodies, statics and who touches whom under which law, with numbers that may be replaced.
 
 The rule for a pair of surfaces: what its [[pair]] table states holds. Else friction and restitution are the product
 of what the two surfaces state, torsion and rolling (lengths) their sum. Where neither states it, [contact] holds.
@@ -17,15 +17,15 @@ from numpy.typing import NDArray
 
 from symphys.model.shapes import Scalar, Static
 from symphys.model.world import Body, Law, Pair, Side, World, points_of
-from symphys.problem.parametric.collision_filter import Meetings
-from symphys.problem.parametric.joints import JointPlan
-from symphys.problem.parametric.parts import COMBINE, VARIABLE, BodyPlan, PairPlan, Part, StaticPlan, Value
+from symphys.problem.parametric.collision_filter import CollisionFilter
+from symphys.problem.parametric.joints import ParametricJoint
+from symphys.problem.parametric.parts import COMBINE, VARIABLE, PairRule, ParametricBody, ParametricStatic, Part, Value
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class WorldPlan:
+class ParametricWorld:
     """Everything that a world is built from.
 
     Attributes:
@@ -35,17 +35,17 @@ class WorldPlan:
         joints: in the file's order.
     """
 
-    bodies: tuple[BodyPlan, ...]
-    statics: tuple[StaticPlan, ...]
-    pairs: tuple[PairPlan, ...]
+    bodies: tuple[ParametricBody, ...]
+    statics: tuple[ParametricStatic, ...]
+    pairs: tuple[PairRule, ...]
     contact: Law
     gravity: tuple[float, float, float]
-    joints: tuple[JointPlan, ...] = ()
+    joints: tuple[ParametricJoint, ...] = ()
 
     def parameters(self) -> dict[str, Array]:
         """Every parameter with its value: (1,), or (3,) for gravity, the size of a box and the place of a block."""
         found = {"gravity": np.array(self.gravity)}
-        parts: tuple[Part | PairPlan | JointPlan, ...] = (*self.parts, *self.pairs, *self.joints)
+        parts: tuple[Part | PairRule | ParametricJoint, ...] = (*self.parts, *self.pairs, *self.joints)
         for part in parts:
             found |= {name: np.atleast_1d(np.array(numbers, float)) for name, numbers in part.parameters().items()}
         return found
@@ -63,10 +63,10 @@ class WorldPlan:
                 return float(nominal[name][0]) if count == 1 else tuple(nominal[name].tolist())
             return overrides[name] if count == 1 else tuple(overrides[name][i] for i in range(count))
 
-        bodies = tuple(plan.body(overrides, value) for plan in self.bodies)
-        statics = tuple(plan.static(value) for plan in self.statics)
+        bodies = tuple(body.valued(overrides, value) for body in self.bodies)
+        statics = tuple(static.valued(value) for static in self.statics)
         places = {body.name: index for index, body in enumerate(bodies)}
-        joints = tuple(plan.joint(places, value) for plan in self.joints)
+        joints = tuple(joint.valued(places, value) for joint in self.joints)
         return World(bodies, statics, self._pairs(bodies, statics, value), value("gravity"), joints)
 
     @cached_property
@@ -75,21 +75,21 @@ class WorldPlan:
         return (*self.bodies, *self.statics)
 
     @cached_property
-    def meetings(self) -> tuple[tuple[int, int], ...]:
+    def collision_pairs(self) -> tuple[tuple[int, int], ...]:
         """Every two parts that may touch, as places in ``parts``: each lets the other, and nothing forbids it."""
-        return tuple(Meetings(self.parts, (*self.pairs, *self.jointed)).pairs())
+        return tuple(CollisionFilter(self.parts, (*self.pairs, *self.jointed)).pairs())
 
     @cached_property
-    def jointed(self) -> tuple[PairPlan, ...]:
+    def jointed(self) -> tuple[PairRule, ...]:
         """As [[pair]] tables: the bodies that joints hold together do not touch each other."""
         return tuple(joint.apart for joint in self.joints if joint.apart is not None)
 
     def _pairs(self, bodies: tuple[Body, ...], statics: tuple[Static, ...], value: Value) -> tuple[Pair, ...]:
         """As ``world.all_pairs`` has them: first what is against statics, then what is against later bodies."""
-        laws = {(i, j): self.law(self.parts[i].name, self.parts[j].name, value) for i, j in self.meetings}
+        laws = {(i, j): self.law(self.parts[i].name, self.parts[j].name, value) for i, j in self.collision_pairs}
         sides = [[Side(i, k) for k in range(len(body.shapes))] for i, body in enumerate(bodies)]
         sides += [[Side(None, k)] for k in range(len(statics))]
-        both = [(a, b, laws[i, j]) for i, j in self.meetings for a in sides[i] for b in sides[j]]
+        both = [(a, b, laws[i, j]) for i, j in self.collision_pairs for a in sides[i] for b in sides[j]]
 
         def place(entry: tuple[Side, Side, Law]) -> tuple[int, ...]:
             a, b, _ = entry
@@ -110,10 +110,10 @@ class WorldPlan:
 
     def lets(self, a: str, b: str) -> bool:
         """Whether ``a`` lets ``b`` touch it, as far as collides_with goes."""
-        mates, other = self._named[a].mates, self._named[b]
-        return mates is None or b in mates or other.group in mates
+        named, other = self._named[a].collides_with, self._named[b]
+        return named is None or b in named or other.group in named
 
-    def pair(self, a: str, b: str) -> PairPlan | None:
+    def pair(self, a: str, b: str) -> PairRule | None:
         """The [[pair]] table that holds for the two surfaces, if there is one."""
         g, h = self._named[a].group, self._named[b].group
         for names in ((a, b), (a, h), (g, b), (g, h)):
@@ -127,7 +127,7 @@ class WorldPlan:
         return {part.name: part for part in self.parts}
 
     @cached_property
-    def _tables(self) -> dict[frozenset[str | None], PairPlan]:
+    def _tables(self) -> dict[frozenset[str | None], PairRule]:
         return {frozenset(pair.between): pair for pair in self.pairs}
 
     def law(self, a: str, b: str, value: Value) -> Law:

@@ -15,7 +15,7 @@ Place = Sequence[str | int]
 
 
 @dataclass(frozen=True)
-class Origin:
+class SourceLocation:
     """Where something was written: the file's name, its parsed content, and the place there."""
 
     file: str
@@ -23,7 +23,7 @@ class Origin:
     place: Place
 
 
-Origins = Mapping[tuple[str | int, ...], Origin]
+Origins = Mapping[tuple[str | int, ...], SourceLocation]
 """Of tables in lists, and of keys in other tables, by their places in what files that include others become."""
 
 
@@ -41,19 +41,19 @@ class Faults:
         """Note a fault."""
         self.add_at(self.origin(place), message)
 
-    def add_at(self, origin: Origin, message: str) -> None:
+    def add_at(self, origin: SourceLocation, message: str) -> None:
         """Note a fault where something was written."""
         file = "" if origin.file == self.file else origin.file
         issue = Issue(describe_place(origin.place, origin.data), message, file)
         if issue not in self.issues[-1000:]:
             self.issues.append(issue)
 
-    def origin(self, place: Place) -> Origin:
+    def origin(self, place: Place) -> SourceLocation:
         """Where what is at a place was written."""
         found = self.origins.get(tuple(place[:2]))
         if found is None:
-            return Origin(self.file, self.data, place)
-        return Origin(found.file, found.data, (*found.place, *place[2:]))
+            return SourceLocation(self.file, self.data, place)
+        return SourceLocation(found.file, found.data, (*found.place, *place[2:]))
 
     def called(self, place: Place, beside: Place) -> str:
         """``pair[3] of robot.toml``: what to call a place in a message about the place ``beside``."""

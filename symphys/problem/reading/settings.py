@@ -11,7 +11,11 @@ from symphys.problem.schema import Document
 from symphys.suggest import hint, quote
 
 OPENED = ("simulation", "world", "contact", "objective", "solver")
-"""Tables that a setting may open; it adds no body, surface, variable or aim."""
+"""Tables that a setting may open; it adds no body, surface, variable or objective."""
+
+RENAMED = {"fall": "termination", "forget": "adjoint_discount"}
+"""Old names of keys; a setting may use either name, whichever the file has."""
+FORMER = {name: old for old, name in RENAMED.items()}
 
 
 class SettingError(Exception):
@@ -43,6 +47,9 @@ def assign(data: dict[str, Any], path: str, value: object) -> None:
     open_below, rest = False, path
     while True:
         key, remainder = step(node, rest, top=node is data)
+        if isinstance(node, dict) and key not in node:
+            other = RENAMED.get(str(key)) or FORMER.get(str(key))
+            key = key if other is None or other not in node else other
         if remainder is None:
             node[key] = value
             return

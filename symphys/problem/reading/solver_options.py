@@ -41,7 +41,7 @@ def validate_options(cls: type[Options], table: Mapping[str, object], file: str,
 
 
 def read_options(model: type[BaseModel], table: Mapping[str, object], where: str, faults: Faults) -> dict[str, Any]:
-    """The values that the table gives, in the kinds of the model; empty after a complaint."""
+    """The values that the table gives, in the kinds of the model; empty after a fault."""
     for key, value in table.items():
         if any(isinstance(item, float) and isnan(item) for item in (value if isinstance(value, list) else [value])):
             faults.add((where, key), "must be a number, not nan")
@@ -62,7 +62,7 @@ def by_present_names(cls: type[Any], table: Mapping[str, object], where: str, fa
     present = old_names(cls)
     for old, name in present.items():
         if old in table and name in table:
-            faults.add((where, old), f"is the old name of {name}, which is there too: leave it out")
+            faults.add((where, old), f"is the old name of {name}, which is given too; leave one of the two out")
     return {present.get(key, key): value for key, value in table.items()}
 
 
@@ -74,11 +74,11 @@ def old_names(cls: type[Any]) -> dict[str, str]:
 def require_solvers(tables: Iterable[str], asked: Iterable[str], known: Iterable[str], file: str) -> None:
     """ProblemError if a [solver.NAME] table, or a name that the file's ``solvers`` asks for, is that of no solver."""
     names = list(known)
-    told = [(f"solver.{name}", name) for name in tables]
-    told += [(f"solvers[{k}]", name) for k, name in enumerate(asked)]
+    named = [(f"solver.{name}", name) for name in tables]
+    named += [(f"solvers[{k}]", name) for k, name in enumerate(asked)]
     issues = [
         Issue(where, f"there is no solver {quote(name)}; {hint(name, names)}")
-        for where, name in told
+        for where, name in named
         if name not in names
     ]
     if issues:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from symphys.suggest import quote
 
@@ -18,3 +18,8 @@ def shown(value: object) -> str:
     if isinstance(value, list):
         return f"a list of {len(value)}"
     return "a table" if isinstance(value, Mapping) else f"a {type(value).__name__}"
+
+
+def listed(words: Sequence[str], last: str) -> str:
+    """``a, b or c``; ``last`` is the word before the last one."""
+    return f"{', '.join(words[:-1])} {last} {words[-1]}"

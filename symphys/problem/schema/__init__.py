@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from symphys.problem.schema.document import Document
-from symphys.problem.schema.types import Table
+from symphys.problem.schema.types import SchemaTable
 
-__all__ = ["Document", "Table"]
+__all__ = ["Document", "SchemaTable"]

@@ -110,11 +110,15 @@ def positive(count: int) -> Callable[[object], list[float]]:
     return check
 
 
-def length(value: object) -> float:
-    """The straight part of a capsule."""
-    if not is_number(value) or value <= 0:
-        raise fault(f"must be a number greater than 0, not {shown(value)}; a capsule without length is a sphere")
-    return float(value)
+def positive_number(reason: str) -> Callable[[object], float]:
+    """A positive finite number; ``reason`` goes into the message."""
+
+    def check(value: object) -> float:
+        if not is_number(value) or value <= 0:
+            raise fault(f"must be a number greater than 0, not {shown(value)}; {reason}")
+        return float(value)
+
+    return check
 
 
 def spacing(value: object) -> list[float]:
@@ -163,7 +167,7 @@ def nested(bound: bool) -> Callable[[object], Any]:
 
 
 def smoothing(value: object) -> list[float]:
-    """The stages of the smoothing knob, from large to small; a number is one stage."""
+    """The stages of the smoothing, from large to small; a number is one stage."""
     stages: list[float] = []
     for stage in value if isinstance(value, list) else [value]:
         if not is_number(stage):

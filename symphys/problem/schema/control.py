@@ -6,13 +6,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from symphys.problem.schema.types import Finite, Identifier, NonNegative, Numbers, Table, Texts
+from symphys.problem.schema.types import Finite, Identifier, NonNegative, Numbers, SchemaTable, Texts
 
 Width = Annotated[int, Field(ge=1, le=100_000)]
 Activation = Literal["tanh", "relu", "linear"]
 
 
-class SensorTable(Table):
+class SensorTable(SchemaTable):
     """A vector that controllers may use, in the velocities that are reported."""
 
     name: Identifier = Field(description="how controllers refer to it")
@@ -23,14 +23,14 @@ class SensorTable(Table):
     )
 
 
-class LinearTable(Table):
+class LinearTable(SchemaTable):
     """Gains times what is sensed, and offsets."""
 
     gains: Numbers | None = Field(default=None, description="for each output a list with a number for each input; or 0")
     offsets: Numbers | None = Field(default=None, description="a number for each output; default 0")
 
 
-class PeriodicTable(Table):
+class PeriodicTable(SchemaTable):
     """Sines of one frequency and its multiples, about offsets."""
 
     frequency: Finite = Field(description="[Hz]")
@@ -42,7 +42,7 @@ class PeriodicTable(Table):
     cosines: Numbers | None = Field(default=None, description="likewise")
 
 
-class NetTable(Table):
+class NetTable(SchemaTable):
     """A multi-layer perceptron; its weights are a layer's matrix row by row, then its biases, layer after layer."""
 
     hidden: list[Width] = Field(default=[], description="the width of each hidden layer; none: one layer")
@@ -59,13 +59,13 @@ class NetTable(Table):
     seed: Annotated[int, Field(ge=0)] = Field(default=0, description="of random weights")
 
 
-class FunctionTable(Table):
+class FunctionTable(SchemaTable):
     """A casadi function that Python gives: load_problem(..., functions={name: function})."""
 
     weights: Numbers | None = Field(default=None, description="its numbers at the start; default 0")
 
 
-class ControllerTable(Table):
+class ControllerTable(SchemaTable):
     """What drives inputs, step after step. Where several drive the same input, their outputs add up."""
 
     name: Identifier = Field(

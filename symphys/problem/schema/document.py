@@ -12,10 +12,10 @@ from symphys.problem.schema.joints import JointTable
 from symphys.problem.schema.objectives import (
     ConstraintTable,
     CostTable,
-    FallTable,
     ObjectiveTable,
     OutputTable,
     TargetTable,
+    TerminationTable,
     VariableTable,
 )
 from symphys.problem.schema.physics import (
@@ -30,10 +30,10 @@ from symphys.problem.schema.physics import (
     WorldTable,
 )
 from symphys.problem.schema.scenarios import ScenarioTable
-from symphys.problem.schema.types import Label, Table
+from symphys.problem.schema.types import Label, SchemaTable, deprecated
 
 
-class Document(Table):
+class Document(SchemaTable):
     """A symphys problem."""
 
     model_config = ConfigDict(json_schema_extra={"anyOf": [{"required": ["body"]}, {"required": ["include"]}]})
@@ -63,8 +63,14 @@ class Document(Table):
     constraint: list[ConstraintTable] = Field(default=[])
     output: list[OutputTable] = Field(default=[])
     scenario: list[ScenarioTable] = Field(default=[])
-    fall: FallTable | None = None
+    termination: TerminationTable | None = None
+    fall: TerminationTable | None = deprecated("termination")
     objective: ObjectiveTable = ObjectiveTable()
     solver: dict[str, dict[str, Any]] = Field(
         default={}, description="options by solver: [solver.gradient], [solver.cma], ..."
     )
+
+    @property
+    def ending(self) -> tuple[str, TerminationTable | None]:
+        """The table that says when a motion is over, and the key that it has in the file."""
+        return ("fall", self.fall) if self.fall is not None else ("termination", self.termination)

@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import Field, PlainValidator, WithJsonSchema
 
 from symphys.problem.schema import checks
-from symphys.problem.schema.types import Finite, Table, Vector
+from symphys.problem.schema.types import Finite, SchemaTable, Vector
 
 MOST_INCLUDES = 100
 Prefix = Annotated[
@@ -17,7 +17,7 @@ Prefix = Annotated[
 ]
 
 
-class IncludeTable(Table):
+class IncludeTable(SchemaTable):
     """A file whose tables are put before those of this one: a robot, a course.
 
     It holds what a problem file may, but for [simulation], [objective], [solver] and further includes.
@@ -38,7 +38,7 @@ class IncludeTable(Table):
     )
 
 
-class IncludedTable(Table):
+class IncludedTable(SchemaTable):
     """The text of an included file, as run folders keep it."""
 
     file: str = Field(description="as [[include]] names it")

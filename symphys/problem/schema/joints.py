@@ -6,22 +6,31 @@ from typing import Annotated
 
 from pydantic import Field
 
-from symphys.problem.schema.types import Coordinates, Ends, Finite, Identifier, NonNegative, Positive, Table, Vector
+from symphys.problem.schema.types import (
+    Coordinates,
+    Ends,
+    Finite,
+    Identifier,
+    NonNegative,
+    Positive,
+    SchemaTable,
+    Vector,
+)
 
 AXIS = "[x, y, z], world coordinates at the start, any length but 0"
 
 
-class BareTable(Table):
+class BareTable(SchemaTable):
     """A kind without keys: { }."""
 
 
-class AxisTable(Table):
+class AxisTable(SchemaTable):
     """A hinge or a slider."""
 
     axis: Vector = Field(description=f"about or along which the second body moves: {AXIS}")
 
 
-class UniversalTable(Table):
+class UniversalTable(SchemaTable):
     """A universal joint."""
 
     axes: Annotated[list[Vector], Field(min_length=2, max_length=2)] = Field(
@@ -30,7 +39,7 @@ class UniversalTable(Table):
     )
 
 
-class ServoTable(Table):
+class ServoTable(SchemaTable):
     """A motor whose command is an angle, or a position: the target velocity is gain (command - angle)."""
 
     gain: Positive = Field(description="[1/s]")
@@ -41,20 +50,20 @@ class ServoTable(Table):
     )
 
 
-class VelocityTable(Table):
+class VelocityTable(SchemaTable):
     """A motor whose command is a velocity."""
 
     torque: Positive = Field(description="the most that it gives [N m], or [N] where the joint slides")
     velocity: Positive = Field(description="the fastest that it aims at [rad/s], or [m/s]")
 
 
-class TorqueTable(Table):
+class TorqueTable(SchemaTable):
     """A motor whose command is a torque [N m], or a force [N] where the joint slides."""
 
     torque: Positive = Field(description="the most that it gives [N m], or [N] where the joint slides")
 
 
-class MotorTable(Table):
+class MotorTable(SchemaTable):
     """One of three kinds of motors."""
 
     servo: ServoTable | None = Field(default=None, description="{ gain = 20, torque = 30, velocity = 8 }")
@@ -62,7 +71,7 @@ class MotorTable(Table):
     torque: TorqueTable | None = Field(default=None, description="{ torque = 30 }")
 
 
-class SpringTable(Table):
+class SpringTable(SchemaTable):
     """Along every coordinate: torque = -stiffness (angle - rest) - damping rate."""
 
     stiffness: NonNegative = Field(default=0.0, description="[N m/rad], or [N/m]")
@@ -70,7 +79,7 @@ class SpringTable(Table):
     rest: Finite = Field(default=0.0, description="where it gives nothing [rad], or [m]")
 
 
-class JointTable(Table):
+class JointTable(SchemaTable):
     """What holds two bodies together, or a body to the world; coordinates are 0 as the bodies lie in the file.
 
     With ``start`` they begin elsewhere. One of ball, hinge, slider, universal and fixed says how.

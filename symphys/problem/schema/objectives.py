@@ -17,15 +17,15 @@ from symphys.problem.schema.types import (
     NonNegative,
     Numbers,
     Positive,
+    SchemaTable,
     Stop,
-    Table,
     Texts,
 )
 
 Knots = Annotated[int, Field(ge=1, le=1_000_000)]
 
 
-class VariableTable(Table):
+class VariableTable(SchemaTable):
     """Something that a solver may choose."""
 
     name: Identifier = Field(description="how formulas and results refer to it")
@@ -51,7 +51,7 @@ class VariableTable(Table):
     )
 
 
-class CostTable(Table):
+class CostTable(SchemaTable):
     """A term of the objective: a number to make small, or a vector whose squares are summed."""
 
     name: Label
@@ -61,7 +61,7 @@ class CostTable(Table):
     weight: Finite = Field(default=1.0, description="negative makes a value large")
 
 
-class TargetTable(Table):
+class TargetTable(SchemaTable):
     """A vector that should be zero within a tolerance; the objective gets weight * |value|^2."""
 
     name: Label
@@ -71,7 +71,7 @@ class TargetTable(Table):
     weight: NonNegative = 1.0
 
 
-class ConstraintTable(Table):
+class ConstraintTable(SchemaTable):
     """Bounds on every component of a vector."""
 
     name: Label
@@ -86,8 +86,8 @@ class ConstraintTable(Table):
     )
 
 
-class OutputTable(Table):
-    """A number that is told: while solvers work, in results and in reports. Nothing depends on it."""
+class OutputTable(SchemaTable):
+    """A number that is reported: while solvers work, in results and in reports. Nothing depends on it."""
 
     name: Label
     at: Instant = Field(default="end", description='"end" or a time [s]')
@@ -95,7 +95,7 @@ class OutputTable(Table):
     unit: Label | None = Field(default=None, description='such as "m/s"')
 
 
-class FallTable(Table):
+class TerminationTable(SchemaTable):
     """When a motion is over before its time: from then on nothing moves, and running costs stop."""
 
     margin: str = Field(
@@ -105,7 +105,7 @@ class FallTable(Table):
     cost: NonNegative = Field(default=0.0, description="added for every second that is left; more than standing costs")
 
 
-class ObjectiveTable(Table):
+class ObjectiveTable(SchemaTable):
     """When to be content."""
 
     goal: Finite | None = Field(default=None, description="the objective should come down to this")

@@ -17,10 +17,10 @@ from symphys.problem.schema.types import (
     Orientation,
     Pair,
     Positive,
+    SchemaTable,
     Share,
     Smoothing,
     Spacing,
-    Table,
     Vector,
 )
 
@@ -30,7 +30,7 @@ Cuts = Annotated[int, Field(ge=0, le=8)]
 DEFAULT = Scheme()
 
 
-class SimulationTable(Table):
+class SimulationTable(SchemaTable):
     """How time passes."""
 
     duration: Positive = Field(description="how long to simulate [s]; a whole number of time steps")
@@ -73,13 +73,13 @@ class SimulationTable(Table):
     )
 
 
-class WorldTable(Table):
+class WorldTable(SchemaTable):
     """What acts everywhere."""
 
     gravity: Vector = Field(default=list(GRAVITY), description="[m/s^2], for instance [0, 0, -9.81]")
 
 
-class SurfaceTable(Table):
+class SurfaceTable(SchemaTable):
     """What one surface brings into its contacts.
 
     Friction and restitution of a contact are the product of what its two surfaces state, torsion and rolling their
@@ -166,7 +166,7 @@ class TerrainTable(MemberTable):
     origin: Pair | None = Field(default=None, description="x and y of the first height [m]; default [0, 0]")
 
 
-class ContactTable(Table):
+class ContactTable(SchemaTable):
     """The law of contacts for which no surface and no pair states anything else."""
 
     friction: NonNegative = Field(default=0.5, description="Coulomb's coefficient")

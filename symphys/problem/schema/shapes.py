@@ -1,16 +1,62 @@
-"""Tables of shapes: of bodies, of their parts, and of static blocks."""
+"""Tables of shapes: of bodies, of their parts, and of static blocks; a key for each of ``SHAPES``."""
 
 from __future__ import annotations
 
-from pydantic import Field
+from typing import Annotated, Any
 
-from symphys.problem.schema.types import Length, Orientation, Positive, Size, Table, Vector
+from pydantic import Field, PlainValidator, WithJsonSchema, create_model
+
+from symphys.model.shapes import SHAPES, SizeKey, Sphere
+from symphys.problem.schema import checks
+from symphys.problem.schema.types import Orientation, Positive, SchemaTable, Size, Vector
 
 MOST_PARTS = 1000
 UPRIGHT = "quaternion [w, x, y, z], or { roll_deg, pitch_deg, yaw_deg }"
 
 
-class SphereTable(Table):
+def value_of(key: SizeKey) -> Any:
+    """The kind of value of a size."""
+    if key.count == 3:
+        return Size
+    if not key.reason:
+        return Positive
+    return Annotated[
+        float,
+        PlainValidator(checks.positive_number(key.reason)),
+        WithJsonSchema({"type": "number", "exclusiveMinimum": 0}),
+    ]
+
+
+def one_of_the_shapes() -> type[SchemaTable]:
+    """A table with an optional table of sizes for each shape."""
+    fields: dict[str, Any] = {}
+    for kind, shape in SHAPES.items():
+        sizes: dict[str, Any] = {k.name: (value_of(k), Field(description=k.description)) for k in shape.size_keys}
+        name = f"Solid{kind.capitalize()}Table"
+        table = create_model(name, __base__=SchemaTable, __doc__=shape.summary, __module__=__name__, **sizes)
+        fields[kind] = (table | None, Field(default=None, description=shape.example))
+    return create_model("OneShapeTable", __base__=SchemaTable, __module__=__name__, **fields)
+
+
+class SolidTable(one_of_the_shapes()):  # type: ignore[misc]
+    """One of the shapes."""
+
+
+class PartTable(SolidTable):
+    """One part of a compound: a shape, and its place in the body's frame."""
+
+    centre: Vector = Field(default=[0.0, 0.0, 0.0], description="[m], from the centre of mass")
+    orientation: Orientation = Field(default=[1.0, 0.0, 0.0, 0.0], description=UPRIGHT)
+
+
+class PlacedSphereTable(SchemaTable):
+    """One sphere of a compound of spheres."""
+
+    radius: Positive = Field(description="[m]")
+    centre: Vector = Field(default=[0.0, 0.0, 0.0], description="[m], from the centre of mass, in the body's frame")
+
+
+class SphereTable(SchemaTable):
     """A sphere about the centre of mass."""
 
     radius: Positive = Field(description="[m]")
@@ -19,52 +65,10 @@ class SphereTable(Table):
     )
 
 
-class BallTable(Table):
-    """A solid sphere."""
+class ShapeTable(SolidTable):
+    """One of the shapes, or a compound of several."""
 
-    radius: Positive = Field(description="[m]")
-
-
-class BoxTable(Table):
-    """A solid box along its own axes."""
-
-    size: Size = Field(description="full length of its edges along x, y and z [m]")
-
-
-class CapsuleTable(Table):
-    """A solid cylinder with round ends, along its own z axis."""
-
-    radius: Positive = Field(description="[m]")
-    length: Length = Field(description="of the straight part [m]; end to end it is 2 radii longer")
-
-
-class PlacedSphereTable(BallTable):
-    """One sphere of a compound of spheres."""
-
-    centre: Vector = Field(default=[0.0, 0.0, 0.0], description="[m], from the centre of mass, in the body's frame")
-
-
-class SolidTable(Table):
-    """One of the shapes."""
-
-    sphere: BallTable | None = Field(default=None, description="{ radius = 0.5 }")
-    box: BoxTable | None = Field(default=None, description="{ size = [0.2, 0.1, 0.3] }")
-    capsule: CapsuleTable | None = Field(default=None, description="{ radius = 0.05, length = 0.3 }")
-
-
-class PartTable(SolidTable):
-    """One part of a compound: a sphere, a box or a capsule, and its place in the body's frame."""
-
-    centre: Vector = Field(default=[0.0, 0.0, 0.0], description="[m], from the centre of mass")
-    orientation: Orientation = Field(default=[1.0, 0.0, 0.0, 0.0], description=UPRIGHT)
-
-
-class ShapeTable(Table):
-    """A sphere, a box, a capsule, or a compound of several."""
-
-    sphere: SphereTable | None = Field(default=None, description="{ radius = 0.5 }")
-    box: BoxTable | None = Field(default=None, description="{ size = [0.2, 0.1, 0.3] }")
-    capsule: CapsuleTable | None = Field(default=None, description="{ radius = 0.05, length = 0.3 }")
+    sphere: SphereTable | None = Field(default=None, description=Sphere.example)
     spheres: list[PlacedSphereTable] | None = Field(
         default=None,
         min_length=1,

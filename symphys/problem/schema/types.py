@@ -9,10 +9,15 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, PlainValidator
 from symphys.problem.schema import checks
 
 
-class Table(BaseModel):
+class SchemaTable(BaseModel):
     """A table of the file: unknown keys are errors, values are taken as they are written."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+def deprecated(name: str) -> Any:
+    """The field of an optional key that has a new name; ``check_twice`` refuses both."""
+    return Field(default=None, description=f"old name of {name}", json_schema_extra={"deprecated": True})
 
 
 def vector_schema(count: int) -> dict[str, Any]:
@@ -61,7 +66,6 @@ Pair = Annotated[list[float], PlainValidator(checks.vector(2)), WithJsonSchema(v
 Ends = Annotated[list[float], PlainValidator(checks.ends), WithJsonSchema(vector_schema(2))]
 Coordinates = Annotated[list[float], PlainValidator(checks.coordinates), WithJsonSchema(coordinates_schema())]
 Size = Annotated[list[float], PlainValidator(checks.positive(3)), WithJsonSchema(positive_schema(3))]
-Length = Annotated[float, PlainValidator(checks.length), WithJsonSchema({"type": "number", "exclusiveMinimum": 0})]
 Spacing = Annotated[
     list[float],
     PlainValidator(checks.spacing),
@@ -110,7 +114,7 @@ Interpolation = Literal["constant", "linear"]
 Stop = Literal["met", "converged"]
 
 
-class RollPitchYaw(Table):
+class RollPitchYaw(SchemaTable):
     """An orientation as angles: turn by roll about x, then pitch about y, then yaw about z, all fixed world axes."""
 
     roll_deg: Finite = 0.0

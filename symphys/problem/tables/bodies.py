@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.model.shapes import Shape
-from symphys.problem.checks.inertia import centre_of_mass, complaint, volume
+from symphys.problem.checks.inertia import centre_of_mass, inertia_fault
 from symphys.problem.checks.magnitude import check_magnitudes
-from symphys.problem.parametric.parts import COMBINE, BodyPlan
-from symphys.problem.parametric.sizes import extent
+from symphys.problem.parametric.parts import COMBINE, ParametricBody
 from symphys.problem.reading.faults import Faults
 from symphys.problem.schema.physics import BodyTable, SurfaceTable
 from symphys.problem.tables.shapes import read_orientation, read_shape
@@ -22,8 +21,8 @@ OFF_CENTRE = 1e-6
 """How far a compound's centre of mass may be from the body's origin, relative to the size of the compound."""
 
 
-def read_body(index: int, table: BodyTable, faults: Faults) -> BodyPlan:
-    """The plan of one body; notes a mass or inertia that is missing, doubled or impossible."""
+def read_body(index: int, table: BodyTable, faults: Faults) -> ParametricBody:
+    """One body; notes a mass or inertia that is missing, doubled or impossible."""
     place = ("body", index)
     before = len(faults.issues)
     shapes = read_shape(place, table.shape, faults)
@@ -31,8 +30,8 @@ def read_body(index: int, table: BodyTable, faults: Faults) -> BodyPlan:
     hollow = single is not None and single.hollow
     density = read_density(place, table, hollow, faults)
     check_inertia(place, table, shapes, faults)
-    mass = table.mass or (density or 0.0) * sum(volume(shape) for shape in shapes)
-    plan = BodyPlan(
+    mass = table.mass or (density or 0.0) * sum(shape.volume for shape in shapes)
+    body = ParametricBody(
         name=table.name,
         mass=mass,
         density=density if len(shapes) == 1 else None,
@@ -40,12 +39,12 @@ def read_body(index: int, table: BodyTable, faults: Faults) -> BodyPlan:
         hollow=hollow,
         inertia=frozen(table.inertia),
         states=states(table),
-        mates=None if table.collides_with is None else frozenset(table.collides_with),
+        collides_with=None if table.collides_with is None else frozenset(table.collides_with),
         group=table.group,
     )
     if len(faults.issues) == before:
-        check_magnitudes(place, table, plan, faults)
-    return plan
+        check_magnitudes(place, table, body, faults)
+    return body
 
 
 def read_density(place: tuple[str, int], table: BodyTable, hollow: bool, faults: Faults) -> float | None:
@@ -62,7 +61,7 @@ def read_density(place: tuple[str, int], table: BodyTable, hollow: bool, faults:
 def check_inertia(place: tuple[str, int], table: BodyTable, shapes: Sequence[Shape], faults: Faults) -> None:
     """A given inertia must be possible; one that is not given must follow from the shape."""
     if table.inertia is not None:
-        reason = complaint(table.inertia)
+        reason = inertia_fault(table.inertia)
         if reason:
             faults.add((*place, "inertia"), reason)
     elif table.shape is None:
@@ -70,7 +69,7 @@ def check_inertia(place: tuple[str, int], table: BodyTable, shapes: Sequence[Sha
     elif shapes:
         centre = centre_of_mass(shapes)
         off = float(np.linalg.norm(centre))
-        size = max(hypot(*shape.centre) + extent(shape) for shape in shapes)
+        size = max(hypot(*shape.centre) + shape.extent for shape in shapes)
         if not off <= OFF_CENTRE * size:
             key = "spheres" if table.shape.spheres else "parts"
             listed = ", ".join(f"{c:.6g}" for c in centre)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from symphys.model.world import Law
 from symphys.problem.model import Variable
-from symphys.problem.parametric.parts import BodyPlan, PairPlan
-from symphys.problem.parametric.world import WorldPlan
+from symphys.problem.parametric.parts import PairRule, ParametricBody
+from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema import Document
 from symphys.problem.schema.physics import ContactTable, PairTable
@@ -23,9 +23,9 @@ def read_contact(table: ContactTable) -> Law:
 
 def read_pairs(
     tables: Sequence[PairTable], names: Sequence[str], groups: Sequence[str], faults: Faults
-) -> tuple[PairPlan, ...]:
+) -> tuple[PairRule, ...]:
     """The [[pair]] tables; notes names that do not exist and pairs that are stated twice."""
-    pairs: list[PairPlan] = []
+    pairs: list[PairRule] = []
     first: dict[frozenset[str], int] = {}
     for index, table in enumerate(tables):
         place = ("pair", index)
@@ -45,12 +45,12 @@ def read_pairs(
         }
         if own and not table.collide:
             faults.add((*place, "collide"), f"with false, {', '.join(own)} would have no effect; leave one out")
-        pairs.append(PairPlan(f"{a}-{b}", between, table.collide, own))
+        pairs.append(PairRule(f"{a}-{b}", between, table.collide, own))
     return tuple(pairs)
 
 
-def check_mates(
-    bodies: Sequence[BodyPlan], names: Sequence[str], groups: Sequence[str], document: Document, faults: Faults
+def check_collides_with(
+    bodies: Sequence[ParametricBody], names: Sequence[str], groups: Sequence[str], document: Document, faults: Faults
 ) -> None:
     """Every name in collides_with must be another body's, a static surface's or a group's."""
     known = {*names, *groups}
@@ -62,11 +62,11 @@ def check_mates(
                 faults.add(("body", index, "collides_with"), message)
 
 
-def check_ranks(plan: WorldPlan, faults: Faults) -> None:
+def check_ranks(parametric: ParametricWorld, faults: Faults) -> None:
     """Where two [[pair]] tables of a surface and a group both hold for two surfaces, they must say the same."""
-    groups = {part.name: part.group for part in plan.parts}
+    groups = {part.name: part.group for part in parametric.parts}
     found: dict[tuple[str | None, str | None], Rivals] = {}
-    for index, pair in enumerate(plan.pairs):
+    for index, pair in enumerate(parametric.pairs):
         own = {name for name in pair.between if name in groups}
         others = pair.between - own
         if len(own) == 1 and others:
@@ -74,7 +74,7 @@ def check_ranks(plan: WorldPlan, faults: Faults) -> None:
             found.setdefault((group, groups[name]), {}).setdefault(statement(pair), []).append((index, name))
     for (shared, home), rivals in found.items():
         for index, name in (entry for entries in rivals.values() for entry in entries):
-            rival = rival_of(plan, index, name, found.get((home, shared), {}))
+            rival = rival_of(parametric, index, name, found.get((home, shared), {}))
             if rival is not None and rival[0] < index:
                 other, place = rival[1], ("pair", index)
                 text = (
@@ -90,44 +90,44 @@ Rivals = dict[Statement, list[tuple[int, str]]]
 """[[pair]] tables by what they say: (index, the surface that it names)."""
 
 
-def statement(pair: PairPlan) -> Statement:
+def statement(pair: PairRule) -> Statement:
     """What a table says."""
     return (pair.collide, *sorted(pair.states.items()))
 
 
-def rival_of(plan: WorldPlan, index: int, name: str, rivals: Rivals) -> tuple[int, str] | None:
+def rival_of(parametric: ParametricWorld, index: int, name: str, rivals: Rivals) -> tuple[int, str] | None:
     """The first of other tables, with its surface, that contradicts a table for the surface called ``name``."""
-    bodies = {body.name for body in plan.bodies}
-    mine = statement(plan.pairs[index])
+    bodies = {body.name for body in parametric.bodies}
+    mine = statement(parametric.pairs[index])
     for place, other in (entry for said, entries in rivals.items() if said != mine for entry in entries):
-        table = plan.pair(name, other)
+        table = parametric.pair(name, other)
         settled = table is not None and table.between == {name, other}
-        meet = bodies & {name, other} and plan.lets(name, other) and plan.lets(other, name)
+        meet = bodies & {name, other} and parametric.lets(name, other) and parametric.lets(other, name)
         if other != name and meet and not settled:
             return place, other
     return None
 
 
-def check_laws(plan: WorldPlan, faults: Faults) -> None:
+def check_laws(parametric: ParametricWorld, faults: Faults) -> None:
     """A contact is either soft or has restitution; a [[pair]] table must belong to surfaces that may touch."""
-    check_ranks(plan, faults)
-    laws = {plan.owners(pair): pair.law for pair in plan.world({}).pairs}
+    check_ranks(parametric, faults)
+    laws = {parametric.owners(pair): pair.law for pair in parametric.world({}).pairs}
     used = set()
     for owners, law in laws.items():
-        table = plan.pair(*owners)
+        table = parametric.pair(*owners)
         used.add(table and table.name)
         if law.soft and law.restitution:
-            faults.add(law_place(plan, table), f"{' and '.join(sorted(owners))}: {either(law)}")
-    for index, pair in enumerate(plan.pairs):
+            faults.add(law_place(parametric, table), f"{' and '.join(sorted(owners))}: {either(law)}")
+    for index, pair in enumerate(parametric.pairs):
         if pair.collide and pair.name not in used:
-            faults.add(("pair", index, "between"), unused(plan, pair))
-    check_damping(plan, faults)
+            faults.add(("pair", index, "between"), unused(parametric, pair))
+    check_damping(parametric, faults)
 
 
-def check_varied(plan: WorldPlan, variables: Sequence[Variable | None], faults: Faults) -> None:
+def check_varied(parametric: ParametricWorld, variables: Sequence[Variable | None], faults: Faults) -> None:
     """A variable must not give restitution to soft contacts."""
-    soft = {name for pair in plan.world({}).pairs if pair.law.soft for name in plan.owners(pair)}
-    soft |= {pair.name for pair in plan.pairs if pair.states.get("frequency", plan.contact.frequency)}
+    soft = {name for pair in parametric.world({}).pairs if pair.law.soft for name in parametric.owners(pair)}
+    soft |= {pair.name for pair in parametric.pairs if pair.states.get("frequency", parametric.contact.frequency)}
     for index, variable in enumerate(variables):
         for slot in variable.slots if variable else ():
             owner, _, key = slot.name.rpartition(".")
@@ -144,28 +144,28 @@ def either(law: Law) -> str:
     )
 
 
-def unused(plan: WorldPlan, pair: PairPlan) -> str:
+def unused(parametric: ParametricWorld, pair: PairRule) -> str:
     """The message for a [[pair]] table that holds for no two surfaces."""
-    if any(pair.between == jointed.between for jointed in plan.jointed):
+    if any(pair.between == jointed.between for jointed in parametric.jointed):
         return "a joint holds these two, which do not touch unless it says collide = true"
-    if pair.between <= {part.name for part in plan.parts}:
+    if pair.between <= {part.name for part in parametric.parts}:
         return "these two never touch, so that nothing can be stated about them"
     return "no two of these ever touch, or tables that name them more closely go before this one: it has no effect"
 
 
-def law_place(plan: WorldPlan, table: PairPlan | None) -> Place:
+def law_place(parametric: ParametricWorld, table: PairRule | None) -> Place:
     """Where the frequency of a pair is stated."""
     if table and "frequency" in table.states:
-        return ("pair", plan.pairs.index(table), "frequency")
+        return ("pair", parametric.pairs.index(table), "frequency")
     return ("contact", "frequency")
 
 
-def check_damping(plan: WorldPlan, faults: Faults) -> None:
+def check_damping(parametric: ParametricWorld, faults: Faults) -> None:
     """Damping without softness would have no effect."""
     stated = faults.data.get("contact", {})
-    soft = plan.contact.soft or any(pair.states.get("frequency") for pair in plan.pairs)
+    soft = parametric.contact.soft or any(pair.states.get("frequency") for pair in parametric.pairs)
     if "damping" in stated and not soft:
         faults.add(("contact", "damping"), "has no effect on rigid contacts; give frequency too")
-    for index, pair in enumerate(plan.pairs):
-        if "damping" in pair.states and not pair.states.get("frequency", plan.contact.frequency):
+    for index, pair in enumerate(parametric.pairs):
+        if "damping" in pair.states and not pair.states.get("frequency", parametric.contact.frequency):
             faults.add(("pair", index, "damping"), "has no effect on a rigid contact; give frequency too")

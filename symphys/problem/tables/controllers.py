@@ -1,21 +1,22 @@
-"""The [[controller]] tables: what they drive, what they sense, and their numbers at the start."""
+"""The [[sensor]] and [[controller]] tables: what is sensed, what it drives, and the numbers at the start."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.expression import Formula, FormulaError, parse
 from symphys.model.controllers import ControlLaw, Custom, Linear, Net, Periodic
 from symphys.problem.checks.memory import check_net
 from symphys.problem.feedback import Controller, Sensor
 from symphys.problem.quantities import Quantity, SlotError, read_slot
 from symphys.problem.reading.faults import Faults, Place
-from symphys.problem.schema.control import ControllerTable, NetTable
-from symphys.problem.tables.weights import random_weights, read_weights
+from symphys.problem.schema.control import ControllerTable, NetTable, SensorTable
 from symphys.suggest import hint, quote
 
 Array = NDArray[np.float64]
@@ -25,6 +26,28 @@ KINDS = {
     "net": "net = { hidden = [32, 32] }",
     "function": "function = {}",
 }
+
+
+def read_sensors(tables: Sequence[SensorTable], sample: Mapping[str, Any], faults: Faults) -> tuple[Sensor, ...]:
+    """Every sensor; ``sample`` has a value for each name that a sensor may read."""
+    return tuple(_read(index, table, sample, faults) for index, table in enumerate(tables))
+
+
+def _read(index: int, table: SensorTable, sample: Mapping[str, Any], faults: Faults) -> Sensor:
+    formulas: list[Formula] = []
+    size = 0
+    for text in table.reads:
+        try:
+            formula = parse(text)
+            value = ca.DM(formula.evaluate(sample))
+        except FormulaError as error:
+            faults.add(("sensor", index, "reads"), str(error))
+            continue
+        if not value.is_regular():
+            faults.add(("sensor", index, "reads"), f"{text} is not a finite number at the start of the guess")
+        formulas.append(formula)
+        size += int(value.shape[0])
+    return Sensor(table.name, tuple(formulas), size)
 
 
 def read_controllers(
@@ -46,15 +69,17 @@ def read_controllers(
         varied: names of quantities that variables set.
     """
     widths = {sensor.name: sensor.size for sensor in sensors}
-    readers = [Reader(index, table, widths, known, functions, faults, varied) for index, table in enumerate(tables)]
+    readers = [
+        ControllerReader(index, table, widths, known, functions, faults, varied) for index, table in enumerate(tables)
+    ]
     found = [reader.read() for reader in readers]
     for name in functions.keys() - {table.name for table in tables if table.function is not None}:
         faults.add(("controller",), f'Python gives a function {quote(name)}, but no controller "{name}" has function')
     return tuple(controller for controller in found if controller)
 
 
-class Reader:
-    """Reads one table; every complaint lands below its place."""
+class ControllerReader:
+    """Reads one table; every fault is noted below its place."""
 
     def __init__(
         self,
@@ -183,3 +208,39 @@ class Reader:
 def regular(value: Any) -> bool:
     """Whether lists of lists are equally long."""
     return not isinstance(value, list) or len({len(row) if isinstance(row, list) else 0 for row in value}) == 1
+
+
+def random_weights(net: Net, spread: float, seed: int) -> Array:
+    """(w,) normally distributed, with a standard deviation of spread / sqrt(inputs of the layer); biases are 0."""
+    rng = np.random.default_rng(seed)
+    weights = np.zeros(net.sizes["weights"])
+    for layer in net.layers():
+        count = layer.matrix.stop - layer.matrix.start
+        weights[layer.matrix] = spread / np.sqrt(layer.inputs) * rng.standard_normal(count)
+    straight = weights[net.straight]
+    straight[:] = spread / np.sqrt(net.senses) * rng.standard_normal(straight.size)
+    return weights
+
+
+def read_weights(faults: Faults, place: Place, name: str, net: Net) -> Array:
+    """(w,) from a .npy file, whose path is relative to the file that names it; zeros after a fault."""
+    path = Path(faults.origin(place).file).parent / name
+    count = net.sizes["weights"]
+    try:
+        array = np.load(path, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        reason = getattr(error, "strerror", None) or "it is no .npy file of numbers"
+        faults.add(place, f"{path} cannot be read: {reason}")
+        return np.zeros(count)
+    if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu":
+        faults.add(place, f"{path} does not hold one array of numbers")
+    elif array.size != count or array.ndim != 1:
+        layers = ", ".join(f"{layer.outputs} x {layer.inputs}" for layer in net.layers())
+        text = f"has the shape {array.shape}; the net has {count} weights, so ({count},) is needed: matrices {layers}"
+        faults.add(place, f"{path} {text}{' with biases' if net.biases else ''}")
+    elif not np.isfinite(array).all():
+        k = int(np.argmax(~np.isfinite(array)))
+        faults.add(place, f"{path} holds numbers that are not finite; the first is number {k}")
+    else:
+        return array.astype(float)
+    return np.zeros(count)

@@ -122,7 +122,7 @@ def about(x: Array, near: Array) -> Array:
 
 
 def unit(place: Place, axis: Sequence[float], faults: Faults) -> Array | None:
-    """(3,) of length 1; None after a complaint."""
+    """(3,) of length 1; None after a fault."""
     length = float(np.linalg.norm(axis))
     if not 1e-12 < length < np.inf:
         faults.add(place, "an axis must not be zero; [0, 0, 1] points up")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.model.joints import KINDS, Kind, Limits, Motor, Servo, Spring, TorqueMotor, VelocityMotor
-from symphys.problem.parametric.joints import WORLD, JointPlan
+from symphys.problem.parametric.joints import WORLD, ParametricJoint
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.joints import JointTable, MotorTable, SpringTable
 from symphys.problem.tables.joint_frames import read_sockets
@@ -27,7 +27,7 @@ EXAMPLES = {
 
 def read_joints(
     tables: Sequence[JointTable], bodies: Sequence[str], initial: Mapping[str, Array], faults: Faults
-) -> tuple[JointPlan, ...]:
+) -> tuple[ParametricJoint, ...]:
     """The [[joint]] tables; notes what is impossible, and loops in which nothing can move.
 
     Args:
@@ -36,12 +36,12 @@ def read_joints(
         initial: their state at the start; see ``Problem.initial``.
         faults: gets what is wrong.
     """
-    found = [Reader(index, table, bodies, initial, faults).read() for index, table in enumerate(tables)]
+    found = [JointReader(index, table, bodies, initial, faults).read() for index, table in enumerate(tables)]
     check_loops(found, faults)
-    return tuple(plan for plan in found if plan)
+    return tuple(joint for joint in found if joint)
 
 
-def check_loops(plans: Sequence[JointPlan | None], faults: Faults) -> None:
+def check_loops(joints: Sequence[ParametricJoint | None], faults: Faults) -> None:
     """Rigid fixed joints must not close a loop: what each of them carries would not be determined."""
     whole: dict[str, str] = {}
 
@@ -50,22 +50,22 @@ def check_loops(plans: Sequence[JointPlan | None], faults: Faults) -> None:
             name = whole[name]
         return name
 
-    for index, plan in enumerate(plans):
-        if plan is None or plan.kind.name != "fixed" or plan.frequency:
+    for index, joint in enumerate(joints):
+        if joint is None or joint.kind.name != "fixed" or joint.frequency:
             continue
-        a, b = root(plan.first), root(plan.second or WORLD)
+        a, b = root(joint.first), root(joint.second or WORLD)
         if a == b:
             text = (
-                f"{plan.second or WORLD} and {plan.first} are held together by other fixed joints already; leave this "
-                "one out, or let one of them give way with a frequency"
+                f"{joint.second or WORLD} and {joint.first} are held together by other fixed joints already; leave "
+                "this one out, or let one of them give way with a frequency"
             )
             faults.add(("joint", index, "fixed"), text)
         else:
             whole[a] = b
 
 
-class Reader:
-    """Reads one table; every complaint lands below its place."""
+class JointReader:
+    """Reads one table; every fault is noted below its place."""
 
     def __init__(
         self, index: int, table: JointTable, bodies: Sequence[str], initial: Mapping[str, Array], faults: Faults
@@ -78,7 +78,7 @@ class Reader:
         """Note a fault of one key, or of a key of a table within."""
         self.faults.add((*self.place, *key.split(".")), message)
 
-    def read(self) -> JointPlan | None:
+    def read(self) -> ParametricJoint | None:
         """The joint; None if it is unclear what it holds together, or how."""
         before, table = len(self.faults.issues), self.table
         self.check_between()
@@ -90,7 +90,7 @@ class Reader:
         second, first = (None if name == WORLD else name for name in table.between)
         assert first is not None
         limits = self.limits(kind)
-        return JointPlan(
+        return ParametricJoint(
             name=table.name,
             kind=kind,
             first=first,

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Aims:
+class Objectives:
     """All that should come out."""
 
     costs: tuple[Cost, ...]
@@ -30,14 +30,16 @@ class Aims:
     outputs: tuple[Output, ...]
 
 
-def read_aims(document: Document, simulation: Simulation, sample: Mapping[str, Any], faults: Faults) -> Aims:
-    """Every aim; ``sample`` has a value for each name that a formula may use."""
-    reader = Reader(simulation, sample, faults)
+def read_objectives(
+    document: Document, simulation: Simulation, sample: Mapping[str, Any], faults: Faults
+) -> Objectives:
+    """All of them; ``sample`` has a value for each name that a formula may use."""
+    reader = ObjectiveReader(simulation, sample, faults)
     costs = [reader.cost(index, table) for index, table in enumerate(document.cost)]
     targets = [reader.target(index, table) for index, table in enumerate(document.target)]
     constraints = [reader.constraint(index, table) for index, table in enumerate(document.constraint)]
     outputs = [reader.output(index, table) for index, table in enumerate(document.output)]
-    return Aims(
+    return Objectives(
         tuple(cost for cost in costs if cost),
         tuple(target for target in targets if target),
         tuple(constraint for constraint in constraints if constraint),
@@ -45,7 +47,7 @@ def read_aims(document: Document, simulation: Simulation, sample: Mapping[str, A
     )
 
 
-class Reader:
+class ObjectiveReader:
     """Reads one table at a time; None stands for one with a faulty formula."""
 
     def __init__(self, simulation: Simulation, sample: Mapping[str, Any], faults: Faults) -> None:
@@ -91,7 +93,7 @@ class Reader:
         return found and Target(table.name, found[0], table.at, table.tolerance, table.weight)
 
     def output(self, index: int, table: OutputTable) -> Output | None:
-        """One number that is told."""
+        """One output."""
         place = ("output", index)
         check_moment(table.at, self.simulation, (*place, "at"), self.faults)
         found = self.formula((*place, "value"), table.value, table.at)

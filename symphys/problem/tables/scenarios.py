@@ -9,14 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.model.state_layout import GIVEN
-from symphys.problem.model import Simulation, Slot, Variable
-from symphys.problem.parametric.forward_kinematics import spanning
-from symphys.problem.parametric.joints import WORLD, JointPlan
-from symphys.problem.parametric.world import WorldPlan
+from symphys.problem.model import (
+    Discretisation,
+    RandomizedPose,
+    RandomizedQuantity,
+    Scenarios,
+    Simulation,
+    Variable,
+    VariableSlot,
+)
+from symphys.problem.parametric.forward_kinematics import spanning_tree
+from symphys.problem.parametric.joints import WORLD, ParametricJoint
+from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.quantities import Quantity, SlotError, limits, read_slot
-from symphys.problem.randomization import Grid, Posed, Scenarios, Varied
 from symphys.problem.reading.faults import Faults, Place
-from symphys.problem.schema.scenarios import GridTable, ScenarioTable
+from symphys.problem.schema.scenarios import DiscretisationTable, ScenarioTable
 from symphys.problem.tables.simulation import check_steps
 from symphys.suggest import hint, quote
 
@@ -29,7 +36,7 @@ KINDS = ("sets", "robot", "simulation")
 def read_scenarios(
     tables: Sequence[ScenarioTable],
     known: Mapping[str, Quantity],
-    plan: WorldPlan,
+    parametric: ParametricWorld,
     simulation: Simulation,
     variables: Sequence[Variable],
     faults: Faults,
@@ -39,23 +46,34 @@ def read_scenarios(
     for variable in variables:
         for slot in variable.slots:
             taken |= {(slot.name, k): f"variable {variable.name}" for k in slot.components}
-    reader = Reader(known, plan, simulation, taken, faults)
+    reader = ScenarioReader(known, parametric, simulation, taken, faults)
     for index, table in enumerate(tables):
         reader.read(index, table)
-    return Scenarios(tuple(reader.varied), tuple(reader.posed), tuple(reader.grids))
+    return Scenarios(tuple(reader.quantities), tuple(reader.poses), tuple(reader.discretisations))
 
 
-class Reader:
+class ScenarioReader:
     """Reads one table after the other."""
 
     def __init__(
-        self, known: Mapping[str, Quantity], plan: WorldPlan, simulation: Simulation, taken: Taken, faults: Faults
+        self,
+        known: Mapping[str, Quantity],
+        parametric: ParametricWorld,
+        simulation: Simulation,
+        taken: Taken,
+        faults: Faults,
     ) -> None:
         """Nothing is read yet."""
-        self.known, self.plan, self.simulation, self.taken, self.faults = known, plan, simulation, taken, faults
-        self.varied: list[Varied] = []
-        self.posed: list[Posed] = []
-        self.grids: list[Grid] = []
+        self.known, self.parametric, self.simulation, self.taken, self.faults = (
+            known,
+            parametric,
+            simulation,
+            taken,
+            faults,
+        )
+        self.quantities: list[RandomizedQuantity] = []
+        self.poses: list[RandomizedPose] = []
+        self.discretisations: list[Discretisation] = []
 
     def read(self, index: int, table: ScenarioTable) -> None:
         """One table."""
@@ -71,7 +89,7 @@ class Reader:
             self.grid(place, table.name, table.simulation)
 
     def numbers(self, place: Place, table: ScenarioTable) -> None:
-        """Numbers that are drawn."""
+        """Numbers that are sampled."""
         try:
             slots = tuple(read_slot(text, self.known) for text in table.sets or ())
         except SlotError as error:
@@ -94,7 +112,9 @@ class Reader:
         lower, upper = (np.stack(ends) for ends in zip(*(limits(slot, self.known) for slot in slots), strict=True))
         self.check_physical((*place, "shift"), slots, spread, lower, upper)
         factor, lasts = table.factor or 0.0, table.lasts or 0.0
-        self.varied.append(Varied(table.name, kind, slots, factor, spread, table.alike, lasts, lower, upper))
+        self.quantities.append(
+            RandomizedQuantity(table.name, kind, slots, factor, spread, table.alike, lasts, lower, upper)
+        )
 
     def check_lasting(self, place: Place, seconds: float | None, kind: str) -> None:
         """Inputs alone last, and not beyond the motion."""
@@ -103,7 +123,9 @@ class Reader:
         elif seconds is not None and seconds > self.simulation.duration:
             self.faults.add(place, f"is longer than the motion, {self.simulation.duration:g} s")
 
-    def check_physical(self, place: Place, slots: Sequence[Slot], shift: Array, lower: Array, upper: Array) -> None:
+    def check_physical(
+        self, place: Place, slots: Sequence[VariableSlot], shift: Array, lower: Array, upper: Array
+    ) -> None:
         """What is added must not lead beyond what is physical."""
         for slot, low, high in zip(slots, lower, upper, strict=True):
             nominal = self.known[slot.name].nominal[list(slot.components)]
@@ -113,7 +135,7 @@ class Reader:
                     place, f"would take {slot.name} from {ends}; physical is {low.max():g} to {high.min():g}"
                 )
 
-    def take(self, place: Place, slots: Sequence[Slot], name: str) -> None:
+    def take(self, place: Place, slots: Sequence[VariableSlot], name: str) -> None:
         """Note who sets what; refuse second ones."""
         for slot in slots:
             for k in slot.components:
@@ -123,17 +145,17 @@ class Reader:
                     return
 
     def pose(self, place: Place, table: ScenarioTable, robot: str) -> None:
-        """A robot whose pose is drawn."""
-        bodies = [body.name for body in self.plan.bodies]
+        """A robot whose pose is sampled."""
+        bodies = [body.name for body in self.parametric.bodies]
         if robot not in bodies:
             self.faults.add((*place, "robot"), f"there is no body {quote(robot)}; {hint(robot, bodies)}")
             return
-        whole = together(robot, self.plan.joints)
+        whole = together(robot, self.parametric.joints)
         if WORLD in whole:
             self.faults.add((*place, "robot"), f"{robot} hangs on the world; only what moves freely has a pose")
             return
         slots = [
-            Slot(f"{body}.{field}", tuple(range(4 if field == "orientation" else 3)))
+            VariableSlot(f"{body}.{field}", tuple(range(4 if field == "orientation" else 3)))
             for body in whole
             for field in GIVEN
         ]
@@ -141,20 +163,20 @@ class Reader:
         tilt, bend = table.tilt + np.deg2rad(table.tilt_deg), table.joints + np.deg2rad(table.joints_deg)
         if not (tilt or bend or table.velocity):
             self.faults.add((*place, "tilt"), "give tilt, joints or velocity, or several of them")
-        joints = bending(self.plan.joints, whole)
-        self.posed.append(Posed(table.name, tuple(whole), joints, float(tilt), float(bend), table.velocity))
+        joints = bending(self.parametric.joints, whole)
+        self.poses.append(RandomizedPose(table.name, tuple(whole), joints, float(tilt), float(bend), table.velocity))
 
-    def grid(self, place: Place, name: str, table: GridTable) -> None:
+    def grid(self, place: Place, name: str, table: DiscretisationTable) -> None:
         """Another discretisation."""
         given = {key: value for key in ("dt", "sweeps") if (value := getattr(table, key)) is not None}
         if not given:
             self.faults.add((*place, "simulation"), "give dt, sweeps or both")
         if table.dt is not None:
             check_steps(self.simulation.duration, table.dt, self.faults, (*place, "simulation", "dt"))
-        self.grids.append(Grid(name, replace(self.simulation, **given)))
+        self.discretisations.append(Discretisation(name, replace(self.simulation, **given)))
 
 
-def together(body: str, joints: Sequence[JointPlan]) -> list[str]:
+def together(body: str, joints: Sequence[ParametricJoint]) -> list[str]:
     """The bodies that joints hold together with one, the world too."""
     found = {body: None}
     while True:
@@ -165,9 +187,9 @@ def together(body: str, joints: Sequence[JointPlan]) -> list[str]:
         found |= dict.fromkeys(more)
 
 
-def bending(joints: Sequence[JointPlan], bodies: Sequence[str]) -> tuple[JointPlan, ...]:
+def bending(joints: Sequence[ParametricJoint], bodies: Sequence[str]) -> tuple[ParametricJoint, ...]:
     """The rigid hinges of a robot that close no loop."""
-    tree = spanning(joints)
+    tree = spanning_tree(joints)
     return tuple(
         joint
         for joint in joints

@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.maths import rotation
-from symphys.model.shapes import UPRIGHT, Box, Capsule, Shape, Sphere
-from symphys.problem.parametric.sizes import flatness
+from symphys.model.shapes import SHAPES, UPRIGHT, Shape, Sphere
 from symphys.problem.reading.faults import Faults, Place
+from symphys.problem.reading.value_texts import listed
 from symphys.problem.schema.shapes import PartTable, ShapeTable, SolidTable
 from symphys.problem.schema.types import RollPitchYaw
 
 Array = NDArray[np.float64]
-SINGLE = ("sphere", "box", "capsule")
-EXAMPLES = "{ sphere = { radius = 0.5 } }, { box = { size = [1, 2, 3] } } or { capsule = { radius = 0.1, length = 1 } }"
+KINDS = tuple(SHAPES)
+EXAMPLES = listed([f"{{ {kind} = {shape.example} }}" for kind, shape in SHAPES.items()], "or")
 COMPOUND = "{ parts = [{ box = { size = [1, 2, 3] }, centre = [0.5, 0, 0] }, ...] }"
 
 
@@ -26,11 +26,11 @@ def read_shape(place: Place, table: ShapeTable | None, faults: Faults) -> tuple[
     if table is None:
         return ()
     place = (*place, "shape")
-    given = [key for key in (*SINGLE, "spheres", "parts") if getattr(table, key) is not None]
+    given = [key for key in (*KINDS, "spheres", "parts") if getattr(table, key) is not None]
     if len(given) != 1:
         faults.add(
             place,
-            f"{wanted(given)} one of sphere, box, capsule, spheres and parts: {EXAMPLES}, or several: {COMPOUND}",
+            f"{wanted(given)} one of {', '.join(KINDS)}, spheres and parts: {EXAMPLES}, or several: {COMPOUND}",
         )
         return ()
     if table.spheres is not None:
@@ -38,11 +38,11 @@ def read_shape(place: Place, table: ShapeTable | None, faults: Faults) -> tuple[
     if table.parts is not None:
         found = [read_part((*place, "parts", k), part, faults) for k, part in enumerate(table.parts)]
         return tuple(shape for shape in found if shape) if all(found) else ()
-    return (solid(place, table, three([0, 0, 0]), UPRIGHT, faults),)
+    return (solid(place, table, given[0], three([0, 0, 0]), UPRIGHT, faults),)
 
 
 def read_part(place: Place, table: PartTable, faults: Faults) -> Shape | None:
-    """One part of a compound; None after a complaint."""
+    """One part of a compound; None after a fault."""
     orientation = read_orientation((*place, "orientation"), table.orientation, faults)
     return read_solid(place, table, table.centre, orientation, faults)
 
@@ -50,36 +50,30 @@ def read_part(place: Place, table: PartTable, faults: Faults) -> Shape | None:
 def read_solid(
     place: Place, table: SolidTable, centre: Sequence[float], orientation: Array, faults: Faults
 ) -> Shape | None:
-    """The one shape of a table; None after a complaint."""
-    given = [key for key in SINGLE if getattr(table, key) is not None]
+    """The one shape of a table; None after a fault."""
+    given = [key for key in KINDS if getattr(table, key) is not None]
     if len(given) != 1:
-        faults.add(place, f"{wanted(given)} one of sphere, box and capsule: {EXAMPLES}")
+        faults.add(place, f"{wanted(given)} one of {listed(KINDS, 'and')}: {EXAMPLES}")
         return None
     w, x, y, z = (float(q) for q in orientation)
-    return solid(place, table, three(centre), (w, x, y, z), faults)
+    return solid(place, table, given[0], three(centre), (w, x, y, z), faults)
 
 
 def solid(
     place: Place,
-    table: ShapeTable | SolidTable,
+    table: SolidTable,
+    kind: str,
     centre: tuple[float, float, float],
     orientation: tuple[float, float, float, float],
     faults: Faults,
 ) -> Shape:
-    """The sphere, box or capsule of a table that has one; notes one that is too flat."""
-    if table.sphere is not None:
-        return Sphere(table.sphere.radius, centre)
-    shape: Box | Capsule
-    if table.box is not None:
-        shape = Box(three([edge / 2 for edge in table.box.size]), centre, orientation)
-        place = (*place, "box", "size")
-    else:
-        assert table.capsule is not None
-        shape = Capsule(table.capsule.radius, table.capsule.length / 2, centre, orientation)
-        place = (*place, "capsule")
-    reason = flatness(shape)
+    """The shape of this kind that a table has; notes one that is too flat."""
+    cls, own = SHAPES[kind], getattr(table, kind)
+    keys = [key.name for key in cls.size_keys]
+    shape = cls.from_sizes({key: getattr(own, key) for key in keys}, centre, orientation)
+    reason = shape.flatness
     if reason:
-        faults.add(place, reason)
+        faults.add((*place, kind, *(keys if len(keys) == 1 else [])), reason)
     return shape
 
 

@@ -1,47 +1,34 @@
-"""The [fall] table: where a motion is over, and what that does to costs."""
+"""The [termination] table, formerly [fall]: where a motion is over, and what that does to costs."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
 
-from symphys.expression import Formula, FormulaError, parse
-from symphys.problem.model import Cost
+from symphys.expression import FormulaError, parse
+from symphys.problem.model import ALIVE, Cost, Termination
 from symphys.problem.reading.faults import Faults
-from symphys.problem.schema.objectives import FallTable
-
-ALIVE = "alive"
-COST = "fall"
+from symphys.problem.schema import Document
 
 
-@dataclass(frozen=True)
-class Fall:
-    """Where a motion is over before its time: from then on nothing moves.
-
-    Attributes:
-        margin: of a number of the state; over where it is below 0.
-    """
-
-    margin: Formula
-
-
-def read_fall(
-    table: FallTable | None, sample: Mapping[str, Any], inputs: Collection[str], faults: Faults
-) -> Fall | None:
-    """The fall; None without one, or with a faulty formula.
+def read_termination(
+    document: Document, sample: Mapping[str, Any], inputs: Collection[str], faults: Faults
+) -> Termination | None:
+    """The termination; None without one, or with a faulty formula.
 
     Args:
-        table: of the file.
+        document: the file, with one of the two tables or none.
         sample: every name that a sensor may read, with its value at the start of the guess.
         inputs: names of forces, torques and commands, which are not of the state.
         faults: gets what is wrong.
     """
+    key, table = document.ending
     if table is None:
         return None
-    place = ("fall", "margin")
+    place = (key, "margin")
     try:
         formula = parse(table.margin)
         value = ca.DM(formula.evaluate({k: v for k, v in sample.items() if k != "time" and k not in inputs}))
@@ -52,18 +39,21 @@ def read_fall(
         faults.add(place, f"must be a number, but is a vector of {value.shape[0]}; min(a, b) is the smaller one")
     elif not float(value) >= 0:
         faults.add(place, f"is {float(value):.4g} at the start of the guess, so it would be over at once; 0 or more")
-    return Fall(formula)
+    return Termination(formula)
 
 
-def stopped(cost: Cost) -> Cost:
-    """A running cost that stops at the fall."""
+def with_termination_cost(document: Document, costs: tuple[Cost, ...], faults: Faults) -> tuple[Cost, ...]:
+    """The costs, running ones until the termination, and that of the time which is left; it is called as the table."""
+    key, table = document.ending
+    if table is None:
+        return costs
+    for index, cost in enumerate(costs):
+        if cost.name == key:
+            faults.add(("cost", index, "name"), f'"{key}" is the name of the cost that [{key}] adds; choose another')
+    left = Cost(key, parse(f"1 - {ALIVE}"), "always", table.cost, squares=True)
+    return (*map(until_termination, costs), *([left] if table.cost > 0 else []))
+
+
+def until_termination(cost: Cost) -> Cost:
+    """A running cost that stops at the termination."""
     return replace(cost, formula=parse(f"({cost.formula.text}) * {ALIVE}")) if cost.at == "always" else cost
-
-
-def costs_of_falling(table: FallTable, costs: tuple[Cost, ...], faults: Faults) -> tuple[Cost, ...]:
-    """The costs as a fall leaves them, and that of the time which is left."""
-    if any(cost.name == COST for cost in costs):
-        index = [cost.name for cost in costs].index(COST)
-        faults.add(("cost", index, "name"), f'"{COST}" is the name of the cost that [fall] adds; choose another')
-    last = Cost(COST, parse(f"1 - {ALIVE}"), "always", table.cost, squares=True)
-    return (*map(stopped, costs), *([last] if table.cost > 0 else []))

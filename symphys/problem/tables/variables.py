@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.problem.checks.magnitude import check_mass
-from symphys.problem.model import Kind, Simulation, Slot, Variable
+from symphys.problem.model import Kind, Simulation, Variable, VariableSlot
 from symphys.problem.quantities import OPEN, Quantity, SlotError, limits, physical, read_slot
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.objectives import VariableTable
@@ -21,8 +21,8 @@ Mask = NDArray[np.bool_]
 WEIGHTS = 0.1
 
 
-class Reader:
-    """Reads one table; every complaint lands below its place."""
+class VariableReader:
+    """Reads one table; every fault is noted below its place."""
 
     def __init__(self, index: int, table: VariableTable, known: Mapping[str, Quantity], faults: Faults) -> None:
         """Keep what all steps need."""
@@ -61,8 +61,8 @@ class Reader:
         self.check_numbers(variable)
         return variable
 
-    def slots(self) -> tuple[Slot, ...]:
-        """What is set; empty after a complaint."""
+    def slots(self) -> tuple[VariableSlot, ...]:
+        """What is set; empty after a fault."""
         found = []
         for text in self.table.sets:
             try:
@@ -98,13 +98,13 @@ class Reader:
         if linear and knots < 2:
             self.add("knots", "linear interpolation needs 2 or more knots")
 
-    def nominal(self, slots: Sequence[Slot]) -> Array | None:
+    def nominal(self, slots: Sequence[VariableSlot]) -> Array | None:
         """(components,): the value in the file, if it is the same for all slots."""
         values = [self.known[slot.name].nominal[list(slot.components)] for slot in slots]
         same = all(np.array_equal(a, b) for a, b in pairwise(values))
         return values[0] if same else None
 
-    def usual_scale(self, slots: Sequence[Slot], kind: Kind) -> Array | float:
+    def usual_scale(self, slots: Sequence[VariableSlot], kind: Kind) -> Array | float:
         """Parameters vary by their own size, numbers of controllers by WEIGHTS, everything else by 1."""
         value = self.nominal(slots)
         if kind == "weight":
@@ -185,7 +185,7 @@ def read_variables(
     tables: Sequence[VariableTable], known: Mapping[str, Quantity], simulation: Simulation, faults: Faults
 ) -> tuple[Variable, ...]:
     """All variables; notes quantities that are set twice."""
-    found = [Reader(index, table, known, faults).read(simulation) for index, table in enumerate(tables)]
+    found = [VariableReader(index, table, known, faults).read(simulation) for index, table in enumerate(tables)]
     owners: dict[str, NDArray[np.intp]] = {name: np.full(quantity.nominal.size, -1) for name, quantity in known.items()}
     for index, variable in enumerate(found):
         for slot in variable.slots if variable else ():

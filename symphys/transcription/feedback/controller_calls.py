@@ -23,7 +23,7 @@ class Places(Protocol):
 
     rollout: Rollout
     layout: MemoryLayout
-    knob: Place
+    smoothing: Place
     x: Place
     given: Place
     u: Place
@@ -35,10 +35,10 @@ def control_calls(rollout: Rollout, places: Places) -> list[FunctionCall]:
     """The calls that come before those of a step: from ``x`` and ``given`` to ``u``; none without controllers."""
     if rollout.feedback is None:
         return []
-    return Writer(rollout, places).calls
+    return ControllerCalls(rollout, places).calls
 
 
-class Writer:
+class ControllerCalls:
     """Writes the calls of one step, one after the other."""
 
     def __init__(self, rollout: Rollout, places: Places) -> None:

@@ -10,7 +10,7 @@ import casadi as ca
 from symphys.model.state_layout import input_columns, input_sizes, inputs_size
 from symphys.model.world import World
 from symphys.problem import Controller, Problem, Sensor
-from symphys.transcription.feedback.sensor_memory import Memory
+from symphys.transcription.feedback.sensor_memory import SensorMemory
 from symphys.transcription.formula_names import Parameters, instant, namespace
 
 Expr = Any
@@ -21,7 +21,7 @@ class Control:
     """The sensors and controllers of a problem, as functions that a rollout calls in every step."""
 
     def __init__(
-        self, problem: Problem, world: World, inputs: Sequence[str], parameters: Parameters, memory: Memory
+        self, problem: Problem, world: World, inputs: Sequence[str], parameters: Parameters, memory: SensorMemory
     ) -> None:
         """Nothing is built before it is asked for."""
         self.problem, self.world, self.inputs, self.parameters, self.memory = problem, world, inputs, parameters, memory

@@ -1,4 +1,4 @@
-"""What sensors need to know of the step before: commands and velocities, carried along behind the world's state."""
+"""What sensors need to know of the step before: commands and velocities, stored behind the world's state."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ Expr = Any
 
 
 @dataclass(frozen=True)
-class Memory:
+class SensorMemory:
     """Columns after those of the world's state (``Layout``).
 
     Attributes:
         world: what is simulated.
         inputs: names of the inputs that are remembered.
         bodies: names of the bodies whose velocity is remembered.
-        falls: whether there is ``alive`` at the end: 1 until a fall, 0 from then on; ``after`` leaves it out.
+        terminates: whether the last column is ``alive``: 1 until the termination, 0 from then on; ``after`` omits it.
     """
 
     world: World
     inputs: tuple[str, ...] = ()
     bodies: tuple[str, ...] = ()
-    falls: bool = False
+    terminates: bool = False
 
     @cached_property
     def columns(self) -> dict[str, slice]:
         """Where each lies in the whole state: inputs by their names, velocities as ``torso.velocity``."""
         sizes, start, found = input_sizes(self.world), Layout(self.world).size, dict[str, slice]()
         lengths = [(name, sizes[name]) for name in self.inputs] + [(f"{body}.velocity", 3) for body in self.bodies]
-        lengths += [(ALIVE, 1)] * self.falls
+        lengths += [(ALIVE, 1)] * self.terminates
         for name, length in lengths:
             found[name] = slice(start, start + length)
             start += length
@@ -55,7 +55,7 @@ class Memory:
         layout = Layout(self.world)
         commands = [type(x).zeros(input_sizes(self.world)[name]) for name in self.inputs]
         velocities = [x[layout[f"{body}.velocity"]] for body in self.bodies]
-        return ca.vertcat(x, *commands, *velocities, *([type(x)(1)] if self.falls else []))
+        return ca.vertcat(x, *commands, *velocities, *([type(x)(1)] if self.terminates else []))
 
     def after(self, x: Expr, u: Expr, inputs: Sequence[str]) -> Expr:
         """(memory,) what is remembered of a step from state x with the inputs u, which stacks ``inputs``."""
@@ -73,17 +73,17 @@ class Memory:
         return {name: x[self.columns[name]] for name in self.inputs}
 
 
-def memory_of(problem: Problem, world: World) -> Memory:
+def memory_of(problem: Problem, world: World) -> SensorMemory:
     """What the sensors of a problem, and its accelerometers, make necessary."""
     sensed = frozenset[str]().union(*(formula.names for sensor in problem.sensors for formula in sensor.formulas))
-    aims: list[Cost | Target | Constraint | Output] = [
+    objectives: list[Cost | Target | Constraint | Output] = [
         *problem.costs,
         *problem.targets,
         *problem.constraints,
         *problem.outputs,
     ]
-    asked = frozenset[str]().union(*(aim.formula.names for aim in aims))
+    asked = frozenset[str]().union(*(each.formula.names for each in objectives))
     inputs = tuple(name for name in input_sizes(world) if name in sensed)
-    margin = problem.fall.margin.names if problem.fall else frozenset[str]()
+    margin = problem.termination.margin.names if problem.termination else frozenset[str]()
     bodies = accelerometer_bodies(world, sensed | asked | margin)
-    return Memory(world, inputs, bodies, problem.fall is not None)
+    return SensorMemory(world, inputs, bodies, problem.termination is not None)

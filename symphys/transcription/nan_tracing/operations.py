@@ -35,7 +35,7 @@ WORDS = {
 
 
 @dataclass(frozen=True)
-class Blame:
+class NonFiniteOperation:
     """An operation with finite operands whose result is not, on the way to a result of the function.
 
     Attributes:
@@ -49,7 +49,7 @@ class Blame:
     result: tuple[int, int]
 
 
-def blame(function: ca.Function, arguments: Sequence[Array]) -> Blame | None:
+def non_finite_operation(function: ca.Function, arguments: Sequence[Array]) -> NonFiniteOperation | None:
     """What spoils the results of an SX function for these arguments, one dense vector each; None if nothing does."""
     run = _Run(function, arguments)
     spoilt = [(place, source) for place, source in run.results if not isfinite(run.values[source])]
@@ -58,7 +58,7 @@ def blame(function: ca.Function, arguments: Sequence[Array]) -> Blame | None:
     result, at = min(spoilt)
     while bad := [source for source in run.operands[at] if not isfinite(run.values[source])]:
         at = bad[0]
-    return Blame(run.words(at), run.origins(at), result)
+    return NonFiniteOperation(run.words(at), run.origins(at), result)
 
 
 class _Run:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from symphys.model.state_layout import Layout, input_columns
 from symphys.problem import Constraint, Cost, Output, Target
-from symphys.transcription.nan_tracing.operations import Blame, blame
+from symphys.transcription.nan_tracing.operations import NonFiniteOperation, non_finite_operation
 from symphys.transcription.rollout import Rollout
 
 Array = NDArray[np.float64]
@@ -22,7 +22,7 @@ MOST_NAMES = 4
 
 
 @dataclass(frozen=True)
-class Course:
+class RolloutArrays:
     """All that a rollout went through.
 
     Attributes:
@@ -55,77 +55,77 @@ class Course:
         return [self.x[k], np.array([*self.given[k], *time]), self.p, np.array([self.smoothing])]
 
 
-def first_fault(rollout: Rollout, course: Course) -> str:
+def first_non_finite(rollout: Rollout, arrays: RolloutArrays) -> str:
     """A clause that says where the rollout, or what is asked of it, first is not finite; empty if it is nowhere."""
-    return _in_start(rollout, course) or _in_steps(rollout, course) or _in_formulas(rollout, course)
+    return _in_start(rollout, arrays) or _in_steps(rollout, arrays) or _in_formulas(rollout, arrays)
 
 
-def first_derivative_fault(rollout: Rollout, course: Course) -> str:
+def first_non_finite_derivative(rollout: Rollout, arrays: RolloutArrays) -> str:
     """The same for derivatives: of the formulas, then of the steps, from the last one back."""
-    formulas = (_derivative_clause(rollout, course, *case) for case in _instants(rollout))
-    return next(filter(None, formulas), "") or _in_steps_back(rollout, course)
+    formulas = (_derivative_clause(rollout, arrays, *case) for case in _instants(rollout))
+    return next(filter(None, formulas), "") or _in_steps_back(rollout, arrays)
 
 
-def _in_start(rollout: Rollout, course: Course) -> str:
+def _in_start(rollout: Rollout, arrays: RolloutArrays) -> str:
     names = _argument_names(rollout)
-    for values, columns in ((course.x[0], names[0]), (course.p, names[2]), (course.given.T, names[1])):
+    for values, columns in ((arrays.x[0], names[0]), (arrays.p, names[2]), (arrays.given.T, names[1])):
         bad = [name for name, value in zip(columns, values, strict=True) if not np.isfinite(value).all()]
         if bad:
             return f"it begins with {_listed(list(dict.fromkeys(bad)))}, as the variables set it"
     return ""
 
 
-def _in_steps(rollout: Rollout, course: Course) -> str:
-    bad = ~(np.isfinite(course.x[1:]).all(axis=1) & np.isfinite(course.u).all(axis=1))
+def _in_steps(rollout: Rollout, arrays: RolloutArrays) -> str:
+    bad = ~(np.isfinite(arrays.x[1:]).all(axis=1) & np.isfinite(arrays.u).all(axis=1))
     if not bad.any():
         return ""
     k = int(np.argmax(bad))
-    if rollout.feedback is not None and not np.isfinite(course.u[k]).all():
+    if rollout.feedback is not None and not np.isfinite(arrays.u[k]).all():
         known = [*_argument_names(rollout), ("time",)]
-        found = blame(rollout.feedback, course.control_arguments(k, rollout.dt))
+        found = non_finite_operation(rollout.feedback, arrays.control_arguments(k, rollout.dt))
         return f"it begins in what controllers give at t = {k * rollout.dt:g} s{_cause(found, known, known[1:2])}"
-    found = blame(rollout.step, course.step_arguments(k))
+    found = non_finite_operation(rollout.step, arrays.step_arguments(k))
     names = _argument_names(rollout)
     return f"it begins in the step from t = {k * rollout.dt:g} s{_cause(found, names, names[:1])}"
 
 
-def _in_formulas(rollout: Rollout, course: Course) -> str:
+def _in_formulas(rollout: Rollout, arrays: RolloutArrays) -> str:
     names = _argument_names(rollout)
     for kind, asked, k, row in _instants(rollout):
-        found = blame(rollout.compiled(asked.formula), _formula_arguments(rollout, course, k, row))
+        found = non_finite_operation(rollout.compiled(asked.formula), _formula_arguments(rollout, arrays, k, row))
         if found is not None:
             return f"{kind} {asked.name!r} is not finite at t = {k * rollout.dt:g} s{_cause(found, names)}"
     return ""
 
 
-def _derivative_clause(rollout: Rollout, course: Course, kind: str, asked: Asked, k: int, row: int) -> str:
+def _derivative_clause(rollout: Rollout, arrays: RolloutArrays, kind: str, asked: Asked, k: int, row: int) -> str:
     formula = rollout.compiled(asked.formula)
-    arguments = _formula_arguments(rollout, course, k, row)
+    arguments = _formula_arguments(rollout, arrays, k, row)
     seeds = [np.zeros(formula.numel_out(0)), np.ones(formula.numel_out(0))]
-    found = blame(formula.reverse(1), [*arguments, *seeds])
+    found = non_finite_operation(formula.reverse(1), [*arguments, *seeds])
     if found is None:
         return ""
     names = _argument_names(rollout)
     return f"the derivative of {kind} {asked.name!r} is not finite at t = {k * rollout.dt:g} s{_cause(found, names)}"
 
 
-def _in_steps_back(rollout: Rollout, course: Course) -> str:
+def _in_steps_back(rollout: Rollout, arrays: RolloutArrays) -> str:
     backward = rollout.closed.expand().reverse(1)
-    adjoint, results = np.ones(course.x.shape[1]), [np.zeros(course.x.shape[1])]
+    adjoint, results = np.ones(arrays.x.shape[1]), [np.zeros(arrays.x.shape[1])]
     if rollout.feedback is not None:
-        results.append(np.zeros(course.u.shape[1]))
+        results.append(np.zeros(arrays.u.shape[1]))
     for k in reversed(range(rollout.steps)):
         seeds = [adjoint, *(np.zeros(result.size) for result in results[1:])]
-        arguments = [*course.closed_arguments(k, rollout), *results, *seeds]
+        arguments = [*arrays.closed_arguments(k, rollout), *results, *seeds]
         adjoint = np.array(backward(*arguments)[0]).ravel()
         if not np.isfinite(adjoint).all():
-            names, found = _argument_names(rollout), blame(backward, arguments)
+            names, found = _argument_names(rollout), non_finite_operation(backward, arguments)
             when = f"t = {k * rollout.dt:g} s to {(k + 1) * rollout.dt:g} s"
             return f"the derivative of the step from {when} is not finite{_cause(found, names, names)}"
     return ""
 
 
-def _cause(found: Blame | None, names: Sequence[Columns], results: Sequence[Columns] = ()) -> str:
+def _cause(found: NonFiniteOperation | None, names: Sequence[Columns], results: Sequence[Columns] = ()) -> str:
     """Such as ``: 1 / 0, made from ball.mass, on the way to ball.velocity``; arguments without a name are left out."""
     if found is None:
         return ""
@@ -137,7 +137,7 @@ def _cause(found: Blame | None, names: Sequence[Columns], results: Sequence[Colu
 
 
 def _instants(rollout: Rollout) -> Iterator[tuple[str, Asked, int, int]]:
-    """(kind, what is asked, number of the state, number of the inputs) of every look at a formula; see ``Rollout``."""
+    """(kind, objective, number of the state, number of the inputs) of every evaluation of a formula."""
     problem, steps = rollout.problem, rollout.steps
     groups = (
         ("cost", problem.costs),
@@ -156,8 +156,8 @@ def _instants(rollout: Rollout) -> Iterator[tuple[str, Asked, int, int]]:
             yield from ((kind, asked, k, k - 1) for k in range(1, steps + 1))
 
 
-def _formula_arguments(rollout: Rollout, course: Course, k: int, row: int) -> list[Array]:
-    return [course.x[k], course.u[row], course.p, np.array([k * rollout.dt]), course.z]
+def _formula_arguments(rollout: Rollout, arrays: RolloutArrays, k: int, row: int) -> list[Array]:
+    return [arrays.x[k], arrays.u[row], arrays.p, np.array([k * rollout.dt]), arrays.z]
 
 
 def _argument_names(rollout: Rollout) -> tuple[Columns, Columns, Columns]:

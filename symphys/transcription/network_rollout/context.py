@@ -14,21 +14,21 @@ from numpy.typing import NDArray
 from symphys.codegen import Kernel
 from symphys.codegen.backends import build_kernel
 from symphys.problem import Problem
-from symphys.transcription.network_rollout.partition import Split, split
+from symphys.transcription.network_rollout.partition import Partition, partition
 from symphys.transcription.network_rollout.step_program import (
     RESULTS,
-    Aims,
+    RolloutObjectives,
     sense_function,
-    stage_program,
     start_function,
+    step_program,
 )
-from symphys.transcription.network_rollout.virtual_machine import PlainStage
+from symphys.transcription.network_rollout.virtual_machine import VirtualMachineStep
 from symphys.transcription.rollout import Rollout
 
 Array = NDArray[np.float64]
 
 
-class Stage(Protocol):
+class BatchStep(Protocol):
     """Computes one step of many robots.
 
     Attributes:
@@ -39,43 +39,43 @@ class Stage(Protocol):
     seeded: tuple[str, ...]
     sizes: Mapping[str, int]
 
-    def forward(self, rows: Array, knob: Sequence[float]) -> Mapping[str, Array]:
+    def forward(self, rows: Array, smoothing: Sequence[float]) -> Mapping[str, Array]:
         """(B, m) -> results by name, each (B, size)."""
 
-    def gradient(self, rows: Array, seeds: Array, knob: Sequence[float]) -> tuple[Any, Array]:
+    def gradient(self, rows: Array, seeds: Array, smoothing: Sequence[float]) -> tuple[Any, Array]:
         """(B, m), (B, all sizes) -> something, and the slopes (B, m) of seeds . results."""
 
 
-class KernelStage:
+class KernelStep:
     """The same by a kernel; see ``Stage``."""
 
     def __init__(self, kernel: Kernel) -> None:
-        """Of a ``stage_program``."""
+        """Of a ``step_program``."""
         self.kernel, self.seeded = kernel, kernel.seeded
         self.sizes: Mapping[str, int] = {name: kernel.program.outputs[name].size for name in kernel.seeded}
         self.forward, self.gradient = kernel.forward, kernel.gradient
 
 
 @dataclass(frozen=True, eq=False)
-class Made:
+class RolloutContext:
     """A problem with large nets, ready to be rolled out.
 
     Attributes:
-        split: the problem taken apart.
-        aims: what is asked of a rollout.
+        partition: the problem taken apart.
+        objectives: what is asked of a rollout.
         sensors: names of those that large nets use.
         columns: for each net, which columns of what they read it takes.
     """
 
-    split: Split
-    aims: Aims
+    partition: Partition
+    objectives: RolloutObjectives
     sensors: tuple[str, ...]
     columns: tuple[NDArray[np.intp], ...]
 
     @property
     def rollout(self) -> Rollout:
         """Of the problem without its large nets."""
-        return self.split.rollout
+        return self.partition.rollout
 
     @cached_property
     def start(self) -> ca.Function:
@@ -93,23 +93,23 @@ class Made:
         return sense_function(self.rollout, self.sensors)
 
     @cached_property
-    def plain(self) -> Stage:
+    def plain(self) -> BatchStep:
         """The step on casadi's virtual machine."""
-        return PlainStage(self.rollout, self.aims, self.sensors)
+        return VirtualMachineStep(self.rollout, self.objectives, self.sensors)
 
     def compiled(self, exact: bool, backend: str) -> Kernel:
         """The step as a kernel of a backend, of one thread; KernelUnavailable if that cannot be."""
-        program = stage_program(self.rollout, self.aims, self.sensors, exact)
+        program = step_program(self.rollout, self.objectives, self.sensors, exact)
         seeded = [name for name in RESULTS if name in program.outputs]
         return build_kernel(backend, program, seeded, threads=1)
 
 
-def make(problem: Problem) -> Made:
+def make_context(problem: Problem) -> RolloutContext:
     """Take a problem apart and say what is asked of it."""
-    parts = split(problem)
+    parts = partition(problem)
     sensors = tuple(dict.fromkeys(name for controller in parts.nets for name in controller.senses))
     sizes = {sensor.name: sensor.size for sensor in problem.sensors}
     ends = np.cumsum([0, *(sizes[name] for name in sensors)])
     places = {name: np.arange(a, b) for name, a, b in zip(sensors, ends[:-1], ends[1:], strict=True)}
     columns = tuple(np.concatenate([places[name] for name in controller.senses]) for controller in parts.nets)
-    return Made(parts, Aims(parts.rollout), sensors, columns)
+    return RolloutContext(parts, RolloutObjectives(parts.rollout), sensors, columns)

@@ -12,8 +12,13 @@ from numpy.typing import NDArray
 
 from symphys.codegen.cuda import Device
 from symphys.shooting import Values, WithoutResiduals
-from symphys.transcription.network_rollout.context import Made, Stage
-from symphys.transcription.network_rollout.forward_backward import Backward, Way, aim_arguments, forward
+from symphys.transcription.network_rollout.context import BatchStep, RolloutContext
+from symphys.transcription.network_rollout.forward_backward import (
+    BackwardPass,
+    ForwardPass,
+    forward,
+    objective_arguments,
+)
 from symphys.transcription.network_rollout.layers import Layers
 
 Array = NDArray[np.float64]
@@ -45,17 +50,22 @@ class LargeEvaluator(WithoutResiduals):
     """See ``Evaluator``; and ``shared`` for robots that share their weights."""
 
     def __init__(
-        self, made: Made, stage: Stage, threads: int, real: Any = np.float64, device: Device | None = None
+        self,
+        context: RolloutContext,
+        batch_step: BatchStep,
+        threads: int,
+        real: Any = np.float64,
+        device: Device | None = None,
     ) -> None:
         """``threads`` share the robots of a call; the nets have their precision, ``real``, and may be on a device."""
-        self.made, self.stage, self.threads, self.real, self.device = made, stage, threads, real, device
+        self.context, self.batch_step, self.threads, self.real, self.device = context, batch_step, threads, real, device
 
     def shared(self, weights: Sequence[Array], Z: Array, smoothing: float = 0.0, gradient: bool = False) -> Shared:
         """Roll out robots.
 
         Args:
             weights: of each net, in the order of the file, shared by all robots.
-            Z: (B, s) what robots do not share: the entries ``made.split.small`` of z.
+            Z: (B, s) what robots do not share: the entries ``context.partition.small`` of z.
             smoothing: [m/s].
             gradient: whether derivatives are wanted.
         """
@@ -74,30 +84,36 @@ class LargeEvaluator(WithoutResiduals):
         sums = zip(*(part.weights for part in found if part.weights is not None), strict=True)
         return replace(common, small=small, weights=tuple(np.sum(own, axis=0) for own in sums))
 
-    def way(self, z: Array, smoothing: float) -> Way:
+    def forward_pass(self, z: Array, smoothing: float) -> ForwardPass:
         """The motion of one decision vector."""
-        parts = self.made.split
-        return forward(self.made, self.stage, self.nets_at(z), z[None, parts.small], smoothing)
+        parts = self.context.partition
+        return forward(self.context, self.batch_step, self.nets_at(z), z[None, parts.small], smoothing)
 
     def nets_at(self, z: Array) -> list[Layers]:
         """The nets of one decision vector."""
-        return self._nets([own.at(z) for own in self.made.split.weights])
+        return self._nets([own.at(z) for own in self.context.partition.weights])
 
     def _nets(self, weights: Sequence[Array]) -> list[Layers]:
         return [
-            Layers(law, own, self.real, self.device) for law, own in zip(self.made.split.laws, weights, strict=True)
+            Layers(law, own, self.real, self.device)
+            for law, own in zip(self.context.partition.laws, weights, strict=True)
         ]
 
     def _part(self, nets: Sequence[Layers], Z: Array, smoothing: float, gradient: bool) -> Shared:
-        way = forward(self.made, self.stage, nets, Z, smoothing)
-        values = Shared(*self._values(way))
+        motion = forward(self.context, self.batch_step, nets, Z, smoothing)
+        values = Shared(*self._values(motion))
         if not gradient:
             return values
-        small, weights = Backward(self.made, self.stage, nets, way, smoothing, self.made.aims.slopes).run()
+        small, weights = BackwardPass(
+            self.context, self.batch_step, nets, motion, smoothing, self.context.objectives.slopes
+        ).run()
         return replace(values, small=small, weights=tuple(weights))
 
-    def _values(self, way: Way) -> tuple[Array, Array, Array, Array]:
-        found = [self.made.aims.value.call(aim_arguments(self.made, way, b)) for b in range(len(way.z))]
+    def _values(self, motion: ForwardPass) -> tuple[Array, Array, Array, Array]:
+        found = [
+            self.context.objectives.value.call(objective_arguments(self.context, motion, b))
+            for b in range(len(motion.z))
+        ]
         merit, objective, errors, outputs = (
             np.array([np.array(row[i]).ravel() for row in found]) for i in (0, 1, 2, 4)
         )
@@ -112,18 +128,18 @@ class LargeEvaluator(WithoutResiduals):
         return self._each(Z, smoothing, gradient=True)
 
     def _each(self, Z: Array, smoothing: float, gradient: bool) -> Values:
-        split_, found = self.made.split, []
+        partition, found = self.context.partition, []
         for z in Z:
-            weights = [own.at(z) for own in split_.weights]
-            found.append(self.shared(weights, z[None, split_.small], smoothing, gradient))
+            weights = [own.at(z) for own in partition.weights]
+            found.append(self.shared(weights, z[None, partition.small], smoothing, gradient))
         values = Values(*stacked(found))
         if not gradient:
             return values
         slopes = []
         for each in found:
             assert each.small is not None and each.weights is not None
-            slopes.append(split_.joined(each.small[0], each.weights))
-        return replace(values, gradient=np.array(slopes).reshape(len(Z), split_.n))
+            slopes.append(partition.joined(each.small[0], each.weights))
+        return replace(values, gradient=np.array(slopes).reshape(len(Z), partition.n))
 
 
 def stacked(parts: Sequence[Shared]) -> tuple[Array, Array, Array, Array]:
@@ -132,3 +148,29 @@ def stacked(parts: Sequence[Shared]) -> tuple[Array, Array, Array, Array]:
         np.concatenate([getattr(part, name) for part in parts]) for name in ("merit", "objective", "errors", "outputs")
     )
     return merit, objective, errors, outputs
+
+
+class LargeProbe:
+    """See ``Probe``; by the passes that solvers' gradients are made of."""
+
+    def __init__(self, evaluator: LargeEvaluator) -> None:
+        """By the nets and steps of an evaluator."""
+        self._evaluator, self._context = evaluator, evaluator.context
+
+    def values(self, Z: Array) -> Array:
+        """See ``Probe``."""
+        motions = (self._evaluator.forward_pass(z, 0.0) for z in Z)
+        return np.array(
+            [
+                float(self._context.objectives.probe.call(objective_arguments(self._context, motion, 0))[0])
+                for motion in motions
+            ]
+        )
+
+    def gradient(self, z: Array) -> Array:
+        """See ``Probe``."""
+        evaluator = self._evaluator
+        nets, motion = evaluator.nets_at(z), evaluator.forward_pass(z, 0.0)
+        slopes = self._context.objectives.probe_slopes
+        small, weights = BackwardPass(self._context, evaluator.batch_step, nets, motion, 0.0, slopes).run()
+        return self._context.partition.joined(small[0], weights)

@@ -7,7 +7,7 @@ product a layer and segment. So memory holds states, and the values of a net for
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.transcription.network_rollout.context import Made, Stage
+from symphys.transcription.network_rollout.context import BatchStep, RolloutContext
 from symphys.transcription.network_rollout.layers import Layers
 
 Array = NDArray[np.float64]
@@ -24,7 +24,7 @@ SEGMENT_WORDS = 24_000_000
 
 
 @dataclass(frozen=True)
-class Way:
+class ForwardPass:
     """What a pass forwards leaves, for B robots.
 
     Attributes:
@@ -46,76 +46,90 @@ class Way:
     u: Array
 
 
-def forward(made: Made, stage: Stage, nets: Sequence[Layers], Z: Array, smoothing: float) -> Way:
+def forward(
+    context: RolloutContext, batch_step: BatchStep, nets: Sequence[Layers], Z: Array, smoothing: float
+) -> ForwardPass:
     """Roll out robots (B, s) that share these nets."""
-    steps, dt = made.rollout.steps, made.rollout.dt
-    starts = [[np.array(part).ravel() for part in made.start(z)] for z in Z]
+    steps, dt = context.rollout.steps, context.rollout.dt
+    starts = [[np.array(part).ravel() for part in context.start(z)] for z in Z]
     x0, given, p, sensed0 = (np.array([start[i] for start in starts]) for i in range(4))
-    way = Way(
+    motion = ForwardPass(
         z=Z,
         x=np.empty((steps + 1, *x0.shape)),
         given=given.reshape(len(Z), steps, -1).swapaxes(0, 1).copy(),
         p=p,
         sensed=np.empty((steps + 1, *sensed0.shape)),
-        asked=np.empty((steps, len(Z), stage.sizes.get("asked", 0))),
-        u=np.empty((steps, len(Z), made.rollout.given.shape[0])),
+        asked=np.empty((steps, len(Z), batch_step.sizes.get("asked", 0))),
+        u=np.empty((steps, len(Z), context.rollout.given.shape[0])),
     )
-    way.x[0], way.sensed[0] = x0, sensed0
+    motion.x[0], motion.sensed[0] = x0, sensed0
     for k in range(steps):
-        for net, columns, place in zip(nets, made.columns, made.split.places, strict=True):
-            values = net.forward(way.sensed[k][:, columns])
-            way.given[k] += net.outputs(values) @ place.T
-        found = stage.forward(rows(way, k, dt), [smoothing])
-        way.x[k + 1], way.u[k] = found["after"], found["inputs"]
-        way.sensed[k + 1] = found["sensed"]
+        for net, columns, place in zip(nets, context.columns, context.partition.places, strict=True):
+            values = net.forward(motion.sensed[k][:, columns])
+            motion.given[k] += net.outputs(values) @ place.T
+        found = batch_step.forward(rows(motion, k, dt), [smoothing])
+        motion.x[k + 1], motion.u[k] = found["after"], found["inputs"]
+        motion.sensed[k + 1] = found["sensed"]
         if "asked" in found:
-            way.asked[k] = found["asked"]
-    return way
+            motion.asked[k] = found["asked"]
+    return motion
 
 
-def rows(way: Way, k: int, dt: float) -> Array:
+def rows(motion: ForwardPass, k: int, dt: float) -> Array:
     """(B, m) what the step from k is computed from."""
-    times = np.broadcast_to([k * dt, (k + 1) * dt], (len(way.z), 2))
-    return np.concatenate([way.x[k], way.given[k], way.p, times, way.z], axis=1)
+    times = np.broadcast_to([k * dt, (k + 1) * dt], (len(motion.z), 2))
+    return np.concatenate([motion.x[k], motion.given[k], motion.p, times, motion.z], axis=1)
 
 
-def aim_arguments(made: Made, way: Way, b: int) -> list[Array]:
-    """What ``made.aims`` takes, for one robot."""
-    stages = made.aims.stages
-    moments = [part for k, row in stages.moments for part in (way.x[k, b], way.u[row, b])]
+def objective_arguments(context: RolloutContext, motion: ForwardPass, b: int) -> list[Array]:
+    """What ``context.objectives`` takes, for one robot."""
+    samples = context.objectives.samples
+    moments = [part for k, row in samples.moments for part in (motion.x[k, b], motion.u[row, b])]
     series, start = [], 0
-    for symbol in stages.series.values():
+    for symbol in samples.series.values():
         size = symbol.shape[0]
-        series.append(way.asked[:, b, start : start + size].T)
+        series.append(motion.asked[:, b, start : start + size].T)
         start += size
-    return [way.z[b], way.p[b], *moments, *series]
+    return [motion.z[b], motion.p[b], *moments, *series]
 
 
-class Backward:
+class BackwardPass:
     """A pass backwards along a ``Way``: the gradient of the sum over robots of what ``slopes`` are the slopes of."""
 
     def __init__(
-        self, made: Made, stage: Stage, nets: Sequence[Layers], way: Way, smoothing: float, slopes: ca.Function
+        self,
+        context: RolloutContext,
+        batch_step: BatchStep,
+        nets: Sequence[Layers],
+        motion: ForwardPass,
+        smoothing: float,
+        slopes: ca.Function,
     ) -> None:
-        """Begin with what ``slopes``, one of those of ``made.aims``, say of the robots' motions."""
-        self.made, self.stage, self.nets, self.way, self.knob = made, stage, nets, way, [smoothing]
-        self.z, self.p = np.zeros_like(way.z), np.zeros_like(way.p)
+        """Begin with what ``slopes``, one of those of ``context.objectives``, say of the robots' motions."""
+        self.context, self.batch_step, self.nets, self.motion, self.smoothing = (
+            context,
+            batch_step,
+            nets,
+            motion,
+            [smoothing],
+        )
+        self.z, self.p = np.zeros_like(motion.z), np.zeros_like(motion.p)
         self.at_x: dict[int, Array] = {}
         self.at_u: dict[int, Array] = {}
-        self.asked = np.zeros_like(way.asked)
+        self.asked = np.zeros_like(motion.asked)
         self.weights = [np.zeros(net.net.sizes["weights"]) for net in nets]
-        for b in range(len(way.z)):
-            self.aim(b, slopes)
+        for b in range(len(motion.z)):
+            self.start_robot(b, slopes)
 
-    def aim(self, b: int, slopes: ca.Function) -> None:
+    def start_robot(self, b: int, slopes: ca.Function) -> None:
         """Slopes at one robot's motion."""
-        way, stages = self.way, self.made.aims.stages
-        found = [np.array(part) for part in slopes.call(aim_arguments(self.made, way, b))]
+        motion, samples = self.motion, self.context.objectives.samples
+        found = [np.array(part) for part in slopes.call(objective_arguments(self.context, motion, b))]
         self.z[b], self.p[b], others = found[0].ravel(), found[1].ravel(), found[2:]
-        for k, row in stages.moments:
+        for k, row in samples.moments:
             x, u, *others = others
-            self.at_x.setdefault(k, np.zeros_like(way.x[0]))[b] += x.ravel()
-            self.at_u.setdefault(row, np.zeros_like(way.u[0]))[b] += u.ravel()
+            self.at_x.setdefault(k, np.zeros_like(motion.x[0]))[b] += x.ravel()
+            self.at_u.setdefault(row, np.zeros_like(motion.u[0]))[b] += u.ravel()
         start = 0
         for series in others:
             self.asked[:, b, start : start + len(series)] = series.T
@@ -123,32 +137,32 @@ class Backward:
 
     def run(self) -> tuple[Array, list[Array]]:
         """(B, s) the gradients of what robots do not share, and for each net that of the shared weights, summed."""
-        steps, robots = len(self.way.given), len(self.way.z)
+        steps, robots = len(self.motion.given), len(self.motion.z)
         width = sum(layer.outputs for net in self.nets for layer in net.layers)
         length = max(1, min(steps, SEGMENT_WORDS // max(1, 2 * robots * width)))
-        x, sensed = self.at_x.get(steps, np.zeros_like(self.way.x[0])), np.zeros_like(self.way.sensed[0])
-        given = np.zeros_like(self.way.given)
+        x, sensed = self.at_x.get(steps, np.zeros_like(self.motion.x[0])), np.zeros_like(self.motion.sensed[0])
+        given = np.zeros_like(self.motion.given)
         for end in range(steps, 0, -length):
             x, sensed = self.segment(max(0, end - length), end, x, sensed, given)
         flat = given.swapaxes(0, 1).reshape(robots, -1)
         for b in range(robots):
-            parts = [self.way.x[0, b], self.way.given[:, b].ravel(), self.way.p[b], self.way.sensed[0, b]]
+            parts = [self.motion.x[0, b], self.motion.given[:, b].ravel(), self.motion.p[b], self.motion.sensed[0, b]]
             seeds = [x[b], flat[b], self.p[b], sensed[b]]
-            self.z[b] += np.array(self.made.pull(self.way.z[b], *parts, *seeds)).ravel()
+            self.z[b] += np.array(self.context.pull(self.motion.z[b], *parts, *seeds)).ravel()
         return self.z, self.weights
 
     def segment(self, first: int, end: int, x: Array, sensed: Array, given: Array) -> tuple[Array, Array]:
         """From step ``end`` back to ``first``: adjoints of the state and of what is sensed there."""
         kept = [
-            net.forward(self.way.sensed[first:end][:, :, columns])
-            for net, columns in zip(self.nets, self.made.columns, strict=True)
+            net.forward(self.motion.sensed[first:end][:, :, columns])
+            for net, columns in zip(self.nets, self.context.columns, strict=True)
         ]
         deltas: list[list[Any]] = [[] for _ in self.nets]
         adjoints: list[list[Any]] = [[] for _ in self.nets]
         for k in range(end - 1, first - 1, -1):
             x, given[k], sensed = self.step(k, x, sensed)
             for i, (net, columns, place) in enumerate(
-                zip(self.nets, self.made.columns, self.made.split.places, strict=True)
+                zip(self.nets, self.context.columns, self.context.partition.places, strict=True)
             ):
                 output = given[k] @ place
                 back, delta = net.pull([value[k - first] for value in kept[i]], output)
@@ -163,13 +177,37 @@ class Backward:
     def step(self, k: int, x: Array, sensed: Array) -> tuple[Array, Array, Array]:
         """One step back: adjoints of the state, of the inputs, and zeros for what is sensed before it."""
         parts = {"after": x, "sensed": sensed, "asked": self.asked[k]}
-        parts["inputs"] = self.at_u.get(k, np.zeros_like(self.way.u[0]))
-        seeds = np.concatenate([parts[name] for name in self.stage.seeded], axis=1)
-        _, slopes = self.stage.gradient(rows(self.way, k, self.made.rollout.dt), seeds, self.knob)
-        sizes = [self.way.x.shape[2], self.way.given.shape[2], self.way.p.shape[1], 2, self.way.z.shape[1]]
+        parts["inputs"] = self.at_u.get(k, np.zeros_like(self.motion.u[0]))
+        seeds = np.concatenate([parts[name] for name in self.batch_step.seeded], axis=1)
+        _, slopes = self.batch_step.gradient(rows(self.motion, k, self.context.rollout.dt), seeds, self.smoothing)
+        sizes = [self.motion.x.shape[2], self.motion.given.shape[2], self.motion.p.shape[1], 2, self.motion.z.shape[1]]
         before, given, p, _, z = np.split(slopes, np.cumsum(sizes)[:-1], axis=1)
         self.p += p
         self.z += z
         if k in self.at_x:
             before = before + self.at_x[k]
         return before, given, np.zeros_like(sensed)
+
+
+def back(
+    context: RolloutContext,
+    batch_step: BatchStep,
+    nets: Sequence[Layers],
+    motion: ForwardPass,
+    smoothing: float,
+    ends: Array,
+) -> Iterator[Array]:
+    """See ``Transcription.back``; of the first robot of a pass."""
+    count, dt = ends.shape[1], context.rollout.dt
+    nx, nu = motion.x.shape[2], motion.u.shape[2]
+    sense, x = context.sense.reverse(count), ends.T
+    blank = {name: np.zeros((count, size)) for name, size in batch_step.sizes.items()}
+    for k in reversed(range(len(motion.u))):
+        seeds = np.concatenate([(blank | {"after": x})[name] for name in batch_step.seeded], axis=1)
+        _, slopes = batch_step.gradient(np.tile(rows(motion, k, dt)[:1], (count, 1)), seeds, [smoothing])
+        given, sensed = slopes[:, nx : nx + nu], np.zeros((count, motion.sensed.shape[2]))
+        for net, columns, place in zip(nets, context.columns, context.partition.places, strict=True):
+            sensed[:, columns] += net.pull(net.forward(motion.sensed[k][:1, columns]), given @ place)[0]
+        through = sense(motion.x[k, 0], motion.p[0], k * dt, motion.sensed[k, 0], sensed.T)[0]
+        x = slopes[:, :nx] + np.array(through).T
+        yield x.T

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.errors import Issue, ProblemError
 from symphys.model.controllers import Net
-from symphys.problem import Controller, Problem
+from symphys.problem import Constraint, Controller, Cost, Output, Problem, Target
 from symphys.transcription.formula_names import input_names, spans
-from symphys.transcription.network_rollout.limits import refuse_formulas, refuse_large
 from symphys.transcription.rollout import Rollout, symbolic_rollout
 
 Array = NDArray[np.float64]
@@ -66,7 +66,7 @@ class Weights:
 
 
 @dataclass(frozen=True)
-class Split:
+class Partition:
     """A problem taken apart.
 
     Attributes:
@@ -95,7 +95,7 @@ class Split:
         return gradient
 
 
-def split(problem: Problem) -> Split:
+def partition(problem: Problem) -> Partition:
     """Take a problem apart; ProblemError if its formulas look at the weights of large nets."""
     nets = large_nets(problem)
     names = {name for controller in nets for name in controller.weights}
@@ -105,7 +105,7 @@ def split(problem: Problem) -> Split:
     others = tuple(controller for controller in problem.controllers if controller not in nets)
     rest = replace(problem, variables=tuple(v for v, _ in kept), controllers=others)
     rollout = symbolic_rollout(rest, input_names(problem))
-    return Split(
+    return Partition(
         rollout=rollout,
         small=np.concatenate([np.zeros(0, int), *(np.arange(*span) for _, span in kept)]),
         n=sum(v.guess.size for v in problem.variables),
@@ -124,3 +124,32 @@ def _weights(problem: Problem, controller: Controller) -> Weights:
                 of_z.append(np.arange(first, last))
                 of_net.append(np.array(slot.components, int))
     return Weights(controller.numbers["weights"], np.concatenate(of_z), np.concatenate(of_net))
+
+
+def refuse_large(problem: Problem, nets: Sequence[Controller], most: int, what: str) -> None:
+    """ProblemError if there are any, from what cannot deal with them."""
+    issues = [
+        Issue(f'controller "{net.name}".net', f"has {net.law.sizes['weights']} weights; {what} takes up to {most}")
+        for net in nets
+    ]
+    if issues:
+        raise ProblemError(problem.file, issues)
+
+
+def refuse_formulas(problem: Problem, names: Sequence[str]) -> None:
+    """ProblemError if a formula looks at the weights of large nets, by these names of variables or numbers."""
+    issues = [
+        Issue(f'{kind} "{each.name}"', f"looks at {name}, the weights of a net that is too large for formulas")
+        for kind, each in _formulas(problem)
+        for name in names
+        if name in each.formula.names
+    ]
+    if issues:
+        raise ProblemError(problem.file, issues)
+
+
+def _formulas(problem: Problem) -> Iterator[tuple[str, Cost | Target | Constraint | Output]]:
+    yield from (("cost", cost) for cost in problem.costs)
+    yield from (("target", target) for target in problem.targets)
+    yield from (("constraint", constraint) for constraint in problem.constraints)
+    yield from (("output", output) for output in problem.outputs)

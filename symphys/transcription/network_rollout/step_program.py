@@ -29,7 +29,7 @@ Expr = Any
 RESULTS = ("after", "sensed", "asked", "inputs")
 
 
-class Stages:
+class FormulaSamples:
     """Stands in for a rollout where costs, targets and constraints are put together; see ``Sampled``."""
 
     def __init__(self, rollout: Rollout) -> None:
@@ -64,7 +64,7 @@ class Stages:
         return self.series.setdefault((formula, shift), ca.MX.sym("series", size, self.steps))
 
 
-class Aims:
+class RolloutObjectives:
     """What a problem asks of a rollout as functions of (z, p, x and u at moments, series), and their slopes.
 
     ``value`` gives merit, objective, errors, costs and outputs, ``slopes`` the derivatives of the merit; ``probe`` and
@@ -73,14 +73,14 @@ class Aims:
 
     def __init__(self, rollout: Rollout) -> None:
         """Build them."""
-        self.stages = Stages(rollout)
-        asked = terms(self.stages)
+        self.samples = FormulaSamples(rollout)
+        asked = terms(self.samples)
         self.terms = asked
         merit = asked.objective + asked.penalties
-        moments = [symbol for pair in self.stages.moments.values() for symbol in pair]
-        self.arguments = [self.stages.z, self.stages.p, *moments, *self.stages.series.values()]
+        moments = [symbol for pair in self.samples.moments.values() for symbol in pair]
+        self.arguments = [self.samples.z, self.samples.p, *moments, *self.samples.series.values()]
         results = [ca.densify(part) for part in (merit, asked.objective, asked.errors, asked.costs, asked.outputs)]
-        self.value = ca.Function("aims", self.arguments, results)
+        self.value = ca.Function("objectives", self.arguments, results)
         self.slopes, number = self._slopes(merit), combined(asked.means)
         self.probe, self.probe_slopes = ca.Function("probe", self.arguments, [number]), self._slopes(number)
 
@@ -89,7 +89,7 @@ class Aims:
         return ca.Function("slopes", self.arguments, slopes)
 
 
-class StagePlaces:
+class StepPlaces:
     """Where a program keeps one step; see ``Places``."""
 
     def __init__(self, rollout: Rollout) -> None:
@@ -98,7 +98,7 @@ class StagePlaces:
         sizes = (int(part.shape[0]) for part in (rollout.x0, rollout.given, rollout.p))
         self.nx, self.nu, self.np = sizes
         n = int(rollout.z.shape[0])
-        self.all, self.knob = self.layout.take(self.nx + self.nu + self.np + 2 + n), self.layout.take(1)
+        self.all, self.smoothing = self.layout.take(self.nx + self.nu + self.np + 2 + n), self.layout.take(1)
         self.x, self.given = self.layout.series(self.nx, 2), self.layout.take(self.nu)
         self.u = self.given if rollout.feedback is None else self.layout.series(self.nu, 1)
         self.p, self.time, self.z = self.layout.take(self.np), self.layout.series(1, 2), self.layout.take(n)
@@ -109,19 +109,19 @@ class StagePlaces:
         return (self.x.still(), self.given, self.p, self.time.still(), self.time.later().still(), self.z)
 
 
-def stage_program(rollout: Rollout, aims: Aims, sensors: Sequence[str], exact: bool) -> Program:
+def step_program(rollout: Rollout, objectives: RolloutObjectives, sensors: Sequence[str], exact: bool) -> Program:
     """The program of one step.
 
     Its vector is (x, inputs, p, time, time after, z). The outputs are the next state ``after``, what the sensors read
-    there ``sensed``, the values of the formulas of ``aims.stages.series`` one after the other ``asked``, and ``inputs``
-    with what small controllers add.
+    there ``sensed``, the values of the formulas of ``objectives.samples.series`` one after the other ``asked``, and
+    ``inputs`` with what small controllers add.
     """
-    places = StagePlaces(rollout)
+    places = StepPlaces(rollout)
     body = [*control_calls(rollout, places), *step_calls(places, exact)]
     outputs = {"after": places.x.later().still(), "inputs": places.u.still()}
     last: list[FunctionCall] = []
     sensed = [_sense(places, name, last) for name in sensors]
-    asked = [_asked(places, formula, shift, last) for formula, shift in aims.stages.series]
+    asked = [_asked(places, formula, shift, last) for formula, shift in objectives.samples.series]
     for name, found in (("sensed", sensed), ("asked", asked)):
         if found:
             outputs[name] = _joined(places, found, last)
@@ -131,7 +131,7 @@ def stage_program(rollout: Rollout, aims: Aims, sensors: Sequence[str], exact: b
     return Program(
         size=places.layout.size,
         z=places.all,
-        knob=places.knob,
+        knob=places.smoothing,
         steps=1,
         outputs={name: outputs[name] for name in RESULTS if name in outputs},
         prologue=(FunctionCall(first, (places.all,), places.written),),
@@ -140,7 +140,7 @@ def stage_program(rollout: Rollout, aims: Aims, sensors: Sequence[str], exact: b
     )
 
 
-def _sense(places: StagePlaces, name: str, calls: list[FunctionCall]) -> Place:
+def _sense(places: StepPlaces, name: str, calls: list[FunctionCall]) -> Place:
     """What a sensor reads in the next state."""
     sensor = next(s for s in places.rollout.problem.sensors if s.name == name)
     result = places.layout.take(sensor.size)
@@ -151,7 +151,7 @@ def _sense(places: StagePlaces, name: str, calls: list[FunctionCall]) -> Place:
     return result
 
 
-def _asked(places: StagePlaces, formula: Formula, shift: int, calls: list[FunctionCall]) -> Place:
+def _asked(places: StepPlaces, formula: Formula, shift: int, calls: list[FunctionCall]) -> Place:
     """The value of a formula at the start or at the end of the step."""
     function = dense(places.rollout.compiled(formula))
     result = places.layout.take(int(function.size1_out(0)))
@@ -160,7 +160,7 @@ def _asked(places: StagePlaces, formula: Formula, shift: int, calls: list[Functi
     return result
 
 
-def _joined(places: StagePlaces, parts: list[Place], calls: list[FunctionCall]) -> Place:
+def _joined(places: StepPlaces, parts: list[Place], calls: list[FunctionCall]) -> Place:
     """The parts one after the other."""
     symbols = [ca.SX.sym("part", part.size) for part in parts]
     result = places.layout.take(sum(part.size for part in parts))

@@ -20,12 +20,10 @@ from symphys.shooting import Nlp, ShootingProblem
 from symphys.transcription.decision_variables import blocks
 from symphys.transcription.functions import ExpressionFunctions
 from symphys.transcription.gradient_probe import Probe
-from symphys.transcription.judge import Verdict, verdict
-from symphys.transcription.network_rollout.context import KernelStage, Made, make
-from symphys.transcription.network_rollout.evaluator import LargeEvaluator
-from symphys.transcription.network_rollout.forward_backward import Way, aim_arguments
-from symphys.transcription.network_rollout.gradient_probe import LargeProbe
-from symphys.transcription.network_rollout.sensitivity import back
+from symphys.transcription.judge import Assessment, assessment
+from symphys.transcription.network_rollout.context import KernelStep, RolloutContext, make_context
+from symphys.transcription.network_rollout.evaluator import LargeEvaluator, LargeProbe
+from symphys.transcription.network_rollout.forward_backward import ForwardPass, back, objective_arguments
 from symphys.transcription.objective import limits
 from symphys.transcription.simulation import Record, simulate
 from symphys.transcription.transcription import Transcription, fastest
@@ -42,23 +40,24 @@ class LargeTranscription(Transcription):
     """See ``Transcription``; ``rollout`` is that of the problem without its large nets.
 
     Attributes:
-        made: what it is computed with.
+        context: what it is computed with.
     """
 
-    made: Made
+    context: RolloutContext
 
-    def judge(self, z: Array, smoothing: float = 0.0) -> Verdict:
+    def judge(self, z: Array, smoothing: float = 0.0) -> Assessment:
         """See ``Transcription``."""
-        way = self._plain.way(z, smoothing)
+        motion = self._plain.forward_pass(z, smoothing)
         _, objective, errors, costs, outputs = (
-            np.array(part).ravel() for part in self.made.aims.value.call(aim_arguments(self.made, way, 0))
+            np.array(part).ravel()
+            for part in self.context.objectives.value.call(objective_arguments(self.context, motion, 0))
         )
-        return verdict(self.problem, float(objective[0]), costs, errors, outputs)
+        return assessment(self.problem, float(objective[0]), costs, errors, outputs)
 
     def record(self, z: Array, smoothing: float = 0.0) -> Record:
         """See ``Transcription``."""
-        way = self._plain.way(z, smoothing)
-        found = simulate(self.rollout, lambda *_: self._happened(way, smoothing), way.z[0], smoothing)
+        motion = self._plain.forward_pass(z, smoothing)
+        found = simulate(self.rollout, lambda *_: self._happened(motion, smoothing), motion.z[0], smoothing)
         return replace(found, z=np.asarray(z, float))
 
     def prices(self, kinds: Iterable[str] = ("gradient",)) -> dict[str, float]:
@@ -74,9 +73,9 @@ class LargeTranscription(Transcription):
 
     def back(self, record: Record, ends: Array) -> Iterator[Array]:
         """See ``Transcription``."""
-        plain, smoothing = self._plain, record.course.smoothing
-        way = plain.way(record.z, smoothing)
-        return back(self.made, plain.stage, plain.nets_at(record.z), way, smoothing, ends)
+        plain, smoothing = self._plain, record.arrays.smoothing
+        motion = plain.forward_pass(record.z, smoothing)
+        return back(self.context, plain.batch_step, plain.nets_at(record.z), motion, smoothing, ends)
 
     def pull(self, record: Record, states: Mapping[int, Array], parameters: Array) -> Array | None:
         """See ``Transcription``."""
@@ -85,14 +84,14 @@ class LargeTranscription(Transcription):
     @cached_property
     def _plain(self) -> LargeEvaluator:
         """The judge's: casadi's virtual machine."""
-        return LargeEvaluator(self.made, self.made.plain, 1)
+        return LargeEvaluator(self.context, self.context.plain, 1)
 
-    def _happened(self, way: Way, smoothing: float) -> list[Any]:
+    def _happened(self, motion: ForwardPass, smoothing: float) -> list[Any]:
         """What ``recorder`` gives, of the first robot."""
         rollout, steps = self.rollout, self.rollout.steps
         scheme = rollout.problem.simulation.scheme()
         step = rollout.remembering(report_function(rollout.world, scheme, rollout.inputs, rollout.parameters.symbols))
-        x, u, given, p = way.x[:, 0].T, way.u[:, 0].T, way.given[:, 0].T, way.p[0]
+        x, u, given, p = motion.x[:, 0].T, motion.u[:, 0].T, motion.given[:, 0].T, motion.p[0]
         _, *happened = step.map(steps)(x[:, :-1], u, np.tile(p[:, None], steps), smoothing)
         return [x, u, given, p[:, None], *happened]
 
@@ -102,42 +101,42 @@ def transcribe_large(
 ) -> LargeTranscription:
     """See ``transcribe``: "simd32" has nets in single precision, and steps in double all the same."""
     began = perf_counter()
-    made = make(problem)
+    context = make_context(problem)
     built = perf_counter() - began
-    evaluator, description = _evaluator(made, exact, backend, processors() if threads is None else threads)
+    evaluator, description = _evaluator(context, exact, backend, processors() if threads is None else threads)
     shooting = ShootingProblem(
         name=problem.name,
         blocks=blocks(problem),
         evaluator=evaluator,
         nlp=Nlp(None),
         squares=False,
-        constraint_names=made.aims.terms.names,
-        constraint_lower=made.aims.terms.lower,
-        constraint_upper=made.aims.terms.upper,
+        constraint_names=context.objectives.terms.names,
+        constraint_lower=context.objectives.terms.lower,
+        constraint_upper=context.objectives.terms.upper,
         limits=limits(problem),
         smoothing=problem.simulation.smoothing,
         stop_when_met=problem.stop_when_met,
         output_names=tuple(output.label for output in problem.outputs),
     )
-    functions = ExpressionFunctions(made.rollout, made.aims.terms)
+    functions = ExpressionFunctions(context.rollout, context.objectives.terms)
     return LargeTranscription(
-        problem, made.rollout, made.aims.terms, functions, shooting, description, built, made=made
+        problem, context.rollout, context.objectives.terms, functions, shooting, description, built, context=context
     )
 
 
-def _evaluator(made: Made, exact: bool, backend: str, threads: int) -> tuple[LargeEvaluator, Description]:
+def _evaluator(context: RolloutContext, exact: bool, backend: str, threads: int) -> tuple[LargeEvaluator, Description]:
     """The evaluator that is asked for, or casadi's with a note. Steps are in double precision always."""
     began = perf_counter()
     if backend in PLAIN:
-        return LargeEvaluator(made, made.plain, threads), Description("casadi", threads=threads)
+        return LargeEvaluator(context, context.plain, threads), Description("casadi", threads=threads)
     try:
-        kernel = made.compiled(exact, STEPPING[backend])
+        kernel = context.compiled(exact, STEPPING[backend])
     except (KernelUnavailable, ProgramError) as error:
         note = f"casadi's virtual machine evaluates, which is slower: {error}"
-        return LargeEvaluator(made, made.plain, threads), Description("casadi", threads=threads, note=note)
+        return LargeEvaluator(context, context.plain, threads), Description("casadi", threads=threads, note=note)
     precision, device = PRECISIONS[backend], kernel.device if isinstance(kernel, DeviceKernel) else None
     shared, nets = threads if device is None else 1, "nets by matrix products"
     if precision == "single":
         nets += " in single precision, steps in double"
-    told = replace(described(kernel, perf_counter() - began, precision, nets), threads=shared)
-    return LargeEvaluator(made, KernelStage(kernel), shared, REALS[precision], device), told
+    description = replace(described(kernel, perf_counter() - began, precision, nets), threads=shared)
+    return LargeEvaluator(context, KernelStep(kernel), shared, REALS[precision], device), description

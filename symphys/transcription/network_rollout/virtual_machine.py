@@ -9,45 +9,45 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.transcription.network_rollout.step_program import RESULTS, Aims, sense_function
+from symphys.transcription.network_rollout.step_program import RESULTS, RolloutObjectives, sense_function
 from symphys.transcription.rollout import Rollout
 
 Array = NDArray[np.float64]
 
 
-class PlainStage:
-    """Computes what the kernel of ``stage_program`` computes; see ``Stage``."""
+class VirtualMachineStep:
+    """Computes what the kernel of ``step_program`` computes; see ``BatchStep``."""
 
-    def __init__(self, rollout: Rollout, aims: Aims, sensors: Sequence[str]) -> None:
+    def __init__(self, rollout: Rollout, objectives: RolloutObjectives, sensors: Sequence[str]) -> None:
         """Build the function of one step."""
         sizes = [int(part.shape[0]) for part in (rollout.x0, rollout.given, rollout.p)]
         sizes += [1, 1, int(rollout.z.shape[0])]
-        row, knob = ca.MX.sym("row", sum(sizes)), ca.MX.sym("smoothing")
+        row, smoothing = ca.MX.sym("row", sum(sizes)), ca.MX.sym("smoothing")
         x, given, p, now, later, z = ca.vertsplit(row, np.cumsum([0, *sizes]).tolist())
         u = given if rollout.feedback is None else rollout.feedback(x, given, p, now)
-        after = rollout.step(x, u, p, knob)
+        after = rollout.step(x, u, p, smoothing)
         found = {"after": after, "inputs": u}
         found["sensed"] = sense_function(rollout, sensors)(after, p, later)
         asked = [
             rollout.compiled(formula)(after if shift else x, u, p, later if shift else now, z)
-            for formula, shift in aims.stages.series
+            for formula, shift in objectives.samples.series
         ]
         found["asked"] = ca.vertcat(ca.MX(0, 1), *asked)
         names = [name for name in RESULTS if found[name].shape[0]]
         self.seeded = tuple(names)
         self.sizes: Mapping[str, int] = {name: int(found[name].shape[0]) for name in names}
-        self._value = ca.Function("stage", [row, knob], [ca.densify(found[name]) for name in names])
+        self._value = ca.Function("stage", [row, smoothing], [ca.densify(found[name]) for name in names])
         self._pull = self._value.reverse(1)
 
-    def forward(self, rows: Array, knob: Sequence[float]) -> dict[str, Array]:
-        """See ``Stage``."""
-        found = [[np.array(part).ravel() for part in self._value.call([row, knob[0]])] for row in rows]
+    def forward(self, rows: Array, smoothing: Sequence[float]) -> dict[str, Array]:
+        """See ``BatchStep``."""
+        found = [[np.array(part).ravel() for part in self._value.call([row, smoothing[0]])] for row in rows]
         return {name: np.array([each[i] for each in found]) for i, name in enumerate(self.seeded)}
 
-    def gradient(self, rows: Array, seeds: Array, knob: Sequence[float]) -> tuple[Any, Array]:
-        """See ``Stage``."""
+    def gradient(self, rows: Array, seeds: Array, smoothing: Sequence[float]) -> tuple[Any, Array]:
+        """See ``BatchStep``."""
         cuts, slopes = np.cumsum(list(self.sizes.values()))[:-1], []
         for row, seed in zip(rows, seeds, strict=True):
-            values, parts = self._value.call([row, knob[0]]), np.split(seed, cuts)
-            slopes.append(np.array(self._pull.call([row, knob[0], *values, *parts])[0]).ravel())
+            values, parts = self._value.call([row, smoothing[0]]), np.split(seed, cuts)
+            slopes.append(np.array(self._pull.call([row, smoothing[0], *values, *parts])[0]).ravel())
         return None, np.array(slopes)

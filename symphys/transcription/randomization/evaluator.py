@@ -18,7 +18,7 @@ from symphys.transcription.randomization.sampler import Sampler
 Array = NDArray[np.float64]
 
 
-class KernelSituations:
+class ScenarioEvaluator:
     """See ``Situations``: a sampler and a kernel for each grid."""
 
     def __init__(self, grids: Sequence[str], samplers: Sequence[Sampler], kernels: Sequence[Kernel]) -> None:
@@ -30,7 +30,7 @@ class KernelSituations:
         return ScenarioSamples(grid, self.samplers[grid].draw(rng, count, width))
 
     def nominal(self, count: int) -> ScenarioSamples:
-        """The problem's own situation, ``count`` times."""
+        """The nominal sample, ``count`` times."""
         return ScenarioSamples(0, np.tile(self.samplers[0].nominal, (count, 1)))
 
     def value(self, Z: Array, drawn: ScenarioSamples, smoothing: float) -> Values:
@@ -51,9 +51,9 @@ class KernelSituations:
 
 
 class NominalEvaluator(WithoutResiduals):
-    """Evaluates points in the problem's own situation; see ``Evaluator``."""
+    """Evaluates points in the nominal sample; see ``Evaluator``."""
 
-    def __init__(self, situations: KernelSituations) -> None:
+    def __init__(self, situations: ScenarioEvaluator) -> None:
         """By the same kernels."""
         self.situations = situations
 

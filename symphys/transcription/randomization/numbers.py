@@ -1,21 +1,21 @@
-"""Numbers that differ from situation to situation, as variables that no solver chooses."""
+"""Numbers that differ from sample to sample, as variables that no solver chooses."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.problem import Problem, Slot, Variable, Varied
+from symphys.problem import Problem, RandomizedQuantity, Variable, VariableSlot
 
 Array = NDArray[np.float64]
 LEAST = 0.05
 """Of a factor, however wide the draws are made."""
 
 
-class Numbers:
+class QuantitySampler:
     """The draws of one table."""
 
-    def __init__(self, problem: Problem, varied: Varied) -> None:
+    def __init__(self, problem: Problem, varied: RandomizedQuantity) -> None:
         """Look up what the numbers are without it."""
         self.varied, self.steps = varied, problem.simulation.steps
         self.lasts = max(1, round(varied.lasts / problem.simulation.dt)) if varied.lasts else self.steps
@@ -49,7 +49,7 @@ class Numbers:
         return ((step >= first[:, None]) & (step < first[:, None] + self.lasts)).astype(float)
 
 
-def hidden(name: str, kind: str, slot: Slot, guess: Array, knots: int = 1) -> Variable:
+def hidden(name: str, kind: str, slot: VariableSlot, guess: Array, knots: int = 1) -> Variable:
     """A variable that no solver sees."""
     none, one = np.full(guess.size, np.inf), np.ones(guess.size)
     return Variable(name, kind, (slot,), knots, "constant", guess, -none, none, one, 0 * one)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""The pose of a robot, which differs from situation to situation."""
+"""The pose of a robot, which differs from sample to sample."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from symphys.dynamics import gap_function
 from symphys.model.state_layout import GIVEN, initial_state
-from symphys.problem import Posed, Problem, Slot
-from symphys.problem.parametric.forward_kinematics import side, sockets, spanning
-from symphys.problem.parametric.joints import JointPlan
+from symphys.problem import Problem, RandomizedPose, VariableSlot
+from symphys.problem.parametric.forward_kinematics import sockets, spanning_tree, subtree
+from symphys.problem.parametric.joints import ParametricJoint
 from symphys.transcription.randomization.numbers import hidden
 
 Array = NDArray[np.float64]
@@ -19,20 +19,22 @@ State = dict[str, Array]
 """By name, (count, k) each."""
 
 
-class Poses:
+class PoseSampler:
     """The draws of one table: turned as a whole, joint by joint, then lifted until nothing overlaps."""
 
-    def __init__(self, problem: Problem, posed: Posed) -> None:
+    def __init__(self, problem: Problem, posed: RandomizedPose) -> None:
         """Find what hangs on each joint, and what stands still below the robot."""
         self.posed, self.problem, self.world = posed, problem, problem.world()
         self.names = [f"{body}.{field}" for body in posed.bodies for field in GIVEN]
         initial = problem.initial
         self.variables = tuple(
-            hidden(f"{posed.name}:{name}", "initial", Slot(name, tuple(range(initial[name].size))), initial[name])
+            hidden(
+                f"{posed.name}:{name}", "initial", VariableSlot(name, tuple(range(initial[name].size))), initial[name]
+            )
             for name in self.names
         )
-        tree = spanning(problem.plan.joints)
-        self.hinges = [Hinge(joint, side(joint.first, joint, tree), initial) for joint in posed.joints]
+        tree = spanning_tree(problem.parametric.joints)
+        self.hinges = [Hinge(joint, subtree(joint.first, joint, tree), initial) for joint in posed.joints]
         robot = {i for i, body in enumerate(self.world.bodies) if body.name in posed.bodies}
         below = [k for k, p in enumerate(self.world.pairs) if p.second.body is None and p.first.body in robot]
         symbols = {name: ca.SX.sym(name, value.size) for name, value in initial.items()}
@@ -68,7 +70,7 @@ class Poses:
 class Hinge:
     """A joint with all that its first body carries."""
 
-    def __init__(self, joint: JointPlan, moved: list[str], initial: State) -> None:
+    def __init__(self, joint: ParametricJoint, moved: list[str], initial: State) -> None:
         """Axis and pivot in the frame of the body that stays."""
         assert joint.second is not None, "a robot hangs on nothing"
         self.base, self.moved = joint.second, moved

@@ -1,4 +1,4 @@
-"""Draws situations: the numbers that differ, one row each."""
+"""Samples of scenarios: the numbers that differ, one row each."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.problem import Problem
-from symphys.transcription.randomization.numbers import Numbers
-from symphys.transcription.randomization.poses import Poses
+from symphys.transcription.randomization.numbers import QuantitySampler
+from symphys.transcription.randomization.poses import PoseSampler
 
 Array = NDArray[np.float64]
 
 
 class Sampler:
-    """The situations of a problem, on one grid of time.
+    """Samples of a problem's scenarios, on one grid of time.
 
     Attributes:
         problem: with a variable for all that differs, behind its own.
@@ -26,8 +26,10 @@ class Sampler:
         """See what differs."""
         scenarios = problem.scenarios
         assert scenarios is not None, "nothing differs"
-        self._parts: list[Numbers | Poses] = [Numbers(problem, varied) for varied in scenarios.varied]
-        self._parts += [Poses(problem, posed) for posed in scenarios.posed]
+        self._parts: list[QuantitySampler | PoseSampler] = [
+            QuantitySampler(problem, varied) for varied in scenarios.quantities
+        ]
+        self._parts += [PoseSampler(problem, posed) for posed in scenarios.poses]
         own = tuple(variable for part in self._parts for variable in part.variables)
         self.problem = replace(problem, variables=(*problem.variables, *own), scenarios=None)
         self.nominal = np.concatenate([np.zeros(0), *(variable.guess for variable in own)])

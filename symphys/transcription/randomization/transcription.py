@@ -10,7 +10,7 @@ from symphys.codegen.backends import PRECISIONS, build_kernel, described
 from symphys.problem import Problem
 from symphys.shooting import Nlp
 from symphys.transcription.program import rollout_program
-from symphys.transcription.randomization.evaluator import KernelSituations, NominalEvaluator
+from symphys.transcription.randomization.evaluator import NominalEvaluator, ScenarioEvaluator
 from symphys.transcription.randomization.sampler import Sampler
 from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.transcription import Transcription
@@ -18,7 +18,7 @@ from symphys.transcription.transcription import Transcription
 WITHOUT = "there is no evaluation in other situations"
 
 
-def with_situations(
+def with_scenarios(
     plain: Transcription, problem: Problem, exact: bool, backend: str, threads: int | None
 ) -> Transcription:
     """``plain``, which is of the problem without its scenarios, with kernels that know them in place of its backend.
@@ -29,24 +29,24 @@ def with_situations(
     try:
         if backend not in PRECISIONS:
             raise KernelUnavailable(f"the backend {backend} has no situations")
-        situations = _situations(problem, exact, backend, processors() if threads is None else threads)
+        situations = _evaluator(problem, exact, backend, processors() if threads is None else threads)
     except (KernelUnavailable, ProgramError) as error:
-        told = replace(plain.backend, note=f"{WITHOUT}: {error}")
-        return replace(plain, problem=problem, backend=told)
+        description = replace(plain.backend, note=f"{WITHOUT}: {error}")
+        return replace(plain, problem=problem, backend=description)
     shooting = replace(
         plain.shooting, evaluator=NominalEvaluator(situations), scenario=situations, squares=False, nlp=Nlp(None)
     )
     grids = f"{len(situations.kernels)} discretisations" if len(situations.kernels) > 1 else ""
-    told = described(situations.kernels[0], perf_counter() - began, note=grids)
+    description = described(situations.kernels[0], perf_counter() - began, note=grids)
     cached = all(kernel.report.cached for kernel in situations.kernels)
-    return replace(plain, problem=problem, shooting=shooting, backend=replace(told, cached=cached))
+    return replace(plain, problem=problem, shooting=shooting, backend=replace(description, cached=cached))
 
 
-def _situations(problem: Problem, exact: bool, backend: str, threads: int) -> KernelSituations:
+def _evaluator(problem: Problem, exact: bool, backend: str, threads: int) -> ScenarioEvaluator:
     assert problem.scenarios is not None, "nothing differs"
-    grids = {"": problem.simulation, **{grid.name: grid.simulation for grid in problem.scenarios.grids}}
+    grids = {"": problem.simulation, **{grid.name: grid.simulation for grid in problem.scenarios.discretisations}}
     samplers = [Sampler(replace(problem, simulation=simulation)) for simulation in grids.values()]
-    return KernelSituations(list(grids), samplers, [_kernel(each, exact, backend, threads) for each in samplers])
+    return ScenarioEvaluator(list(grids), samplers, [_kernel(each, exact, backend, threads) for each in samplers])
 
 
 def _kernel(sampler: Sampler, exact: bool, backend: str, threads: int) -> Kernel:

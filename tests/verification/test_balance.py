@@ -13,7 +13,7 @@ from symphys.findings.levels import BAD, GOOD
 from symphys.problem import load_problem
 from symphys.problems import find
 from symphys.transcription import transcribe
-from symphys.verification.budget import budget, momentum_gap
+from symphys.verification.balance import balance, momentum_gap
 from symphys.verification.contacts import slides, surface
 
 ROD = """
@@ -97,7 +97,7 @@ tolerance = 0.1
 def test_momentum_closes_for_shipped_problems(name):
     shipped = transcribe(load_problem(find(name)), backend="casadi")
     for seed in (0, 1):
-        found = budget(shipped.rollout, shipped.record(shipped.shooting.start(seed)))
+        found = balance(shipped.rollout, shipped.record(shipped.shooting.start(seed)))
         assert found["momentum"] < 1e-9
         assert found["gains"] == []
 
@@ -112,7 +112,7 @@ def test_a_force_that_does_not_act_as_recorded_is_found():
 def test_work_of_forces_and_torques(make):
     """A constant torque gives (tau t)^2 / 2 I, a constant force F^2 t^2 / 2 m; gravity moves energy only."""
     top = make(TOP)
-    energy = {key: np.array(column) for key, column in budget(
+    energy = {key: np.array(column) for key, column in balance(
         top.rollout, top.record(top.shooting.start(0)))["energy"].items()}  # fmt: skip
     expected = (1.4 * energy["time"]) ** 2 / (2 * 0.7) + (4 * energy["time"]) ** 2 / (2 * 2.0)
     assert energy["applied"] == pytest.approx(expected, abs=1e-12)
@@ -128,7 +128,7 @@ def test_what_friction_takes(make):
     """
     slide = make(SLIDE)
     record = slide.record(slide.shooting.start(0))
-    found = budget(slide.rollout, record)
+    found = balance(slide.rollout, record)
     assert found["energy"]["contact"][-1] == pytest.approx(-2 / 7 * 2.0**2 / 2, rel=1e-9)
     (ball,) = slides(slide.rollout, record)
     assert ball["contact"] == "ball-ground"
@@ -140,7 +140,7 @@ def test_energy_that_a_contact_adds_is_told_with_its_step(make):
     """Kane's rod: the blow turns the slip round, friction holds it, Newton's law gives back the whole normal speed."""
     rod = make(ROD)
     record = rod.record(rod.shooting.start(0))
-    found = budget(rod.rollout, record)
+    found = balance(rod.rollout, record)
     (gain,) = found["gains"]
     before, after = (0.5 * (v @ v + 0.09 * w @ w) for v, w in (
         (record.motion.velocity[i, 0], record.motion.angular_velocity[i, 0]) for i in (0, -1)))  # fmt: skip
@@ -160,7 +160,7 @@ def test_energy_that_a_contact_adds_is_told_with_its_step(make):
 
 def test_an_impact_adds_no_energy_unless_asked_to(make):
     rod = make(ROD.replace("energy_cap = false", ""))
-    assert budget(rod.rollout, rod.record(rod.shooting.start(0)))["gains"] == []
+    assert balance(rod.rollout, rod.record(rod.shooting.start(0)))["gains"] == []
 
 
 def test_words_of_the_budget():

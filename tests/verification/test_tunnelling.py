@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from symphys.transcription import Transcription
-from symphys.verification.tunnelling import passages
+from symphys.verification.tunnelling import tunnelling
 
 SHOT = """
 [simulation]
@@ -54,7 +54,7 @@ def found(shot: Transcription, moved: float = 0.0) -> dict:
     record = shot.record(shot.shooting.start(0))
     position = record.motion.position
     position[len(position) // 2 :, 0, 0] += moved
-    return passages(shot.rollout, record)
+    return tunnelling(shot.rollout, record)
 
 
 @pytest.mark.parametrize("surface", [WALL.format(thickness=0.02), WALL.format(thickness=0.3), RIDGE, BODY])
@@ -67,7 +67,7 @@ def test_a_ball_that_is_before_a_wall_and_then_behind_it_went_through(make, surf
     record = shot.record(shot.shooting.start(0))
     if len(record.motion.body_names) > 1:
         record.motion.position[:, 1, 0] -= 90
-    told = passages(there.rollout, record)
+    told = tunnelling(there.rollout, record)
     assert told["passed"] > 1
     assert told["passed_at"]["contact"] in ("ball-wall", "ball-ridge", "ball-plate")
     assert 0.02 <= told["passed_at"]["time"] <= 0.03
@@ -91,6 +91,6 @@ def test_a_body_ends_below_terrain(make):
     shot = make(SHOT.format(duration=0.1, surface='[[terrain]]\nname = "hill"\nheight = "0 * x"', speed=0))
     record = shot.record(shot.shooting.start(0))
     record.motion.position[-1, 0, 2] = -1.0
-    told = passages(shot.rollout, record)
+    told = tunnelling(shot.rollout, record)
     assert told["passed_at"] == {"contact": "ball-hill", "time": pytest.approx(0.1), "depth": pytest.approx(1.05)}
     assert np.isfinite(told["passed"])

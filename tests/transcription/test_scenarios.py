@@ -126,7 +126,7 @@ def test_pushes_act_for_their_time(problem: Problem) -> None:
 def test_pushes_act_as_long_on_a_finer_grid(problem: Problem) -> None:
     """From the same instants."""
     assert problem.scenarios is not None
-    (grid,) = problem.scenarios.grids
+    (grid,) = problem.scenarios.discretisations
     coarse, fine = (
         columns(sampler, sampler.draw(np.random.default_rng(0), 50, 1.0))["torso.force"].reshape(50, -1, 2)[1:]
         for sampler in (Sampler(problem), Sampler(replace(problem, simulation=grid.simulation)))
@@ -225,7 +225,7 @@ def test_forgetting_and_falling(walker: Transcription) -> None:
     situations = walker.shooting.scenario
     assert situations is not None
     drawn = situations.draw(np.random.default_rng(3), 8)
-    exact, faded = (situations.gradient(np.zeros((1, 2)), drawn, 0.0, forget) for forget in (0.0, 50.0))
+    exact, faded = (situations.gradient(np.zeros((1, 2)), drawn, 0.0, discount) for discount in (0.0, 50.0))
     assert exact.gradient is not None and faded.gradient is not None
     assert np.linalg.norm(faded.gradient[:, 0]) < 0.1 * np.linalg.norm(exact.gradient[:, 0])
     assert exact.alive is not None

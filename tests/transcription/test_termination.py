@@ -22,7 +22,7 @@ name = "ball"
 shape = { sphere = { radius = 0.1 } }
 mass = 1
 position = [0, 0, 1]
-[fall]
+[termination]
 margin = "ball.position[2] - 0.5"
 cost = 2
 [[variable]]
@@ -52,21 +52,21 @@ def ball(path: Path) -> Transcription:
     return transcribe(load_problem(path))
 
 
-def test_nothing_moves_after_a_fall(ball: Transcription) -> None:
+def test_nothing_moves_after_the_termination(ball: Transcription) -> None:
     height = ball.simulate(np.array([1.0, 0, 0])).position[:, 0, 2]
     assert height[HALF] > 0.5 > height[HALF + 1]
     assert np.all(height[HALF + 1 :] == height[HALF + 1])
 
 
 def test_costs_are_those_of_the_time_before(ball: Transcription) -> None:
-    """Trapezoids of what is alive: the step of the fall counts half, the time left twice."""
+    """Trapezoids of what is alive: the step of the termination counts half, the time left twice."""
     costs = ball.judge(np.array([1.0, 0, 0])).costs
     assert costs["ahead"] == pytest.approx(DT * DT * (sum(range(HALF + 1)) - HALF / 2 + HALF / 2), rel=1e-9)
-    assert costs["fall"] == pytest.approx(2 * (1 - DT * (HALF + 0.5)), rel=1e-12)
+    assert costs["termination"] == pytest.approx(2 * (1 - DT * (HALF + 0.5)), rel=1e-12)
 
 
-def test_gradients_end_at_the_fall(ball: Transcription) -> None:
-    """Casadi and kernel agree; the end's target is as far as the ball came; the instant of the fall has no slope."""
+def test_gradients_end_at_the_termination(ball: Transcription) -> None:
+    """Casadi and kernel agree; the end's target is as far as the ball came; the instant itself has no slope."""
     z, reached = np.array([[1.0, 0, 0]]), DT * (HALF + 1)
     values = [transcribe(ball.problem, backend=name).shooting.evaluator.gradient(z, 0.0) for name in ("casadi", "auto")]
     expected = [ball.judge(z[0]).costs["ahead"] + 2 * (reached - 1) * reached, 0, 0]
@@ -87,10 +87,10 @@ def test_adjoints_that_fade_end_at_the_fall(ball: Transcription) -> None:
     assert gradient[0] == pytest.approx([ball.judge(np.array([1.0, 0, 0])).costs["ahead"], 0, 0], rel=1e-9)
 
 
-def test_without_a_fall_it_is_as_if_there_were_none(path: Path) -> None:
+def test_without_a_termination_it_is_as_if_there_were_none(path: Path) -> None:
     """To the bit."""
     free = path.with_name("free.toml")
-    free.write_text(BALL.replace("[fall]", "[objective]").replace("margin", "#").replace("cost = 2", ""))
+    free.write_text(BALL.replace("[termination]", "[objective]").replace("margin", "#").replace("cost = 2", ""))
     path.write_text(BALL.replace("- 0.5", "+ 50"), encoding="utf-8")
     a, b = (transcribe(load_problem(file)).shooting.evaluator.gradient(np.array([[1.0, 2, 3]]), 0.0)
             for file in (path, free))  # fmt: skip
@@ -101,24 +101,56 @@ def test_without_a_fall_it_is_as_if_there_were_none(path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ("- 0.5", "- 1.5", r"fall\.margin: is -0.5 at the start of the guess"),
-        ("ball.position[2] - 0.5", "ball.position", r"fall\.margin: must be a number, but is a vector of 3"),
-        ("ball.position[2] - 0.5", "1 - time", r"fall\.margin: .*time"),
-        ("ball.position[2] - 0.5", "1 - ball.force[0]", r"fall\.margin: .*ball.force"),
-        ('name = "ahead"', 'name = "fall"', r'cost "fall"\.name: "fall" is the name of the cost that .fall. adds'),
-        ("cost = 2", "cost = -2", r"fall\.cost: must be at least 0"),
+        ("- 0.5", "- 1.5", r"termination\.margin: is -0.5 at the start of the guess"),
+        ("ball.position[2] - 0.5", "ball.position", r"termination\.margin: must be a number, but is a vector of 3"),
+        ("ball.position[2] - 0.5", "1 - time", r"termination\.margin: .*time"),
+        ("ball.position[2] - 0.5", "1 - ball.force[0]", r"termination\.margin: .*ball.force"),
+        (
+            'name = "ahead"',
+            'name = "termination"',
+            r'cost "termination"\.name: "termination" is the name of the cost that .termination. adds',
+        ),
+        ("cost = 2", "cost = -2", r"termination\.cost: must be at least 0"),
     ],
 )
-def test_bad_falls_are_named(path: Path, old: str, new: str, told: str) -> None:
+def test_bad_terminations_are_named(path: Path, old: str, new: str, told: str) -> None:
     path.write_text(BALL.replace(old, new), encoding="utf-8")
     with pytest.raises(ProblemError, match=told):
         load_problem(path)
 
 
-def test_alive_is_known_with_a_fall_only(path: Path) -> None:
+def test_alive_is_known_with_a_termination_only(path: Path) -> None:
     path.write_text(BALL.replace("ball.position[0] - 1", "alive"), encoding="utf-8")
     assert load_problem(path).targets[0].formula.names == {"alive"}
-    path.write_text(BALL.replace("[fall]", "[objective]").replace("margin", "#").replace("cost = 2", "")
+    path.write_text(BALL.replace("[termination]", "[objective]").replace("margin", "#").replace("cost = 2", "")
                     .replace("ball.position[0] - 1", "alive"), encoding="utf-8")  # fmt: skip
     with pytest.raises(ProblemError, match="alive"):
         load_problem(path)
+
+
+def test_the_old_name_goes_on_working(path: Path) -> None:
+    """With the name of the table the added cost keeps its name, and so does a fault its place."""
+    path.write_text(BALL.replace("[termination]", "[fall]"), encoding="utf-8")
+    old = load_problem(path)
+    assert [cost.name for cost in old.costs] == ["ahead", "fall"]
+    path.write_text(BALL, encoding="utf-8")
+    new = load_problem(path)
+    assert new.termination == old.termination
+    assert [cost.formula.text for cost in new.costs] == [cost.formula.text for cost in old.costs]
+    path.write_text(BALL.replace("[termination]", "[fall]").replace("- 0.5", "- 1.5"), encoding="utf-8")
+    with pytest.raises(ProblemError, match=r"fall\.margin: is -0.5"):
+        load_problem(path)
+
+
+def test_both_names_are_refused(path: Path) -> None:
+    path.write_text(f'{BALL}\n[fall]\nmargin = "1"\n', encoding="utf-8")
+    with pytest.raises(ProblemError, match=r"fall: is the old name of \[termination\], which is given too"):
+        load_problem(path)
+
+
+@pytest.mark.parametrize("table", ["fall", "termination"])
+@pytest.mark.parametrize("key", ["fall", "termination"])
+def test_settings_may_use_either_name(path: Path, table: str, key: str) -> None:
+    path.write_text(BALL.replace("[termination]", f"[{table}]"), encoding="utf-8")
+    problem = load_problem(path, {f"{key}.cost": 7})
+    assert [cost.weight for cost in problem.costs if cost.name == table] == [7]

@@ -12,13 +12,13 @@ import pytest
 
 from symphys.errors import ProblemError
 from symphys.model import shapes
-from symphys.model.shapes import Box, Capsule, Plane, Sphere, Terrain, contact_points
+from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain, contact_points
 from symphys.model.world import Law
 from symphys.problem import Problem
 from symphys.problem.checks.pair_limit import MOST_POINTS
-from symphys.problem.parametric.collision_filter import KINDS, Meetings
-from symphys.problem.parametric.parts import BlockPlan, BodyPlan, PairPlan, Part, PlanePlan
-from symphys.problem.parametric.world import WorldPlan
+from symphys.problem.parametric.collision_filter import KINDS, CollisionFilter
+from symphys.problem.parametric.parts import PairRule, ParametricBody, ParametricStatic, Part
+from symphys.problem.parametric.world import ParametricWorld
 
 Load = Callable[..., Problem]
 Refused = Callable[..., ProblemError]
@@ -73,9 +73,9 @@ def test_the_most_that_is_allowed(load: Load, refused: Refused) -> None:
 def plans(count: int, **keys: object) -> list[Part]:
     """Boxes b0, b1, ...; ``keys`` for all, functions of the index among them."""
     chosen = [{key: value(i) if callable(value) else value for key, value in keys.items()} for i in range(count)]
-    usual = {"mates": None, "group": None}
+    usual = {"collides_with": None, "group": None}
     return [
-        BodyPlan(f"b{i}", 1.0, None, (Box((1.0, 1.0, 1.0)),), False, 1.0, {}, **{**usual, **own})  # type: ignore[arg-type]
+        ParametricBody(f"b{i}", 1.0, None, (Box((1.0, 1.0, 1.0)),), False, 1.0, {}, **{**usual, **own})  # type: ignore[arg-type]
         for i, own in enumerate(chosen)
     ]
 
@@ -84,20 +84,20 @@ def plans(count: int, **keys: object) -> list[Part]:
     "parts",
     [
         plans(50_000),
-        plans(50_000, group=lambda i: f"g{i % 7}", mates=lambda i: frozenset({f"g{i % 5}"})),
-        plans(20_000, mates=lambda i: frozenset({f"b{(i + 1) % 20_000}", f"b{(i - 1) % 20_000}"})),
+        plans(50_000, group=lambda i: f"g{i % 7}", collides_with=lambda i: frozenset({f"g{i % 5}"})),
+        plans(20_000, collides_with=lambda i: frozenset({f"b{(i + 1) % 20_000}", f"b{(i - 1) % 20_000}"})),
     ],
     ids=["free", "groups", "chain"],
 )
 def test_tens_of_thousands_are_counted_at_once(parts: list[Part]) -> None:
     began = time.perf_counter()
-    census = Meetings([*parts, PlanePlan("ground", (0, 0, 1), 0.0, {})], []).census(MOST_POINTS)
+    count = CollisionFilter([*parts, ParametricStatic(Plane.ground(), {})], []).count(MOST_POINTS)
     assert time.perf_counter() - began < 2
-    assert census.points > MOST_POINTS
+    assert count.points > MOST_POINTS
 
 
-def random_parts(rng: np.random.Generator) -> tuple[list[Part], list[PairPlan]]:
-    """A few bodies and statics with random groups, mates and tables."""
+def random_parts(rng: np.random.Generator) -> tuple[list[Part], list[PairRule]]:
+    """A few bodies and statics with random groups, named and tables."""
     groups = [None, "g", "h"]
     surfaces = [Sphere(1.0), Box((1.0, 1.0, 1.0)), Capsule(1.0, 1.0)]
     names = [f"b{i}" for i in range(6)] + ["plane", "block"]
@@ -108,16 +108,16 @@ def random_parts(rng: np.random.Generator) -> tuple[list[Part], list[PairPlan]]:
     parts: list[Part] = []
     for name in names[:6]:
         held = tuple(surfaces[k] for k in rng.integers(0, 3, rng.integers(0, 3)))
-        mates = some(["g", "h", *(other for other in names if other != name)]) if rng.random() < 0.5 else None
-        parts.append(BodyPlan(name, 1.0, None, held, False, 1.0, {}, mates, groups[rng.integers(3)]))
-    parts.append(PlanePlan("plane", (0, 0, 1), 0.0, {}, groups[rng.integers(3)]))
-    parts.append(BlockPlan("block", Box((1.0, 1.0, 1.0)), {}, groups[rng.integers(3)]))
+        named = some(["g", "h", *(other for other in names if other != name)]) if rng.random() < 0.5 else None
+        parts.append(ParametricBody(name, 1.0, None, held, False, 1.0, {}, named, groups[rng.integers(3)]))
+    parts.append(ParametricStatic(Plane("plane"), {}, groups[rng.integers(3)]))
+    parts.append(ParametricStatic(Fixture("block", Box((1.0, 1.0, 1.0))), {}, groups[rng.integers(3)]))
     tables = {frozenset(str(n) for n in rng.choice([*names, "g", "h"], 2)) for _ in range(rng.integers(0, 6))}
     kept = [table for table in sorted(tables, key=sorted) if len(table) == 2 or table <= {"g", "h"}]
-    return parts, [PairPlan("-".join(sorted(table)), table, bool(rng.random() < 0.4), {}) for table in kept]
+    return parts, [PairRule("-".join(sorted(table)), table, bool(rng.random() < 0.4), {}) for table in kept]
 
 
-def contradicts(plan: WorldPlan, a: Part, b: Part) -> bool:
+def contradicts(plan: ParametricWorld, a: Part, b: Part) -> bool:
     """Whether tables of one rank say different things about two parts; a file with such tables is refused."""
     if any(pair.between == {a.name, b.name} for pair in plan.pairs):
         return False
@@ -126,12 +126,12 @@ def contradicts(plan: WorldPlan, a: Part, b: Part) -> bool:
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_kin_meet_as_their_members_do(seed: int) -> None:
-    """Counting and listing by kin gives what looking at every two parts gives."""
+def test_classes_meet_as_their_members_do(seed: int) -> None:
+    """Counting and listing by classes gives what looking at every two parts gives."""
     parts, tables = random_parts(np.random.default_rng(seed))
-    bodies = tuple(part for part in parts if isinstance(part, BodyPlan))
-    statics = tuple(part for part in parts if not isinstance(part, BodyPlan))
-    plan = WorldPlan(bodies, statics, tuple(tables), Law(), (0, 0, -9.81))
+    bodies = tuple(part for part in parts if isinstance(part, ParametricBody))
+    statics = tuple(part for part in parts if not isinstance(part, ParametricBody))
+    plan = ParametricWorld(bodies, statics, tuple(tables), Law(), (0, 0, -9.81))
     if any(contradicts(plan, a, b) for a, b in combinations(parts, 2)):
         tables, plan = [], replace(plan, pairs=())
     expected = []
@@ -140,15 +140,15 @@ def test_kin_meet_as_their_members_do(seed: int) -> None:
         meet = i < len(bodies) and plan.lets(a.name, b.name) and plan.lets(b.name, a.name)
         if meet and (table is None or table.collide) and a.surfaces and b.surfaces:
             expected.append((i, j))
-    assert list(plan.meetings) == expected
+    assert list(plan.collision_pairs) == expected
     points = sum(contact_points(s, t) for i, j in expected for s in parts[i].surfaces for t in parts[j].surfaces)
-    assert Meetings(parts, tables).census(MOST_POINTS).points == points
+    assert CollisionFilter(parts, tables).count(MOST_POINTS).points == points
     assert len(plan.world({}).pairs) == points
 
 
 def test_every_kind_of_surface_is_counted() -> None:
-    assert {type(kind) for kind in KINDS} == {Sphere, Capsule, Box, Plane, Terrain}
-    assert {kind for both in shapes.POINTS for kind in both} == {type(kind) for kind in KINDS}
+    assert set(KINDS) == {Sphere, Capsule, Box, Plane, Terrain}
+    assert {kind for both in shapes.POINTS for kind in both} == set(KINDS)
 
 
 def test_surfaces_that_no_rule_covers(

@@ -9,7 +9,7 @@ from symphys.findings.advice import advice
 from symphys.findings.examination import Examination, Growth
 from symphys.findings.levels import BAD, GOOD, Judged
 from symphys.findings.numerics import GROWTH_LIMITS, growth_finding, reach
-from symphys.verification.sensitivity_growth import backwards, growth, state_columns
+from symphys.verification.sensitivity_growth import backwards, sensitivity_growth, state_columns
 
 FLIGHT = """
 title = "Free flight"
@@ -85,7 +85,7 @@ def test_free_flight(make):
 def test_growth_is_the_norm_of_the_derivative_where_all_directions_are_swept(make, monkeypatch):
     flight = make(FLIGHT)
     monkeypatch.setattr("symphys.verification.sensitivity_growth.DIRECTIONS", 99)
-    found = growth(flight, flight.record(flight.shooting.start(0)))
+    found = sensitivity_growth(flight, flight.record(flight.shooting.start(0)))
     for time, factor in zip(found["time"], found["factor"], strict=True):
         block = np.array([[1, 1 - time], [0, 1]])
         if time < 1:
@@ -95,16 +95,16 @@ def test_growth_is_the_norm_of_the_derivative_where_all_directions_are_swept(mak
 def test_a_few_directions_estimate_it_from_below(make, monkeypatch):
     flight = make(FLIGHT)
     record = flight.record(flight.shooting.start(0))
-    few = growth(flight, record)["factor"][0]
+    few = sensitivity_growth(flight, record)["factor"][0]
     monkeypatch.setattr("symphys.verification.sensitivity_growth.DIRECTIONS", 99)
-    every = growth(flight, record)["factor"][0]
+    every = sensitivity_growth(flight, record)["factor"][0]
     assert every / 3 < few <= every * (1 + 1e-9)
 
 
 def test_billiards_grow_exponentially_and_the_advice_says_so(make):
     """Each flight of length l between discs that curve like R magnifies by L + sqrt(L^2 - 1), L = 1 + l / R."""
     billiard = make(BILLIARD)
-    found = growth(billiard, billiard.record(billiard.shooting.start(0)))
+    found = sensitivity_growth(billiard, billiard.record(billiard.shooting.start(0)))
     time, factor = np.array(found["time"]), np.array(found["factor"])
     flight, curvature, speed = 1.2, 0.4, 2.0
     ratio = 1 + flight / curvature

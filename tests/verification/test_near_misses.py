@@ -7,7 +7,7 @@ import pytest
 
 from symphys.transcription import Transcription
 from symphys.verification.gradient import compare_gradient
-from symphys.verification.near_misses import misses
+from symphys.verification.near_misses import near_misses
 from symphys.verification.refinement import settling
 
 THROW = """
@@ -46,7 +46,7 @@ value = "-ball.position[0]"
 
 
 def wall(of: Transcription, z: np.ndarray) -> dict:
-    (found,) = [row for row in misses(of, of.record(z)) if row["contact"] == "ball-wall"]
+    (found,) = [row for row in near_misses(of, of.record(z)) if row["contact"] == "ball-wall"]
     return found
 
 
@@ -103,7 +103,7 @@ def test_what_bounces_or_flies_far_away_is_no_near_miss(throw):
     z = throw.shooting.start(0)
     z[0] = 9.0
     assert wall(throw, z)["spreads"] > 1
-    assert not [row for row in misses(throw, throw.record(z)) if row["touches"]]
+    assert not [row for row in near_misses(throw, throw.record(z)) if row["touches"]]
 
 
 HELD = """

@@ -28,10 +28,10 @@ Expr = Any
 MOST_SAMPLES = 400
 MOST_GAINS = 5
 GAIN = 1e-6
-"""Of the largest kinetic energy: what a contact must add in a step to be told."""
+"""Of the largest kinetic energy: what a contact must add in a step to be reported."""
 
 
-def budget(rollout: Rollout, record: Record) -> dict[str, Any]:
+def balance(rollout: Rollout, record: Record) -> dict[str, Any]:
     """What became of energy and momentum.
 
     Returns:
@@ -75,12 +75,12 @@ def budget(rollout: Rollout, record: Record) -> dict[str, Any]:
 
 
 def momentum_gap(rollout: Rollout, record: Record) -> float:
-    """The largest unexplained change of momentum in a step, of bodies or what hangs together; see ``budget``.
+    """The largest unexplained change of momentum in a step, of bodies or groups that joints connect; see ``balance``.
 
     Momenta are those of the leapfrog: without what persistent forces, half a step ahead, have done already.
     """
     motion, dt, numbers = record.motion, rollout.dt, bodies(rollout, record)
-    layout, x = Layout(rollout.world), record.course.x
+    layout, x = Layout(rollout.world), record.arrays.x
     memory = np.stack([x[:, layout[f"{name}.reaction_force"]] for name in motion.body_names], axis=1)
     held = numbers.mass[:, None] * motion.velocity - x[:, layout["lag"], None] * memory
     impulses = dt * (numbers.mass[:, None] * numbers.gravity + motion.force + contact_forces(rollout, motion))
@@ -120,11 +120,11 @@ def _energies(rollout: Rollout, record: Record) -> tuple[Array, Array, Array]:
         turned = rotation.between(at["orientation"], after[layout[f"{body.name}.orientation"]])
         for field, way in (("force", moved), ("torque", turned)):
             work += ca.dot(given.get(f"{body.name}.{field}", ca.SX.zeros(3)), way)
-    states, course = ca.Function("energies", [x, p], [kinetic, potential]), record.course
-    x_k = plain(rollout, course.x)
-    both = states.map(len(x_k))(x_k.T, np.tile(course.p[:, None], len(course.x)))
+    states, arrays = ca.Function("energies", [x, p], [kinetic, potential]), record.arrays
+    x_k = plain(rollout, arrays.x)
+    both = states.map(len(x_k))(x_k.T, np.tile(arrays.p[:, None], len(arrays.x)))
     works = ca.Function("work", [x, after, u], [work]).map(rollout.steps)
-    done = works(x_k[:-1].T, x_k[1:].T, course.u.T)
+    done = works(x_k[:-1].T, x_k[1:].T, arrays.u.T)
     return np.array(both[0]).ravel(), np.array(both[1]).ravel(), np.array(done).ravel()
 
 

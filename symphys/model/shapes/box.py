@@ -1,0 +1,83 @@
+"""The box."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import hypot
+from typing import Any, ClassVar, Self
+
+from symphys.model.shapes.shape import FLATTEST, UPRIGHT, Scalar, SizeKey, SolidShape
+
+
+@dataclass(frozen=True)
+class Box(SolidShape):
+    """A rectangular block.
+
+    Attributes:
+        half_sizes: (3,) [m], along its own axes.
+        centre: (3,) [m].
+        orientation: (4,) unit quaternion w x y z.
+    """
+
+    kind: ClassVar[str] = "box"
+    plural: ClassVar[str] = "boxes"
+    summary: ClassVar[str] = "A solid box along its own axes."
+    example: ClassVar[str] = "{ size = [0.2, 0.1, 0.3] }"
+    size_keys: ClassVar[tuple[SizeKey, ...]] = (
+        SizeKey("size", "full length of its edges along x, y and z [m]", count=3),
+    )
+    contact_points: ClassVar[Mapping[str, int]] = {"plane": 8, "terrain": 8, "box": 16}
+
+    half_sizes: tuple[Scalar, ...]
+    centre: tuple[Scalar, ...] = (0.0, 0.0, 0.0)
+    orientation: tuple[Scalar, ...] = UPRIGHT
+
+    @classmethod
+    def from_sizes(cls, sizes: Mapping[str, Any], centre: tuple[Scalar, ...], orientation: tuple[Scalar, ...]) -> Self:
+        """See ``SolidShape``."""
+        return cls(tuple(edge / 2 for edge in sizes["size"]), centre, orientation)
+
+    @property
+    def sizes(self) -> dict[str, Any]:
+        """The full edges."""
+        return {"size": tuple(2 * half for half in self.half_sizes)}
+
+    @property
+    def volume(self) -> Scalar:
+        """Volume [m^3]."""
+        a, b, c = self.half_sizes
+        return 8 * a * b * c
+
+    @property
+    def moments(self) -> tuple[Scalar, Scalar, Scalar]:
+        """See ``SolidShape``."""
+        a, b, c = (half * half / 3 for half in self.half_sizes)
+        return b + c, a + c, a + b
+
+    @property
+    def extent(self) -> float:
+        """From the centre to the farthest point [m]."""
+        return hypot(*self.half_sizes)
+
+    @property
+    def rounded_box(self) -> tuple[float, tuple[float, float, float]]:
+        """Itself, without rounding."""
+        x, y, z = (float(half) for half in self.half_sizes)
+        return 0.0, (x, y, z)
+
+    @property
+    def mjcf_size(self) -> tuple[Scalar, ...]:
+        """Half sizes."""
+        return self.half_sizes
+
+    @property
+    def flatness(self) -> str:
+        """See ``SolidShape``."""
+        least, most = 2 * min(self.half_sizes), 2 * max(self.half_sizes)
+        if least >= FLATTEST * most:
+            return ""
+        return (
+            f"the smallest edge, {least:g} m, is less than {FLATTEST:g} of the largest, {most:g} m: that is no solid; "
+            f"make it {FLATTEST * most:g} m or more, or use a [[plane]] for a wall"
+        )

@@ -1,0 +1,115 @@
+"""What every shape of a body says of itself: sizes, volume, inertia, contact points, and how other formats write it.
+
+A new shape is a module beside this one and an entry in ``shapes.SHAPES``; a rule in ``dynamics.collision`` computes
+each of its contact pairs. Everything else asks the shape.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+Scalar = Any
+"""float or casadi.SX"""
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+"""The quaternion of no rotation."""
+FLATTEST = 1e-6
+"""Least ratio of a shape's smallest size to its largest."""
+
+
+@dataclass(frozen=True)
+class SizeKey:
+    """A size as problem files give it, positive [m].
+
+    Attributes:
+        name: the key.
+        description: for the JSON schema.
+        count: 1 for a number, 3 for a list.
+        reason: why it must not be 0, for messages; empty: that goes without saying.
+    """
+
+    name: str
+    description: str = "[m]"
+    count: int = 1
+    reason: str = ""
+
+
+class SolidShape(ABC):
+    """A solid, placed in a body's frame or in the world.
+
+    Attributes:
+        kind: its key in problem files and in scene.json, and its type in MJCF.
+        plural: for messages.
+        summary: one sentence for the JSON schema.
+        example: its table in a problem file.
+        size_keys: its sizes as problem files give them.
+        contact_points: in how many points it may touch another surface at once, by the kind of that; a pair of kinds
+            may be stated by either of the two.
+        turns: whether a turn about its centre changes it.
+        centre: (3,) [m].
+    """
+
+    kind: ClassVar[str]
+    plural: ClassVar[str]
+    summary: ClassVar[str]
+    example: ClassVar[str]
+    size_keys: ClassVar[tuple[SizeKey, ...]]
+    contact_points: ClassVar[Mapping[str, int]]
+    turns: ClassVar[bool] = True
+    centre: tuple[Scalar, ...]
+
+    @classmethod
+    @abstractmethod
+    def from_sizes(cls, sizes: Mapping[str, Any], centre: tuple[Scalar, ...], orientation: tuple[Scalar, ...]) -> Self:
+        """The shape with these ``sizes``; see there."""
+
+    @property
+    @abstractmethod
+    def sizes(self) -> dict[str, Any]:
+        """By the names of ``size_keys`` [m]: a number, or a tuple of three."""
+
+    @property
+    @abstractmethod
+    def volume(self) -> Scalar:
+        """Volume [m^3]."""
+
+    @property
+    @abstractmethod
+    def moments(self) -> tuple[Scalar, Scalar, Scalar]:
+        """Principal moments of inertia about its own centre, along its own axes, by mass [m^2]."""
+
+    @property
+    @abstractmethod
+    def extent(self) -> float:
+        """Distance from its centre to its farthest point [m]."""
+
+    @property
+    @abstractmethod
+    def rounded_box(self) -> tuple[float, tuple[float, float, float]]:
+        """How pictures draw it: all points within a radius [m] of a box with these half sizes (3,) [m]."""
+
+    @property
+    @abstractmethod
+    def mjcf_size(self) -> tuple[Scalar, ...]:
+        """``size`` of a MuJoCo geom whose type is ``kind``."""
+
+    @property
+    def flatness(self) -> str:
+        """Why it is too flat or thin to differ from a surface or a line without volume; empty if it is not."""
+        return ""
+
+    @property
+    def orientation(self) -> tuple[Scalar, ...]:
+        """(4,): unit quaternion w x y z; no rotation where a turn changes nothing."""
+        return UPRIGHT
+
+    @property
+    def placement(self) -> dict[str, tuple[Scalar, ...]]:
+        """``centre`` and, unless a turn changes nothing, ``orientation``."""
+        return {"centre": self.centre} | ({"orientation": self.orientation} if self.turns else {})
+
+    def resized(self, sizes: Mapping[str, Any]) -> Self:
+        """The shape with other ``sizes``, in its place."""
+        return self.from_sizes(sizes, self.centre, self.orientation)
