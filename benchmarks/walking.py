@@ -23,7 +23,7 @@ from symphys.runs.job import solver_options
 from symphys.shooting import ScenarioSamples
 from symphys.solvers import SOLVERS
 from symphys.transcription import Transcription, transcribe
-from symphys.transcription.randomization.evaluator import ScenarioEvaluator
+from symphys.transcription.randomization.evaluator import KernelScenarioEvaluator
 
 Array = NDArray[np.float64]
 UNSEEN, SEED, LEAST = 500, 20161105, 0.7
@@ -35,7 +35,7 @@ class Walks:
     def __init__(self, problem: Problem) -> None:
         """Compile it."""
         made = transcribe(problem, exact=True)
-        assert isinstance(made.shooting.scenario, ScenarioEvaluator), made.backend.note
+        assert isinstance(made.shooting.scenario, KernelScenarioEvaluator), made.backend.note
         self.problem, self.made, self.situations = problem, made, made.shooting.scenario
         names = [*(f"target {t.name}" for t in problem.targets), *(c.name for c in problem.constraints)]
         self.upright = names.index("stays upright")

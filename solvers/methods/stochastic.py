@@ -6,7 +6,7 @@ drown all others. ``adjoint_discount`` lets adjoints decay on their way back, at
 own, drawn once, decides which point is kept, since the path crosses regions that look good in a few samples only.
 
 Motions that end early add nothing to a gradient after that, so ``fallen`` raises the weight of their gradient of the
-time before. Validation rates that they end early, through the cost of [fall].
+time before. Validation rates that they end early, through the cost of [termination].
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from symphys.solvers.randomized.descent import (
 )
 from symphys.solvers.randomized.validation import NOISE, first_sample, rate_by_validation
 
-NOT_FINITE = "not one sample of a batch is finite: bound the variables, lower `rate`, or add [fall]"
+NOT_FINITE = "not one sample of a batch is finite: bound the variables, lower `rate`, or add [termination]"
 
 
 @dataclass(frozen=True)

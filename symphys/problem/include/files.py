@@ -11,7 +11,7 @@ from typing import Any, TypeVar, get_origin
 
 from pydantic import ValidationError
 
-from symphys.problem.include.merge import MergedFiles, SourceFile, merge
+from symphys.problem.include.merge import IncludedFile, MergedFiles, merge
 from symphys.problem.include.prefix import prefixed
 from symphys.problem.reading.faults import Faults, SourceLocation
 from symphys.problem.reading.messages import report
@@ -58,7 +58,7 @@ def with_included(path: Path, text: str, data: dict[str, Any]) -> MergedFiles:
     whole = text if kept else text + appendix(texts)
     if len(whole.encode()) > MAX_BYTES:
         raise refuse(path, f"with the files that it includes, it is larger than {MAX_BYTES // 1_000_000} MB")
-    return merge([*sources, SourceFile(str(path), data, data)], LISTS, whole, faults)
+    return merge([*sources, IncludedFile(str(path), data, data)], LISTS, whole, faults)
 
 
 def read_tables(data: Mapping[str, Any], key: str, model: type[Model], faults: Faults) -> list[Model]:
@@ -104,7 +104,7 @@ def exists(file: Path) -> bool:
         return False
 
 
-def source(file: str, text: str, table: IncludeTable, faults: Faults) -> SourceFile:
+def source(file: str, text: str, table: IncludeTable, faults: Faults) -> IncludedFile:
     """The tables of an included file; notes those that it may not have."""
     written = parse_toml(Path(file), text)
     found = dict[str, Any]()
@@ -114,7 +114,7 @@ def source(file: str, text: str, table: IncludeTable, faults: Faults) -> SourceF
             faults.add_at(SourceLocation(file, written, (key,)), reason)
         elif key not in OWN:
             found[key] = value
-    return SourceFile(file, written, prefixed(found, table.prefix) if table.prefix else found, table)
+    return IncludedFile(file, written, prefixed(found, table.prefix) if table.prefix else found, table)
 
 
 def key_fault(key: str, value: object, problem: str) -> str:
@@ -135,7 +135,7 @@ def key_fault(key: str, value: object, problem: str) -> str:
     return ""
 
 
-def check_twice(sources: list[SourceFile], faults: Faults) -> None:
+def check_twice(sources: list[IncludedFile], faults: Faults) -> None:
     """A file that is included twice needs different prefixes."""
     seen: dict[tuple[str, str], int] = {}
     for index, one in enumerate(sources):

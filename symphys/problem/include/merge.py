@@ -11,7 +11,7 @@ from symphys.problem.schema.include import IncludeTable
 
 
 @dataclass(frozen=True)
-class SourceFile:
+class IncludedFile:
     """A file.
 
     Attributes:
@@ -49,7 +49,7 @@ class MergedFiles:
         return {key for _, ranges in self.moves for key in ranges}
 
 
-def merge(sources: Sequence[SourceFile], lists: Collection[str], text: str, faults: Faults) -> MergedFiles:
+def merge(sources: Sequence[IncludedFile], lists: Collection[str], text: str, faults: Faults) -> MergedFiles:
     """All tables, in the order of the files; notes keys that two files give differently.
 
     Args:
@@ -74,7 +74,7 @@ def merge(sources: Sequence[SourceFile], lists: Collection[str], text: str, faul
     return merged
 
 
-def append(merged: MergedFiles, source: SourceFile, key: str, entries: Sequence[Any]) -> range:
+def append(merged: MergedFiles, source: IncludedFile, key: str, entries: Sequence[Any]) -> range:
     """Put the tables of a list after those that are there; where they then are."""
     known = merged.data.setdefault(key, [])
     start = len(known)
@@ -84,7 +84,7 @@ def append(merged: MergedFiles, source: SourceFile, key: str, entries: Sequence[
     return range(start, len(known))
 
 
-def overlay(merged: MergedFiles, source: SourceFile, key: str, table: Mapping[str, Any], faults: Faults) -> None:
+def overlay(merged: MergedFiles, source: IncludedFile, key: str, table: Mapping[str, Any], faults: Faults) -> None:
     """Add the keys of a table to those that are there."""
     known = merged.data.setdefault(key, {})
     for name, value in table.items():

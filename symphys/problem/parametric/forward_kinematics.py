@@ -22,7 +22,7 @@ Tree = Mapping[str, Mapping[str, str]]
 
 
 @dataclass(frozen=True)
-class Displacement:
+class BodyDisplacement:
     """A turn about a pivot (3,) [m] by a unit quaternion (4,), then a shift (3,) [m]; world frame."""
 
     pivot: Array
@@ -87,7 +87,7 @@ def move(joint: ParametricJoint, tree: Tree, state: State) -> None:
     for coordinate, value in zip(joint.kind.coordinates, joint.start, strict=True):
         placed, pivot = sockets(joint, state)
         axis, angle = np.asarray(coordinate.axis(placed), float), sign * value * coordinate.turns
-        motion = Displacement(
+        motion = BodyDisplacement(
             pivot=pivot,
             shift=(sign * value - angle) * axis,
             turn=np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * axis]),
@@ -118,7 +118,7 @@ def sockets(joint: ParametricJoint, state: State) -> tuple[PlacedFrames, Array]:
     return PlacedFrames(axes[0], axes[1], points[0] - points[1]), points[1]
 
 
-def displace(name: str, base: str, motion: Displacement, state: State) -> None:
+def displace(name: str, base: str, motion: BodyDisplacement, state: State) -> None:
     """Displace a body, in place; ``base`` is what it moves against."""
     axes = np.array(rotation.matrix(motion.turn), float)
     before = state[f"{name}.position"]

@@ -18,7 +18,7 @@ from symphys.transcription.randomization.sampler import Sampler
 Array = NDArray[np.float64]
 
 
-class ScenarioEvaluator:
+class KernelScenarioEvaluator:
     """See ``Situations``: a sampler and a kernel for each grid."""
 
     def __init__(self, grids: Sequence[str], samplers: Sequence[Sampler], kernels: Sequence[Kernel]) -> None:
@@ -53,7 +53,7 @@ class ScenarioEvaluator:
 class NominalEvaluator(WithoutResiduals):
     """Evaluates points in the nominal sample; see ``Evaluator``."""
 
-    def __init__(self, situations: ScenarioEvaluator) -> None:
+    def __init__(self, situations: KernelScenarioEvaluator) -> None:
         """By the same kernels."""
         self.situations = situations
 

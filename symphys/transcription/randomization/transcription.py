@@ -10,7 +10,7 @@ from symphys.codegen.backends import PRECISIONS, build_kernel, described
 from symphys.problem import Problem
 from symphys.shooting import Nlp
 from symphys.transcription.program import rollout_program
-from symphys.transcription.randomization.evaluator import NominalEvaluator, ScenarioEvaluator
+from symphys.transcription.randomization.evaluator import KernelScenarioEvaluator, NominalEvaluator
 from symphys.transcription.randomization.sampler import Sampler
 from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.transcription import Transcription
@@ -42,11 +42,11 @@ def with_scenarios(
     return replace(plain, problem=problem, shooting=shooting, backend=replace(description, cached=cached))
 
 
-def _evaluator(problem: Problem, exact: bool, backend: str, threads: int) -> ScenarioEvaluator:
+def _evaluator(problem: Problem, exact: bool, backend: str, threads: int) -> KernelScenarioEvaluator:
     assert problem.scenarios is not None, "nothing differs"
     grids = {"": problem.simulation, **{grid.name: grid.simulation for grid in problem.scenarios.discretisations}}
     samplers = [Sampler(replace(problem, simulation=simulation)) for simulation in grids.values()]
-    return ScenarioEvaluator(list(grids), samplers, [_kernel(each, exact, backend, threads) for each in samplers])
+    return KernelScenarioEvaluator(list(grids), samplers, [_kernel(each, exact, backend, threads) for each in samplers])
 
 
 def _kernel(sampler: Sampler, exact: bool, backend: str, threads: int) -> Kernel:
