@@ -5,8 +5,12 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 MOST_TERMS = 60
+MADE = {"build/kernels"}
+"""Paths that are made by running something."""
 
 
 def entries() -> list[tuple[str, str, str]]:
@@ -29,5 +33,21 @@ def test_every_term_lives_where_the_glossary_says() -> None:
         for term, _, where in entries()
         for path in re.findall(r"`([^`]+)`", where)
         if not (ROOT / path).exists()
+    ]
+    assert missing == []
+
+
+@pytest.mark.parametrize("name", ["ARCHITECTURE.md", "CONTRIBUTING.md", "docs/glossary.md", "docs/time_step.md"])
+def test_paths_that_documents_name_exist(name: str) -> None:
+    """From the top, or below symphys/; with or without their ending."""
+    text = (ROOT / name).read_text(encoding="utf-8")
+    tops = {path.name for folder in (ROOT, ROOT / "symphys") for path in folder.iterdir() if path.is_dir()}
+    named = {
+        found for found in re.findall(r"`([a-z_]+(?:/[a-z_0-9]+)+)(?:\.py)?`", text) if found.split("/")[0] in tops
+    }
+    missing = [
+        found
+        for found in sorted(named - MADE)
+        if not any((base / f"{found}{end}").exists() for base in (ROOT, ROOT / "symphys") for end in ("", ".py"))
     ]
     assert missing == []
