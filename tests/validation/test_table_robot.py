@@ -47,7 +47,7 @@ def point(problem: Problem) -> Array:
 def test_sensors(problem: Problem, rollout: Rollout) -> None:
     """There are 81, and none is constant while the robot moves."""
     assert sum(sensor.size for sensor in problem.sensors) == 81
-    course = simulate(rollout, recorder(rollout), point(problem), 0.0).course
+    course = simulate(rollout, recorder(rollout), point(problem), 0.0).arrays
     for sensor in problem.sensors:
         read = rollout.control.sensor(sensor)
         columns = np.array([np.array(read(x, course.p, 0.01 * k)).ravel() for k, x in enumerate(course.x)])
