@@ -55,14 +55,14 @@ __all__ = [
 _HOMES = {
     "errors": ("ProblemError", "SymphysError"),
     "problem": ("Problem", "load_problem"),
-    "rollout": ("roll_out",),
+    "dynamics.horizon": ("roll_out",),
     "shooting": ("ShootingProblem",),
-    "state": ("Layout", "initial_state"),
-    "step": ("step_function",),
+    "model.state_layout": ("Layout", "initial_state"),
+    "dynamics": ("step_function",),
     "trajectory": ("Trajectory",),
     "transcription": ("Transcription", "transcribe"),
-    "shapes": ("Box", "Capsule", "Fixture", "Plane", "Sphere", "Terrain"),
-    "world": ("Body", "Law", "Scheme", "World", "make_world"),
+    "model.shapes": ("Box", "Capsule", "Fixture", "Plane", "Sphere", "Terrain"),
+    "model.world": ("Body", "Law", "Scheme", "World", "make_world"),
 }
 
 

@@ -147,9 +147,8 @@ def test_terrain_is_sampled_around_the_start(tmp_path: Path) -> None:
 def test_terrain_is_sampled_along_the_motion(tmp_path: Path) -> None:
     """Where its formula has no value, there is none."""
     problem = problem_of(tmp_path, BALL)
-    motion = transcribe(replace(problem, parametric=replace(problem.parametric, statics=())), backend="casadi").simulate(
-        np.array([20.0, 0, 0])
-    )
+    bare = replace(problem, parametric=replace(problem.parametric, statics=()))
+    motion = transcribe(bare, backend="casadi").simulate(np.array([20.0, 0, 0]))
     (hills,) = make_scene(problem, {}, motion).to_json()["terrain"]
     x, z = np.array(hills["x"]), np.array(hills["z"])
     assert x[-1] > 20.5
