@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from rolling import Rolling, Walk
 from scenes import Scene, Solid
 
-from symphys.dynamics import step_function
+from symphys.dynamics.functions import step_function
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Scheme, World
 

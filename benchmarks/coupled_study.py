@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from scenes import Solid
 from table_robot import table_problem
 
-from symphys.dynamics import report_function
 from symphys.dynamics.contact.coupling import STRONG, may_couple
+from symphys.dynamics.functions import report_function
 from symphys.model.shapes import Capsule, Plane
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Body, Law, Pair, Scheme, World, is_zero, make_world

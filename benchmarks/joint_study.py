@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from robots import JointedScene
 from rolling import Walk
 
-from symphys.dynamics import reading_function, trace_step
+from symphys.dynamics.functions import trace_step
+from symphys.dynamics.observation import reading_function
 from symphys.model.state_layout import Layout
 from symphys.model.world import Scheme, World
 

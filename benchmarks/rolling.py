@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.codegen import FunctionCall, Kernel, MemoryLayout, Place, Program, compile_program
-from symphys.dynamics import trace_step
+from symphys.dynamics.functions import trace_step
 from symphys.model.state_layout import Layout as Columns
 from symphys.model.world import Scheme, World
 

@@ -11,7 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from symphys.dynamics import step_function
+    from symphys.dynamics.functions import step_function
     from symphys.dynamics.horizon import roll_out
     from symphys.errors import ProblemError, SymphysError
     from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain
@@ -58,7 +58,7 @@ _HOMES = {
     "dynamics.horizon": ("roll_out",),
     "shooting": ("ShootingProblem",),
     "model.state_layout": ("Layout", "initial_state"),
-    "dynamics": ("step_function",),
+    "dynamics.functions": ("step_function",),
     "trajectory": ("Trajectory",),
     "transcription": ("Transcription", "transcribe"),
     "model.shapes": ("Box", "Capsule", "Fixture", "Plane", "Sphere", "Terrain"),

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.dynamics import step_function
+from symphys.dynamics.functions import step_function
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Scheme, World
 

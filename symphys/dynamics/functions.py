@@ -8,14 +8,15 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.context import State, StepContext, make_context
+from symphys.dynamics.arguments import arguments_of, context_of, inline, parts_of
+from symphys.dynamics.context import State
 from symphys.dynamics.step import take_step
 from symphys.dynamics.step_report import report
 from symphys.dynamics.tracing.dead_code import without_dead_code
 from symphys.dynamics.tracing.decorator import tracing
 from symphys.dynamics.tracing.recording import Recorder, TracedCall, TracedVector
 from symphys.dynamics.tracing.trace import InlineTracer
-from symphys.model.state_layout import Layout, inputs_size
+from symphys.model.state_layout import Layout
 from symphys.model.world import Scheme, World
 
 Expr = Any
@@ -107,30 +108,5 @@ def trace_step(
     return TracedStep(without_dead_code(recorder.calls), results)
 
 
-def inline(world: World, arguments: Sequence[Expr]) -> InlineTracer:
-    """A tracer of functions of x, u, p and smoothing; x by its parts, so that equal bodies share what they compute."""
-    (x, *others), tracer = arguments, InlineTracer()
-    for column in (*parts_of(Layout(world), x).values(), *others):
-        tracer.take(column)
-    return tracer
-
-
-def context_of(world: World, scheme: Scheme | None, inputs: Sequence[str], arguments: Sequence[Expr]) -> StepContext:
-    """Of a step with these arguments."""
-    return make_context(world, scheme, tuple(inputs), arguments[1], arguments[3])
-
-
 def _packed(layout: Layout, tracer: InlineTracer, x: State) -> Expr:
     return layout.pack({name: tracer.value(part) for name, part in x.items()})
-
-
-def parts_of(layout: Layout, x: Expr) -> State:
-    """The state's parts by name."""
-    return {name: x[layout[name]] for name in layout.names()}
-
-
-def arguments_of(world: World, inputs: Sequence[str], parameters: Sequence[Any]) -> list[Expr]:
-    """Symbols for x, u, p and smoothing."""
-    x = ca.SX.sym("x", Layout(world).size)
-    u = ca.SX.sym("u", inputs_size(world, inputs))
-    return [x, u, ca.vertcat(ca.SX(0, 1), *parameters), ca.SX.sym("smoothing")]

@@ -11,7 +11,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from symphys.dynamics import (
+from symphys.dynamics.observation import (
     accelerometers,
     body_quantities,
     body_quantity_names,

@@ -8,7 +8,8 @@ import casadi as ca
 import numpy as np
 
 from symphys.codegen import Fading, FunctionCall, MemoryLayout, Place, Program
-from symphys.dynamics import TracedVector, trace_step
+from symphys.dynamics.functions import trace_step
+from symphys.dynamics.tracing.recording import TracedVector
 from symphys.expression import Formula
 from symphys.model.state_layout import Layout as Columns
 from symphys.problem import ALIVE

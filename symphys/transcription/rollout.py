@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from symphys.dynamics import step_function
+from symphys.dynamics.functions import step_function
 from symphys.dynamics.horizon import roll_out
 from symphys.expression import Formula
 from symphys.model.world import World

@@ -10,7 +10,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.dynamics import reading_function, report_function
+from symphys.dynamics.functions import report_function
+from symphys.dynamics.observation import reading_function
 from symphys.model.state_layout import GIVEN, Layout, input_columns
 from symphys.trajectory import NotFinite, Trajectory
 from symphys.transcription.nan_tracing.steps import RolloutArrays, first_non_finite

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.dynamics import slip_function
+from symphys.dynamics.observation import slip_function
 from symphys.trajectory import Trajectory
 from symphys.transcription import Record, Rollout, plain
 from symphys.verification.bodies import bodies

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.dynamics import components
+from symphys.dynamics.joints.warm_start import components
 from symphys.model.joints import Joint, TorqueMotor
 from symphys.model.state_layout import Layout
 from symphys.transcription import Record, Rollout

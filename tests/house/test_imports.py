@@ -30,7 +30,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "problem": (
         "dynamics errors expression maths model problems suggest",
         "casadi numpy pydantic pydantic_core",
-        "problem file to problem",
+        "problem file to problem; of the dynamics only what is observed",
     ),
     "codegen": ("errors shooting", "casadi cuda cupy numpy", "programs compiled to SIMD C and CUDA"),
     "transcription": (
@@ -138,6 +138,25 @@ def test_no_module_imports_itself_by_a_detour() -> None:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
         pytest.fail(" -> ".join(error.args[1]))
+
+
+def reached(start: set[str]) -> set[str]:
+    """All that is imported when these modules are, each with the packages that it lies in; symphys itself imports lazily."""
+    found, left = set[str](), start
+    while left:
+        parents = {name.rpartition(".")[0] for name in left}
+        found |= left
+        left = ({target for name in left for target in imported(name)} | parents) & modules().keys() - found - {PACKAGE}
+    return found
+
+
+def test_reading_a_problem_takes_no_time_step() -> None:
+    """Of the dynamics it needs what can be seen of the start: gaps, joints, sensors."""
+    parts = reached({name for name in modules() if room(name) == "problem"})
+    of_step = {f"{PACKAGE}.dynamics.{name}" for name in ("functions", "step", "substep", "pgs", "impact.impact")}
+    assert of_step <= modules().keys()
+    assert "symphys.dynamics.observation.queries" in parts
+    assert not of_step & parts
 
 
 def test_folders_are_small() -> None:

@@ -11,7 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from symphys import problems
-from symphys.dynamics import gap_function, reading_function, step_function
+from symphys.dynamics.functions import step_function
+from symphys.dynamics.observation import gap_function, reading_function
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Scheme
 from symphys.problem import Problem, load_problem

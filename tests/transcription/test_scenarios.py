@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from symphys.dynamics import gap_function
+from symphys.dynamics.observation import gap_function
 from symphys.dynamics.observation.joint_coordinates import readings
 from symphys.model.state_layout import initial_state
 from symphys.problem import Problem, load_problem

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symphys.dynamics import report_function
+from symphys.dynamics.functions import report_function
 from symphys.model.shapes import Plane
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Body, Law, Scheme, World, make_world

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symphys.dynamics import step_function
+from symphys.dynamics.functions import step_function
 from symphys.dynamics.line_search import clusters
 from symphys.dynamics.prediction import bodies_of
 from symphys.dynamics.unknowns import PlacedConstraint

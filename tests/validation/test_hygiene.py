@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from laboratory import Lab, central_difference, value_and_gradient
 
-from symphys.dynamics import step_function
+from symphys.dynamics.functions import step_function
 from symphys.model.shapes import Plane, Sphere
 from symphys.model.state_layout import initial_state
 from symphys.model.world import Body, Law, Scheme, make_world

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from symphys.dynamics import step_function
 from symphys.dynamics.free_rotation import SECOND_ORDER, turned
+from symphys.dynamics.functions import step_function
 from symphys.maths import rotation
 from symphys.model.shapes import Box, Capsule, Plane, Shape
 from symphys.model.state_layout import Layout, initial_state

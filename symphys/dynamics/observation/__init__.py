@@ -1,1 +1,28 @@
 """What can be computed from a state without taking a step: sensors, coordinates of joints, queries."""
+
+from symphys.dynamics.observation.body_sensors import (
+    accelerometer_bodies,
+    accelerometers,
+    body_quantities,
+    body_quantity_names,
+)
+from symphys.dynamics.observation.joint_coordinates import (
+    joint_quantities,
+    joint_quantity_names,
+    reading_function,
+    readings,
+)
+from symphys.dynamics.observation.queries import gap_function, slip_function
+
+__all__ = [
+    "accelerometer_bodies",
+    "accelerometers",
+    "body_quantities",
+    "body_quantity_names",
+    "gap_function",
+    "joint_quantities",
+    "joint_quantity_names",
+    "reading_function",
+    "readings",
+    "slip_function",
+]

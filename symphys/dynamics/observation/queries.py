@@ -7,10 +7,10 @@ from typing import Any
 
 import casadi as ca
 
+from symphys.dynamics.arguments import arguments_of, context_of, inline, parts_of
 from symphys.dynamics.collision import Contact
 from symphys.dynamics.contact.body_term import Motions, at_touch
 from symphys.dynamics.context import StepContext
-from symphys.dynamics.functions import arguments_of, context_of, inline, parts_of
 from symphys.dynamics.motion import PredictedMotion
 from symphys.dynamics.prediction import bodies_of, detect_contacts, predicted_motions
 from symphys.dynamics.tracing.decorator import traced, tracing

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.dynamics import accelerometers, body_quantities, gap_function, joint_quantities, readings
+from symphys.dynamics.observation import accelerometers, body_quantities, gap_function, joint_quantities, readings
 from symphys.model.state_layout import GIVEN, initial_state
 from symphys.model.world import World
 from symphys.problem.model import Variable

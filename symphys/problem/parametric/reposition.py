@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from symphys.dynamics import gap_function
+from symphys.dynamics.observation import gap_function
 from symphys.maths import rotation
 from symphys.model.state_layout import initial_state
 from symphys.problem.model import Variable

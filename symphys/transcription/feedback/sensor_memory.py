@@ -9,7 +9,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics import accelerometer_bodies
+from symphys.dynamics.observation import accelerometer_bodies
 from symphys.model.state_layout import Layout, input_columns, input_sizes
 from symphys.model.world import World
 from symphys.problem import ALIVE, Constraint, Cost, Output, Problem, Target

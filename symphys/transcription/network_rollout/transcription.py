@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from symphys.codegen import KernelUnavailable, ProgramError, processors
 from symphys.codegen.backends import BEST, PRECISIONS, Description, described
 from symphys.codegen.cuda import DeviceKernel
-from symphys.dynamics import report_function
+from symphys.dynamics.functions import report_function
 from symphys.problem import Problem
 from symphys.shooting import Nlp, ShootingProblem
 from symphys.transcription.decision_variables import blocks

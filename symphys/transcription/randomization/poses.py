@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from symphys.dynamics import gap_function
+from symphys.dynamics.observation import gap_function
 from symphys.model.state_layout import GIVEN, initial_state
 from symphys.problem import Problem, RandomizedPose, VariableSlot
 from symphys.problem.parametric.forward_kinematics import sockets, spanning_tree, subtree

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from symphys.dynamics import step_function
 from symphys.dynamics.collision import RULES
+from symphys.dynamics.functions import step_function
 from symphys.dynamics.observation.queries import gap_function
 from symphys.model.shapes import Box, Plane
 from symphys.model.state_layout import initial_state

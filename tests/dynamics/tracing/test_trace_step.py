@@ -8,10 +8,10 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symphys.dynamics import TracedCall, TracedStep, TracedVector, step_function, trace_step
+from symphys.dynamics.functions import TracedStep, step_function, trace_step
 from symphys.dynamics.tracing.dead_code import without_dead_code
 from symphys.dynamics.tracing.decorator import repeat, traced, tracing
-from symphys.dynamics.tracing.recording import Recorder
+from symphys.dynamics.tracing.recording import Recorder, TracedCall, TracedVector
 from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Body, Law, Scheme, World, make_world

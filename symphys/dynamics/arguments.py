@@ -1,0 +1,41 @@
+"""The arguments of functions of a state, as symbols: x, u, p and smoothing; the parts of x by name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import casadi as ca
+
+from symphys.dynamics.context import State, StepContext, make_context
+from symphys.dynamics.tracing.trace import InlineTracer
+from symphys.model.state_layout import Layout, inputs_size
+from symphys.model.world import Scheme, World
+
+Expr = Any
+"""casadi SX, MX or DM"""
+
+
+def inline(world: World, arguments: Sequence[Expr]) -> InlineTracer:
+    """A tracer of functions of x, u, p and smoothing; x by its parts, so that equal bodies share what they compute."""
+    (x, *others), tracer = arguments, InlineTracer()
+    for column in (*parts_of(Layout(world), x).values(), *others):
+        tracer.take(column)
+    return tracer
+
+
+def context_of(world: World, scheme: Scheme | None, inputs: Sequence[str], arguments: Sequence[Expr]) -> StepContext:
+    """Of a step with these arguments."""
+    return make_context(world, scheme, tuple(inputs), arguments[1], arguments[3])
+
+
+def parts_of(layout: Layout, x: Expr) -> State:
+    """The state's parts by name."""
+    return {name: x[layout[name]] for name in layout.names()}
+
+
+def arguments_of(world: World, inputs: Sequence[str], parameters: Sequence[Any]) -> list[Expr]:
+    """Symbols for x, u, p and smoothing."""
+    x = ca.SX.sym("x", Layout(world).size)
+    u = ca.SX.sym("u", inputs_size(world, inputs))
+    return [x, u, ca.vertcat(ca.SX(0, 1), *parameters), ca.SX.sym("smoothing")]
