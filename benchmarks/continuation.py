@@ -31,14 +31,15 @@ def main() -> None:
     for title, name, settings, solvers, seeds in CASES:
         made = transcribe(load_problem(find(name), settings))
         print(f"\n{title} ({name}, {seeds} seeds): solved, exact objective, gradients and Jacobians + rollouts")
-        print(f"{'':14}" + "".join(f"{', '.join(f'{knob:g}' for knob in knobs):>30}" for knobs in SCHEDULES))
+        print(f"{'':14}" + "".join(f"{', '.join(f'{each:g}' for each in stages):>30}" for stages in SCHEDULES))
         for each in solvers:
-            print(f"{each:14}" + "".join(f"{cell(made, each, knobs, seeds):>30}" for knobs in SCHEDULES), flush=True)
+            cells = (cell(made, each, stages, seeds) for stages in SCHEDULES)
+            print(f"{each:14}" + "".join(f"{found:>30}" for found in cells), flush=True)
 
 
-def cell(made: Transcription, name: str, knobs: tuple[float, ...], seeds: int) -> str:
+def cell(made: Transcription, name: str, stages: tuple[float, ...], seeds: int) -> str:
     """How one solver does with one schedule, medians over the seeds."""
-    found = [solve(made, name, knobs, seed) for seed in range(seeds)]
+    found = [solve(made, name, stages, seed) for seed in range(seeds)]
     verdicts = [made.judge(outcome.z) for outcome in found]
     solved = sum(verdict.solved for verdict in verdicts)
     objective = median(verdict.objective for verdict in verdicts)
@@ -47,11 +48,11 @@ def cell(made: Transcription, name: str, knobs: tuple[float, ...], seeds: int) -
     return f"{solved}/{seeds} {objective:8.2g} {slopes:4.0f} + {rollouts:.0f}"
 
 
-def solve(made: Transcription, name: str, knobs: tuple[float, ...], seed: int) -> Outcome:
+def solve(made: Transcription, name: str, stages: tuple[float, ...], seed: int) -> Outcome:
     """With the options of the problem's file."""
     chosen, problem = solver(name), made.problem
     options = validate_options(chosen.Options, problem.solver_tables.get(name, {}), problem.file, name)
-    shooting = replace(made.shooting, smoothing=knobs)
+    shooting = replace(made.shooting, smoothing=stages)
     return chosen.solve(shooting, shooting.start(seed), options, seed)
 
 

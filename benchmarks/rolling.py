@@ -64,9 +64,9 @@ class Rolling:
 
     def _program(self) -> Program:
         layout, columns = MemoryLayout(), self.columns
-        z, knob = layout.take(self.size), layout.take(1)
+        z, parameters = layout.take(self.size), layout.take(1)
         x = layout.series(columns.size, self.steps + 1)
-        body = step_calls(self.world, self.scheme, layout, x, knob)
+        body = step_calls(self.world, self.scheme, layout, x, parameters)
         (symbols, state) = ca.SX.sym("z", self.size), ca.SX.sym("x", columns.size)
         first = ca.Function("first", [symbols], [ca.densify(self.start(symbols))])
         asked = ca.densify(self.end(state))
@@ -75,7 +75,7 @@ class Rolling:
         return Program(
             size=layout.size,
             z=z,
-            knob=knob,
+            parameters=parameters,
             steps=self.steps,
             outputs={"end": end},
             prologue=(FunctionCall(first, (z,), (x.still(),)),),
@@ -84,7 +84,7 @@ class Rolling:
         )
 
 
-def step_calls(world: World, scheme: Scheme, layout: MemoryLayout, x: Place, knob: Place) -> list[FunctionCall]:
+def step_calls(world: World, scheme: Scheme, layout: MemoryLayout, x: Place, parameters: Place) -> list[FunctionCall]:
     """The calls of one exact time step, from the states ``x`` to the next ones."""
     columns, recording = Columns(world), trace_step(world, scheme, exact=True)
     after, empty = x.later(), Place(0, 0)
@@ -96,7 +96,7 @@ def step_calls(world: World, scheme: Scheme, layout: MemoryLayout, x: Place, kno
                 part = columns[slot.name]
                 places[slot] = Place(x.offset + part.start, part.stop - part.start, x.stride)
             elif slot.name:
-                places[slot] = knob if slot.name == "smoothing" else empty
+                places[slot] = parameters if slot.name == "smoothing" else empty
         for slot in piece.outputs:
             places.setdefault(slot, layout.take(slot.size))
         inputs, outputs = (tuple(places[slot] for slot in slots) for slots in (piece.inputs, piece.outputs))

@@ -74,7 +74,7 @@ def compile_costs(program: Program) -> Kernel:
 def spheres(sweeps: int, exact: bool) -> tuple[float, float]:
     """Seconds for BATCH rollouts without and with gradient, one thread."""
     problem = spheres_on_ground(COUNT, sweeps, STEPS)
-    print(f"{COUNT} spheres, {3 * COUNT} rows, {sweeps} sweeps, {BATCH} copies,", "exact" if exact else "with the knob")
+    print(f"{COUNT} spheres, {3 * COUNT} rows, {sweeps} sweeps, {BATCH} copies,", "exact" if exact else "smoothed")
     kernel = compile_costs(rollout_program(symbolic_rollout(problem), exact))
     Z = around(guess_of(problem))
     forward = fastest(lambda: kernel.forward(Z, [0.0]))

@@ -23,13 +23,15 @@ class Lab:
         self.world, self.scheme, self.layout = world, scheme, Layout(world)
         self.step = step_function(world, scheme, inputs, parameters)
 
-    def trajectory(self, values: Mapping[str, Any], time: float, u: Any = None, p: Any = None, knob: Any = 0) -> Any:
+    def trajectory(
+        self, values: Mapping[str, Any], time: float, u: Any = None, p: Any = None, smoothing: Any = 0
+    ) -> Any:
         """(nx, steps + 1), symbolic or numeric like the arguments."""
         steps = round(time / self.scheme.dt)
         u = ca.DM.zeros(self.step.size1_in(1), steps) if u is None else u
         p = ca.DM(0, 1) if p is None else p
         x0 = initial_state(self.world, values)
-        return ca.horzcat(x0, self.step.mapaccum(steps)(x0, u, ca.repmat(p, 1, steps), ca.repmat(knob, 1, steps)))
+        return ca.horzcat(x0, self.step.mapaccum(steps)(x0, u, ca.repmat(p, 1, steps), ca.repmat(smoothing, 1, steps)))
 
     def states(self, values: Mapping[str, Any], time: float, **more: Any) -> dict[str, Array]:
         """Each quantity by name: (steps + 1, components)."""

@@ -14,25 +14,25 @@ PENDULUM_STATE = Place(STEPS + 5, 2, 2)
 
 
 def pendulum() -> Program:
-    """A driven pendulum with a running cost; z is the torque of each step, the knob is gravity."""
+    """A driven pendulum with a running cost; z is the torque of each step, the parameters is gravity."""
     x, u, g, a = ca.SX.sym("x", 2), ca.SX.sym("u"), ca.SX.sym("g"), ca.SX.sym("a")
     move = ca.Function("move", [x, u, g], [ca.vertcat(x[0] + 0.05 * x[1], x[1] + 0.05 * (u - g * ca.sin(x[0])))])
     cost = ca.Function("cost", [x, u], [ca.fmax(x[0] ** 2 - 0.1, 0) + 0.01 * u**2])
     end = ca.Function("end", [x, a], [a + 10 * ca.sumsqr(x), x - ca.vertcat(1, 0)])
     start = ca.Function("start", [], [ca.SX([1.0, 0.0])])
     at = MemoryLayout()
-    torque, knob, total, merit, residuals = at.series(1, STEPS), at.take(1), at.take(1), at.take(1), at.take(2)
+    torque, parameters, total, merit, residuals = at.series(1, STEPS), at.take(1), at.take(1), at.take(1), at.take(2)
     state = at.series(2, STEPS + 1)
     assert state == PENDULUM_STATE
     return Program(
         size=at.size,
         z=Place(torque.offset, STEPS),
-        knob=knob,
+        parameters=parameters,
         steps=STEPS,
         zeroed=(total,),
         prologue=(FunctionCall(start, (), (state.still(),)),),
         body=(
-            FunctionCall(move, (state, torque, knob), (state.later(),)),
+            FunctionCall(move, (state, torque, parameters), (state.later(),)),
             FunctionCall(cost, (state, torque), (total,), accumulate=True),
         ),
         epilogue=(FunctionCall(end, (state.later(STEPS), total), (merit, residuals)),),
@@ -61,7 +61,7 @@ def chain() -> Program:
     return Program(
         size=at.size,
         z=z,
-        knob=Place(0, 0),
+        parameters=Place(0, 0),
         steps=STEPS,
         zeroed=(nothing, work),
         constants=tuple((x.still(), (0.8 * i, 0.1 * i)) for i, x in enumerate(states)),
@@ -95,15 +95,15 @@ def _chain_functions() -> dict[str, Any]:
 
 
 def graph(program: Program) -> Any:
-    """(z, knob) -> all outputs and their Jacobian with respect to z, as one flat casadi Function."""
-    z, knob = ca.SX.sym("z", program.z.size), ca.SX.sym("knob", program.knob.size)
+    """(z, parameters) -> all outputs and their Jacobian with respect to z, as one flat casadi Function."""
+    z, parameters = ca.SX.sym("z", program.z.size), ca.SX.sym("parameters", program.parameters.size)
     memory = ca.SX.nan(program.size)
     for place in program.zeroed:
         memory[place.offset : place.offset + place.size] = 0
     for place, values in program.constants:
         memory[place.offset : place.offset + place.size] = values
     memory[program.z.offset : program.z.offset + program.z.size] = z
-    memory[program.knob.offset : program.knob.offset + program.knob.size] = knob
+    memory[program.parameters.offset : program.parameters.offset + program.parameters.size] = parameters
     calls = [(call, 0) for call in program.prologue]
     calls += [(call, k) for k in range(program.steps) for call in program.body]
     for call, k in calls + [(call, 0) for call in program.epilogue]:
@@ -112,4 +112,4 @@ def graph(program: Program) -> Any:
         for result, span in zip(results, spans[len(call.inputs) :], strict=True):
             memory[span] = result + (memory[span] if call.accumulate else 0)
     outputs = ca.vertcat(*(memory[p.offset : p.offset + p.size] for p in program.outputs.values()))
-    return ca.Function("graph", [z, knob], [outputs, ca.jacobian(outputs, z)])
+    return ca.Function("graph", [z, parameters], [outputs, ca.jacobian(outputs, z)])

@@ -17,7 +17,7 @@ from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Body, Law, Scheme, World, make_world
 
 Array = NDArray[np.float64]
-KNOBS = (0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0)
+SMOOTHINGS = (0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0)
 QUARTER = np.sqrt(0.5)
 TURNS = np.array(
     [(1, 0, 0, 0), (QUARTER, QUARTER, 0, 0), (QUARTER, 0, QUARTER, 0), (QUARTER, 0, 0, QUARTER), (0.5, 0.5, 0.5, 0.5)]
@@ -80,11 +80,11 @@ def lot(first: str, second: str, static: str, law: str, cuts: int | None = None)
     ]
     world = make_world(bodies, [STATICS[static]], laws[law])
     step = step_function(world, Scheme(sweeps=3, cuts=cuts), parameters=[size_a, size_b, centre, numbers])
-    x, p, knob = ca.SX.sym("x", step.size1_in(0)), ca.SX.sym("p", 12), ca.SX.sym("s")
-    after = step(x, ca.DM(0, 1), p, knob)
+    x, p, smoothing = ca.SX.sym("x", step.size1_in(0)), ca.SX.sym("p", 12), ca.SX.sym("s")
+    after = step(x, ca.DM(0, 1), p, smoothing)
     weighted = ca.dot(after, ca.DM(np.linspace(1, 2, after.numel())))
-    slope = ca.gradient(weighted, ca.vertcat(x, p, knob))
-    return Lot(Layout(world), world, ca.Function("d", [x, p, knob], [after, ca.densify(slope)]))
+    slope = ca.gradient(weighted, ca.vertcat(x, p, smoothing))
+    return Lot(Layout(world), world, ca.Function("d", [x, p, smoothing], [after, ca.densify(slope)]))
 
 
 def draw(rng: np.random.Generator, world: World) -> tuple[Array, Array, float]:
@@ -101,7 +101,7 @@ def draw(rng: np.random.Generator, world: World) -> tuple[Array, Array, float]:
     for name, (position, orientation) in zip("ab", poses, strict=True):
         values |= {f"{name}.position": position, f"{name}.orientation": orientation}
         values |= {f"{name}.velocity": motion(rng, 2.0), f"{name}.angular_velocity": motion(rng, 10.0)}
-    return np.array(initial_state(world, values)).ravel(), p, float(rng.choice(KNOBS))
+    return np.array(initial_state(world, values)).ravel(), p, float(rng.choice(SMOOTHINGS))
 
 
 def pose(rng: np.random.Generator, size: Array) -> tuple[Array, Array]:
@@ -127,8 +127,8 @@ def steps(
     """(scene, x', slope) of three steps from each of ``count`` scenes."""
     parts, rng = lot(*structure, cuts), np.random.default_rng(seed)
     for k in range(count):
-        x, p, knob = draw(rng, parts.world)
+        x, p, smoothing = draw(rng, parts.world)
         for _ in range(3):
-            after, slope = (np.array(part).ravel() for part in parts.derivatives(x, p, knob))
+            after, slope = (np.array(part).ravel() for part in parts.derivatives(x, p, smoothing))
             yield k, after, slope
             x = after

@@ -5,7 +5,7 @@ from symphys.codegen.errors import KernelUnavailable, ProgramError
 from symphys.codegen.program.interpret import interpret
 from symphys.codegen.program.layout import MemoryLayout
 from symphys.codegen.program.nan_location import Bad
-from symphys.codegen.program.program import Fading, FunctionCall, Place, Program
+from symphys.codegen.program.program import AdjointDiscount, FunctionCall, Place, Program
 from symphys.codegen.runtime.fixed_addresses import Fixed
 from symphys.codegen.runtime.kernel import Kernel, ProcessorKernel
 from symphys.codegen.toolchain.build import compile_program, shared_library
@@ -14,11 +14,11 @@ from symphys.codegen.toolchain.compiler import processors
 from symphys.codegen.toolchain.report import BuildReport
 
 __all__ = [
+    "AdjointDiscount",
     "Bad",
     "BuildReport",
     "Cache",
     "CacheInfo",
-    "Fading",
     "Fixed",
     "FunctionCall",
     "Kernel",

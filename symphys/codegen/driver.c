@@ -3,11 +3,11 @@
 
 typedef struct {
   word rows;
-  source z, knob, seed;
+  source z, parameters, seed;
   double *outputs, *gradient, *trajectory;
   word offset, size, stride, count; /* of the trajectory */
-  double loss;                      /* of the adjoint of what fades, in each step back */
-  word spared;                      /* steps at the end, in which nothing moves */
+  double discount;                      /* of the adjoint of what is discounted, in each step back */
+  word skipped;                      /* steps at the end, in which nothing moves */
 } batch;
 
 static void run(const phase *calls, V *m, V *b, word k) {
@@ -45,12 +45,12 @@ static void fill(const program *p, const batch *x, V *m, word row, word rows) {
     memset(m + p->zeroed.places[2 * i], 0, sizeof(V) * p->zeroed.places[2 * i + 1]);
   gather(m, &p->constants, &values, 0, 1, 0);
   gather(m, &p->z, &x->z, row, rows, 0);
-  gather(m, &p->knob, &x->knob, row, rows, 0);
+  gather(m, &p->parameters, &x->parameters, row, rows, 0);
 }
 
 /* What the steps from here on would write is 0, but the state, which stays. */
 static void rest(const program *p, word steps, V *m) {
-  const word *t = p->written.places, *x = p->fading;
+  const word *t = p->written.places, *x = p->discounted;
   for (word i = 0; i < p->written.count; i++, t += 3)
     for (word k = steps; k < p->steps; k++) memset(m + t[0] + k * t[2], 0, sizeof(V) * t[1]);
   for (word k = steps + 1; k <= p->steps; k++)
@@ -58,7 +58,7 @@ static void rest(const program *p, word steps, V *m) {
 }
 
 static void rested(const program *p, word steps, V *b) {
-  const word *x = p->fading;
+  const word *x = p->discounted;
   for (word k = steps + 1; k <= p->steps; k++)
     for (word w = 0; w < x[1]; w++) b[x[0] + steps * x[2] + w] += b[x[0] + k * x[2] + w];
 }
@@ -70,22 +70,22 @@ static void roll(const program *p, word steps, V *m) {
   run(&p->epilogue, m, 0, 0);
 }
 
-/* The adjoint of what fades at step k: a share of it is lost, and all of it where what is kept is 0. */
-static void fade(const program *p, double loss, const V *m, V *b, word k) {
+/* The adjoint of what is discounted at step k: a share of it is lost, and all of it where what is kept is 0. */
+static void discount_adjoint(const program *p, double discount, const V *m, V *b, word k) {
   const V *kept = m + p->kept[0] + k * p->kept[1];
-  V share, *words = b + p->fading[0] + k * p->fading[2];
-  for (word l = 0; l < LANES; l++) LANE(share, l) = (R)(1 - loss) * (p->kept[1] ? LANE(*kept, l) : (R)1);
-  for (word w = 0; w < p->fading[1]; w++) words[w] = words[w] * share;
+  V share, *words = b + p->discounted[0] + k * p->discounted[2];
+  for (word l = 0; l < LANES; l++) LANE(share, l) = (R)(1 - discount) * (p->kept[1] ? LANE(*kept, l) : (R)1);
+  for (word w = 0; w < p->discounted[1]; w++) words[w] = words[w] * share;
 }
 
 /* States are in the memory; the scratch of a step, and the tape for its adjoints, are computed again. */
-static void pull(const program *p, word steps, double loss, V *m, V *b) {
+static void pull(const program *p, word steps, double discount, V *m, V *b) {
   run(&p->back_epilogue, m, b, 0);
   if (steps < p->steps) rested(p, steps, b);
   for (word k = steps - 1; k >= 0; k--) {
     run(&p->again, m, 0, k);
     run(&p->back_body, m, b, k);
-    if (loss > 0) fade(p, loss, m, b, k);
+    if (discount > 0) discount_adjoint(p, discount, m, b, k);
   }
   run(&p->back_prologue, m, b, 0);
 }
@@ -103,13 +103,13 @@ API void evaluate(const program *p, const batch *x, V *m) {
   for (word row = 0; row < x->rows; row += LANES) {
     word rows = x->rows - row < LANES ? x->rows - row : LANES;
     fill(p, x, m, row, rows);
-    roll(p, p->steps - x->spared, m);
+    roll(p, p->steps - x->skipped, m);
     if (x->outputs) scatter(x->outputs, m, &p->outputs, total(&p->outputs), row, rows);
     if (x->trajectory) record(x, m, row, rows);
     if (!x->gradient) continue;
     memset(b, 0, sizeof(V) * p->size);
     gather(b, &p->seeded, &x->seed, row, rows, 1);
-    pull(p, p->steps - x->spared, x->loss, m, b);
+    pull(p, p->steps - x->skipped, x->discount, m, b);
     scatter(x->gradient, b, &p->z, total(&p->z), row, rows);
   }
 }

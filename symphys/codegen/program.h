@@ -7,11 +7,11 @@ typedef struct { word count; const word *entries; } phase;
 typedef struct { word count; const word *places; } ranges; /* (offset, size) pairs */
 typedef struct {
   word size, tape, steps;
-  ranges z, knob, zeroed, constants, outputs, seeded;
+  ranges z, parameters, zeroed, constants, outputs, seeded;
   const double *values;                                  /* of the constants */
   phase prologue, body, epilogue;                        /* forward */
   phase again, back_body, back_prologue, back_epilogue;  /* backward */
-  word fading[3], kept[2];                               /* (offset, size, stride), (offset, stride) */
+  word discounted[3], kept[2];                               /* (offset, size, stride), (offset, stride) */
   ranges written;                                        /* by each step: (offset, size, stride) */
 } program;
 typedef struct { const double *rows; word stride; } source; /* stride 0: one row for all lanes */

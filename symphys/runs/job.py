@@ -77,7 +77,7 @@ def make_jobs(
 
 
 def fitting(problem: Problem) -> list[str]:
-    """The solvers that are for such problems: with situations that differ, or without."""
+    """The solvers that are for such problems: with scenarios, or without."""
     return [name for name, each in SOLVERS.items() if each.scenarios in (None, problem.scenarios is not None)]
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from symphys.codegen import Fading, FunctionCall, MemoryLayout, Place, Program
+from symphys.codegen import AdjointDiscount, FunctionCall, MemoryLayout, Place, Program
 from symphys.dynamics.functions import trace_step
 from symphys.dynamics.tracing.recording import TracedVector
 from symphys.expression import Formula
@@ -97,14 +97,14 @@ def rollout_program(rollout: Rollout, exact: bool = False) -> Program:
     return Program(
         size=samples.layout.size,
         z=samples.z,
-        knob=samples.smoothing,
+        parameters=samples.smoothing,
         steps=rollout.steps,
         outputs=outputs,
         prologue=(_prologue(samples),),
         body=(*body, *samples.calls),
         epilogue=(epilogue,),
         constants=((Place(samples.time.offset, len(times)), times),),
-        fading=Fading(samples.x, alive),
+        discounted=AdjointDiscount(samples.x, alive),
     )
 
 

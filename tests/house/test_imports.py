@@ -141,7 +141,7 @@ def test_no_module_imports_itself_by_a_detour() -> None:
 
 
 def reached(start: set[str]) -> set[str]:
-    """All that is imported when these modules are, each with the packages that it lies in; symphys itself imports lazily."""
+    """All that is imported when these modules are, with the packages that it lies in; symphys itself imports lazily."""
     found, left = set[str](), start
     while left:
         parents = {name.rpartition(".")[0] for name in left}

@@ -50,6 +50,6 @@ def test_stages_let_go_of_it(name: str, most: int, seed: int) -> None:
 
 @pytest.mark.parametrize("name", ["gradient", "least_squares"])
 def test_smoothing_alone_does_not_do(name: str) -> None:
-    """At a constant knob the solver is content with what the exact sled misses."""
+    """At a constant smoothing the solver is content with what the exact sled misses."""
     made = sled((0.1,))
     assert not made.judge(solve(name, made).z).solved

@@ -18,16 +18,16 @@ from symphys.report.figures.history import draw_run, exact_ends, segments
 from symphys.results.run import Run, read_run
 
 Edit = Callable[..., None]
-KNOBS = (0.1, 0.01, 0.0)
+SMOOTHINGS = (0.1, 0.01, 0.0)
 ENDS = (20, 30, 44)
 """The last row of each stage among the 45 of the fixture's trace."""
 
 
-def stage(knob: float, objective: float, exact: float, solved: bool) -> dict[str, Any]:
+def stage(smoothing: float, objective: float, exact: float, solved: bool) -> dict[str, Any]:
     """One of "stages" in result.json."""
     counts = {"rollouts": 21, "gradients": 13, "jacobians": 0, "hessians": 0}
     exactly = {"exact_objective": exact, "exact_worst": 100 * exact, "solved": solved}
-    told = {"smoothing": knob, "status": "stalled", "objective": objective, "worst": 0.5, "counts": counts}
+    told = {"smoothing": smoothing, "status": "stalled", "objective": objective, "worst": 0.5, "counts": counts}
     return {**told, **exactly, "equivalents": 61.0, "seconds": 0.25}
 
 
@@ -41,7 +41,7 @@ def staged(run_dir: Path, edit: Edit) -> Path:
         rows = list(csv.DictReader(file))
     assert len(rows) == ENDS[-1] + 1
     for index, row in enumerate(rows):
-        row["smoothing"] = str(KNOBS[sum(index > end for end in ENDS)])
+        row["smoothing"] = str(SMOOTHINGS[sum(index > end for end in ENDS)])
     with (run_dir / "trace.csv").open("w", newline="") as file:
         writer = csv.DictWriter(file, rows[0].keys())
         writer.writeheader()

@@ -143,7 +143,9 @@ def test_the_gradient_under_refinement() -> None:
 
 
 def test_smoothing_of_the_problem_and_smoothing_that_would_do_no_harm() -> None:
-    tried = tuple(Smoothed(knob, False, 1.0, worst) for knob, worst in ((1e-3, 0.5), (1e-2, 0.9), (1e-1, 4.0)))
+    tried = tuple(
+        Smoothed(smoothing, False, 1.0, worst) for smoothing, worst in ((1e-3, 0.5), (1e-2, 0.9), (1e-1, 4.0))
+    )
     assert "Up to 0.01 m/s" in smoothed_findings(tried, MET)[0].meaning
     assert smoothed_findings(tried[2:], MET)[0].level == UNKNOWN
     assert smoothed_findings((Smoothed(1e-2, True, 1.0, 0.9),), MET)[0].level == GOOD

@@ -19,13 +19,13 @@ from symphys.runs.transcription_cache import TranscriptionCache
 from symphys.solvers import TraceRow
 from symphys.transcription import Transcription, transcribe
 
-KNOBS = [0.1, 0.01, 0.0]
+SMOOTHINGS = [0.1, 0.01, 0.0]
 
 
 @cache
-def transcribed(knobs: tuple[float, ...]) -> Transcription:
+def transcribed(smoothing: tuple[float, ...]) -> Transcription:
     """The sled."""
-    return transcribe(load_problem(find("sled"), {"simulation.smoothing": list(knobs)}))
+    return transcribe(load_problem(find("sled"), {"simulation.smoothing": list(smoothing)}))
 
 
 def once(problem: Problem, exact: bool) -> Transcription:
@@ -34,8 +34,8 @@ def once(problem: Problem, exact: bool) -> Transcription:
     return transcribed(problem.simulation.smoothing)
 
 
-def job(out: Path, knobs: Any = (0.1, 0.01, 0.0), solver: str = "least_squares", seeds: int = 1) -> list[Job]:
-    settings: dict[str, object] = {"simulation.smoothing": list(knobs)}
+def job(out: Path, smoothing: Any = (0.1, 0.01, 0.0), solver: str = "least_squares", seeds: int = 1) -> list[Job]:
+    settings: dict[str, object] = {"simulation.smoothing": list(smoothing)}
     return make_jobs([load_problem(find("sled"), settings)], [solver], range(seeds), settings, out)
 
 
@@ -51,7 +51,7 @@ def without_times(result: Result) -> list[StageRecord]:
 def test_each_stage_is_judged_exactly(tmp_path: Path) -> None:
     (asked,), (first,) = job(tmp_path / "all"), job(tmp_path / "first", (0.1,))
     whole, part = run(asked), run(first)
-    assert [stage.smoothing for stage in whole.stages] == KNOBS
+    assert [stage.smoothing for stage in whole.stages] == SMOOTHINGS
     # the first stage alone is a run of its own, and the judge of runs says the same of it
     assert part.objective == part.stages[0].exact_objective == whole.stages[0].exact_objective
     assert part.worst == part.stages[0].exact_worst == whole.stages[0].exact_worst
@@ -82,22 +82,22 @@ def test_files_tell_of_the_stages(tmp_path: Path) -> None:
     result = run(asked)
     assert read_result(asked.folder.path / "result.json") == result
     with (asked.folder.path / "trace.csv").open(encoding="utf-8", newline="") as file:
-        knobs = [float(row["smoothing"]) for row in csv.DictReader(file)]
-    assert list(dict.fromkeys(knobs)) == KNOBS
+        smoothing = [float(row["smoothing"]) for row in csv.DictReader(file)]
+    assert list(dict.fromkeys(smoothing)) == SMOOTHINGS
     log = (asked.folder.path / "log.txt").read_text(encoding="utf-8")
     assert "stage 2 of 3: smoothing 0.01" in log
 
 
-@pytest.mark.parametrize("knob", KNOBS)
-def test_interrupted_in_any_stage_it_goes_on_to_the_same_end(tmp_path: Path, knob: float) -> None:
+@pytest.mark.parametrize("smoothing", SMOOTHINGS)
+def test_interrupted_in_any_stage_it_goes_on_to_the_same_end(tmp_path: Path, smoothing: float) -> None:
     def press(row: TraceRow) -> None:
-        if row.smoothing == knob:
+        if row.smoothing == smoothing:
             raise KeyboardInterrupt
 
     (asked,), (broken,) = job(tmp_path / "whole"), job(tmp_path / "broken")
     whole, stopped = run(asked), run(broken, press)
     assert stopped.status == "interrupted"
-    assert [stage.smoothing for stage in stopped.stages] == KNOBS[: KNOBS.index(knob) + 1]
+    assert [stage.smoothing for stage in stopped.stages] == SMOOTHINGS[: SMOOTHINGS.index(smoothing) + 1]
     assert stopped.stages[-1].status == "interrupted"
     rest = run(broken)
     assert (rest.z, rest.counts, rest.iterations) == (whole.z, whole.counts, whole.iterations)
@@ -121,5 +121,5 @@ def test_what_only_the_smoothed_rollout_meets_has_advice(tmp_path: Path) -> None
     assert "add a stage at 0" in result.advice
 
 
-def test_the_kernel_has_the_knob_where_any_stage_turns_it(tmp_path: Path) -> None:
-    assert [job(tmp_path, knobs)[0].smooth for knobs in ((0.0,), (0.1, 0.0), (0.1,))] == [False, True, True]
+def test_the_kernel_has_the_smoothing_where_any_stage_turns_it(tmp_path: Path) -> None:
+    assert [job(tmp_path, smoothing)[0].smooth for smoothing in ((0.0,), (0.1, 0.0), (0.1,))] == [False, True, True]

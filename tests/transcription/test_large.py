@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -105,18 +106,19 @@ tolerance = 0.1
 """
 
 
-@pytest.fixture(params=['activation = "tanh"', 'activation = "relu", biases = false', "skip = true"])
+@pytest.fixture(scope="module", params=['activation = "tanh"', 'activation = "relu", biases = false', "skip = true"])
 def both(
-    request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> tuple[Transcription, LargeTranscription]:
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[tuple[Transcription, LargeTranscription]]:
     """The same problem with its nets in the step, and beside it."""
-    path = tmp_path / "hopping.toml"
+    path = tmp_path_factory.mktemp("hopping") / "hopping.toml"
     path.write_text(HOPPING.replace("ACTIVATION", request.param))
     within = transcribe(load_problem(path), backend="casadi")
-    monkeypatch.setattr(split, "MOST_WEIGHTS", 10)
-    beside = transcribe(load_problem(path))
-    assert isinstance(beside, LargeTranscription)
-    return within, beside
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(split, "MOST_WEIGHTS", 10)
+        beside = transcribe(load_problem(path))
+        assert isinstance(beside, LargeTranscription)
+        yield within, beside
 
 
 def points(context: Transcription) -> Array:

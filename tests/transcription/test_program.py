@@ -26,14 +26,14 @@ def test_value_and_gradient_are_those_of_the_expression(problem: Problem) -> Non
     program = rollout_program(transcription.rollout)
     kernel = compile_program(program, seeded=("merit",), threads=1)
     z = transcription.shooting.start(1)
-    for knob in (0.0, 1e-3):
+    for smoothing in (0.0, 1e-3):
         merit, objective, errors, slope, _ = (
-            np.array(part).ravel() for part in transcription.functions.gradient(z, knob)
+            np.array(part).ravel() for part in transcription.functions.gradient(z, smoothing)
         )
-        outputs, gradient = kernel.gradient(z, [1.0], [knob])
+        outputs, gradient = kernel.gradient(z, [1.0], [smoothing])
         for name, expected in (("merit", merit), ("objective", objective), ("errors", errors)):
             assert outputs[name][0] == pytest.approx(expected, rel=1e-12, abs=1e-12)
-            assert interpret(program, z, [knob])[name] == pytest.approx(expected, rel=1e-12, abs=1e-12)
+            assert interpret(program, z, [smoothing])[name] == pytest.approx(expected, rel=1e-12, abs=1e-12)
         assert gradient[0] == pytest.approx(slope, rel=1e-9, abs=1e-11 * np.abs(slope).max())
 
 
@@ -48,12 +48,12 @@ def test_residuals_and_their_jacobian_are_those_of_the_expression() -> None:
 
 
 @pytest.mark.parametrize("name", ["ball_throw", "bank_shot"])
-def test_the_exact_kernel_is_the_knob_at_zero(name: str) -> None:
+def test_the_exact_kernel_is_the_smoothed_one_at_zero(name: str) -> None:
     rollout = transcribe(load_problem(find(name), {"simulation.duration": 1.0})).rollout
-    exact, knob = (compile_program(rollout_program(rollout, exact=e), seeded=("merit",)) for e in (True, False))
+    exact, smoothed = (compile_program(rollout_program(rollout, exact=e), seeded=("merit",)) for e in (True, False))
     Z = np.concatenate([v.guess for v in rollout.problem.variables]) + np.linspace(0, 0.1, 9)[:, None]
-    (one, slope), (other, expected) = exact.gradient(Z, [1.0], [0.0]), knob.gradient(Z, [1.0], [0.0])
+    (one, slope), (other, expected) = exact.gradient(Z, [1.0], [0.0]), smoothed.gradient(Z, [1.0], [0.0])
     for output, values in one.items():
         assert values == pytest.approx(other[output], rel=1e-9, abs=1e-12), output
     assert slope == pytest.approx(expected, rel=1e-8, abs=1e-10 * np.abs(expected).max())
-    assert exact.report.operations < 0.9 * knob.report.operations
+    assert exact.report.operations < 0.9 * smoothed.report.operations

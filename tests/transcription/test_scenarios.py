@@ -1,4 +1,4 @@
-"""Situations that differ: draws keep their bounds and joints, and evaluations are those of files with their numbers."""
+"""Domain randomization: draws keep their bounds and joints, and evaluations are those of files with their numbers."""
 
 from __future__ import annotations
 
@@ -77,14 +77,19 @@ simulation = { dt = 0.005 }
 """
 
 
-@pytest.fixture
-def problem(tmp_path: Path) -> Problem:
-    path = tmp_path / "walker.toml"
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("walker") / "walker.toml"
     path.write_text(WALKER, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def problem(path: Path) -> Problem:
     return load_problem(path)
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def walker(problem: Problem) -> Transcription:
     made = transcribe(problem)
     if made.shooting.scenario is None:
@@ -165,21 +170,21 @@ def test_poses_hold_together_and_touch_nothing(problem: Problem) -> None:
     assert 5 < lifted < 55
 
 
-def test_evaluations_are_those_of_the_numbers_in_a_file(walker: Transcription, tmp_path: Path) -> None:
+def test_evaluations_are_those_of_the_numbers_in_a_file(walker: Transcription, path: Path) -> None:
     """Values and gradients of rows against files with the same numbers."""
-    situations = walker.shooting.scenario
-    assert situations is not None
-    z, drawn = np.array([[0.3, -0.2]]), situations.draw(np.random.default_rng(2), 3)
+    scenario = walker.shooting.scenario
+    assert scenario is not None
+    z, drawn = np.array([[0.3, -0.2]]), scenario.draw(np.random.default_rng(2), 3)
     numbers = columns(Sampler(walker.problem), drawn.numbers)
     numbers["torso.force"][:] = 0
-    found = situations.gradient(z, ScenarioSamples(0, np.concatenate(list(numbers.values()), axis=1)), 0.0)
+    found = scenario.gradient(z, ScenarioSamples(0, np.concatenate(list(numbers.values()), axis=1)), 0.0)
     assert found.gradient is not None
     for k in range(3):
         settings = {
             "ground.friction": float(numbers["ground.friction"][k, 0]),
             **{f"body.{body}.mass": float(numbers[f"{body}.mass"][k, 0]) for body in ("torso", "leg")},
         }
-        loaded = load_problem(tmp_path / "walker.toml", settings)
+        loaded = load_problem(path, settings)
         posed = {name: numbers[name][k] if name in numbers else value for name, value in loaded.initial.items()}
         alone = transcribe(replace(loaded, initial=posed, scenarios=None)).shooting.evaluator.gradient(z, 0.0)
         assert alone.gradient is not None
@@ -190,14 +195,14 @@ def test_evaluations_are_those_of_the_numbers_in_a_file(walker: Transcription, t
 
 def test_pushes_push(walker: Transcription) -> None:
     """Sideways, with the force that was drawn."""
-    situations = walker.shooting.scenario
-    assert situations is not None
-    drawn = situations.draw(np.random.default_rng(2), 30)
+    scenario = walker.shooting.scenario
+    assert scenario is not None
+    drawn = scenario.draw(np.random.default_rng(2), 30)
     force = columns(Sampler(walker.problem), drawn.numbers)["torso.force"].reshape(30, -1, 2)
     quiet = ScenarioSamples(0, drawn.numbers.copy())
     columns(Sampler(walker.problem), quiet.numbers)["torso.force"][:] = 0
     z = np.zeros((1, 2))
-    far = [-situations.value(z, each, 0.0).merit for each in (drawn, quiet)]
+    far = [-scenario.value(z, each, 0.0).merit for each in (drawn, quiet)]
     ahead = force[..., 0].sum(axis=1)
     strong = np.abs(ahead) > 100
     assert strong.sum() > 5
@@ -206,12 +211,10 @@ def test_pushes_push(walker: Transcription) -> None:
 
 def test_the_problem_itself_is_the_first(walker: Transcription) -> None:
     """On every grid; a finer one has nearly the same answer, and the plain evaluator the same to the bit."""
-    situations = walker.shooting.scenario
-    assert situations is not None
+    scenario = walker.shooting.scenario
+    assert scenario is not None
     z = np.array([[0.3, -0.2]])
-    first, finer = (
-        situations.gradient(z, situations.draw(np.random.default_rng(0), 2, 1.0, grid), 0.0) for grid in (0, 1)
-    )
+    first, finer = (scenario.gradient(z, scenario.draw(np.random.default_rng(0), 2, 1.0, grid), 0.0) for grid in (0, 1))
     alone = walker.shooting.evaluator.gradient(z, 0.0)
     assert first.merit[0] == alone.merit[0] and first.gradient is not None and alone.gradient is not None
     assert np.array_equal(first.gradient[0], alone.gradient[0])
@@ -220,14 +223,14 @@ def test_the_problem_itself_is_the_first(walker: Transcription) -> None:
     assert finer.merit[0] == pytest.approx(first.merit[0], rel=0.1, abs=0.01)
 
 
-def test_forgetting_and_falling(walker: Transcription) -> None:
+def test_discount_and_termination(walker: Transcription) -> None:
     """Shorter adjoints far from the end; what has fallen says so."""
-    situations = walker.shooting.scenario
-    assert situations is not None
-    drawn = situations.draw(np.random.default_rng(3), 8)
-    exact, faded = (situations.gradient(np.zeros((1, 2)), drawn, 0.0, discount) for discount in (0.0, 50.0))
-    assert exact.gradient is not None and faded.gradient is not None
-    assert np.linalg.norm(faded.gradient[:, 0]) < 0.1 * np.linalg.norm(exact.gradient[:, 0])
+    scenario = walker.shooting.scenario
+    assert scenario is not None
+    drawn = scenario.draw(np.random.default_rng(3), 8)
+    exact, discounted = (scenario.gradient(np.zeros((1, 2)), drawn, 0.0, discount) for discount in (0.0, 50.0))
+    assert exact.gradient is not None and discounted.gradient is not None
+    assert np.linalg.norm(discounted.gradient[:, 0]) < 0.1 * np.linalg.norm(exact.gradient[:, 0])
     assert exact.alive is not None
     assert set(exact.alive) == {0.0, 1.0} or set(exact.alive) == {1.0}
 
@@ -236,19 +239,19 @@ def test_without_kernels_there_are_none(problem: Problem) -> None:
     """It is said, and the rest works."""
     made = transcribe(problem, backend="casadi")
     assert made.shooting.scenario is None
-    assert "no evaluation in other situations" in made.backend.note
+    assert "no samples of scenarios" in made.backend.note
     assert np.isfinite(made.shooting.evaluator.value(np.zeros((1, 2)), 0.0).merit).all()
 
 
-def test_a_shorter_horizon_is_a_shorter_motion(walker: Transcription, tmp_path: Path) -> None:
+def test_a_shorter_horizon_is_a_shorter_motion(walker: Transcription, path: Path) -> None:
     """The gradient is that of a file with less duration, in which both knots act together."""
-    situations = walker.shooting.scenario
-    assert situations is not None
+    scenario = walker.shooting.scenario
+    assert scenario is not None
     z, simulation = np.array([[0.3, 0.3]]), walker.problem.simulation
     shorter = transcribe(replace(walker.problem, simulation=replace(simulation, duration=simulation.duration / 2)))
     assert shorter.shooting.scenario is not None
-    nominal = [each.draw(np.random.default_rng(0), 1) for each in (situations, shorter.shooting.scenario)]
-    short = situations.gradient(z, nominal[0], 0.0, horizon=simulation.duration / 2)
+    nominal = [each.draw(np.random.default_rng(0), 1) for each in (scenario, shorter.shooting.scenario)]
+    short = scenario.gradient(z, nominal[0], 0.0, horizon=simulation.duration / 2)
     alone = shorter.shooting.scenario.gradient(z, nominal[1], 0.0)
     assert short.gradient is not None and alone.gradient is not None
     assert short.gradient[0] == pytest.approx([alone.gradient.sum(), 0], rel=1e-9)

@@ -47,8 +47,10 @@ def path(tmp_path: Path) -> Path:
     return found
 
 
-@pytest.fixture
-def ball(path: Path) -> Transcription:
+@pytest.fixture(scope="module")
+def ball(tmp_path_factory: pytest.TempPathFactory) -> Transcription:
+    path = tmp_path_factory.mktemp("ball") / "ball.toml"
+    path.write_text(BALL, encoding="utf-8")
     return transcribe(load_problem(path))
 
 
@@ -75,7 +77,7 @@ def test_gradients_end_at_the_termination(ball: Transcription) -> None:
         assert found.gradient[0] == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
-def test_adjoints_that_fade_end_at_the_fall(ball: Transcription) -> None:
+def test_discounted_adjoints_end_at_the_termination(ball: Transcription) -> None:
     """The target at the end pulls no longer, since the motion was over."""
     fading = rollout_program(ball.rollout).fading
     assert fading is not None and fading.kept is not None

@@ -12,9 +12,9 @@ from symphys.transcription import transcribe
 from symphys.transcription.decision_variables import knot_weights
 
 
-@pytest.fixture
-def pushed(tmp_path):
-    file = tmp_path / "pushed.toml"
+@pytest.fixture(scope="module")
+def pushed(tmp_path_factory):
+    file = tmp_path_factory.mktemp("pushed") / "pushed.toml"
     file.write_text(PUSHED)
     return transcribe(load_problem(file), backend="casadi")
 

@@ -16,7 +16,7 @@ from symphys.model.shapes import Plane, Sphere
 from symphys.model.state_layout import initial_state
 from symphys.model.world import Body, Law, Scheme, make_world
 
-KNOBS = (0.0, 1e-12, 1e-6, 1e-3, 0.1)
+SMOOTHINGS = (0.0, 1e-12, 1e-6, 1e-3, 0.1)
 PLACES = {
     "at rest": ([0, 0, 0.2], [0.4, 0, 0.2]),
     "stacked": ([0, 0, 0.2], [0, 0, 0.6]),
@@ -40,11 +40,11 @@ def two_balls(law, gravity=(0, 0, -9.81)):
 def with_derivatives(world):
     """(x, smoothing) -> (x', dx'/d(x, smoothing), second derivatives of a weighted sum of x')."""
     step = step_function(world)
-    x, knob = ca.SX.sym("x", step.size1_in(0)), ca.SX.sym("s")
-    after = step(x, ca.DM(0, 1), ca.DM(0, 1), knob)
-    at = ca.vertcat(x, knob)
+    x, smoothing = ca.SX.sym("x", step.size1_in(0)), ca.SX.sym("s")
+    after = step(x, ca.DM(0, 1), ca.DM(0, 1), smoothing)
+    at = ca.vertcat(x, smoothing)
     weighted = ca.dot(after, ca.DM(np.linspace(1, 2, after.shape[0])))
-    return ca.Function("d", [x, knob], [after, ca.jacobian(after, at), ca.hessian(weighted, at)[0]])
+    return ca.Function("d", [x, smoothing], [after, ca.jacobian(after, at), ca.hessian(weighted, at)[0]])
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -53,11 +53,11 @@ def test_derivatives_are_finite_in_degenerate_places(law):
     world = two_balls(LAWS[law])
     derivatives = with_derivatives(world)
     for place, (a, b) in PLACES.items():
-        for knob in KNOBS:
+        for smoothing in SMOOTHINGS:
             x = initial_state(world, {"a.position": a, "b.position": b})
             for _ in range(3):
-                x, *more = derivatives(x, knob)
-                assert all(np.isfinite(np.array(part)).all() for part in (x, *more)), (place, knob)
+                x, *more = derivatives(x, smoothing)
+                assert all(np.isfinite(np.array(part)).all() for part in (x, *more)), (place, smoothing)
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -86,15 +86,15 @@ vector = st.tuples(number, number, number)
 
 
 @settings(max_examples=150, deadline=None)
-@given(vector, vector, vector, vector, st.sampled_from(sorted(LAWS)), st.sampled_from(KNOBS), st.booleans())
-def test_random_scenes_are_finite(a, b, va, wa, law, knob, snap):
+@given(vector, vector, vector, vector, st.sampled_from(sorted(LAWS)), st.sampled_from(SMOOTHINGS), st.booleans())
+def test_random_scenes_are_finite(a, b, va, wa, law, smoothing, snap):
     """Touching, overlapping, aligned, moving: value and slope of five steps."""
     derivatives = derivatives_under(law)
     a, b = (np.round(p, 1) if snap else np.array(p) for p in (a, b))
     start = {"a.position": a, "b.position": b, "a.velocity": va, "a.angular_velocity": np.array(wa) * 10}
     x = initial_state(two_balls(LAWS[law]), start)
     for _ in range(5):
-        x, slope, _ = derivatives(x, knob)
+        x, slope, _ = derivatives(x, smoothing)
         assert np.isfinite(np.array(x)).all()
         assert np.isfinite(np.array(slope)).all()
 
@@ -166,11 +166,13 @@ def test_forward_results_do_not_depend_on_gradients():
 
 @pytest.mark.parametrize("law", ["hard", "spins", "plastic"])
 def test_smoothing_goes_to_the_exact_step(law):
-    """The error falls with the knob, and knob 0 is the limit."""
+    """The error falls with the smoothing, and smoothing 0 is the limit."""
     lab = Lab(two_balls(LAWS[law]), Scheme())
     start = {"a.position": [0, 0, 0.5], "a.velocity": [1, 0, 0], "b.position": [0.6, 0.1, 0.2]}
     exact = lab.states(start, 0.8)["a.position"][-1]
-    errors = [np.abs(lab.states(start, 0.8, knob=s)["a.position"][-1] - exact).max() for s in (1e-2, 1e-4, 1e-6, 1e-12)]
+    errors = [
+        np.abs(lab.states(start, 0.8, smoothing=s)["a.position"][-1] - exact).max() for s in (1e-2, 1e-4, 1e-6, 1e-12)
+    ]
     assert errors[0] > errors[2]
     assert errors[1] < 1e-3
     assert errors[3] < 1e-6

@@ -82,8 +82,8 @@ def test_v4_sawtooth(start):
 def test_v4_no_sawtooth_when_zoomed():
     """201 starts within 1e-4: the result falls on a line, with and without smoothing."""
     ball = Lab(floor_world(ELASTIC), Scheme(dt=0.002))
-    z, knob = ca.MX.sym("z"), ca.MX.sym("s")
-    final = ca.Function("f", [z, knob], [height(ball, z, -2.0, 0.406, vx=-1, knob=knob)])
+    z, smoothing = ca.MX.sym("z"), ca.MX.sym("s")
+    final = ca.Function("f", [z, smoothing], [height(ball, z, -2.0, 0.406, vx=-1, smoothing=smoothing)])
     starts = 0.6 + np.linspace(0, 1e-4, 201)
     for smoothing, tolerance in ((0.0, 1e-9), (0.01, 1e-6)):
         values = np.array(final.map(201)(starts, smoothing)).ravel()

@@ -71,10 +71,10 @@ def push_lab(sweeps: int) -> Lab:
     return Lab(world, Scheme(dt=H, sweeps=sweeps), inputs=["b.force"])
 
 
-def pushed(force: Sequence[float], sweeps: int = 30, knob: float = 0.0) -> Any:
+def pushed(force: Sequence[float], sweeps: int = 30, smoothing: float = 0.0) -> Any:
     """Displacement in one step from rest under a force."""
     start = {"b.position": [0, 0, 0.5]}
-    return push_lab(sweeps).states(start, H, u=list(force), knob=knob)["b.position"][-1] - [0, 0, 0.5]
+    return push_lab(sweeps).states(start, H, u=list(force), smoothing=smoothing)["b.position"][-1] - [0, 0, 0.5]
 
 
 @pytest.mark.parametrize("share", [0.5, 0.9, 0.99, 1.0, 1.01, 1.1, 1.5])
@@ -91,12 +91,12 @@ def test_v6_ten_sweeps_are_not_enough_for_that() -> None:
 
 
 def test_v6_smoothing_makes_a_sigmoid_across_the_cone() -> None:
-    """Sideways: monotonous up to what sweeps leave, rises before the kink and goes to it with the knob."""
+    """Sideways: monotonous up to what sweeps leave, rises before the kink and goes to it with the smoothing."""
     shares = np.linspace(0.5, 1.5, 11)
     kink = np.maximum(shares - 1, 0) * H * H / 2
     errors = []
-    for knob in (1e-2, 1e-3, 1e-4):
-        smooth = np.array([pushed([share, 0, 0], knob=knob)[0] for share in shares])
+    for smoothing in (1e-2, 1e-3, 1e-4):
+        smooth = np.array([pushed([share, 0, 0], smoothing=smoothing)[0] for share in shares])
         assert (np.diff(smooth) > -1e-8).all()
         assert smooth[4] > smooth[0]
         errors.append(np.abs(smooth - kink).max())

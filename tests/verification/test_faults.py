@@ -100,9 +100,9 @@ def test_a_derivative_of_a_step_that_is_not_finite(make):
     throw = make(THROW.format(more=MASS))
     record = throw.record(throw.shooting.start(0))
     step = throw.rollout.step
-    x, u, p, knob = (ca.SX.sym(name, step.size1_in(i)) for i, name in enumerate("xups"))
-    bent = step(x, u, p, knob) + ca.sqrt(x[1])
-    throw.rollout.__dict__["step"] = ca.Function("step", [x, u, p, knob], [bent])
+    x, u, p, smoothing = (ca.SX.sym(name, step.size1_in(i)) for i, name in enumerate("xups"))
+    bent = step(x, u, p, smoothing) + ca.sqrt(x[1])
+    throw.rollout.__dict__["step"] = ca.Function("step", [x, u, p, smoothing], [bent])
     assert first_non_finite(throw.rollout, record.arrays) == ""
     fault = first_non_finite_derivative(throw.rollout, record.arrays)
     assert fault.startswith("the derivative of the step from t = 0.18 s to 0.2 s is not finite: ")

@@ -8,7 +8,7 @@ typedef struct {
   void (*evaluate)(const void *, const void *, void *);
   const void *program, *batch;
   void *memory;
-  double *z, *knob;
+  double *z, *parameters;
   const double *results[2];
 } task;
 
@@ -20,7 +20,7 @@ static int run(const task *t, const double **arg, double **res, integer first, i
   if (!t->evaluate) return 1;
   if (arg[0]) memcpy(t->z, arg[0], N * sizeof(double));
   else memset(t->z, 0, N * sizeof(double));
-  *t->knob = arg[1] ? *arg[1] : 0;
+  *t->parameters = arg[1] ? *arg[1] : 0;
   t->evaluate(t->program, t->batch, t->memory);
   if (res[0]) memcpy(res[0], t->results[0], first * sizeof(double));
   if (res[1]) memcpy(res[1], t->results[1], second * sizeof(double));

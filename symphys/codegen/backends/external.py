@@ -25,7 +25,7 @@ class Task(ctypes.Structure):
     """One of the tasks of external.c."""
 
     _fields_ = (
-        *((name, ctypes.c_void_p) for name in ("evaluate", "program", "batch", "memory", "z", "knob")),
+        *((name, ctypes.c_void_p) for name in ("evaluate", "program", "batch", "memory", "z", "parameters")),
         ("results", ctypes.c_void_p * 2),
     )
 
@@ -62,7 +62,7 @@ def external_nlp(made: ProcessorKernel, expression: Function, rows: Seeds | None
 def task(fixed: Fixed, first: Array, second: Array) -> Task:
     """What external.c needs to know of an evaluation; the results are views of its arrays."""
     results = (ctypes.c_void_p * 2)(first.ctypes.data, second.ctypes.data)
-    return Task(*fixed.addresses, fixed.z.ctypes.data, fixed.knob.ctypes.data, results)
+    return Task(*fixed.addresses, fixed.z.ctypes.data, fixed.parameters.ctypes.data, results)
 
 
 def load(sizes: dict[str, int], tasks: Sequence[Task]) -> list[Function]:

@@ -44,7 +44,7 @@ class BackendSource:
     Attributes:
         functions: as casadi functions.
         program: makes the program of its rollout: the outputs merit, objective and, where the problem has any, errors,
-            constraints, outputs and residuals, of z and the smoothing as its knob. None: there is none.
+            constraints, outputs and residuals, of z and the smoothing as its parameters. None: there is none.
         exact: whether that program is for smoothing 0 only.
     """
 

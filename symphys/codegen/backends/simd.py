@@ -26,25 +26,25 @@ class KernelEvaluator:
         self.kernel, self.rows, self.exact = kernel, rows, exact
         self.steepest = Seeds.whole(kernel, "merit").words[0]
 
-    def knob(self, smoothing: float) -> tuple[float]:
-        """The kernel's knob."""
+    def parameters(self, smoothing: float) -> tuple[float]:
+        """The kernel's parameters."""
         if self.exact and smoothing != 0:
             raise ValueError(f"this kernel is for smoothing 0 only, not for {smoothing:g}")
         return (smoothing,)
 
     def value(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
-        outputs = self.kernel.forward(Z, self.knob(smoothing))
+        outputs = self.kernel.forward(Z, self.parameters(smoothing))
         return Values(*common(outputs), probe=probed(self.kernel, outputs))
 
     def gradient(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
-        outputs, gradient = self.kernel.gradient(Z, self.steepest, self.knob(smoothing))
+        outputs, gradient = self.kernel.gradient(Z, self.steepest, self.parameters(smoothing))
         return Values(*common(outputs), gradient=gradient)
 
     def residuals(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
-        outputs = self.kernel.forward(Z, self.knob(smoothing))
+        outputs = self.kernel.forward(Z, self.parameters(smoothing))
         r = outputs["residuals"]
         return Values(squared(r), *common(outputs)[1:], residuals=r)
 
@@ -53,7 +53,7 @@ class KernelEvaluator:
         assert self.rows is not None, "a problem without residuals has no Jacobian"
         seeds = self.rows.words
         outputs, slopes = self.kernel.gradient(
-            np.repeat(Z, len(seeds), axis=0), np.tile(seeds, (len(Z), 1)), self.knob(smoothing)
+            np.repeat(Z, len(seeds), axis=0), np.tile(seeds, (len(Z), 1)), self.parameters(smoothing)
         )
         first = {name: rows[:: len(seeds)] for name, rows in outputs.items()}
         r = np.ascontiguousarray(first["residuals"])

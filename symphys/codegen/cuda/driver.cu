@@ -4,10 +4,10 @@ typedef struct {
   const program *p;
   V *memory;
   word rows, first, end; /* robots; steps */
-  source z, knob, seed;
+  source z, parameters, seed;
   double *outputs, *gradient, *trajectory;
   word offset, size, stride, count; /* of the trajectory */
-  double loss;                      /* of the adjoint of what fades, in each step back */
+  double discount;                      /* of the adjoint of what is discounted, in each step back */
 } job;
 
 #define KERNEL(name) extern "C" __global__ void __launch_bounds__(LANES *WARPS) name(const job *x)
@@ -71,7 +71,7 @@ KERNEL(begin) {
   const source values = {p->values, 0};
   gather(m, &p->constants, &values, 0, false);
   gather(m, &p->z, &x->z, row_of(x), false);
-  gather(m, &p->knob, &x->knob, row_of(x), false);
+  gather(m, &p->parameters, &x->parameters, row_of(x), false);
   run(&p->prologue, m, 0, 0);
 }
 
@@ -82,7 +82,7 @@ KERNEL(advance) {
 /* What the steps from x->first on would write is 0, but the state, which stays. */
 KERNEL(rest) {
   const program *p = x->p;
-  const word *t = p->written.places, *s = p->fading;
+  const word *t = p->written.places, *s = p->discounted;
   V *m = values_of(x);
   for (word i = 0; i < p->written.count; i++, t += 3)
     for (word k = x->first; k < p->steps; k++) clear(m, t[0] + k * t[2], t[1]);
@@ -112,16 +112,16 @@ KERNEL(seed) {
 /* The adjoints of a state that stays from x->first on are those of all its copies. */
 KERNEL(rested) {
   const program *p = x->p;
-  const word *s = p->fading;
+  const word *s = p->discounted;
   V *b = adjoints_of(x);
   for (word k = x->first + 1; k <= p->steps; k++)
     EACH(w, s[0], s[0] + s[1]) b[(w + x->first * s[2]) * LANES] += b[(w + k * s[2]) * LANES];
 }
 
-/* The adjoint of what fades at step k: a share of it is lost, and all of it where what is kept is 0. */
-static __device__ void fade(const job *x, const V *m, V *b, word k) {
-  const word *s = x->p->fading, *kept = x->p->kept;
-  const V share = (V)(1 - x->loss) * (kept[1] ? m[(kept[0] + k * kept[1]) * LANES] : S(1.0));
+/* The adjoint of what is discounted at step k: a share of it is lost, and all of it where what is kept is 0. */
+static __device__ void discount_adjoint(const job *x, const V *m, V *b, word k) {
+  const word *s = x->p->discounted, *kept = x->p->kept;
+  const V share = (V)(1 - x->discount) * (kept[1] ? m[(kept[0] + k * kept[1]) * LANES] : S(1.0));
   EACH(w, s[0] + k * s[2], s[0] + k * s[2] + s[1]) b[w * LANES] *= share;
   __syncthreads();
 }
@@ -132,7 +132,7 @@ KERNEL(retreat) {
   for (word k = x->end - 1; k >= x->first; k--) {
     run(&x->p->again, m, 0, k);
     run(&x->p->back_body, m, b, k);
-    if (x->loss > 0) fade(x, m, b, k);
+    if (x->discount > 0) discount_adjoint(x, m, b, k);
   }
 }
 

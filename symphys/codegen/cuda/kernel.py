@@ -76,8 +76,8 @@ class DeviceKernel(Kernel):
             setattr(job, name, device.address(array))
         place = batch.place
         job.offset, job.size, job.stride, job.count = place.offset, place.size, place.stride, batch.count
-        job.loss = batch.loss
-        for name, first, last in self._phases(self.program.steps - batch.spared, "gradient" in results):
+        job.discount = batch.discount
+        for name, first, last in self._phases(self.program.steps - batch.skipped, "gradient" in results):
             job.first, job.end = first, last
             self._launch(name, -(-rows // device.lanes), job)
         for name, array in results.items():
@@ -86,14 +86,14 @@ class DeviceKernel(Kernel):
     def _phases(self, steps: int, gradient: bool) -> Iterator[tuple[str, int, int]]:
         """Kernels with the steps that they are for."""
         chunks = [(first, min(first + STEPS, steps)) for first in range(0, steps, STEPS)]
-        spared = [(steps, steps)] * (steps < self.program.steps)
+        skipped = [(steps, steps)] * (steps < self.program.steps)
         yield "begin", 0, 0
         yield from (("advance", *chunk) for chunk in chunks)
-        yield from (("rest", *each) for each in spared)
+        yield from (("rest", *each) for each in skipped)
         yield "finish", 0, 0
         if gradient:
             yield "seed", 0, 0
-            yield from (("rested", *each) for each in spared)
+            yield from (("rested", *each) for each in skipped)
             yield from (("retreat", *chunk) for chunk in reversed(chunks))
             yield "collect", 0, 0
 

@@ -36,10 +36,10 @@ class DeviceJob(ctypes.Structure):
         ("program", ctypes.c_void_p),
         ("memory", ctypes.c_void_p),
         *((name, WORD) for name in ("rows", "first", "end")),
-        *((name, RowSource) for name in ("z", "knob", "seed")),
+        *((name, RowSource) for name in ("z", "parameters", "seed")),
         *((name, ctypes.c_void_p) for name in ("outputs", "gradient", "trajectory")),
         *((name, WORD) for name in ("offset", "size", "stride", "count")),
-        ("loss", ctypes.c_double),
+        ("discount", ctypes.c_double),
     )
 
 
@@ -74,9 +74,9 @@ class Tables:
             setattr(data, name, DevicePhase(len(each.spans), spans, entries))
         written = [place for call in program.body for place in call.outputs if place.stride]
         data.written = List(len(written), self._put(strided(written)))
-        if program.fading is not None:
-            state, kept = program.fading.state, program.fading.kept
-            data.fading = (WORD * 3)(state.offset, state.size, state.stride)
+        if program.discounted is not None:
+            state, kept = program.discounted.state, program.discounted.kept
+            data.discounted = (WORD * 3)(state.offset, state.size, state.stride)
             data.kept = (WORD * 2)(*((kept.offset, kept.stride) if kept else (0, 0)))
         self._kept.append(device.put(np.frombuffer(bytes(data), np.uint8)))
         self.address = device.address(self._kept[-1])

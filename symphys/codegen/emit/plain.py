@@ -14,7 +14,7 @@ from symphys.codegen.graph.instructions import graph_of
 from symphys.codegen.program.program import Function, Place, Program
 from symphys.codegen.runtime.library import data_places
 
-RANGES = ("z", "knob", "zeroed", "constants", "outputs", "seeded")
+RANGES = ("z", "parameters", "zeroed", "constants", "outputs", "seeded")
 TABLES = ("prologue", "body", "epilogue", "again", "back_body", "back_prologue", "back_epilogue")
 """In the order of the driver's ``program``."""
 

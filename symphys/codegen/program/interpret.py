@@ -12,13 +12,13 @@ from symphys.codegen.program.program import FunctionCall, Place, Program
 Array = NDArray[np.float64]
 
 
-def interpret(program: Program, z: ArrayLike, knob: ArrayLike = ()) -> dict[str, Array]:
+def interpret(program: Program, z: ArrayLike, parameters: ArrayLike = ()) -> dict[str, Array]:
     """The outputs of one rollout."""
-    memory = remember(program, z, knob)
+    memory = remember(program, z, parameters)
     return {name: at(memory, place, 0).copy() for name, place in program.outputs.items()}
 
 
-def remember(program: Program, z: ArrayLike, knob: ArrayLike = ()) -> Array:
+def remember(program: Program, z: ArrayLike, parameters: ArrayLike = ()) -> Array:
     """(size,) the memory after one rollout: trajectories lie in it."""
     memory = np.full(program.size, np.nan)
     for place in program.zeroed:
@@ -26,7 +26,7 @@ def remember(program: Program, z: ArrayLike, knob: ArrayLike = ()) -> Array:
     for place, values in program.constants:
         at(memory, place, 0)[:] = values
     at(memory, program.z, 0)[:] = z
-    at(memory, program.knob, 0)[:] = knob
+    at(memory, program.parameters, 0)[:] = parameters
     for call, k in _order(program):
         _perform(call, memory, k)
     return memory

@@ -24,7 +24,7 @@ class Bad:
         phase: "inputs", "prologue", "body" or "epilogue".
         step: the time step; 0 outside the body.
         call: the number of the call in its phase; -1 for the inputs.
-        function: the name of its function; "z" or "knob" for the inputs.
+        function: the name of its function; "z" or "parameters" for the inputs.
         word: the word of the memory.
         value: nan, inf or -inf.
     """
@@ -46,7 +46,7 @@ def first_bad(program: Program, loaded: Loaded, batch: RolloutBatch, memory: Mem
     """Run one rollout phase by phase and step by step, and look at all that each wrote."""
     loaded.begin(batch.part(0, 1), memory)
     lane = memory[:, 0]
-    for name, place in (("z", program.z), ("knob", program.knob)):
+    for name, place in (("z", program.z), ("parameters", program.parameters)):
         if (word := _not_finite(lane, place)) is not None:
             return Bad("inputs", 0, -1, name, word, float(lane[word]))
     for phase, k, calls in _stretches(program):

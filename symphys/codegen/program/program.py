@@ -62,7 +62,7 @@ class FunctionCall:
 
 
 @dataclass(frozen=True)
-class Fading:
+class AdjointDiscount:
     """What adjoints may lose on their way back through time.
 
     Attributes:
@@ -85,17 +85,17 @@ class Program:
     Attributes:
         size: words of memory.
         z: the decision vector; what gradients are with respect to.
-        knob: other inputs of a rollout; may be empty.
+        parameters: other inputs of a rollout; may be empty.
         steps: number of time steps.
         outputs: named places, read after the epilogue.
         zeroed: places that are 0 at the beginning.
         constants: places and their values. Programs that differ in them only share one compiled kernel.
-        fading: what adjoints may lose on their way back; None: nothing.
+        discounted: what adjoints may lose on their way back; None: nothing.
     """
 
     size: int
     z: Place
-    knob: Place
+    parameters: Place
     steps: int
     outputs: Mapping[str, Place]
     prologue: tuple[FunctionCall, ...] = ()
@@ -103,7 +103,7 @@ class Program:
     epilogue: tuple[FunctionCall, ...] = ()
     zeroed: tuple[Place, ...] = ()
     constants: tuple[tuple[Place, tuple[float, ...]], ...] = ()
-    fading: Fading | None = None
+    discounted: AdjointDiscount | None = None
 
     def __post_init__(self) -> None:
         """Check everything that can be checked; ProgramError names the call and the words."""
@@ -146,7 +146,7 @@ class Verification:
         self.program = program
         self.written = np.full(program.size, NEVER)
         self.scratch = np.zeros(program.size, dtype=bool)
-        for name, place in (("z", program.z), ("knob", program.knob)):
+        for name, place in (("z", program.z), ("parameters", program.parameters)):
             self._begin(name, place)
         for place in program.zeroed:
             self._begin("zeroed place", place)
@@ -243,11 +243,11 @@ def verify(program: Program) -> Verification:
         check.inside(f"output {name}", words)
         check._refuse(f"output {name}", words, check.written[words] == NEVER, "which nobody writes")
         check._refuse(f"output {name}", words, check.scratch[words], "which are scratch of the body")
-    for name, faded in () if program.fading is None else vars(program.fading).items():
-        if faded is not None:
-            words = faded.words(program.steps)
-            check.inside(f"fading {name}", words)
-            check._refuse(f"fading {name}", words, check.scratch[words], "which are scratch of the body")
+    for name, discounted in () if program.discounted is None else vars(program.discounted).items():
+        if discounted is not None:
+            words = discounted.words(program.steps)
+            check.inside(f"discounted {name}", words)
+            check._refuse(f"discounted {name}", words, check.scratch[words], "which are scratch of the body")
     return check
 
 

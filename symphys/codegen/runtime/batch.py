@@ -20,10 +20,10 @@ class RolloutBatch:
     """One call's arrays; those of one row serve all lanes.
 
     Attributes:
-        inputs: by the names "z", "knob" and "seed", (rows, words), or (words,) for all.
+        inputs: by the names "z", "parameters" and "seed", (rows, words), or (words,) for all.
         results: by the names "outputs", "gradient" and "trajectory", rows first.
         place, count: of the trajectory.
-        loss, spared: see ``Kernel.gradient``.
+        discount, skipped: see ``Kernel.gradient``.
         rows: how many.
     """
 
@@ -31,7 +31,7 @@ class RolloutBatch:
         """Check name -> (values, words in a row); ProgramError says which shape was wanted."""
         self.inputs: dict[str, Array] = {}
         self.results: dict[str, Array] = {}
-        self.place, self.count, self.loss, self.spared = Place(0, 0), 0, 0.0, 0
+        self.place, self.count, self.discount, self.skipped = Place(0, 0), 0, 0.0, 0
         for name, (values, size) in inputs.items():
             array = np.ascontiguousarray(values, dtype=np.float64)
             if array.ndim not in (1, 2) or array.shape[-1] != size:
@@ -76,5 +76,5 @@ class RolloutBatch:
             setattr(data, name, array.ctypes.data + start * array[:1].nbytes)
         place = self.place
         data.offset, data.size, data.stride, data.count = place.offset, place.size, place.stride, self.count
-        data.loss, data.spared = self.loss, self.spared
+        data.discount, data.skipped = self.discount, self.skipped
         return data

@@ -17,7 +17,7 @@ class Fixed:
         loaded: the kernel's library.
         batch: the driver's.
         memory: of its own.
-        z, knob: (n,) and (p,), read.
+        z, parameters: (n,) and (p,), read.
         outputs: (rows, width) all outputs in their order, written.
         gradient: (rows, n), written; empty where there is no seed.
         seed: (rows, s), read; empty likewise.
@@ -27,7 +27,7 @@ class Fixed:
     batch: BatchData
     memory: Memory
     z: Array
-    knob: Array
+    parameters: Array
     outputs: Array
     gradient: Array
     seed: Array

@@ -32,41 +32,41 @@ class Kernel(ABC):
         """``seeded``: names of the outputs that are differentiated."""
         self.program, self.report, self.seeded = program, report, tuple(seeded)
 
-    def forward(self, Z: ArrayLike, knob: ArrayLike = ()) -> Outputs:
+    def forward(self, Z: ArrayLike, parameters: ArrayLike = ()) -> Outputs:
         """The outputs of rollouts.
 
         Args:
             Z: (batch, n) decision vectors, or one (n,).
-            knob: (batch, p) or one (p,) for all.
+            parameters: (batch, p) or one (p,) for all.
         """
-        batch = self._batch(Z, knob)
+        batch = self._batch(Z, parameters)
         outputs = batch.outputs(self._width())
         self._run(batch)
         return self._named(outputs)
 
     def gradient(
-        self, Z: ArrayLike, seed: ArrayLike, knob: ArrayLike = (), loss: float = 0.0, spared: int = 0
+        self, Z: ArrayLike, seed: ArrayLike, parameters: ArrayLike = (), discount: float = 0.0, skipped: int = 0
     ) -> tuple[Outputs, Array]:
         """Outputs, and (batch, n): the derivative of seed . outputs with respect to z, row by row.
 
         Args:
             Z: (batch, n), or one (n,) for all seeds.
             seed: (batch, s) or one (s,) for all; s words of the seeded outputs, in their order.
-            knob: (batch, p) or one (p,) for all.
-            loss: the share of its adjoint that ``program.fading.state`` loses in each step back; above 0, adjoints also
-                end where ``kept`` is 0. What comes out is no derivative then.
-            spared: steps at the end that are not computed: ``program.fading.state`` stays as it is, and what else these
-                steps would write is 0.
+            parameters: (batch, p) or one (p,) for all.
+            discount: the share of its adjoint that ``program.discounted.state`` loses in each step back; above 0,
+                adjoints also end where ``kept`` is 0. What comes out is no derivative then.
+            skipped: steps at the end that are not computed: ``program.discounted.state`` stays as it is, and what else
+                these steps would write is 0.
         """
-        if spared and (self.program.fading is None or not 0 <= spared <= self.program.steps):
-            raise ProgramError(f"{spared} of {self.program.steps} steps cannot be spared, or no state is told")
-        batch = self._batch(Z, knob, seed)
-        batch.loss, batch.spared = loss, spared
+        if skipped and (self.program.discounted is None or not 0 <= skipped <= self.program.steps):
+            raise ProgramError(f"{skipped} of {self.program.steps} steps cannot be skipped, or no state is discounted")
+        batch = self._batch(Z, parameters, seed)
+        batch.discount, batch.skipped = discount, skipped
         outputs, gradient = batch.outputs(self._width()), batch.gradient(self.program.z.size)
         self._run(batch)
         return self._named(outputs), gradient
 
-    def jacobian(self, z: ArrayLike, name: str, knob: ArrayLike = ()) -> Array:
+    def jacobian(self, z: ArrayLike, name: str, parameters: ArrayLike = ()) -> Array:
         """(size, n) the derivative of an output at one z: a lane for each of its words."""
         start = 0
         for other in self.seeded:
@@ -74,22 +74,22 @@ class Kernel(ABC):
             if other == name:
                 seeds = np.zeros((size, self._seeds()))
                 seeds[:, start : start + size] = np.eye(size)
-                return self.gradient(np.ravel(z), seeds, knob)[1]
+                return self.gradient(np.ravel(z), seeds, parameters)[1]
             start += size
         raise ProgramError(f"no seeded output is called {name!r}; there are {', '.join(self.seeded)}")
 
-    def trajectory(self, Z: ArrayLike, place: Place, count: int, knob: ArrayLike = ()) -> Array:
+    def trajectory(self, Z: ArrayLike, place: Place, count: int, parameters: ArrayLike = ()) -> Array:
         """(batch, count, size) the words of a place at steps 0 .. count - 1."""
         last = place.offset + place.stride * max(count - 1, 0)
         if min(place.offset, last) < 0 or max(place.offset, last) + place.size > self.program.size:
             raise ProgramError(f"{count} steps of {place} do not lie in the memory of {self.program.size} words")
-        batch = self._batch(Z, knob)
+        batch = self._batch(Z, parameters)
         trajectory = batch.trajectory(place, count)
         self._run(batch)
         return trajectory
 
-    def _batch(self, Z: ArrayLike, knob: ArrayLike, seed: ArrayLike | None = None) -> RolloutBatch:
-        rows = {"z": (Z, self.program.z.size), "knob": (knob, self.program.knob.size)}
+    def _batch(self, Z: ArrayLike, parameters: ArrayLike, seed: ArrayLike | None = None) -> RolloutBatch:
+        rows = {"z": (Z, self.program.z.size), "parameters": (parameters, self.program.parameters.size)}
         return RolloutBatch(rows if seed is None else rows | {"seed": (seed, self._seeds())})
 
     def _seeds(self) -> int:
@@ -121,15 +121,16 @@ class ProcessorKernel(Kernel):
 
     def fixed(self, seed: ArrayLike = ()) -> Fixed:
         """An evaluation of one z at fixed addresses, with a row for each seed (rows, s), or one row without any."""
-        seeds, z, knob = np.array(seed, float), np.zeros(self.program.z.size), np.zeros(self.program.knob.size)
-        batch = self._batch(z, knob, seeds if seeds.size else None)
+        seeds = np.array(seed, float)
+        z, parameters = np.zeros(self.program.z.size), np.zeros(self.program.parameters.size)
+        batch = self._batch(z, parameters, seeds if seeds.size else None)
         outputs = batch.outputs(self._width())
         gradient = batch.gradient(len(z)) if seeds.size else np.zeros((0, len(z)))
-        return Fixed(self.loaded, batch.part(0, batch.rows), self._pool.new(), z, knob, outputs, gradient, seeds)
+        return Fixed(self.loaded, batch.part(0, batch.rows), self._pool.new(), z, parameters, outputs, gradient, seeds)
 
-    def first_bad(self, z: ArrayLike, knob: ArrayLike = ()) -> Bad | None:
+    def first_bad(self, z: ArrayLike, parameters: ArrayLike = ()) -> Bad | None:
         """The first call of one rollout that gives a value that is not finite; None if all are finite."""
-        batch = self._batch(np.ravel(z), np.ravel(knob))
+        batch = self._batch(np.ravel(z), np.ravel(parameters))
         return self._pool.lend(lambda memory: first_bad(self.program, self.loaded, batch, memory))
 
     def _run(self, batch: RolloutBatch) -> None:

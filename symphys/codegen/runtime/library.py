@@ -37,10 +37,10 @@ def program_fields(phase: type) -> Any:
         ("size", WORD),
         ("tape", WORD),
         ("steps", WORD),
-        *((name, List) for name in ("z", "knob", "zeroed", "constants", "outputs", "seeded")),
+        *((name, List) for name in ("z", "parameters", "zeroed", "constants", "outputs", "seeded")),
         ("values", ctypes.c_void_p),
         *((name, phase) for name in TABLES),
-        ("fading", WORD * 3),
+        ("discounted", WORD * 3),
         ("kept", WORD * 2),
         ("written", List),
     )
@@ -57,11 +57,11 @@ class BatchData(ctypes.Structure):
 
     _fields_ = (
         ("rows", WORD),
-        *((name, RowSource) for name in ("z", "knob", "seed")),
+        *((name, RowSource) for name in ("z", "parameters", "seed")),
         *((name, ctypes.c_void_p) for name in ("outputs", "gradient", "trajectory")),
         *((name, WORD) for name in ("offset", "size", "stride", "count")),
-        ("loss", ctypes.c_double),
-        ("spared", WORD),
+        ("discount", ctypes.c_double),
+        ("skipped", WORD),
     )
 
 
@@ -88,9 +88,9 @@ class Loaded:
             setattr(self.data, name, self._list(*plan.tables[name]))
         written = [place for call in program.body for place in call.outputs if place.stride]
         self.data.written = self._list(len(written), strided(written))
-        if program.fading is not None:
-            state, kept = program.fading.state, program.fading.kept
-            self.data.fading = (WORD * 3)(state.offset, state.size, state.stride)
+        if program.discounted is not None:
+            state, kept = program.discounted.state, program.discounted.kept
+            self.data.discounted = (WORD * 3)(state.offset, state.size, state.stride)
             self.data.kept = (WORD * 2)(*((kept.offset, kept.stride) if kept else (0, 0)))
 
     def _list(self, count: int, words: Any) -> List:
@@ -124,7 +124,7 @@ def data_places(program: Program, seeded: Sequence[str]) -> dict[str, Sequence[P
     """The places that the drivers know by name."""
     return {
         "z": [program.z],
-        "knob": [program.knob],
+        "parameters": [program.parameters],
         "zeroed": program.zeroed,
         "constants": [place for place, _ in program.constants],
         "outputs": list(program.outputs.values()),

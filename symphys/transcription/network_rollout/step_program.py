@@ -131,7 +131,7 @@ def step_program(rollout: Rollout, objectives: RolloutObjectives, sensors: Seque
     return Program(
         size=places.layout.size,
         z=places.all,
-        knob=places.smoothing,
+        parameters=places.smoothing,
         steps=1,
         outputs={name: outputs[name] for name in RESULTS if name in outputs},
         prologue=(FunctionCall(first, (places.all,), places.written),),

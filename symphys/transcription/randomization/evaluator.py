@@ -1,4 +1,4 @@
-"""Evaluates points in situations by kernels whose decision vector is z with all that differs behind it."""
+"""Evaluates points in samples of scenarios by kernels whose decision vector is z with all that differs behind it."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ Array = NDArray[np.float64]
 
 
 class KernelScenarioEvaluator:
-    """See ``Situations``: a sampler and a kernel for each grid."""
+    """See ``ScenarioEvaluator``: a sampler and a kernel for each grid."""
 
     def __init__(self, grids: Sequence[str], samplers: Sequence[Sampler], kernels: Sequence[Kernel]) -> None:
         """Kernels of the samplers' problems, the merit seeded."""
         self.grids, self.samplers, self.kernels = tuple(grids), tuple(samplers), tuple(kernels)
 
     def draw(self, rng: np.random.Generator, count: int, width: float = 1.0, grid: int = 0) -> ScenarioSamples:
-        """See ``Situations``."""
+        """See ``ScenarioEvaluator``."""
         return ScenarioSamples(grid, self.samplers[grid].draw(rng, count, width))
 
     def nominal(self, count: int) -> ScenarioSamples:
@@ -34,7 +34,7 @@ class KernelScenarioEvaluator:
         return ScenarioSamples(0, np.tile(self.samplers[0].nominal, (count, 1)))
 
     def value(self, Z: Array, drawn: ScenarioSamples, smoothing: float) -> Values:
-        """See ``Situations``."""
+        """See ``ScenarioEvaluator``."""
         kernel = self.kernels[drawn.grid]
         outputs = kernel.forward(joined(Z, drawn), [smoothing])
         return replace(values(outputs), probe=probed(kernel, outputs))
@@ -42,28 +42,28 @@ class KernelScenarioEvaluator:
     def gradient(
         self, Z: Array, drawn: ScenarioSamples, smoothing: float, adjoint_discount: float = 0.0, horizon: float = inf
     ) -> Values:
-        """See ``Situations``."""
+        """See ``ScenarioEvaluator``."""
         simulation = self.samplers[drawn.grid].problem.simulation
-        loss = 1 - exp(-adjoint_discount * simulation.dt)
-        spared = max(0, simulation.steps - round(min(horizon, simulation.duration) / simulation.dt))
-        outputs, slopes = self.kernels[drawn.grid].gradient(joined(Z, drawn), [1.0], [smoothing], loss, spared)
+        discount = 1 - exp(-adjoint_discount * simulation.dt)
+        skipped = max(0, simulation.steps - round(min(horizon, simulation.duration) / simulation.dt))
+        outputs, slopes = self.kernels[drawn.grid].gradient(joined(Z, drawn), [1.0], [smoothing], discount, skipped)
         return values(outputs, np.ascontiguousarray(slopes[:, : Z.shape[1]]))
 
 
 class NominalEvaluator(WithoutResiduals):
     """Evaluates points in the nominal sample; see ``Evaluator``."""
 
-    def __init__(self, situations: KernelScenarioEvaluator) -> None:
+    def __init__(self, scenario: KernelScenarioEvaluator) -> None:
         """By the same kernels."""
-        self.situations = situations
+        self.scenario = scenario
 
     def value(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
-        return self.situations.value(Z, self.situations.nominal(len(Z)), smoothing)
+        return self.scenario.value(Z, self.scenario.nominal(len(Z)), smoothing)
 
     def gradient(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
-        return self.situations.gradient(Z, self.situations.nominal(len(Z)), smoothing)
+        return self.scenario.gradient(Z, self.scenario.nominal(len(Z)), smoothing)
 
 
 def joined(Z: Array, drawn: ScenarioSamples) -> Array:

@@ -15,7 +15,7 @@ from symphys.transcription.randomization.sampler import Sampler
 from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.transcription import Transcription
 
-WITHOUT = "there is no evaluation in other situations"
+WITHOUT = "there are no samples of scenarios"
 
 
 def with_scenarios(
@@ -28,17 +28,17 @@ def with_scenarios(
     began = perf_counter()
     try:
         if backend not in PRECISIONS:
-            raise KernelUnavailable(f"the backend {backend} has no situations")
-        situations = _evaluator(problem, exact, backend, processors() if threads is None else threads)
+            raise KernelUnavailable(f"the backend {backend} cannot draw samples of scenarios")
+        scenario = _evaluator(problem, exact, backend, processors() if threads is None else threads)
     except (KernelUnavailable, ProgramError) as error:
         description = replace(plain.backend, note=f"{WITHOUT}: {error}")
         return replace(plain, problem=problem, backend=description)
     shooting = replace(
-        plain.shooting, evaluator=NominalEvaluator(situations), scenario=situations, squares=False, nlp=Nlp(None)
+        plain.shooting, evaluator=NominalEvaluator(scenario), scenario=scenario, squares=False, nlp=Nlp(None)
     )
-    grids = f"{len(situations.kernels)} discretisations" if len(situations.kernels) > 1 else ""
-    description = described(situations.kernels[0], perf_counter() - began, note=grids)
-    cached = all(kernel.report.cached for kernel in situations.kernels)
+    grids = f"{len(scenario.kernels)} discretisations" if len(scenario.kernels) > 1 else ""
+    description = described(scenario.kernels[0], perf_counter() - began, note=grids)
+    cached = all(kernel.report.cached for kernel in scenario.kernels)
     return replace(plain, problem=problem, shooting=shooting, backend=replace(description, cached=cached))
 
 

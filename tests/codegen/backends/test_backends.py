@@ -177,7 +177,7 @@ def test_names() -> None:
 
 
 def test_an_exact_kernel_refuses_smoothing() -> None:
-    """It has no knob: an answer to another question would be worse than none."""
+    """It has no parameters: an answer to another question would be worse than none."""
     require("simd")
     made = transcribe(load_problem(find("ball_throw"), {"simulation.duration": 0.2}), exact=True, backend="simd")
     Z = made.shooting.start(0)[None]

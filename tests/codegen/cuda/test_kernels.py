@@ -11,7 +11,7 @@ import programs
 import pytest
 from emulated import Emulated, needs_compiler
 
-from symphys.codegen import Cache, Fading, Kernel, KernelUnavailable, Place, Program, compile_program
+from symphys.codegen import AdjointDiscount, Cache, Kernel, KernelUnavailable, Place, Program, compile_program
 from symphys.codegen.cuda import DeviceKernel, compile_on
 
 pytestmark = needs_compiler
@@ -21,8 +21,8 @@ TORQUE = Place(0, 1, 1)
 
 
 def pendulum() -> Program:
-    """Whose state fades."""
-    return replace(programs.pendulum(), fading=Fading(programs.PENDULUM_STATE, TORQUE))
+    """Whose adjoints are discounted."""
+    return replace(programs.pendulum(), discounted=AdjointDiscount(programs.PENDULUM_STATE, TORQUE))
 
 
 def rows(kernel: Kernel, count: int) -> Any:
@@ -45,12 +45,12 @@ def pair(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
 @pytest.mark.parametrize("count", [1, 4, 11])
 def test_outputs_and_gradients_are_the_processors(pair: tuple[DeviceKernel, Kernel], count: int) -> None:
     there, here = pair
-    z, seed, knob = rows(here, count), seeds(here, count), [9.81]
-    outputs, gradient = there.gradient(z, seed, knob)
-    wanted, slopes = here.gradient(z, seed, knob)
+    z, seed, parameters = rows(here, count), seeds(here, count), [9.81]
+    outputs, gradient = there.gradient(z, seed, parameters)
+    wanted, slopes = here.gradient(z, seed, parameters)
     for name, values in wanted.items():
         np.testing.assert_array_equal(outputs[name], values)
-        np.testing.assert_array_equal(there.forward(z, knob)[name], values)
+        np.testing.assert_array_equal(there.forward(z, parameters)[name], values)
     np.testing.assert_allclose(gradient, slopes, rtol=1e-12, atol=1e-13)
 
 
@@ -62,13 +62,13 @@ def test_jacobians_and_trajectories(pair: tuple[DeviceKernel, Kernel]) -> None:
     np.testing.assert_array_equal(*found)
 
 
-@pytest.mark.parametrize("loss, spared", [(0.1, 0), (0.0, 7), (0.1, STEPS), (0.0, 1)])
-def test_adjoints_that_fade_and_steps_that_are_spared(
-    pair: tuple[DeviceKernel, Kernel], loss: float, spared: int
+@pytest.mark.parametrize("discount, skipped", [(0.1, 0), (0.0, 7), (0.1, STEPS), (0.0, 1)])
+def test_discounted_adjoints_and_skipped_steps(
+    pair: tuple[DeviceKernel, Kernel], discount: float, skipped: int
 ) -> None:
     z = np.ones((9, STEPS))
     z[np.arange(9), 2 * np.arange(9)] = 0
-    found = [kernel.gradient(z, [1, 0, 0], [9.81], loss, spared) for kernel in pair]
+    found = [kernel.gradient(z, [1, 0, 0], [9.81], discount, skipped) for kernel in pair]
     np.testing.assert_array_equal(found[0][0]["merit"], found[1][0]["merit"])
     np.testing.assert_allclose(found[0][1], found[1][1], rtol=1e-12, atol=1e-14)
 

@@ -39,7 +39,7 @@ def throw(cache: Cache) -> Kernel:
     program = Program(
         size=at.size,
         z=decision,
-        knob=smoothing,
+        parameters=smoothing,
         steps=STEPS,
         prologue=(FunctionCall(begin, (decision,), (states,)),),
         body=(FunctionCall(step, (states, none, none, smoothing), (states.later(),)),),

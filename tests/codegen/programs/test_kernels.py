@@ -15,8 +15,8 @@ def draw(kernel: Kernel, rows: int) -> Any:
     return np.random.default_rng(1).normal(size=(rows, kernel.program.z.size))
 
 
-def knob(kernel: Kernel) -> Any:
-    return np.full(kernel.program.knob.size, 9.81)
+def gravity(kernel: Kernel) -> Any:
+    return np.full(kernel.program.parameters.size, 9.81)
 
 
 def joined(outputs: dict[str, Any]) -> Any:
@@ -26,25 +26,29 @@ def joined(outputs: dict[str, Any]) -> Any:
 def test_outputs_and_jacobian_are_those_of_the_graph(kernel: Kernel) -> None:
     graph = programs.graph(kernel.program)
     for z in draw(kernel, 3):
-        outputs, jacobian = (value.full() for value in graph(z, knob(kernel)))
-        np.testing.assert_allclose(joined(kernel.forward(z, knob(kernel)))[0], outputs.ravel(), rtol=1e-12, atol=1e-13)
-        rows = [kernel.jacobian(z, name, knob(kernel)) for name in kernel.program.outputs]
+        outputs, jacobian = (value.full() for value in graph(z, gravity(kernel)))
+        np.testing.assert_allclose(
+            joined(kernel.forward(z, gravity(kernel)))[0], outputs.ravel(), rtol=1e-12, atol=1e-13
+        )
+        rows = [kernel.jacobian(z, name, gravity(kernel)) for name in kernel.program.outputs]
         np.testing.assert_allclose(np.vstack(rows), jacobian, rtol=1e-12, atol=1e-13)
 
 
 def test_the_interpreter_agrees_to_the_bit(kernel: Kernel) -> None:
     z = draw(kernel, 1)[0]
-    outputs = kernel.forward(z, knob(kernel))
-    for name, value in interpret(kernel.program, z, knob(kernel)).items():
+    outputs = kernel.forward(z, gravity(kernel))
+    for name, value in interpret(kernel.program, z, gravity(kernel)).items():
         np.testing.assert_array_equal(outputs[name][0], value)
 
 
 def test_a_gradient_is_the_seed_times_the_jacobian(kernel: Kernel) -> None:
     z = draw(kernel, 9)
     seed = np.random.default_rng(2).normal(size=(9, sum(p.size for p in kernel.program.outputs.values())))
-    outputs, gradient = kernel.gradient(z, seed, knob(kernel))
-    np.testing.assert_array_equal(joined(outputs), joined(kernel.forward(z, knob(kernel))))
-    jacobians = [np.vstack([kernel.jacobian(row, name, knob(kernel)) for name in kernel.program.outputs]) for row in z]
+    outputs, gradient = kernel.gradient(z, seed, gravity(kernel))
+    np.testing.assert_array_equal(joined(outputs), joined(kernel.forward(z, gravity(kernel))))
+    jacobians = [
+        np.vstack([kernel.jacobian(row, name, gravity(kernel)) for name in kernel.program.outputs]) for row in z
+    ]
     np.testing.assert_allclose(gradient, np.einsum("bs,bsn->bn", seed, jacobians), rtol=1e-11, atol=1e-12)
 
 
@@ -64,7 +68,7 @@ def test_rows_depend_on_neither_batch_nor_threads(chain: Kernel, rows: int, thre
     np.testing.assert_array_equal(joined(outputs), joined(again))
 
 
-def test_each_row_may_have_its_own_knob(pendulum: Kernel) -> None:
+def test_each_row_may_have_its_own_parameters(pendulum: Kernel) -> None:
     z, gravity = draw(pendulum, 3), np.array([[1.0], [9.0], [20.0]])
     together = joined(pendulum.forward(z, gravity))
     for i in range(3):
@@ -73,33 +77,33 @@ def test_each_row_may_have_its_own_knob(pendulum: Kernel) -> None:
 
 def test_a_nan_stays_in_its_lane_and_is_found(pendulum: Kernel) -> None:
     z = draw(pendulum, 8)
-    clean, slope = pendulum.gradient(z, np.ones(3), knob(pendulum))
+    clean, slope = pendulum.gradient(z, np.ones(3), gravity(pendulum))
     z[5, 20] = 1e200
-    bad, bent = pendulum.gradient(z, np.ones(3), knob(pendulum))
+    bad, bent = pendulum.gradient(z, np.ones(3), gravity(pendulum))
     others = np.arange(8) != 5
     np.testing.assert_array_equal(joined(bad)[others], joined(clean)[others])
     np.testing.assert_array_equal(bent[others], slope[others])
     assert not np.isfinite(bad["merit"][5, 0])
-    found = pendulum.first_bad(z[5], knob(pendulum))
+    found = pendulum.first_bad(z[5], gravity(pendulum))
     assert found is not None
     assert (found.phase, found.step, found.function) == ("body", 20, "cost")
     assert str(found).startswith("step 20, cost: word")
-    assert pendulum.first_bad(z[4], knob(pendulum)) is None
+    assert pendulum.first_bad(z[4], gravity(pendulum)) is None
     z[5, 20] = np.nan
-    found = pendulum.first_bad(z[5], knob(pendulum))
+    found = pendulum.first_bad(z[5], gravity(pendulum))
     assert found is not None
     assert (found.phase, found.function, found.word) == ("inputs", "z", 20)
 
 
 def test_trajectories_lie_in_the_memory(pendulum: Kernel) -> None:
     z = draw(pendulum, 9)
-    states = pendulum.trajectory(z, programs.PENDULUM_STATE, programs.STEPS + 1, knob(pendulum))
+    states = pendulum.trajectory(z, programs.PENDULUM_STATE, programs.STEPS + 1, gravity(pendulum))
     assert states.shape == (9, programs.STEPS + 1, 2)
     np.testing.assert_array_equal(states[:, 0], np.tile([1.0, 0.0], (9, 1)))
-    residuals = pendulum.forward(z, knob(pendulum))["residuals"]
+    residuals = pendulum.forward(z, gravity(pendulum))["residuals"]
     np.testing.assert_array_equal(states[:, -1] - [1, 0], residuals)
     with pytest.raises(ProgramError, match="do not lie in the memory"):
-        pendulum.trajectory(z, programs.PENDULUM_STATE, programs.STEPS + 2, knob(pendulum))
+        pendulum.trajectory(z, programs.PENDULUM_STATE, programs.STEPS + 2, gravity(pendulum))
 
 
 @pytest.mark.parametrize("lanes", [1, 2, 4, 16])
@@ -116,8 +120,8 @@ def test_single_precision_is_close(pendulum: Kernel, cache: Cache) -> None:
     single = compile_program(pendulum.program, precision="single", cache=cache)
     assert single.report.lanes == 2 * pendulum.report.lanes
     z = draw(pendulum, 20)
-    value, gradient = pendulum.gradient(z, [1, 0, 0], knob(pendulum))
-    close, slope = single.gradient(z, [1, 0, 0], knob(pendulum))
+    value, gradient = pendulum.gradient(z, [1, 0, 0], gravity(pendulum))
+    close, slope = single.gradient(z, [1, 0, 0], gravity(pendulum))
     np.testing.assert_allclose(close["merit"], value["merit"], rtol=1e-4)
     np.testing.assert_allclose(slope, gradient, rtol=1e-3, atol=1e-4)
 
@@ -138,7 +142,7 @@ def test_wrong_shapes_are_named(pendulum: Kernel) -> None:
         compile_program(pendulum.program, lanes=3)
     with pytest.raises(ProgramError, match=r"z has the shape \(3,\); wanted is \(batch, 30\) or \(30,\)"):
         pendulum.forward(np.ones(3), [1.0])
-    with pytest.raises(ProgramError, match=r"the batch sizes \[2, 3\] of z, knob differ"):
+    with pytest.raises(ProgramError, match=r"the batch sizes \[2, 3\] of z, parameters differ"):
         pendulum.forward(np.ones((3, 30)), np.ones((2, 1)))
 
 

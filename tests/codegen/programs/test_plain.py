@@ -17,15 +17,15 @@ from symphys.codegen.emit.plain import plain_source
 from symphys.codegen.toolchain.compiler import find_compiler
 
 CALL = """
-void call(const double *z, const double *knob, const double *seed, double *outputs, double *gradient, double *work) {
-  const batch one = {1, {z, 0}, {knob, 0}, {seed, 0}, outputs, gradient, 0, 0, 0, 0, 0};
+void call(const double *z, const double *p, const double *seed, double *outputs, double *gradient, double *work) {
+  const batch one = {1, {z, 0}, {p, 0}, {seed, 0}, outputs, gradient, 0, 0, 0, 0, 0};
   evaluate(&PROGRAM, &one, work);
 }
 """
 
 
 def plain(program: Program, folder: Path) -> Any:
-    """(z, knob, seed) -> (outputs, gradient) by the plain file."""
+    """(z, parameters, seed) -> (outputs, gradient) by the plain file."""
     source = plain_source(program, tuple(program.outputs), {})
     (folder / "plain.c").write_text(source.text + CALL, "utf-8")
     flags = ["-std=c99", "-O2", "-Wall", "-pedantic", "-Werror", "-fPIC", "-shared"]
@@ -58,9 +58,9 @@ def test_it_gives_what_the_kernel_gives(name: str, cache: Cache, tmp_path: Path)
         pytest.skip(str(error))
     call, random = plain(program, tmp_path), np.random.default_rng(3)
     for _ in range(3):
-        z, knob = random.normal(size=program.z.size), np.full(program.knob.size, 9.81)
+        z, parameters = random.normal(size=program.z.size), np.full(program.parameters.size, 9.81)
         seed = random.normal(size=sum(place.size for place in program.outputs.values()))
-        values, slope = kernel.gradient(z, seed, knob)
-        outputs, gradient = call(z, knob, seed)
+        values, slope = kernel.gradient(z, seed, parameters)
+        outputs, gradient = call(z, parameters, seed)
         np.testing.assert_array_equal(outputs, np.concatenate([value[0] for value in values.values()]))
         np.testing.assert_allclose(gradient, slope[0], rtol=1e-11, atol=1e-11)

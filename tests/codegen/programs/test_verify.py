@@ -16,7 +16,7 @@ Z, SUM, A, B, STATE = Place(0, 2), Place(2, 2), Place(4, 2), Place(6, 2), Place(
 
 
 def make(**parts: Any) -> Program:
-    whole: Mapping[str, Any] = {"size": 20, "z": Z, "knob": Place(0, 0), "zeroed": (SUM,), "steps": 5}
+    whole: Mapping[str, Any] = {"size": 20, "z": Z, "parameters": Place(0, 0), "zeroed": (SUM,), "steps": 5}
     return Program(**{**whole, "outputs": {"sum": SUM}, **parts})
 
 

@@ -47,7 +47,9 @@ def evaluate(piece: TracedCall, values: dict[TracedVector, np.ndarray]) -> dict[
     return {slot: np.array(ca.DM(result)).ravel() for slot, result in zip(piece.outputs, results, strict=True)}
 
 
-def run(recording: TracedStep, layout: Layout, x: np.ndarray, u: np.ndarray, knob: float, p: Any = ()) -> np.ndarray:
+def run(
+    recording: TracedStep, layout: Layout, x: np.ndarray, u: np.ndarray, smoothing: float, p: Any = ()
+) -> np.ndarray:
     """The next state, piece by piece."""
     values: dict[TracedVector, np.ndarray] = {}
     after = np.zeros(layout.size)
@@ -56,7 +58,7 @@ def run(recording: TracedStep, layout: Layout, x: np.ndarray, u: np.ndarray, kno
             if slot.name in layout:
                 values[slot] = x[layout[slot.name]]
             elif slot.name:
-                values[slot] = {"u": u, "p": np.array(p), "smoothing": np.array([knob])}[slot.name]
+                values[slot] = {"u": u, "p": np.array(p), "smoothing": np.array([smoothing])}[slot.name]
         values |= evaluate(piece, values)
         for slot in recording.results.keys() & set(piece.outputs):
             after[recording.results[slot]] = values[slot]
