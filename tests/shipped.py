@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from symphys import problems
@@ -14,6 +15,12 @@ from symphys.solvers import Outcome, Status, solver
 from symphys.transcription import Transcription, transcribe
 
 Array = NDArray[np.float64]
+
+
+def seeds(count: int) -> pytest.MarkDecorator:
+    """The first seed in every run of the tests, the others of ``count`` with ``make thorough``."""
+    others = (pytest.param(seed, marks=pytest.mark.thorough) for seed in range(1, count))
+    return pytest.mark.parametrize("seed", [0, *others])
 
 
 @cache

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from scipy.spatial.transform import Rotation
-from shipped import shipped, solve, work
+from shipped import seeds, shipped, solve, work
 
 POINT, TIP = np.array([0.2, 0.35, 0.3]), np.array([0, 0, 0.075])
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@seeds(3)
 def test_reaches_the_point(seed: int) -> None:
     """Within 1 cm after 7 s and at the end, in at most 150 gradients; servos stay within their limits."""
     made = shipped("arm_reach")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shipped import shipped, solve, work
+from shipped import seeds, shipped, solve, work
 
 from symphys import problems
 from symphys.problem import load_problem
@@ -22,7 +22,7 @@ def test_solvers_agree_on_the_stroke() -> None:
 
 
 @pytest.mark.parametrize(("name", "most"), [("gradient", 25), ("least_squares", 4), ("ipopt", 14), ("cma", 350)])
-@pytest.mark.parametrize("seed", [0, 1])
+@seeds(2)
 def test_every_solver_sinks_it(name: str, most: int, seed: int) -> None:
     made = shipped("bank_shot")
     found = solve(name, made, seed)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 from scipy.optimize import fsolve
-from shipped import Array, shipped, solve, work
+from shipped import Array, seeds, shipped, solve, work
 
 GRAVITY = np.array([0, 0, -9.81])
 START, RING, TIME = np.array([-2.2, 1.8, 2.1]), np.array([0, 0, 3.05]), 1.3
@@ -38,7 +38,7 @@ def test_least_squares_finds_the_throw_of_the_formulas() -> None:
 
 
 @pytest.mark.parametrize(("name", "most"), [("gradient", 12), ("ipopt", 16), ("cma", 300)])
-@pytest.mark.parametrize("seed", [0, 1])
+@seeds(2)
 def test_every_solver_scores_off_the_board(name: str, most: int, seed: int) -> None:
     made = shipped("basket")
     found = solve(name, made, seed)

@@ -8,7 +8,7 @@ from math import pi, tan
 import numpy as np
 import pytest
 from scipy.optimize import fsolve
-from shipped import Array, shipped, solve, work
+from shipped import Array, seeds, shipped, solve, work
 
 RADIUS, BRAKE, FORWARD, TIME = 0.1085, 0.08 * 9.81, 30.0, 2.4
 
@@ -48,7 +48,7 @@ def test_least_squares_finds_what_the_formula_gives() -> None:
 
 
 @pytest.mark.parametrize(("name", "most"), [("gradient", 100), ("ipopt", 40), ("cma", 700)])
-@pytest.mark.parametrize("seed", [0, 1])
+@seeds(2)
 def test_every_solver_finds_the_pocket(name: str, most: int, seed: int) -> None:
     made = shipped("bowling")
     found = solve(name, made, seed)

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from shipped import Array, shipped, solve, work
+from shipped import Array, seeds, shipped, solve, work
 
 CART, BOB, LENGTH, INERTIA, GRAVITY, TIME, KNOTS = 1.0, 0.3, 0.5, 0.0003, 9.81, 2.0, 11
 UPRIGHT = [1.0, -np.pi, 0.0, 0.0]
@@ -70,7 +70,7 @@ def test_the_cart_moves_as_its_equations_say() -> None:
 
 
 @pytest.mark.parametrize(("name", "most"), [("gradient", 150), ("least_squares", 8), ("ipopt", 25), ("cma", 6000)])
-@pytest.mark.parametrize("seed", [0, 1])
+@seeds(2)
 def test_every_solver_swings_it_up(name: str, most: int, seed: int) -> None:
     """By the other equations too, whatever the forces are."""
     made = shipped("cart_pole")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from shipped import Array, shipped, solve, work
+from shipped import Array, seeds, shipped, solve, work
 
 BAT, BALL, GRAVITY, RESTITUTION, TOUCH = 1.0, 0.1, 9.81, 0.8, 0.02 + 0.05
 KNOTS = np.linspace(0, 0.6, 7)
@@ -35,7 +35,7 @@ def flown(lift: Array) -> tuple[Array, list[float]]:
 
 
 @pytest.mark.parametrize(("name", "most"), [("gradient", 60), ("least_squares", 6), ("ipopt", 30), ("cma", 1500)])
-@pytest.mark.parametrize("seed", [0, 1])
+@seeds(2)
 def test_the_forces_bring_bat_and_ball_back(name: str, most: int, seed: int) -> None:
     """Judged by the other motion, whatever the forces are; and its bat has the speed of the formula."""
     made = shipped("juggle")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from plate import Plate
-from shipped import Array, shipped, solve, work
+from shipped import Array, seeds, shipped, solve, work
 
 KICK = [4.8767, 1.7477, -0.1312]
 """As the time step goes to 0, from 10 ms, 5 ms and 2.5 ms."""
@@ -55,7 +55,7 @@ def test_least_squares_finds_the_kick() -> None:
 
 
 @pytest.mark.parametrize(("name", "most"), [("gradient", 40), ("ipopt", 18), ("cma", 350)])
-@pytest.mark.parametrize("seed", [0, 1])
+@seeds(2)
 def test_every_solver_knocks_it_into_place(name: str, most: int, seed: int) -> None:
     """The way of the kick across and its place trade off against each other; its way along does not."""
     made = shipped("knock")

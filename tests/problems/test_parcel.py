@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from plate import Plate
-from shipped import shipped, solve, work
+from shipped import seeds, shipped, solve, work
 
 LENGTH, WIDTH, FRICTION, GRAVITY = 0.4, 0.3, 0.35, 9.81
 PLATE = Plate((LENGTH, WIDTH), 0.01, FRICTION)
@@ -38,7 +38,7 @@ def test_least_squares_finds_what_brings_the_plate_to_its_place() -> None:
 
 
 @pytest.mark.parametrize(("name", "most"), [("gradient", 14), ("ipopt", 15), ("cma", 350)])
-@pytest.mark.parametrize("seed", [0, 1])
+@seeds(2)
 def test_every_solver_delivers_it(name: str, most: int, seed: int) -> None:
     made = shipped("parcel")
     found = solve(name, made, seed)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shipped import shipped, solve, work
+from shipped import seeds, shipped, solve, work
 
 PUTT = [2.3215, -1.1838]
 """[m/s] Where the putt goes as the time step goes to 0, from 10 ms, 5 ms and 2.5 ms: their changes halve."""
@@ -17,7 +17,7 @@ def test_least_squares_finds_the_putt() -> None:
 
 
 @pytest.mark.parametrize(("name", "most"), [("gradient", 16), ("ipopt", 16), ("cma", 250)])
-@pytest.mark.parametrize("seed", [0, 1])
+@seeds(2)
 def test_every_solver_stops_at_the_cup(name: str, most: int, seed: int) -> None:
     """Across, the slope forgives: 1 cm at the cup is 3 cm/s of the putt."""
     made = shipped("putt")

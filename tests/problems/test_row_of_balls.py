@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from shipped import shipped, solve, work
+from shipped import seeds, shipped, solve, work
 
 MASSES = [1.6, 0.8, 0.4, 0.2, 0.1]
 
@@ -27,7 +27,7 @@ def test_the_formula() -> None:
 
 
 @pytest.mark.parametrize(("name", "most"), [("gradient", 45), ("least_squares", 25), ("ipopt", 35), ("cma", 1000)])
-@pytest.mark.parametrize("seed", [0, 1])
+@seeds(2)
 def test_each_mass_is_the_geometric_mean_of_its_neighbours(name: str, most: int, seed: int) -> None:
     made = shipped("row_of_balls")
     found = solve(name, made, seed)

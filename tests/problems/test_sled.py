@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from shipped import seeds
 
 from symphys import problems
 from symphys.problem import load_problem, validate_options
@@ -26,7 +27,7 @@ def solve(name: str, made: Transcription, seed: int = 0) -> Outcome:
 
 
 @pytest.mark.parametrize("name", ["gradient", "least_squares", "ipopt"])
-@pytest.mark.parametrize("seed", [0, 1])
+@seeds(2)
 def test_friction_holds_it(name: str, seed: int) -> None:
     """Below 3.9 N it stays where it is, so that the gradient is rounding and nothing else."""
     made = sled((0.0,))
@@ -38,7 +39,7 @@ def test_friction_holds_it(name: str, seed: int) -> None:
 
 
 @pytest.mark.parametrize(("name", "most"), [("gradient", 160), ("least_squares", 60), ("ipopt", 250), ("cma", 0)])
-@pytest.mark.parametrize("seed", [0, 1])
+@seeds(2)
 def test_stages_let_go_of_it(name: str, most: int, seed: int) -> None:
     made = sled()
     found = solve(name, made, seed)

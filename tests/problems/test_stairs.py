@@ -6,7 +6,7 @@ from math import sqrt
 
 import numpy as np
 import pytest
-from shipped import shipped, solve, work
+from shipped import seeds, shipped, solve, work
 
 RISER, PERIOD, GRAVITY, LYING = 0.17, 0.5, 9.81, 0.68 + 0.03
 FALL = sqrt(2 * RISER / GRAVITY)  # [s] from one step to the next, without a bounce
@@ -29,7 +29,7 @@ def test_least_squares_finds_both_to_rounding() -> None:
 
 
 @pytest.mark.parametrize(("name", "most"), [("gradient", 12), ("ipopt", 12), ("cma", 250)])
-@pytest.mark.parametrize("seed", [0, 1])
+@seeds(2)
 def test_every_solver_comes_near(name: str, most: int, seed: int) -> None:
     made = shipped("stairs")
     found = solve(name, made, seed)
