@@ -36,10 +36,11 @@ bench: $(VENV)/.benching  ## measure what BENCHMARKS.md reports, contact aside; 
 	$(BIN)/python benchmarks/pile.py build
 	$(BIN)/python benchmarks/against_mujoco.py
 
-bench-contact: $(VENV)/.benching  ## errors of contact against the step, gradients, what each trick buys; three quarters of an hour
+bench-contact: $(VENV)/.benching  ## errors of contact against the step, gradients, what each trick buys; an hour
 	$(BIN)/python benchmarks/gradients.py build
 	$(BIN)/python benchmarks/ablation.py
 	$(BIN)/python benchmarks/consistency.py build
+	$(BIN)/python benchmarks/coupled_study.py
 
 bench-robots: $(VENV)/.benching  ## jointed robots: what each device of joints buys; agreement, errors, speed against MuJoCo and casadi's C; growth of adjoints
 	$(BIN)/python benchmarks/joint_study.py build
