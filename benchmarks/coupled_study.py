@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from scenes import Solid
 from table_robot import table_problem
 
-from symphys.dynamics.functions import report_function
 from symphys.dynamics.contact.coupling import STRONG, may_couple
+from symphys.dynamics.functions import report_function
 from symphys.model.shapes import Capsule, Plane
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Body, Law, Pair, Scheme, World, is_zero, make_world
@@ -100,7 +100,7 @@ def tower(sweeps: int) -> tuple[float, float, float]:
 
 
 def heap(sweeps: int) -> tuple[float, float, float]:
-    """Three crossed layers of two bars fall 5 mm: (.., median residual, kinetic energy [J]), in the last half second."""
+    """Three crossed layers of two bars fall 5 mm: (.., median residual, kinetic energy [J]), last half second."""
     radius, half = 0.03, 0.2
     bodies = [Solid(f"b{k}", 1.0, (radius, half)).body() for k in range(6)]
     world = make_world(bodies, [Plane.ground()], Law(0.6))
