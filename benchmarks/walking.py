@@ -44,7 +44,7 @@ class Walks:
         """(count,) mean speed [m/s], and whether upright at every step."""
         errors = self.situations.value(z[None], drawn, 0.0).errors
         kernel, rows = self.situations.kernels[0], np.hstack([np.tile(z, (len(drawn.numbers), 1)), drawn.numbers])
-        state = kernel.program.fading.state  # type: ignore[union-attr]
+        state = kernel.program.discounted.state  # type: ignore[union-attr]
         last = Place(state.offset + self.problem.simulation.steps * state.stride, state.size)
         ends = kernel.trajectory(rows, last, 1, [0.0])[:, 0, 0]
         return ends / self.problem.simulation.duration, errors[:, self.upright] <= 1

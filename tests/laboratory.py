@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from typing import Any
 
 import casadi as ca
@@ -22,6 +23,7 @@ class Lab:
     def __init__(self, world: World, scheme: Scheme, inputs: Sequence[str] = (), parameters: Sequence[Any] = ()):
         self.world, self.scheme, self.layout = world, scheme, Layout(world)
         self.step = step_function(world, scheme, inputs, parameters)
+        self.horizon = cache(self.step.mapaccum)
 
     def trajectory(
         self, values: Mapping[str, Any], time: float, u: Any = None, p: Any = None, smoothing: Any = 0
@@ -30,8 +32,13 @@ class Lab:
         steps = round(time / self.scheme.dt)
         u = ca.DM.zeros(self.step.size1_in(1), steps) if u is None else u
         p = ca.DM(0, 1) if p is None else p
-        x0 = initial_state(self.world, values)
-        return ca.horzcat(x0, self.step.mapaccum(steps)(x0, u, ca.repmat(p, 1, steps), ca.repmat(smoothing, 1, steps)))
+        x = initial_state(self.world, values)
+        if any(isinstance(given, ca.MX) for given in (x, u, p, smoothing)):
+            return ca.horzcat(x, self.horizon(steps)(x, u, ca.repmat(p, 1, steps), ca.repmat(smoothing, 1, steps)))
+        states, inputs = [x], ca.horzsplit(ca.DM(u))
+        for k in range(steps):
+            states.append(self.step(states[-1], inputs[k], p, smoothing))
+        return ca.horzcat(*states)
 
     def states(self, values: Mapping[str, Any], time: float, **more: Any) -> dict[str, Array]:
         """Each quantity by name: (steps + 1, components)."""

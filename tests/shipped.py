@@ -49,6 +49,14 @@ def met(name: str, made: Transcription, of: int, wanted: int) -> list[Outcome]:
     raise AssertionError(f"only {len(found)} of {of} seeds met all")
 
 
+def short_descent(name: str, iterations: int) -> tuple[float, float]:
+    """Merits of a shipped problem's guess, and after so many iterations of first-order descent."""
+    made = transcribe(load_problem(problems.find(name), {"solver.gradient.iterations": iterations}))
+    found = solve("gradient", made)
+    merits = made.shooting.evaluator.value(np.stack([made.shooting.start(0), found.z]), 0.0).merit
+    return float(merits[0]), float(merits[1])
+
+
 def work(found: Outcome) -> int:
     """Gradients and Jacobians, or rollouts where there are none."""
     counts = found.counts

@@ -38,7 +38,7 @@ def test_gradients_are_exact_with_the_time_of_impact_only(cases: list[gradients.
         assert np.abs(gradients.here(case, case.largest, time_of_impact=False) - exact).max() > 0.1
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_gradient_of_a_tumbling_box_falls_with_the_step(cases: list[gradients.Case]) -> None:
     box = cases[3]
     curve = gradients.study(

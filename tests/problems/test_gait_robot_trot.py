@@ -20,7 +20,7 @@ def speed(made: Transcription, torque: float) -> float:
     return float(made.simulate(np.array([torque])).position[-1, 0, 0]) / made.problem.simulation.duration
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.005])
+@pytest.mark.parametrize("dt", [0.01, pytest.param(0.005, marks=pytest.mark.thorough)])
 def test_it_trots_as_published(dt: float) -> None:
     """0.7 m/s; 80 N m is what the published engine's 4 N m come to in 20 iterations."""
     made = trot(simulation__dt=dt)

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shipped import met, shipped
-
-SEEDS = pytest.mark.parametrize("wanted", [1, pytest.param(2, marks=pytest.mark.thorough)])
+from shipped import met, shipped, short_descent
 
 
-@SEEDS
+def test_a_short_descent_takes_it_nearer() -> None:
+    before, after = short_descent("hopper_jump", 40)
+    assert after < 0.6 * before
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("wanted", [1, 2])
 def test_it_jumps_half_a_metre(wanted: int) -> None:
     """From one seed of three, or two: aloft for 0.1 s at least, landing on its foot, the leg within its limits."""
     made = shipped("hopper_jump")

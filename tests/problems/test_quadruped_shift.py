@@ -5,12 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from shipped import met, shipped
-
-SEEDS = pytest.mark.parametrize("wanted", [1, pytest.param(2, marks=pytest.mark.thorough)])
+from shipped import met, shipped, short_descent
 
 
-@SEEDS
+def test_a_short_descent_takes_it_nearer() -> None:
+    before, after = short_descent("quadruped_shift", 25)
+    assert after < 0.6 * before
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("wanted", [1, 2])
 def test_the_net_shifts_the_torso(wanted: int) -> None:
     """From one seed of three, or two: to 5 mm, on feet that stay where they are; without the net it stays."""
     made = shipped("quadruped_shift")

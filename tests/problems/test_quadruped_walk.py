@@ -37,12 +37,12 @@ def ahead(made: Transcription, z: Array) -> Any:
 
 
 def test_a_short_lesson_helps() -> None:
-    """A hundred batches of 16 for 3 s: what stood walks, and costs less in situations that are new.
+    """Sixty batches of 16 for 2 s: what stood walks, and costs less in samples that are new.
 
-    And over these 300 steps the adjoint of a calm walk is its derivative, against central differences.
+    And over these 200 steps the adjoint of a calm walk is its derivative, against central differences.
     """
     name = "quadruped_walk"
-    shorter = {"simulation.duration": 3, "solver.stochastic.iterations": 100, "solver.stochastic.samples": 16}
+    shorter = {"simulation.duration": 2, "solver.stochastic.iterations": 60, "solver.stochastic.samples": 16}
     made, situations, z = taught(name, shorter)
     assert np.median(compared(made, gait(made, 0.05))[0]) < 1e-6
     still, learnt = (situations.value(each[None], situations.draw(np.random.default_rng(UNSEEN), 32), 0.0)
@@ -50,7 +50,7 @@ def test_a_short_lesson_helps() -> None:
     assert learnt.objective.mean() < 0.8 * still.objective.mean()
     assert learnt.alive is not None and learnt.alive.mean() > 0.6
     before, after = ahead(made, made.shooting.start(0))[0], ahead(made, z)[0]
-    assert after > before + 1.0
+    assert after > before + 0.8
 
 
 @pytest.mark.thorough

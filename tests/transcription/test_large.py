@@ -106,7 +106,13 @@ tolerance = 0.1
 """
 
 
-@pytest.fixture(scope="module", params=['activation = "tanh"', 'activation = "relu", biases = false', "skip = true"])
+FORMS = ("skip = true", 'activation = "tanh"', 'activation = "relu", biases = false')
+OTHERS = (pytest.param(form, marks=pytest.mark.thorough) for form in FORMS[1:])
+FIRST_FORM = pytest.mark.parametrize("both", [FORMS[0], *OTHERS], indirect=True, scope="module")
+"""The first form in every run of the tests, the others with ``make thorough``."""
+
+
+@pytest.fixture(scope="module", params=FORMS)
 def both(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[tuple[Transcription, LargeTranscription]]:
@@ -169,6 +175,7 @@ def test_robots_share_weights(both: tuple[Transcription, LargeTranscription], mo
     assert np.allclose(total, expected, rtol=1e-7, atol=1e-8 * np.abs(expected).max())
 
 
+@FIRST_FORM
 def test_judge_and_motion(both: tuple[Transcription, LargeTranscription]) -> None:
     """Casadi's rollouts of both agree, motion and contacts included."""
     within, beside = both
@@ -181,6 +188,7 @@ def test_judge_and_motion(both: tuple[Transcription, LargeTranscription]) -> Non
             assert np.allclose(values, motions[1][name], rtol=1e-9, atol=1e-9, equal_nan=True), name
 
 
+@FIRST_FORM
 def test_examination(both: tuple[Transcription, LargeTranscription]) -> None:
     """``check`` says the same of both: gradient, refinements, growth through the nets, energy."""
     z = points(both[0])[0]
@@ -207,7 +215,7 @@ def test_single_precision_of_nets(both: tuple[Transcription, LargeTranscription]
 
 
 @needs_compiler
-@pytest.mark.parametrize("both", ["skip = true"], indirect=True)
+@FIRST_FORM
 def test_nets_on_a_device(
     both: tuple[Transcription, LargeTranscription], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

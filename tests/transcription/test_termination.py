@@ -79,7 +79,7 @@ def test_gradients_end_at_the_termination(ball: Transcription) -> None:
 
 def test_discounted_adjoints_end_at_the_termination(ball: Transcription) -> None:
     """The target at the end pulls no longer, since the motion was over."""
-    fading = rollout_program(ball.rollout).fading
+    fading = rollout_program(ball.rollout).discounted
     assert fading is not None and fading.kept is not None
     kernel = getattr(ball.shooting.evaluator, "kernel", None)
     if kernel is None:
