@@ -2,8 +2,9 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+QUICK := $(addprefix tests/,house model expression findings problem solvers dynamics)
 
-.PHONY: help demo demo-walk test thorough lint typecheck bench bench-contact bench-robots bench-table1 bench-gpu bench-walk bench-lessons gallery clean
+.PHONY: help demo demo-walk test test-quick thorough lint typecheck bench bench-contact bench-robots bench-table1 bench-gpu bench-walk bench-lessons gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
@@ -16,6 +17,9 @@ demo-walk: $(VENV)/.installed  ## a quadruped learns to walk, in two minutes; Ct
 
 test: $(VENV)/.developing  ## run the tests; ARGS="-m 'not slow'" passes options to pytest
 	$(BIN)/pytest -n auto --dist loadfile $(ARGS)
+
+test-quick: $(VENV)/.developing  ## run the tests that tell most in a minute: the house, problem files, the step, solvers
+	$(BIN)/pytest -n auto --dist loadfile -m "not slow" $(QUICK) $(ARGS)
 
 thorough: $(VENV)/.developing  ## run the tests that take minutes: ten thousand random scenes, tall towers, long rolls
 	$(BIN)/pytest -n auto -m thorough $(ARGS)

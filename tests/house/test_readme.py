@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from symphys.cli import main
 from symphys.cli.app import app
 from symphys.expression import FUNCTIONS
@@ -21,6 +23,7 @@ def block(language: str) -> str:
     return str(text)
 
 
+@pytest.mark.slow
 def test_the_problem_of_your_own_is_solved(tmp_path: Path) -> None:
     path = tmp_path / "croquet.toml"
     path.write_text(block("toml"), encoding="utf-8")

@@ -76,6 +76,7 @@ tolerance = 0.01
 """
 
 
+@pytest.mark.slow
 def test_a_run_keeps_included_files(tmp_path: Path) -> None:
     """The key knows them, so that a changed ball is thrown again; the folder alone is a problem as well."""
     path, ball, out = tmp_path / "throw.toml", tmp_path / "ball.toml", tmp_path / "out"

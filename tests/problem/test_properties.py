@@ -142,6 +142,7 @@ def test_any_bytes(path: Path, content: bytes) -> None:
         load_problem(path)
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None)
 @given(data=st.data())
 def test_a_valid_file_with_any_value_anywhere(path: Path, valid: str, data: st.DataObject) -> None:
@@ -186,6 +187,7 @@ def test_any_setting(path: Path, valid: str, key: list[str], value: object) -> N
     load(path, valid, {".".join(key): value})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shapes", [False, True])
 def test_the_rewritten_file_is_the_same(path: Path, valid: str, shapes: bool) -> None:
     original = SHAPES if shapes else valid

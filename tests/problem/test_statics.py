@@ -128,6 +128,7 @@ def test_settings_reach_blocks_and_terrain(load: Load) -> None:
     assert ramp.shape.half_sizes[0] == 2.5
 
 
+@pytest.mark.slow
 def test_surfaces_that_touch_in_several_points(load: Load) -> None:
     box = BASE.replace("sphere = { radius = 0.1 }", "box = { size = [1, 1, 1] }")
     second = box[box.index("[[body]]") :].replace("ball", "other").replace("[0.5, 0.25, 2]", "[0.5, 0.25, 9]")

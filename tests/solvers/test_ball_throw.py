@@ -37,6 +37,7 @@ def throw(distance: float, backend: str = "auto") -> ShootingProblem:
     return made.shooting
 
 
+@pytest.mark.slow
 @every_throw
 def test_descent(backend: str, distance: float) -> None:
     found = solve("gradient", throw(distance, backend))
@@ -51,6 +52,7 @@ def test_least_squares(backend: str, distance: float) -> None:
     assert found.counts.jacobians <= FEWEST_JACOBIANS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hessian", ["limited-memory", "exact"])
 @every_throw
 def test_ipopt(backend: str, distance: float, hessian: str) -> None:

@@ -172,6 +172,7 @@ def test_a_foreign_error_belongs_to_its_stage() -> None:
     assert total(found.stages) == found.counts
 
 
+@pytest.mark.slow
 @replayed
 @pytest.mark.parametrize("problem", [moving(), bent()], ids=["moving", "bent"])
 def test_goes_on_in_any_stage_to_the_last_bit(name: str, problem: ShootingProblem) -> None:

@@ -67,6 +67,7 @@ def test_two_bodies(root: str | None, kind: str) -> None:
     check(root, (kind,), False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("branched", [False, True])
 @pytest.mark.parametrize(("root", "kind"), list(product(ROOTS, KINDS)))
 def test_three_bodies(root: str | None, kind: str, branched: bool) -> None:

@@ -120,6 +120,7 @@ def test_v7_a_motorised_robot_in_flight_keeps_its_momenta() -> None:
     assert np.abs(states["b0.angular_velocity"]).max() > 0.5
 
 
+@pytest.mark.slow
 def test_v7_a_ball_hits_a_floating_linkage() -> None:
     """10 kg at 5 m/s: the momentum of all is 50 N s, in whatever way the impact is taken apart."""
     from symphys.model.shapes import Capsule

@@ -23,6 +23,7 @@ def boxes(count: int) -> World:
     return World(world.bodies, world.statics, tuple(pair for pair in world.pairs if pair.second.body is None))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [gap_function, step_function])
 def test_boxes_alike_are_built_once(make: Callable[[World], object], monkeypatch: pytest.MonkeyPatch) -> None:
     built: list[int] = []

@@ -65,12 +65,14 @@ def run(
     return after
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", worlds())
 @pytest.mark.parametrize("scheme", [Scheme(sweeps=5), Scheme(sweeps=2, warm_start=False), Scheme(sweeps=1)])
 def test_pieces_give_the_whole_step(name: str, scheme: Scheme) -> None:
     compare(worlds()[name], scheme)
 
 
+@pytest.mark.slow
 def test_pieces_give_the_whole_step_of_other_shapes() -> None:
     compare(shapes(), Scheme(sweeps=2, cuts=0))
 
