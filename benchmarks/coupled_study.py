@@ -23,9 +23,10 @@ from table_robot import table_problem
 
 from symphys.dynamics.contact.coupling import STRONG, may_couple
 from symphys.dynamics.functions import report_function
+from symphys.model.scalar import is_zero
 from symphys.model.shapes import Capsule, Plane
 from symphys.model.state_layout import Layout, initial_state
-from symphys.model.world import Body, Law, Pair, Scheme, World, is_zero, make_world
+from symphys.model.world import Body, Law, Pair, Scheme, World, make_world
 from symphys.transcription import symbolic_rollout
 from symphys.transcription.simulation import recorder, simulate
 

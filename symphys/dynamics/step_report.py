@@ -14,7 +14,8 @@ from symphys.dynamics.joints.joint_impulse import JointImpulse
 from symphys.dynamics.substep import Substep
 from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import AnyImpulse
-from symphys.model.world import Pair, World, is_zero
+from symphys.model.scalar import is_zero
+from symphys.model.world import Pair, World
 
 Expr = Any
 """casadi SX"""

@@ -35,8 +35,9 @@ from symphys.export.mjcf_joints import StartState, actuators, freedoms, plain
 from symphys.export.mjcf_surfaces import geoms, pairs, text
 from symphys.model.joints import Link, kinematic_trees, tree_joints
 from symphys.model.joints.kinematic_tree import FLOATING
+from symphys.model.scalar import is_zero
 from symphys.model.shapes import Terrain
-from symphys.model.world import Body, World, is_zero
+from symphys.model.world import Body, World
 from symphys.problem import Problem
 
 Array = NDArray[np.float64]

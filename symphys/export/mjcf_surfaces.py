@@ -6,8 +6,9 @@ from collections.abc import Iterable
 from typing import Any
 from xml.etree.ElementTree import Element
 
+from symphys.model.scalar import is_zero
 from symphys.model.shapes import Plane, Shape, Terrain, surface
-from symphys.model.world import Law, Side, World, is_zero, side_name
+from symphys.model.world import Law, Side, World, side_name
 
 MJCF_PLACEMENT = {"centre": "pos", "orientation": "quat"}
 

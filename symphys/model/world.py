@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from symphys.model.joints import Joint
+from symphys.model.scalar import is_zero
 from symphys.model.shapes import SOLID_SPHERE, Scalar, Shape, Sphere, Static, Surface, contact_points, surface
 
 Vector = Sequence[Any]
@@ -207,8 +208,3 @@ def side_name(bodies: Sequence[Body], statics: Sequence[Static], side: Side) -> 
         return statics[side.shape].name
     body = bodies[side.body]
     return f"{body.name}[{side.shape}]" if len(body.shapes) > 1 else body.name
-
-
-def is_zero(value: Scalar) -> bool:
-    """Whether a number is structurally zero: a plain 0, or a casadi expression that is the constant 0."""
-    return bool(value.is_zero()) if hasattr(value, "is_zero") else value == 0

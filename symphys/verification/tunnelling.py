@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.model.shapes import Sphere, Surface
-from symphys.model.world import is_zero
+from symphys.model.shapes import SolidShape, Surface
 from symphys.transcription import Record, Rollout
 from symphys.verification.bodies import bodies
 from symphys.verification.signed_gaps import SurfacePair, surface_pairs
@@ -79,7 +78,7 @@ def _balls(pair: SurfacePair) -> bool:
 
 def _is_ball(surface: Surface) -> bool:
     """Whether it is a sphere about its body's centre of mass."""
-    return isinstance(surface, Sphere) and all(is_zero(component) for component in surface.centre)
+    return isinstance(surface, SolidShape) and surface.central
 
 
 def _between(pair: SurfacePair, record: Record, k: int, places: Array) -> Array:

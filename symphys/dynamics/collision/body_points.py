@@ -9,8 +9,8 @@ import casadi as ca
 
 from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.maths import rotation
-from symphys.model.shapes import UPRIGHT, Box, Capsule, Shape, Sphere
-from symphys.model.world import is_zero
+from symphys.model.scalar import is_zero
+from symphys.model.shapes import UPRIGHT, Box, Capsule, Shape
 
 Expr = Any
 """casadi SX or a float"""
@@ -45,6 +45,6 @@ def turned_by(orientation: tuple[Any, ...], vector: Offset) -> Offset:
 
 def axes(body_path: PredictedPath, shape: Shape) -> tuple[Parabola, Parabola, Parabola]:
     """The paths of a shape's own axes, world frame."""
-    turn = UPRIGHT if isinstance(shape, Sphere) else shape.orientation
-    x, y, z = (body_path.arm(turned_by(turn, unit)) for unit in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+    units = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    x, y, z = (body_path.arm(turned_by(shape.orientation, unit)) for unit in units)
     return x, y, z

@@ -8,7 +8,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.model.world import is_zero
+from symphys.model.scalar import is_zero
 
 Expr = Any
 """casadi SX, MX or DM"""

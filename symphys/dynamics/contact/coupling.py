@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,8 +10,8 @@ import numpy as np
 
 from symphys.dynamics.motion import inertia_matrix
 from symphys.maths.smoothing import length
-from symphys.model.shapes import Box, Capsule, Shape, Sphere
-from symphys.model.world import Body, Pair, World, is_zero
+from symphys.model.scalar import is_zero
+from symphys.model.world import Body, Pair, World
 
 Expr = Any
 """casadi SX, MX or DM"""
@@ -75,30 +74,16 @@ def may_couple(world: World, pair: Pair) -> bool:
 def _ratio(body: Body, shape: int, friction: Any) -> float:
     """The largest mu W_nt / W_nn of a body without joints; infinite where symbols decide it."""
     surface = body.shapes[shape]
-    if isinstance(surface, Sphere) and all(is_zero(c) for c in surface.centre):
+    if surface.central:
         return 0.0
     numbers = [
         ca.SX(friction),
         ca.SX(body.mass),
         ca.vec(ca.SX(inertia_matrix(body.inertia))),
-        *map(ca.SX, sizes(surface)),
+        *map(ca.SX, [*surface.sizes.values(), surface.centre]),
     ]
     if not all(number.is_constant() for number in numbers):
         return np.inf
     moments = np.linalg.eigvalsh(np.array(ca.DM(inertia_matrix(body.inertia))))
-    reach = np.linalg.norm(np.array(surface.centre, float)) + extent(surface)
+    reach = np.linalg.norm(np.array(surface.centre, float)) + surface.extent
     return float(float(friction) * reach / (2 * np.sqrt(moments[0] / float(body.mass))))
-
-
-def sizes(shape: Shape) -> Sequence[Any]:
-    """The numbers that say how large a shape is and where."""
-    if isinstance(shape, Box):
-        return (*shape.half_sizes, *shape.centre)
-    return (shape.radius, *shape.centre, *((shape.half_length,) if isinstance(shape, Capsule) else ()))
-
-
-def extent(shape: Shape) -> float:
-    """The distance of a shape's furthest point from its centre [m]."""
-    if isinstance(shape, Box):
-        return float(np.linalg.norm(np.array(shape.half_sizes, float)))
-    return float(shape.radius) + (float(shape.half_length) if isinstance(shape, Capsule) else 0.0)

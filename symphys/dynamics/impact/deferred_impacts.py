@@ -14,8 +14,9 @@ from symphys.dynamics.impact.impact import TOUCHING, StepSplit, strikes
 from symphys.dynamics.impact.restitution import eccentric_bodies
 from symphys.dynamics.prediction import bodies_of, detect_contacts, predicted_motions
 from symphys.dynamics.tracing.decorator import traced
+from symphys.model.scalar import is_zero
 from symphys.model.shapes import Sphere
-from symphys.model.world import Law, Pair, World, is_zero
+from symphys.model.world import Law, Pair, World
 
 Expr = Any
 """casadi SX, MX or DM"""

@@ -31,8 +31,7 @@ from symphys.dynamics.unknowns import (
     Velocities,
 )
 from symphys.maths.smoothing import TINY_SQUARE
-from symphys.model.shapes import Sphere
-from symphys.model.world import World, is_zero
+from symphys.model.world import World
 
 Expr = Any
 """casadi SX, MX or DM"""
@@ -41,11 +40,7 @@ Expr = Any
 def eccentric_bodies(world: World) -> set[int]:
     """The bodies on which contacts may act off the centre: on others friction cannot make a rebound add energy."""
     held = {index for joint in world.joints for index in joint.bodies}
-    return held | {
-        index
-        for index, body in enumerate(world.bodies)
-        if any(not isinstance(s, Sphere) or not all(is_zero(c) for c in s.centre) for s in body.shapes)
-    }
+    return held | {index for index, body in enumerate(world.bodies) if not all(shape.central for shape in body.shapes)}
 
 
 def rebound(

@@ -11,10 +11,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
+from symphys.model.scalar import Scalar
 from symphys.model.shapes.box import Box
 from symphys.model.shapes.capsule import Capsule
 from symphys.model.shapes.plane import Plane
-from symphys.model.shapes.shape import UPRIGHT, Scalar, SizeKey, SolidShape
+from symphys.model.shapes.shape import UPRIGHT, SizeKey, SolidShape
 from symphys.model.shapes.sphere import SOLID_SPHERE, Sphere
 from symphys.model.shapes.terrain import Terrain
 

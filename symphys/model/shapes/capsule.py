@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from math import pi
 from typing import Any, ClassVar, Self
 
-from symphys.model.shapes.shape import FLATTEST, UPRIGHT, Scalar, SizeKey, SolidShape
+from symphys.model.scalar import Scalar
+from symphys.model.shapes.shape import FLATTEST, UPRIGHT, SizeKey, SolidShape
 from symphys.model.shapes.sphere import SOLID_SPHERE
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-from symphys.model.shapes.shape import Scalar
+from symphys.model.scalar import Scalar
 
 
 @dataclass(frozen=True)

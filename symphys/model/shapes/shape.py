@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
-Scalar = Any
-"""float or casadi.SX"""
+from symphys.model.scalar import Scalar, is_zero
+
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 """The quaternion of no rotation."""
 FLATTEST = 1e-6
@@ -104,6 +104,11 @@ class SolidShape(ABC):
     def orientation(self) -> tuple[Scalar, ...]:
         """(4,): unit quaternion w x y z; no rotation where a turn changes nothing."""
         return UPRIGHT
+
+    @property
+    def central(self) -> bool:
+        """Whether it is a ball about the origin: whatever touches it acts through there, and no turn changes it."""
+        return not self.turns and all(is_zero(c) for c in self.centre)
 
     @property
     def placement(self) -> dict[str, tuple[Scalar, ...]]:

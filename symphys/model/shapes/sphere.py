@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from math import pi
 from typing import Any, ClassVar, Self
 
-from symphys.model.shapes.shape import Scalar, SizeKey, SolidShape
+from symphys.model.scalar import Scalar
+from symphys.model.shapes.shape import SizeKey, SolidShape
 
 SOLID_SPHERE = 2 / 5
 """Of a uniform ball: moment of inertia by mass and squared radius."""

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.maths import rotation
+from symphys.model.scalar import is_zero
 from symphys.model.shapes import UPRIGHT, Scalar, Shape
-from symphys.model.world import is_zero
 
 Array = NDArray[np.float64]
 Tensor = list[list[Scalar]]
