@@ -76,12 +76,10 @@ def _ratio(body: Body, shape: int, friction: Any) -> float:
     surface = body.shapes[shape]
     if surface.central:
         return 0.0
-    numbers = [
-        ca.SX(friction),
-        ca.SX(body.mass),
-        ca.vec(ca.SX(inertia_matrix(body.inertia))),
-        *map(ca.SX, [*surface.sizes.values(), surface.centre]),
-    ]
+    sizes = (
+        ca.vertcat(*size) if isinstance(size, tuple) else size for size in (*surface.sizes.values(), surface.centre)
+    )
+    numbers = [*map(ca.SX, (friction, body.mass, *sizes)), ca.SX(inertia_matrix(body.inertia))]
     if not all(number.is_constant() for number in numbers):
         return np.inf
     moments = np.linalg.eigvalsh(np.array(ca.DM(inertia_matrix(body.inertia))))
