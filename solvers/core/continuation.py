@@ -24,8 +24,6 @@ from symphys.solvers.core.point import Incumbent, Point
 Rate = Callable[[CountingEvaluator, Sequence[Array]], list[Point]]
 """Rates points as the solver compares them, without offering them to the incumbent; [] where it compares none."""
 EXACT = 0.0
-FATAL = (Status.NOT_APPLICABLE, Status.FAILED)
-"""What ends the solve in whatever stage it happens. Numbers that are not finite may be so at one smoothing only."""
 OVERTAKEN = (
     "{} does better in the exact rollout than what the last stage came to, and is kept: what the stages gained, they "
     "gained for another problem; try other stages, or none"

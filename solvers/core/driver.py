@@ -14,7 +14,7 @@ import numpy as np
 
 from symphys.shooting import ShootingProblem
 from symphys.solvers.core.checkpoint import Checkpoint, from_plain, to_plain
-from symphys.solvers.core.continuation import FATAL, Rate, exact_best, stage_result
+from symphys.solvers.core.continuation import Rate, exact_best, stage_result
 from symphys.solvers.core.evaluator import CountingEvaluator, WorkCounter
 from symphys.solvers.core.interface import Iteration, IterationRecorder, Log, Method, Solver, StageContext, nothing
 from symphys.solvers.core.outcome import Array, Counts, Monitor, Outcome, StageResult, Status, StopReason
@@ -217,7 +217,7 @@ class Driver:
             reason = StopReason(Status.MET) if saved == FINISHED else self._run_stage(z, saved)
             status, best = reason.status, self._evaluator.incumbent.best
             z, saved = (best.z if best else z), None
-            solution, over = z, status in FATAL or index + 1 == len(smoothings)
+            solution, over = z, status.fatal or index + 1 == len(smoothings)
             if over:
                 reason, solution = exact_best(self._evaluator, self._rate, self._start, self._stages, z, reason)
             total = self._evaluator.counter.counts, self._trace.seconds

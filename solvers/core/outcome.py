@@ -24,6 +24,11 @@ class Status(Enum):
     FAILED = "failed"
     INTERRUPTED = "interrupted"
 
+    @property
+    def fatal(self) -> bool:
+        """Whether it ends the solve in whatever stage: numbers that are not finite may be so at one smoothing only."""
+        return self in (Status.NOT_APPLICABLE, Status.FAILED)
+
 
 @dataclass(frozen=True)
 class StopReason:

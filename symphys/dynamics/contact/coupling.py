@@ -11,7 +11,7 @@ import numpy as np
 from symphys.dynamics.motion import inertia_matrix
 from symphys.maths.smoothing import length
 from symphys.model.scalar import is_zero
-from symphys.model.world import Body, Pair, World
+from symphys.model.world import Body, Law, Pair, World
 
 Expr = Any
 """casadi SX, MX or DM"""
@@ -37,18 +37,18 @@ class Coupling:
     sliding_mass: Expr
 
 
-def coupling_of(mobility: Expr, n: Expr, friction: Expr, softness: Expr) -> Coupling:
+def coupling_of(mobility: Expr, n: Expr, law: Law, softness: Expr) -> Coupling:
     """The coupling of a contact with normal n (3,)."""
     w = mobility + softness * ca.mtimes(n, n.T)
     along = ca.mtimes(w, n)
     across = along - n * ca.dot(n, along)
-    return Coupling(w, ca.inv_minor(w), 1 / (ca.dot(n, along) + friction * length(across)))
+    return Coupling(w, ca.inv_minor(w), 1 / (ca.dot(n, along) + law.friction * length(across)))
 
 
-def pulls_together(mobility: Expr, n: Expr, friction: Expr, slip: Expr) -> Expr:
+def pulls_together(mobility: Expr, n: Expr, law: Law, slip: Expr) -> Expr:
     """1 if an impulse on the edge of the cone, against the ``slip`` (3,), brings the surfaces together (Painleve)."""
     across = _across(slip, n)
-    return ca.dot(n, ca.mtimes(mobility, n - friction * across / length(across))) <= 0
+    return ca.dot(n, ca.mtimes(mobility, n - law.friction * across / length(across))) <= 0
 
 
 def _across(a: Expr, n: Expr) -> Expr:

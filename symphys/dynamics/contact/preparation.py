@@ -111,8 +111,8 @@ def prepare(
         width=width_of(settings, contact),
         smoothing=smoothing,
         same=same,
-        coupling=coupling_of(push, frame.normal, law.friction, softness) if coupled else None,
-        paradox=pulls_together(push, frame.normal, law.friction, slip) if coupled else ca.SX(0),
+        coupling=coupling_of(push, frame.normal, law, softness) if coupled else None,
+        paradox=pulls_together(push, frame.normal, law, slip) if coupled else ca.SX(0),
     )
 
 

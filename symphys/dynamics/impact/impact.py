@@ -185,7 +185,7 @@ def _constraint(
         width=struck * width_of(settings, contact),
         smoothing=settings.smoothing,
         same=same,
-        coupling=coupling_of(push, frame.normal, law.friction, ca.SX(0)) if coupled else None,
+        coupling=coupling_of(push, frame.normal, law, ca.SX(0)) if coupled else None,
     )
 
 
