@@ -19,7 +19,7 @@ from symphys.json_values import Array, Text
 from symphys.results.trace import renamed
 
 FORMAT = 1
-JUDGED_LATE = {"verdict", "doubts"}
+ADDED_LATER = {"verdict", "doubts"}
 """Fields that older files do not have."""
 REACHED = frozenset(
     (
@@ -168,7 +168,8 @@ class Result:
     """One solve, judged by the exact rollout at smoothing 0; nan or empty is what is not known.
 
     Two are equal if their files are. A number whose field has a ``label`` is shown under it at the top of the page,
-    rounded to so many ``decimals`` if the field says so; a new one needs nothing else but to be filled in.
+    rounded to so many ``decimals`` if the field says so; a new one is named in
+    ``ADDED_LATER``, so that older files can be read, and filled in by ``runs.record``; nothing else.
 
     Attributes:
         problem, title: the file's stem and its title.
@@ -314,7 +315,7 @@ def read_result(path: Path) -> Result:
         if not isinstance(value, Mapping) or value.get("format") != FORMAT:
             raise files.FileError(f"not a result of format {FORMAT}")
         known = {each.name for each in dataclasses.fields(Result)} - {"absent"}
-        if missing := known - JUDGED_LATE - value.keys():
+        if missing := known - ADDED_LATER - value.keys():
             raise files.FileError(f"a result without {', '.join(sorted(missing))}")
     except files.FileError as error:
         raise files.FileError(f"{path}: {error}") from error
