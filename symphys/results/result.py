@@ -168,8 +168,8 @@ class Result:
     """One solve, judged by the exact rollout at smoothing 0; nan or empty is what is not known.
 
     Two are equal if their files are. A number whose field has a ``label`` is shown under it at the top of the page,
-    rounded to so many ``decimals`` if the field says so; a new one is named in
-    ``ADDED_LATER``, so that older files can be read, and filled in by ``runs.record``; nothing else.
+    rounded to so many ``decimals`` if the field says so; a new one is named in ``ADDED_LATER``, so that
+    older files can be read, and filled in by ``runs.record``.
 
     Attributes:
         problem, title: the file's stem and its title.

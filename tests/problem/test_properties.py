@@ -143,7 +143,7 @@ def test_any_bytes(path: Path, content: bytes) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=300, deadline=None)
 @given(data=st.data())
 def test_a_valid_file_with_any_value_anywhere(path: Path, valid: str, data: st.DataObject) -> None:
     document = copy.deepcopy(tomllib.loads(data.draw(st.sampled_from([valid, SHAPES]))))
@@ -152,7 +152,7 @@ def test_a_valid_file_with_any_value_anywhere(path: Path, valid: str, data: st.D
     load(path, "\n".join(f"{key} = {write(value)}" for key, value in document.items()))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(data=st.data())
 def test_a_valid_robot_with_any_value_anywhere(path: Path, data: st.DataObject) -> None:
     """In the robot file, in the problem, or in a setting."""
@@ -170,7 +170,7 @@ def test_a_valid_robot_with_any_value_anywhere(path: Path, data: st.DataObject) 
         load_problem(path.parent / "main.toml", changed).world()
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=200, deadline=None)
 @given(data=st.data())
 def test_a_valid_file_with_text_spliced_in(path: Path, valid: str, data: st.DataObject) -> None:
     start = data.draw(st.integers(0, len(valid)))
@@ -178,7 +178,7 @@ def test_a_valid_file_with_text_spliced_in(path: Path, valid: str, data: st.Data
     load(path, valid[:start] + data.draw(st.text(max_size=10)) + valid[stop:])
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=200, deadline=None)
 @given(
     key=st.lists(st.sampled_from([*KEYS, "ball", "0", "gradient", "throw", "dt"]) | st.text(max_size=3), max_size=5),
     value=VALUES,

@@ -79,8 +79,8 @@ def test_gradients_end_at_the_termination(ball: Transcription) -> None:
 
 def test_discounted_adjoints_end_at_the_termination(ball: Transcription) -> None:
     """The target at the end pulls no longer, since the motion was over."""
-    fading = rollout_program(ball.rollout).discounted
-    assert fading is not None and fading.kept is not None
+    discounted = rollout_program(ball.rollout).discounted
+    assert discounted is not None and discounted.kept is not None
     kernel = getattr(ball.shooting.evaluator, "kernel", None)
     if kernel is None:
         pytest.skip("kernels need a compiler")

@@ -85,7 +85,7 @@ number = st.floats(-1, 1)
 vector = st.tuples(number, number, number)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(vector, vector, vector, vector, st.sampled_from(sorted(LAWS)), st.sampled_from(SMOOTHINGS), st.booleans())
 def test_random_scenes_are_finite(a, b, va, wa, law, smoothing, snap):
     """Touching, overlapping, aligned, moving: value and slope of five steps."""
