@@ -82,6 +82,8 @@ def exact_best(
     advice = OVERTAKEN.format(_name(stages, chosen.z))
     if chosen.met and problem.stop_when_met:
         return StopReason(Status.MET, advice), chosen.z
+    if reason.whole:
+        return reason, chosen.z
     gained = reason.status in (Status.MET, Status.CONVERGED)
     return StopReason(Status.STALLED if gained else reason.status, advice), chosen.z
 

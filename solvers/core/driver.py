@@ -1,7 +1,7 @@
 """The driver of a solve: it runs the stages and the loop of a method, records iterations, keeps the checkpoint.
 
-A method has ``init``, ``step`` and ``terminate``, see ``interface.Method``. Interruption and going on, the errors of
-foreign code, the trace and continuation are here, the same for all.
+A method has ``init``, ``step`` and ``terminate``, see ``interface.Method``. Interruption and going on, limits of the
+solve, the errors of foreign code, the trace and continuation are here, the same for all.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from symphys.solvers.core.checkpoint import Checkpoint, from_plain, to_plain
 from symphys.solvers.core.continuation import Rate, exact_best, stage_result
 from symphys.solvers.core.evaluator import CountingEvaluator, WorkCounter
 from symphys.solvers.core.interface import Iteration, IterationRecorder, Log, Method, Solver, StageContext, nothing
+from symphys.solvers.core.options import SolverOptions
 from symphys.solvers.core.outcome import Array, Counts, Monitor, Outcome, StageResult, Status, StopReason
 from symphys.solvers.core.point import Incumbent, Stop
 from symphys.solvers.core.trace import SolveTrace, counts_of
@@ -25,7 +26,7 @@ FINISHED: dict[str, object] = {}
 """The state of a stage that has nothing left to do."""
 INTERRUPTED = "interrupted; with its checkpoint the solve goes on from here"
 
-O_inv = TypeVar("O_inv")
+O_inv = TypeVar("O_inv", bound=SolverOptions)
 StateT = TypeVar("StateT")
 Stage = Callable[[StageContext, O_inv, "dict[str, object] | None", IterationRecorder], StopReason]
 """Runs one stage from its start, or from the saved state of a method where a solve goes on."""
@@ -66,6 +67,9 @@ def iterate(method: Method[StateT], saved: dict[str, object] | None, recorder: I
         reason = method.terminate(state)
         if reason is not None:
             return reason
+        spent = recorder.spent()
+        if spent is not None:
+            return method.conclude(state, spent)
         following = method.step(state)
         if isinstance(following, StopReason):
             return following
@@ -115,7 +119,7 @@ def make_solver(
                 return StopReason(Status.NOT_APPLICABLE, refused)
             return stage(context, options, saved, recorder)
 
-        request = Request(name, problem, start, seed, monitor, checkpoint, log or silent, constraints)
+        request = Request(name, problem, start, options, seed, monitor, checkpoint, log or silent, constraints)
         return Driver(request, run_stage, rate(options, seed)).run()
 
     return Solver(name, summary, Options, solve, prepare, threaded, scenarios)
@@ -123,17 +127,19 @@ def make_solver(
 
 @dataclass(frozen=True)
 class Request:
-    """What a solver was called with, see ``interface.Solve``, its own options aside.
+    """What a solver was called with, see ``interface.Solve``.
 
     Attributes:
         solver: its name.
         problem, start, seed, monitor, checkpoint, log: of the call.
+        options: of the call; of these the driver knows the limits.
         constraints: see ``make_solver``.
     """
 
     solver: str
     problem: ShootingProblem
     start: Array
+    options: SolverOptions
     seed: int
     monitor: Monitor | None
     checkpoint: dict[str, object] | None
@@ -192,6 +198,12 @@ class Driver:
         if self._request.monitor:
             self._request.monitor(row)
 
+    def spent(self) -> StopReason | None:
+        """See ``IterationRecorder``."""
+        row = self._trace.last
+        reason = self._request.options.spent(row) if row else None
+        return reason and replace(reason, whole=True)
+
     def distribute(self, work: Counts, first: int) -> None:
         """See ``IterationRecorder``."""
         self._trace.distribute(work, first)
@@ -217,7 +229,7 @@ class Driver:
             reason = StopReason(Status.MET) if saved == FINISHED else self._run_stage(z, saved)
             status, best = reason.status, self._evaluator.incumbent.best
             z, saved = (best.z if best else z), None
-            solution, over = z, status.fatal or index + 1 == len(smoothings)
+            solution, over = z, reason.whole or status.fatal or index + 1 == len(smoothings)
             if over:
                 reason, solution = exact_best(self._evaluator, self._rate, self._start, self._stages, z, reason)
             total = self._evaluator.counter.counts, self._trace.seconds

@@ -59,7 +59,8 @@ class Method(Protocol[StateT]):
 
     As in optimistix a method has no loop and stores no progress: all of it is in the state. An evaluation ends the
     stage by itself once a point meets everything, see ``Stop``. The budget of a method is an option of it, so
-    ``terminate`` compares the state with it, and its advice names the option.
+    ``terminate`` compares the state with it, and its advice names the option. Limits of the whole solve are in
+    ``SolverOptions``, and the driver compares with them.
     """
 
     def init(self) -> Iteration[StateT] | StopReason:
@@ -74,6 +75,10 @@ class Method(Protocol[StateT]):
         """Why to end here: a stationary point, a budget that is used up, no progress. None: make another step."""
         ...
 
+    def conclude(self, state: StateT, reason: StopReason) -> StopReason:
+        """Do what is left to do where a limit of the solve ends it; the reason, perhaps with other advice."""
+        return reason
+
     def resume(self, saved: dict[str, Any]) -> StateT:
         """The state from the plain values of a checkpoint; SymphysError if they do not fit."""
         ...
@@ -84,6 +89,10 @@ class IterationRecorder(Protocol):
 
     def commit(self, iteration: Iteration[Any]) -> None:
         """End an iteration: a row of the trace, a checkpoint, then the monitor, which may raise KeyboardInterrupt."""
+        ...
+
+    def spent(self) -> StopReason | None:
+        """Why a limit of the solve ends it after the last row, see ``SolverOptions``; None: it goes on."""
         ...
 
     def distribute(self, work: Counts, first: int) -> None:
@@ -137,7 +146,8 @@ class Solver(Generic[O_inv]):
     Attributes:
         name: as in ``--solver`` and ``[solver.NAME]``.
         summary: one line for people.
-        Options: frozen dataclass of plain values, each with a default; ValueError where a value cannot be.
+        Options: frozen dataclass of plain values, each with a default; ValueError where a value cannot be. Those of
+            a solver that the driver runs are ``SolverOptions``.
         solve: see ``Solve``.
         prepare: loads what ``solve`` needs, such as a library, so that who times solves can leave it out; ``solve``
             works without, and a second call costs nothing.

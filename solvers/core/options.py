@@ -1,13 +1,42 @@
-"""What the options of all solvers share: checks, and names as they are recorded."""
+"""What the options of all solvers share: limits of a solve, checks, and names as they are recorded."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
-from dataclasses import asdict, fields
+from dataclasses import asdict, dataclass, fields
 from difflib import get_close_matches
-from typing import Any
+from typing import Any, ClassVar
 
 from symphys.errors import SymphysError
+from symphys.solvers.core.outcome import Status, StopReason, TraceRow
+
+TIME = "the time is used up: raise `max_seconds`"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolverOptions:
+    """Options of every solver: limits of a whole solve, by whatever method and in whatever stage of smoothing.
+
+    A limit is a field, with its line in the attributes, its check in ``__post_init__`` and its end in ``spent``. The
+    driver asks it after each iteration. Nothing else depends on which limits there are.
+
+    Attributes:
+        max_seconds: [s] that a solve may take, sessions before a break included; the iteration that reaches it is the
+            last. inf: no limit.
+    """
+
+    __pydantic_config__: ClassVar[dict[str, object]] = {"extra": "forbid"}
+
+    max_seconds: float = math.inf
+
+    def __post_init__(self) -> None:
+        """ValueError that names the option and what would be valid."""
+        require(self.max_seconds > 0, "max_seconds", "above 0")
+
+    def spent(self, row: TraceRow) -> StopReason | None:
+        """Why the solve ends after the iteration of this row; None: it goes on."""
+        return StopReason(Status.BUDGET, TIME) if row.seconds >= self.max_seconds else None
 
 
 def require(holds: bool, name: str, valid: str) -> None:
@@ -36,7 +65,9 @@ def refuse(solver: str, name: str, reason: str) -> SymphysError:
 def recorded_options(options: Any) -> dict[str, object]:
     """Options as plain values; one that was renamed (metadata "was" of its field) by its first name.
 
-    So the key of a run, which is made from them, stays the same.
+    Limits that are not set are left out. So the key of a run, which is made from all this, stays the same.
     """
     first = {field.name: field.metadata.get("was", field.name) for field in fields(options)}
-    return {first[name]: value for name, value in asdict(options).items()}
+    unset = {limit.name: limit.default for limit in fields(SolverOptions)}
+    values = asdict(options).items()
+    return {first[name]: value for name, value in values if name not in unset or value != unset[name]}

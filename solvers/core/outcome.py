@@ -32,10 +32,16 @@ class Status(Enum):
 
 @dataclass(frozen=True)
 class StopReason:
-    """Why a stage of a solve ended: a status, and one sentence of advice, see ``Outcome``."""
+    """Why a stage of a solve ended.
+
+    Attributes:
+        status, advice: see ``Outcome``.
+        whole: whether the solve ends with the stage, whatever stages are left, as it does with a fatal status.
+    """
 
     status: Status
     advice: str = ""
+    whole: bool = False
 
     def __str__(self) -> str:
         """Return the line of the log."""

@@ -27,6 +27,11 @@ class SolveTrace:
         return tuple(self._rows)
 
     @property
+    def last(self) -> TraceRow | None:
+        """The last row; None before the first."""
+        return self._rows[-1] if self._rows else None
+
+    @property
     def seconds(self) -> float:
         """Since the solve began, breaks left out."""
         return self._earlier + time.perf_counter() - self._began

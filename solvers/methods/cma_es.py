@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -26,8 +26,8 @@ from symphys.solvers.core.checkpoint import damaged
 from symphys.solvers.core.convergence import converged, not_finite
 from symphys.solvers.core.driver import iterating, make_solver
 from symphys.solvers.core.evaluator import CountingEvaluator
-from symphys.solvers.core.interface import Iteration, StageContext
-from symphys.solvers.core.options import at_least, require
+from symphys.solvers.core.interface import Iteration, Method, StageContext
+from symphys.solvers.core.options import SolverOptions, at_least, require
 from symphys.solvers.core.outcome import Array, Status, StopReason
 from symphys.solvers.core.point import best_of
 from symphys.solvers.core.vanishing_gradient import FLAT
@@ -43,7 +43,7 @@ NOT_FINITE = "not one simulation of a generation is finite: lower `sigma` or bou
 
 
 @dataclass(frozen=True)
-class CmaOptions:
+class CmaOptions(SolverOptions):
     """Options of CMA-ES.
 
     Attributes:
@@ -59,8 +59,6 @@ class CmaOptions:
         every: generations between two validations.
     """
 
-    __pydantic_config__: ClassVar[dict[str, object]] = {"extra": "forbid"}
-
     sigma: float = 1.0
     population: int = 0
     evaluations: int = 10_000
@@ -73,6 +71,7 @@ class CmaOptions:
 
     def __post_init__(self) -> None:
         """ValueError that names the option and what would be valid."""
+        super().__post_init__()
         require(0 < self.sigma < math.inf, "sigma", "above 0")
         require(self.population == 0 or self.population > 2, "population", "0 or at least 3")
         at_least(0, evaluations=self.evaluations, validation=self.validation)
@@ -84,7 +83,7 @@ class CmaOptions:
         return ValidationBatch(self.validation, self.validation_width, seed)
 
 
-class CmaEs:
+class CmaEs(Method[CmaState]):
     """The method, see ``interface.Method``; every stage of smoothing draws from the same stream anew.
 
     pycma's strategy cannot be copied. So a state is what it can be replayed from, and the strategy that made the last
@@ -129,14 +128,15 @@ class CmaEs:
         return Iteration(strategy.state(), best, step=strategy.sigma)
 
     def terminate(self, state: CmaState) -> StopReason | None:
-        """Whether the budget is used up or one of pycma's criteria holds; the last mean may be kept then."""
+        """Whether the budget is used up or one of pycma's criteria holds."""
         if self.held:
             return converged(self.evaluator)
-        strategy = self._strategy(state)
-        reason = self._reason(strategy)
-        if reason is None:
-            return None
-        self.candidates.keep(strategy.centre, len(state.merits), due=True)
+        reason = self._reason(self._strategy(state))
+        return None if reason is None else self.conclude(state, reason)
+
+    def conclude(self, state: CmaState, reason: StopReason) -> StopReason:
+        """See ``Method``: the last mean may be kept."""
+        self.candidates.keep(self._strategy(state).centre, len(state.merits), due=True)
         return self.candidates.conclude(reason, state.start)
 
     def resume(self, saved: dict[str, Any]) -> CmaState:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
@@ -37,8 +36,6 @@ class EvolutionOptions(DescentOptions):
     Attributes:
         sigma: how far pairs lie to either side, in units of scale.
     """
-
-    __pydantic_config__: ClassVar[dict[str, object]] = {"extra": "forbid"}
 
     sigma: float = 0.03
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -19,9 +19,9 @@ from symphys.solvers.core.convergence import Progress, not_finite, stationary
 from symphys.solvers.core.directions import DIRECTIONS, DirectionMemory, MomentumWeights, learn_length
 from symphys.solvers.core.driver import iterating, make_solver
 from symphys.solvers.core.evaluator import CountingEvaluator
-from symphys.solvers.core.interface import Iteration, StageContext
+from symphys.solvers.core.interface import Iteration, Method, StageContext
 from symphys.solvers.core.line_search import ROUNDING, backtrack
-from symphys.solvers.core.options import at_least, require
+from symphys.solvers.core.options import SolverOptions, at_least, require
 from symphys.solvers.core.outcome import Array, Status, StopReason
 from symphys.solvers.core.point import Point
 from symphys.solvers.core.vanishing_gradient import REFUSALS, SHORTER, vanished
@@ -46,7 +46,7 @@ NOT_FINITE = "the simulation along the descent direction is not finite: bound th
 
 
 @dataclass(frozen=True)
-class GradientOptions:
+class GradientOptions(SolverOptions):
     """Options of first-order descent.
 
     Attributes:
@@ -65,8 +65,6 @@ class GradientOptions:
             rates; 0 goes on regardless.
     """
 
-    __pydantic_config__: ClassVar[dict[str, object]] = {"extra": "forbid"}
-
     method: Literal["spectral", "gradient", "momentum", "adam"] = "spectral"
     iterations: int = 300
     rates: tuple[float, ...] = ()
@@ -79,6 +77,7 @@ class GradientOptions:
 
     def __post_init__(self) -> None:
         """ValueError that names the option and what would be valid."""
+        super().__post_init__()
         require(self.method in DIRECTIONS, "method", f"one of {', '.join(DIRECTIONS)}")
         at_least(0, iterations=self.iterations, backtracking=self.backtracking)
         at_least(0, tolerance=self.tolerance, patience=self.patience)
@@ -125,7 +124,7 @@ class GradientState:
     progress: Progress
 
 
-class GradientDescent:
+class GradientDescent(Method[GradientState]):
     """The method, see ``interface.Method``. Nothing is drawn: the seed acts through the start alone."""
 
     def __init__(self, context: StageContext, options: GradientOptions) -> None:

@@ -20,7 +20,7 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
@@ -32,7 +32,7 @@ from symphys.solvers.core.convergence import converged, not_finite
 from symphys.solvers.core.driver import make_solver
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Iteration, IterationRecorder, StageContext
-from symphys.solvers.core.options import at_least, require
+from symphys.solvers.core.options import SolverOptions, at_least, require
 from symphys.solvers.core.outcome import Array, Counts, Status, StopReason
 from symphys.solvers.core.point import Point
 from symphys.solvers.methods.ipopt_options import SILENT, check
@@ -78,7 +78,7 @@ GOOD = ("Solve_Succeeded", "Solved_To_Acceptable_Level", "Feasible_Point_Found")
 
 
 @dataclass(frozen=True)
-class IpoptOptions:
+class IpoptOptions(SolverOptions):
     """Options of IPOPT.
 
     Attributes:
@@ -88,8 +88,6 @@ class IpoptOptions:
         options: IPOPT's own, such as {mu_strategy = "adaptive"}, passed on as they are.
     """
 
-    __pydantic_config__: ClassVar[dict[str, object]] = {"extra": "forbid"}
-
     iterations: int = 300
     tolerance: float = 1e-8
     hessian: Literal["limited-memory", "exact"] = "limited-memory"
@@ -97,6 +95,7 @@ class IpoptOptions:
 
     def __post_init__(self) -> None:
         """ValueError that names the option and what would be valid."""
+        super().__post_init__()
         at_least(0, iterations=self.iterations)
         require(0 < self.tolerance < math.inf, "tolerance", "above 0")
         require(self.hessian in ("limited-memory", "exact"), "hessian", "limited-memory or exact")
@@ -126,6 +125,9 @@ def stage(
         if not point.finite:
             return not_finite(point)
         recorder.commit(Iteration(state, point))
+    spent = recorder.spent()
+    if spent is not None:
+        return spent
     watch, first = Watch(evaluator, recorder, state), recorder.rows
     with tempfile.TemporaryDirectory() as folder:
         text = Path(folder) / "ipopt.txt"
@@ -137,6 +139,8 @@ def stage(
     recorder.distribute(work(stats, len(evaluator.problem.constraint_lower) > 0), first)
     if watch.ended:
         raise watch.ended
+    if watch.spent is not None:
+        return watch.spent
     return reason(evaluator, str(stats["return_status"]), np.array(result["x"]).ravel() * evaluator.scale)
 
 
@@ -198,13 +202,14 @@ def worse(solution: Point, best: Point) -> bool:
 
 
 class Watch(ca.Callback):
-    """Records every iterate: one rollout, a row of the trace; ends the solve when all is met or on interruption."""
+    """Records every iterate: one rollout, a row of the trace; ends the solve when all is met, at limits, on Ctrl-C."""
 
     def __init__(self, evaluator: CountingEvaluator, recorder: IterationRecorder, state: IpoptState) -> None:
         """``state``: of the start, which has its row already."""
         ca.Callback.__init__(self)
         self.evaluator, self.recorder, self.state, self.skip = evaluator, recorder, state, True
         self.ended: BaseException | None = None
+        self.spent: StopReason | None = None
         self.construct("watch", {})
 
     def get_n_in(self) -> int:
@@ -230,13 +235,14 @@ class Watch(ca.Callback):
             self.record(self.evaluator.clip(np.array(arguments[0]).ravel() * self.evaluator.scale))
         except (Exception, KeyboardInterrupt) as error:
             self.ended = error
-        return [float(self.ended is not None)]
+        return [float(self.ended is not None or self.spent is not None)]
 
     def record(self, z: Array) -> None:
-        """A row of the trace."""
+        """A row of the trace, after which a limit of the solve may end it."""
         point, before = self.evaluator.value(z), self.state
         self.state = IpoptState(before.iteration + 1, z)
         self.recorder.commit(Iteration(self.state, point, step=float(np.linalg.norm(z - before.z))))
+        self.spent = self.recorder.spent()
 
 
 def functions(nlp: Nlp, scale: Array, exact: bool) -> tuple[dict[str, Any], dict[str, Any]]:

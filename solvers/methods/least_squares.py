@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -24,9 +24,9 @@ from symphys.solvers.core.checkpoint import revive
 from symphys.solvers.core.convergence import Progress, not_finite, stationary
 from symphys.solvers.core.driver import iterating, make_solver
 from symphys.solvers.core.evaluator import CountingEvaluator
-from symphys.solvers.core.interface import Iteration, StageContext
+from symphys.solvers.core.interface import Iteration, Method, StageContext
 from symphys.solvers.core.line_search import ROUNDING
-from symphys.solvers.core.options import at_least, require
+from symphys.solvers.core.options import SolverOptions, at_least, require
 from symphys.solvers.core.outcome import Array, Status, StopReason
 from symphys.solvers.core.point import Point
 from symphys.solvers.core.vanishing_gradient import REFUSALS, vanished
@@ -51,7 +51,7 @@ NOT_FINITE = "the simulations around the best point are not finite: bound the va
 
 
 @dataclass(frozen=True)
-class LeastSquaresOptions:
+class LeastSquaresOptions(SolverOptions):
     """Options of Levenberg-Marquardt.
 
     Attributes:
@@ -62,8 +62,6 @@ class LeastSquaresOptions:
         patience: stalled where the merit has not fallen by 1e-5 of itself in so many iterations; 0 goes on regardless.
     """
 
-    __pydantic_config__: ClassVar[dict[str, object]] = {"extra": "forbid"}
-
     iterations: int = 100
     damping: float = 1e-3
     tolerance: float = 1e-8
@@ -71,6 +69,7 @@ class LeastSquaresOptions:
 
     def __post_init__(self) -> None:
         """ValueError that names the option and what would be valid."""
+        super().__post_init__()
         at_least(0, iterations=self.iterations, tolerance=self.tolerance, patience=self.patience)
         require(0 < self.damping < math.inf, "damping", "above 0")
 
@@ -109,7 +108,7 @@ class LeastSquaresState:
         return 2 * self.jacobian.T @ self.residuals
 
 
-class LevenbergMarquardt:
+class LevenbergMarquardt(Method[LeastSquaresState]):
     """The method, see ``interface.Method``. Nothing is drawn: the seed acts through the start alone."""
 
     def __init__(self, context: StageContext, options: LeastSquaresOptions) -> None:

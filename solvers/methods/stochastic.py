@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import ClassVar
 
 import numpy as np
 
@@ -48,8 +47,6 @@ class StochasticOptions(DescentOptions):
         evolution: share of the direction that comes from values alone.
         sigma: its spread, in units of scale.
     """
-
-    __pydantic_config__: ClassVar[dict[str, object]] = {"extra": "forbid"}
 
     clip: float = 1.0
     adjoint_discount: float = field(default=2.0, metadata={"was": "forget"})

@@ -5,7 +5,7 @@ Draws of an iteration depend on the seed and its number alone. The gradient esti
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
@@ -15,8 +15,8 @@ import numpy as np
 from symphys.shooting import ScenarioSamples, ShootingProblem
 from symphys.solvers.core.checkpoint import revive
 from symphys.solvers.core.directions import DirectionMemory, MomentumWeights, adam
-from symphys.solvers.core.interface import Iteration, StageContext
-from symphys.solvers.core.options import at_least, require
+from symphys.solvers.core.interface import Iteration, Method, StageContext
+from symphys.solvers.core.options import SolverOptions, at_least, require
 from symphys.solvers.core.outcome import Array, Status, StopReason
 from symphys.solvers.core.point import Point
 from symphys.solvers.randomized.validation import SAMPLES, Validation, ValidationBatch
@@ -30,7 +30,7 @@ LASTING = "share of the batch that lasts"
 
 
 @dataclass(frozen=True)
-class DescentOptions:
+class DescentOptions(SolverOptions):
     """Options that all descents over samples share.
 
     Attributes:
@@ -61,6 +61,7 @@ class DescentOptions:
 
     def __post_init__(self) -> None:
         """ValueError that names the option and what would be valid."""
+        super().__post_init__()
         at_least(0, iterations=self.iterations, validation=self.validation)
         at_least(1, samples=self.samples, every=self.every)
         at_least(0, width=self.width, validation_width=self.validation_width)
@@ -123,7 +124,7 @@ class GradientEstimate:
 OptionsT = TypeVar("OptionsT", bound=DescentOptions)
 
 
-class Descent(ABC, Generic[OptionsT]):
+class Descent(Method[DescentState], Generic[OptionsT]):
     """The method but for its gradient estimate, see ``interface.Method``.
 
     Attributes:
@@ -167,7 +168,13 @@ class Descent(ABC, Generic[OptionsT]):
         """After the last iteration."""
         if state.iteration < self.options.iterations:
             return None
-        return self.validation.conclude(StopReason(Status.BUDGET, DONE), self.start)
+        return self.conclude(state, StopReason(Status.BUDGET, DONE))
+
+    def conclude(self, state: DescentState, reason: StopReason) -> StopReason:
+        """See ``Method``: the last point may be kept, and so it is validated, unless it was."""
+        if state.iteration and not self.options.validates(state.iteration):
+            self.validation.keep(state.z)
+        return self.validation.conclude(reason, self.start)
 
     def resume(self, saved: dict[str, Any]) -> DescentState:
         """See ``Method``."""

@@ -67,9 +67,9 @@ class Validation:
             incumbent.replace(point)
 
     def conclude(self, reason: StopReason, start: Array) -> StopReason:
-        """Why a stage ended, or that its start (n,) is kept."""
+        """Why a stage ended, or that its start (n,) is kept, unless a limit of the solve came in between."""
         best = self.evaluator.incumbent.best
-        if best is None or not np.array_equal(best.z, start):
+        if reason.whole or best is None or not np.array_equal(best.z, start):
             return reason
         return StopReason(Status.STALLED if reason.status is Status.CONVERGED else reason.status, NO_BETTER)
 

@@ -211,6 +211,33 @@ def test_a_checkpoint_of_another_configuration_is_not_used(make_job: MakeJob) ->
     assert seen == [0, 1, 2, 3, 4]
 
 
+def throw(problem_file: Path, out: Path, **options: object) -> Job:
+    """A job of gradient descent."""
+    settings: dict[str, object] = {f"solver.gradient.{key}": value for key, value in options.items()}
+    return make_jobs([load_problem(problem_file, settings)], ["gradient"], [0], settings, out)[0]
+
+
+def test_a_run_whose_time_is_up_is_over(problem_file: Path, tmp_path: Path) -> None:
+    """As one whose iterations are used up: it is not done again, and one with more time begins afresh."""
+    job = throw(problem_file, tmp_path / "out", max_seconds=1e-9)
+    first = run(job)
+    assert (first.status, first.verdict, first.iterations) == ("budget", "not_solved", 0)
+    assert first.advice == "the time is used up: raise `max_seconds`"
+    assert not (job.folder.path / "checkpoint.json").exists()
+    assert "max_seconds" in (job.folder.path / "log.txt").read_text(encoding="utf-8")
+    assert run(job, interrupt_at(0)) == first
+    assert run(throw(problem_file, tmp_path / "out", max_seconds=1000)).solved
+
+
+def test_an_interrupted_run_with_a_time_goes_on(problem_file: Path, tmp_path: Path) -> None:
+    job = throw(problem_file, tmp_path / "out", max_seconds=1000)
+    stopped = run(job, interrupt_at(1))
+    assert (stopped.status, stopped.iterations) == ("interrupted", 1)
+    seen: list[int] = []
+    assert run(job, lambda row: seen.append(row.iteration)).solved
+    assert seen[0] == 2
+
+
 def test_an_expected_failure_is_a_result_with_the_message(make_job: MakeJob) -> None:
     job = make_job(does="refuse")
     result = run(job)

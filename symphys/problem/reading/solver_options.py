@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import MISSING, Field, fields
+from dataclasses import MISSING, Field, fields, is_dataclass
+from inspect import cleandoc
 from math import isnan
 from typing import Any, TypeVar, get_type_hints
 
@@ -95,7 +96,12 @@ def options_model(cls: type[Any]) -> type[BaseModel]:
             schema["properties"][old] = {**schema["properties"][name], "deprecated": True}
 
     config = ConfigDict(extra="forbid", strict=True, json_schema_extra=add_old_names)
-    return create_model(cls.__name__, __config__=config, __doc__=cls.__doc__, **entries)
+    return create_model(cls.__name__, __config__=config, __doc__=documentation(cls), **entries)
+
+
+def documentation(cls: type[Any]) -> str:
+    """What a dataclass says of its options, then what those say from which it has some."""
+    return "\n\n".join(cleandoc(each.__doc__ or "") for each in cls.__mro__ if is_dataclass(each))
 
 
 def default(field: Field[Any]) -> Any:

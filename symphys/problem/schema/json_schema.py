@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import isinf
 from typing import Any
 
 from pydantic import BaseModel
@@ -32,21 +33,26 @@ def json_schema(solvers: Mapping[str, type[Any]] | None = None) -> dict[str, Any
             "properties": {name: references[model, "validation"] for name, model in models.items()},
             "additionalProperties": False,
         }
-    result: dict[str, Any] = without_null({"$schema": DIALECT, **document, "$defs": shared})
+    result: dict[str, Any] = plain({"$schema": DIALECT, **document, "$defs": shared})
     result["title"] = "symphys problem"
     return result
 
 
-def without_null(node: Any) -> Any:
-    """The schema without null, which TOML does not have."""
+def plain(node: Any) -> Any:
+    """The schema without null, which TOML does not have, and without infinite defaults, which JSON cannot write."""
     if isinstance(node, list):
-        return [without_null(item) for item in node]
+        return [plain(item) for item in node]
     if not isinstance(node, dict):
         return node
-    kept = {key: without_null(value) for key, value in node.items() if value is not None}
+    kept = {key: plain(value) for key, value in node.items() if value is not None and not infinite(value)}
     choices = kept.get("anyOf")
     if not isinstance(choices, list) or {"type": "null"} not in choices:
         return kept
     remaining = [choice for choice in choices if choice != {"type": "null"}]
     del kept["anyOf"]
     return {**remaining[0], **kept} if len(remaining) == 1 else {"anyOf": remaining, **kept}
+
+
+def infinite(value: Any) -> bool:
+    """Whether a value is an infinite number."""
+    return isinstance(value, float) and isinf(value)
