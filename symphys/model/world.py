@@ -8,7 +8,8 @@ SI units; vectors are in world coordinates unless a field says "body frame".
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from math import inf, prod
 from typing import Any
 
 from symphys.model.joints import Joint
@@ -50,6 +51,10 @@ class Body:
 class Law:
     """How two surfaces act on each other.
 
+    Problem files are read by these fields. A new one needs its key in ``ContactTable`` and ``PairTable``, in
+    ``SurfaceTable`` where surfaces state it. Its metadata say whether they do, by ``combine``, which makes one of the
+    numbers of two surfaces, and whether variables may set it, by ``physical``, the least and the largest value.
+
     Attributes:
         friction: Coulomb's coefficient mu; |tangential impulse| <= mu * normal impulse, on the exact disc.
         restitution: Newton's e in [0, 1].
@@ -59,10 +64,10 @@ class Law:
         damping: damping ratio of a soft contact.
     """
 
-    friction: Scalar = 0.5
-    restitution: Scalar = 0.0
-    torsion: Scalar = 0.0
-    rolling: Scalar = 0.0
+    friction: Scalar = field(default=0.5, metadata={"combine": prod, "physical": (0.0, inf)})
+    restitution: Scalar = field(default=0.0, metadata={"combine": prod, "physical": (0.0, 1.0)})
+    torsion: Scalar = field(default=0.0, metadata={"combine": sum})
+    rolling: Scalar = field(default=0.0, metadata={"combine": sum})
     frequency: Scalar = 0.0
     damping: Scalar = 1.0
 

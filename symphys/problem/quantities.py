@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from symphys.problem.feedback import Controller
 from symphys.problem.model import Kind, VariableSlot
+from symphys.problem.parametric.parts import VARIABLE
 from symphys.suggest import hint, quote
 
 Array = NDArray[np.float64]
@@ -22,8 +23,7 @@ LIMITS: dict[str, tuple[float, float]] = {
     "radius": (0.0, inf),
     "size": (0.0, inf),
     "length": (0.0, inf),
-    "friction": (0.0, inf),
-    "restitution": (0.0, 1.0),
+    **VARIABLE,
 }
 """What is physical; masses and sizes must exceed their limit."""
 ACTING = ("gain", "torque", "velocity", "range", "stiffness", "damping")
@@ -88,10 +88,10 @@ def unknown(name: str, known: Mapping[str, Quantity]) -> str:
     """The nearest quantities; for a coefficient that no table states, how to state it."""
     owner, _, key = name.rpartition(".")
     owners = dict.fromkeys(other.rpartition(".")[0] for other in known)
-    if key in ("friction", "restitution") and owner in owners:
+    if key in VARIABLE and owner in owners:
         return f"{owner} states no {key}: give it a value there first, so that this variable has something to change"
     same_owner = [other for other in known if owner and other.startswith(f"{owner}.")]
-    stated = f"; what states no {key} has none to vary" if key in ("friction", "restitution") else ""
+    stated = f"; what states no {key} has none to vary" if key in VARIABLE else ""
     return hint(name, same_owner or known) + stated
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields
 
 import casadi as ca
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from symphys.errors import ProblemError
 from symphys.model.world import Law
 from symphys.problem import Problem
+from symphys.problem.schema.physics import ContactTable, PairTable, SurfaceTable
 
 Load = Callable[..., Problem]
 Refused = Callable[..., ProblemError]
@@ -60,6 +62,26 @@ def test_a_pair_table_overrides(load: Load) -> None:
     problem = load(("[ground]", text))
     assert laws(problem)["ball-ground"] == Law(friction=0.1, restitution=0.5)
     assert problem.parameters["ground-ball.friction"] == 0.1
+
+
+def test_tables_have_the_coefficients_that_a_law_declares() -> None:
+    """With its defaults; those of surfaces are those that combine."""
+    law = {each.name: each for each in fields(Law)}
+    given = ContactTable().model_dump(exclude_none=True)
+    assert set(ContactTable.model_fields) == set(law)
+    assert given == {name: law[name].default for name in given}
+    assert set(SurfaceTable.model_fields) == {name for name, each in law.items() if "combine" in each.metadata}
+    assert set(PairTable.model_fields) == {*law, "between", "collide"}
+
+
+@pytest.mark.parametrize("name", [each.name for each in fields(Law)])
+def test_each_coefficient_of_a_pair_reaches_its_law(load: Load, name: str) -> None:
+    """And is a parameter where a variable may set it."""
+    stated = {"restitution": 0.0, "frequency": 0.0 if name == "restitution" else 5.0} | {name: 0.25}
+    text = "\n".join(f"{key} = {value}" for key, value in stated.items())
+    problem = load(("[ground]", f'[[pair]]\nbetween = ["ball", "ground"]\n{text}\n[ground]'))
+    assert getattr(laws(problem)["ball-ground"], name) == stated[name]
+    assert ("ball-ground." + name in problem.parameters) == (name in ("friction", "restitution"))
 
 
 def test_soft_pairs(load: Load) -> None:

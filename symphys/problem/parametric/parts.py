@@ -3,27 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from math import prod
 from typing import Any, ClassVar
 
 from symphys.model.shapes import Scalar, Shape, Sphere, Static, Surface
-from symphys.model.world import Body
+from symphys.model.world import Body, Law
 from symphys.problem.checks.inertia import Tensor, simplest, specific
 
 Numbers = float | tuple[float, ...]
 Value = Callable[[str], Any]
 """A parameter's value by name: a scalar, or a tuple of them."""
 
+LAW = {each.name: each.metadata for each in fields(Law)}
+"""The coefficients of a contact law, all of which a [[pair]] table may state."""
 COMBINE: dict[str, Callable[[list[Scalar]], Scalar]] = {
-    "friction": prod,
-    "restitution": prod,
-    "torsion": sum,
-    "rolling": sum,
+    name: about["combine"] for name, about in LAW.items() if "combine" in about
 }
-VARIABLE = ("friction", "restitution")
-"""The coefficients that are parameters where stated."""
+"""Those that surfaces state."""
+VARIABLE: dict[str, tuple[float, float]] = {
+    name: about["physical"] for name, about in LAW.items() if "physical" in about
+}
+"""Those that are parameters where stated, with the least and the largest value that is physical."""
 
 
 def stated(states: Mapping[str, float]) -> dict[str, Numbers]:
@@ -135,7 +136,7 @@ Part = ParametricBody | ParametricStatic
 
 @dataclass(frozen=True)
 class PairRule:
-    """What a [[pair]] table states between two surfaces or groups; ``states`` may hold frequency and damping too.
+    """What a [[pair]] table states between two surfaces or groups; ``states`` holds any coefficients of a law.
 
     ``between`` has one name where a group meets itself.
     """

@@ -19,7 +19,16 @@ from symphys.model.shapes import Scalar, Static
 from symphys.model.world import Body, Law, Pair, Side, World, points_of
 from symphys.problem.parametric.collision_filter import CollisionFilter
 from symphys.problem.parametric.joints import ParametricJoint
-from symphys.problem.parametric.parts import COMBINE, VARIABLE, PairRule, ParametricBody, ParametricStatic, Part, Value
+from symphys.problem.parametric.parts import (
+    COMBINE,
+    LAW,
+    VARIABLE,
+    PairRule,
+    ParametricBody,
+    ParametricStatic,
+    Part,
+    Value,
+)
 
 Array = NDArray[np.float64]
 
@@ -131,17 +140,16 @@ class ParametricWorld:
         return {frozenset(pair.between): pair for pair in self.pairs}
 
     def law(self, a: str, b: str, value: Value) -> Law:
-        """The contact law of the two by the rule above; friction and restitution with their parameters' values."""
+        """The contact law of the two by the rule above, with the values of what is a parameter."""
         pair = self.pair(a, b)
         own = pair.states if pair else {}
         states = {name: self._named[name].states for name in (a, b)}
         found: dict[str, Scalar] = {}
-        for key, combine in COMBINE.items():
+        for key in LAW:
             if pair and key in own:
                 found[key] = value(f"{pair.name}.{key}") if key in VARIABLE else own[key]
                 continue
             sides = [value(f"{x}.{key}") if key in VARIABLE else states[x][key] for x in (a, b) if key in states[x]]
             if sides:
-                found[key] = combine(sides)
-        found |= {key: own[key] for key in ("frequency", "damping") if key in own}
+                found[key] = COMBINE[key](sides)
         return replace(self.contact, **found)

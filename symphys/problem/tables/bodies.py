@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import hypot
 
 import numpy as np
@@ -91,9 +91,9 @@ def read_state(table: BodyTable, index: int, faults: Faults) -> dict[str, Array]
     return {f"{table.name}.{key}": value for key, value in given.items()}
 
 
-def states(table: SurfaceTable) -> dict[str, float]:
-    """The coefficients that a table states."""
-    given = {key: getattr(table, key) for key in COMBINE}
+def states(table: SurfaceTable, keys: Iterable[str] = COMBINE) -> dict[str, float]:
+    """The coefficients that a table states, among those that its kind of table has."""
+    given = {key: getattr(table, key) for key in keys}
     return {key: value for key, value in given.items() if value is not None}
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from symphys.model.world import Law
 from symphys.problem.model import Variable
-from symphys.problem.parametric.parts import PairRule, ParametricBody
+from symphys.problem.parametric.parts import LAW, PairRule, ParametricBody
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema import Document
@@ -17,8 +17,7 @@ from symphys.suggest import hint, quote
 
 def read_contact(table: ContactTable) -> Law:
     """The law where nothing else is stated."""
-    given = table.model_dump(exclude={"damping"})
-    return Law(**given) if table.damping is None else Law(**given, damping=table.damping)
+    return Law(**table.model_dump(exclude_none=True))
 
 
 def read_pairs(
@@ -40,9 +39,7 @@ def read_pairs(
         if first.setdefault(between, index) != index:
             other = faults.elsewhere(place, ("pair", first[between]))
             faults.add((*place, "between"), f"{a} and {b} already have a [[pair]] table{other}")
-        own = states(table) | {
-            key: value for key in ("frequency", "damping") if (value := getattr(table, key)) is not None
-        }
+        own = states(table, LAW)
         if own and not table.collide:
             faults.add((*place, "collide"), f"with false, {', '.join(own)} would have no effect; leave one out")
         pairs.append(PairRule(f"{a}-{b}", between, table.collide, own))
