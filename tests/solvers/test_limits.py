@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from toys import PLAIN, counted, rosenbrock, solve, stop_at, through_json, values
-from windy import windy
+from toys import PLAIN, counted, rosenbrock, solve, stop_at, through_json, toy, values
+from windy import BEST, windy
 
 from symphys.errors import ProblemError
 from symphys.problem import json_schema, validate_options
@@ -120,6 +120,18 @@ def test_cma_in_situations_validates_its_last_mean() -> None:
     found = SOLVERS["cma"].solve(windy(), np.array([3.0, 3.0]), SOLVERS["cma"].Options(**options))
     assert spent(found) and len(found.trace) == 7
     assert not np.array_equal(found.z, [3.0, 3.0])
+
+
+@pytest.mark.usefixtures("clock")
+def test_where_the_start_is_kept_the_advice_is_that_of_the_limit() -> None:
+    """There was no time to find better; in situations, and where smoothing leads away from the start."""
+    leaps = SOLVERS["stochastic"].Options(max_seconds=1.5, rate=1.0)
+    found = SOLVERS["stochastic"].solve(windy(), BEST, leaps)
+    assert spent(found) and np.array_equal(found.z, BEST)
+    moved = toy(1, lambda z, s: z - 1 - s, guess=1.0, smoothing=(1.0, 0.0))
+    found = solve("gradient", moved, options={"max_seconds": 1.5})
+    assert found.stages[0].z[0] > 1
+    assert spent(found) and found.z[0] == 1
 
 
 def test_side_by_side() -> None:
