@@ -49,10 +49,10 @@ def mixed() -> tuple[World, dict[str, Any]]:
 
 def placed(rng: np.random.Generator) -> tuple[Any, Any]:
     """A point and an orientation."""
-    return rng.uniform(-0.3, 0.3, 3).tolist(), Rotation.random(rng=rng).as_quat(scalar_first=True).tolist()
+    return tuple(rng.uniform(-0.3, 0.3, 3)), tuple(Rotation.random(rng=rng).as_quat(scalar_first=True))
 
 
 def tensor(rng: np.random.Generator) -> Any:
     """A moment of inertia that is not along the body's axes."""
     turn = Rotation.random(rng=rng).as_matrix()
-    return ((turn * rng.uniform(0.03, 0.05, 3)) @ turn.T).tolist()
+    return tuple(map(tuple, (turn * rng.uniform(0.03, 0.05, 3)) @ turn.T))

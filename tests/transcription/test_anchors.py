@@ -17,7 +17,7 @@ LEG = """
 [simulation]
 duration = 0.4
 dt = 0.01
-sweeps = 40
+sweeps = 4
 [ground]
 friction = 0.8
 [[body]]

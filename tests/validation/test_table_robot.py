@@ -13,7 +13,7 @@ from symphys.model.state_layout import Layout
 from symphys.problem import Problem
 from symphys.transcription import Rollout, symbolic_rollout
 from symphys.transcription.program import rollout_program
-from symphys.transcription.simulation import recorder, simulate
+from symphys.transcription.simulation import Record, recorder, simulate
 
 Array = NDArray[np.float64]
 STEPS = 50
@@ -32,6 +32,12 @@ def rollout(problem: Problem) -> Rollout:
 
 
 @pytest.fixture(scope="module")
+def record(problem: Problem, rollout: Rollout) -> Record:
+    """From a point off every symmetry, in casadi's words."""
+    return simulate(rollout, recorder(rollout), point(problem), 0.0)
+
+
+@pytest.fixture(scope="module")
 def kernel(rollout: Rollout) -> Kernel:
     """Compiled."""
     return compile_program(rollout_program(rollout, exact=True), seeded=["merit"], threads=1)
@@ -44,10 +50,10 @@ def point(problem: Problem) -> Array:
     return np.concatenate([weights + 0.05 * rng.standard_normal(weights.size), [0.03, -0.02, 0.01]])
 
 
-def test_sensors(problem: Problem, rollout: Rollout) -> None:
+def test_sensors(problem: Problem, rollout: Rollout, record: Record) -> None:
     """There are 81, and none is constant while the robot moves."""
     assert sum(sensor.size for sensor in problem.sensors) == 81
-    course = simulate(rollout, recorder(rollout), point(problem), 0.0).arrays
+    course = record.arrays
     for sensor in problem.sensors:
         read = rollout.control.sensor(sensor)
         columns = np.array([np.array(read(x, course.p, 0.01 * k)).ravel() for k, x in enumerate(course.x)])
@@ -72,9 +78,9 @@ def test_gradient_by_differences(problem: Problem, kernel: Kernel) -> None:
     assert np.min(found, axis=0).max() < 1e-5 * np.abs(slopes[:16]).max()
 
 
-def test_joints_and_feet(problem: Problem, rollout: Rollout) -> None:
+def test_joints_and_feet(record: Record) -> None:
     """At 20 sweeps joints part by less than a millimetre (rms), and feet sink in by less than one."""
-    motion = simulate(rollout, recorder(rollout), point(problem), 0.0).motion
+    motion = record.motion
     assert np.sqrt(np.mean(motion.joint_separation**2)) < 1e-3
     assert motion.contact_gap.min() > -1e-3
     assert (motion.contact_force[:, :, 2] > 0).any(axis=0).all(), "every foot bears load at some time"
@@ -90,6 +96,7 @@ def test_robots_of_a_batch_are_those_alone(problem: Problem, kernel: Kernel) -> 
         assert np.array_equal(kernel.gradient(Z[k], [1.0], [0.0])[1][0], slopes[k])
 
 
+@pytest.mark.thorough
 def test_it_stands_and_so_does_its_gradient() -> None:
     """Put down and pushed, at 20 sweeps, with exact instants of touch: it comes to rest, its adjoint does not grow."""
     standing, kernel = rollout_of(toi=True, cuts=0, stride=0.0)

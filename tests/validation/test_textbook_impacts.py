@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from blocks import turned_by
 from laboratory import Lab
+from repeats import first
 from textbook import Array, G, differences, final
 
 from symphys.model.shapes import Plane, Sphere
@@ -44,7 +45,7 @@ def two_falling(z: Array, masses: tuple[float, float], e: float, time: float) ->
     raise AssertionError("too many impacts")
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.001])
+@first("dt", [0.01, 0.001])
 @pytest.mark.parametrize("gap", [0.1, 0.01, 0.001, 1e-5])
 @pytest.mark.parametrize(("masses", "e"), [((5.0, 1.0), 1.0), ((1000.0, 1.0), 1.0), ((8.0, 1.0), 0.8)])
 def test_ball_on_ball(masses: tuple[float, float], e: float, gap: float, dt: float) -> None:
@@ -87,7 +88,7 @@ def stick(e: float, mu: float, dt: float, sweeps: int = 10) -> Lab:
     return Lab(make_world([rod], [Plane.ground()], Law(mu, e)), Scheme(dt=dt, sweeps=sweeps))
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.0025])
+@first("dt", [0.01, 0.0025])
 @pytest.mark.parametrize(("mu", "e", "sweeps"), [(0.0, 1.0, 10), (0.0, 0.5, 10), (1.0, 0.5, 60), (1.0, 0.5, 10)])
 def test_rod_drops_on_its_end(mu: float, e: float, sweeps: int, dt: float) -> None:
     """J = m v (1 + e) / (1 + 3 cos^2) on a smooth floor (Routh); on a rough one the end also stops along it."""

@@ -11,6 +11,7 @@ import pytest
 from blocks import among, block, turned_by
 from laboratory import Lab
 from linkage import ABOUT_Z
+from repeats import first
 from textbook import Array, G, differences, final
 
 from symphys.model.joints import HINGE, SLIDER, Joint, Socket
@@ -28,7 +29,7 @@ def turntable(dt: float, mu: float = 0.5) -> Lab:
     return Lab(World(world.bodies, pairs=world.pairs, joints=(axle,)), Scheme(dt=dt))
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.005])
+@first("dt", [0.01, 0.005])
 def test_ball_circles_on_a_turntable(dt: float) -> None:
     """Weltner 1979: rolling on a plate that turns at W a ball moves on circles at 2/7 W, whatever its velocity.
 
@@ -60,7 +61,7 @@ def test_ball_circles_on_a_turntable(dt: float) -> None:
     assert slope[[0, 1, 3, 4]] == pytest.approx(differences(exact, at), abs=2e-5)
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.0025])
+@first("dt", [0.01, 0.0025])
 def test_ball_on_a_plank_that_slides(dt: float) -> None:
     """A plank M moves at V on ice, a ball m is put on it: momentum is kept, and it rolls from t1 on.
 
@@ -135,7 +136,7 @@ def test_block_on_an_accelerated_slope(share: float, side: int) -> None:
         assert relative[-1] - relative[10] == pytest.approx(along * c * (time - 0.1), rel=0.01)
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.005])
+@first("dt", [0.01, 0.005])
 def test_block_slides_down_a_wedge_that_gives_way(dt: float) -> None:
     """Frictionless: the wedge goes back at m g sin cos / (M + m sin^2), momentum along x is kept; by M too."""
     alpha, mass, time = 0.4, 3.0, 0.3

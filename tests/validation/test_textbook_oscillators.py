@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from laboratory import Lab
 from linkage import ABOUT_Y, ABOUT_Z
+from repeats import first
 from scipy.integrate import solve_ivp
 from textbook import Array, G, differences, final
 
@@ -18,7 +19,7 @@ from symphys.model.shapes import Capsule, Plane, Sphere
 from symphys.model.world import Body, Law, Scheme, World, make_world
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.0025])
+@first("dt", [0.01, 0.0025])
 @pytest.mark.parametrize("at", [0.3, 0.47])
 def test_spring_and_dry_friction(at: float, dt: float) -> None:
     """Coulomb: every half swing pi sqrt(m / c) is 2 mu N / c shorter than the last; it stops where c |x| <= mu N.
@@ -109,7 +110,7 @@ def test_pendulum_made_of_two(pivot: Kind) -> None:
     assert np.abs(x - exact).max() < 0.01 * abs(x[0])
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.0025])
+@first("dt", [0.01, 0.0025])
 @pytest.mark.parametrize("e", [0.6, 1.0])
 def test_ball_strikes_a_rod_on_a_pivot(e: float, dt: float) -> None:
     """J = m v (1 + e) / (1 + m s^2 / I) at s from the pivot: the rod leaves at w = J s / I; by s and v too."""

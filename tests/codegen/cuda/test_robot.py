@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import programs
 import pytest
+from agreement import transcribed
 from emulated import Emulated, needs_compiler
 
 from symphys.codegen import Cache, Kernel, KernelUnavailable, Program, compile_program
@@ -18,22 +19,55 @@ from symphys.codegen.cuda.compiler import compiled, image, linked
 from symphys.codegen.cuda.schedule import schedules
 from symphys.codegen.cuda.source import device_sources
 from symphys.codegen.emit.plan import FAST_MEMORY, plan
-from symphys.problem import load_problem
-from symphys.problems import find
-from symphys.transcription import rollout_program, symbolic_rollout
+from symphys.transcription import rollout_program
 
-SETTINGS = {"simulation.duration": 1.0, "simulation.cuts": 0, "simulation.time_of_impact": False}
+LEG = """
+[simulation]
+duration = 1.0
+dt = 0.01
+cuts = 0
+time_of_impact = false
+[[body]]
+name = "torso"
+shape = { sphere = { radius = 0.1 } }
+mass = 1.0
+position = [0, 0, 0.6]
+collides_with = []
+[[body]]
+name = "foot"
+shape = { sphere = { radius = 0.1 } }
+mass = 0.3
+position = [0.05, 0, 0.13]
+[[joint]]
+name = "leg"
+between = ["torso", "foot"]
+slider = { axis = [0, 0, 1] }
+motor = { servo = { gain = 20, torque = 40, velocity = 3 } }
+[ground]
+friction = 0.5
+[[variable]]
+name = "command"
+sets = "leg.command"
+knots = 10
+[[variable]]
+name = "start"
+sets = ["torso.velocity[0]", "foot.velocity[0]"]
+guess = 0.1
+[[cost]]
+name = "height"
+at = "always"
+value = "torso.position[2] - torso.position[0]"
+"""
 SEEDED = ("merit",)
 
 
 @cache
 def hopping() -> Program:
-    return rollout_program(symbolic_rollout(load_problem(find("hopper_jump"), SETTINGS)), exact=True)
+    return rollout_program(transcribed(LEG, "casadi").rollout, exact=True)
 
 
 def points(count: int) -> Any:
-    variables = load_problem(find("hopper_jump"), SETTINGS).variables
-    guess = np.concatenate([variable.guess.ravel() for variable in variables])
+    guess = transcribed(LEG, "casadi").shooting.start(0)
     return guess + 0.05 * np.random.default_rng(0).standard_normal((count, guess.size))
 
 

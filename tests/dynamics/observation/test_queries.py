@@ -36,7 +36,7 @@ def test_boxes_alike_are_built_once(make: Callable[[World], object], monkeypatch
     monkeypatch.setitem(RULES, (Box, Plane), counted)
     make(boxes(2))
     of_two = len(built)
-    make(boxes(9))
+    make(boxes(4))
     assert len(built) == 2 * of_two
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from repeats import first
 
 from symphys.dynamics.functions import TracedStep, step_function, trace_step
 from symphys.dynamics.tracing.dead_code import without_dead_code
@@ -67,7 +68,7 @@ def run(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", worlds())
-@pytest.mark.parametrize("scheme", [Scheme(sweeps=5), Scheme(sweeps=2, warm_start=False), Scheme(sweeps=1)])
+@first("scheme", [Scheme(sweeps=5), Scheme(sweeps=2, warm_start=False), Scheme(sweeps=1)])
 def test_pieces_give_the_whole_step(name: str, scheme: Scheme) -> None:
     compare(worlds()[name], scheme)
 
