@@ -60,6 +60,12 @@ def write_yard(folder: Path) -> Path:
     return folder
 
 
+def prism(count: int, radius: float = 1.0, half: float = 1.0) -> NDArray[np.float64]:
+    """(2 count, 3): the corners of a prism along z whose base is regular; an approximation to a cylinder."""
+    angles = 2 * np.pi * np.arange(count) / count
+    return np.array([[radius * np.cos(a), radius * np.sin(a), z] for z in (-half, half) for a in angles])
+
+
 def area(points: NDArray[np.float64]) -> float:
     """Of a polygon; positive if it goes counter-clockwise."""
     x, y = points.T

@@ -16,6 +16,7 @@ from symphys import json_values as values
 from symphys.json_values import Array, Text
 from symphys.model.shapes import SHAPES
 from symphys.results.drawable import LARGEST, small
+from symphys.results.polytope import Polytope, make_polytope
 from symphys.results.scene_joints import SceneJoint
 from symphys.results.text_files import read_table
 
@@ -24,11 +25,11 @@ UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Solid:
-    """All points within ``radius`` of an inner box: a sphere, whose box is a point, a capsule, a line, or a box.
+    """All points within ``radius`` of the convex hull of some corners; see ``RoundedHull``.
 
     Attributes:
-        radius: [m]; 0 for a box.
-        half: (3,) half sizes of the inner box along its own axes [m].
+        radius: [m].
+        corners: (k, 3) [m], from its centre, along its own axes; one for a ball, two for a capsule.
         centre: (3,) [m], in the body's frame; in the world for what stands still.
         orientation: (4,) unit quaternion w x y z.
         kind: of the shape, as problem files call it.
@@ -36,7 +37,7 @@ class Solid:
     """
 
     radius: float = 0.0
-    half: Array = field(default_factory=lambda: np.zeros(3))
+    corners: Array = field(default_factory=lambda: np.zeros((1, 3)))
     centre: Array = field(default_factory=lambda: np.zeros(3))
     orientation: Array = field(default_factory=lambda: np.array(UPRIGHT))
     kind: str = "sphere"
@@ -46,23 +47,33 @@ class Solid:
     def of(cls, kind: str, sizes: Mapping[str, Any], centre: Array, orientation: Array) -> Solid:
         """The solid that a shape of this kind draws."""
         whole = {key: tuple(size) if isinstance(size, np.ndarray) else size for key, size in sizes.items()}
-        radius, half = SHAPES[kind].from_sizes(whole, tuple(centre), UPRIGHT).rounded_box
-        return cls(float(radius), np.array(half, float), centre, orientation, kind, sizes)
+        hull = SHAPES[kind].from_sizes(whole, tuple(centre), UPRIGHT).rounded_hull
+        return cls(hull.radius, np.array(hull.corners, float), centre, orientation, kind, sizes)
+
+    @property
+    def polytope(self) -> Polytope:
+        """The faces and edges of the hull of its corners."""
+        return make_polytope(tuple(map(tuple, self.corners.tolist())))
+
+    @property
+    def half(self) -> Array:
+        """(3,) [m]: half sizes of the box about its centre, along its own axes, that holds its corners."""
+        return np.asarray(np.abs(self.corners).max(axis=0))
 
     @property
     def girth(self) -> float:
-        """The smallest half size [m]."""
-        return self.radius or float(self.half.min())
+        """From its centre to the nearest point of its surface [m]."""
+        return self.radius + self.polytope.inradius
 
     @property
     def reach(self) -> float:
         """From the origin to the farthest point, at most [m]."""
-        return float(np.linalg.norm(self.centre) + np.linalg.norm(self.half)) + self.radius
+        return float(np.linalg.norm(self.centre) + np.linalg.norm(self.corners, axis=1).max()) + self.radius
 
     @property
     def is_ball(self) -> bool:
         """Whether it is a sphere, or a point."""
-        return not self.half.any()
+        return len(self.corners) == 1
 
     def to_json(self) -> dict[str, Any]:
         """One of ``shapes``: kind, sizes as in problem files, centre and, unless round, orientation."""

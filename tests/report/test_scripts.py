@@ -4,47 +4,44 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 from page_scripts import NODE, run_script
-from yard import area
+from yard import area, prism
 
+from symphys.report.scene.animation import solid_data
 from symphys.report.scene.outlines import outline
 from symphys.results.scene import Solid
 
 pytestmark = NODE
 
-
 EYE = "camera(-2, 0.4)"
+SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.3])
 def test_script_and_figures_have_the_same_outline(radius: float) -> None:
     axes = np.random.default_rng(1).standard_normal((3, 2))
-    found = np.array(run_script(f"outline({axes.tolist()}, {radius})"))
-    assert area(found) == pytest.approx(area(outline(axes, radius)))
+    for points in (SIGNS @ axes, prism(24) @ axes, prism(24)[:, :2], prism(24)[:, 1:], SIGNS[:1, :2], SIGNS[:2, 1:]):
+        found = np.array(run_script(f"outline({points.tolist()}, {radius})"))
+        assert area(found) == pytest.approx(area(outline(points, radius)), abs=1e-9)
 
 
 def placed(solid: Solid, name: str, fixed: bool = False) -> str:
-    data = {
-        "radius": solid.radius,
-        "centre": solid.centre.tolist(),
-        "half": solid.half.tolist(),
-        "q": solid.orientation.tolist(),
-    }
-    if solid.is_ball:
-        del data["half"], data["q"]
-    return f"place({json.dumps(data)}, {{ p: [0, 0, 0], q: [1, 0, 0, 0] }}, '{name}', {str(fixed).lower()})"
+    return (
+        f"place({json.dumps(solid_data(solid))}, {{ p: [0, 0, 0], q: [1, 0, 0, 0] }}, '{name}', {str(fixed).lower()})"
+    )
 
 
-RAMP = Solid(0.0, np.array([2.0, 1, 0.1]))
+RAMP = Solid(0.0, SIGNS * [2, 1, 0.1])
 
 
 def test_what_lies_on_a_large_block_is_drawn_after_it() -> None:
     """Also at its far end, where its centre is farther away than that of the block."""
     for x, y in ((-1.8, 0.9), (1.8, 0.9), (1.8, -0.9), (-1.8, -0.9)):
-        for solid in (Solid(0.1, centre=np.array([x, y, 0.2])), Solid(0.0, np.full(3, 0.1), np.array([x, y, 0.2]))):
+        for solid in (Solid(0.1, centre=np.array([x, y, 0.2])), Solid(0.0, 0.1 * SIGNS, np.array([x, y, 0.2]))):
             both = f"[{placed(solid, 'top')}, {placed(RAMP, 'ramp')}]"
             assert run_script(f"inOrder({both}, {EYE}).map((s) => s.colour)") == ["ramp", "top"]
             under = replace(solid, centre=solid.centre * [1, 1, -1])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +21,13 @@ from symphys.report.scene.animation import motion_data
 from symphys.report.scene.motion import draw_motion
 from symphys.report.scene.outlines import inner_edges, outline
 from symphys.report.scene.panel import make_panel
-from symphys.report.scene.views import SIDE_XZ, SIDE_YZ, TOP, TOP_TURNED, choose_views, half_axes
+from symphys.report.scene.views import SIDE_XZ, SIDE_YZ, TOP, TOP_TURNED, choose_views, corners, half_axes
 from symphys.results.scene import Scene, Solid, read_scene
 from symphys.results.trajectories import read_trajectory
 from symphys.trajectory import Trajectory
+
+SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
+UPRIGHT = np.array([1.0, 0, 0, 0])
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +48,7 @@ def scene(yard: Path) -> Scene:
 
 def test_outline_of_a_box_is_its_convex_hull() -> None:
     axes = np.random.default_rng(1).standard_normal((3, 2))
-    around = outline(axes, 0.0)
+    around = outline(SIGNS @ axes, 0.0)
     a, b, c = axes
     parallelograms = [np.linalg.det(np.array(pair)) for pair in ((a, b), (a, c), (b, c))]
     assert area(around) == pytest.approx(4 * sum(abs(p) for p in parallelograms))
@@ -53,25 +57,26 @@ def test_outline_of_a_box_is_its_convex_hull() -> None:
 
 
 def test_outline_of_a_capsule_is_a_stadium() -> None:
-    around = outline(np.array([[0, 0], [0, 0], [0.3, 0.4]]), 0.2)
+    around = outline(np.array([[-0.3, -0.4], [0.3, 0.4]]), 0.2)
     assert area(around) == pytest.approx(2 * 0.2 * 1.0 + np.pi * 0.04, rel=5e-3)
     assert np.abs(around[:, 0]).max() == pytest.approx(0.5, rel=5e-3)
 
 
 def test_outline_of_what_is_seen_along_its_axis_is_a_circle() -> None:
     for axes in (np.zeros((3, 2)), np.array([[0, 0], [1e-16, 0], [0, 1e-17]])):
-        np.testing.assert_allclose(np.linalg.norm(outline(axes, 0.2), axis=1), 0.2)
-    assert area(outline(np.zeros((3, 2)), 0.2)) > 0
+        np.testing.assert_allclose(np.linalg.norm(outline(SIGNS @ axes, 0.2), axis=1), 0.2)
+    assert area(outline(np.zeros((1, 2)), 0.2)) > 0
 
 
 def test_edges_inside_a_box() -> None:
     """Three from the nearest corner; seen along an axis none; seen along a diagonal of a face the one in front."""
-    axes = np.diag([1.0, 2.0, 3.0])
-    general = inner_edges(axes, np.array([0.6, -0.64, 0.48]))
+    box = Solid(0.0, SIGNS * [1, 2, 3])
+    general = inner_edges(UPRIGHT, box, np.array([0.6, -0.64, 0.48]))
     assert general.shape == (3, 2, 3)
-    np.testing.assert_array_equal(general[:, 0], np.tile([1, -2, 3], (3, 1)))
-    assert inner_edges(axes, np.array([0.0, -1.0, 0.0])).shape == (0, 2, 3)
-    (front,) = inner_edges(axes, np.array([0.6, -0.8, 0.0]))
+    np.testing.assert_array_equal((general == [1, -2, 3]).all(axis=2).sum(axis=1), 1)
+    np.testing.assert_array_equal((general[:, 0] != general[:, 1]).sum(axis=0), 1)
+    assert inner_edges(UPRIGHT, box, np.array([0.0, -1.0, 0.0])).shape == (0, 2, 3)
+    (front,) = inner_edges(UPRIGHT, box, np.array([0.6, -0.8, 0.0]))
     np.testing.assert_array_equal(np.sort(front[:, 2]), [-3, 3])
     np.testing.assert_array_equal(front[:, :2], [[1, -2], [1, -2]])
 
@@ -82,11 +87,13 @@ def test_the_viewer_is_in_front(view: Any) -> None:
     assert np.linalg.det([right, up, view.front]) == pytest.approx(1)
 
 
-def test_half_axes_turn_with_body_and_part() -> None:
-    solid = Solid(0.1, np.array([0.0, 0.0, 2.0]), np.zeros(3), np.array(QUARTER))
-    np.testing.assert_allclose(half_axes(np.array([1.0, 0, 0, 0]), solid)[2], [2, 0, 0], atol=1e-12)
+def test_corners_turn_with_body_and_part() -> None:
+    solid = Solid(0.1, np.array([[0, 0, -2.0], [0, 0, 2]]), np.zeros(3), np.array(QUARTER))
+    np.testing.assert_allclose(half_axes(UPRIGHT, solid)[2], [2, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(corners(UPRIGHT, solid), [[-2, 0, 0], [2, 0, 0]], atol=1e-12)
     about_z = np.array([np.sqrt(0.5), 0, 0, np.sqrt(0.5)])
     np.testing.assert_allclose(half_axes(about_z, solid)[2], [0, 2, 0], atol=1e-12)
+    np.testing.assert_allclose(corners(about_z, solid), [[0, -2, 0], [0, 2, 0]], atol=1e-12)
 
 
 def test_terrain_and_fixtures_give_a_side_view(motion: Trajectory, scene: Scene) -> None:

@@ -15,7 +15,7 @@ from symphys.model.scalar import Scalar
 from symphys.model.shapes.box import Box
 from symphys.model.shapes.capsule import Capsule
 from symphys.model.shapes.plane import Plane
-from symphys.model.shapes.shape import UPRIGHT, SizeKey, SolidShape
+from symphys.model.shapes.shape import UPRIGHT, RoundedHull, SizeKey, SolidShape
 from symphys.model.shapes.sphere import SOLID_SPHERE, Sphere
 from symphys.model.shapes.terrain import Terrain
 
@@ -29,6 +29,7 @@ __all__ = [
     "Capsule",
     "Fixture",
     "Plane",
+    "RoundedHull",
     "Scalar",
     "Shape",
     "SizeKey",

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import product
 from math import hypot
 from typing import Any, ClassVar, Self
 
 from symphys.model.scalar import Scalar
-from symphys.model.shapes.shape import FLATTEST, UPRIGHT, SizeKey, SolidShape
+from symphys.model.shapes.shape import FLATTEST, UPRIGHT, RoundedHull, SizeKey, SolidShape
 
 
 @dataclass(frozen=True)
@@ -62,10 +63,10 @@ class Box(SolidShape):
         return hypot(*self.half_sizes)
 
     @property
-    def rounded_box(self) -> tuple[float, tuple[float, float, float]]:
-        """Itself, without rounding."""
+    def rounded_hull(self) -> RoundedHull:
+        """Its eight corners."""
         x, y, z = (float(half) for half in self.half_sizes)
-        return 0.0, (x, y, z)
+        return RoundedHull(0.0, tuple(product((-x, x), (-y, y), (-z, z))))
 
     @property
     def mjcf_size(self) -> tuple[Scalar, ...]:

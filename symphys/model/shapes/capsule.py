@@ -8,7 +8,7 @@ from math import pi
 from typing import Any, ClassVar, Self
 
 from symphys.model.scalar import Scalar
-from symphys.model.shapes.shape import FLATTEST, UPRIGHT, SizeKey, SolidShape
+from symphys.model.shapes.shape import FLATTEST, UPRIGHT, RoundedHull, SizeKey, SolidShape
 from symphys.model.shapes.sphere import SOLID_SPHERE
 
 
@@ -73,9 +73,10 @@ class Capsule(SolidShape):
         return float(self.radius + self.half_length)
 
     @property
-    def rounded_box(self) -> tuple[float, tuple[float, float, float]]:
-        """Its box is a line."""
-        return float(self.radius), (0.0, 0.0, float(self.half_length))
+    def rounded_hull(self) -> RoundedHull:
+        """The two ends of its segment."""
+        end = float(self.half_length)
+        return RoundedHull(float(self.radius), ((0.0, 0.0, -end), (0.0, 0.0, end)))
 
     @property
     def mjcf_size(self) -> tuple[Scalar, ...]:

@@ -36,6 +36,21 @@ class SizeKey:
     reason: str = ""
 
 
+@dataclass(frozen=True)
+class RoundedHull:
+    """All points within a radius of the convex hull of some corners.
+
+    A sphere has one corner, a capsule two. A polytope has radius 0. A curved surface is approximated by many corners.
+
+    Attributes:
+        radius: [m].
+        corners: (k, 3) [m], from the centre of mass of the shape, along its own axes. None lies between others.
+    """
+
+    radius: float
+    corners: tuple[tuple[float, float, float], ...]
+
+
 class SolidShape(ABC):
     """A solid, placed in a body's frame or in the world.
 
@@ -87,8 +102,8 @@ class SolidShape(ABC):
 
     @property
     @abstractmethod
-    def rounded_box(self) -> tuple[float, tuple[float, float, float]]:
-        """How pictures draw it: all points within a radius [m] of a box with these half sizes (3,) [m]."""
+    def rounded_hull(self) -> RoundedHull:
+        """What pictures draw."""
 
     @property
     @abstractmethod

@@ -8,7 +8,7 @@ from math import pi
 from typing import Any, ClassVar, Self
 
 from symphys.model.scalar import Scalar
-from symphys.model.shapes.shape import SizeKey, SolidShape
+from symphys.model.shapes.shape import RoundedHull, SizeKey, SolidShape
 
 SOLID_SPHERE = 2 / 5
 """Of a uniform ball: moment of inertia by mass and squared radius."""
@@ -61,9 +61,9 @@ class Sphere(SolidShape):
         return float(self.radius)
 
     @property
-    def rounded_box(self) -> tuple[float, tuple[float, float, float]]:
-        """Its box is a point."""
-        return float(self.radius), (0.0, 0.0, 0.0)
+    def rounded_hull(self) -> RoundedHull:
+        """One corner."""
+        return RoundedHull(float(self.radius), ((0.0, 0.0, 0.0),))
 
     @property
     def mjcf_size(self) -> tuple[Scalar, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from symphys.model.shapes import Sphere
+from symphys.model.shapes import SHAPES, SURFACES, SolidShape, Surface, points_of_kinds
 from symphys.problem.parametric.collision_filter import BodyClass, CollisionFilter, PairCount
 from symphys.problem.parametric.parts import ParametricBody
 from symphys.problem.reading.faults import Faults
@@ -39,9 +39,17 @@ def too_many(candidates: CollisionFilter, counted: PairCount) -> str:
         "let fewer of them meet: give them a group, and say who touches whom by collides_with or by a [[pair]] with "
         "collide = false"
     )
-    if any(not isinstance(surface, Sphere) for a, _ in counted.shares for surface in sets[a][0].part.surfaces):
-        remedy += "; or take spheres in place of boxes and capsules"
+    simplest = min(SHAPES.values(), key=most_points)
+    solids = [solid for a, _ in counted.shares for solid in sets[a][0].part.surfaces if isinstance(solid, SolidShape)]
+    others = sorted({solid.plural for solid in solids if most_points(type(solid)) > most_points(simplest)})
+    if others:
+        remedy += f"; or take {simplest.plural} in place of {' and '.join(others)}"
     return f"{count} points of contact in every step are too many, {MOST_POINTS} are allowed ({listed}); {remedy}"
+
+
+def most_points(kind: type[Surface]) -> int:
+    """In how many points a surface of this kind touches another at most."""
+    return max(points_of_kinds(kind, other) for other in SURFACES.values())
 
 
 def between(a: Sequence[BodyClass], b: Sequence[BodyClass], same: bool) -> str:

@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import Field
 
 from symphys.model.world import GRAVITY, Scheme
-from symphys.problem.schema.shapes import UPRIGHT, ShapeTable, SolidTable
+from symphys.problem.schema.shapes import EXAMPLES, UPRIGHT, ShapeTable, SolidTable
 from symphys.problem.schema.types import (
     Finite,
     Grid,
@@ -145,7 +145,7 @@ class BlockTable(MemberTable):
     """A static solid: a ramp, a step, a post, a wall with an end."""
 
     name: Identifier = Field(description="how pairs, formulas and settings refer to it")
-    shape: SolidTable = Field(description="its surface: { box = { size = [1, 1, 0.2] } }, or a sphere or capsule")
+    shape: SolidTable = Field(description=f"its surface: {EXAMPLES}")
     position: Vector = Field(default=[0.0, 0.0, 0.0], description="of its centre [m]")
     orientation: Orientation = Field(default=[1.0, 0.0, 0.0, 0.0], description=UPRIGHT)
 

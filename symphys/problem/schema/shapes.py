@@ -7,10 +7,13 @@ from typing import Annotated, Any
 from pydantic import Field, PlainValidator, WithJsonSchema, create_model
 
 from symphys.model.shapes import SHAPES, SizeKey, Sphere
+from symphys.problem.reading.value_texts import listed
 from symphys.problem.schema import checks
 from symphys.problem.schema.types import Orientation, Positive, SchemaTable, Size, Vector
 
 MOST_PARTS = 1000
+EXAMPLES = listed([f"{{ {kind} = {shape.example} }}" for kind, shape in SHAPES.items()], "or")
+"""A table of each shape."""
 UPRIGHT = "quaternion [w, x, y, z], or { roll_deg, pitch_deg, yaw_deg }"
 
 

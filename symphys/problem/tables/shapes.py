@@ -12,12 +12,11 @@ from symphys.maths import rotation
 from symphys.model.shapes import SHAPES, UPRIGHT, Shape, Sphere
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.reading.value_texts import listed
-from symphys.problem.schema.shapes import PartTable, ShapeTable, SolidTable
+from symphys.problem.schema.shapes import EXAMPLES, PartTable, ShapeTable, SolidTable
 from symphys.problem.schema.types import RollPitchYaw
 
 Array = NDArray[np.float64]
 KINDS = tuple(SHAPES)
-EXAMPLES = listed([f"{{ {kind} = {shape.example} }}" for kind, shape in SHAPES.items()], "or")
 COMPOUND = "{ parts = [{ box = { size = [1, 2, 3] }, centre = [0.5, 0, 0] }, ...] }"
 
 

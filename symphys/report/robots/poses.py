@@ -15,7 +15,7 @@ from symphys.report.robots.branches import colours, linked, traced
 from symphys.report.robots.joint_positions import bones, draw_joint_positions, draw_lines
 from symphys.report.scene.outlines import inner_edges, outline
 from symphys.report.scene.panel import ViewPanel
-from symphys.report.scene.views import View, centres, half_axes, solids_of, turn
+from symphys.report.scene.views import View, centres, corners, solids_of, turn
 from symphys.results.scene import Scene, Solid
 from symphys.trajectory import Array, Trajectory
 
@@ -49,9 +49,9 @@ def extents(trajectory: Trajectory, scene: Scene, view: View, bodies: Sequence[i
     for body in bodies:
         for solid in solids_of(trajectory, scene, body):
             middle = view.flat(centres(trajectory, body, solid))
-            half = view.flat(np.abs(half_axes(trajectory.orientation[:, body], solid)).sum(axis=1)) + solid.radius
-            low.append(middle - half)
-            high.append(middle + half)
+            ends = view.flat(corners(trajectory.orientation[:, body], solid))
+            low.append(middle + ends.min(axis=1) - solid.radius)
+            high.append(middle + ends.max(axis=1) + solid.radius)
     return np.min(low, axis=0), np.max(high, axis=0)
 
 
@@ -96,20 +96,18 @@ class RobotDrawing:
         ]
 
     def draw_solid(self, body: int, solid: Solid, colour: Array, zorder: float) -> None:
-        """Its outline, filled, and the edges of a box."""
+        """Its outline, filled, and the edges that are seen in it."""
         turned = self.trajectory.orientation[self.shot, body]
         centre = self.view.flat(self.trajectory.position[self.shot, body] + turn(turned, solid.centre))
         if solid.radius == 0 and solid.is_ball:
             self.axes.plot(*centre, "o", color=tuple(colour), markersize=3, zorder=zorder)
             return
-        half = half_axes(turned, solid)
-        around = centre + outline(self.view.flat(half), solid.radius)
+        around = centre + outline(self.view.flat(corners(turned, solid)), solid.radius)
         patch = Circle((centre[0], centre[1]), solid.radius) if solid.is_ball else Polygon(around)
         patch.set(facecolor=tuple(mixed(colour, 0.42)), edgecolor=tuple(colour), linewidth=0.8, zorder=zorder)
         self.axes.add_patch(patch)
-        if solid.radius == 0:
-            edges = centre + self.view.flat(inner_edges(half, self.view.front))
-            draw_lines(self.axes, edges, tuple(colour), 0.6, zorder)
+        edges = centre + self.view.flat(inner_edges(turned, solid, self.view.front))
+        draw_lines(self.axes, edges, tuple(colour), 0.6, zorder)
 
 
 def mixed(colour: str | Array, strength: float) -> Array:

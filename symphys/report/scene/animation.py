@@ -11,6 +11,7 @@ from symphys.report.pages.markup import Html, dot, join, tag
 from symphys.report.robots.branches import colours, keys, linked, traced
 from symphys.report.robots.joint_positions import SQUARE, axes_of, drawable
 from symphys.report.scene.views import SIDE_YZ, TOP, choose_views, reach, solids_of
+from symphys.results.polytope import Polytope
 from symphys.results.scene import Scene, SceneTerrain, Solid
 from symphys.trajectory import Array, Trajectory
 
@@ -98,11 +99,26 @@ def body_data(trajectory: Trajectory, scene: Scene) -> list[dict[str, object]]:
 
 
 def solid_data(solid: Solid) -> dict[str, object]:
-    """Radius, half sizes of the inner box, centre and orientation; what is usual is left out."""
+    """Radius, centre, and unless it is a ball corners and orientation; of a polytope also ``face_data``."""
     data: dict[str, object] = {"radius": solid.radius, "centre": rounded(solid.centre, 1e-6)}
     if not solid.is_ball:
-        data |= {"half": rounded(solid.half, 1e-6), "q": rounded(solid.orientation, 1e-7)}
-    return data
+        data |= {"corners": rounded(solid.corners, 1e-6), "q": rounded(solid.orientation, 1e-7)}
+    return data if len(solid.corners) < 3 else data | face_data(solid.polytope)
+
+
+def face_data(polytope: Polytope) -> dict[str, object]:
+    """The corners of each face, counter-clockwise from outside; the face beyond each of its edges that is not drawn.
+
+    The latter, ``smooth``, has -1 for edges that are drawn. It is left out where all of them are.
+    """
+    faces = [list(face) for face in polytope.faces]
+    if polytope.sharp.all():
+        return {"faces": faces}
+    smooth = [[-1] * len(face) for face in faces]
+    for first, second, left, right in polytope.edges[~polytope.sharp].tolist():
+        smooth[left][faces[left].index(first)] = right
+        smooth[right][faces[right].index(second)] = left
+    return {"faces": faces, "smooth": smooth}
 
 
 def terrain_data(ground: SceneTerrain) -> dict[str, object]:

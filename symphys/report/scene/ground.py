@@ -14,7 +14,7 @@ from symphys.findings import writing
 from symphys.report.figures import style
 from symphys.report.scene.outlines import inner_edges, outline
 from symphys.report.scene.panel import ViewPanel
-from symphys.report.scene.views import View, half_axes
+from symphys.report.scene.views import View, corners
 from symphys.results.scene import UPRIGHT, Scene, SceneTerrain, Solid
 from symphys.trajectory import Trajectory
 
@@ -39,13 +39,12 @@ def draw_ground(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Sce
 
 def draw_fixture(axes: Axes, view: View, solid: Solid) -> None:
     """The outline of a static solid, and the edges that are seen in it."""
-    half = half_axes(np.array(UPRIGHT), solid)
-    around = view.flat(solid.centre) + outline(view.flat(half), solid.radius)
+    upright = np.array(UPRIGHT)
+    around = view.flat(solid.centre) + outline(view.flat(corners(upright, solid)), solid.radius)
     axes.add_patch(Polygon(around, **HATCH, zorder=1.55))
     axes.add_patch(Polygon(around, fill=False, edgecolor=style.GROUND_EDGE, linewidth=1.3, zorder=1.56))
-    if solid.radius == 0:
-        for edge in view.flat(solid.centre + inner_edges(half, view.front)):
-            axes.plot(*edge.T, color=style.GROUND_EDGE, linewidth=0.8, zorder=1.56)
+    for edge in view.flat(solid.centre + inner_edges(upright, solid, view.front)):
+        axes.plot(*edge.T, color=style.GROUND_EDGE, linewidth=0.8, zorder=1.56)
 
 
 def draw_profile(axes: Axes, panel: ViewPanel, trajectory: Trajectory, ground: SceneTerrain) -> None:
@@ -89,7 +88,7 @@ def draw_planes(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Sce
         normal = normal / length
         foot = middle + (offset - normal @ middle) * normal
         along = size * np.array([-normal[1], normal[0]])
-        corners = np.array([foot - along, foot + along, foot + along - size * normal, foot - along - size * normal])
+        cut = np.array([foot - along, foot + along, foot + along - size * normal, foot - along - size * normal])
         # The line lies under every solid, so that it ends where another plane's solid begins.
-        axes.plot(*corners[:2].T, color=style.GROUND_EDGE, linewidth=2.2, zorder=1.5)
-        axes.add_patch(Polygon(corners, **HATCH, zorder=1.6))
+        axes.plot(*cut[:2].T, color=style.GROUND_EDGE, linewidth=2.2, zorder=1.5)
+        axes.add_patch(Polygon(cut, **HATCH, zorder=1.6))

@@ -1,9 +1,12 @@
-"""How a solid looks in a parallel projection: its outline, and the edges of a box that are seen inside it."""
+"""How a solid looks in a parallel projection: its outline, and the edges that are seen inside it."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from symphys.report.scene.views import turn
+from symphys.results.polytope import flat_hull
+from symphys.results.scene import Solid
 from symphys.trajectory import Array
 
 ROUND = 16
@@ -12,27 +15,17 @@ SEEN = 1e-6
 """A face whose normal has less than this share of its length towards the viewer is seen from its edge."""
 
 
-def outline(axes: Array, radius: float) -> Array:
-    """(n, 2): the outline about the centre, counter-clockwise, of all within ``radius`` of a projected box.
-
-    Args:
-        axes: (k, 2) projected half axes of the box; those of length 0 do not count.
-        radius: of the rounding.
-    """
-    lengths = np.linalg.norm(axes, axis=1)
-    sides = axes[lengths > 1e-9 * max(float(lengths.max(initial=0.0)), radius)]
-    if not len(sides):
-        return np.zeros((1, 2)) + radius * directions(0.0, 2 * np.pi)[:-1]
-    upward = (sides[:, 1] > 0) | ((sides[:, 1] == 0) & (sides[:, 0] > 0))
-    sides = np.where(upward[:, None], sides, -sides)
-    sides = sides[np.argsort(np.arctan2(sides[:, 1], sides[:, 0]))]
-    edges = 2 * np.concatenate([sides, -sides])
-    corners = np.cumsum(edges, axis=0) - sides.sum(axis=0)  # a corner after each edge
+def outline(points: Array, radius: float) -> Array:
+    """(n, 2): the outline of all within ``radius`` of the hull of (k, 2) projected corners, counter-clockwise."""
+    corners = points[flat_hull(points, radius)]
+    if len(corners) == 1:
+        return corners + radius * directions(0.0, 2 * np.pi)[:-1]
     if radius == 0:
         return np.asarray(corners)
-    facing = np.unwrap(np.arctan2(-edges[:, 0], edges[:, 1]))
-    after = np.append(facing[1:], facing[0] + 2 * np.pi)
-    arcs = [corner + radius * directions(a, b) for corner, a, b in zip(corners, facing, after, strict=True)]
+    edges = corners - np.roll(corners, 1, axis=0)  # an edge before each corner
+    facing = np.arctan2(-edges[:, 0], edges[:, 1])
+    turns = np.mod(np.roll(facing, -1) - facing, 2 * np.pi)
+    arcs = [corner + radius * directions(a, a + by) for corner, a, by in zip(corners, facing, turns, strict=True)]
     return np.concatenate(arcs)
 
 
@@ -42,17 +35,16 @@ def directions(start: float, stop: float) -> Array:
     return np.stack([np.cos(angles), np.sin(angles)], axis=1)
 
 
-def inner_edges(axes: Array, front: Array) -> Array:
-    """(k, 2, 3): the edges of a box between two faces that the viewer sees, about its centre.
+def inner_edges(orientation: Array, solid: Solid, front: Array) -> Array:
+    """(k, 2, 3) [m]: the edges between two faces that the viewer sees, from the solid's centre, in the world.
 
     Args:
-        axes: (3, 3) half axes as rows, orthogonal.
+        orientation: (4,) of the body.
+        solid: a ball and a capsule have no edges.
         front: (3,) towards the viewer, of length 1.
     """
-    lengths = np.maximum(np.linalg.norm(axes, axis=1), 1e-300)
-    towards = axes @ front / lengths
-    seen = np.abs(towards) > SEEN
-    nearest = np.where(seen & (towards < 0), -1.0, 1.0)[:, None] * axes
-    corner = nearest.sum(axis=0)
-    found = [[corner, corner - 2 * nearest[k]] for k in range(3) if seen[k - 1] and seen[k - 2]]
-    return np.array(found, float).reshape(-1, 2, 3)
+    polytope = solid.polytope
+    normals, ends = (turn(orientation, turn(solid.orientation, own)) for own in (polytope.normals, solid.corners))
+    seen = normals @ front > SEEN
+    between = polytope.edges[polytope.sharp & seen[polytope.edges[:, 2:]].all(axis=1), :2]
+    return np.asarray(ends[between])

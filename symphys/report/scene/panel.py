@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from symphys.report.figures import style
-from symphys.report.scene.views import NAMES, View, half_axes, reach
+from symphys.report.scene.views import NAMES, View, corners, reach
 from symphys.results.scene import UPRIGHT, Scene, SceneFixture, ScenePlane, SceneTerrain
 from symphys.trajectory import Array, Trajectory
 
@@ -65,8 +65,8 @@ def include(plane: ScenePlane, view: View, low: Array, high: Array, room: float)
 def of_fixture(fixture: SceneFixture) -> Array:
     """(2, 3) [m]: the lowest and highest coordinates of a fixture."""
     solid = fixture.solid
-    size = np.abs(half_axes(np.array(UPRIGHT), solid)).sum(axis=0) + solid.radius
-    return np.array([solid.centre - size, solid.centre + size])
+    around = solid.centre + corners(np.array(UPRIGHT), solid)
+    return np.array([around.min(axis=0) - solid.radius, around.max(axis=0) + solid.radius])
 
 
 def of_terrain(ground: SceneTerrain) -> Array:

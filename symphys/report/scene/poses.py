@@ -13,7 +13,7 @@ from matplotlib.patches import Circle, Polygon
 from symphys.report.figures import style
 from symphys.report.scene.outlines import inner_edges, outline
 from symphys.report.scene.panel import ViewPanel
-from symphys.report.scene.views import View, centres, half_axes, reach, solids_of, turn
+from symphys.report.scene.views import View, centres, corners, half_axes, reach, solids_of, turn
 from symphys.results.scene import Scene, Solid
 from symphys.trajectory import Array, Trajectory
 
@@ -53,7 +53,7 @@ def apart(trajectory: Trajectory, view: View, body: int, solids: Sequence[Solid]
 
 
 def marked(trajectory: Trajectory, view: View, body: int, solid: Solid) -> Array:
-    """(N+1, 4, 2) [m]: the seen places of a solid's centre and of the ends of its half axes."""
+    """(N+1, 4, 2) [m]: the seen places of a solid's centre, and of the ends of the half axes of a box around it."""
     middle = centres(trajectory, body, solid)[:, None]
     tips = middle + half_axes(trajectory.orientation[:, body], solid)
     return view.flat(np.concatenate([middle, tips], axis=1))
@@ -72,25 +72,20 @@ class BodyDrawing:
     def draw(self, trajectory: Trajectory, body: int, solid: Solid, shot: int) -> None:
         """One solid: its outline, and inside it what shows how the body is turned."""
         centre = self.view.flat(centres(trajectory, body, solid)[shot])
-        half = half_axes(trajectory.orientation[shot, body], solid)
+        orientation = trajectory.orientation[shot, body]
+        ends = self.view.flat(corners(orientation, solid))
         if solid.radius == 0 and solid.is_ball:
             self.axes.plot(*centre, "o", color=self.colour, markersize=4, alpha=0.3 + self.strength, zorder=4)
             return
-        self.fill(
-            Circle((centre[0], centre[1]), solid.radius) if solid.is_ball else self.polygon(centre, half, solid.radius)
-        )
+        around = centre + outline(ends, solid.radius)
+        self.fill(Circle((centre[0], centre[1]), solid.radius) if solid.is_ball else Polygon(around))
         if solid.is_ball:
             tip = solid.radius * self.view.flat(spoke(trajectory.orientation[:, body], self.view)[shot])
             self.line(centre, np.array([np.zeros(2), tip]))
-        elif solid.radius > 0:
-            self.line(centre, self.view.flat(np.array([half[2], -half[2]])))
-        else:
-            for edge in inner_edges(half, self.view.front):
-                self.line(centre, self.view.flat(edge))
-
-    def polygon(self, centre: Array, half: Array, radius: float) -> Polygon:
-        """The outline of a box or a capsule."""
-        return Polygon(centre + outline(self.view.flat(half), radius))
+        elif len(ends) == 2:
+            self.line(centre, ends)
+        for edge in inner_edges(orientation, solid, self.view.front):
+            self.line(centre, self.view.flat(edge))
 
     @property
     def width(self) -> float:

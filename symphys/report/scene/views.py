@@ -81,8 +81,13 @@ def centres(trajectory: Trajectory, body: int, solid: Solid) -> Array:
     return trajectory.position[:, body] + turn(trajectory.orientation[:, body], solid.centre)
 
 
+def corners(orientation: Array, solid: Solid) -> Array:
+    """(..., k, 3) [m]: a solid's corners from its centre, in the world, for orientations (..., 4) of its body."""
+    return turn(orientation[..., None, :], turn(solid.orientation, solid.corners))
+
+
 def half_axes(orientation: Array, solid: Solid) -> Array:
-    """(..., 3, 3) [m]: the half axes of a solid's inner box as rows, in the world, for orientations (..., 4)."""
+    """(..., 3, 3) [m]: the half axes of the box around a solid's corners, as rows, in the world; see ``corners``."""
     own = [half * turn(solid.orientation, axis) for half, axis in zip(solid.half, np.eye(3), strict=True)]
     return np.stack([turn(orientation, axis) for axis in own], axis=-2)
 

@@ -176,9 +176,9 @@ class Player {
 
   hide(solid, cells) { // draw again the cells that lie over a solid and are nearer than what it stands on
     if (this.elevation < LOW) return;
-    const { front, right, up } = this.painter.eye, level = { half: solid.half, radius: 0 };
+    const { front, right, up } = this.painter.eye, level = { corners: solid.corners, radius: 0 };
     const depth = dot(solid.centre, front) + support(level, [front[0], front[1], 0]);
-    const wide = support(solid, right), tall = support(solid, up);
+    const [wide, tall] = [right, up].map((n) => Math.max(support(solid, n), support(solid, back(n))));
     const over = cells.filter(({ cell, depth: farthest }) => {
       const d = sum(cell.polygon[0], solid.centre, -1);
       return farthest > depth && Math.abs(dot(d, right)) < wide + cell.width && Math.abs(dot(d, up)) < tall + cell.width;

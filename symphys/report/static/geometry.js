@@ -17,7 +17,10 @@ function camera(azimuth, elevation) { // orthonormal: right, up, towards the vie
 }
 
 function reach(body) { // from the body's centre to its farthest point
-  return Math.max(...body.solids.map((s) => s.radius + Math.hypot(...s.centre) + Math.hypot(...(s.half || [0]))));
+  return Math.max(...body.solids.map((s) => {
+    const far = triples(s.corners || []).map((c) => Math.hypot(...c));
+    return s.radius + Math.hypot(...s.centre) + Math.max(0, ...far);
+  }));
 }
 
 function bounds(data) { // box around all bodies at all frames

@@ -91,16 +91,16 @@ class Painter {
   drawShadows(solid, patches, terrain) { // straight down
     for (const ground of terrain) {
       const found = shadow(ground, solid);
-      if (found) this.drawShadow(found.points, found.height, support(solid, [0, 0, 1]));
+      if (found) this.drawShadow(found.points, found.height, support(solid, [0, 0, -1]));
     }
     for (const { plane } of patches) {
       const n = plane.normal, height = dot(solid.centre, n) - plane.offset;
-      if (n[2] < 0.5 || height < 0 || solid.girth === 0 || dot(n, this.eye.front) < 0.02) continue;
+      if (n[2] < 0.5 || height < 0 || solid.reach === 0 || dot(n, this.eye.front) < 0.02) continue;
       const foot = sum(solid.centre, n, -height);
       const across = cross(n, Math.abs(n[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0]);
       const u = across.map((x) => x / Math.hypot(...across)), v = cross(n, u);
-      const around = outline(solid.half.map((a) => [dot(a, u), dot(a, v)]), solid.radius);
-      this.drawShadow(around.map((c) => sum(sum(foot, u, c[0]), v, c[1])), height, support(solid, n));
+      const around = outline(solid.corners.map((c) => [dot(c, u), dot(c, v)]), solid.radius);
+      this.drawShadow(around.map((c) => sum(sum(foot, u, c[0]), v, c[1])), height, support(solid, back(n)));
     }
   }
 
@@ -113,7 +113,7 @@ class Painter {
   }
 
   drawSolid(solid, planes) {
-    const draw = { ball: "drawBall", capsule: "drawCapsule", box: "drawBox" }[solid.kind];
+    const draw = { ball: "drawBall", capsule: "drawCapsule", polytope: "drawPolytope" }[solid.kind];
     this[draw](solid, planes);
   }
 
@@ -137,7 +137,7 @@ class Painter {
 
   drawCapsule(capsule, planes) {
     const pen = this.pen, [x, y] = this.place(capsule.centre), r = capsule.radius * this.scale;
-    const axis = capsule.half[2], ax = dot(axis, this.eye.right), ay = -dot(axis, this.eye.up), length = Math.hypot(ax, ay);
+    const end = capsule.corners[1], ax = dot(end, this.eye.right), ay = -dot(end, this.eye.up), length = Math.hypot(ax, ay);
     const side = length > 1e-9 * capsule.reach ? [-ay / length, ax / length] : [0, 1];
     const sign = side[1] < 0 || (side[1] === 0 && side[0] < 0) ? -r : r, far = side.map((c) => sign * c);
     const shade = pen.createLinearGradient(x - far[0], y - far[1], x + far[0], y + far[1]);
@@ -155,7 +155,7 @@ class Painter {
 
   silhouette(solid, planes) { // around what is seen, in the plane of its centre; of what stands still, what is above ground
     const { right, up } = this.eye;
-    const points = outline(solid.half.map((a) => [dot(a, right), dot(a, up)]), solid.radius);
+    const points = outline(solid.corners.map((c) => [dot(c, right), dot(c, up)]), solid.radius);
     const around = points.map(([a, b]) => sum(sum(solid.centre, right, a), up, b));
     return solid.fixed ? clip(around, planes) : around;
   }
@@ -169,18 +169,46 @@ class Painter {
     pen.restore();
   }
 
-  drawBox(box, planes) {
-    for (const face of faces(box)) {
-      if (dot(face.normal, this.eye.front) <= 1e-6) continue;
-      const corners = box.fixed ? clip(face.corners, planes) : face.corners;
-      if (corners.length < 3) continue;
-      this.trace(corners);
-      this.pen.closePath();
-      this.pen.fillStyle = mix(box.colour, "#ffffff", 0.08 + 0.5 * Math.max(0, dot(face.normal, LIGHT)));
-      this.pen.fill();
-      this.pen.lineJoin = "round";
-      this.edge(box.colour);
+  drawPolytope(solid, planes) { // the faces that are seen; if it is rounded, as far out as the radius, inside its outline
+    const pen = this.pen, { radius } = solid, around = radius ? this.silhouette(solid, planes) : [];
+    pen.lineJoin = "round";
+    if (radius) this.fill(around, mix(solid.colour, "#ffffff", 0.08));
+    for (const { corners, normal, smooth } of solid.faces.filter((face) => this.sees(face))) {
+      const flat = radius ? corners.map((c) => sum(c, normal, radius)) : corners;
+      const polygon = solid.fixed ? clip(flat, planes) : flat;
+      if (polygon.length < 3) continue;
+      this.fill(polygon, mix(solid.colour, "#ffffff", 0.08 + 0.5 * Math.max(0, dot(normal, LIGHT))));
+      if (!radius && !smooth) this.edge(solid.colour);
+      if (!radius && smooth) this.drawEdges(solid, corners, smooth, planes);
     }
+    if (!radius) return;
+    this.trace(around);
+    pen.closePath();
+    this.edge(solid.colour);
+  }
+
+  sees(face) { return dot(face.normal, this.eye.front) > 1e-6; }
+
+  fill(polygon, colour) {
+    this.trace(polygon);
+    this.pen.closePath();
+    this.pen.fillStyle = colour;
+    this.pen.fill();
+  }
+
+  drawEdges(solid, corners, smooth, planes) { // of a face; where the surface goes on smoothly, only at the outline
+    const pen = this.pen;
+    pen.strokeStyle = pen.fillStyle; // so that no line stays free between faces
+    pen.lineWidth = 1;
+    pen.stroke();
+    pen.lineCap = "round";
+    corners.forEach((corner, k) => {
+      if (smooth[k] >= 0 && this.sees(solid.faces[smooth[k]])) return;
+      const line = [corner, corners[(k + 1) % corners.length]];
+      this.trace(solid.fixed ? clip(line, planes) : line);
+      this.edge(solid.colour);
+    });
+    pen.lineCap = "butt";
   }
 
   edge(colour) {

@@ -40,8 +40,8 @@ function heightAt({ x, y, z }, px, py) { // between the heights of a cell; null 
 
 function shadow(terrain, solid) { // what a solid hides from above, and how high above it is; null for none
   const foot = heightAt(terrain, solid.centre[0], solid.centre[1]), height = solid.centre[2] - foot;
-  if (foot === null || height < 0 || solid.girth === 0) return null;
-  const [x, y] = solid.centre, around = outline(solid.half.map((a) => a.slice(0, 2)), solid.radius);
+  if (foot === null || height < 0 || solid.reach === 0) return null;
+  const [x, y] = solid.centre, around = outline(solid.corners.map((c) => c.slice(0, 2)), solid.radius);
   const points = around.map(([a, b]) => [x + a, y + b, heightAt(terrain, x + a, y + b)]);
   return points.some((p) => p[2] === null) ? null : { points, height };
 }

@@ -1,8 +1,9 @@
-"""Solids say of themselves what their points say: volume, moments of inertia, extent, and the box that is drawn."""
+"""Solids say of themselves what their points say: volume, moments of inertia, extent, and the hull that is drawn."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -16,10 +17,12 @@ SOLIDS = (Sphere(0.3), Box((0.1, 0.2, 0.35)), Capsule(0.15, 0.25))
 def grid(shape: Shape, count: int = 120) -> tuple[NDArray[np.float64], float]:
     """(n, 3) points inside a solid, of a regular grid, and the volume that each stands for.
 
-    Inside is what lies within the radius of the rounded box.
+    Inside is what lies within the radius of the rounded hull, which is here that of a box, a line or a point.
     """
-    radius, half = shape.rounded_box
-    sides = np.array(half) + radius
+    radius, corners = shape.rounded_hull.radius, np.array(shape.rounded_hull.corners)
+    half = corners.max(axis=0)
+    assert sorted(corners.tolist()) == sorted(map(list, product(*({-h, h} for h in half))))
+    sides = half + radius
     points = np.stack(np.meshgrid(*((np.arange(count) + 0.5) / count * 2 - 1 for _ in range(3))), axis=-1)
     points = points.reshape(-1, 3) * sides
     outside = np.maximum(np.abs(points) - half, 0)
