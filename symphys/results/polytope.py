@@ -118,53 +118,24 @@ def find_faces(points: Array) -> list[list[int]]:
     if rank == 2:
         loop = flat_hull(along[:, :2])
         return [loop, loop[::-1]]
-    return wrapped(along / extent)  # a stretch does not change which corners are those of a face
+    return merged(along / extent)  # a stretch does not change which corners are those of a face
 
 
-def wrapped(points: Array) -> list[list[int]]:
-    """The faces of the hull of (k, 3) points of extent 1, by turning a plane about each edge of those found.
+def merged(points: Array) -> list[list[int]]:
+    """The faces of the hull of (k, 3) points of extent 1: what Qhull finds, with one face for all in one plane."""
+    from scipy.spatial import ConvexHull  # takes half a second: late, for those who draw polytopes
 
-    This is the gift wrapping of Chand and Kapur, "An algorithm for convex polytopes", 1970, for all corners of a face
-    at once. Where rounding makes faces that do not fit together, it ends with the largest number of faces there can be.
-    """
-    faces = [first_face(points)]
-    left = set(steps(faces[0]))
-    for face in faces:  # grows meanwhile
-        normal = face_normal(points[face])
-        for a, b in steps(face):
-            if (b, a) not in left and len(faces) < 2 * len(points):
-                faces.append(face_on(points, a, turned(points, a, points[b] - points[a], normal)))
-                left |= set(steps(faces[-1]))
-    return faces
+    planes = ConvexHull(points).equations
+    loops: dict[tuple[int, ...], list[int]] = {}
+    for plane in planes:
+        on = np.flatnonzero(points @ plane[:3] + plane[3] > -COPLANAR)
+        if tuple(on) not in loops:
+            loops[tuple(on)] = face_on(points, on, plane[:3])
+    return list(loops.values())
 
 
-def first_face(points: Array) -> list[int]:
-    """A face at the lowest x: a plane turned first about a line along y, then about the edge or line that it meets."""
-    start = int(points[:, 0].argmin())
-    normal = turned(points, start, np.array([0.0, 1.0, 0.0]), np.array([-1.0, 0.0, 0.0]))
-    arms = points - points[start]
-    touched = (arms @ normal > -COPLANAR) & (np.hypot(arms[:, 0], arms[:, 2]) > COPLANAR)
-    along = arms[np.flatnonzero(touched)[0]]
-    return face_on(points, start, turned(points, start, along, normal))
-
-
-def turned(points: Array, start: int, along: Array, normal: Array) -> Array:
-    """(3,): the normal of a plane that holds all points on its inner side, after it turns about a line in it.
-
-    It turns away from the left side of the line through point ``start``, until it meets points beside the line.
-    """
-    along = along / np.linalg.norm(along)
-    inward = np.cross(normal, along)
-    arms = points - points[start]
-    x, depth = arms @ inward, np.maximum(-arms @ normal, 0.0)
-    angles = np.where(np.hypot(x, depth) > COPLANAR, np.arctan2(depth, x), -1.0)
-    angle = angles.max()
-    return np.asarray(-np.sin(angle) * inward - np.cos(angle) * normal)
-
-
-def face_on(points: Array, start: int, normal: Array) -> list[int]:
-    """The corners of the face in a plane through point ``start``."""
-    on = np.flatnonzero((points - points[start]) @ normal > -COPLANAR)
+def face_on(points: Array, on: Ints, normal: Array) -> list[int]:
+    """The corners of the face with these points, counter-clockwise about its normal."""
     right = np.cross(np.eye(3)[np.abs(normal).argmin()], normal)
     right = right / np.linalg.norm(right)
     flat = np.stack([points[on] @ right, points[on] @ np.cross(normal, right)], axis=1)

@@ -52,7 +52,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "findings": ("json_values", "numpy", "what the numbers of an examination mean"),
     "results": (
         "errors files findings json_values model problem shooting trajectory",
-        "casadi numpy",
+        "casadi numpy scipy",
         "what a run folder holds",
     ),
     "runs": (
