@@ -54,7 +54,7 @@ bench-robots: $(VENV)/.benching  ## jointed robots: what each device of joints b
 	$(BIN)/python benchmarks/robot_growth.py
 	$(BIN)/python benchmarks/robot_kernels.py
 
-bench-walk: $(VENV)/.benching  ## robots that learn to walk, three seeds each; their gaits in situations not seen before (half an hour)
+bench-walk: $(VENV)/.benching  ## robots that learn to walk, three seeds each; their gaits in unseen samples of scenarios (half an hour)
 	$(BIN)/python benchmarks/trot.py
 	$(BIN)/python benchmarks/walking.py
 	$(BIN)/python benchmarks/walking.py quadruped_walk_net
@@ -62,7 +62,7 @@ bench-walk: $(VENV)/.benching  ## robots that learn to walk, three seeds each; t
 	$(BIN)/python benchmarks/building.py
 	$(BIN)/python benchmarks/walk_gradient.py
 
-bench-lessons: $(VENV)/.benching  ## solvers on one walk against time, what situations that differ buy, what each option does (an hour)
+bench-lessons: $(VENV)/.benching  ## solvers on one walk against time, what domain randomization buys, what each option does (an hour)
 	$(BIN)/python benchmarks/race.py quadruped_walk build
 	$(BIN)/python benchmarks/race.py quadruped_walk_net build
 	$(BIN)/python benchmarks/robustness.py build

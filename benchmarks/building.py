@@ -3,7 +3,7 @@
     python benchmarks/building.py [SEEDS]
 
 ``gait_robot_build`` as it is shipped, and with thighs and motors held as they are in the file of the robot; as many
-gradients each. Then both walk in 500 situations that neither has seen.
+gradients each. Then both walk in 500 samples that neither has seen.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ def main() -> None:
         walks = Walks(asked)
         for seed in range(int(sys.argv[1]) if len(sys.argv) > 1 else 3):
             z = learnt(walks.made, seed)
-            drawn = walks.situations.draw(np.random.default_rng(SEED), UNSEEN)
+            drawn = walks.scenario.draw(np.random.default_rng(SEED), UNSEEN)
             speed, upright = walks(z, drawn)
-            merit = walks.situations.value(z[None], drawn, 0.0).objective
+            merit = walks.scenario.value(z[None], drawn, 0.0).objective
             built = {name: round(float(part[0, 0]), 3) for name, part in walks.made.shooting.by_block(z).items()
                      if name.endswith(HARDWARE)}  # fmt: skip
             print(f"  {what}: nominal {speed[0]:.2f} m/s; {UNSEEN} unseen: {speed[upright].mean():.2f} m/s, "

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from robots import SERVO, SOCKETS, JointedScene, Pose, Rotation, block, quadruped, state_of
+from robots import AXES, SERVO, JointedScene, Pose, Rotation, block, quadruped, state_of
 
-from symphys.model.joints import HINGE, Joint, Socket
+from symphys.model.joints import HINGE, Joint, JointFrame
 from symphys.model.shapes import Plane, Sphere
 from symphys.model.world import Body, Law, World, make_world
 
@@ -38,9 +38,9 @@ def hinges(count: int, first: int = 0) -> tuple[Joint, ...]:
     return tuple(Joint(f"j{k}", HINGE, k, k - 1 if k else None, (upper, lower[k])) for k in range(first, count))
 
 
-def hinge_at(x: float, y: float, z: float) -> Socket:
+def hinge_at(x: float, y: float, z: float) -> JointFrame:
     """About y, at a point of the body."""
-    return Socket((x, y, z), SOCKETS["y"])
+    return JointFrame((x, y, z), AXES["y"])
 
 
 def parallelograms(*angles: float) -> JointedScene:

@@ -2,7 +2,7 @@
 
     python benchmarks/lessons.py [ITERATIONS [SEEDS]]
 
-Shorter lessons than the shipped problem's, so that differences show. Then 500 situations that were not seen.
+Shorter lessons than the shipped problem's, so that differences show. Then 500 samples that were not seen.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ CHANGES: dict[str, dict[str, Any]] = {
     "adjoint discount 20": {"adjoint_discount": 20.0},
     "clip inf: plain mean": {"clip": inf},
     "samples 8": {"samples": 8},
-    "width 0: one situation": {"width": 0.0},
+    "width 0: one sample": {"width": 0.0},
     "fallen 1: no more weight": {"fallen": 1.0},
     "validation 0: the last point": {"validation": 0},
     "hold 1: no falling rate": {"hold": 1.0},
@@ -51,7 +51,7 @@ def main() -> None:
             asked = replace(options, **{"iterations": iterations, **values})
             found = SOLVERS["stochastic"].solve(shooting, shooting.start(seed), asked, seed)
             spent = perf_counter() - began
-            unseen = walks.situations.draw(np.random.default_rng(SEED), UNSEEN)
+            unseen = walks.scenario.draw(np.random.default_rng(SEED), UNSEEN)
             speed, upright = walks(found.z, unseen)
             mean = speed[upright].mean() if upright.any() else 0.0
             print(

@@ -3,10 +3,10 @@
     python benchmarks/race.py [PROBLEM [FOLDER [SEEDS]]]
 
 Each solver has the options of the shipped file, so that all take about the same time, but validates from the start.
-What counts is the nominal speed of the point that the solver would keep so far, by its validation in 64 situations. At
-the end each gait walks in 500 situations that none has seen. MuJoCo runs beside ``quadruped_walk``: the robot is the
+What counts is the nominal speed of the point that the solver would keep so far, by its validation in 64 samples. At
+the end each gait walks in 500 samples that none has seen. MuJoCo runs beside ``quadruped_walk``: the robot is the
 same by our exporter, with contacts and servos of its own, 2 ms a step; it is alone, without feedback and without
-situations that differ: ``rollout`` takes commands that are known before.
+samples that differ: ``rollout`` takes commands that are known before.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def raced(walks: Walks, name: str, seed: int) -> Course:
     course = Course(
         NAMES[name], np.array([row.seconds for row in rows]), np.array([row.outputs["speed [m/s]"] for row in rows])
     )
-    speed, upright = walks(found.z, walks.situations.draw(np.random.default_rng(SEED), UNSEEN))
+    speed, upright = walks(found.z, walks.scenario.draw(np.random.default_rng(SEED), UNSEEN))
     marks = ", ".join(f"{mark} m/s after {course.reaches(mark):.0f} s" for mark in MARKS)
     print(
         f"{course.name} seed {seed}: {marks}; after {spent:.0f} s nominal {speed[0]:.2f} m/s, {UNSEEN} unseen "

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from symphys.model.joints import HINGE, Joint, Link, Motor, Servo, Socket, Spring, kinematic_trees
+from symphys.model.joints import HINGE, Joint, JointFrame, Link, Motor, Servo, Spring, kinematic_trees
 from symphys.model.shapes import Plane, Sphere
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Body, Law, World, make_world
@@ -19,8 +19,8 @@ from symphys.model.world import Body, Law, World, make_world
 Array = NDArray[np.float64]
 Values = dict[str, Any]
 HALF = float(np.sqrt(0.5))
-SOCKETS = {"x": (1.0, 0.0, 0.0, 0.0), "y": (HALF, 0.0, 0.0, HALF), "z": (HALF, 0.0, -HALF, 0.0)}
-"""Orientations of sockets whose x axis is that axis of the body."""
+AXES = {"x": (1.0, 0.0, 0.0, 0.0), "y": (HALF, 0.0, 0.0, HALF), "z": (HALF, 0.0, -HALF, 0.0)}
+"""Orientations of frames whose x axis is that axis of the body."""
 HIPS = {"left front": (1, 1), "right front": (1, -1), "left hind": (-1, 1), "right hind": (-1, -1)}
 STANDING = 0.65
 """Height of the trunk's centre above the ground with straight legs [m]."""
@@ -49,8 +49,8 @@ def quadruped(motor: Motor | None = None, spring: Spring | None = None, ground: 
         bodies += leg(name)
         held = (("z", 0, hip, (0, 0, 0)), ("x", base, (0, 0, 0), (0, 0, 0)), ("y", base + 1, (0, 0, 0), (0, 0, 0.15)))
         for k, (axis, parent, above, below) in enumerate((*held, ("y", base + 2, (0, 0, -0.15), (0, 0, 0.15)))):
-            sockets = (Socket(below, SOCKETS[axis]), Socket(above, SOCKETS[axis]))
-            joints.append(Joint(f"{name} {k + 1}", HINGE, base + k, parent, sockets, motor, spring=spring))
+            frames = (JointFrame(below, AXES[axis]), JointFrame(above, AXES[axis]))
+            joints.append(Joint(f"{name} {k + 1}", HINGE, base + k, parent, frames, motor, spring=spring))
     world = make_world(bodies, [Plane.ground()], Law(0.8))
     pairs = tuple(pair for pair in world.pairs if pair.second.body is None) if ground else ()
     return World(world.bodies, world.statics if ground else (), pairs, joints=tuple(joints))
@@ -68,15 +68,15 @@ def chain(count: int = 8, length: float = 0.15, spring: Spring | None = None, mo
     bodies = [Body(f"rod{k}", 0.5, block(0.5, 0.03, 0.03, length)) for k in range(count)]
     joints = []
     for k in range(count):
-        turned = SOCKETS["yx"[k % 2]]
-        sockets = Socket((0, 0, length / 2), turned), Socket((0, 0, -length / 2 if k else 0), turned)
-        joints.append(Joint(f"j{k}", HINGE, k, k - 1 if k else None, sockets, motor, spring=spring))
+        turned = AXES["yx"[k % 2]]
+        frames = JointFrame((0, 0, length / 2), turned), JointFrame((0, 0, -length / 2 if k else 0), turned)
+        joints.append(Joint(f"j{k}", HINGE, k, k - 1 if k else None, frames, motor, spring=spring))
     return World(tuple(bodies), joints=tuple(joints))
 
 
 @dataclass(frozen=True)
 class Pose:
-    """A body or a socket: orientation, (3,) position [m], velocity [m/s] and angular velocity [rad/s], world frame."""
+    """A body or a frame: orientation, (3,) position [m], velocity [m/s] and angular velocity [rad/s], world frame."""
 
     turn: Rotation
     place: Array
@@ -99,7 +99,7 @@ REST = Pose(Rotation.identity(), np.zeros(3), np.zeros(3), np.zeros(3))
 
 
 def turns_of(joint: Joint, q: Sequence[float]) -> Rotation:
-    """From the first side's socket to the second's, at coordinates (n,); of a ball joint they are a rotation vector."""
+    """From the first side's frame to the second's, at coordinates (n,); of a ball joint they are a rotation vector."""
     if joint.kind.name == "ball":
         return Rotation.from_rotvec(q)
     axes = {"hinge": "X", "universal": "YX", "slider": "", "fixed": ""}[joint.kind.name]
@@ -130,12 +130,12 @@ def state_of(world: World, coordinates: Mapping[str, Any], rates: Mapping[str, A
 
 def held(joint: Joint, link: Link, parent: Pose, q: Array, speed: Array) -> Pose:
     """The pose of a link from its parent's."""
-    own, other = joint.sockets if link.sign > 0 else joint.sockets[::-1]
-    at = parent.turn * of_socket(other)
+    own, other = joint.frames if link.sign > 0 else joint.frames[::-1]
+    at = parent.turn * of_frame(other)
     turn = turns_of(joint, q)
-    socket = at * (turn if link.sign > 0 else turn.inv())
-    second = at if link.sign > 0 else socket  # whose axes coordinates count along
-    body = socket * of_socket(own).inv()
+    frame = at * (turn if link.sign > 0 else turn.inv())
+    second = at if link.sign > 0 else frame  # whose axes coordinates count along
+    body = frame * of_frame(own).inv()
     place, velocity = parent.point(other.point)
     spin = parent.spin + link.sign * sum((r * axis for r, axis in swung(joint, second, q, speed)), np.zeros(3))
     if joint.kind.name == "slider":
@@ -145,9 +145,9 @@ def held(joint: Joint, link: Link, parent: Pose, q: Array, speed: Array) -> Pose
     return Pose(body, place - arm, velocity - np.cross(spin, arm), spin)
 
 
-def of_socket(socket: Socket) -> Rotation:
-    """From the socket's axes to the body's."""
-    return Rotation.from_quat(socket.orientation, scalar_first=True)
+def of_frame(frame: JointFrame) -> Rotation:
+    """From the frame's axes to the body's."""
+    return Rotation.from_quat(frame.orientation, scalar_first=True)
 
 
 def swung(joint: Joint, second: Rotation, q: Array, speed: Array) -> Iterator[tuple[float, Array]]:

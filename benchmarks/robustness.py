@@ -1,10 +1,10 @@
-"""Whether a gait that is learnt in situations that differ walks where one that is learnt in a single one falls.
+"""Whether a gait that is learnt under domain randomization walks where one that is learnt in one sample falls.
 
     python benchmarks/robustness.py [FOLDER [SEEDS]]
 
 The conjecture of Degrave et al. Each seed learns ``quadruped_walk`` twice, with the same work of the processor: in
-batches of situations that are drawn anew, and in the problem's own situation alone, a gradient an iteration, which
-costs what eight cost. Then each gait walks in 500 situations that neither has seen, drawn half, once, one and a half
+batches of samples that are drawn anew, and in the problem's own sample alone, a gradient an iteration, which
+costs what eight cost. Then each gait walks in 500 samples that neither has seen, drawn half, once, one and a half
 times and twice as widely as the problem's tables say. It succeeds where it stays within 30 degrees of upright for 10 s
 and keeps 70 % of its own speed.
 """
@@ -30,7 +30,7 @@ from symphys.solvers import SOLVERS
 Array = NDArray[np.float64]
 WIDTHS = (0.5, 1.0, 1.5, 2.0)
 SEEDS, STREAM = 5, 1997
-WAYS = {"varied": "learnt in situations that differ", "nominal": "learnt in one situation"}
+WAYS = {"varied": "learnt under domain randomization", "nominal": "learnt in one sample"}
 
 
 def main() -> None:
@@ -54,13 +54,13 @@ def measured(walks: Walks, way: str, seed: int) -> Array:
     """(widths,) the share that succeeds."""
     options = solver_options(walks.problem, "stochastic")
     if way == "nominal":
-        blocks = options.iterations * options.samples // walks.situations.kernels[0].report.lanes
+        blocks = options.iterations * options.samples // walks.scenario.kernels[0].report.lanes
         options = replace(options, iterations=blocks, samples=1, width=0.0, validation=1, validation_width=0.0)
     shooting = walks.made.shooting
     z = SOLVERS["stochastic"].solve(shooting, shooting.start(seed), options, seed).z
     shares, speeds = [], []
     for k, width in enumerate(WIDTHS):
-        drawn = walks.situations.draw(np.random.default_rng([STREAM, k]), UNSEEN, width)
+        drawn = walks.scenario.draw(np.random.default_rng([STREAM, k]), UNSEEN, width)
         speed, upright = walks(z, drawn)
         shares.append(float((upright & (speed >= LEAST * speed[0])).mean()))
         speeds.append(speed[0])
@@ -79,7 +79,7 @@ def interval(successes: Array, count: int) -> tuple[Array, Array]:
 
 
 def drawn(rates: Mapping[str, Array]) -> Figure:
-    """Success against how widely situations differ."""
+    """Success against how widely samples differ."""
     figure = Figure(figsize=(6.4, 3.6), layout="constrained")
     axes = figure.subplots()
     for (way, each), colour in zip(rates.items(), style.BODIES, strict=False):
@@ -88,7 +88,7 @@ def drawn(rates: Mapping[str, Array]) -> Figure:
             axes.plot(WIDTHS, shares, color=colour, linewidth=0.7, alpha=0.4)
         bars = np.abs(np.stack([low, high]) - each.mean(axis=0))
         axes.errorbar(WIDTHS, each.mean(axis=0), bars, color=colour, linewidth=2, capsize=3, label=WAYS[way])
-    axes.set(xlabel="width of the situations, of the problem's tables", ylabel="share that succeeds", ylim=(0, 1.02))
+    axes.set(xlabel="width of the samples, of the problem's tables", ylabel="share that succeeds", ylim=(0, 1.02))
     axes.set_xticks(WIDTHS)
     axes.legend(frameon=False)
     return figure

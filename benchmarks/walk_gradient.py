@@ -2,7 +2,7 @@
 
     python benchmarks/walk_gradient.py
 
-Gaits of ``quadruped_walk`` with legs that move by so much, in 16 situations each, along 8 random directions. Where
+Gaits of ``quadruped_walk`` with legs that move by so much, in 16 samples each, along 8 random directions. Where
 changes explode there are no differences to compare with, so lengths of gradients are told beside.
 """
 
@@ -16,7 +16,7 @@ from symphys.problems import find
 from symphys.transcription import Transcription, transcribe
 
 Array = NDArray[np.float64]
-STEP, SITUATIONS, DIRECTIONS = 1e-7, 16, 8
+STEP, SAMPLES, DIRECTIONS = 1e-7, 16, 8
 AMPLITUDES = (0.02, 0.05, 0.1, 0.15, 0.2)
 
 
@@ -45,18 +45,18 @@ def gait(made: Transcription, amplitude: float) -> Array:
 
 
 def compared(made: Transcription, z: Array) -> tuple[Array, Array]:
-    """(situations * directions,) relative errors of slopes, and (situations,) lengths of gradients."""
-    situations = made.shooting.scenario
-    assert situations is not None
+    """(samples * directions,) relative errors of slopes, and (samples,) lengths of gradients."""
+    scenario = made.shooting.scenario
+    assert scenario is not None
     rng = np.random.default_rng(0)
-    drawn = situations.draw(rng, SITUATIONS)
-    slopes = situations.gradient(z[None], drawn, 0.0).gradient
+    drawn = scenario.draw(rng, SAMPLES)
+    slopes = scenario.gradient(z[None], drawn, 0.0).gradient
     assert slopes is not None
     errors = []
     for _ in range(DIRECTIONS):
         along = rng.standard_normal(z.size)
         along /= np.linalg.norm(along)
-        high, low = (situations.value((z + sign * STEP * along)[None], drawn, 0.0).merit for sign in (1, -1))
+        high, low = (scenario.value((z + sign * STEP * along)[None], drawn, 0.0).merit for sign in (1, -1))
         difference, slope = (high - low) / (2 * STEP), slopes @ along
         errors.append(np.abs(slope - difference) / np.abs(difference))
     return np.concatenate(errors), np.linalg.norm(slopes, axis=1)

@@ -1,8 +1,8 @@
-"""How a quadruped learns to walk, and what its gait is worth in situations that it has not seen.
+"""How a quadruped learns to walk, and what its gait is worth in samples of scenarios that it has not seen.
 
     python benchmarks/walking.py [PROBLEM [SEEDS]]
 
-Each seed solves the shipped problem; then the gait walks in 500 situations drawn from a stream that nothing else uses,
+Each seed solves the shipped problem; then the gait walks in 500 samples drawn from a stream that nothing else uses,
 at half the time step, with twice the sweeps, and for three times as long. Upright: the torso within 30 degrees at every
 step. Times are of the descent alone, on all cores.
 """
@@ -30,28 +30,28 @@ UNSEEN, SEED, LEAST = 500, 20161105, 0.7
 
 
 class Walks:
-    """Rollouts of a problem in situations: how far the torso comes, and whether it stays upright."""
+    """Rollouts of a problem in samples: how far the torso comes, and whether it stays upright."""
 
     def __init__(self, problem: Problem) -> None:
         """Compile it."""
         made = transcribe(problem, exact=True)
         assert isinstance(made.shooting.scenario, KernelScenarioEvaluator), made.backend.note
-        self.problem, self.made, self.situations = problem, made, made.shooting.scenario
+        self.problem, self.made, self.scenario = problem, made, made.shooting.scenario
         names = [*(f"target {t.name}" for t in problem.targets), *(c.name for c in problem.constraints)]
         self.upright = names.index("stays upright")
 
     def __call__(self, z: Array, drawn: ScenarioSamples) -> tuple[Array, Array]:
         """(count,) mean speed [m/s], and whether upright at every step."""
-        errors = self.situations.value(z[None], drawn, 0.0).errors
-        kernel, rows = self.situations.kernels[0], np.hstack([np.tile(z, (len(drawn.numbers), 1)), drawn.numbers])
+        errors = self.scenario.value(z[None], drawn, 0.0).errors
+        kernel, rows = self.scenario.kernels[0], np.hstack([np.tile(z, (len(drawn.numbers), 1)), drawn.numbers])
         state = kernel.program.discounted.state  # type: ignore[union-attr]
         last = Place(state.offset + self.problem.simulation.steps * state.stride, state.size)
         ends = kernel.trajectory(rows, last, 1, [0.0])[:, 0, 0]
         return ends / self.problem.simulation.duration, errors[:, self.upright] <= 1
 
     def draw(self, count: int) -> ScenarioSamples:
-        """Situations as the tables say, the problem's own first."""
-        return self.situations.draw(np.random.default_rng(SEED), count)
+        """Samples as the tables say, the problem's own first."""
+        return self.scenario.draw(np.random.default_rng(SEED), count)
 
 
 def main() -> None:

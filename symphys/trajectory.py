@@ -47,7 +47,7 @@ class Trajectory:
             most, NaN where another has fewer.
         joint_torque: of motors [N m] or [N]; 0 without one.
         joint_command: commands of motors, in the unit of their kind; 0 without one.
-        joint_separation: distance of the sockets along the directions that a joint locks [m].
+        joint_separation: distance of the frames along the directions that a joint locks [m].
     """
 
     time: Array

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from symphys.model.joints import HINGE, Joint, Socket
+from symphys.model.joints import HINGE, Joint, JointFrame
 from symphys.model.world import Body, World
 
 Array = NDArray[np.float64]
 HALF = float(np.sqrt(0.5))
 ABOUT_Y, ABOUT_Z = (HALF, 0.0, 0.0, HALF), (HALF, 0.0, -HALF, 0.0)
-"""Orientations of sockets whose x axis is that of the body's y, or z."""
+"""Orientations of frames whose x axis is that of the body's y, or z."""
 
 
 def rod(name: str, length: float = 0.5, mass: Any = 1.0) -> Body:
@@ -29,9 +29,9 @@ def chain(count: int, length: float = 0.5, free: bool = False, **each: Any) -> W
     for k in range(count):
         if k == 0 and free:
             continue
-        above = Socket((0, 0, -length / 2 if k else 0), ABOUT_Y)
+        above = JointFrame((0, 0, -length / 2 if k else 0), ABOUT_Y)
         joints.append(
-            Joint(f"j{k}", HINGE, k, k - 1 if k else None, (Socket((0, 0, length / 2), ABOUT_Y), above), **each)
+            Joint(f"j{k}", HINGE, k, k - 1 if k else None, (JointFrame((0, 0, length / 2), ABOUT_Y), above), **each)
         )
     return World(tuple(rod(f"b{k}", length) for k in range(count)), joints=tuple(joints))
 
@@ -52,16 +52,16 @@ def turned(q: Array, vector: Any) -> Array:
 
 
 def separations(world: World, states: dict[str, Array]) -> Array:
-    """(N, joints) [m]: how far the two sockets of each joint are apart."""
+    """(N, joints) [m]: how far the two frames of each joint are apart."""
     found = []
     for joint in world.joints:
         ends = []
-        for index, socket in zip((joint.first, joint.second), joint.sockets, strict=True):
+        for index, frame in zip((joint.first, joint.second), joint.frames, strict=True):
             if index is None:
-                ends.append(np.asarray(socket.point, float)[None])
+                ends.append(np.asarray(frame.point, float)[None])
                 continue
             name = world.bodies[index].name
-            ends.append(states[f"{name}.position"] + turned(states[f"{name}.orientation"], socket.point))
+            ends.append(states[f"{name}.position"] + turned(states[f"{name}.orientation"], frame.point))
         found.append(np.linalg.norm(ends[0] - ends[1], axis=1))
     return np.array(found).T
 

@@ -8,7 +8,19 @@ import numpy as np
 from robots import Pose, state_of
 from scipy.spatial.transform import Rotation
 
-from symphys.model.joints import BALL, FIXED, HINGE, SLIDER, UNIVERSAL, Joint, Kind, Limits, Socket, Spring, TorqueMotor
+from symphys.model.joints import (
+    BALL,
+    FIXED,
+    HINGE,
+    SLIDER,
+    UNIVERSAL,
+    Joint,
+    JointFrame,
+    Kind,
+    Limits,
+    Spring,
+    TorqueMotor,
+)
 from symphys.model.world import Body, World
 
 HELD: tuple[tuple[Kind, int, int | None], ...] = (
@@ -32,11 +44,11 @@ def mixed() -> tuple[World, dict[str, Any]]:
     rng = np.random.default_rng(3)
     joints = []
     for k, (kind, first, second) in enumerate(HELD):
-        sockets = Socket(*placed(rng)), Socket(*placed(rng))
+        frames = JointFrame(*placed(rng)), JointFrame(*placed(rng))
         motor = TorqueMotor(2.0) if kind is HINGE else None
         spring = Spring(3.0, 0.1, 0.2) if kind.coordinates else None
         limits = Limits(-3.0, None) if kind is HINGE else Limits()
-        joints.append(Joint(f"{kind.name}{k}", kind, first, second, sockets, motor, limits, spring))
+        joints.append(Joint(f"{kind.name}{k}", kind, first, second, frames, motor, limits, spring))
     bodies = [Body(f"b{k}", 1 + 0.1 * k, tensor(rng)) for k in range(13)]
     world = World(tuple(bodies), joints=tuple(joints))
     coordinates = {joint.name: rng.uniform(-0.5, 0.5, len(joint.kind.coordinates) or 3) for joint in joints}

@@ -12,15 +12,15 @@ LEGS = ("fl", "fr", "hl", "hr")
 STEPS, DT = 40, 0.05
 UPRIGHT = [1.0, 0.0, 0.0, 0.0]
 TURNED = [float(np.sqrt(0.5)), 0.0, 0.0, float(np.sqrt(0.5))]
-"""The socket's x axis along the body's y."""
+"""The frame's x axis along the body's y."""
 SERVO = {"kind": "servo", "gain": 20, "torque": 30, "velocity": 8}
 
 
 def hinge(name: str, first: str, second: str | None, points: tuple[Any, Any], **more: Any) -> dict[str, Any]:
     """A hinge about the bodies' y axis, as scene.json tells it."""
-    sockets = [{"point": list(point), "orientation": TURNED} for point in points]
+    frames = [{"point": list(point), "orientation": TURNED} for point in points]
     turns = [{"name": "angle", "turns": True}]
-    whole = {"name": name, "kind": "hinge", "first": first, "second": second, "sockets": sockets, "coordinates": turns}
+    whole = {"name": name, "kind": "hinge", "first": first, "second": second, "sockets": frames, "coordinates": turns}
     return {**whole, "limits": [-1.0, 2.0], "motor": SERVO, **more}
 
 

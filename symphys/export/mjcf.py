@@ -42,7 +42,7 @@ from symphys.problem import Problem
 
 Array = NDArray[np.float64]
 APART = 1e-5
-"""[m], [rad]: what of a joint's sockets must not be apart at the start."""
+"""[m], [rad]: what of a joint's frames must not be apart at the start."""
 LISTED = 5
 """Names in a refusal."""
 
@@ -164,10 +164,10 @@ def refusals(start: StartState) -> Iterator[tuple[str, list[str]]]:
     loops = [joint.name for k, joint in enumerate(world.joints) if k not in trees and not joint.soft]
     yield "a joint that closes a loop, where MuJoCo's give way; leave it out", loops
     apart = [world.joints[k].name for k in sorted(trees) if gap(start, world.joints[k].name) > APART]
-    yield "a joint that does not fit its bodies at the start; move them until its sockets meet", apart
+    yield "a joint that does not fit its bodies at the start; move them until its frames meet", apart
 
 
 def gap(start: StartState, joint: str) -> float:
-    """How far the sockets of a joint are apart, or turned, as far as it holds them [m], [rad]."""
+    """How far the frames of a joint are apart, or turned, as far as it holds them [m], [rad]."""
     reading = start.readings[joint]
     return float(max(plain(reading.separation)[0], plain(reading.tilt)[0]))

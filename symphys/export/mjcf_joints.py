@@ -124,8 +124,8 @@ def acting(joint: Joint) -> dict[str, str]:
 
 
 def place(joint: Joint, link: Link) -> str:
-    """The socket's point on the child, in its frame."""
-    return text(joint.sockets[0 if link.sign > 0 else 1].point)
+    """The point of the joint's frame on the child, in the child's frame."""
+    return text(joint.frames[0 if link.sign > 0 else 1].point)
 
 
 def names(joint: Joint) -> list[str]:

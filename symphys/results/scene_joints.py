@@ -13,7 +13,7 @@ from symphys.json_values import Array, Text
 
 
 @dataclass(frozen=True)
-class SceneSocket:
+class SceneJointFrame:
     """Where a joint is on one side, in the frame of the body or the world: ``point`` (3,) [m], ``orientation`` (4,)."""
 
     point: Array = field(default_factory=lambda: np.zeros(3))
@@ -24,7 +24,7 @@ class SceneSocket:
         return {"point": self.point.tolist(), "orientation": self.orientation.tolist()}
 
     @classmethod
-    def from_json(cls, value: object, text: Text = values.name) -> SceneSocket | None:
+    def from_json(cls, value: object, text: Text = values.name) -> SceneJointFrame | None:
         """One side; None if its place is not finite or its orientation none."""
         read = values.record(cls, {"point": None, "orientation": None, **values.table(value)}, text)
         length = float(np.linalg.norm(read.orientation))
@@ -79,7 +79,7 @@ class SceneJoint:
     Attributes:
         name, kind: as in the problem file.
         first, second: names of bodies; ``second`` is empty for the world, which is null in the file.
-        sockets: of the first and of the second.
+        frames: of the first and of the second, ``sockets`` in the file.
         coordinates: in the order of the joint's values.
         lower, upper: bounds of every coordinate, ``limits`` in the file; infinite where there is none, which is null.
         motor: None if nothing drives it.
@@ -89,7 +89,9 @@ class SceneJoint:
     kind: str = ""
     first: str = ""
     second: str = ""
-    sockets: tuple[SceneSocket, ...] = (SceneSocket(), SceneSocket())
+    frames: tuple[SceneJointFrame, ...] = field(
+        default=(SceneJointFrame(), SceneJointFrame()), metadata={"key": "sockets"}
+    )
     coordinates: tuple[SceneCoordinate, ...] = ()
     lower: float = -np.inf
     upper: float = np.inf
@@ -112,7 +114,7 @@ class SceneJoint:
             "kind": self.kind,
             "first": self.first,
             "second": self.second or None,
-            "sockets": [socket.to_json() for socket in self.sockets],
+            "sockets": [frame.to_json() for frame in self.frames],
             "coordinates": [{"name": each.name, "turns": each.turns} for each in self.coordinates],
             "limits": [bound if np.isfinite(bound) else None for bound in (self.lower, self.upper)],
             "motor": None if self.motor is None else self.motor.to_json(),
@@ -120,7 +122,7 @@ class SceneJoint:
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> SceneJoint | None:
-        """A joint; None for one without a name, a body and two sockets."""
+        """A joint; None for one without a name, a body and two frames."""
         entry = values.table(value)
         limits = values.numbers(entry.get("limits"))
         lower, upper = limits if limits.size == 2 else (np.nan, np.nan)
@@ -132,5 +134,5 @@ class SceneJoint:
             upper=np.inf if np.isnan(upper) else float(upper),
             motor=SceneMotor.from_json(entry.get("motor")),
         )
-        whole = len(read.sockets) == len(values.tables(entry.get("sockets"))) == 2
+        whole = len(read.frames) == len(values.tables(entry.get("sockets"))) == 2
         return read if read.name and read.first and whole else None

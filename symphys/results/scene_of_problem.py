@@ -14,7 +14,7 @@ from symphys.model.shapes import Fixture, Plane, Scalar, Shape, Terrain
 from symphys.model.world import Body, World
 from symphys.problem import Problem
 from symphys.results.scene import Scene, SceneBody, SceneFixture, ScenePlane, SceneTerrain, Solid
-from symphys.results.scene_joints import SceneCoordinate, SceneJoint, SceneMotor, SceneSocket
+from symphys.results.scene_joints import SceneCoordinate, SceneJoint, SceneJointFrame, SceneMotor
 from symphys.shooting import Array
 from symphys.trajectory import Trajectory
 
@@ -78,7 +78,7 @@ def make_joint(joint: Joint, bodies: Sequence[str]) -> SceneJoint:
         kind=joint.kind.name,
         first=bodies[joint.first],
         second="" if joint.second is None else bodies[joint.second],
-        sockets=tuple(SceneSocket(plain(socket.point), plain(socket.orientation)) for socket in joint.sockets),
+        frames=tuple(SceneJointFrame(plain(frame.point), plain(frame.orientation)) for frame in joint.frames),
         coordinates=tuple(SceneCoordinate(each.name, each.turns) for each in joint.kind.coordinates),
         lower=bound(joint.limits.lower, -np.inf),
         upper=bound(joint.limits.upper, np.inf),

@@ -13,12 +13,12 @@ from robots import REST, quadruped, state_of
 
 from symphys.export import ExportError, mjcf, mjcf_files
 from symphys.model.heightfield import Heightfield
-from symphys.model.joints import BALL, HINGE, Joint, Limits, Servo, Socket, Spring, TorqueMotor, VelocityMotor
+from symphys.model.joints import BALL, HINGE, Joint, JointFrame, Limits, Servo, Spring, TorqueMotor, VelocityMotor
 from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain
 from symphys.model.world import Body, Law, Pair, World, make_world
 from symphys.problem import load_problem
 
-ARM = Joint("arm", HINGE, 0, None, (Socket((0, 0, 0.5)), Socket()))
+ARM = Joint("arm", HINGE, 0, None, (JointFrame((0, 0, 0.5)), JointFrame()))
 ROD = Body("rod", 2.0, 0.1)
 
 
@@ -34,7 +34,7 @@ def numbers(element: Element | None, key: str) -> list[float]:
 
 def hanging(**more: Any) -> Element:
     """A rod below the world's origin."""
-    joint = Joint("arm", HINGE, 0, None, ARM.sockets, **more)
+    joint = Joint("arm", HINGE, 0, None, ARM.frames, **more)
     return read(World((ROD,), joints=(joint,)), rod__position=[0, 0, -0.5])
 
 
@@ -104,13 +104,13 @@ def test_the_start_is_a_keyframe() -> None:
             make_world([Body.ball("ball", 0.1, 1.0)], [Terrain("hill", Heightfield(((0, 0), (0, 1)), (1, 1)))]),
             "hill: terrain",
         ),
-        (World((ROD,), joints=(Joint("arm", HINGE, 0, None, ARM.sockets, frequency=3),)), "arm: a joint that gives"),
+        (World((ROD,), joints=(Joint("arm", HINGE, 0, None, ARM.frames, frequency=3),)), "arm: a joint that gives"),
         (
-            World((ROD,), joints=(Joint("arm", HINGE, 0, None, (Socket((0, 0, 1)), Socket())),)),
+            World((ROD,), joints=(Joint("arm", HINGE, 0, None, (JointFrame((0, 0, 1)), JointFrame())),)),
             "arm: a joint that does",
         ),
         (
-            World((ROD,), joints=(Joint("a", BALL, 0, None, (Socket(), Socket())), ARM)),
+            World((ROD,), joints=(Joint("a", BALL, 0, None, (JointFrame(), JointFrame())), ARM)),
             "arm: a joint that closes a loop",
         ),
     ],

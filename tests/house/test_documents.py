@@ -51,3 +51,16 @@ def test_paths_that_documents_name_exist(name: str) -> None:
         if not any((base / f"{found}{end}").exists() for base in (ROOT, ROOT / "symphys") for end in ("", ".py"))
     ]
     assert missing == []
+
+
+@pytest.mark.parametrize("name", ["ARCHITECTURE.md", "CONTRIBUTING.md", "docs/glossary.md", "docs/time_step.md"])
+def test_names_that_documents_name_are_those_of_the_code(name: str) -> None:
+    """Of ``module.function`` and ``Class.attribute`` both."""
+    text = (ROOT / name).read_text(encoding="utf-8")
+    rooms = [ROOT / room for room in ("symphys", "solvers", "problems", "tests", "benchmarks")]
+    files = [file for room in rooms for file in room.rglob("*") if file.suffix in (".py", ".toml", ".c", ".h", ".js")]
+    words = {file.stem for file in files} | {"casadi", "numpy", "py", "toml", "json", "md"}
+    for file in files:
+        words |= set(re.findall(r"\w+", file.read_text(encoding="utf-8")))
+    named = re.findall(r"`([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)+)`", text)
+    assert [found for found in named if not words.issuperset(found.split("."))] == []

@@ -57,7 +57,7 @@ def test_files_are_put_in_their_places(load_both: Load) -> None:
     floor, post = world.statics
     assert (floor.normal, floor.offset) == (pytest.approx([0, 0, 1]), 3.4)
     assert post.shape.centre == pytest.approx(np.array([0, 3, 0.5]) + there)
-    assert world.joints[1].sockets[1].point == pytest.approx(np.array([0, 0, 1.5]) + there)
+    assert world.joints[1].frames[1].point == pytest.approx(np.array([0, 0, 1.5]) + there)
     x = initial_state(world, initial)
     for reading in readings(world, x).values():
         assert max(float(reading.separation), float(reading.tilt)) < 1e-9

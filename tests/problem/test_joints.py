@@ -206,13 +206,13 @@ def test_limits_at_one_end(load: Load) -> None:
     ("kind", "x", "y"),
     [(HINGE, [0, 1, 0], None), ("slider = { axis = [1, 0, 1] }", [1, 0, 1], None), (UNIVERSAL, [1, 0, 0], [0, 1, 0])],
 )
-def test_sockets_coincide_at_the_start_along_the_axes(load: Load, kind: str, x: list[float], y: object) -> None:
+def test_frames_coincide_at_the_start_along_the_axes(load: Load, kind: str, x: list[float], y: object) -> None:
     problem = load((LIMITS, ""), (SETS, 'sets = "shin.velocity"'), (HINGE, kind), text=LEG)
     joint = knee(problem)
-    for name, socket in zip(("shin", "thigh"), joint.sockets, strict=True):
+    for name, frame in zip(("shin", "thigh"), joint.frames, strict=True):
         turn = Rotation.from_quat(problem.initial[f"{name}.orientation"], scalar_first=True)
-        assert problem.initial[f"{name}.position"] + turn.apply(socket.point) == pytest.approx([0.1, 0.2, 0.95])
-        axes = (turn * Rotation.from_quat(socket.orientation, scalar_first=True)).as_matrix()
+        assert problem.initial[f"{name}.position"] + turn.apply(frame.point) == pytest.approx([0.1, 0.2, 0.95])
+        axes = (turn * Rotation.from_quat(frame.orientation, scalar_first=True)).as_matrix()
         assert axes[:, 0] == pytest.approx(np.array(x) / np.linalg.norm(x))
         assert y is None or axes[:, 1] == pytest.approx(y)
 
@@ -224,14 +224,14 @@ def test_anchors_stand_for_the_point(load: Load) -> None:
     anchors = f"anchors = [{end.tolist()}, [0, 0, 0.25]]"
     joint = knee(load((BETWEEN, 'between = ["world", "thigh"]'), (POINT, anchors), text=LEG))
     assert (joint.first, joint.second) == (0, None)
-    assert joint.sockets[0].point == (0, 0, 0.25)
-    assert joint.sockets[1].point == pytest.approx(end)
+    assert joint.frames[0].point == (0, 0, 0.25)
+    assert joint.frames[1].point == pytest.approx(end)
 
 
 @pytest.mark.parametrize("kind", ["slider = { axis = [1, 0, 0] }", "fixed = {}"])
 def test_what_does_not_turn_needs_no_point(load: Load, kind: str) -> None:
     joint = knee(load(*BARE, (HINGE, kind), (POINT, ""), text=LEG))
-    assert joint.sockets[0].point == (0, 0, 0)
+    assert joint.frames[0].point == (0, 0, 0)
 
 
 def test_the_bodies_of_a_joint_touch_only_if_they_are_told_to(load: Load, refused: Refused, names: Names) -> None:

@@ -121,7 +121,7 @@ def test_the_table_robot_has_108_rows(robot: Robot) -> None:
     locked = sum(joint.locked for joint in world.joints)
     assert (locked, len([joint for joint in world.joints if joint.driven]), 3 * len(world.pairs)) == (80, 16, 12)
     for leg in LEGS:
-        axes = [plan.sockets[1].orientation for plan in robot("table_robot").parametric.joints if plan.name[:2] == leg]
+        axes = [plan.frames[1].orientation for plan in robot("table_robot").parametric.joints if plan.name[:2] == leg]
         assert len(axes) == 4
 
 

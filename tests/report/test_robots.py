@@ -114,7 +114,7 @@ def test_pivots_and_axes_go_with_the_bodies(load: Load) -> None:
     trajectory, scene = load(turned_leg())
     hip, knee = scene.joints[:2]
     assert np.allclose(position(trajectory, hip, 0), [0.3, 0.2, 0.65])
-    assert np.allclose(on_side(trajectory, knee, 1, knee.sockets[1].point, 0, True), [0, 0.2, 0.65])
+    assert np.allclose(on_side(trajectory, knee, 1, knee.frames[1].point, 0, True), [0, 0.2, 0.65])
     (side, axis), *more = axes_of(hip)
     assert more == []
     assert np.allclose(on_side(trajectory, hip, side, axis, 0, False), [0, 1, 0])
@@ -128,10 +128,10 @@ def test_a_universal_joint_has_two_axes_and_the_world_stands_still(load: Load) -
     joint = hinge("base", "torso", None, ([0, 0, 0], [1, 2, 3]), kind="universal")
     trajectory, scene = load(turned_leg(), {**SCENE, "joints": [joint]})
     (base,) = scene.joints
-    assert np.allclose(on_side(trajectory, base, 1, base.sockets[1].point, 0, True), [1, 2, 3])
+    assert np.allclose(on_side(trajectory, base, 1, base.frames[1].point, 0, True), [1, 2, 3])
     found = [on_side(trajectory, base, side, axis, 0, False) for side, axis in axes_of(base)]
     assert np.allclose(found, [[-1, 0, 0], [0, 1, 0]])
-    assert base.sockets[0].orientation.tolist() == TURNED
+    assert base.frames[0].orientation.tolist() == TURNED
 
 
 def test_poses_of_a_whole_robot_hardly_cover_each_other(load: Load) -> None:

@@ -157,7 +157,7 @@ def test_terrain_is_sampled_along_the_motion(tmp_path: Path) -> None:
 
 
 def test_joints_are_told_with_all_that_a_report_needs(tmp_path: Path) -> None:
-    """Sockets in the frames of the bodies; the motor's bound is that which a variable sets."""
+    """Frames in the frames of the bodies; the motor's bound is that which a variable sets."""
     found = make_scene(problem_of(tmp_path, ARM), {"made": np.array([[12.0]])}).to_json()
     assert found["gravity"] == [0, 0, -5]
     assert [(body["name"], body["mass"]) for body in found["bodies"]] == [("upper", 2.0), ("lower", 1.0)]
@@ -166,7 +166,7 @@ def test_joints_are_told_with_all_that_a_report_needs(tmp_path: Path) -> None:
     assert elbow["motor"] == {"kind": "servo", "gain": 20, "torque": 12, "velocity": 8}
     assert elbow["limits"] == [None, 2]
     assert elbow["coordinates"] == [{"name": "angle", "turns": True}]
-    assert [socket["point"] for socket in elbow["sockets"]] == [[0, 0, 0.5], [0, 0, -0.5]]
+    assert [frame["point"] for frame in elbow["sockets"]] == [[0, 0, 0.5], [0, 0, -0.5]]
     turned = Rotation.from_quat(np.roll(elbow["sockets"][0]["orientation"], -1))
     np.testing.assert_allclose(turned.apply([1, 0, 0]), [0, 1, 0], atol=1e-12)
     assert (shoulder["second"], shoulder["sockets"][1]["point"]) == (None, [0, 0, 0])

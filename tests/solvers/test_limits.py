@@ -115,7 +115,7 @@ def test_the_last_point_of_a_descent_is_validated(name: str) -> None:
 
 
 @pytest.mark.usefixtures("clock")
-def test_cma_in_situations_validates_its_last_mean() -> None:
+def test_cma_on_samples_validates_its_last_mean() -> None:
     options = {"max_seconds": 6.5, "every": 1000, "population": 10}
     found = SOLVERS["cma"].solve(windy(), np.array([3.0, 3.0]), SOLVERS["cma"].Options(**options))
     assert spent(found) and len(found.trace) == 7
@@ -124,7 +124,7 @@ def test_cma_in_situations_validates_its_last_mean() -> None:
 
 @pytest.mark.usefixtures("clock")
 def test_where_the_start_is_kept_the_advice_is_that_of_the_limit() -> None:
-    """There was no time to find better; in situations, and where smoothing leads away from the start."""
+    """There was no time to find better; on samples, and where smoothing leads away from the start."""
     leaps = SOLVERS["stochastic"].Options(max_seconds=1.5, rate=1.0)
     found = SOLVERS["stochastic"].solve(windy(), BEST, leaps)
     assert spent(found) and np.array_equal(found.z, BEST)

@@ -18,7 +18,7 @@ from laboratory import Lab
 from numpy.typing import NDArray
 from repeats import thorough
 
-from symphys.model.joints import HINGE, SLIDER, Joint, Limits, Socket
+from symphys.model.joints import HINGE, SLIDER, Joint, JointFrame, Limits
 from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain
 from symphys.model.world import Body, Law, Scheme, World, make_world
 
@@ -119,7 +119,7 @@ def test_an_impact_on_the_boundary_keeps_its_slope(name: str, cuts: int | None) 
 def coordinate_at_the_end(kind: str) -> ca.Function:
     """(value, rate, limit) -> (a coordinate at the end, its gradient) of a block on a rail, or a rod on a hinge."""
     z, limit = ca.MX.sym("z", 3), ca.SX.sym("limit")
-    joint = Joint("j", SLIDER if kind == "slider" else HINGE, 0, None, (Socket(), Socket()), limits=Limits(None, limit))
+    joint = Joint("j", SLIDER if kind == "slider" else HINGE, 0, None, (JointFrame(),) * 2, limits=Limits(None, limit))
     world = World((Body("a", 1.0, 1.0),), gravity=(0.0, 0.0, 0.0), joints=(joint,))
     lab, zero = Lab(world, Scheme(dt=DT), parameters=[limit]), ca.MX.zeros(2)
     if kind == "slider":

@@ -117,7 +117,7 @@ def random_impact():
     m, r, mu, e = (ca.SX.sym(name) for name in ("m", "r", "mu", "e"))
     bodies = [Body.ball("a", r, m), Body("b", 0.7, (0.02, 0.03, 0.04), (Sphere(0.15, (0.1, 0, 0)), Sphere(0.1)))]
     world = make_world(bodies, [Plane.ground()], Law(mu, e))
-    lab = Lab(world, Scheme(sweeps=30), parameters=[m, r, mu, e])
+    lab = Lab(world, Scheme(), parameters=[m, r, mu, e])
 
     def final(z):
         values = {

@@ -11,7 +11,7 @@ from blocks import turned_by
 from laboratory import Lab
 from textbook import Array, G, about_a_point, differences, final, turn
 
-from symphys.model.joints import BALL, HINGE, Joint, Socket
+from symphys.model.joints import BALL, HINGE, Joint, JointFrame
 from symphys.model.world import Body, Scheme, World
 
 MASS, ARM = 0.5, 0.08
@@ -22,7 +22,7 @@ ABOUT_TIP = (8e-4 + MASS * ARM**2,) * 2 + (5e-4,)
 
 def top(dt: float) -> Lab:
     """Its tip is held at the origin; its axis is its z."""
-    tip = Joint("tip", BALL, 0, None, (Socket((0, 0, -ARM)), Socket()))
+    tip = Joint("tip", BALL, 0, None, (JointFrame((0, 0, -ARM)), JointFrame()))
     return Lab(World((Body("top", MASS, MOMENTS),), joints=(tip,)), Scheme(dt=dt))
 
 
@@ -73,7 +73,7 @@ def test_sleeping_top(share: float) -> None:
     roots = np.roots([a, -1j * c * spin, -weight])
     # turning about the vertical, the axis u = sin(tilt) towards -y turns at the spin
     amounts = np.linalg.solve([[1, 1], roots], [-1j * tilt, spin * tilt])
-    tip = Joint("tip", BALL, 0, None, (Socket((0, 0, -arm)), Socket()))
+    tip = Joint("tip", BALL, 0, None, (JointFrame((0, 0, -arm)), JointFrame()))
     world = World((Body("top", mass, (2.5e-3, 2.5e-3, c)),), joints=(tip,))
     errors = []
     for dt in (0.01, 0.005):
@@ -93,8 +93,8 @@ def gyroscope(dt: float) -> Lab:
     bodies = (Body("arm", 0.1, (1e-4, 1e-4, 1e-5)), Body("wheel", 1.0, (1e-3, 1e-3, 2e-3)))
     axle = tuple(turned_by((0, 1, 0), -np.pi / 2))
     joints = (
-        Joint("pivot", BALL, 0, None, (Socket((0, 0, -0.1)), Socket())),
-        Joint("axle", HINGE, 1, 0, (Socket((0, 0, 0), axle), Socket((0, 0, 0.1), axle))),
+        Joint("pivot", BALL, 0, None, (JointFrame((0, 0, -0.1)), JointFrame())),
+        Joint("axle", HINGE, 1, 0, (JointFrame((0, 0, 0), axle), JointFrame((0, 0, 0.1), axle))),
     )
     return Lab(World(bodies, joints=joints), Scheme(dt=dt))
 
@@ -129,7 +129,7 @@ def test_wheel_on_an_arm(spin: float) -> None:
 def test_spherical_pendulum_precesses() -> None:
     """Airy: small ellipses with half axes a, b turn by 3/8 a b / l^2 of their phase: 3/8 w a b / l^2 [rad/s]."""
     length, a, b, dt, time = 1.0, 0.2, 0.1, 0.01, 10.0
-    string = Joint("string", BALL, 0, None, (Socket((0, 0, length)), Socket()))
+    string = Joint("string", BALL, 0, None, (JointFrame((0, 0, length)), JointFrame()))
     lab = Lab(World((Body("bob", 1.0, 1e-9),), joints=(string,)), Scheme(dt=dt))
     w0 = np.sqrt(G / length)
     q = turned_by((0, 1, 0), -np.arcsin(a))

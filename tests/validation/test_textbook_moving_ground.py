@@ -14,7 +14,7 @@ from linkage import ABOUT_Z
 from repeats import first
 from textbook import Array, G, differences, final
 
-from symphys.model.joints import HINGE, SLIDER, Joint, Socket
+from symphys.model.joints import HINGE, SLIDER, Joint, JointFrame
 from symphys.model.shapes import Box
 from symphys.model.world import Body, Law, Scheme, World, make_world
 
@@ -25,7 +25,7 @@ def turntable(dt: float, mu: float = 0.5) -> Lab:
     """A ball on a heavy plate that turns freely about z; its top at z = 0."""
     plate = Body("plate", 1e3, (1e3, 1e3, 1e3), (Box((2.0, 2.0, 0.1)),))
     world = make_world([plate, Body.ball("b", R, 0.1)], [], Law(mu))
-    axle = Joint("axle", HINGE, 0, None, (Socket((0, 0, 0), ABOUT_Z), Socket((0, 0, -0.1), ABOUT_Z)))
+    axle = Joint("axle", HINGE, 0, None, (JointFrame((0, 0, 0), ABOUT_Z), JointFrame((0, 0, -0.1), ABOUT_Z)))
     return Lab(World(world.bodies, pairs=world.pairs, joints=(axle,)), Scheme(dt=dt))
 
 
@@ -71,8 +71,8 @@ def test_ball_on_a_plank_that_slides(dt: float) -> None:
     m = ca.SX.sym("m")
     bodies = [block("plank", (2.0, 0.5, 0.1), plank), Body.ball("b", R, m)]
     world = make_world(bodies, [], Law(mu))
-    sockets = Socket(), Socket((0, 0, -0.1))
-    rail = Joint("rail", SLIDER, 0, None, sockets)
+    frames = JointFrame(), JointFrame((0, 0, -0.1))
+    rail = Joint("rail", SLIDER, 0, None, frames)
     lab = Lab(World(world.bodies, pairs=world.pairs, joints=(rail,)), Scheme(dt=dt), parameters=[m])
 
     def start(z: Any) -> dict[str, Any]:
@@ -102,7 +102,7 @@ def sled(alpha: float, mu: float, mass: float) -> World:
     top = Box((0.6, 0.3, 0.1), orientation=tuple(turned_by((0, 1, 0), alpha)))
     bodies = [Body("sled", mass, 0.1 * mass, (top,)), block("b", (0.1, 0.1, 0.05))]
     world = among(make_world(bodies, [], Law(mu)), {(0, 1)})
-    return replace(world, joints=(Joint("rail", SLIDER, 0, None, (Socket(), Socket())),))
+    return replace(world, joints=(Joint("rail", SLIDER, 0, None, (JointFrame(), JointFrame())),))
 
 
 @pytest.mark.parametrize("side", [-1, 1])

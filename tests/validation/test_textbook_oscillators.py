@@ -13,7 +13,7 @@ from repeats import first
 from scipy.integrate import solve_ivp
 from textbook import Array, G, differences, final
 
-from symphys.model.joints import BALL, FIXED, HINGE, SLIDER, Joint, Socket, Spring, VelocityMotor
+from symphys.model.joints import BALL, FIXED, HINGE, SLIDER, Joint, JointFrame, Spring, VelocityMotor
 from symphys.model.joints.kind import Kind
 from symphys.model.shapes import Capsule, Plane, Sphere
 from symphys.model.world import Body, Law, Scheme, World, make_world
@@ -29,10 +29,10 @@ def test_spring_and_dry_friction(at: float, dt: float) -> None:
     mass, light, stiffness, mu, time = 1.0, 0.1, 30.0, 0.2, 3.0
     bodies = (Body("carriage", light, 1e-3), Body("p", mass, 0.1, (Sphere(0.05),)))
     world = make_world(bodies, [Plane.ground()], Law(mu))
-    upright = Socket((0, 0, 0), ABOUT_Z)
+    upright = JointFrame((0, 0, 0), ABOUT_Z)
     joints = (
-        Joint("lift", SLIDER, 0, None, (upright, Socket((0, 0, 0.05), ABOUT_Z))),
-        Joint("rail", SLIDER, 1, 0, (Socket(), Socket()), spring=Spring(stiffness)),
+        Joint("lift", SLIDER, 0, None, (upright, JointFrame((0, 0, 0.05), ABOUT_Z))),
+        Joint("rail", SLIDER, 1, 0, (JointFrame(), JointFrame()), spring=Spring(stiffness)),
     )
     lab = Lab(World(world.bodies, world.statics, world.pairs, joints=joints), Scheme(dt=dt))
     start = {"p.position": [at, 0, 0.05], "carriage.position": [0, 0, 0.05]}
@@ -56,10 +56,10 @@ def test_spring_and_dry_friction(at: float, dt: float) -> None:
 def governor(moment: float, dt: float) -> Lab:
     """A bob of 1 kg on a hinge whose arm of 0.4 m is turned about the vertical by a motor."""
     bodies = (Body("shaft", 1.0, 0.1), Body("bob", 1.0, moment))
-    upright = Socket((0, 0, 0), ABOUT_Z)
+    upright = JointFrame((0, 0, 0), ABOUT_Z)
     joints = (
         Joint("motor", HINGE, 0, None, (upright, upright), VelocityMotor(1e6, 100.0)),
-        Joint("pin", HINGE, 1, 0, (Socket((0, 0, 0.4), ABOUT_Y), Socket((0, 0, 0), ABOUT_Y))),
+        Joint("pin", HINGE, 1, 0, (JointFrame((0, 0, 0.4), ABOUT_Y), JointFrame((0, 0, 0), ABOUT_Y))),
     )
     return Lab(World(bodies, joints=joints), Scheme(dt=dt), ["motor.command"])
 
@@ -96,10 +96,10 @@ def test_pendulum_made_of_two(pivot: Kind) -> None:
     """A rod and a bob fixed to its end swing as one: T = 2 pi sqrt(I / (m g d)), small angles (Huygens)."""
     length, tilt, dt, time = 0.5, 0.01, 0.01, 6.0
     bodies = (Body("rod", 1.0, (1 / 48, 1 / 48, 1e-3)), Body("bob", 2.0, 0.01))
-    half = Socket((0, 0, length / 2), ABOUT_Y), Socket((0, 0, -length / 2), ABOUT_Y)
+    half = JointFrame((0, 0, length / 2), ABOUT_Y), JointFrame((0, 0, -length / 2), ABOUT_Y)
     joints = (
-        Joint("pivot", pivot, 0, None, (half[0], Socket((0, 0, 0), ABOUT_Y))),
-        Joint("weld", FIXED, 1, 0, (Socket((0, 0, 0), ABOUT_Y), half[1])),
+        Joint("pivot", pivot, 0, None, (half[0], JointFrame((0, 0, 0), ABOUT_Y))),
+        Joint("weld", FIXED, 1, 0, (JointFrame((0, 0, 0), ABOUT_Y), half[1])),
     )
     lab = Lab(World(bodies, joints=joints), Scheme(dt=dt))
     down, q = -np.array([np.sin(tilt), 0, np.cos(tilt)]), [np.cos(tilt / 2), 0, np.sin(tilt / 2), 0]
@@ -117,7 +117,7 @@ def test_ball_strikes_a_rod_on_a_pivot(e: float, dt: float) -> None:
     mass, length, r, time = 0.5, 1.0, 0.02, 0.12
     rod = Body("rod", 1.0, (1 / 12, 1 / 12, 1e-3), (Capsule(0.01, length / 2),))
     world = make_world([rod, Body.ball("ball", r, mass)], [], Law(0.0, e), (0, 0, 0))
-    pivot = Joint("pivot", HINGE, 0, None, (Socket((0, 0, length / 2), ABOUT_Y), Socket((0, 0, 0), ABOUT_Y)))
+    pivot = Joint("pivot", HINGE, 0, None, (JointFrame((0, 0, length / 2), ABOUT_Y), JointFrame((0, 0, 0), ABOUT_Y)))
     lab = Lab(World(world.bodies, pairs=world.pairs, gravity=(0, 0, 0), joints=(pivot,)), Scheme(dt=dt))
 
     def start(z: Any) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 from textbook import Array, G
 
-from symphys.model.joints import BALL, HINGE, SLIDER, Joint, Limits, Socket, Spring, VelocityMotor
+from symphys.model.joints import BALL, HINGE, SLIDER, Joint, JointFrame, Limits, Spring, VelocityMotor
 from symphys.model.shapes import Plane, Sphere
 from symphys.model.world import Body, Law, Scheme, World, make_world
 
@@ -24,9 +24,14 @@ def kapitza(dt: float) -> Lab:
     """A bob on a light rod of 0.3 m, its pivot on a vertical rail driven at commanded velocities."""
     bodies = (Body("cart", 1.0, 0.1), Body("bob", 0.1, 1e-7))
     rail = Joint(
-        "rail", SLIDER, 0, None, (Socket((0, 0, 0), ABOUT_Z), Socket((0, 0, 0), ABOUT_Z)), VelocityMotor(1e6, 1e3)
+        "rail",
+        SLIDER,
+        0,
+        None,
+        (JointFrame((0, 0, 0), ABOUT_Z),) * 2,
+        VelocityMotor(1e6, 1e3),
     )
-    pin = Joint("pin", HINGE, 1, 0, (Socket((0, 0, -LENGTH), ABOUT_Y), Socket((0, 0, 0), ABOUT_Y)))
+    pin = Joint("pin", HINGE, 1, 0, (JointFrame((0, 0, -LENGTH), ABOUT_Y), JointFrame((0, 0, 0), ABOUT_Y)))
     return Lab(World(bodies, joints=(rail, pin)), Scheme(dt=dt), ["rail.command"])
 
 
@@ -66,8 +71,8 @@ def slow_mode(masses: tuple[float, float], dt: float) -> tuple[float, float]:
     length, tilt, time = 0.5, 1e-3, 2.0
     m1, m2 = masses
     bodies = (Body("a", m1, 1e-9 * m1), Body("b", m2, 1e-9 * m2))
-    up = Socket((0, 0, length))
-    joints = (Joint("top", BALL, 0, None, (up, Socket())), Joint("mid", BALL, 1, 0, (up, Socket())))
+    up = JointFrame((0, 0, length))
+    joints = (Joint("top", BALL, 0, None, (up, JointFrame())), Joint("mid", BALL, 1, 0, (up, JointFrame())))
     squares, modes = eigh(np.diag([m1 + m2, m2]) * G * length, np.array([[m1 + m2, m2], [m2, m2]]) * length**2)
     w, angles = np.sqrt(squares[0]), tilt * modes[:, 0] / np.abs(modes[:, 0]).max()
     start: dict[str, Any] = {}
@@ -107,7 +112,9 @@ def test_carts_on_springs(dt: float) -> None:
     n, stiffness, mass = 4, 40.0, 0.5
     bodies = tuple(Body(f"c{k}", mass, 0.1) for k in range(n))
     joints = tuple(
-        Joint(f"j{k}", SLIDER, k, k - 1 if k else None, (Socket(), Socket((0.2, 0, 0))), spring=Spring(stiffness))
+        Joint(
+            f"j{k}", SLIDER, k, k - 1 if k else None, (JointFrame(), JointFrame((0.2, 0, 0))), spring=Spring(stiffness)
+        )
         for k in range(n)
     )
     lab = Lab(World(bodies, gravity=(0, 0, 0), joints=joints), Scheme(dt=dt))
@@ -133,10 +140,10 @@ def test_hanging_chain_carries_its_weight() -> None:
     outer = float(np.arctan(3 * np.tan(inner)))
     slopes = [-outer, -inner, inner, outer]
     ends = np.cumsum([[0, 0]] + [[length * np.cos(s), length * np.sin(s)] for s in slopes], axis=0)
-    half = Socket((0, 0, -length / 2)), Socket((0, 0, length / 2))
-    joints = [Joint("hook", BALL, 0, None, (half[0], Socket()))]
+    half = JointFrame((0, 0, -length / 2)), JointFrame((0, 0, length / 2))
+    joints = [Joint("hook", BALL, 0, None, (half[0], JointFrame()))]
     joints += [Joint(f"j{k}", BALL, k, k - 1, half) for k in range(1, 4)]
-    joints += [Joint("end", BALL, 3, None, (half[1], Socket((ends[-1][0], 0, ends[-1][1]))))]
+    joints += [Joint("end", BALL, 3, None, (half[1], JointFrame((ends[-1][0], 0, ends[-1][1]))))]
     bodies = tuple(rod(f"b{k}", length) for k in range(4))
     start: dict[str, Any] = {}
     for k, s in enumerate(slopes):
@@ -183,7 +190,7 @@ def test_knee_strikes_its_stop(dt: float) -> None:
     """
     length, w0, bend = 0.5, 3.0, 0.6
     joints = chain(2).joints
-    knee = Joint("j1", HINGE, 1, 0, joints[1].sockets, limits=Limits(upper=0.0))
+    knee = Joint("j1", HINGE, 1, 0, joints[1].frames, limits=Limits(upper=0.0))
     lab = Lab(World(chain(2).bodies, gravity=(0, 0, 0), joints=(joints[0], knee)), Scheme(dt=dt))
     start = hanging(2, [0.0, -bend])
     start |= {"b1.angular_velocity": [0, w0, 0]}

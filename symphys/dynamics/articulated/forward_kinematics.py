@@ -36,7 +36,7 @@ class JointStart:
 
     Attributes:
         arms: (3,) from the centres of mass of the parent, or the world's origin, and of the link's body.
-        apart: (3,) from the second socket to the first, as far as it is free.
+        apart: (3,) from the second frame to the first, as far as it is free.
         axes: (3, count) about or along which coordinates move the first side.
         righting: (4,) the rotation of the first side that brings back what is locked, to second order in its error.
     """

@@ -43,7 +43,7 @@ def floating(place: Expr) -> Expr:
 
 
 def joint_point(frames: JointFrames, t: Expr) -> Expr:
-    """(3,): midway between both sockets; at the first one's for what slides."""
+    """(3,): midway between both frames; at the first one's for what slides."""
     first, second = (c + a for c, a in zip(frames.centres, frames.arms, strict=True))
     if frames.joint.kind.slides is not None:
         return first.at(t)

@@ -1,4 +1,4 @@
-"""Where the sockets of a joint are during a substep, and the directions that follow."""
+"""Where the frames of a joint are during a substep, and the directions that follow."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Expr = Any
 
 @dataclass(frozen=True)
 class JointFrames:
-    """The paths of both sockets' points and axes; arms from the centres of mass, the world's from its origin."""
+    """The paths of both frames' points and axes; arms from the centres of mass, the world's from its origin."""
 
     joint: Joint
     centres: tuple[Parabola, Parabola]
@@ -29,20 +29,20 @@ class JointFrames:
     axes: tuple[tuple[Parabola, ...], tuple[Parabola, ...]]
 
     def placed(self, t: Expr) -> PlacedFrames:
-        """Both sockets at time t."""
+        """Both frames at time t."""
         a, b = (ca.horzcat(*(axis.at(t) for axis in axes)) for axes in self.axes)
         first, second = (centre + arm for centre, arm in zip(self.centres, self.arms, strict=True))
         return PlacedFrames(a, b, (first - second).at(t))
 
     def lever_arms(self, t: Expr) -> tuple[Expr, Expr]:
-        """(3,) each: from the centres of mass to the sockets; to the first one's for what slides."""
+        """(3,) each: from the centres of mass to the frames; to the first one's for what slides."""
         first, second = self.arms[0].at(t), self.arms[1].at(t)
         if self.joint.kind.slides is not None:
             second += self.placed(t).apart
         return first, second
 
     def common_arms(self, t: Expr) -> tuple[Expr, Expr]:
-        """(3,) each: to one point for both, midway between the sockets, so that impulses make no spin."""
+        """(3,) each: to one point for both, midway between the frames, so that impulses make no spin."""
         first, second = self.lever_arms(t)
         if self.joint.kind.slides is not None:
             return first, second
@@ -50,7 +50,7 @@ class JointFrames:
         return first - half, second + half
 
     def terms(self, motions: Motions, seen: Expr, given: Expr) -> tuple[BodyTerm, ...]:
-        """The bodies of constraints that see the sockets at one time and give impulses at another."""
+        """The bodies of constraints that see the frames at one time and give impulses at another."""
         arms, impulse_arms = self.lever_arms(seen), self.common_arms(given)
         return tuple(
             BodyTerm(
@@ -67,24 +67,24 @@ class JointFrames:
 
 @traced
 def joint_frames(joint: Joint, motions: Motions) -> JointFrames:
-    """The sockets of a joint whose bodies have these motions."""
+    """The frames of a joint whose bodies have these motions."""
     return joint_frames_on(joint, [motion.predicted_path() for motion in motions])
 
 
 def joint_frames_on(joint: Joint, body_paths: Sequence[PredictedPath]) -> JointFrames:
-    """The sockets of a joint whose bodies have these paths."""
+    """The frames of a joint whose bodies have these paths."""
     body_paths = [*body_paths, *([at_rest(body_paths[0].dt)] if joint.second is None else [])]
     axes = []
-    for body_path, socket in zip(body_paths, joint.sockets, strict=True):
-        turned = rotation.matrix(ca.SX(ca.vertcat(*socket.orientation)))
+    for body_path, frame in zip(body_paths, joint.frames, strict=True):
+        turned = rotation.matrix(ca.SX(ca.vertcat(*frame.orientation)))
         axes.append(tuple(body_path.arm(tuple(turned[i, j] for i in range(3))) for j in range(3)))
     centres = body_paths[0].centre(), body_paths[1].centre()
-    arms = body_paths[0].arm(joint.sockets[0].point), body_paths[1].arm(joint.sockets[1].point)
+    arms = body_paths[0].arm(joint.frames[0].point), body_paths[1].arm(joint.frames[1].point)
     return JointFrames(joint, centres, arms, (axes[0], axes[1]))
 
 
 def joint_frames_at(joint: Joint, poses: tuple[tuple[Expr, Expr], ...]) -> JointFrames:
-    """The sockets of a joint whose bodies are at these positions and orientations."""
+    """The frames of a joint whose bodies are at these positions and orientations."""
     zero = ca.SX.zeros(3)
     return joint_frames_on(
         joint, [PredictedPath(p, rotation.matrix(q), zero, zero, zero, zero, ca.SX(0)) for p, q in poses]

@@ -26,7 +26,7 @@ class LockConstraint:
         softness: (n,) gamma of a joint that is soft, 0 if rigid.
         target: (n,) velocities that the constraint asks for [m/s], [rad/s].
         error: (n,) [m], [rad] at the start of the substep.
-        axes: (3, 3) of the first socket at the start. Forces on a point are stored along these, so that they turn with
+        axes: (3, 3) of the first frame at the start. Forces on a point are stored along these, so that they turn with
             the body: a rod's pull stays along the rod.
         same: whether both bodies are of one tree of joints.
     """

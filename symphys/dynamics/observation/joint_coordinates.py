@@ -26,7 +26,7 @@ class Reading:
     Attributes:
         value, rate: (k,).
         torque: (k,) of the motor in the step before, [N m] or [N]; zeros without a motor.
-        separation: how far the sockets are apart, as far as the joint holds them together [m].
+        separation: how far the frames are apart, as far as the joint holds them together [m].
         tilt: how far they are turned against each other, as far as it holds that [rad].
     """
 

@@ -3,7 +3,7 @@
 from symphys.model.joints.ball import BALL
 from symphys.model.joints.fixed import FIXED
 from symphys.model.joints.hinge import HINGE
-from symphys.model.joints.joint import Joint, Limits, Socket, Spring
+from symphys.model.joints.joint import Joint, JointFrame, Limits, Spring
 from symphys.model.joints.kind import Coordinate, Kind, PlacedFrames
 from symphys.model.joints.kinematic_tree import KinematicTree, Link, carriers, kinematic_trees, tree_joints
 from symphys.model.joints.motor import Motor, Servo, TorqueMotor, VelocityMotor
@@ -21,6 +21,7 @@ __all__ = [
     "UNIVERSAL",
     "Coordinate",
     "Joint",
+    "JointFrame",
     "Kind",
     "KinematicTree",
     "Limits",
@@ -28,7 +29,6 @@ __all__ = [
     "Motor",
     "PlacedFrames",
     "Servo",
-    "Socket",
     "Spring",
     "TorqueMotor",
     "VelocityMotor",

@@ -1,4 +1,4 @@
-"""A fixed joint: both sockets stay together, point and axes."""
+"""A fixed joint: both frames stay together, point and axes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A hinge: the first side turns about the x axis of the sockets."""
+"""A hinge: the first side turns about the x axis of the frames."""
 
 from __future__ import annotations
 

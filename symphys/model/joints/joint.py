@@ -16,12 +16,12 @@ Vector = Sequence[Any]
 
 
 @dataclass(frozen=True)
-class Socket:
+class JointFrame:
     """A point with axes on one side of a joint.
 
     Attributes:
         point: (3,) [m] from the centre of mass, body frame; of the world: world frame.
-        orientation: (4,) unit quaternion w x y z from the socket's axes to the body's, or the world's.
+        orientation: (4,) unit quaternion w x y z from the frame's axes to the body's, or the world's.
     """
 
     point: Vector = (0.0, 0.0, 0.0)
@@ -53,7 +53,7 @@ class Joint:
         name: how states, commands and formulas refer to it.
         kind: what it locks.
         first, second: indices of bodies; second None: the world. Coordinates are those of the first against the second.
-        sockets: of the first and of the second.
+        frames: of the first and of the second.
         motor, limits, spring: along every coordinate.
         frequency, damping: [Hz] and damping ratio of a joint that is soft (Catto, GDC 2011); 0 is a rigid one.
     """
@@ -62,7 +62,7 @@ class Joint:
     kind: Kind
     first: int
     second: int | None
-    sockets: tuple[Socket, Socket]
+    frames: tuple[JointFrame, JointFrame]
     motor: Motor | None = None
     limits: Limits = Limits()
     spring: Spring | None = None

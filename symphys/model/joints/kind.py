@@ -1,7 +1,7 @@
 """A kind of joint as data: what it locks, and which coordinates are left.
 
-Each side carries a socket, a point with three axes. ``a`` are the axes of the first side's socket, ``b`` those of the
-second's: columns of (3, 3), world frame. At coordinates 0 the sockets coincide.
+Each side carries a frame, a point with three axes. ``a`` are the axes of the first side's frame, ``b`` those of the
+second's: columns of (3, 3), world frame. At coordinates 0 the frames coincide.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ Expr = Any
 
 @dataclass(frozen=True)
 class PlacedFrames:
-    """Both sockets of a joint in the world.
+    """Both frames of a joint in the world.
 
     Attributes:
-        a, b: (3, 3) axes of the first and of the second side's socket.
-        apart: (3,) [m] from the second socket to the first.
+        a, b: (3, 3) axes of the first and of the second side's frame.
+        apart: (3,) [m] from the second frame to the first.
     """
 
     a: Expr
@@ -35,7 +35,7 @@ class Coordinate:
     Attributes:
         name: ``angle`` or ``position``; with a number where there are two.
         turns: whether it is a rotation [rad], else a displacement [m].
-        value: of the placed sockets.
+        value: of the placed frames.
         axis: (3,) unit vector, world frame: about which, or along which, the first side moves as the value grows.
         fixed_in_first: whether the axis moves with the first side, else with the second.
     """
@@ -53,8 +53,8 @@ class Kind:
 
     Attributes:
         name: in problem files.
-        slides: axes of the second socket along which the first may not move; None: it may not move at all.
-        turns: pairs (i, j): axis i of the first socket stays perpendicular to axis j of the second. A free rotation
+        slides: axes of the second frame along which the first may not move; None: it may not move at all.
+        turns: pairs (i, j): axis i of the first frame stays perpendicular to axis j of the second. A free rotation
             less for each.
         coordinates: what is left.
     """

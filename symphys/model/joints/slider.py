@@ -1,4 +1,4 @@
-"""A slider: the first side moves along the x axis of the sockets and does not turn."""
+"""A slider: the first side moves along the x axis of the frames and does not turn."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ class BodyDisplacement:
 def forward_kinematics(joints: Sequence[ParametricJoint], initial: Mapping[str, Array], faults: Faults) -> State:
     """The state at the start with every joint at its ``start``; see ``Problem.initial``.
 
-    Sockets are where the bodies lie in the file. A joint with a start moves its second body in the table, and its
+    Joint frames are where the bodies lie in the file. A joint with a start moves its second body in the table, and its
     subtree, as one; if the world holds that side, it moves the other side, the other way. Since a joint changes
     nothing within either side, the order of joints does not matter.
 
@@ -85,7 +85,7 @@ def move(joint: ParametricJoint, tree: Tree, state: State) -> None:
     if WORLD in moved:
         moved, base, sign = subtree(base, joint, tree), joint.first, -1.0
     for coordinate, value in zip(joint.kind.coordinates, joint.start, strict=True):
-        placed, pivot = sockets(joint, state)
+        placed, pivot = placed_frames(joint, state)
         axis, angle = np.asarray(coordinate.axis(placed), float), sign * value * coordinate.turns
         motion = BodyDisplacement(
             pivot=pivot,
@@ -108,13 +108,13 @@ def subtree(start: str, cut: ParametricJoint, tree: Tree) -> list[str]:
     return list(found)
 
 
-def sockets(joint: ParametricJoint, state: State) -> tuple[PlacedFrames, Array]:
-    """Both sockets in the world, and (3,) [m] where the second is."""
+def placed_frames(joint: ParametricJoint, state: State) -> tuple[PlacedFrames, Array]:
+    """Both frames of a joint in the world, and (3,) [m] where the second is."""
     axes, points = [], []
-    for name, socket in zip((joint.first, joint.second or WORLD), joint.sockets, strict=True):
+    for name, frame in zip((joint.first, joint.second or WORLD), joint.frames, strict=True):
         lies = pose(name, state)
-        axes.append(lies.axes @ np.array(rotation.matrix(np.array(socket.orientation)), float))
-        points.append(lies.to_world(np.array(socket.point)))
+        axes.append(lies.axes @ np.array(rotation.matrix(np.array(frame.orientation)), float))
+        points.append(lies.to_world(np.array(frame.point)))
     return PlacedFrames(axes[0], axes[1], points[0] - points[1]), points[1]
 
 

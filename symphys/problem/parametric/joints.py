@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import TypeVar
 
-from symphys.model.joints import Joint, Kind, Limits, Motor, Socket, Spring
+from symphys.model.joints import Joint, JointFrame, Kind, Limits, Motor, Spring
 from symphys.problem.parametric.parts import Numbers, PairRule, Value
 
 WORLD = "world"
@@ -21,7 +21,7 @@ class ParametricJoint:
         name: unique among bodies, static surfaces, joints and variables.
         kind: what it locks.
         first, second: names of the body whose coordinates count and of what they are measured against; None: the world.
-        sockets: of the first and of the second.
+        frames: of the first and of the second.
         motor, limits, spring: along every coordinate.
         frequency: [Hz] of a joint that gives way; 0: rigid.
         damping: its damping ratio.
@@ -33,7 +33,7 @@ class ParametricJoint:
     kind: Kind
     first: str
     second: str | None
-    sockets: tuple[Socket, Socket]
+    frames: tuple[JointFrame, JointFrame]
     motor: Motor | None
     limits: Limits
     spring: Spring | None
@@ -58,7 +58,7 @@ class ParametricJoint:
         """Parameter names and values: those of motor and spring, and the anchor."""
         parts = [part for part in (self.motor, self.spring) if part is not None]
         found = {f"{self.name}.{key}": getattr(part, key) for part in parts for key in given(part)}
-        return found | {self.anchor: self.sockets[1].point}
+        return found | {self.anchor: self.frames[1].point}
 
     def valued(self, places: Mapping[str, int], value: Value) -> Joint:
         """The joint with its parameters' values; ``places`` has the indices of bodies."""
@@ -67,7 +67,7 @@ class ParametricJoint:
             kind=self.kind,
             first=places[self.first],
             second=None if self.second is None else places[self.second],
-            sockets=(self.sockets[0], replace(self.sockets[1], point=value(self.anchor))),
+            frames=(self.frames[0], replace(self.frames[1], point=value(self.anchor))),
             motor=None if self.motor is None else self._valued(self.motor, value),
             limits=self.limits,
             spring=None if self.spring is None else self._valued(self.spring, value),

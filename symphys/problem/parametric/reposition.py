@@ -53,7 +53,7 @@ def shift(joint: ParametricJoint, anchor: Expr, tree: Tree, state: dict[str, Exp
     moved, stays, sign = subtree(joint.first, joint, tree), base, 1.0
     if WORLD in moved:
         moved, stays, sign = subtree(base, joint, tree), joint.first, -1.0
-    by = sign * (anchor - ca.DM(joint.sockets[1].point))
+    by = sign * (anchor - ca.DM(joint.frames[1].point))
     if base != WORLD:
         by = ca.mtimes(rotation.matrix(state[f"{base}.orientation"]), by)
     for body in moved:

@@ -1,4 +1,4 @@
-"""Where the sockets of a joint are: from its point or anchors, its axes, and the bodies' start."""
+"""Where the frames of a joint are: from its point or anchors, its axes, and the bodies' start."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.maths import rotation
-from symphys.model.joints import Socket
+from symphys.model.joints import JointFrame
 from symphys.problem.parametric.joints import WORLD
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.joints import JointTable
@@ -37,9 +37,9 @@ class Pose:
         return np.asarray(self.position + self.axes @ point)
 
 
-def read_sockets(
+def read_joint_frames(
     place: Place, table: JointTable, initial: Mapping[str, Array], faults: Faults
-) -> tuple[Socket, Socket]:
+) -> tuple[JointFrame, JointFrame]:
     """Of the second body in the table, whose coordinates count, then of the first; they coincide at the start.
 
     Args:
@@ -51,7 +51,8 @@ def read_sockets(
     poses = [pose(name, initial) for name in reversed(table.between)]
     points, axes = read_points(place, table, poses, faults), read_axes(place, table, faults)
     first, second = (
-        Socket(tuple(point.tolist()), quaternion(pose.axes.T @ axes)) for point, pose in zip(points, poses, strict=True)
+        JointFrame(tuple(point.tolist()), quaternion(pose.axes.T @ axes))
+        for point, pose in zip(points, poses, strict=True)
     )
     return first, second
 
@@ -91,7 +92,7 @@ def check_meeting(place: Place, places: Sequence[Array], faults: Faults) -> None
 
 
 def read_axes(place: Place, table: JointTable, faults: Faults) -> Array:
-    """(3, 3): the axes of both sockets at the start as columns, world frame."""
+    """(3, 3): the axes of both frames at the start as columns, world frame."""
     if table.universal is not None:
         return universal_axes((*place, "universal", "axes"), table.universal.axes, faults)
     for key, single in (("hinge", table.hinge), ("slider", table.slider)):

@@ -12,7 +12,7 @@ from symphys.model.joints import KINDS, Kind, Limits, Motor, Servo, Spring, Torq
 from symphys.problem.parametric.joints import WORLD, ParametricJoint
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.joints import JointTable, MotorTable, SpringTable
-from symphys.problem.tables.joint_frames import read_sockets
+from symphys.problem.tables.joint_frames import read_joint_frames
 from symphys.suggest import hint, quote
 
 Array = NDArray[np.float64]
@@ -95,7 +95,7 @@ class JointReader:
             kind=kind,
             first=first,
             second=second,
-            sockets=read_sockets(self.place, table, self.initial, self.faults),
+            frames=read_joint_frames(self.place, table, self.initial, self.faults),
             motor=self.motor(table.motor),
             limits=limits,
             spring=read_spring(table.spring),

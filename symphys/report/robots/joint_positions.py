@@ -16,7 +16,7 @@ from symphys.results.scene_joints import SceneJoint
 from symphys.trajectory import Array, Trajectory
 
 AXES = {"hinge": ((0, 0),), "slider": ((1, 0),), "universal": ((1, 1), (0, 0))}
-"""Which axes of a joint are drawn: (side, axis of that side's socket)."""
+"""Which axes of a joint are drawn: (side, axis of that side's frame)."""
 SQUARE = ("slider", "fixed")
 """Kinds whose mark is a square."""
 BAR = 0.065
@@ -40,12 +40,12 @@ def drawable(trajectory: Trajectory, scene: Scene) -> list[SceneJoint]:
 
 def position(trajectory: Trajectory, joint: SceneJoint, shot: int) -> Array:
     """(3,) [m]: the point of the first side."""
-    return on_side(trajectory, joint, 0, joint.sockets[0].point, shot, True)
+    return on_side(trajectory, joint, 0, joint.frames[0].point, shot, True)
 
 
 def axes_of(joint: SceneJoint) -> list[tuple[int, Array]]:
     """The axes that are drawn: the side that carries each, and its direction (3,) in that side's frame."""
-    return [(side, turn(joint.sockets[side].orientation, np.eye(3)[k])) for side, k in AXES.get(joint.kind, ())]
+    return [(side, turn(joint.frames[side].orientation, np.eye(3)[k])) for side, k in AXES.get(joint.kind, ())]
 
 
 def bones(trajectory: Trajectory, scene: Scene, shot: int) -> Iterator[tuple[int, Array]]:
@@ -53,7 +53,7 @@ def bones(trajectory: Trajectory, scene: Scene, shot: int) -> Iterator[tuple[int
     for joint in drawable(trajectory, scene):
         for side, name in enumerate(joint.bodies):
             body = trajectory.body_names.index(name)
-            end = on_side(trajectory, joint, side, joint.sockets[side].point, shot, True)
+            end = on_side(trajectory, joint, side, joint.frames[side].point, shot, True)
             yield body, np.array([trajectory.position[shot, body], end])
     for body in linked(trajectory, scene):
         for solid in scene.solids(trajectory.body_names[body]):

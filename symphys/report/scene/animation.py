@@ -157,8 +157,8 @@ def joint_data(trajectory: Trajectory, scene: Scene) -> list[dict[str, object]]:
     return [
         {
             "sides": [
-                {"body": index[name], "point": socket.point.round(6).tolist()}
-                for name, socket in zip((joint.first, joint.second), joint.sockets, strict=True)
+                {"body": index[name], "point": frame.point.round(6).tolist()}
+                for name, frame in zip((joint.first, joint.second), joint.frames, strict=True)
             ],
             "axes": [[side, direction.round(6).tolist()] for side, direction in axes_of(joint)],
             "square": joint.kind in SQUARE,

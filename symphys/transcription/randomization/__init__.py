@@ -1,4 +1,4 @@
-"""Situations that differ: numbers and poses that are drawn, behind z in the vector of a kernel."""
+"""Samples of scenarios: numbers and poses that are drawn, behind z in the vector of a kernel."""
 
 from symphys.transcription.randomization.transcription import with_scenarios
 

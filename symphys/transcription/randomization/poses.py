@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from symphys.dynamics.observation import gap_function
 from symphys.model.state_layout import GIVEN, initial_state
 from symphys.problem import Problem, RandomizedPose, VariableSlot
-from symphys.problem.parametric.forward_kinematics import sockets, spanning_tree, subtree
+from symphys.problem.parametric.forward_kinematics import placed_frames, spanning_tree, subtree
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.transcription.randomization.numbers import hidden
 
@@ -74,7 +74,7 @@ class Hinge:
         """Axis and pivot in the frame of the body that stays."""
         assert joint.second is not None, "a robot hangs on nothing"
         self.base, self.moved = joint.second, moved
-        placed, pivot = sockets(joint, initial)
+        placed, pivot = placed_frames(joint, initial)
         still = rotations(initial[f"{self.base}.orientation"]).inv()
         (coordinate,) = joint.kind.coordinates
         self.axis = still.apply(np.asarray(coordinate.axis(placed), float).ravel())

@@ -7,7 +7,7 @@ import pytest
 from laboratory import Lab
 from linkage import ABOUT_Y, Array
 
-from symphys.model.joints import HINGE, Joint, Socket
+from symphys.model.joints import HINGE, Joint, JointFrame
 from symphys.model.shapes import Capsule, Plane
 from symphys.model.world import Body, Scheme, World, make_world
 
@@ -18,7 +18,7 @@ def standing(cuts: int, ground: bool, pivot: float = PIVOT, time_of_impact: bool
     """A rod that stands on a hinge at this height, which turns about y."""
     rod = Body("rod", 1.0, (0.02, 0.02, 0.001), (Capsule(0.03, 0.2),))
     made = make_world([rod], [Plane.ground()] if ground else [])
-    joint = Joint("pivot", HINGE, 0, None, (Socket((0, 0, -ARM), ABOUT_Y), Socket((0, 0, pivot), ABOUT_Y)))
+    joint = Joint("pivot", HINGE, 0, None, (JointFrame((0, 0, -ARM), ABOUT_Y), JointFrame((0, 0, pivot), ABOUT_Y)))
     scheme = Scheme(dt=0.01, cuts=cuts, time_of_impact=time_of_impact)
     return Lab(World(made.bodies, made.statics, made.pairs, joints=(joint,)), scheme)
 

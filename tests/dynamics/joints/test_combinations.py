@@ -13,12 +13,12 @@ from linkage import Array, momenta
 from scipy.spatial.transform import Rotation
 
 from symphys.dynamics.observation.joint_coordinates import reading_function
-from symphys.model.joints import KINDS, Joint, Socket
+from symphys.model.joints import KINDS, Joint, JointFrame
 from symphys.model.world import Body, Scheme, World
 
 ROOTS = (None, *KINDS)
 TURN = tuple(Rotation.from_euler("xyz", [0.4, -0.7, 0.9]).as_quat(scalar_first=True))
-"""Of sockets, so that no axis is a body's."""
+"""Of frames, so that no axis is a body's."""
 
 
 def tree(root: str | None, kinds: tuple[str, ...], branched: bool) -> tuple[World, dict[str, Any]]:
@@ -26,14 +26,14 @@ def tree(root: str | None, kinds: tuple[str, ...], branched: bool) -> tuple[Worl
 
     ``root``: the kind that holds the first body to the world; None for none.
     """
-    joints = [] if root is None else [Joint("root", KINDS[root], 0, None, (Socket((0, 0.1, 0.2), TURN),) * 2)]
+    joints = [] if root is None else [Joint("root", KINDS[root], 0, None, (JointFrame((0, 0.1, 0.2), TURN),) * 2)]
     start: dict[str, Any] = {"b0.position": np.zeros(3)}
     for k, kind in enumerate(kinds, 1):
         above, y = (0, 0.1 * (-1) ** k) if branched else (k - 1, 0.1)
-        sockets = Socket((0.02, -y, 0.2), TURN), Socket((0, y, -0.2), TURN)
+        frames = JointFrame((0.02, -y, 0.2), TURN), JointFrame((0, y, -0.2), TURN)
         # every other joint is held by its second side, so that both signs occur
         first, second = (k, above) if k % 2 else (above, k)
-        joints.append(Joint(f"j{k}", KINDS[kind], first, second, sockets if k % 2 else sockets[::-1]))
+        joints.append(Joint(f"j{k}", KINDS[kind], first, second, frames if k % 2 else frames[::-1]))
         start[f"b{k}.position"] = start[f"b{above}.position"] + [-0.02, 2 * y, -0.4]
     bodies = tuple(Body(f"b{k}", 1.0 + k, (0.01, 0.02, 0.025)) for k in range(len(kinds) + 1))
     return World(bodies, gravity=(3.0, 0, -9.0) if root else (0, 0, 0), joints=tuple(joints)), start

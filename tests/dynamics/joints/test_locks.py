@@ -11,7 +11,7 @@ from laboratory import Lab
 from linkage import ABOUT_Y, Array, chain, energy, hanging, momenta, rod, separations
 from scipy.spatial.transform import Rotation
 
-from symphys.model.joints import KINDS, Joint, Servo, Socket
+from symphys.model.joints import KINDS, Joint, JointFrame, Servo
 from symphys.model.world import Body, Scheme, World
 
 G = 9.81
@@ -21,13 +21,13 @@ DOF = {"ball": 3, "fixed": 0, "hinge": 1, "slider": 1, "universal": 2}
 def pair_of_bodies(kind: str, **more: Any) -> World:
     """Two bodies without gravity, joined off their centres, along skew axes."""
     bodies = (Body("a", 1.0, (0.02, 0.03, 0.04)), Body("b", 2.0, (0.05, 0.04, 0.06)))
-    sockets = Socket((0.1, 0.2, 0.05), ABOUT_Y), Socket((-0.1, 0.05, -0.2), ABOUT_Y)
-    return World(bodies, gravity=(0, 0, 0), joints=(Joint("j", KINDS[kind], 0, 1, sockets, **more),))
+    frames = JointFrame((0.1, 0.2, 0.05), ABOUT_Y), JointFrame((-0.1, 0.05, -0.2), ABOUT_Y)
+    return World(bodies, gravity=(0, 0, 0), joints=(Joint("j", KINDS[kind], 0, 1, frames, **more),))
 
 
 def thrown(world: World) -> dict[str, Any]:
-    """Both aligned, their sockets together, tumbling as one rigid body would."""
-    first, second = (np.array(socket.point) for socket in world.joints[0].sockets)
+    """Both aligned, their frames together, tumbling as one rigid body would."""
+    first, second = (np.array(frame.point) for frame in world.joints[0].frames)
     place, spin = second - first, np.array([1.0, -2.0, 1.5])
     values = {"a.position": place, "a.velocity": np.cross(spin, place) + 1, "a.angular_velocity": spin}
     return values | {"b.velocity": [1, 1, 1], "b.angular_velocity": spin}
@@ -56,7 +56,7 @@ def test_what_is_locked_stays_locked(kind: str) -> None:
     if kind == "hinge":
         assert np.abs(others).max() < 1e-4 < 0.5 < np.abs(about_x).max()
     if kind == "universal":
-        across = turn.apply([0, 1, 0]) @ np.array([-1, 0, 0])  # x of one socket against y of the other
+        across = turn.apply([0, 1, 0]) @ np.array([-1, 0, 0])  # x of one frame against y of the other
         assert np.abs(across).max() < 1e-4 < 0.5 < np.abs(others).max()
 
 
@@ -143,11 +143,11 @@ def test_v7_a_ball_hits_a_floating_linkage() -> None:
 def test_a_parallelogram_stays_one() -> None:
     """A closed loop: two rods on the world carry a third, which must not turn."""
     bodies = (rod("b0"), rod("b1"), rod("bar", 1.0))
-    down, up = Socket((0, 0, -0.25), ABOUT_Y), Socket((0, 0, 0.25), ABOUT_Y)
+    down, up = JointFrame((0, 0, -0.25), ABOUT_Y), JointFrame((0, 0, 0.25), ABOUT_Y)
     lying = (np.sqrt(0.5), 0, np.sqrt(0.5), 0)  # the bar's z along x
     back = Rotation.from_quat(lying, scalar_first=True).inv() * Rotation.from_quat(ABOUT_Y, scalar_first=True)
-    ends = [Socket((0, 0, z), tuple(back.as_quat(scalar_first=True))) for z in (-0.5, 0.5)]
-    joints = [Joint(f"top{k}", KINDS["hinge"], k, None, (up, Socket((k, 0, 0), ABOUT_Y))) for k in range(2)]
+    ends = [JointFrame((0, 0, z), tuple(back.as_quat(scalar_first=True))) for z in (-0.5, 0.5)]
+    joints = [Joint(f"top{k}", KINDS["hinge"], k, None, (up, JointFrame((k, 0, 0), ABOUT_Y))) for k in range(2)]
     joints += [Joint(f"low{k}", KINDS["hinge"], 2, k, (ends[k], down)) for k in range(2)]
     world = World(bodies, joints=tuple(joints))
     angle = 0.6

@@ -16,9 +16,9 @@ from symphys.model.joints import (
     SLIDER,
     UNIVERSAL,
     Joint,
+    JointFrame,
     Limits,
     Servo,
-    Socket,
     Spring,
     TorqueMotor,
     VelocityMotor,
@@ -115,8 +115,8 @@ def test_a_damper_takes_what_it_should() -> None:
 def test_a_damper_under_a_load_is_of_second_order() -> None:
     """A cart falls along a rail: v = g m/c (1 - exp(-c t/m))."""
     cart, exact = Body("cart", 2.0, 0.1), 9.81 / 3 * (1 - np.exp(-3 * 0.5))
-    sockets = Socket((0, 0, 0), ABOUT_Z), Socket((0, 0, 0), ABOUT_Z)
-    rail = Joint("rail", SLIDER, 0, None, sockets, spring=Spring(damping=6.0))
+    frames = JointFrame((0, 0, 0), ABOUT_Z), JointFrame((0, 0, 0), ABOUT_Z)
+    rail = Joint("rail", SLIDER, 0, None, frames, spring=Spring(damping=6.0))
     errors = []
     for dt in (0.02, 0.01):
         states = Lab(World((cart,), joints=(rail,)), Scheme(dt=dt)).states({}, 0.5)
@@ -161,7 +161,7 @@ def test_a_rod_leans_on_its_limit() -> None:
 def test_slider_and_its_servo() -> None:
     """A cart of 2 kg on a rail along x: F t^2 / 2 m, then it holds its place."""
     cart = Body("cart", 2.0, 0.1)
-    rail = Joint("rail", SLIDER, 0, None, (Socket(), Socket()), motor=Servo(5.0, 4.0, 1.0), limits=Limits(-1, 1))
+    rail = Joint("rail", SLIDER, 0, None, (JointFrame(),) * 2, motor=Servo(5.0, 4.0, 1.0), limits=Limits(-1, 1))
     lab = Lab(World((cart,), joints=(rail,)), Scheme(), ["rail.command"])
     states = lab.states({}, 4.0, u=np.full((1, 400), 0.7))
     assert states["cart.velocity"][10, 0] == pytest.approx(0.2, rel=1e-6)
@@ -172,7 +172,7 @@ def test_slider_and_its_servo() -> None:
 
 
 def test_universal_joint_has_two_servos() -> None:
-    joint = Joint("j", UNIVERSAL, 0, None, (Socket((0, 0, 0.25)), Socket()), motor=Servo(10.0, 5.0, 3.0))
+    joint = Joint("j", UNIVERSAL, 0, None, (JointFrame((0, 0, 0.25)), JointFrame()), motor=Servo(10.0, 5.0, 3.0))
     lab = Lab(World(chain(1).bodies, joints=(joint,)), Scheme(), ["j.command"])
     last = lab.step.mapaccum(200)
     x = ca.DM(lab.trajectory(hanging(1, [0.0]), 2.0, u=np.tile([[0.4], [-0.3]], 200))[:, -1])
@@ -187,7 +187,7 @@ def test_universal_joint_has_two_servos() -> None:
 def test_a_soft_joint_sags() -> None:
     """g / (2 pi f)^2, 62 mm at 2 Hz (Catto)."""
     body = Body("b", 1.0, 0.1)
-    joint = Joint("j", FIXED, 0, None, (Socket(), Socket()), frequency=2.0, damping=1.0)
+    joint = Joint("j", FIXED, 0, None, (JointFrame(),) * 2, frequency=2.0, damping=1.0)
     z = Lab(World((body,), joints=(joint,)), Scheme()).states({}, 4.0)["b.position"][-1, 2]
     assert z == pytest.approx(-9.81 / (4 * np.pi) ** 2, rel=1e-6)
 
@@ -197,8 +197,8 @@ def test_derivatives_are_those_of_differences() -> None:
     m, length, gain, k = ca.SX.sym("m"), ca.SX.sym("l"), ca.SX.sym("g"), ca.SX.sym("k")
     hip = Body("hip", 2.0, (0.02, 0.03, 0.04))
     shin = Body("shin", m, (0.01, 0.012, 0.003), (Sphere(0.05, (0, 0, -length)),))
-    sockets = Socket((0, 0, 0.2), ABOUT_Y), Socket((0.05, 0, -0.1), ABOUT_Y)
-    knee = Joint("knee", HINGE, 1, 0, sockets, Servo(gain, 20.0, 8.0), Limits(-1.0, 0.9), Spring(k, 0.1))
+    frames = JointFrame((0, 0, 0.2), ABOUT_Y), JointFrame((0.05, 0, -0.1), ABOUT_Y)
+    knee = Joint("knee", HINGE, 1, 0, frames, Servo(gain, 20.0, 8.0), Limits(-1.0, 0.9), Spring(k, 0.1))
     flat = make_world([hip, shin], [Plane.ground()], Law(0.5, 0.2))
     pairs = tuple(pair for pair in flat.pairs if pair.second.body is None)
     world = World(flat.bodies, flat.statics, pairs, joints=(knee,))
@@ -230,8 +230,8 @@ def test_joints_fit_while_a_leg_lands() -> None:
 def test_a_soft_joint_of_two_free_bodies_keeps_its_limit() -> None:
     """No tree holds them: what is beyond the limit is taken back, and no momentum is made."""
     bodies = (Body("a", 1.0, (0.02, 0.03, 0.04)), Body("b", 2.0, (0.05, 0.04, 0.06)))
-    sockets = Socket((0, 0, -0.2), ABOUT_Y), Socket((0, 0, 0.2), ABOUT_Y)
-    joint = Joint("j", HINGE, 0, 1, sockets, limits=Limits(upper=0.3), frequency=5.0, damping=1.0)
+    frames = JointFrame((0, 0, -0.2), ABOUT_Y), JointFrame((0, 0, 0.2), ABOUT_Y)
+    joint = Joint("j", HINGE, 0, 1, frames, limits=Limits(upper=0.3), frequency=5.0, damping=1.0)
     lab = Lab(World(bodies, gravity=(0, 0, 0), joints=(joint,)), Scheme())
     q = [np.cos(0.2), 0, np.sin(0.2), 0]
     start = {"a.position": [0.2 * np.sin(0.4), 0, 0.2 + 0.2 * np.cos(0.4)], "a.orientation": q}
