@@ -16,9 +16,9 @@ Expr = Any
 """casadi SX, MX or DM"""
 
 
-def inline(world: World, arguments: Sequence[Expr]) -> InlineTracer:
+def inline(world: World, arguments: Sequence[Expr], reduces: bool = True) -> InlineTracer:
     """A tracer of functions of x, u, p and smoothing; x by its parts, so that equal bodies share what they compute."""
-    (x, *others), tracer = arguments, InlineTracer()
+    (x, *others), tracer = arguments, InlineTracer(reduces)
     for column in (*parts_of(Layout(world), x).values(), *others):
         tracer.take(column)
     return tracer

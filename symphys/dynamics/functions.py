@@ -57,7 +57,7 @@ def report_function(
 ) -> ca.Function:
     """The same step with all of its ``StepReport``: (x, u, p, smoothing) -> (x_next, forces, gaps, .. paradox)."""
     arguments = arguments_of(world, inputs, parameters)
-    tracer, layout = inline(world, arguments), Layout(world)
+    tracer, layout = inline(world, arguments, reduces=False), Layout(world)
     with tracing(tracer):
         context = context_of(world, scheme, inputs, arguments)
         after, substeps = take_step(context, parts_of(layout, arguments[0]))

@@ -2,34 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import groupby
-from typing import Any
+from typing import Any, TypeVar
 
 import casadi as ca
 
 from symphys.dynamics.articulated.forward_dynamics import accelerations, world_inertia
 from symphys.dynamics.collision import Contact, collide
-from symphys.dynamics.collision.predicted_path import at_rest
+from symphys.dynamics.collision.predicted_path import PredictedPath, at_rest
 from symphys.dynamics.context import State, StepContext
 from symphys.dynamics.motion import BodyState, PredictedMotion, free_motion, momentum, motion_from
 from symphys.dynamics.tracing.decorator import traced
 from symphys.model.joints import kinematic_trees
+from symphys.model.shapes import Surface
 from symphys.model.state_layout import BODY_FIELDS
 from symphys.model.world import Pair, World
 
 Expr = Any
 """casadi SX, MX or DM"""
+T = TypeVar("T")
 
 
 def detect_contacts(context: StepContext, motions: Sequence[PredictedMotion], duration: Expr) -> list[Contact]:
     """The contacts on the way: one for each pair."""
-    found: list[Contact] = []
+    return along_paths(collide, context, motions, duration)
+
+
+def along_paths(
+    look: Callable[[Surface, Surface, PredictedPath, PredictedPath], list[T]],
+    context: StepContext,
+    motions: Sequence[PredictedMotion],
+    duration: Expr,
+) -> list[T]:
+    """What ``look`` finds of two surfaces on their bodies' paths: one for each pair."""
+    found: list[T] = []
     for (first, second), _ in groupby(context.world.pairs, key=lambda pair: (pair.first, pair.second)):
         surfaces = context.world.surface(first), context.world.surface(second)
         a = motions[_index(first.body)].predicted_path()
         b = at_rest(duration) if second.body is None else motions[second.body].predicted_path()
-        found += collide(*surfaces, a, b)
+        found += look(*surfaces, a, b)
     return found
 
 

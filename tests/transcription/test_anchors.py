@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from repeats import first
 
 from symphys.errors import ProblemError
 from symphys.problem import load_problem, reposition
@@ -90,7 +91,7 @@ def added(line: str) -> str:
     return f"{head}[0, 0, {sum(map(float, tail.rstrip(']').split('+')))!r}]"
 
 
-@pytest.mark.parametrize("longer", [0.05, -0.06])
+@first("longer", [0.05, -0.06])
 def test_it_is_the_robot_that_is_built_so(tmp_path: Path, longer: float) -> None:
     """Motion, cost and velocities, and the foot on the ground."""
     built, varied = leg(tmp_path, -0.15 - longer, -0.15 - longer), leg(tmp_path, -0.15, -0.15)

@@ -8,12 +8,14 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics.arguments import arguments_of, context_of, inline, parts_of
-from symphys.dynamics.collision import Contact
+from symphys.dynamics.collision import Contact, collide
+from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.contact.body_term import Motions, at_touch
 from symphys.dynamics.context import StepContext
 from symphys.dynamics.motion import PredictedMotion
-from symphys.dynamics.prediction import bodies_of, detect_contacts, predicted_motions
+from symphys.dynamics.prediction import along_paths, bodies_of, detect_contacts, predicted_motions
 from symphys.dynamics.tracing.decorator import traced, tracing
+from symphys.model.shapes import Surface
 from symphys.model.state_layout import Layout
 from symphys.model.world import Scheme, World
 
@@ -24,10 +26,11 @@ Expr = Any
 def gap_function(world: World) -> ca.Function:
     """The gaps [m] of a state: x -> (pairs,); candidates that cannot touch as things lie have a large one."""
     arguments = arguments_of(world, (), ())
-    tracer = inline(world, arguments)
+    tracer = inline(world, arguments, reduces=False)
     with tracing(tracer):
-        contacts, _ = _contacts(world, context_of(world, None, (), arguments), arguments[0])
-    gaps = [tracer.value(contact.gap) for contact in contacts]
+        context = context_of(world, None, (), arguments)
+        motions, duration = _motions(world, context, arguments[0])
+        gaps = map(tracer.value, along_paths(_gaps, context, motions, duration))
     return ca.Function("gaps", arguments[:1], [ca.densify(ca.vertcat(ca.SX(0, 1), *gaps))])
 
 
@@ -36,9 +39,11 @@ def slip_function(
 ) -> ca.Function:
     """How fast surfaces move across their normals [m/s]: (x, u, p) -> (pairs,)."""
     x, u, p, _ = arguments = arguments_of(world, inputs, parameters)
-    tracer = inline(world, arguments)
+    tracer = inline(world, arguments, reduces=False)
     with tracing(tracer):
-        contacts, motions = _contacts(world, context_of(world, scheme, inputs, [x, u, p, ca.SX(0)]), x)
+        context = context_of(world, scheme, inputs, [x, u, p, ca.SX(0)])
+        motions, duration = _motions(world, context, x)
+        contacts = detect_contacts(context, motions, duration)
         moving = (tuple(motions[i] for i in bodies_of(pair)) for pair in world.pairs)
         speeds = [_slip(contact, each) for contact, each in zip(contacts, moving, strict=True)]
     values = map(tracer.value, speeds)
@@ -51,7 +56,12 @@ def _slip(contact: Contact, motions: Motions) -> Expr:
     return ca.norm_2(velocity - normal * ca.dot(normal, velocity))
 
 
-def _contacts(world: World, context: StepContext, x: Expr) -> tuple[list[Contact], list[PredictedMotion]]:
+@traced
+def _gaps(first: Surface, second: Surface, a: PredictedPath, b: PredictedPath) -> list[Expr]:
+    """Nothing else of the contacts: the function is small, whatever the instant of touch takes."""
+    return [contact.gap for contact in collide(first, second, a, b)]
+
+
+def _motions(world: World, context: StepContext, x: Expr) -> tuple[list[PredictedMotion], Expr]:
     duration = ca.SX(context.settings.scheme.dt)
-    motions = predicted_motions(context, parts_of(Layout(world), x), duration)
-    return detect_contacts(context, motions, duration), motions
+    return predicted_motions(context, parts_of(Layout(world), x), duration), duration

@@ -58,8 +58,9 @@ class Template:
 class Tracer(ABC):
     """Calls traced functions; see ``decorator``."""
 
-    def __init__(self) -> None:
-        """Nothing yet."""
+    def __init__(self, reduces: bool = True) -> None:
+        """``reduces``: what a function computes twice is looked for, which takes up to half of the building."""
+        self._reduces = reduces
         self._columns: list[Expr] = []
         self._entries: list[list[Expr]] = []
         self._homes: dict[int, tuple[int, int]] = {}
@@ -140,7 +141,9 @@ class Tracer(ABC):
         matrices = tuple(given.placed(leaf, slot) for leaf, slot in leaves)
         if not given.columns:
             return Template(None, (), result_shape, matrices)
-        columns = ca.cse([ca.vertcat(*column) for column in given.columns.values()])
+        columns: Any = [ca.vertcat(*column) for column in given.columns.values()]
+        if self._reduces:
+            columns = ca.cse(columns)
         needed = {symbol.element_hash() for symbol in ca.symvar(ca.vertcat(*columns))}
         used = [k for k, column in enumerate(entries) if any(e.element_hash() in needed for e in column)]
         built = self.shared(ca.Function("piece", [symbols[k] for k in used], columns))
