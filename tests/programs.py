@@ -14,7 +14,7 @@ PENDULUM_STATE = Place(STEPS + 5, 2, 2)
 
 
 def pendulum() -> Program:
-    """A driven pendulum with a running cost; z is the torque of each step, the parameters is gravity."""
+    """A driven pendulum with a running cost; z is the torque of each step, the parameter is gravity."""
     x, u, g, a = ca.SX.sym("x", 2), ca.SX.sym("u"), ca.SX.sym("g"), ca.SX.sym("a")
     move = ca.Function("move", [x, u, g], [ca.vertcat(x[0] + 0.05 * x[1], x[1] + 0.05 * (u - g * ca.sin(x[0])))])
     cost = ca.Function("cost", [x, u], [ca.fmax(x[0] ** 2 - 0.1, 0) + 0.01 * u**2])

@@ -1,4 +1,4 @@
-"""The parametric of a joint, with numbers that may be replaced."""
+"""A joint of a problem: bodies by name, numbers that variables may replace."""
 
 from __future__ import annotations
 

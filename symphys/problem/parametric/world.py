@@ -1,4 +1,4 @@
-"""The parametric of a world: bodies, statics and who touches whom under which law, with numbers that may be replaced.
+"""The world of a problem: bodies, statics and who touches whom under which law, with numbers that may be replaced.
 
 The rule for a pair of surfaces: what its [[pair]] table states holds. Else friction and restitution are the product
 of what the two surfaces state, torsion and rolling (lengths) their sum. Where neither states it, [contact] holds.
