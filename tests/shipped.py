@@ -59,6 +59,16 @@ def short_descent(name: str, iterations: int) -> tuple[float, float]:
     return float(merits[0]), float(merits[1])
 
 
+def first_steps(name: str, seconds: float, evaluations: int) -> tuple[Transcription, Array]:
+    """A shipped robot over a time so short that no kernel pays, in the file's own situation, and what CMA-ES found."""
+    problem = load_problem(problems.find(name), {"simulation.duration": seconds})
+    made = transcribe(replace(problem, scenarios=None), exact=True, backend="casadi")
+    chosen = solver("cma")
+    asked = {"evaluations": evaluations, "samples": 8, "sigma": 0.05}
+    options = validate_options(chosen.Options, asked, problem.file, "cma")
+    return made, chosen.solve(made.shooting, made.shooting.start(0), options, 0).z
+
+
 def work(found: Outcome) -> int:
     """Gradients and Jacobians, or rollouts where there are none."""
     counts = found.counts
