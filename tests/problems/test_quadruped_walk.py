@@ -39,7 +39,7 @@ def ahead(made: Transcription, z: Array) -> Any:
 
 def test_its_first_steps_help() -> None:
     """Over a second and a half, from values alone: what stood steps ahead; and the adjoint is the derivative."""
-    made, z = first_steps("quadruped_walk", 1.5, 160)
+    made, z = first_steps("quadruped_walk", 1.5, 240)
     still, learnt = (made.judge(each) for each in (made.shooting.start(0), z))
     assert learnt.objective < 0.8 * still.objective
     assert ahead(made, z)[0] > ahead(made, made.shooting.start(0))[0] + 0.1
