@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from symphys import problems
+from symphys.codegen.backends import BEST
 from symphys.problem import load_problem, validate_options
 from symphys.solvers import Outcome, Status, solver
 from symphys.transcription import Transcription, transcribe
@@ -24,9 +25,10 @@ def seeds(count: int) -> pytest.MarkDecorator:
 
 
 @cache
-def shipped(name: str) -> Transcription:
-    """A shipped problem."""
-    return transcribe(load_problem(problems.find(name)))
+def shipped(name: str, backend: str = BEST) -> Transcription:
+    """A shipped problem, as ``symphys solve`` transcribes it; "casadi" is cheaper where few rollouts are asked for."""
+    problem = load_problem(problems.find(name))
+    return transcribe(problem, exact=max(problem.simulation.smoothing) == 0, backend=backend)
 
 
 def solve(name: str, made: Transcription, seed: int = 0, polish: bool = False) -> Outcome:
@@ -51,10 +53,20 @@ def met(name: str, made: Transcription, of: int, wanted: int) -> list[Outcome]:
 
 def short_descent(name: str, iterations: int) -> tuple[float, float]:
     """Merits of a shipped problem's guess, and after so many iterations of first-order descent."""
-    made = transcribe(load_problem(problems.find(name), {"solver.gradient.iterations": iterations}))
+    made = transcribe(load_problem(problems.find(name), {"solver.gradient.iterations": iterations}), backend="casadi")
     found = solve("gradient", made)
     merits = made.shooting.evaluator.value(np.stack([made.shooting.start(0), found.z]), 0.0).merit
     return float(merits[0]), float(merits[1])
+
+
+def first_steps(name: str, seconds: float, evaluations: int) -> tuple[Transcription, Array]:
+    """A shipped robot over a time so short that no kernel pays, in the file's own situation, and what CMA-ES found."""
+    problem = load_problem(problems.find(name), {"simulation.duration": seconds})
+    made = transcribe(replace(problem, scenarios=None), exact=True, backend="casadi")
+    chosen = solver("cma")
+    asked = {"evaluations": evaluations, "samples": 8, "sigma": 0.05}
+    options = validate_options(chosen.Options, asked, problem.file, "cma")
+    return made, chosen.solve(made.shooting, made.shooting.start(0), options, 0).z
 
 
 def work(found: Outcome) -> int:

@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
-from shipped import seeds, shipped, solve, work
+from shipped import solve, work
+
+from symphys import problems
+from symphys.problem import load_problem
+from symphys.transcription import transcribe
 
 POINT, TIP = np.array([0.2, 0.35, 0.3]), np.array([0, 0, 0.075])
 
 
-@seeds(3)
-def test_reaches_the_point(seed: int) -> None:
+@pytest.mark.parametrize(
+    ("dt", "seed"), [(0.02, 0), *(pytest.param(0.01, seed, marks=pytest.mark.thorough) for seed in range(3))]
+)
+def test_reaches_the_point(dt: float, seed: int) -> None:
     """Within 1 cm after 7 s and at the end, in at most 150 gradients; servos stay within their limits."""
-    made = shipped("arm_reach")
+    made = transcribe(load_problem(problems.find("arm_reach"), {"simulation.dt": dt}), exact=True)
     assert made.shooting.n == 17284
     found = solve("gradient", made, seed)
     assert work(found) <= 150
     motion = made.simulate(found.z)
-    for k in (700, 800):
+    for k in (round(7 / dt), round(8 / dt)):
         w, *axis = motion.orientation[k, 3]
         tip = motion.position[k, 3] + Rotation.from_quat([*axis, w]).apply(TIP)
         assert np.linalg.norm(tip - POINT) < 0.01

@@ -1,9 +1,10 @@
-"""The journal's robot, faster: a short lesson here, whole ones, with legs and motors too, as ``thorough``."""
+"""The journal's robot, faster: the first steps here, lessons, with legs and motors too, as ``thorough``."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from shipped import first_steps
 
 from symphys.problem import load_problem
 from symphys.problems import find
@@ -23,6 +24,13 @@ def taught(name: str, settings: dict[str, object], seed: int = 0) -> tuple[Trans
     return made, SOLVERS["stochastic"].solve(made.shooting, made.shooting.start(seed), options, seed)
 
 
+def test_its_first_steps_get_faster() -> None:
+    """Over a second and a half, from values alone: faster than by hand."""
+    made, z = first_steps("gait_robot_fast", 1.5, 160)
+    assert made.judge(z).outputs[SPEED] > 1.3 * made.judge(made.shooting.start(0)).outputs[SPEED]
+
+
+@pytest.mark.thorough
 def test_a_short_lesson_helps() -> None:
     """Sixty batches of 16 for 3 s: faster than by hand, as the trace tells it."""
     asked = {"iterations": 60, "samples": 16, "patience": 0.0}

@@ -28,7 +28,7 @@ def hit(velocity: Array, side: float) -> Array:
 
 def test_the_impact_is_that_of_the_formula() -> None:
     """The crate stands on the floor all the time, and the floor has one step of 10 ms at most to brake it."""
-    made = shipped("knock")
+    made = shipped("knock", "casadi")
     motion = made.simulate(np.array(KICK))
     after = hit(np.array(KICK[:2]), KICK[2] + KICK[1] * 0.25 / KICK[0])
     assert np.allclose(after, [2.3990, 0.2716, 2.8353], rtol=0, atol=1e-3)
@@ -40,7 +40,7 @@ def test_the_impact_is_that_of_the_formula() -> None:
 
 
 def test_impact_and_slide_end_where_the_formulas_do() -> None:
-    last = shipped("knock").simulate(np.array(KICK))
+    last = shipped("knock", "casadi").simulate(np.array(KICK))
     after = hit(np.array(KICK[:2]), KICK[2] + KICK[1] * 0.25 / KICK[0])
     x, y, angle = Plate((0.3, 0.4), 0.1, 0.3).slid(after)
     q = last.orientation[-1, 0]
@@ -49,11 +49,12 @@ def test_impact_and_slide_end_where_the_formulas_do() -> None:
 
 
 def test_least_squares_finds_the_kick() -> None:
-    found = solve("least_squares", shipped("knock"), polish=True)
+    found = solve("least_squares", shipped("knock", "casadi"), polish=True)
     assert np.allclose(found.z, KICK, rtol=0, atol=[1e-4, 2e-3, 1e-4])
     assert found.counts.jacobians <= 7
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("name", "most"), [("gradient", 40), ("ipopt", 18), ("cma", 350)])
 @seeds(2)
 def test_every_solver_knocks_it_into_place(name: str, most: int, seed: int) -> None:

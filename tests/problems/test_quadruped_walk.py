@@ -1,4 +1,4 @@
-"""A quadruped that learns to walk, by a few numbers and by a net: short lessons here, whole ones as ``thorough``."""
+"""A quadruped that learns to walk, by a few numbers and by a net: first steps here, lessons as ``thorough``."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from shipped import first_steps
 from walk_gradient import compared, gait
 
 from symphys.problem import load_problem
@@ -36,6 +37,24 @@ def ahead(made: Transcription, z: Array) -> Any:
     return motion.position[-1, torso, 0], (1 - 2 * (q[:, 1] ** 2 + q[:, 2] ** 2)).min()
 
 
+def test_its_first_steps_help() -> None:
+    """Over a second and a half, from values alone: what stood steps ahead; and the adjoint is the derivative."""
+    made, z = first_steps("quadruped_walk", 1.5, 240)
+    still, learnt = (made.judge(each) for each in (made.shooting.start(0), z))
+    assert learnt.objective < 0.8 * still.objective
+    assert ahead(made, z)[0] > ahead(made, made.shooting.start(0))[0] + 0.1
+    evaluator, calm = made.shooting.evaluator, gait(made, 0.05)
+    slope = evaluator.gradient(calm[None], 0.0).gradient
+    assert slope is not None
+    errors = []
+    for along in np.random.default_rng(0).standard_normal((4, calm.size)):
+        step = 1e-7 * along / np.linalg.norm(along)
+        high, low = evaluator.value(np.stack([calm + step, calm - step]), 0.0).merit
+        errors.append(abs((high - low) / 2 / (slope[0] @ step) - 1))
+    assert np.median(errors) < 1e-6
+
+
+@pytest.mark.thorough
 def test_a_short_lesson_helps() -> None:
     """Sixty batches of 16 for 2 s: what stood walks, and costs less in samples that are new.
 

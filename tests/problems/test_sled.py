@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -15,9 +16,14 @@ from symphys.transcription import Transcription, transcribe
 
 
 @cache
+def staged() -> Transcription:
+    return transcribe(load_problem(problems.find("sled")))
+
+
 def sled(smoothing: tuple[float, ...] = ()) -> Transcription:
-    settings = {"simulation.smoothing": list(smoothing)} if smoothing else {}
-    return transcribe(load_problem(problems.find("sled"), settings))
+    """In these stages, or in the file's; one kernel serves all."""
+    made = staged()
+    return replace(made, shooting=replace(made.shooting, smoothing=smoothing)) if smoothing else made
 
 
 def solve(name: str, made: Transcription, seed: int = 0) -> Outcome:

@@ -24,9 +24,9 @@ def two_balls() -> Transcription:
     ("name", "most", "iterations"),
     [
         ("gradient", 1.3975, 60),
-        ("least_squares", 1.3970, 30),
+        pytest.param("least_squares", 1.3970, 30, marks=pytest.mark.thorough),
         ("ipopt", 1.3975, 60),
-        pytest.param("cma", 1.400, 700, marks=pytest.mark.slow),
+        pytest.param("cma", 1.400, 700, marks=pytest.mark.thorough),
     ],
 )
 def test_the_goal_is_reached_without_waste(name: str, most: float, iterations: int) -> None:

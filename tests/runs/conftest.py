@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -110,12 +110,13 @@ def problem(problem_file: Path) -> Problem:
 
 @pytest.fixture
 def make_job(problem: Problem, problem_file: Path, tmp_path: Path) -> Callable[..., Job]:
-    """A job of the told solver; keywords are its options."""
+    """A job of the told solver, unexamined unless asked for; keywords are its options."""
 
-    def make(seed: int = 0, **options: object) -> Job:
+    def make(seed: int = 0, examine: bool = False, **options: object) -> Job:
         settings: dict[str, object] = {f"solver.told.{key}": value for key, value in options.items()}
         told_problem = load_problem(problem_file, settings)
-        return make_jobs([told_problem], ["told"], [seed], settings, tmp_path / "out", "symphys solve")[0]
+        (job,) = make_jobs([told_problem], ["told"], [seed], settings, tmp_path / "out", "symphys solve")
+        return replace(job, examine=examine)
 
     return make
 

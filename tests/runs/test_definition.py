@@ -53,7 +53,7 @@ def unread(kind: Any, value: Any, path: str = "") -> Iterator[str]:
 
 @pytest.mark.parametrize("does", ["solve", "miss", "refuse"])
 def test_every_key_of_a_result_is_read_and_written_again(make_job: MakeJob, does: str) -> None:
-    job = make_job(does=does)
+    job = make_job(examine=True, does=does)
     result = run(job)
     written = files.read_json(job.folder.path / RESULT)
     assert set(unread(Result, written)) <= {"format", "z.shape"}
@@ -64,7 +64,7 @@ def test_every_key_of_a_result_is_read_and_written_again(make_job: MakeJob, does
 
 
 def test_the_page_reads_what_the_run_wrote(make_job: MakeJob) -> None:
-    job = make_job()
+    job = make_job(examine=True)
     result = run(job)
     read = read_run(job.folder.path, job.folder.path)
     assert files.strict(read.to_json()) == files.strict(result.to_json())
@@ -72,14 +72,14 @@ def test_the_page_reads_what_the_run_wrote(make_job: MakeJob) -> None:
 
 
 def test_a_scene_is_written_again_as_it_was(make_job: MakeJob) -> None:
-    job = make_job()
+    job = make_job(examine=True)
     run(job)
     path = job.folder.path / SCENE
     assert files.strict(read_scene(path).to_json()) == files.read_json(path)
 
 
 def test_every_array_of_a_motion_has_a_field_with_its_shape(make_job: MakeJob) -> None:
-    job = make_job()
+    job = make_job(examine=True)
     run(job)
     with np.load(job.folder.path / TRAJECTORY, allow_pickle=False) as motion:
         assert set(motion.files) == {field.name for field in fields(Trajectory)}
@@ -87,7 +87,7 @@ def test_every_array_of_a_motion_has_a_field_with_its_shape(make_job: MakeJob) -
 
 
 def test_columns_of_older_traces_keep_their_meaning(make_job: MakeJob, tmp_path: Path) -> None:
-    job = make_job()
+    job = make_job(examine=True)
     run(job)
     before = read_run(job.folder.path, job.folder.path).trace
     path = job.folder.path / "trace.csv"

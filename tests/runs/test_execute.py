@@ -39,7 +39,7 @@ def interrupt_at(iteration: int) -> Callable[[TraceRow], None]:
 
 
 def test_a_run_leaves_every_file(make_job: MakeJob) -> None:
-    job = make_job()
+    job = make_job(examine=True)
     result = run(job)
     names = {path.name for path in job.folder.path.iterdir()}
     assert names == {
@@ -73,7 +73,7 @@ def test_what_a_problem_tells_is_in_the_result_and_along_the_trace(problem_file:
 
 def test_a_run_need_not_be_examined(make_job: MakeJob) -> None:
     """What is cheap is measured all the same, since the verdict rests on it."""
-    result = run(replace(make_job(), examine=False))
+    result = run(make_job(examine=False))
     assert result.solved
     assert {"gained", "drift", "deepest", "residual", "passed"} <= result.trust.keys()
     assert not {"gradient", "refined", "growth"} & result.trust.keys()

@@ -35,12 +35,21 @@ def once(problem: Problem, exact: bool) -> Transcription:
 
 
 def job(out: Path, smoothing: Any = (0.1, 0.01, 0.0), solver: str = "least_squares", seeds: int = 1) -> list[Job]:
+    """Unexamined: stages are judged all the same."""
     settings: dict[str, object] = {"simulation.smoothing": list(smoothing)}
-    return make_jobs([load_problem(find("sled"), settings)], [solver], range(seeds), settings, out)
+    made = make_jobs([load_problem(find("sled"), settings)], [solver], range(seeds), settings, out)
+    return [replace(each, examine=False) for each in made]
 
 
 def run(asked: Job, monitor: Callable[[TraceRow], None] = lambda row: None) -> Result:
     return execute(asked, monitor, TranscriptionCache(once))
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Job, Result]:
+    """A run of all stages."""
+    (asked,) = job(tmp_path_factory.mktemp("whole"))
+    return asked, run(asked)
 
 
 def without_times(result: Result) -> list[StageRecord]:
@@ -48,38 +57,35 @@ def without_times(result: Result) -> list[StageRecord]:
     return [replace(stage, seconds=0.0, equivalents=0.0) for stage in result.stages]
 
 
-def test_each_stage_is_judged_exactly(tmp_path: Path) -> None:
-    (asked,), (first,) = job(tmp_path / "all"), job(tmp_path / "first", (0.1,))
-    whole, part = run(asked), run(first)
-    assert [stage.smoothing for stage in whole.stages] == SMOOTHINGS
+def test_each_stage_is_judged_exactly(whole: tuple[Job, Result], tmp_path: Path) -> None:
+    (first,) = job(tmp_path, (0.1,))
+    part, result = run(first), whole[1]
+    assert [stage.smoothing for stage in result.stages] == SMOOTHINGS
     # the first stage alone is a run of its own, and the judge of runs says the same of it
-    assert part.objective == part.stages[0].exact_objective == whole.stages[0].exact_objective
-    assert part.worst == part.stages[0].exact_worst == whole.stages[0].exact_worst
-    assert not part.solved and not whole.stages[0].solved
-    assert whole.stages[0].exact_objective > 10 * whole.stages[0].objective
-    last = whole.stages[-1]
-    assert (last.exact_objective, last.exact_worst, last.solved) == (whole.objective, whole.worst, True)
+    assert part.objective == part.stages[0].exact_objective == result.stages[0].exact_objective
+    assert part.worst == part.stages[0].exact_worst == result.stages[0].exact_worst
+    assert not part.solved and not result.stages[0].solved
+    assert result.stages[0].exact_objective > 10 * result.stages[0].objective
+    last = result.stages[-1]
+    assert (last.exact_objective, last.exact_worst, last.solved) == (result.objective, result.worst, True)
     assert last.objective == pytest.approx(last.exact_objective, rel=1e-9)
 
 
-def test_the_work_of_the_stages_is_that_of_the_run(tmp_path: Path) -> None:
-    (asked,) = job(tmp_path)
-    result = run(asked)
+def test_the_work_of_the_stages_is_that_of_the_run(whole: tuple[Job, Result]) -> None:
+    result = whole[1]
     for kind, count in result.counts.items():
         assert sum(stage.counts[kind] for stage in result.stages) == count
     assert sum(stage.equivalents for stage in result.stages) == pytest.approx(result.equivalents)
     assert sum(stage.seconds for stage in result.stages) <= result.seconds["solve"]
 
 
-def test_what_the_guess_is_worth(tmp_path: Path) -> None:
+def test_what_the_guess_is_worth(whole: tuple[Job, Result]) -> None:
     """It does not move: 1.118 m from its place, 111.8 tolerances."""
-    (asked,) = job(tmp_path)
-    assert run(asked).guess == pytest.approx({"objective": 1.25, "worst": 111.8}, rel=1e-3)
+    assert whole[1].guess == pytest.approx({"objective": 1.25, "worst": 111.8}, rel=1e-3)
 
 
-def test_files_tell_of_the_stages(tmp_path: Path) -> None:
-    (asked,) = job(tmp_path)
-    result = run(asked)
+def test_files_tell_of_the_stages(whole: tuple[Job, Result]) -> None:
+    asked, result = whole
     assert read_result(asked.folder.path / "result.json") == result
     with (asked.folder.path / "trace.csv").open(encoding="utf-8", newline="") as file:
         smoothing = [float(row["smoothing"]) for row in csv.DictReader(file)]
@@ -89,24 +95,26 @@ def test_files_tell_of_the_stages(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("smoothing", SMOOTHINGS)
-def test_interrupted_in_any_stage_it_goes_on_to_the_same_end(tmp_path: Path, smoothing: float) -> None:
+def test_interrupted_in_any_stage_it_goes_on_to_the_same_end(
+    whole: tuple[Job, Result], tmp_path: Path, smoothing: float
+) -> None:
     def press(row: TraceRow) -> None:
         if row.smoothing == smoothing:
             raise KeyboardInterrupt
 
-    (asked,), (broken,) = job(tmp_path / "whole"), job(tmp_path / "broken")
-    whole, stopped = run(asked), run(broken, press)
+    (broken,) = job(tmp_path)
+    stopped, end = run(broken, press), whole[1]
     assert stopped.status == "interrupted"
     assert [stage.smoothing for stage in stopped.stages] == SMOOTHINGS[: SMOOTHINGS.index(smoothing) + 1]
     assert stopped.stages[-1].status == "interrupted"
     rest = run(broken)
-    assert (rest.z, rest.counts, rest.iterations) == (whole.z, whole.counts, whole.iterations)
-    assert without_times(rest) == without_times(whole)
+    assert (rest.z, rest.counts, rest.iterations) == (end.z, end.counts, end.iterations)
+    assert without_times(rest) == without_times(end)
 
 
 def test_side_by_side(tmp_path: Path, recorder: Any) -> None:
-    alone = run_batch(job(tmp_path / "a", seeds=3), 1, recorder, once)
-    beside = run_batch(job(tmp_path / "b", seeds=3), 1, recorder, once, multi_start=True)
+    alone = run_batch(job(tmp_path / "a", seeds=2), 1, recorder, once)
+    beside = run_batch(job(tmp_path / "b", seeds=2), 1, recorder, once, multi_start=True)
     assert alone.accepted and beside.accepted
     for one, other in zip(alone.results, beside.results, strict=True):
         assert one is not None and other is not None

@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from shipped import seeds
 from toys import solve
 
 import symphys.problems
@@ -21,10 +22,12 @@ SHIPPED = Path(next(iter(symphys.problems.__path__))) / "ball_throw.toml"
 FEWEST_GRADIENTS = 45
 FEWEST_JACOBIANS = 15
 TARGETS = [6.0, 8.0, 10.0, 12.0, 14.0]
-
-
-BACKENDS = [("casadi", distance) for distance in TARGETS] + [("simd", distance) for distance in TARGETS] + [("c", 10.0)]
-every_throw = pytest.mark.parametrize(("backend", "distance"), BACKENDS)
+QUICK = [("casadi", 6.0), ("casadi", 14.0), ("simd", 10.0), ("c", 10.0)]
+OTHERS = [(backend, distance) for backend in ("casadi", "simd") for distance in TARGETS]
+every_throw = pytest.mark.parametrize(
+    ("backend", "distance"),
+    [*QUICK, *(pytest.param(*each, marks=pytest.mark.thorough) for each in OTHERS if each not in QUICK)],
+)
 
 
 @cache
@@ -60,18 +63,18 @@ def test_ipopt(backend: str, distance: float, hessian: str) -> None:
 
 
 @pytest.mark.parametrize("backend", ["casadi", "c", "simd"])
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@seeds(3)
 def test_cma(backend: str, seed: int) -> None:
     assert solve("cma", throw(10.0, backend), seed=seed).status is Status.MET
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", range(3, 10))
 def test_cma_with_every_seed(seed: int) -> None:
     assert solve("cma", throw(10.0), seed=seed).status is Status.MET
 
 
-@pytest.mark.parametrize("seed", range(1, 6))
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.thorough) for seed in range(2, 6))])
 def test_derivatives_lead_there_from_perturbed_guesses(seed: int) -> None:
     for name in ("gradient", "least_squares", "ipopt"):
         assert solve(name, throw(10.0), seed=seed).status is Status.MET

@@ -14,6 +14,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from shipped import seeds
 from toys import PLAIN, Counted, constrained, rosenbrock, solve, target, toy
 from windy import BEST, Winds, windy
 
@@ -137,20 +138,20 @@ def lost(found: Outcome, problem: ShootingProblem, name: str, seen: list[Seen]) 
 
 @pytest.mark.parametrize("name", PLAIN)
 @pytest.mark.parametrize("kind", PROBLEMS)
-def test_the_result_is_the_best_of_what_was_evaluated(name: str, kind: str) -> None:
-    for seed in range(4):
-        problem, evaluator = recorded(PROBLEMS[kind]())
-        found = solve(name, problem, seed)
-        if found.status is not Status.NOT_APPLICABLE:
-            assert any(np.array_equal(each.z, problem.start(seed)) for each in evaluator.seen)
-            assert not lost(found, problem, name, evaluator.seen)
+@seeds(4)
+def test_the_result_is_the_best_of_what_was_evaluated(name: str, kind: str, seed: int) -> None:
+    problem, evaluator = recorded(PROBLEMS[kind]())
+    found = solve(name, problem, seed)
+    if found.status is not Status.NOT_APPLICABLE:
+        assert any(np.array_equal(each.z, problem.start(seed)) for each in evaluator.seen)
+        assert not lost(found, problem, name, evaluator.seen)
 
 
 @pytest.mark.parametrize("name", PLAIN)
-def test_so_it_is_where_evaluations_are_noisy(name: str) -> None:
-    for seed in range(4):
-        problem, evaluator = recorded(rosenbrock(), noisy(seed))
-        assert not lost(solve(name, problem, seed), problem, name, evaluator.seen)
+@seeds(4)
+def test_so_it_is_where_evaluations_are_noisy(name: str, seed: int) -> None:
+    problem, evaluator = recorded(rosenbrock(), noisy(seed))
+    assert not lost(solve(name, problem, seed), problem, name, evaluator.seen)
 
 
 def test_ipopt_passes_a_better_point_by_and_says_so() -> None:

@@ -231,8 +231,23 @@ def test_what_a_problem_tells_of_its_best_point_is_in_every_row(name: str, backe
     assert found.trace[-1].outputs["sum [m]"] == pytest.approx(found.z.sum(), rel=1e-6)
 
 
-@pytest.mark.parametrize("bounds", [(-np.inf, np.inf), (0, np.inf), (-np.inf, 5), (0, 5), (-1, 0.9), (0, 1e-3)])
-@pytest.mark.parametrize("options", [{}, {"sigma": 30.0}, {"options": {"maxstd": 0.02}}, {"options": {"minstd": 1e-4}}])
+BOUNDS = [(-np.inf, np.inf), (0, np.inf), (-np.inf, 5), (0, 5), (-1, 0.9), (0, 1e-3)]
+DEVIATIONS: list[dict[str, Any]] = [
+    {},
+    {"sigma": 30.0},
+    {"options": {"maxstd": 0.02}},
+    {"options": {"minstd": 1e-4}},
+]
+
+
+@pytest.mark.parametrize(
+    ("bounds", "options"),
+    [
+        pytest.param(bounds, options, marks=() if bounds == (-1, 0.9) or not options else pytest.mark.thorough)
+        for options in DEVIATIONS
+        for bounds in BOUNDS
+    ],
+)
 def test_cma_with_one_variable(bounds: tuple[float, float], options: dict[str, Any]) -> None:
     """Bounded on both sides, on one, on none; standard deviations beyond their limits."""
     lower, upper = bounds

@@ -17,6 +17,28 @@ from symphys.verification.refinement import order
 THROW = np.array([3.0, 0.1, 3.0, 0.0, -9.0, 0.5])
 
 
+SHOT = {"simulation.dt": 0.02, "simulation.duration": 3}
+
+
+def shot(**settings):
+    """The bank shot with a coarse step: what it comes to depends on steps and on sweeps."""
+    changed = {f"simulation.{key}": value for key, value in settings.items()}
+    return transcribe(load_problem(find("bank_shot"), SHOT | changed), backend="casadi")
+
+
+@pytest.fixture(scope="module")
+def coarse():
+    """The shot, where it is looked at, and its examination."""
+    made = shot()
+    z = made.shooting.start(1)
+    return made, z, examine(made, z)["refined"]
+
+
+@pytest.fixture(scope="module")
+def halved():
+    return shot(dt=0.01)
+
+
 @pytest.fixture(scope="module")
 def throw():
     return transcribe(load_problem(find("ball_throw")), backend="casadi")
@@ -30,7 +52,7 @@ def test_right_gradients_pass(throw):
 
 def test_wrong_gradients_are_rejected(throw):
     """The derivative of another problem (weaker gravity) does not pass as this one's."""
-    other = transcribe(load_problem(find("ball_throw"), {"world.gravity": [0, 0, -8]}))
+    other = transcribe(load_problem(find("ball_throw"), {"world.gravity": [0, 0, -8]}), backend="casadi")
     wrong = other.probe.gradient(THROW)
     errors = [_compare_block(throw.probe.values, block, THROW, wrong)["error"] for block in throw.shooting.blocks]
     assert max(errors) > 1e-2
@@ -38,7 +60,7 @@ def test_wrong_gradients_are_rejected(throw):
 
 def test_a_jump_is_told_from_a_wrong_gradient():
     """The kick of the guess meets the crate after 0.05 s, the very end of a step: either side agrees."""
-    knock = transcribe(load_problem(find("knock")), backend="casadi")
+    knock = transcribe(load_problem(find("knock"), {"simulation.duration": 0.3}), backend="casadi")
     kick, side = compare_gradient(knock, np.array([5.0, 0.0, -0.05]))
     assert kick["error"] < 1e-4
     assert 0 < kick["jump"] < 1e-4
@@ -67,27 +89,20 @@ def test_examination_reports_refinements_and_contacts(throw):
     assert found["fault"] == ""
 
 
-def test_refined_answers_are_those_of_the_refined_problem():
+def test_refined_answers_are_those_of_the_refined_problem(coarse, halved):
     """The same numbers as a file with half the step, or twice the sweeps; on a shot that depends on both."""
-    settings = {"simulation.dt": 0.02, "simulation.duration": 3}
-    shot = transcribe(load_problem(find("bank_shot"), settings))
-    z = shot.shooting.start(1)
-    finer = {"simulation.dt": 0.01}, {"simulation.sweeps": 2 * shot.problem.simulation.sweeps}
-    halved, doubled = (transcribe(load_problem(find("bank_shot"), settings | more)).judge(z) for more in finer)
-    found = examine(shot, z)["refined"]
-    assert [row["objective"] for row in found[::2]] == [halved.objective, doubled.objective]
-    assert [row["worst"] for row in found[::2]] == [halved.worst, doubled.worst]
-    assert halved.objective != pytest.approx(shot.judge(z).objective, rel=1e-6)
+    made, z, found = coarse
+    half, doubled = halved.judge(z), shot(sweeps=2 * made.problem.simulation.sweeps).judge(z)
+    assert [row["objective"] for row in found[::2]] == [half.objective, doubled.objective]
+    assert [row["worst"] for row in found[::2]] == [half.worst, doubled.worst]
+    assert half.objective != pytest.approx(made.judge(z).objective, rel=1e-6)
 
 
-def test_changes_of_the_gradient_are_those_of_the_refined_problem():
+def test_changes_of_the_gradient_are_those_of_the_refined_problem(coarse, halved):
     """Against the probe of a file with half the step, in the variables' scales."""
-    settings = {"simulation.dt": 0.02, "simulation.duration": 3}
-    shot, finer = (transcribe(load_problem(find("bank_shot"), settings | more), backend="casadi")
-                   for more in ({}, {"simulation.dt": 0.01}))  # fmt: skip
-    z = shot.shooting.start(1)
-    before, after = (np.array(each.probe.gradient(z)).ravel() for each in (shot, finer))
-    found = examine(shot, z)["refined"][0]["gradient"]
+    made, z, refined = coarse
+    before, after = (np.array(each.probe.gradient(z)).ravel() for each in (made, halved))
+    found = refined[0]["gradient"]
     spin = slice(2, 4)
     expected = np.linalg.norm((after - before)[spin]) / np.linalg.norm(before[spin])
     assert found["spin"] == pytest.approx(expected, rel=1e-9)

@@ -136,7 +136,9 @@ def test_a_variable_that_changes_nothing_is_not_felt(make):
 
 def test_more_sweeps_are_looked_at_where_contacts_have_not_settled(make):
     """A heavy ball on a light one: two sweeps are too few, and four leave less."""
-    text = HELD.replace("[[variable]]", HEAVY, 1)
+    text = HELD.replace("[[variable]]", HEAVY, 1).replace(
+        "box = { size = [0.2, 0.2, 0.2] }", "sphere = { radius = 0.1 }"
+    )
     pile = make(text, simulation__sweeps=2)
     z = pile.shooting.start(0)
     residual = float(pile.record(z).motion.residual.max())
