@@ -26,9 +26,8 @@ def seeds(count: int) -> pytest.MarkDecorator:
 
 @cache
 def shipped(name: str, backend: str = BEST) -> Transcription:
-    """A shipped problem, as ``symphys solve`` transcribes it; "casadi" is cheaper where few rollouts are asked for."""
-    problem = load_problem(problems.find(name))
-    return transcribe(problem, exact=max(problem.simulation.smoothing) == 0, backend=backend)
+    """A shipped problem; "casadi" is cheaper than a kernel where few rollouts are asked for."""
+    return transcribe(load_problem(problems.find(name)), backend=backend)
 
 
 def solve(name: str, made: Transcription, seed: int = 0, polish: bool = False) -> Outcome:
