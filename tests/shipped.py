@@ -59,7 +59,7 @@ def short_descent(name: str, iterations: int) -> tuple[float, float]:
 
 
 def first_steps(name: str, seconds: float, evaluations: int) -> tuple[Transcription, Array]:
-    """A shipped robot over a time so short that no kernel pays, in the file's own situation, and what CMA-ES found."""
+    """A shipped robot over a time so short that no kernel pays, with the file's own numbers, and what CMA-ES found."""
     problem = load_problem(problems.find(name), {"simulation.duration": seconds})
     made = transcribe(replace(problem, scenarios=None), exact=True, backend="casadi")
     chosen = solver("cma")

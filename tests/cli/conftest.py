@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from symphys.cli import main
+from symphys.report.pages.run import PAGE
 
 THROW = """
 title = "A short throw"
@@ -45,6 +46,18 @@ def unreachable(tmp_path: Path) -> Path:
     path = tmp_path / "unreachable.toml"
     path.write_text(THROW.format(upper=1.5), encoding="utf-8")
     return path
+
+
+@pytest.fixture
+def whole_report() -> None:
+    """Asks for the pages of runs."""
+
+
+@pytest.fixture(autouse=True)
+def _without_pages_of_runs(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Which have tests of their own, and take longer than the solves of this room."""
+    if "whole_report" not in request.fixturenames:
+        monkeypatch.setattr("symphys.report.write_run_report", lambda folder: (folder / PAGE).write_text(""))
 
 
 @pytest.fixture

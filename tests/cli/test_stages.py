@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
 from symphys.cli.progress import at
 from symphys.runs import read_result
 from symphys.solvers import TraceRow
@@ -13,6 +15,7 @@ from symphys.solvers import TraceRow
 Run = Callable[..., tuple[int, str, str]]
 
 
+@pytest.mark.usefixtures("whole_report")
 def test_a_setting_makes_stages(run: Run, throw: Path) -> None:
     code, _, _ = run("solve", throw, "--solver", "least_squares", "--set", "simulation.smoothing=[0.1, 0.01, 0]")
     found = read_result(Path("reports/throw/least_squares-seed0/result.json"))

@@ -14,6 +14,7 @@ STROKE = [1.1299, 0.5717, 7.55, -18.18]
 """Velocity [m/s] and spin [rad/s], pursued to the last digit by least squares."""
 
 
+@pytest.mark.thorough
 def test_solvers_agree_on_the_stroke() -> None:
     made = shipped("bank_shot")
     found = [solve(name, made, polish=True).z for name in ("least_squares", "ipopt", "gradient")]

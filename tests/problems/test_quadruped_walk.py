@@ -20,7 +20,7 @@ UNSEEN = 4711
 
 
 def taught(name: str, settings: dict[str, object], seed: int = 0) -> tuple[Transcription, ScenarioEvaluator, Array]:
-    """The problem with these settings, its situations, and what the solver found."""
+    """The problem with these settings, its samples, and what the solver found."""
     made = transcribe(load_problem(find(name), settings), exact=True)
     if made.shooting.scenario is None:
         pytest.skip(made.backend.note)
@@ -62,9 +62,9 @@ def test_a_short_lesson_helps() -> None:
     """
     name = "quadruped_walk"
     shorter = {"simulation.duration": 2, "solver.stochastic.iterations": 60, "solver.stochastic.samples": 16}
-    made, situations, z = taught(name, shorter)
+    made, scenario, z = taught(name, shorter)
     assert np.median(compared(made, gait(made, 0.05))[0]) < 1e-6
-    still, learnt = (situations.value(each[None], situations.draw(np.random.default_rng(UNSEEN), 32), 0.0)
+    still, learnt = (scenario.value(each[None], scenario.draw(np.random.default_rng(UNSEEN), 32), 0.0)
                      for each in (made.shooting.start(0), z))  # fmt: skip
     assert learnt.objective.mean() < 0.8 * still.objective.mean()
     assert learnt.alive is not None and learnt.alive.mean() > 0.6
@@ -74,7 +74,7 @@ def test_a_short_lesson_helps() -> None:
 
 @pytest.mark.thorough
 def test_the_adjoint_of_a_calm_walk_is_its_derivative() -> None:
-    """Against central differences over a thousand steps, in situations that differ."""
+    """Against central differences over a thousand steps, in samples that differ."""
     made = transcribe(load_problem(find("quadruped_walk")), exact=True)
     if made.shooting.scenario is None:
         pytest.skip(made.backend.note)
@@ -86,11 +86,11 @@ def test_the_adjoint_of_a_calm_walk_is_its_derivative() -> None:
 @pytest.mark.parametrize("seed", [0, 1, 2])
 @pytest.mark.parametrize("name", ["quadruped_walk", "quadruped_walk_net"])
 def test_it_walks(name: str, seed: int) -> None:
-    """At 1.5 m/s and more, upright, straight on; nineteen of twenty in situations that it has not seen."""
-    made, situations, z = taught(name, {}, seed)
+    """At 1.5 m/s and more, upright, straight on; nineteen of twenty in samples that it has not seen."""
+    made, scenario, z = taught(name, {}, seed)
     assert made.judge(z).solved
     x, up = ahead(made, z)
     assert x > 15 and up > 0.866
-    errors = situations.value(z[None], situations.draw(np.random.default_rng(UNSEEN), 500), 0.0).errors
+    errors = scenario.value(z[None], scenario.draw(np.random.default_rng(UNSEEN), 500), 0.0).errors
     upright = [constraint.name for constraint in made.problem.constraints].index("stays upright")
     assert (errors[:, upright] <= 1).mean() >= 0.95

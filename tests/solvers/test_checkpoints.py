@@ -20,6 +20,7 @@ EXACT: list[tuple[str, dict[str, Any]]] = [
     ("cma", {}),
     ("cma", {"options": {"CMA_diagonal": 5}, "population": 7}),
 ]
+THOROUGH = pytest.mark.thorough
 every_solver = pytest.mark.parametrize("name", PLAIN)
 
 
@@ -34,7 +35,9 @@ def same(a: Outcome, b: Outcome) -> None:
 
 
 @pytest.mark.parametrize(("name", "options"), EXACT)
-@pytest.mark.parametrize("problem", [rosenbrock(), target()], ids=["rosenbrock", "target"])
+@pytest.mark.parametrize(
+    "problem", [pytest.param(rosenbrock(), id="rosenbrock"), pytest.param(target(), id="target", marks=THOROUGH)]
+)
 def test_the_same_to_the_last_bit(name: str, options: dict[str, Any], problem: Any) -> None:
     whole = solve(name, problem, seed=2, options=options)
     for stop in {0, 1, 2, len(whole.trace) // 2, len(whole.trace) - 2, len(whole.trace) - 1}:

@@ -174,7 +174,9 @@ def test_a_foreign_error_belongs_to_its_stage() -> None:
 
 @pytest.mark.slow
 @replayed
-@pytest.mark.parametrize("problem", [moving(), bent()], ids=["moving", "bent"])
+@pytest.mark.parametrize(
+    "problem", [pytest.param(moving(), id="moving", marks=pytest.mark.thorough), pytest.param(bent(), id="bent")]
+)
 def test_goes_on_in_any_stage_to_the_last_bit(name: str, problem: ShootingProblem) -> None:
     whole = solve(name, problem, seed=2)
     first, second = (sum(row.smoothing >= smoothing for row in whole.trace) for smoothing in SMOOTHINGS[:2])

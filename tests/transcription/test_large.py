@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 HOPPING = """
 [simulation]
-duration = 0.5
+duration = 0.3
 dt = 0.01
 smoothing = 0.02
 

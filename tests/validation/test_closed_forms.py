@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from functools import cache
 
 import casadi as ca
 import numpy as np
@@ -50,13 +51,17 @@ def test_v10_sliding_ball_starts_to_roll(dt):
     assert value[6] == pytest.approx(v0 * rolls - mu * G * rolls**2 / 2 + 5 / 7 * v0 * (time - rolls), abs=5e-6)
 
 
-def tripod(law, slope=0.0, heading=0.0):
-    """A block on three feet; gravity leans as on an incline."""
+def tripod(law, gravity=(0, 0, -G)):
+    """A block on three feet."""
     feet = tuple(Sphere(0.1, (0.3 * np.cos(a), 0.3 * np.sin(a), 0.0)) for a in np.arange(3) * 2 * np.pi / 3)
-    pull = np.sin(slope) * np.array([np.cos(heading), np.sin(heading)])
-    return make_world(
-        [Body("block", 1.0, (0.05, 0.05, 0.08), feet)], [Plane.ground()], law, (*(G * pull), -G * np.cos(slope))
-    )
+    return make_world([Body("block", 1.0, (0.05, 0.05, 0.08), feet)], [Plane.ground()], law, gravity)
+
+
+@cache
+def incline(mu):
+    """The block on a slope: gravity is a parameter."""
+    g = [ca.SX.sym(f"g{k}") for k in range(3)]
+    return Lab(tripod(Law(mu, 0.0), tuple(g)), Scheme(), parameters=g)
 
 
 def test_v10_sliding_stops():
@@ -73,7 +78,8 @@ def test_v10_incline_sticks_inside_the_cone(heading, share):
     """Sticks if and only if tan(slope) <= mu, in every direction: friction acts on the disc."""
     mu = 0.6
     slope = np.arctan(share * mu)
-    states = Lab(tripod(Law(mu, 0.0), slope, heading), Scheme()).states({"block.position": [0, 0, 0.1]}, 2.0)
+    gravity = G * np.array([*(np.sin(slope) * np.array([np.cos(heading), np.sin(heading)])), -np.cos(slope)])
+    states = incline(mu).states({"block.position": [0, 0, 0.1]}, 2.0, p=gravity)
     if share < 1:
         assert np.linalg.norm(states["block.velocity"][-1]) < 1e-9
         assert np.linalg.norm(states["block.position"][-1, :2]) < 1e-4

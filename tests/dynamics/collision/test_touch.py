@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from distances import distance
 from meetings import STILL, Array, Meet, Thing, flying, met, moved_to, random_thing, rule, shifted
+from repeats import first, thorough
 
 from symphys.model.shapes import Plane, Terrain
 
@@ -41,7 +42,7 @@ def fault(a: Thing, b: Thing, found: Meet, dt: float = DT) -> float:
     return float(max(abs(distance(a.at(found.first), b.at(found.first))), -course(a, b, found.first).min()))
 
 
-@pytest.mark.parametrize(("speed", "spin"), [(1.0, 1.0), (5.0, 5.0), (10.0, 0.0)])
+@pytest.mark.parametrize(("speed", "spin"), [(5.0, 5.0), thorough(1.0, 1.0), thorough(10.0, 0.0)])
 @pytest.mark.parametrize("pair", PAIRS)
 def test_touch_is_where_the_distance_ends(pair: tuple[str, str], speed: float, spin: float) -> None:
     """Hits, misses and instants. Arms are parabolas of time, so that of turning bodies is off by (w dt)^3 / 6 of them.
@@ -78,7 +79,7 @@ def test_error_is_of_third_order(pair: tuple[str, str]) -> None:
     assert worst[2] < worst[0] / 20
 
 
-@pytest.mark.parametrize("travel", [0.5, 2.0])
+@first("travel", [2.0, 0.5])
 @pytest.mark.parametrize("wall", KINDS)
 @pytest.mark.parametrize("kind", KINDS)
 def test_nothing_flies_through_thin_walls(kind: str, wall: str, travel: float) -> None:

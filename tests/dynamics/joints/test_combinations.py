@@ -62,6 +62,7 @@ def check(root: str | None, kinds: tuple[str, ...], branched: bool) -> None:
     assert np.isfinite(np.array(slopes)).all()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("root", "kind"), list(product(ROOTS, KINDS)))
 def test_two_bodies(root: str | None, kind: str) -> None:
     check(root, (kind,), False)
