@@ -24,6 +24,7 @@ def taught(name: str, settings: dict[str, object], seed: int = 0) -> tuple[Trans
     return made, SOLVERS["stochastic"].solve(made.shooting, made.shooting.start(seed), options, seed)
 
 
+@pytest.mark.thorough
 def test_its_first_steps_get_faster() -> None:
     """Over a second and a half, from values alone: faster than by hand."""
     made, z = first_steps("gait_robot_fast", 1.5, 160)

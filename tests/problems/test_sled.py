@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from repeats import thorough
 from shipped import seeds
 
 from symphys import problems
@@ -44,7 +45,9 @@ def test_friction_holds_it(name: str, seed: int) -> None:
     assert made.judge(found.z).objective == pytest.approx(1.25, rel=1e-6)
 
 
-@pytest.mark.parametrize(("name", "most"), [("gradient", 160), ("least_squares", 60), ("ipopt", 250), ("cma", 0)])
+@pytest.mark.parametrize(
+    ("name", "most"), [("gradient", 160), ("least_squares", 60), thorough("ipopt", 250), ("cma", 0)]
+)
 @seeds(2)
 def test_stages_let_go_of_it(name: str, most: int, seed: int) -> None:
     made = sled()

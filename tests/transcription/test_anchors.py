@@ -19,6 +19,7 @@ LEG = """
 duration = 0.4
 dt = 0.01
 sweeps = 4
+cuts = 0
 [ground]
 friction = 0.8
 [[body]]

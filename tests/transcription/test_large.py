@@ -27,6 +27,7 @@ HOPPING = """
 [simulation]
 duration = 0.3
 dt = 0.01
+sweeps = 4
 smoothing = 0.02
 
 [[body]]

@@ -23,6 +23,7 @@ WALKER = """
 duration = 0.4
 dt = 0.01
 sweeps = 4
+cuts = 0
 [[body]]
 name = "torso"
 shape = { box = { size = [0.4, 0.2, 0.1] } }

@@ -57,7 +57,7 @@ def test_every_kind_of_joint() -> None:
     falls_as_a_square(*mixed(), torque=0.5, time=0.3, largest=1e-5)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_quadruped_in_flight() -> None:
     rng, world = np.random.default_rng(2), quadruped(TorqueMotor(5.0), Spring(5.0, 0.1), ground=False)
     rates = {joint.name: rng.normal() for joint in world.joints}

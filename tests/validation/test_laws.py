@@ -6,7 +6,6 @@ import casadi as ca
 import numpy as np
 import pytest
 from laboratory import Lab
-from repeats import first
 
 from symphys.maths import rotation
 from symphys.model.shapes import Plane, Sphere
@@ -102,7 +101,8 @@ def test_frictionless_elastic_impact_of_a_turning_body_keeps_energy():
     assert total == pytest.approx(np.full(len(total), total[0]), rel=2e-4)
 
 
-@first("mu", [0.3, 0.0])
+@pytest.mark.thorough
+@pytest.mark.parametrize("mu", [0.3, 0.0])
 def test_v12_corner_impact_converges_at_second_order(mu):
     """A turning compound hits the ground: halving the step divides the error by about four."""
     world = make_world([Body("d", 1.0, (0.03, 0.2, 0.15), DUMBBELL)], [Plane.ground()], Law(mu, 0.8))

@@ -37,6 +37,7 @@ def slid(dt: float, load_sharing: bool = True) -> float:
     return float(2 * np.arctan2(q[3], q[0]))
 
 
+@pytest.mark.thorough
 def test_a_turning_crate_goes_as_with_linear_loads() -> None:
     """At first order in dt, since friction is that of the step's end; without sharing it goes elsewhere."""
     plate = Plate((2 * HALVES[0], 2 * HALVES[1]), HALVES[2], FRICTION)

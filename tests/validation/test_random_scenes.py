@@ -7,8 +7,8 @@ import pytest
 from random_worlds import STRUCTURES, steps
 
 Structure = tuple[str, str, str, str]
-FEW = (2, 4, 6, 7)
-"""Structures of the quick test: all shapes, all kinds of laws and statics but one."""
+FEW = (2, 6, 7)
+"""Structures of the quick test: a box and a capsule under all kinds of laws, on the ground, on hills, at a post."""
 
 
 def not_finite(structure: Structure, count: int, cuts: int | None) -> set[int]:

@@ -41,7 +41,7 @@ def lab(body: str, ground: str) -> Lab:
         ("brick", "plane"),
         thorough("tower", "plane"),
         ("rod", "plane"),
-        ("brick", "slab"),
+        thorough("brick", "slab"),
         ("rod", "slab"),
     ],
 )
