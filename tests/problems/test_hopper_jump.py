@@ -7,6 +7,7 @@ import pytest
 from shipped import met, shipped, short_descent
 
 
+@pytest.mark.thorough
 def test_a_short_descent_takes_it_nearer() -> None:
     before, after = short_descent("hopper_jump", 28)
     assert after < 0.6 * before

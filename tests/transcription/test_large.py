@@ -228,6 +228,7 @@ def test_single_precision_of_nets(both: tuple[Transcription, LargeTranscription]
     assert not np.array_equal(a.gradient, b.gradient)
 
 
+@pytest.mark.thorough
 @needs_compiler
 @FIRST_FORM
 def test_nets_on_a_device(

@@ -246,6 +246,7 @@ def test_without_kernels_there_are_none(problem: Problem) -> None:
     assert np.isfinite(made.shooting.evaluator.value(np.zeros((1, 2)), 0.0).merit).all()
 
 
+@pytest.mark.thorough
 def test_a_shorter_horizon_is_a_shorter_motion(walker: Transcription, path: Path) -> None:
     """The gradient is that of a file with less duration, in which both knots act together."""
     scenario = walker.shooting.scenario

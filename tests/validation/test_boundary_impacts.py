@@ -49,8 +49,8 @@ PAIRS: dict[str, tuple[Any, Any]] = {
     "box-fixed box": (BRICK, Fixture("ground", Box((4.0, 4.0, 0.25)))),
 }
 """The first flies down at the second, whose surface is 0.25 m above its reference point."""
-REPEATED = {"box-fixed box", "crossed capsules"}
-"""Of pairs whose rules others show."""
+REPEATED = {"box-fixed box", "crossed capsules", "capsule-box", "capsule-terrain", "box-terrain"}
+"""Pairs whose parts others show."""
 CUTS = [
     thorough(name, cuts) if name in REPEATED or (cuts == 0 and not name.startswith("sphere")) else (name, cuts)
     for cuts in (None, 0)

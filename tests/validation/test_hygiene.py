@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from laboratory import Lab, built, central_difference, value_and_gradient
+from repeats import thorough
 
 from symphys.model.shapes import Plane, Sphere
 from symphys.model.state_layout import initial_state
@@ -30,6 +31,10 @@ LAWS = {
     "spins": Law(0.5, 0.5, torsion=0.01, rolling=0.01),
     "soft": Law(0.5, 0.0, frequency=5.0),
 }
+LAWS_BY_TURNS = pytest.mark.parametrize(
+    "law", [thorough(law) if law in ("frictionless", "plastic") else law for law in LAWS]
+)
+"""What is left for ``make thorough`` are special cases of the first."""
 
 
 def two_balls(law, gravity=(0, 0, -9.81)):
@@ -60,7 +65,7 @@ def slopes_under(law):
     return ca.Function("d", [x, smoothing], [after, ca.jacobian(after, ca.vertcat(x, smoothing))])
 
 
-@pytest.mark.parametrize("law", LAWS)
+@LAWS_BY_TURNS
 def test_derivatives_are_finite_in_degenerate_places(law):
     """Rest, exact touch, zero slip, zero rotation, coincident centres; at every smoothing; first and second order."""
     world, derivatives = two_balls(LAWS[law]), derivatives_under(law)
@@ -72,7 +77,7 @@ def test_derivatives_are_finite_in_degenerate_places(law):
                 assert all(np.isfinite(np.array(part)).all() for part in (x, *more)), (place, smoothing)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@LAWS_BY_TURNS
 def test_first_derivatives_stay_moderate_at_rest(law):
     """A body that exactly touches inherits no infinite slope from the time it would take to fall there.
 

@@ -73,7 +73,7 @@ def test_pieces_give_the_whole_step(name: str, scheme: Scheme) -> None:
     compare(worlds()[name], scheme)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_pieces_give_the_whole_step_of_other_shapes() -> None:
     compare(shapes(), Scheme(sweeps=2, cuts=0))
 
