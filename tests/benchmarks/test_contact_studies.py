@@ -48,6 +48,7 @@ def test_gradient_of_a_tumbling_box_falls_with_the_step(cases: list[gradients.Ca
     assert (curve.errors[1] < curve.errors[0]).all()
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_motion_of_a_tumbling_box_falls_with_the_step() -> None:
     engine = consistency.Here("symphys, e = 0.5", tumbling_box(2), 0.5)

@@ -31,6 +31,7 @@ def test_every_solver_sinks_it(name: str, most: int, seed: int) -> None:
     assert work(found) <= most
 
 
+@pytest.mark.thorough
 def test_the_stroke_holds_at_half_the_step() -> None:
     """To half a millimetre."""
     finer = transcribe(load_problem(problems.find("bank_shot"), {"simulation.dt": 0.005}), backend="casadi")

@@ -200,6 +200,7 @@ def test_judge_and_motion(both: tuple[Transcription, LargeTranscription]) -> Non
             assert np.allclose(values, motions[1][name], rtol=1e-9, atol=1e-9, equal_nan=True), name
 
 
+@pytest.mark.thorough
 @FIRST_FORM
 def test_examination(
     both: tuple[Transcription, LargeTranscription], examined: tuple[dict[str, Any], dict[str, Any]]

@@ -151,6 +151,7 @@ def test_draws_stay_physical(problem: Problem) -> None:
     assert drawn["torso.mass"].min() >= 5e-3
 
 
+@pytest.mark.thorough
 def test_poses_hold_together_and_touch_nothing(problem: Problem) -> None:
     """Joints at their drawn angles, without a gap; lifted only where the robot would be in the ground."""
     sampler, world = Sampler(problem), problem.world()

@@ -11,6 +11,7 @@ import numpy as np
 import programs
 import pytest
 from operations import alone, every_operation, long_function
+from repeats import thorough
 
 from symphys.codegen import Cache, Kernel, KernelUnavailable, Program, compile_program
 from symphys.codegen.emit.plain import plain_source
@@ -44,7 +45,7 @@ def plain(program: Program, folder: Path) -> Any:
     return call
 
 
-@pytest.mark.parametrize("name", ["pendulum", "chain", "operations", "long"])
+@pytest.mark.parametrize("name", ["pendulum", "chain", "operations", thorough("long")])
 def test_it_gives_what_the_kernel_gives(name: str, cache: Cache, tmp_path: Path) -> None:
     program = {
         "pendulum": programs.pendulum,

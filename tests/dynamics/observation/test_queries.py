@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from repeats import first
 
 from symphys.dynamics.collision import RULES
 from symphys.dynamics.functions import step_function
@@ -24,7 +25,7 @@ def boxes(count: int) -> World:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("make", [gap_function, step_function])
+@first("make", [gap_function, step_function])
 def test_boxes_alike_are_built_once(make: Callable[[World], object], monkeypatch: pytest.MonkeyPatch) -> None:
     built: list[int] = []
     rule = RULES[Box, Plane]
