@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from emulated import Remote, needs_compiler
+from monopod import MONOPOD
 from numpy.typing import NDArray
 
 from symphys.errors import ProblemError
@@ -23,35 +24,16 @@ from symphys.verification.sensitivity_growth import sensitivity_growth
 
 Array = NDArray[np.float64]
 
-HOPPING = """
+HOPPING = (
+    """
 [simulation]
 duration = 0.3
 dt = 0.01
 sweeps = 4
 smoothing = 0.02
-
-[[body]]
-name = "torso"
-shape = { sphere = { radius = 0.1 } }
-mass = 1.0
-position = [0, 0, 0.6]
-collides_with = []
-
-[[body]]
-name = "foot"
-shape = { sphere = { radius = 0.1 } }
-mass = 0.3
-position = [0.05, 0, 0.13]
-
-[[joint]]
-name = "leg"
-between = ["torso", "foot"]
-slider = { axis = [0, 0, 1] }
-motor = { servo = { gain = 20, torque = 40, velocity = 3 } }
-
-[ground]
-friction = 0.5
-
+"""
+    + MONOPOD
+    + """
 [[sensor]]
 name = "body"
 reads = ["torso.position", "torso.accelerometer", "leg.command"]
@@ -108,6 +90,7 @@ name = "there"
 value = "torso.position - [0.2, 0, 0.7]"
 tolerance = 0.1
 """
+)
 
 
 FORMS = ("skip = true", 'activation = "tanh"', 'activation = "relu", biases = false')

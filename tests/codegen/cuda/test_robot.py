@@ -12,6 +12,7 @@ import programs
 import pytest
 from agreement import transcribed
 from emulated import Emulated, needs_compiler
+from monopod import MONOPOD
 
 from symphys.codegen import Cache, Kernel, KernelUnavailable, Program, compile_program
 from symphys.codegen.cuda import DeviceKernel, compile_on, find_gpu
@@ -21,30 +22,16 @@ from symphys.codegen.cuda.source import device_sources
 from symphys.codegen.emit.plan import FAST_MEMORY, plan
 from symphys.transcription import rollout_program
 
-LEG = """
+LEG = (
+    """
 [simulation]
 duration = 1.0
 dt = 0.01
 cuts = 0
 time_of_impact = false
-[[body]]
-name = "torso"
-shape = { sphere = { radius = 0.1 } }
-mass = 1.0
-position = [0, 0, 0.6]
-collides_with = []
-[[body]]
-name = "foot"
-shape = { sphere = { radius = 0.1 } }
-mass = 0.3
-position = [0.05, 0, 0.13]
-[[joint]]
-name = "leg"
-between = ["torso", "foot"]
-slider = { axis = [0, 0, 1] }
-motor = { servo = { gain = 20, torque = 40, velocity = 3 } }
-[ground]
-friction = 0.5
+"""
+    + MONOPOD
+    + """
 [[variable]]
 name = "command"
 sets = "leg.command"
@@ -58,6 +45,7 @@ name = "height"
 at = "always"
 value = "torso.position[2] - torso.position[0]"
 """
+)
 SEEDED = ("merit",)
 
 
