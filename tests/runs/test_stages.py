@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from repeats import first
 
 from symphys.problem import Problem, load_problem
 from symphys.problems import find
@@ -112,9 +113,10 @@ def test_interrupted_in_any_stage_it_goes_on_to_the_same_end(
     assert without_times(rest) == without_times(end)
 
 
-def test_side_by_side(tmp_path: Path, recorder: Any) -> None:
-    alone = run_batch(job(tmp_path / "a", seeds=2), 1, recorder, once)
-    beside = run_batch(job(tmp_path / "b", seeds=2), 1, recorder, once, multi_start=True)
+@first("seeds", [2, 3])
+def test_side_by_side(tmp_path: Path, recorder: Any, seeds: int) -> None:
+    alone = run_batch(job(tmp_path / "a", seeds=seeds), 1, recorder, once)
+    beside = run_batch(job(tmp_path / "b", seeds=seeds), 1, recorder, once, multi_start=True)
     assert alone.accepted and beside.accepted
     for one, other in zip(alone.results, beside.results, strict=True):
         assert one is not None and other is not None
