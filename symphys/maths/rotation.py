@@ -7,6 +7,7 @@ from typing import Any
 
 import casadi as ca
 
+from symphys.maths.inlined import inlined
 from symphys.maths.smoothing import length
 
 Expr = Any
@@ -21,12 +22,14 @@ def cross_matrix(a: Expr) -> Expr:
     return ca.skew(a)
 
 
+@inlined(4, 4)
 def multiply(p: Expr, q: Expr) -> Expr:
     """(4,): the quaternion product p q, which turns by q first."""
     scalar = p[0] * q[0] - ca.dot(p[1:4], q[1:4])
     return ca.vertcat(scalar, p[0] * q[1:4] + q[0] * p[1:4] + ca.cross(p[1:4], q[1:4]))
 
 
+@inlined(4)
 def matrix(q: Expr) -> Expr:
     """(3, 3): the rotation matrix R_wb of a unit quaternion."""
     w, x, y, z = (q[i] for i in range(4))

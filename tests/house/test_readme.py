@@ -28,7 +28,7 @@ def test_the_problem_of_your_own_is_solved(tmp_path: Path) -> None:
     path = tmp_path / "croquet.toml"
     path.write_text(block("toml"), encoding="utf-8")
     assert main(["check", str(path)]) == 0
-    assert main(["solve", str(path), "--solver", "gradient,least_squares", "--out", str(tmp_path / "reports")]) == 0
+    assert main(["solve", str(path), "--solver", "least_squares", "--out", str(tmp_path / "reports")]) == 0
 
 
 def test_the_casadi_example_runs(tmp_path: Path) -> None:

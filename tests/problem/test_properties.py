@@ -143,7 +143,7 @@ def test_any_bytes(path: Path, content: bytes) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(data=st.data())
 def test_a_valid_file_with_any_value_anywhere(path: Path, valid: str, data: st.DataObject) -> None:
     document = copy.deepcopy(tomllib.loads(data.draw(st.sampled_from([valid, SHAPES]))))

@@ -29,7 +29,7 @@ def missed(throw: Sequence[float] | Array) -> Array:
 
 
 def test_least_squares_finds_the_throw_of_the_formulas() -> None:
-    made = shipped("basket")
+    made = shipped("basket", "casadi")
     throw = fsolve(missed, made.shooting.start(0), xtol=1e-12)
     assert np.allclose(throw, [2.156, -1.456, 6.896], rtol=0, atol=5e-4)
     found = solve("least_squares", made, polish=True)
@@ -40,7 +40,7 @@ def test_least_squares_finds_the_throw_of_the_formulas() -> None:
 @pytest.mark.parametrize(("name", "most"), [("gradient", 12), ("ipopt", 16), ("cma", 300)])
 @seeds(2)
 def test_every_solver_scores_off_the_board(name: str, most: int, seed: int) -> None:
-    made = shipped("basket")
+    made = shipped("basket", "casadi")
     found = solve(name, made, seed)
     assert made.judge(found.z).solved
     assert np.linalg.norm(missed(found.z)) < 0.0101
@@ -54,7 +54,7 @@ def test_there_is_a_way_without_the_board() -> None:
     """A parabola straight into the ring: nothing touches the ball on its way."""
     throw = (RING - START - GRAVITY * TIME**2 / 2) / TIME
     assert np.allclose(throw, [1.692, -1.385, 7.107], rtol=0, atol=5e-4)
-    made = shipped("basket")
+    made = shipped("basket", "casadi")
     assert made.judge(throw).solved
     motion = made.simulate(throw)
     assert motion.contact_gap[motion.time <= TIME].min() > 0

@@ -38,7 +38,7 @@ def flown(lift: Array) -> tuple[Array, list[float]]:
 @seeds(2)
 def test_the_forces_bring_bat_and_ball_back(name: str, most: int, seed: int) -> None:
     """Judged by the other motion, whatever the forces are; and its bat has the speed of the formula."""
-    made = shipped("juggle")
+    made = shipped("juggle", "casadi")
     found = solve(name, made, seed)
     assert made.judge(found.z).solved
     assert work(found) <= most
@@ -51,7 +51,7 @@ def test_the_forces_bring_bat_and_ball_back(name: str, most: int, seed: int) -> 
 def test_the_bat_meets_the_ball_with_the_speed_of_the_formula() -> None:
     """m 2 v = M (V - V') and v - V' = e (v + V), for a ball that comes and goes with v."""
     assert pytest.approx(0.654, abs=1e-3) == MEETS
-    made = shipped("juggle")
+    made = shipped("juggle", "casadi")
     found = solve("least_squares", made, polish=True)
     end, before = flown(found.z)
     assert np.allclose(end, [0.5, 1, 0, 0], rtol=0, atol=1e-3)

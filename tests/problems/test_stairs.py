@@ -22,7 +22,7 @@ def test_the_formula() -> None:
 
 
 def test_least_squares_finds_both_to_rounding() -> None:
-    made = shipped("stairs")
+    made = shipped("stairs", "casadi")
     found = solve("least_squares", made, polish=True)
     assert np.allclose(found.z, [LYING + APEX, RESTITUTION], rtol=0, atol=1e-9)
     assert found.counts.jacobians <= 7
@@ -31,7 +31,7 @@ def test_least_squares_finds_both_to_rounding() -> None:
 @pytest.mark.parametrize(("name", "most"), [("gradient", 12), ("ipopt", 12), ("cma", 250)])
 @seeds(2)
 def test_every_solver_comes_near(name: str, most: int, seed: int) -> None:
-    made = shipped("stairs")
+    made = shipped("stairs", "casadi")
     found = solve(name, made, seed)
     assert made.judge(found.z).solved
     assert np.allclose(found.z, [LYING + APEX, RESTITUTION], rtol=0, atol=2e-3)

@@ -8,6 +8,7 @@ import multiprocessing
 import signal
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -136,7 +137,8 @@ def test_a_process_that_dies_fails_its_own_run_only(
     fatal = problem_file.with_name("fatal.toml")
     fatal.write_text(problem_file.read_text(encoding="utf-8"), encoding="utf-8")
     problems = [load_problem(path) for path in (problem_file, fatal)]
-    jobs = make_jobs(problems, ["least_squares"], [0, 1], {}, tmp_path / "out")
+    made = make_jobs(problems, ["least_squares"], [0, 1], {}, tmp_path / "out")
+    jobs = [replace(job, examine=False) for job in made]
     batch = run_batch(jobs, 2, recorder, crashing.transcribe)
     ends = [(result.problem, result.status) for result in batch.results if result]
     assert ends == [("short_throw", "met")] * 2 + [("fatal", "failed")] * 2

@@ -149,6 +149,7 @@ def test_a_limit_reached_on_the_boundary_keeps_its_slope(kind: str) -> None:
             assert np.array(slope).ravel() == pytest.approx([0, 0, 1], abs=1e-9), (start, rate, limit)
 
 
+BRICK_SHAPE, ROD_SHAPE = "box = { size = [1, 1, 1] }", "capsule = { radius = 0.25, length = 0.5 }"
 COMPILED = """
 [simulation]
 duration = 1.0
@@ -196,14 +197,17 @@ value = "8 * brick.position[2]"
 """
 
 
-@pytest.mark.parametrize("backend", ["casadi", "simd"])
-def test_compiled_kernels_keep_the_slope(backend: str) -> None:
-    """z(T) = r + e (v T - (z0 - r)) by z0 and v, of a ball and of a brick, as on the virtual machine."""
+@pytest.mark.parametrize(
+    ("backend", "brick"), [("casadi", True), ("simd", False), thorough("casadi", False), thorough("simd", True)]
+)
+def test_compiled_kernels_keep_the_slope(backend: str, brick: bool) -> None:
+    """z(T) = r + e (v T - (z0 - r)) by z0 and v, of a ball and of a brick or a rod, as on the virtual machine."""
+    text = COMPILED if brick else COMPILED.replace(BRICK_SHAPE, ROD_SHAPE)
     starts = [0.5 + 0.125 * step * speed / 2 for step in (1, 5, 12) for speed in (1.0, 1.5)]
     starts = [z for at in starts for z in (at, np.nextafter(at, 9), np.nextafter(at, -9))]
     speeds = [-speed for _ in (1, 5, 12) for speed in (1.0, 1.5) for _ in range(3)]
     Z = np.array([[z, v, z, v] for z, v in zip(starts, speeds, strict=True)])
-    values = transcribed(COMPILED, backend).shooting.evaluator.gradient(Z, 0.0)
+    values = transcribed(text, backend).shooting.evaluator.gradient(Z, 0.0)
     assert values.gradient is not None
     assert values.gradient == pytest.approx(np.tile([-0.5, -0.5, -4.0, -4.0], (len(Z), 1)), abs=1e-5)
     ends = 0.5 + 0.5 * (-Z[:, 1] - (Z[:, 0] - 0.5))

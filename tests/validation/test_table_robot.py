@@ -60,6 +60,7 @@ def test_sensors(problem: Problem, rollout: Rollout, record: Record) -> None:
         assert (np.ptp(columns, axis=0) > 1e-4).all(), sensor.name
 
 
+@pytest.mark.thorough
 def test_gradient_by_differences(problem: Problem, kernel: Kernel) -> None:
     """Of the distance with respect to weights and start, along random directions and single weights: 1e-5.
 
@@ -86,6 +87,7 @@ def test_joints_and_feet(record: Record) -> None:
     assert (motion.contact_force[:, :, 2] > 0).any(axis=0).all(), "every foot bears load at some time"
 
 
+@pytest.mark.thorough
 def test_robots_of_a_batch_are_those_alone(problem: Problem, kernel: Kernel) -> None:
     """Bit by bit, in any lane, with or without the gradient."""
     weights = problem.variables[0].guess

@@ -17,7 +17,7 @@ from symphys.verification.refinement import order
 THROW = np.array([3.0, 0.1, 3.0, 0.0, -9.0, 0.5])
 
 
-SHOT = {"simulation.dt": 0.02, "simulation.duration": 3}
+SHOT = {"simulation.dt": 0.02, "simulation.duration": 3, "simulation.cuts": 0}
 
 
 def shot(**settings):

@@ -8,6 +8,7 @@ from typing import Any
 
 import casadi as ca
 
+from symphys.maths.inlined import inlined
 from symphys.model.scalar import is_zero
 
 Expr = Any
@@ -24,7 +25,7 @@ class Parabola:
 
     def at(self, t: Expr) -> Expr:
         """(3,): the vector at time t."""
-        return self.start + t * self.velocity + t * t / 2 * self.acceleration
+        return _parabola(self.start, self.velocity, self.acceleration, t)
 
     def velocity_at(self, t: Expr) -> Expr:
         """(3,): its rate at time t."""
@@ -52,6 +53,11 @@ class Parabola:
             ca.cross(self.velocity, other.start) + ca.cross(self.start, other.velocity),
             bend + 2 * ca.cross(self.velocity, other.velocity),
         )
+
+
+@inlined(3, 3, 3, 1)
+def _parabola(start: Expr, velocity: Expr, acceleration: Expr, t: Expr) -> Expr:
+    return start + t * velocity + t * t / 2 * acceleration
 
 
 STAYS = Parabola(ca.SX.zeros(3), ca.SX.zeros(3), ca.SX.zeros(3))

@@ -82,7 +82,7 @@ def dismantle(tree: Any, leaves: list[Expr]) -> Hashable:
     if kind is dict:
         return Knot(kind, tuple(tree), tuple([dismantle(part, leaves) for part in tree.values()]))
     if isinstance(tree, ca.SX | ca.DM):
-        leaves.append(ca.SX(tree))
+        leaves.append(tree if kind is ca.SX else ca.SX(tree))  # a copy costs as much as an addition
         return outline(leaves[-1])
     names = field_names(kind)  # type: ignore[arg-type]
     if names is not None:
@@ -142,7 +142,7 @@ def matrix(leaf: Leaf, entries: list[Expr]) -> Expr:
     """A matrix of this sparsity from its entries."""
     if leaf == SCALAR:
         return entries[0]
-    column = ca.vertcat(ca.SX(0, 1), *entries)
+    column = ca.vertcat(*entries) if entries else ca.SX(0, 1)
     if leaf.pattern is None:
         return column if leaf.columns == 1 else ca.reshape(column, leaf.rows, leaf.columns)
     sparsity = ca.Sparsity.nonzeros(leaf.rows, leaf.columns, list(leaf.pattern))

@@ -1,0 +1,33 @@
+"""Functions whose expression is built once; a call puts it in place, many times faster than operation by operation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache, wraps
+from typing import Any
+
+import casadi as ca
+
+Expr = Any
+"""casadi SX, MX or DM"""
+
+
+def inlined(*sizes: int) -> Callable[[Callable[..., Expr]], Callable[..., Expr]]:
+    """Decorator of a function of column vectors of these sizes, which gives one matrix.
+
+    Its result is that of the function as it is written: casadi repeats every operation, and drops those with 0 and 1.
+    """
+
+    def decorate(function: Callable[..., Expr]) -> Callable[..., Expr]:
+        @cache
+        def built() -> ca.Function:
+            symbols = [ca.SX.sym(f"x{k}", size) for k, size in enumerate(sizes)]
+            return ca.Function("inlined", symbols, [function(*symbols)])
+
+        @wraps(function)
+        def call(*arguments: Expr) -> Expr:
+            return built().call(arguments)[0]
+
+        return call
+
+    return decorate
