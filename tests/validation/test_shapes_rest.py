@@ -37,7 +37,7 @@ def lab(body: str, ground: str) -> Lab:
 @pytest.mark.parametrize(
     ("body", "ground"),
     [
-        ("cube", "plane"),
+        thorough("cube", "plane"),
         ("brick", "plane"),
         thorough("tower", "plane"),
         ("rod", "plane"),

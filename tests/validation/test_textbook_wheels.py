@@ -10,7 +10,7 @@ import pytest
 from blocks import turned_by
 from laboratory import Lab
 from linkage import energy
-from repeats import first
+from repeats import first, thorough
 from scipy.integrate import solve_ivp
 from textbook import Array, G, differences, final, spinning, turn
 
@@ -175,7 +175,7 @@ def coin(dt: float, mu: float = 0.3) -> Lab:
     return Lab(make_world([body], [Plane.ground(), Plane("wall", (-1.0, 0, 0), -0.12)], Law(mu, 0.3)), Scheme(dt=dt))
 
 
-@pytest.mark.parametrize(("dt", "spin"), [(0.01, 10.0), (0.01, 30.0), (0.005, 30.0)])
+@pytest.mark.parametrize(("dt", "spin"), [(0.01, 10.0), (0.01, 30.0), thorough(0.005, 30.0)])
 def test_spinning_coin_loses_energy(dt: float, spin: float) -> None:
     """Euler's disc: whatever rolls, slides and strikes, also against a wall, the energy does not rise."""
     lab = coin(dt)
