@@ -1,8 +1,10 @@
 """Trajectory optimisation through contact.
 
-Rigid bodies with contact as casadi expressions, problem files about them, and what solves and reports them. The names
-below are the public surface; solvers are in ``symphys.solvers``, runs in ``symphys.runs``, reports in
-``symphys.report``. Everything is imported when it is first used.
+    import symphys
+    solution = symphys.solve("ball_throw")
+
+``load``, ``solve``, ``simulate``, ``compile`` and ``read`` are the front door; the classes below build worlds. Solvers
+are in ``symphys.solvers``, reports in ``symphys.report``. Everything is imported when it is first used.
 """
 
 from __future__ import annotations
@@ -10,7 +12,14 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from symphys.version import __version__
+
 if TYPE_CHECKING:
+    from symphys.api.compiled import CompiledRollout, compile
+    from symphys.api.loading import load
+    from symphys.api.simulation import simulate
+    from symphys.api.solution import Solution, read
+    from symphys.api.solving import solve
     from symphys.dynamics.functions import step_function
     from symphys.dynamics.horizon import roll_out
     from symphys.errors import ProblemError, SymphysError
@@ -23,12 +32,11 @@ if TYPE_CHECKING:
     from symphys.transcription import Transcription
     from symphys.transcription.transcribe import transcribe
 
-__version__ = "0.1.0"
-
 __all__ = [
     "Body",
     "Box",
     "Capsule",
+    "CompiledRollout",
     "Fixture",
     "Law",
     "Layout",
@@ -37,6 +45,7 @@ __all__ = [
     "ProblemError",
     "Scheme",
     "ShootingProblem",
+    "Solution",
     "Sphere",
     "SymphysError",
     "Terrain",
@@ -44,15 +53,25 @@ __all__ = [
     "Transcription",
     "World",
     "__version__",
+    "compile",
     "initial_state",
+    "load",
     "load_problem",
     "make_world",
+    "read",
     "roll_out",
+    "simulate",
+    "solve",
     "step_function",
     "transcribe",
 ]
 
 _HOMES = {
+    "api.compiled": ("CompiledRollout", "compile"),
+    "api.loading": ("load",),
+    "api.simulation": ("simulate",),
+    "api.solution": ("Solution", "read"),
+    "api.solving": ("solve",),
     "errors": ("ProblemError", "SymphysError"),
     "problem": ("Problem", "load_problem"),
     "dynamics.horizon": ("roll_out",),
@@ -72,3 +91,8 @@ def __getattr__(name: str) -> object:
         if name in names:
             return getattr(import_module(f"symphys.{home}"), name)
     raise AttributeError(f"module 'symphys' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """The public names."""
+    return sorted(__all__)

@@ -3,16 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from functools import cache
+from functools import cache, cached_property
 from typing import Annotated, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symphys.errors import SymphysError
+from symphys.suggest import hint, quote
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+
+
+OF_BODIES = {
+    "position": "m",
+    "orientation": "",
+    "velocity": "m/s",
+    "angular_velocity": "rad/s",
+    "force": "N",
+    "torque": "N m",
+}
+"""The quantities of a body by their fields, and their units."""
+COORDINATES = ("joint_value", "joint_rate", "joint_torque", "joint_command")
+"""Fields with as many columns as the joint has coordinates, or one number where there is one."""
 
 
 class NotFinite(SymphysError):
@@ -48,6 +62,9 @@ class Trajectory:
         joint_torque: of motors [N m] or [N]; 0 without one.
         joint_command: commands of motors, in the unit of their kind; 0 without one.
         joint_separation: distance of the frames along the directions that a joint locks [m].
+        joint_units: (J,) of the coordinates, "rad" or "m"; empty in older files.
+
+    Quantities also go by the names of formulas: ``motion["ball.position"]``, ``motion["knee.angle"]``; see ``units``.
     """
 
     time: Array
@@ -71,6 +88,43 @@ class Trajectory:
     joint_torque: Annotated[Array, "N, J, K"]
     joint_command: Annotated[Array, "N, J, K"]
     joint_separation: Annotated[Array, "N + 1, J"]
+    joint_units: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> Array:
+        """(N + 1, ...), or (N, ...) of what acts in a step: a quantity by its name; KeyError says which there are."""
+        if name not in self._columns:
+            raise KeyError(f"there is no {quote(name)}; {hint(name, self._columns)}")
+        field_name, index, _ = self._columns[name]
+        array = getattr(self, field_name)[:, index] if index is not None else getattr(self, field_name)
+        if field_name not in COORDINATES:
+            return np.asarray(array)
+        count = int((~np.isnan(self.joint_value[0, index])).sum())
+        return np.asarray(array[:, 0] if count == 1 else array[:, :count])
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of every quantity by its name: ``{"ball.position": "m", ...}``; empty where there is none."""
+        return {name: unit for name, (_, _, unit) in self._columns.items()}
+
+    @cached_property
+    def _columns(self) -> dict[str, tuple[str, int | None, str]]:
+        """The field, the index and the unit of each quantity."""
+        found: dict[str, tuple[str, int | None, str]] = {"time": ("time", None, "s")}
+        for index, body in enumerate(self.body_names):
+            found |= {f"{body}.{key}": (key, index, unit) for key, unit in OF_BODIES.items()}
+        for index, joint in enumerate(self.joint_names):
+            found[f"{joint}.separation"] = ("joint_separation", index, "m")
+            if np.isnan(self.joint_value[:1, index]).all():
+                continue
+            unit = self.joint_units[index] if self.joint_units else ""
+            found[f"{joint}.{'position' if unit == 'm' else 'angle'}"] = ("joint_value", index, unit)
+            found[f"{joint}.rate"] = ("joint_rate", index, unit and f"{unit}/s")
+            found[f"{joint}.torque"] = ("joint_torque", index, {"m": "N", "rad": "N m"}.get(unit, ""))
+            found[f"{joint}.command"] = ("joint_command", index, "")
+        for index, contact in enumerate(self.contact_names):
+            found[f"{contact}.force"] = ("contact_force", index, "N")
+            found[f"{contact}.gap"] = ("contact_gap", index, "m")
+        return found
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
         """Every field as an array, ready for ``numpy.savez``."""

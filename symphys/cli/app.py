@@ -8,7 +8,6 @@ from collections.abc import Sequence
 
 import click
 
-from symphys import __version__
 from symphys.cli.cache import cache
 from symphys.cli.check import check
 from symphys.cli.doctor import doctor
@@ -20,6 +19,7 @@ from symphys.cli.show import show
 from symphys.cli.solve import solve
 from symphys.errors import SymphysError
 from symphys.suggest import hint
+from symphys.version import __version__
 
 SOLVED, UNSOLVED, WRONG, INTERRUPTED = 0, 1, 2, 130
 

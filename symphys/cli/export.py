@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from symphys import __version__
 from symphys.cli.arguments import UsageFault, read_problems, read_settings, settings_option
+from symphys.version import __version__
 
 if TYPE_CHECKING:
     from symphys.problem import Problem

@@ -19,7 +19,7 @@ import casadi as ca
 from symphys.dynamics.contact.constraint import ContactConstraint, ContactImpulse
 from symphys.dynamics.motion import PredictedMotion, apply
 from symphys.dynamics.tracing.decorator import traced
-from symphys.dynamics.unknowns import Momentum, PlacedConstraint, Solution, Velocities
+from symphys.dynamics.unknowns import Iterate, Momentum, PlacedConstraint, Velocities
 from symphys.model.world import World
 
 Expr = Any
@@ -83,9 +83,9 @@ def lengthened(
     cluster: Cluster,
     constraints: Sequence[PlacedConstraint],
     motions: Sequence[PredictedMotion],
-    before: Solution,
-    now: Solution,
-) -> Solution:
+    before: Iterate,
+    now: Iterate,
+) -> Iterate:
     """The solution after the change of the last sweep, from ``before`` to ``now``, is repeated in part."""
     sums: tuple[Expr, Expr] = (ca.SX(0), ca.SX(0))
     longest: Expr = ca.SX(LONGEST)

@@ -15,8 +15,8 @@ from symphys.dynamics.unknowns import (
     AllVelocities,
     AnyImpulse,
     GeneralizedVelocities,
+    Iterate,
     PlacedConstraint,
-    Solution,
     Velocities,
     VelocityConstraint,
 )
@@ -36,9 +36,9 @@ def iterate(
     world: World,
     sweeps: int,
     constraints: tuple[PlacedConstraint, ...],
-    start: Solution,
+    start: Iterate,
     motions: Sequence[PredictedMotion],
-) -> Solution:
+) -> Iterate:
     """The solution after all sweeps; in clusters of unequal bodies with a line search after some of them."""
     found = tuple(clusters(world, constraints))
     if not found:
@@ -48,7 +48,7 @@ def iterate(
     return repeat(sweeps - rounds * EVERY, sweep, constraints, moved)
 
 
-def _round(fixed: Acceleration, state: Solution) -> Solution:
+def _round(fixed: Acceleration, state: Iterate) -> Iterate:
     """Some sweeps, then a longer step along the last."""
     before = repeat(EVERY - 1, sweep, fixed.constraints, state)
     now = sweep(fixed.constraints, before)
@@ -57,7 +57,7 @@ def _round(fixed: Acceleration, state: Solution) -> Solution:
     return now
 
 
-def sweep(constraints: tuple[PlacedConstraint, ...], before: Solution) -> Solution:
+def sweep(constraints: tuple[PlacedConstraint, ...], before: Iterate) -> Iterate:
     """One pass over all constraints."""
     momenta, new = list(before.momenta), list(before.impulses)
     for run in runs(constraints, momenta):
@@ -70,7 +70,7 @@ def sweep(constraints: tuple[PlacedConstraint, ...], before: Solution) -> Soluti
             momenta[i] = moved
         for k, impulse in zip(run, given, strict=True):
             new[k] = impulse
-    return Solution(tuple(momenta), tuple(new), before.impulses)
+    return Iterate(tuple(momenta), tuple(new), before.impulses)
 
 
 def projection_order(constraints: Sequence[PlacedConstraint]) -> list[int]:
@@ -108,14 +108,14 @@ def runs(constraints: Sequence[PlacedConstraint], momenta: Sequence[Velocities])
 
 def apply_start(
     constraints: Sequence[PlacedConstraint], momenta: AllVelocities, impulses: Sequence[AnyImpulse]
-) -> Solution:
+) -> Iterate:
     """Apply the impulses that the sweeps start from."""
     started = list(momenta)
     for each, impulse in zip(constraints, impulses, strict=True):
         after = _apply(each.constraint, tuple(started[i] for i in each.carriers), impulse)
         for i, momentum in zip(each.carriers, after, strict=True):
             started[i] = momentum
-    return Solution(tuple(started), tuple(impulses), tuple(impulses))
+    return Iterate(tuple(started), tuple(impulses), tuple(impulses))
 
 
 @traced

@@ -59,7 +59,7 @@ class VelocityConstraint(Protocol):
 
 
 @dataclass(frozen=True)
-class Solution:
+class Iterate:
     """Momenta of all bodies, accumulated impulses of all constraints, and these before the last sweep."""
 
     momenta: AllVelocities

@@ -1,14 +1,14 @@
 """Problem files: reading, validation, and the model that everything after works with."""
 
 from symphys.problem.feedback import Controller, Sensor
-from symphys.problem.load import load_problem, require_solvable
+from symphys.problem.load import require_solvable
 from symphys.problem.model import (
     ALIVE,
     Constraint,
     Cost,
     Discretisation,
     Output,
-    Problem,
+    ProblemData,
     RandomizedPose,
     RandomizedQuantity,
     Scenarios,
@@ -19,6 +19,7 @@ from symphys.problem.model import (
     VariableSlot,
 )
 from symphys.problem.parametric.reposition import reposition
+from symphys.problem.problem import Problem, load_problem, problem_of_tables
 from symphys.problem.reading.solver_options import require_solvers, validate_options
 from symphys.problem.schema.json_schema import json_schema
 
@@ -30,6 +31,7 @@ __all__ = [
     "Discretisation",
     "Output",
     "Problem",
+    "ProblemData",
     "RandomizedPose",
     "RandomizedQuantity",
     "Scenarios",
@@ -41,6 +43,7 @@ __all__ = [
     "VariableSlot",
     "json_schema",
     "load_problem",
+    "problem_of_tables",
     "reposition",
     "require_solvable",
     "require_solvers",

@@ -1,4 +1,4 @@
-"""From a problem file to a Problem; everything that can be wrong with a file is found here."""
+"""From the text of a problem file to its data; everything that can be wrong with a file is found here."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from symphys.problem.checks.start import at_guess, check_joints, check_overlap, 
 from symphys.problem.feedback import Controller, Sensor
 from symphys.problem.include.files import with_included
 from symphys.problem.include.placing import placed
-from symphys.problem.model import ALIVE, NOTHING, Array, Problem, Simulation, Termination, Variable
+from symphys.problem.model import ALIVE, NOTHING, Array, ProblemData, Simulation, Termination, Variable
 from symphys.problem.parametric.collision_filter import CollisionFilter
 from symphys.problem.parametric.forward_kinematics import forward_kinematics
 from symphys.problem.parametric.parts import Part
@@ -27,8 +27,8 @@ from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.quantities import Quantity, quantities, weight_quantities
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.reading.messages import report
-from symphys.problem.reading.settings import apply_settings
-from symphys.problem.reading.source import parse_toml, read_source
+from symphys.problem.reading.settings import apply_settings, own_settings
+from symphys.problem.reading.source import parse_toml
 from symphys.problem.schema import Document
 from symphys.problem.tables.bodies import read_body, read_state
 from symphys.problem.tables.contact import (
@@ -52,23 +52,22 @@ SHARED_NAMES = (*MEMBERS, "joint", "sensor", "controller", "variable")
 OWN_NAMES = ("cost", "target", "constraint", "output", "scenario")
 
 
-def load_problem(
-    path: str | Path, settings: Mapping[str, object] = NOTHING, functions: Mapping[str, ca.Function] = NOTHING
-) -> Problem:
-    """Read and validate a problem file.
+def read_problem(
+    path: Path, text: str, settings: Mapping[str, object] = NOTHING, functions: Mapping[str, ca.Function] = NOTHING
+) -> ProblemData:
+    """Read and validate the text of a problem file.
 
     Args:
-        path: the TOML file.
-        settings: values that replace those in the file, by dotted key: ``simulation.dt``, ``body.ball.mass`` or
-            ``body.0.mass``, ``ground.friction``, ``solver.gradient.iterations``, ``target.<name>.tolerance``.
-        functions: for controllers with ``function``, by name: casadi functions of (sensed, time, weights).
+        path: of the file; files that it includes are looked for beside it.
+        text: what is in it.
+        settings: see ``load_problem``; those of the table [set] come before them.
+        functions: see ``load_problem``.
 
     Raises:
         ProblemError: names the file and every fault found, each with table, key and what would be valid.
     """
-    path = Path(path)
-    text = read_source(path)
     data = parse_toml(path, text)
+    settings = {**own_settings(data, str(path)), **settings}
     early, late = (
         {key: value for key, value in settings.items() if of_includes(key) is which} for which in (True, False)
     )
@@ -128,7 +127,7 @@ def groups(document: Document) -> list[tuple[Place, str]]:
 
 def build(
     path: Path, text: str, document: Document, faults: Faults, functions: Mapping[str, ca.Function] = NOTHING
-) -> Problem:
+) -> ProblemData:
     """The problem; each stage needs the ones before without fault."""
     simulation = read_simulation(document.simulation, faults)
     parametric, initial = read_world(document, faults)
@@ -146,7 +145,7 @@ def build(
     termination, objectives = read_termination_and_objectives(
         document, simulation, parametric, at_guess(parametric, known, variables), variables, faults
     )
-    return Problem(
+    return ProblemData(
         name=path.stem,
         title=document.title or path.stem,
         description=document.description,
@@ -233,7 +232,7 @@ def stop_when_met(document: Document, objectives: Objectives) -> bool:
     return document.objective.goal is not None or (bool(objectives.targets) and not objectives.costs)
 
 
-def require_solvable(problem: Problem) -> None:
+def require_solvable(problem: ProblemData) -> None:
     """ProblemError if nothing may vary, or if there is no objective, with what to add."""
     body = next(iter(problem.initial)).split(".")[0]
     issues = []

@@ -257,9 +257,9 @@ class Scenarios:
         return any(True for _ in self)
 
 
-@dataclass(frozen=True)
-class Problem:
-    """A validated problem.
+@dataclass(frozen=True, eq=False)
+class ProblemData:
+    """All that a problem file says, validated; equal to itself only.
 
     Attributes:
         name: the file's stem.

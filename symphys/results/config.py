@@ -9,9 +9,10 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from symphys import __version__, files
+from symphys import files
 from symphys import json_values as values
 from symphys.json_values import Text
+from symphys.version import __version__
 
 
 @dataclass(frozen=True)

@@ -74,6 +74,8 @@ def make_trajectory(arrays: Mapping[str, Array]) -> Trajectory:
     if "orientation" not in arrays:
         found["orientation"] = np.broadcast_to(np.array([1.0, 0.0, 0.0, 0.0]), (count, bodies, 4))
     found["body_names"] = names_of(arrays, "body_names", bodies)
+    units = names_of(arrays, "joint_units")
+    found["joint_units"] = units if len(units) == len(joints) else ()
     return Trajectory(time=time, contact_names=contacts, joint_names=joints, **found)
 
 

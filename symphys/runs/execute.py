@@ -12,11 +12,11 @@ from symphys.runs.folder import FolderBusy
 from symphys.runs.job import Job
 from symphys.runs.record import failure
 from symphys.runs.solving import solve
-from symphys.runs.transcription_cache import TranscriptionCache
+from symphys.runs.transcription_cache import Transcriptions
 from symphys.solvers import Monitor, Outcome
 
 
-def execute(job: Job, monitor: Monitor, transcriptions: TranscriptionCache, solved: Outcome | None = None) -> Result:
+def execute(job: Job, monitor: Monitor, transcriptions: Transcriptions, solved: Outcome | None = None) -> Result:
     """Do the run, or go on with it, unless it is done; write its folder; return what it found.
 
     ``monitor`` sees each iteration and may raise KeyboardInterrupt, which ends the run so that it can go on later.
@@ -36,7 +36,7 @@ def execute(job: Job, monitor: Monitor, transcriptions: TranscriptionCache, solv
 def proceed(
     job: Job,
     monitor: Monitor,
-    transcriptions: TranscriptionCache,
+    transcriptions: Transcriptions,
     earlier: Result | None,
     solved: Outcome | None = None,
 ) -> Result:

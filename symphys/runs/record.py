@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from symphys import __version__, files
+from symphys import files
 from symphys.codegen.backends import Description
 from symphys.findings.levels import Judged
 from symphys.findings.verdict import rule
@@ -30,6 +30,7 @@ from symphys.shooting import Array
 from symphys.solvers import Counts, Outcome, StageResult, TraceRow
 from symphys.trajectory import Trajectory
 from symphys.transcription import Assessment, Transcription
+from symphys.version import __version__
 
 JUDGED = frozenset(("objective", "costs", "outputs", "checks"))
 """What is not known where the exact rollout cannot be simulated."""

@@ -10,6 +10,8 @@ from symphys.transcription import Transcription
 
 Transcribe = Callable[[Problem, bool], Transcription]
 """(problem, whether smoothing 0 is all that will be asked for) -> its transcription."""
+Transcriptions = Callable[[Job], Transcription]
+"""What has the transcription of a job's problem, such as a ``TranscriptionCache``."""
 
 
 class TranscriptionCache:

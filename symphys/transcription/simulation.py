@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from symphys.dynamics.functions import report_function
 from symphys.dynamics.observation import reading_function
+from symphys.model.joints import Joint
 from symphys.model.state_layout import GIVEN, Layout, input_columns
 from symphys.trajectory import NotFinite, Trajectory
 from symphys.transcription.nan_tracing.steps import RolloutArrays, first_non_finite
@@ -102,7 +103,13 @@ def _joints(rollout: Rollout, x: Array, u: Array, p: Array) -> dict[str, Any]:
         "joint_torque": torque[1:],
         "joint_command": _split(_commands(rollout, u, counts), counts),
         "joint_separation": separation,
+        "joint_units": tuple(map(_unit, joints)),
     }
+
+
+def _unit(joint: Joint) -> str:
+    """Of a joint's coordinates; empty where it has none."""
+    return "".join("rad" if coordinate.turns else "m" for coordinate in joint.kind.coordinates[:1])
 
 
 def _commands(rollout: Rollout, u: Array, counts: list[int]) -> Array:

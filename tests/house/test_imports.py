@@ -15,12 +15,13 @@ ROOT = Path(__file__).parents[2]
 MOST_MODULES = 15
 PACKAGE = "symphys"
 ROOMS: dict[str, tuple[str, str, str]] = {
+    "version": ("", "", "the version of the package"),
     "errors": ("", "", "errors that a user may meet"),
     "suggest": ("", "", "hints for error messages"),
     "threads": ("", "", "one thread for linear algebra"),
     "files": ("errors", "numpy", "files appear at once and whole, or not at all"),
     "json_values": ("", "numpy", "tolerant readings of JSON"),
-    "trajectory": ("errors", "numpy", "a simulated motion as arrays"),
+    "trajectory": ("errors suggest", "numpy", "a simulated motion as arrays"),
     "shooting": ("", "numpy", "the shooting problem: all that a solver sees"),
     "maths": ("", "casadi", "rotations and smoothed primitives"),
     "model": ("", "casadi numpy", "what a world is, as data"),
@@ -29,7 +30,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "problems": ("errors suggest", "", "shipped problem files"),
     "problem": (
         "dynamics errors expression maths model problems suggest",
-        "casadi numpy pydantic pydantic_core",
+        "casadi numpy pydantic pydantic_core tomli_w",
         "problem file to problem; of the dynamics only what is observed",
     ),
     "codegen": ("errors shooting", "casadi cuda cupy numpy", "programs compiled to SIMD C and CUDA"),
@@ -51,12 +52,13 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "solvers": ("errors shooting", "casadi cma numpy scipy", "optimisation methods"),
     "findings": ("json_values", "numpy", "what the numbers of an examination mean"),
     "results": (
-        "errors files findings json_values model problem shooting trajectory",
+        "errors files findings json_values model problem shooting trajectory version",
         "casadi numpy scipy",
         "what a run folder holds",
     ),
     "runs": (
-        "codegen errors files findings problem results shooting solvers threads trajectory transcription verification",
+        "codegen errors files findings problem results shooting solvers threads trajectory transcription verification "
+        "version",
         "numpy",
         "solve, judge, examine, write",
     ),
@@ -66,9 +68,14 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "pages and figures, made from run folders alone",
     ),
     "doctor": ("codegen", "casadi numpy", "what there is on this machine"),
+    "api": (
+        "errors findings problem problems report results runs shooting solvers suggest trajectory transcription",
+        "casadi matplotlib numpy",
+        "what Python calls",
+    ),
     "cli": (
         "codegen doctor errors export files findings problem problems report results runs solvers suggest threads "
-        "trajectory transcription verification",
+        "trajectory transcription verification version",
         "click numpy rich",
         "the commands",
     ),

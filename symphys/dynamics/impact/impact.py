@@ -26,7 +26,7 @@ from symphys.dynamics.motion import PredictedMotion, angular_velocity, apply
 from symphys.dynamics.prediction import bodies_of, detect_contacts, predicted_motions
 from symphys.dynamics.substep import Substep
 from symphys.dynamics.tracing.decorator import traced
-from symphys.dynamics.unknowns import Momentum, PlacedConstraint, Solution
+from symphys.dynamics.unknowns import Iterate, Momentum, PlacedConstraint
 from symphys.maths import rotation
 from symphys.maths.smoothing import positive
 from symphys.model.world import Law
@@ -135,7 +135,7 @@ def resolve_impact(context: StepContext, x: State, split: StepSplit) -> Substep:
     locks = locks_at(context, trees)
     n, still = len(locks), (*(nothing for _, nothing in locks), *(ZERO for _ in constraints))
     every = (*(constraint for constraint, _ in locks), *constraints)
-    solved = rebound(context, every, Solution(trees.states, still, still), motions, trees)
+    solved = rebound(context, every, Iterate(trees.states, still, still), motions, trees)
     after = _with_velocities(context, x, motions, momenta_of(context, trees, solved.momenta), split.impact)
     _delay(context, after, constraints, solved.impulses[n:], split.late)
     forces = (x[f"{pair.name}.force"] for pair in context.world.pairs)

@@ -25,9 +25,9 @@ from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import (
     AnyImpulse,
     GeneralizedVelocities,
+    Iterate,
     Momentum,
     PlacedConstraint,
-    Solution,
     Velocities,
 )
 from symphys.maths.smoothing import TINY_SQUARE
@@ -46,10 +46,10 @@ def eccentric_bodies(world: World) -> set[int]:
 def rebound(
     context: StepContext,
     constraints: tuple[PlacedConstraint, ...],
-    start: Solution,
+    start: Iterate,
     motions: Sequence[PredictedMotion],
     trees: KinematicTrees,
-) -> Solution:
+) -> Iterate:
     """The impulses of an impact, and the momenta after it."""
     scheme = context.settings.scheme
     if not (scheme.energy_cap and eccentric_bodies(context.world)):
@@ -62,7 +62,7 @@ def rebound(
     for motion, *momenta in zip(motions, *bodies, strict=True):
         sums = _energies(motion, momenta, sums)
     share = _largest_share(sums)
-    return Solution(
+    return Iterate(
         tuple(_between_states(share, a, b) for a, b in zip(plastic.momenta, newton.momenta, strict=True)),
         tuple(_between(share, a, b) for a, b in zip(plastic.impulses, newton.impulses, strict=True)),
         tuple(_between(share, a, b) for a, b in zip(plastic.last, newton.last, strict=True)),

@@ -18,6 +18,10 @@ RENAMED = {"fall": "termination", "forget": "adjoint_discount"}
 FORMER = {name: old for old, name in RENAMED.items()}
 
 
+ALIASES = {"gravity": "world.gravity"}
+"""Names of formulas that are no table's."""
+
+
 class SettingError(Exception):
     """Why a setting has no place."""
 
@@ -41,10 +45,38 @@ def apply_settings(
         raise ProblemError(file, issues)
 
 
+def own_settings(data: dict[str, Any], file: str) -> dict[str, object]:
+    """The settings that a file has itself, in a table [set], which is taken out."""
+    own = data.pop("set", {})
+    if isinstance(own, dict):
+        return own
+    example = 'write [set] and below it, for instance, "body.ball.mass" = 2'
+    raise ProblemError(file, [Issue("set", f"must be a table of dotted keys, not {shown(own)}; {example}")])
+
+
+def located(data: Mapping[str, Any], path: str) -> str:
+    """The path with the kind of table before the name of one: ``body.ball.mass`` for ``ball.mass``."""
+    if path.partition(".")[0] in (*Document.model_fields, *RENAMED, *FORMER):
+        return path
+    named = {
+        (len(table["name"]), key)
+        for key, tables in data.items()
+        if isinstance(tables, list)
+        for table in tables
+        if isinstance(table, dict) and isinstance(table.get("name"), str) and path.startswith(f"{table['name']}.")
+    }
+    longest = max((length for length, _ in named), default=0)
+    kinds = sorted(key for length, key in named if length == longest)
+    if len(kinds) > 1:
+        name = quote(path[:longest])
+        raise SettingError(f"{name} is the name of {' and '.join(kinds)}; say which: {quote(f'{kinds[0]}.{path}')}")
+    return f"{kinds[0]}.{path}" if kinds else ALIASES.get(path, path)
+
+
 def assign(data: dict[str, Any], path: str, value: object) -> None:
     """Walk down the dotted path, in which names may hold dots themselves, and set what is at its end."""
     node: Any = data
-    open_below, rest = False, path
+    open_below, rest = False, located(data, path)
     while True:
         key, remainder = step(node, rest, top=node is data)
         if isinstance(node, dict) and key not in node:
@@ -96,4 +128,6 @@ def unopened(node: Mapping[str, Any], key: str, top: bool) -> str:
     """Why a missing table is not made."""
     if top and key in Document.model_fields:
         return f"the file has no {quote(key)}, and a setting cannot add one"
-    return f"there is no {quote(key)}; {hint(key, [*node, *(OPENED if top else ())])}"
+    tables = [table for tables in node.values() if isinstance(tables, list) for table in tables] if top else []
+    names = [table["name"] for table in tables if isinstance(table, dict) and isinstance(table.get("name"), str)]
+    return f"there is no {quote(key)}; {hint(key, [*node, *(OPENED if top else ()), *names])}"

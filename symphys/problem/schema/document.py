@@ -69,6 +69,9 @@ class Document(SchemaTable):
     solver: dict[str, dict[str, Any]] = Field(
         default={}, description="options by solver: [solver.gradient], [solver.cma], ..."
     )
+    set: dict[str, Any] = Field(
+        default={}, description='values that replace others, such as those of included files: "body.torso.mass" = 3'
+    )
 
     @property
     def ending(self) -> tuple[str, TerminationTable | None]:

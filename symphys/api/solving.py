@@ -1,0 +1,107 @@
+"""One solve, from a problem to its solution."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+import weakref
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from symphys.api.loading import Source, load
+from symphys.api.solution import Solution
+from symphys.api.transcriptions import transcribed
+from symphys.errors import SymphysError
+from symphys.problem import Problem
+from symphys.results.run import read_run
+from symphys.runs import Job, execute, make_jobs
+from symphys.runs.job import fitting
+from symphys.runs.stopping import Interrupts
+from symphys.solvers import TraceRow
+
+Progress = Callable[[TraceRow], None]
+
+
+def solve(
+    problem: Source,
+    solver: str | None = None,
+    seed: int = 0,
+    *,
+    folder: str | Path | None = None,
+    examine: bool = False,
+    backend: str = "auto",
+    threads: int | None = None,
+    progress: Progress | None = None,
+    **options: object,
+) -> Solution:
+    """Solve a problem.
+
+    Args:
+        problem: what ``load`` takes.
+        solver: its name; None: the first that the problem names, else the first that fits it.
+        seed: 0 starts from the guess; others from one perturbed by the ``spread`` of each variable.
+        folder: where run folders are kept, as by ``symphys solve --out``: what is done already is not done again, what
+            was interrupted goes on. None: nothing is kept.
+        examine: whether to examine how far the solution can be trusted, which may take longer than the solve.
+        backend: what evaluates: "auto", "simd", "simd32", "c", "cuda", "cuda32" or "casadi".
+        threads: that share a batch; None: one for each processor.
+        progress: sees each iteration: its ``iteration``, ``objective``, ``max_violation``, ``seconds``.
+        options: of the solver, as in its table [solver.NAME]: ``iterations=200``, ``max_seconds=10``.
+
+    Returns:
+        The solution, whether or not it is one: see ``solved`` and ``verdict``.
+
+    Raises:
+        ProblemError: the problem or an option cannot be used; says what would be valid.
+        SymphysError: there is no such solver, or the run failed.
+        KeyboardInterrupt: after Ctrl-C; with a ``folder``, the same call goes on from there.
+
+    Example:
+        >>> import symphys
+        >>> solution = symphys.solve("ball_throw", solver="least_squares", backend="casadi")
+        >>> solution.solved, sorted(solution.value)
+        (True, ['spin', 'throw'])
+    """
+    read_in = load(problem)
+    name = solver or (read_in.solvers or tuple(fitting(read_in)))[0]
+    asked = read_in.set({f"solver.{name}.{key}": value for key, value in options.items()}) if options else read_in
+    with kept(folder) as out:
+        (job,) = make_jobs([asked], [name], [seed], dict(asked.settings), out, "", backend, examine)
+        run(job, read_in, backend, threads, progress)
+        path = job.folder.path
+        solution = Solution(path, read_run(path, path), asked)
+    if folder is None:
+        weakref.finalize(solution, shutil.rmtree, out, ignore_errors=True)
+    return solution
+
+
+@contextmanager
+def kept(folder: str | Path | None) -> Iterator[Path]:
+    """The folder, or a temporary one, which goes only where nothing comes of it."""
+    if folder is not None:
+        yield Path(folder)
+        return
+    out = Path(tempfile.mkdtemp(prefix="symphys-"))
+    try:
+        yield out
+    except BaseException:
+        shutil.rmtree(out, ignore_errors=True)
+        raise
+
+
+def run(job: Job, problem: Problem, backend: str, threads: int | None, progress: Progress | None) -> None:
+    """Do what is asked for into its folder; options of a solver do not change what is compiled for the problem."""
+    with Interrupts().listening() as stop:
+
+        def monitor(row: TraceRow) -> None:
+            if stop():
+                raise KeyboardInterrupt
+            if progress:
+                progress(row)
+
+        result = execute(job, monitor, lambda job: transcribed(problem, not job.smooth, backend, threads))
+    if result.interrupted:
+        raise KeyboardInterrupt(f"interrupted; what was found is in {job.folder.path}")
+    if result.status == "failed":
+        raise SymphysError(result.advice)

@@ -1,0 +1,57 @@
+"""The numbers of variables by name, as people write them, and as one vector z."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from symphys.errors import SymphysError
+from symphys.shooting import ShootingProblem, VariableBlock
+from symphys.suggest import hint, quote
+
+Array = NDArray[np.float64]
+
+
+def shape_of(block: VariableBlock) -> tuple[int, ...]:
+    """(components,), or (knots, components) where there are several knots."""
+    components, knots = block.shape
+    return (components,) if knots == 1 else (knots, components)
+
+
+def by_name(shooting: ShootingProblem, z: Array) -> dict[str, Array]:
+    """The parts of z (n,): (components,), or (knots, components) where there are several knots."""
+    return {block.name: z[block.start : block.stop].reshape(shape_of(block)) for block in shooting.blocks}
+
+
+def vector(shooting: ShootingProblem, values: Mapping[str, ArrayLike]) -> Array:
+    """(n,): the guess with some variables replaced.
+
+    Args:
+        shooting: of the problem.
+        values: by the names of variables; a number, or one for each component, holds for all knots.
+
+    Raises:
+        SymphysError: no variable has that name, or the numbers do not fit it; says what would.
+    """
+    z, blocks = shooting.start(0), {block.name: block for block in shooting.blocks}
+    for name, value in values.items():
+        if name not in blocks:
+            raise SymphysError(f"no variable is called {quote(name)}; {hint(name, blocks)}")
+        z[blocks[name].start : blocks[name].stop] = fitted(blocks[name], value)
+    return z
+
+
+def fitted(block: VariableBlock, value: Any) -> Array:
+    """(components * knots,) of a value."""
+    given, wanted = np.asarray(value, float), shape_of(block)
+    if given.ndim == 1 and given.size == int(np.prod(wanted)):
+        return given
+    try:
+        return np.broadcast_to(given, wanted).ravel()
+    except ValueError:
+        kind = "(components,)" if len(wanted) == 1 else "(knots, components)"
+        text = f"variable {quote(block.name)} takes numbers of shape {wanted}, {kind}, not {given.shape}"
+        raise SymphysError(text) from None

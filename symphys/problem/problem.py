@@ -1,0 +1,110 @@
+"""A problem and where it comes from: read from a file, a text or tables, changed, and written again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import tomli_w
+
+from symphys.problem.load import read_problem
+from symphys.problem.model import NOTHING, ProblemData
+from symphys.problem.reading.source import parse_toml, read_source
+
+SET = "set"
+"""The table of a problem file that holds settings."""
+
+
+@dataclass(frozen=True, eq=False)
+class Problem(ProblemData):
+    """A validated problem, which never changes: ``set`` gives another one.
+
+    Attributes:
+        settings: what was changed in the text, by dotted key.
+        functions: of controllers with ``function``, by name.
+    """
+
+    settings: Mapping[str, object] = field(default_factory=dict)
+    functions: Mapping[str, ca.Function] = field(default_factory=dict, repr=False)
+
+    def set(self, key: str | Mapping[str, object], value: object = None) -> Problem:
+        """The same problem with another value, or with several from a mapping.
+
+        Args:
+            key: of the problem file, dotted: ``ball.mass``, ``ground.friction``, ``simulation.dt``, ``throw.guess``,
+                ``solver.gradient.iterations``. Tables in lists go by name; their kind, as in ``body.ball.mass``, is
+                needed only where tables of two kinds share the name.
+            value: a number, text, list or table, as in the file.
+
+        Raises:
+            ProblemError: names the key and what would be valid.
+
+        Example:
+            >>> import symphys
+            >>> problem = symphys.load("ball_throw")
+            >>> heavier = problem.set("ball.mass", 2.0)
+            >>> float(problem.parameters["ball.mass"][0]), float(heavier.parameters["ball.mass"][0])
+            (1.0, 2.0)
+        """
+        changes = key if isinstance(key, Mapping) else {key: value}
+        return _made(Path(self.file), self.text, {**self.settings, **changes}, self.functions)
+
+    def to_toml(self) -> str:
+        """The text of a problem file that is this problem: its own, with what was changed in a table [set] at the end.
+
+        Files that it includes are in the text. Numbers of nets from other files are not.
+        """
+        if not self.settings:
+            return self.text
+        data = parse_toml(Path(self.file), self.text)
+        if SET in data:
+            return tomli_w.dumps({**data, SET: {**data[SET], **self.settings}})
+        return f"{self.text.rstrip()}\n\n{tomli_w.dumps({SET: dict(self.settings)})}"
+
+
+def load_problem(
+    path: str | Path, settings: Mapping[str, object] = NOTHING, functions: Mapping[str, ca.Function] = NOTHING
+) -> Problem:
+    """Read and validate a problem file.
+
+    Args:
+        path: the TOML file.
+        settings: values that replace those in the file, by dotted key: ``simulation.dt``, ``body.ball.mass`` or
+            ``body.0.mass``, ``ground.friction``, ``solver.gradient.iterations``, ``target.<name>.tolerance``.
+        functions: for controllers with ``function``, by name: casadi functions of (sensed, time, weights).
+
+    Raises:
+        ProblemError: names the file and every fault found, each with table, key and what would be valid.
+    """
+    path = Path(path)
+    return _made(path, read_source(path), settings, functions)
+
+
+def problem_of_tables(
+    tables: Mapping[str, Any], name: str = "problem", functions: Mapping[str, ca.Function] = NOTHING
+) -> Problem:
+    """A problem from the tables of a problem file as dicts and lists: ``{"simulation": {"duration": 2, ...}, ...}``.
+
+    Numpy's arrays and numbers may stand for lists and numbers. Raises ProblemError like ``load_problem``.
+    """
+    return _made(Path(f"{name}.toml"), tomli_w.dumps(plain(tables)), NOTHING, functions)
+
+
+def plain(value: Any) -> Any:
+    """Without numpy's types and tuples, which TOML does not know."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(each) for key, each in value.items()}
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    if isinstance(value, list | tuple):
+        return [plain(each) for each in value]
+    return value
+
+
+def _made(path: Path, text: str, settings: Mapping[str, object], functions: Mapping[str, ca.Function]) -> Problem:
+    settings = plain(settings)
+    data = read_problem(path, text, settings, functions)
+    return Problem(**vars(data), settings=settings, functions=dict(functions))

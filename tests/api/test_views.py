@@ -1,0 +1,97 @@
+"""The motion by names and units, as tables, figures and in a notebook; the surface, and its examples."""
+
+from __future__ import annotations
+
+import doctest
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import symphys
+
+
+def test_dir_lists_what_there_is() -> None:
+    assert dir(symphys) == sorted(symphys.__all__)
+
+
+def test_importing_is_cheap() -> None:
+    """Nothing of weight is loaded before it is used."""
+    heavy = "{'casadi', 'numpy', 'scipy', 'matplotlib', 'pydantic', 'click', 'rich'} & sys.modules.keys()"
+    done = subprocess.run(
+        [sys.executable, "-c", f"import sys, symphys; dir(symphys); print(sorted({heavy}))"],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("name", ["compile", "load", "read", "simulate", "solve", "Problem"])
+def test_examples_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    found = doctest.DocTestFinder(recurse=True).find(getattr(symphys, name), name, globs={})
+    examples = [each for each in found if each.examples]
+    assert examples
+    runner = doctest.DocTestRunner()
+    for each in examples:
+        runner.run(each)
+    assert runner.summarize().failed == 0
+
+
+def test_quantities_have_names_and_units(solution: symphys.Solution) -> None:
+    motion = solution.trajectory
+    assert motion["ball.velocity"].shape == (26, 3) and motion.units["ball.velocity"] == "m/s"
+    assert motion["ball.force"].shape == (25, 3) and motion["ball-ground.gap"].shape == (26,)
+    assert np.array_equal(motion["time"], motion.time)
+    for name, unit in motion.units.items():
+        assert motion[name].shape[0] in (25, 26) and isinstance(unit, str)
+    with pytest.raises(KeyError, match=r"ball\.position"):
+        motion["ball.positon"]
+
+
+def test_joints_have_names_and_units(tmp_path: Path) -> None:
+    """An angle in rad, a position in m; so they have when they are read from a file."""
+    made = symphys.simulate("cart_pole")
+    assert (made.units["rail.position"], made.units["rail.torque"], made.units["rail.rate"]) == ("m", "N", "m/s")
+    assert (made.units["pivot.angle"], made.units["pivot.rate"]) == ("rad", "rad/s")
+    assert made["pivot.angle"].shape == made.time.shape
+
+
+def test_tables(solution: symphys.Solution) -> None:
+    """Numbers over time by name; what acts during a step has none at the end."""
+    pandas, xarray = (pytest.importorskip(name) for name in ("pandas", "xarray"))
+    frame = solution.to_pandas()
+    assert isinstance(frame, pandas.DataFrame)
+    assert np.array_equal(frame["ball.position.z"], solution.trajectory.position[:, 0, 2])
+    assert frame["ball.force.x"].isna().sum() == 1 and frame.index.name == "time"
+    assert list(solution.to_pandas("trace")["objective"]) == list(solution.trace["objective"])
+    data = solution.to_xarray()
+    assert isinstance(data, xarray.Dataset)
+    assert data["ball.position"].attrs["units"] == "m"
+    assert float(data["ball.position"].sel(axis="z")[0]) == 1.0
+    with pytest.raises(symphys.SymphysError, match="trajectory"):
+        solution.to_pandas("motion")
+
+
+def test_figures(solution: symphys.Solution) -> None:
+    """A panel for each name, a line for each component; the motion without any."""
+    figure = solution.plot("ball.position", "ball-ground.gap", "trace.objective")
+    assert [len(axes.lines) for axes in figure.axes] == [3, 1, 1]
+    assert figure.axes[0].get_title(loc="left") == "ball.position [m]"
+    assert len(solution.plot().axes) >= 1
+    with pytest.raises(symphys.SymphysError, match=r"ball\.position"):
+        solution.plot("ball.positon")
+    with pytest.raises(symphys.SymphysError, match="objective"):
+        solution.plot("trace.objectiv")
+
+
+def test_a_notebook_shows_verdict_checks_and_motion(solution: symphys.Solution) -> None:
+    shown = solution._repr_html_()
+    assert "solved" in shown and "there" in shown and shown.count("<svg") == 1
+    assert repr(solution).startswith("<Solution of problem by least_squares: solved")
+
+
+def test_the_report_is_written_into_the_folder(solution: symphys.Solution) -> None:
+    page = solution.report()
+    assert page.parent == solution.folder and "there" in page.read_text(encoding="utf-8")
