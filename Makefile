@@ -39,6 +39,7 @@ bench: $(VENV)/.benching  ## measure what BENCHMARKS.md reports, contact aside; 
 	$(BIN)/python benchmarks/limit.py build
 	$(BIN)/python benchmarks/pile.py build
 	$(BIN)/python benchmarks/against_mujoco.py
+	$(BIN)/python benchmarks/front_door.py
 
 bench-contact: $(VENV)/.benching  ## errors of contact against the step, gradients, what each trick buys; an hour
 	$(BIN)/python benchmarks/gradients.py build

@@ -27,6 +27,24 @@ def parts() -> dict[str, Path]:
     return {f"{kind}/{path.name}": path for kind in PARTS for path in sorted((FOLDER / kind).glob("*.toml"))}
 
 
+def shipped(name: str) -> Path:
+    """A shipped problem, robot or task: ``ball_throw``, ``robots/arm.toml`` or ``arm``.
+
+    Raises:
+        SymphysError: there is none; names the nearest.
+    """
+    files = {**{path.stem: path for path in parts().values()}, **parts(), **catalogue()}
+    named = name if name in files else name.removesuffix(".toml")
+    if named not in files:
+        raise SymphysError(f"nothing of the name {quote(name)} is shipped; {hint(name, [*catalogue(), *parts()])}")
+    return files[named]
+
+
+def is_part(path: Path) -> bool:
+    """Whether a shipped file is a robot or a task, which problems include."""
+    return path in parts().values()
+
+
 def find(name_or_path: str | Path) -> Path:
     """A path that exists, else the shipped problem of that name (with or without ``.toml``).
 

@@ -12,9 +12,9 @@ from symphys.cli.cache import cache
 from symphys.cli.check import check
 from symphys.cli.doctor import doctor
 from symphys.cli.export import export
-from symphys.cli.listing import listing
 from symphys.cli.report import report
 from symphys.cli.schema import schema
+from symphys.cli.shipped import listing, new
 from symphys.cli.show import show
 from symphys.cli.solve import solve
 from symphys.errors import SymphysError
@@ -43,7 +43,7 @@ def app() -> None:
     """Trajectory optimisation through contact: a problem file in, a solution and a report out."""
 
 
-for command in (solve, report, show, check, export, listing, schema, doctor, cache):
+for command in (new, solve, report, show, check, export, listing, schema, doctor, cache):
     app.add_command(command)
 
 

@@ -13,14 +13,24 @@ from symphys.cli.arguments import out_option, read_problems, read_settings, sett
 @click.command()
 @click.argument("source", metavar="FILE")
 @settings_option
+@click.option("--text", is_flag=True, help="Print the file instead; also of a shipped robot or task.")
 @out_option
-def show(source: str, assignments: tuple[str, ...], out: Path) -> None:
-    """Simulate the guess of a problem, and draw the motion."""
+def show(source: str, assignments: tuple[str, ...], text: bool, out: Path) -> None:
+    """Simulate the guess of a problem, or a shipped robot by itself, and draw the motion."""
+    from symphys import problems
+    from symphys.problem import robot_alone
     from symphys.report import write_motion
     from symphys.runs import SCENE, TRAJECTORY, make_scene
     from symphys.transcription import transcribe
 
-    (problem,) = read_problems([source], read_settings(assignments))
+    here = Path(source).is_file()
+    path = Path(source) if here else problems.shipped(source)
+    if text:
+        click.echo(path.read_text(encoding="utf-8"), nl=False)
+        return
+    settings = read_settings(assignments)
+    alone = not here and problems.is_part(path)
+    (problem,) = [robot_alone(path, settings)] if alone else read_problems([source], settings)
     transcription = transcribe(problem, backend="casadi")
     guess = transcription.shooting.start(0)
     folder = out / problem.name / "guess"

@@ -19,7 +19,7 @@ from symphys.problem.model import (
     VariableSlot,
 )
 from symphys.problem.parametric.reposition import reposition
-from symphys.problem.problem import Problem, load_problem, problem_of_tables
+from symphys.problem.problem import Problem, load_problem, problem_of_tables, robot_alone
 from symphys.problem.reading.solver_options import require_solvers, validate_options
 from symphys.problem.schema.json_schema import json_schema
 
@@ -47,5 +47,6 @@ __all__ = [
     "reposition",
     "require_solvable",
     "require_solvers",
+    "robot_alone",
     "validate_options",
 ]

@@ -93,6 +93,19 @@ def problem_of_tables(
     return _made(Path(f"{name}.toml"), tomli_w.dumps(plain(tables)), NOTHING, functions)
 
 
+def robot_alone(path: Path, settings: Mapping[str, object] = NOTHING) -> Problem:
+    """A shipped robot, for a second, on the ground unless a joint holds it to the world; its motors are at rest."""
+    robot = parse_toml(path, read_source(path))
+    held = any("world" in joint.get("between", ()) for joint in robot.get("joint", ()))
+    tables = {
+        "title": robot.get("title", path.stem),
+        "simulation": {"duration": 1.0, "dt": 0.01},
+        "include": [{"file": f"{path.parent.name}/{path.name}"}],
+        **({} if held else {"ground": {}}),
+    }
+    return problem_of_tables(tables, path.stem).set(settings)
+
+
 def plain(value: Any) -> Any:
     """Without numpy's types and tuples, which TOML does not know."""
     if isinstance(value, Mapping):

@@ -91,7 +91,7 @@ def find(path: Path, index: int, table: IncludeTable, kept: Mapping[str, str], f
             text = f"there is no file {quote(table.file)}, and no shipped robot of that path"
             faults.stop(place, f"{text}; {hint(table.file, shipped)}")
         file = shipped[table.file]
-    if file.samefile(path):
+    if exists(path) and file.samefile(path):
         faults.stop(place, "the file includes itself")
     return str(file), read_source(file)
 
