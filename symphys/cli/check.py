@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from symphys.cli.arguments import UsageFault, read_problems, read_settings, settings_option
+from symphys.findings.writing import several
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -106,8 +107,10 @@ def describe(problem: Problem) -> list[str]:
     if world.joints:
         lines.append(f"  joints       {listed(f'{joint.name} ({joint.kind.name})' for joint in world.joints)}")
     for variable in problem.variables:
+        alike = " alike" if len(variable.slots) > 1 else ""
         sets = listed(slot.name for slot in variable.slots)
-        lines.append(f"  variable     {variable.name}: {variable.guess.size} numbers, sets {sets}")
+        numbers = several(variable.guess.size, "number")
+        lines.append(f"  variable     {variable.name}: {numbers}, sets {sets}{alike}")
     for kind, things in (("cost", problem.costs), ("target", problem.targets), ("constraint", problem.constraints)):
         for thing in things:
             formula = " ".join(thing.formula.text.split())

@@ -211,7 +211,7 @@ def read_world(document: Document, faults: Faults) -> tuple[ParametricWorld, dic
     parts: tuple[Part, ...] = (*bodies, *statics)
     names = [part.name for part in parts]
     shared = list(dict.fromkeys(group for _, group in groups(document)))
-    check_collides_with(bodies, names, shared, document, faults)
+    check_collides_with(names, shared, document, faults)
     pairs = read_pairs(document.pair, names, shared, faults)
     initial: dict[str, Array] = {}
     for index, table in enumerate(document.body):

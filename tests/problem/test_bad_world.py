@@ -51,7 +51,7 @@ CASES = [
     ("position = [0, 0, 1]", "position = 5", 'body "ball".position', "3 numbers, not 5"),
     # names
     ('name = "ball"', "", "body[0].name", "required"),
-    ('name = "ball"', 'name = "my ball"', 'body "my ball".name', '"my ball" is no name'),
+    ('name = "ball"', 'name = "my ball"', 'body "my ball".name', '"my ball" is no name.*for instance "my_ball"'),
     ('name = "ball"', 'name = ""', "body[0].name", "is no name"),
     ('name = "ball"', 'name = "sin"', 'body "sin".name', "already has a meaning"),
     ('name = "ball"', 'name = "time"', 'body "time".name', "already has a meaning"),

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
 from symphys.errors import ProblemError
-from symphys.problem import Problem
+from symphys.problem import Problem, load_problem
 
 Load = Callable[..., Problem]
 Refused = Callable[..., ProblemError]
@@ -142,3 +143,24 @@ def test_refused(refused: Refused, names: Names, text: str, where: str, message:
 def test_ground_in_a_group_of_a_body_name(refused: Refused, names: Names) -> None:
     text = BASE.replace("[ground]", '[ground]\ngroup = "a"') + body("a")
     names(refused(text=text), "ground.group", "already the name of a body")
+
+
+@pytest.mark.parametrize(
+    ("static", "name"),
+    [
+        ('[ground]\ncollides_with = ["ball"]\n', "ground"),
+        ('[[block]]\nname = "ramp"\nshape = { box = { size = [1, 1, 1] } }\ncollides_with = ["ball"]\n', "ramp"),
+        ('[[plane]]\nname = "wall"\nnormal = [0, 0, 1]\noffset = 0\ncollides_with = ["ball"]\n', "wall"),
+    ],
+)
+def test_what_stands_still_says_who_touches_it(tmp_path: Path, static: str, name: str) -> None:
+    """As bodies do: what it does not list passes through."""
+    body = '[[body]]\nname = "{}"\nshape = {{ sphere = {{ radius = 0.1 }} }}\nmass = 1\nposition = [{}, 0, 3]\n'
+    path = tmp_path / "static.toml"
+    head = "[simulation]\nduration = 0.1\ndt = 0.01\n"
+    path.write_text(head + body.format("ball", 0) + body.format("other", 1) + static, encoding="utf-8")
+    pairs = [pair.name for pair in load_problem(path).world().pairs]
+    assert f"ball-{name}" in pairs and f"other-{name}" not in pairs and "ball-other" in pairs
+    path.write_text(path.read_text(encoding="utf-8").replace('["ball"]', '["bal"]'), encoding="utf-8")
+    with pytest.raises(ProblemError, match=rf'{name}.*collides_with: no other body.*did you mean "ball"'):
+        load_problem(path)

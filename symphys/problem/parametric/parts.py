@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 from symphys.model.shapes import Scalar, Shape, Sphere, Static, Surface
 from symphys.model.world import Body, Law
@@ -105,12 +105,13 @@ class ParametricStatic:
         static: as the file has it.
         states: coefficients that its surface states, by name.
         group: that it belongs to.
+        collides_with: names of the bodies and groups that may touch it; None: all.
     """
 
     static: Static
     states: Mapping[str, float]
     group: str | None = None
-    collides_with: ClassVar[None] = None
+    collides_with: frozenset[str] | None = None
 
     @property
     def name(self) -> str:

@@ -44,7 +44,11 @@ def identifier(value: object) -> str:
     """A name that formulas can use."""
     if not isinstance(value, str) or not re.fullmatch(IDENTIFIER, value) or len(value) > MAX_IDENTIFIER:
         shown = quote(value) if isinstance(value, str) else "this"
-        raise fault(f"{shown} is no name: letters, digits and _, a letter first, at most {MAX_IDENTIFIER}")
+        words = re.findall(r"[A-Za-z0-9_]+", value) if isinstance(value, str) else []
+        fitting = "_".join(words)[:MAX_IDENTIFIER]
+        instead = f'; for instance "{fitting}"' if re.fullmatch(IDENTIFIER, fitting) else ""
+        rule = f"letters, digits and _, a letter first, at most {MAX_IDENTIFIER}, since formulas use it"
+        raise fault(f"{shown} is no name: {rule}{instead}")
     if value in RESERVED:
         raise fault(f"{quote(value)} already has a meaning in formulas; choose another name")
     return value

@@ -102,6 +102,9 @@ class MemberTable(SurfaceTable):
     group: Identifier | None = Field(
         default=None, description="a name shared by several surfaces, for collides_with and [[pair]]"
     )
+    collides_with: list[str] | None = Field(
+        default=None, description="names of the bodies, static surfaces and groups that it may touch; default: all"
+    )
 
 
 class BodyTable(MemberTable):
@@ -119,9 +122,6 @@ class BodyTable(MemberTable):
     orientation: Orientation = Field(default=[1.0, 0.0, 0.0, 0.0], description=UPRIGHT)
     velocity: Vector = Field(default=[0.0, 0.0, 0.0], description="[m/s]")
     angular_velocity: Vector = Field(default=[0.0, 0.0, 0.0], description="[rad/s]")
-    collides_with: list[str] | None = Field(
-        default=None, description="names of the bodies, static surfaces and groups that it may touch; default: all"
-    )
 
 
 class GroundTable(MemberTable):

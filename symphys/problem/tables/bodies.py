@@ -13,7 +13,7 @@ from symphys.problem.checks.inertia import centre_of_mass, inertia_fault
 from symphys.problem.checks.magnitude import check_magnitudes
 from symphys.problem.parametric.parts import COMBINE, ParametricBody
 from symphys.problem.reading.faults import Faults
-from symphys.problem.schema.physics import BodyTable, SurfaceTable
+from symphys.problem.schema.physics import BodyTable, MemberTable, SurfaceTable
 from symphys.problem.tables.shapes import read_orientation, read_shape
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ def read_body(index: int, table: BodyTable, faults: Faults) -> ParametricBody:
         hollow=hollow,
         inertia=frozen(table.inertia),
         states=states(table),
-        collides_with=None if table.collides_with is None else frozenset(table.collides_with),
+        collides_with=touching(table),
         group=table.group,
     )
     if len(faults.issues) == before:
@@ -89,6 +89,11 @@ def read_state(table: BodyTable, index: int, faults: Faults) -> dict[str, Array]
         "angular_velocity": np.array(table.angular_velocity),
     }
     return {f"{table.name}.{key}": value for key, value in given.items()}
+
+
+def touching(table: MemberTable) -> frozenset[str] | None:
+    """The names in collides_with; None: all."""
+    return None if table.collides_with is None else frozenset(table.collides_with)
 
 
 def states(table: SurfaceTable, keys: Iterable[str] = COMBINE) -> dict[str, float]:

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 from symphys.model.world import Law
 from symphys.problem.model import Variable
-from symphys.problem.parametric.parts import LAW, PairRule, ParametricBody
+from symphys.problem.parametric.parts import LAW, PairRule
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema import Document
-from symphys.problem.schema.physics import ContactTable, PairTable
-from symphys.problem.tables.bodies import states
+from symphys.problem.schema.physics import ContactTable, MemberTable, PairTable
+from symphys.problem.tables.bodies import states, touching
 from symphys.suggest import hint, quote
 
 
@@ -46,17 +46,21 @@ def read_pairs(
     return tuple(pairs)
 
 
-def check_collides_with(
-    bodies: Sequence[ParametricBody], names: Sequence[str], groups: Sequence[str], document: Document, faults: Faults
-) -> None:
+def check_collides_with(names: Sequence[str], groups: Sequence[str], document: Document, faults: Faults) -> None:
     """Every name in collides_with must be another body's, a static surface's or a group's."""
-    known = {*names, *groups}
-    for index, body in enumerate(bodies):
-        for name in document.body[index].collides_with or ():
-            if name not in known or name == body.name:
-                others = [other for other in (*names, *groups) if other != body.name]
+    tables: list[tuple[Place, MemberTable, str]] = [
+        ((kind, index), table, table.name)
+        for kind in ("body", "plane", "block", "terrain")
+        for index, table in enumerate(getattr(document, kind))
+    ]
+    if document.ground is not None:
+        tables.append((("ground",), document.ground, "ground"))
+    for place, table, own in tables:
+        others = [other for other in (*names, *groups) if other != own]
+        for name in sorted(touching(table) or (), key=(table.collides_with or []).index):
+            if name not in others:
                 message = f"no other body, no static surface and no group is called {quote(name)}; {hint(name, others)}"
-                faults.add(("body", index, "collides_with"), message)
+                faults.add((*place, "collides_with"), message)
 
 
 def check_ranks(parametric: ParametricWorld, faults: Faults) -> None:

@@ -17,7 +17,7 @@ from symphys.problem.parametric.parts import ParametricStatic
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema import Document
 from symphys.problem.schema.physics import BlockTable, GroundTable, PlaneTable, TerrainTable
-from symphys.problem.tables.bodies import states
+from symphys.problem.tables.bodies import states, touching
 from symphys.problem.tables.shapes import read_orientation, read_solid, three
 from symphys.suggest import quote
 
@@ -36,7 +36,7 @@ def read_statics(document: Document, starts: Sequence[Sequence[float]], faults: 
 
 def read_ground(table: GroundTable) -> ParametricStatic:
     """The horizontal plane called ground."""
-    return ParametricStatic(Plane.ground(table.height), states(table), table.group)
+    return ParametricStatic(Plane.ground(table.height), states(table), table.group, touching(table))
 
 
 def read_plane(index: int, table: PlaneTable, faults: Faults) -> ParametricStatic:
@@ -51,7 +51,7 @@ def read_plane(index: int, table: PlaneTable, faults: Faults) -> ParametricStati
         faults.add((*place, "offset"), "give either a point of the plane or its offset along the normal")
     offset = table.offset if table.point is None else float(normal @ np.array(table.point))
     plane = Plane(table.name, three(normal.tolist()), offset or 0.0)
-    return ParametricStatic(plane, states(table), table.group)
+    return ParametricStatic(plane, states(table), table.group, touching(table))
 
 
 def read_block(index: int, table: BlockTable, faults: Faults) -> ParametricStatic:
@@ -59,7 +59,7 @@ def read_block(index: int, table: BlockTable, faults: Faults) -> ParametricStati
     place = ("block", index)
     orientation = read_orientation((*place, "orientation"), table.orientation, faults)
     shape = read_solid((*place, "shape"), table.shape, table.position, orientation, faults)
-    return ParametricStatic(Fixture(table.name, shape or Sphere(1.0)), states(table), table.group)
+    return ParametricStatic(Fixture(table.name, shape or Sphere(1.0)), states(table), table.group, touching(table))
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def read_terrain(
         rows = tuple(tuple(row) for row in table.heights or ())
         (dx, dy), (x, y) = table.spacing, table.origin or (0.0, 0.0)
         height = Heightfield(rows, (dx, dy), (x, y))
-    return ParametricStatic(Terrain(table.name, height or flat), states(table), table.group)
+    return ParametricStatic(Terrain(table.name, height or flat), states(table), table.group, touching(table))
 
 
 def read_formula(
