@@ -15,7 +15,7 @@ from rich.text import Text
 from symphys.cli.wording import brief, labelled, number
 
 if TYPE_CHECKING:
-    from symphys.runs import Job, Observer, Result
+    from symphys.runs import Job, Result
     from symphys.solvers import TraceRow
 
 
@@ -29,7 +29,7 @@ def at(row: TraceRow) -> str:
 
 
 @contextmanager
-def watch(runs: int) -> Iterator[Observer]:
+def watch(runs: int) -> Iterator[Plain | Live]:
     """An observer of a batch of so many runs."""
     console = Console(stderr=True)
     if not console.is_terminal:
@@ -41,25 +41,40 @@ def watch(runs: int) -> Iterator[Observer]:
 
 
 class Notes:
-    """Notes of backends, each once."""
+    """Notes of backends, each once, and the seconds of the runs that were not done before.
+
+    Attributes:
+        seconds: what "build", "compile" and "solve" took in all; runs that share a problem share its first two.
+    """
 
     def __init__(self) -> None:
         """None is shown yet."""
         self.shown: set[str] = set()
+        self.seconds: dict[str, float] = {"build": 0.0, "compile": 0.0, "solve": 0.0}
+        self.made: set[tuple[str, float]] = set()
 
     def new(self, result: Result, skipped: bool) -> list[str]:
         """The lines to print; none for a run that was done before."""
+        if not skipped:
+            self.add(result)
         note = "" if skipped else result.backend.note
         if not note or note in self.shown:
             return []
         self.shown.add(note)
         return [f"symphys: {note}"]
 
+    def add(self, result: Result) -> None:
+        """Count the seconds of a run."""
+        built = (result.problem, result.seconds.get("build", 0.0))
+        for key in ("solve",) if built in self.made else self.seconds:
+            self.seconds[key] += result.seconds.get(key, 0.0)
+        self.made.add(built)
+
 
 class Plain:
     """One line when a run begins, one when it ends, and some while it goes on; nothing is redrawn."""
 
-    def __init__(self, every: float = 30.0) -> None:
+    def __init__(self, every: float = 5.0) -> None:
         """Nothing is shown yet; ``every``: seconds between lines while a run goes on."""
         self.notes = Notes()
         self.every, self.last = every, monotonic()

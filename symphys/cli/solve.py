@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import shlex
 import sys
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING
 
 import click
@@ -20,7 +22,7 @@ from symphys.cli.arguments import (
     read_solvers,
     settings_option,
 )
-from symphys.cli.wording import many_pairs
+from symphys.cli.wording import duration, many_pairs
 
 if TYPE_CHECKING:
     from symphys.runs import BatchResult, Job
@@ -81,6 +83,7 @@ def solve(
     FILE is a problem file, or the name of a shipped problem (see `symphys list`). What is done already is not done
     again, and what was interrupted goes on where it stopped.
     """
+    began = perf_counter()
     threads.limit()
     from symphys.cli.progress import watch
     from symphys.runs import make_jobs, run_batch
@@ -97,10 +100,11 @@ def solve(
     made = partial(transcribe, backend=backend, threads=1 if jobs > 1 else None)
     with watch(len(asked)) as observer:
         batch = run_batch(asked, jobs, observer, made, multi_start)
-    return conclude(asked, batch, out)
+    parts = observer.notes.seconds if jobs == 1 and not multi_start else {}
+    return conclude(asked, batch, out, began, parts)
 
 
-def conclude(jobs: list[Job], batch: BatchResult, out: Path) -> int:
+def conclude(jobs: list[Job], batch: BatchResult, out: Path, began: float, parts: Mapping[str, float]) -> int:
     """Show what came of it; the exit code."""
     from symphys.cli.summary import print_summary
 
@@ -108,7 +112,9 @@ def conclude(jobs: list[Job], batch: BatchResult, out: Path) -> int:
     if batch.interrupted:
         click.echo(last_words(batch, out), err=True)
         return 130
-    write_reports(jobs, out)
+    page = write_reports(jobs, out)
+    click.echo(time_line(perf_counter() - began, parts))
+    click.echo(f"report: {page}")
     return 0 if batch.accepted else 1
 
 
@@ -122,8 +128,18 @@ def last_words(batch: BatchResult, out: Path) -> str:
     )
 
 
-def write_reports(jobs: list[Job], out: Path) -> None:
-    """Write the pages of the runs that are new, and that of the batch; print where to look."""
+def time_line(total: float, parts: Mapping[str, float]) -> str:
+    """The whole time of the command, and what took it as far as that is known."""
+    named = {"building": "build", "compiling": "compile", "solving": "solve"}
+    told = {word: parts[key] for word, key in named.items() if parts.get(key)}
+    if not told:
+        return f"time: {duration(total)} s in all"
+    told["judging and reports"] = max(total - sum(told.values()), 0.0)
+    return f"time: {duration(total)} s in all; {', '.join(f'{word} {duration(part)}' for word, part in told.items())}"
+
+
+def write_reports(jobs: list[Job], out: Path) -> Path:
+    """Write the pages of the runs that are new, and that of the batch; where that lies."""
     from symphys.report import write_batch_report, write_run_report
     from symphys.report.pages.run import PAGE
     from symphys.runs import RESULT
@@ -131,7 +147,7 @@ def write_reports(jobs: list[Job], out: Path) -> None:
     for job in jobs:
         if newer(job.folder.path / RESULT, job.folder.path / PAGE):
             write_run_report(job.folder.path)
-    click.echo(f"report: {write_batch_report(out)}")
+    return write_batch_report(out)
 
 
 def newer(source: Path, page: Path) -> bool:

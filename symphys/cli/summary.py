@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import statistics
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from rich.box import SIMPLE_HEAD
@@ -20,6 +20,11 @@ if TYPE_CHECKING:
 
 NARROWEST = 120
 """Columns of the table where the output is no terminal."""
+NUMBERS = ("solved", "objective", "worst", "iterations", "work", "seconds", "ended")
+GIVES_WAY = ("work", "iterations", "seconds", "objective", "ended")
+"""Columns that are left out where a terminal is too narrow, in this order; no number is cut."""
+MOST_MISSED = 3
+"""How many missed checks of a run are named."""
 
 
 def print_summary(jobs: list[Job], batch: BatchResult) -> None:
@@ -32,28 +37,38 @@ def print_summary(jobs: list[Job], batch: BatchResult) -> None:
     console = Console()
     if not console.is_terminal:
         console = Console(width=max(console.width, NARROWEST))
-    console.print(table(groups))
+    console.print(fitting_table(groups, console.width))
     for line in advice(groups):
         console.print(Text(line), soft_wrap=True)
 
 
-def table(groups: dict[tuple[str, str], list[Result]]) -> Table:
-    """The table of all groups, by problem and solver."""
+def fitting_table(groups: dict[tuple[str, str], list[Result]], width: int) -> Table:
+    """The table with as many columns as fit; where even the least do not, names are wrapped."""
+    for count in range(len(GIVES_WAY) + 1):
+        columns = [name for name in NUMBERS if name not in GIVES_WAY[:count]]
+        shown = table(groups, columns)
+        if Console(width=1000).measure(shown).maximum <= width:
+            break
+    return shown
+
+
+def table(groups: dict[tuple[str, str], list[Result]], columns: Sequence[str] = NUMBERS) -> Table:
+    """The table of all groups, by problem and solver, with these columns."""
     several = any(len(group) > 1 for group in groups.values())
     caption = "worst: largest error / tolerance, met at 1; work in rollouts" + ("; medians over the seeds" * several)
     shown = Table(box=SIMPLE_HEAD, caption=caption, caption_justify="left")
     for name in ("problem", "solver"):
-        shown.add_column(name, no_wrap=True)
-    for name in ("solved", "objective", "worst", "iterations", "work", "seconds"):
-        shown.add_column(name, justify="right", no_wrap=True)
-    shown.add_column("ended")
+        shown.add_column(name, overflow="fold")
+    for name in columns:
+        shown.add_column(name, justify="left" if name == "ended" else "right", no_wrap=name != "ended")
     for (problem, solver), group in groups.items():
-        shown.add_row(Text(problem), Text(solver), *cells(group))
+        found = cells(group)
+        shown.add_row(Text(problem), Text(solver), *(found[name] for name in columns))
     return shown
 
 
-def cells(group: list[Result]) -> list[Text]:
-    """The numbers of one row."""
+def cells(group: list[Result]) -> dict[str, Text]:
+    """The numbers of one row, by column."""
     solved = sum(result.solved for result in group)
     ends = Counter(ended(result) for result in group)
     texts = [
@@ -66,7 +81,8 @@ def cells(group: list[Result]) -> list[Text]:
     ]
     fine = group and all(result.accepted for result in group)
     style = "red" if not fine else "green" if solved == len(group) else "yellow"
-    return [Text(f"{solved}/{len(group)}", style=style), *map(Text, texts)]
+    first = Text(f"{solved}/{len(group)}", style=style)
+    return dict(zip(NUMBERS, [first, *map(Text, texts)], strict=True))
 
 
 def known(result: Result, name: str) -> float | None:
@@ -101,4 +117,14 @@ def said(result: Result) -> list[str]:
     """The lines on one run."""
     if result.verdict == DOUBTED:
         return [f"not to be trusted: {'; '.join(result.doubts)}"]
-    return [] if result.solved else [first_line(result.advice)]
+    return [] if result.solved else [missed(result), first_line(result.advice)]
+
+
+def missed(result: Result) -> str:
+    """Which checks are missed by how much, the worst first; empty where none is."""
+    found = sorted((check for check in result.checks if not check.met), key=lambda check: -check.ratio)
+    if not found:
+        return ""
+    named = [f'"{each.name}" by {number(each.error)} (tolerance {number(each.tolerance)})' for each in found]
+    more = f" and {len(found) - MOST_MISSED} more" if len(found) > MOST_MISSED else ""
+    return f"missed: {', '.join(named[:MOST_MISSED])}{more}"

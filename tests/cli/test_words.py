@@ -13,8 +13,9 @@ from rich.console import Console
 from rich.progress import Progress
 
 from symphys.cli.arguments import UsageFault, read_settings, read_value
-from symphys.cli.progress import Live, Plain, at
-from symphys.cli.summary import advice, table
+from symphys.cli.progress import Live, Notes, Plain, at
+from symphys.cli.solve import time_line
+from symphys.cli.summary import advice, fitting_table, missed, table
 from symphys.cli.wording import brief, duration, many_pairs, number, whole
 from symphys.results.result import CheckRecord
 from symphys.runs import Result
@@ -143,3 +144,41 @@ def test_without_a_terminal_a_long_run_says_now_and_then_where_it_is(
     for k in range(3):
         plain.advanced(Job(), TraceRow(k, 4, 4, 0, 0, 0.1, 2.0, 1.0, 0.5, NAN, NAN, 0.0))  # type: ignore[arg-type]
     assert capsys.readouterr().err.count("throw cma seed 0: iteration") == lines
+
+
+@pytest.mark.parametrize(("width", "gone"), [(120, ()), (80, ("work", "iterations")), (44, ("seconds", "ended"))])
+def test_a_narrow_table_loses_columns_and_cuts_no_number(width: int, gone: tuple[str, ...]) -> None:
+    """The least important first; only names are wrapped."""
+    results = {
+        ("a_rather_long_name", solver): [result(solver=solver, objective=0.000183, equivalents=12345.0)]
+        for solver in ("least_squares", "gradient")
+    }
+    buffer = io.StringIO()
+    Console(file=buffer, width=width).print(fitting_table(results, width))
+    text = buffer.getvalue()
+    assert "…" not in text and max(map(len, text.splitlines())) <= width
+    assert [name for name in (*gone, "solved", "worst") if name in text.splitlines()[1]] == ["solved", "worst"]
+    assert ("12,345" in text) == (width == 120)
+
+
+def test_what_is_missed_is_named_the_worst_first() -> None:
+    checks = [CheckRecord("target", name, ratio / 10, 0.1, ratio, ratio <= 1) for name, ratio in
+              (("near", 0.5), ("far", 7.0), ("farther", 9.0), ("off", 2.0), ("just", 1.5))]  # fmt: skip
+    found = missed(result(solved=False, checks=tuple(checks)))
+    assert found == 'missed: "farther" by 0.9 (tolerance 0.1), "far" by 0.7 (tolerance 0.1), "off" by 0.2 ' + (
+        "(tolerance 0.1) and 1 more"
+    )
+    assert missed(result(checks=tuple(checks[:1]))) == ""
+
+
+def test_the_time_of_a_command_is_told_by_its_parts() -> None:
+    """What is built once for several runs counts once; what was done before does not count."""
+    notes = Notes()
+    seconds = {"build": 1.0, "compile": 2.0, "solve": 3.0}
+    for skipped in (False, False, True):
+        notes.new(result(seconds=seconds), skipped)
+    assert notes.seconds == {"build": 1.0, "compile": 2.0, "solve": 6.0}
+    assert time_line(10.0, notes.seconds) == (
+        "time: 10 s in all; building 1, compiling 2, solving 6, judging and reports 1"
+    )
+    assert time_line(0.5, {}) == "time: 0.5 s in all"
