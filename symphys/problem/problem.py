@@ -10,9 +10,11 @@ from typing import Any
 import casadi as ca
 import tomli_w
 
+from symphys.model.world import World
 from symphys.problem.load import read_problem
 from symphys.problem.model import NOTHING, ProblemData
 from symphys.problem.reading.source import parse_toml, read_source
+from symphys.problem.world_tables import world_tables
 
 SET = "set"
 """The table of a problem file that holds settings."""
@@ -51,6 +53,62 @@ class Problem(ProblemData):
         """
         changes = key if isinstance(key, Mapping) else {key: value}
         return _made(Path(self.file), self.text, {**self.settings, **changes}, self.functions)
+
+    @classmethod
+    def from_world(
+        cls,
+        world: World,
+        start: Mapping[str, Any] | None = None,
+        *,
+        duration: float,
+        dt: float = 0.01,
+        variables: Mapping[str, Any] = NOTHING,
+        costs: Mapping[str, Any] = NOTHING,
+        targets: Mapping[str, Any] = NOTHING,
+        constraints: Mapping[str, Any] = NOTHING,
+        outputs: Mapping[str, Any] = NOTHING,
+        name: str = "problem",
+        **tables: Any,
+    ) -> Problem:
+        """A problem about a world that was built in Python.
+
+        Args:
+            world: of numbers, without symbols; see ``make_world``.
+            start: states by name, ``"ball.position": [0, 0, 1]`` [m]; what is missing is zero, and upright.
+            duration: [s], a whole number of steps.
+            dt: time step [s].
+            variables: by name what each sets, ``{"throw": "ball.velocity"}``, or the keys of its table,
+                ``{"throw": {"sets": "ball.velocity", "guess": [3, 0, 3]}}``.
+            costs: by name the formula of each, or the keys of its table.
+            targets: likewise; their tables have a ``tolerance``.
+            constraints: likewise.
+            outputs: likewise.
+            name: of the problem.
+            tables: further tables of a problem file, such as ``solver={"gradient": {"iterations": 200}}``.
+
+        Raises:
+            SymphysError: names what cannot be, or what a problem file cannot say.
+
+        Example:
+            >>> from symphys import Body, Plane, Problem, make_world, solve
+            >>> world = make_world([Body.ball("ball", radius=0.1, mass=0.5)], [Plane.ground()])
+            >>> there = {"value": "ball.position - [3, 0, 1]", "tolerance": 0.01}
+            >>> throw = {"sets": "ball.velocity", "guess": [6, 0, 2]}
+            >>> problem = Problem.from_world(world, {"ball.position": [0, 0, 1]}, duration=0.5,
+            ...                              variables={"throw": throw}, targets={"there": there})
+            >>> solve(problem, "least_squares", backend="casadi").solved
+            True
+        """
+        lists = {
+            "variable": listed(variables, "sets"),
+            "cost": listed(costs, "value"),
+            "target": listed(targets, "value"),
+            "constraint": listed(constraints, "value"),
+            "output": listed(outputs, "value"),
+        }
+        own = {key: entries for key, entries in lists.items() if entries}
+        made = {"simulation": {"duration": duration, "dt": dt}, **world_tables(world, start or {}), **own}
+        return problem_of_tables({**made, **tables}, name)
 
     def to_toml(self) -> str:
         """The text of a problem file that is this problem: its own, with what was changed in a table [set] at the end.
@@ -91,6 +149,13 @@ def problem_of_tables(
     Numpy's arrays and numbers may stand for lists and numbers. Raises ProblemError like ``load_problem``.
     """
     return _made(Path(f"{name}.toml"), tomli_w.dumps(plain(tables)), NOTHING, functions)
+
+
+def listed(entries: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
+    """Tables with their names; what is no table is the value of ``key``."""
+    return [
+        {"name": name, **(entry if isinstance(entry, Mapping) else {key: entry})} for name, entry in entries.items()
+    ]
 
 
 def robot_alone(path: Path, settings: Mapping[str, object] = NOTHING) -> Problem:
