@@ -36,7 +36,7 @@ def shipped(name: str) -> Path:
     files = {**{path.stem: path for path in parts().values()}, **parts(), **catalogue()}
     named = name if name in files else name.removesuffix(".toml")
     if named not in files:
-        raise SymphysError(f"nothing of the name {quote(name)} is shipped; {hint(name, [*catalogue(), *parts()])}")
+        raise SymphysError(f"there is no file {quote(name)}, and nothing of that name is shipped; {hint(name, [*catalogue(), *parts()])}")
     return files[named]
 
 

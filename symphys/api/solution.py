@@ -40,12 +40,12 @@ class Solution:
     Attributes:
         folder: the run folder that it is read from.
         run: everything that result.json holds: ``counts``, ``seconds``, ``stages``, ``trust``, ``versions``, ...
-        problem: what was solved.
+        given: the problem that was solved, where it is at hand.
     """
 
     folder: Path
     run: Run
-    problem: Problem
+    given: Problem | None = None
 
     @property
     def solved(self) -> bool:
@@ -97,6 +97,14 @@ class Solution:
     def trace(self) -> Trace:
         """The iterations, column by column: ``trace["objective"]``, ``trace["seconds"]``, ..."""
         return self.run.trace
+
+    @cached_property
+    def problem(self) -> Problem:
+        """What was solved; where it is read from the folder, ProblemError if it has controllers that Python gives."""
+        if self.given is not None:
+            return self.given
+        read_in = load_problem(self.folder / PROBLEM, read_config(self.folder / CONFIG).settings)
+        return replace(read_in, name=self.run.problem)
 
     def plot(self, *names: str) -> Figure:
         """A figure of the motion from the side and from above, or of quantities against time.
@@ -152,5 +160,4 @@ def read(folder: str | Path) -> Solution:
     run = read_run(path, path)
     if not run.readable:
         raise ReportError("; ".join(run.faults))
-    problem = load_problem(path / PROBLEM, read_config(path / CONFIG).settings)
-    return Solution(path, run, replace(problem, name=run.problem))
+    return Solution(path, run)

@@ -15,7 +15,7 @@ from symphys.api.transcriptions import transcribed
 from symphys.errors import SymphysError
 from symphys.problem import Problem
 from symphys.results.run import read_run
-from symphys.runs import Job, execute, make_jobs
+from symphys.runs import Job, Result, execute, make_jobs
 from symphys.runs.job import fitting
 from symphys.runs.stopping import Interrupts
 from symphys.solvers import TraceRow
@@ -68,9 +68,11 @@ def solve(
     asked = read_in.set({f"solver.{name}.{key}": value for key, value in options.items()}) if options else read_in
     with kept(folder) as out:
         (job,) = make_jobs([asked], [name], [seed], dict(asked.settings), out, "", backend, examine)
-        run(job, read_in, backend, threads, progress)
+        if run(job, read_in, backend, threads, progress).interrupted:
+            later = "with a folder, the same call would go on" if folder is None else "the same call goes on from there"
+            raise KeyboardInterrupt(f"interrupted in {job.folder.path}; {later}")
         path = job.folder.path
-        solution = Solution(path, read_run(path, path), asked)
+        solution = Solution(path, read_run(path, path), given=asked)
     if folder is None:
         weakref.finalize(solution, shutil.rmtree, out, ignore_errors=True)
     return solution
@@ -90,7 +92,7 @@ def kept(folder: str | Path | None) -> Iterator[Path]:
         raise
 
 
-def run(job: Job, problem: Problem, backend: str, threads: int | None, progress: Progress | None) -> None:
+def run(job: Job, problem: Problem, backend: str, threads: int | None, progress: Progress | None) -> Result:
     """Do what is asked for into its folder; options of a solver do not change what is compiled for the problem."""
     with Interrupts().listening() as stop:
 
@@ -101,7 +103,6 @@ def run(job: Job, problem: Problem, backend: str, threads: int | None, progress:
                 progress(row)
 
         result = execute(job, monitor, lambda job: transcribed(problem, not job.smooth, backend, threads))
-    if result.interrupted:
-        raise KeyboardInterrupt(f"interrupted; what was found is in {job.folder.path}")
     if result.status == "failed":
         raise SymphysError(result.advice)
+    return result

@@ -11,7 +11,7 @@ from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema import Document
 from symphys.problem.schema.physics import ContactTable, MemberTable, PairTable
-from symphys.problem.tables.bodies import states, touching
+from symphys.problem.tables.bodies import states
 from symphys.suggest import hint, quote
 
 
@@ -55,10 +55,11 @@ def check_collides_with(names: Sequence[str], groups: Sequence[str], document: D
     ]
     if document.ground is not None:
         tables.append((("ground",), document.ground, "ground"))
+    known = {*names, *groups}
     for place, table, own in tables:
-        others = [other for other in (*names, *groups) if other != own]
-        for name in sorted(touching(table) or (), key=(table.collides_with or []).index):
-            if name not in others:
+        for name in table.collides_with or ():
+            if name not in known or name == own:
+                others = [other for other in (*names, *groups) if other != own]
                 message = f"no other body, no static surface and no group is called {quote(name)}; {hint(name, others)}"
                 faults.add((*place, "collides_with"), message)
 
