@@ -36,7 +36,8 @@ def shipped(name: str) -> Path:
     files = {**{path.stem: path for path in parts().values()}, **parts(), **catalogue()}
     named = name if name in files else name.removesuffix(".toml")
     if named not in files:
-        raise SymphysError(f"there is no file {quote(name)}, and nothing of that name is shipped; {hint(name, [*catalogue(), *parts()])}")
+        near = hint(name, [*catalogue(), *parts()])
+        raise SymphysError(f"there is no file {quote(name)}, and nothing of that name is shipped; {near}")
     return files[named]
 
 
