@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from symphys.api.loading import Source, load
 from symphys.api.transcriptions import transcribed
 from symphys.api.values import by_name, vector
+from symphys.errors import SymphysError
 from symphys.problem import Problem
 from symphys.shooting import Evaluator, Values
 from symphys.trajectory import Trajectory
@@ -69,12 +70,14 @@ class CompiledRollout:
         return np.asarray(first(found.merit, single)), np.asarray(first(found.gradient, single))
 
     def residuals(self, Z: ArrayLike) -> Array:
-        """(B, m), or (m,): what is squared and summed in the value; NotImplementedError where it is no such sum."""
+        """(B, m), or (m,): what is squared and summed in the value; SymphysError where it is no such sum."""
+        self._require_squares()
         batch, single = rows(Z, self.n)
         return np.asarray(first(self._evaluator.residuals(batch, self.smoothing).residuals, single))
 
     def jacobian(self, Z: ArrayLike) -> Array:
-        """(B, m, n), or (m, n): of the residuals."""
+        """(B, m, n), or (m, n): of the residuals; SymphysError where there are none."""
+        self._require_squares()
         batch, single = rows(Z, self.n)
         return np.asarray(first(self._evaluator.jacobian(batch, self.smoothing).jacobian, single))
 
@@ -85,6 +88,11 @@ class CompiledRollout:
     def trajectory(self, z: ArrayLike) -> Trajectory:
         """The motion of one z (n,); NotFinite if there is none."""
         return self._made.simulate(np.asarray(z, float), self.smoothing)
+
+    def _require_squares(self) -> None:
+        if not self._made.shooting.squares:
+            text = "its value is no sum of squares, so it has no residuals; ask for `value` and `gradient`"
+            raise SymphysError(f"{self.problem.name}: {text}")
 
     @property
     def _evaluator(self) -> Evaluator:

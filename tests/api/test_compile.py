@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from thrown import TABLES
 
 import symphys
 
@@ -63,3 +64,14 @@ def test_smoothing_is_of_the_whole_rollout(problem: symphys.Problem, rollout: sy
     assert np.array_equal(
         soft.trajectory(landing).position, symphys.simulate(problem, smoothing=0.1, throw=[1, 0, -4]).position
     )
+
+
+@pytest.mark.parametrize("backend", ["auto", "casadi"])
+def test_without_squares_there_are_no_residuals(backend: str) -> None:
+    """It is said with the problem's name, whatever evaluates."""
+    tables = {**TABLES, "cost": [{"name": "low", "value": "ball.position[2]"}]}
+    rollout = symphys.compile(tables, backend=backend)
+    for asked in (rollout.residuals, rollout.jacobian):
+        with pytest.raises(symphys.SymphysError, match="problem: its value is no sum of squares"):
+            asked(rollout.z())
+    assert np.isfinite(rollout.gradient(rollout.z())).all()

@@ -34,7 +34,7 @@ def test_the_problem_of_your_own_is_solved(tmp_path: Path) -> None:
     (text,) = blocks("toml")
     path.write_text(text, encoding="utf-8")
     assert main(["check", str(path)]) == 0
-    assert main(["solve", str(path), "--solver", "least_squares", "--out", str(tmp_path / "reports")]) == 0
+    assert main(["solve", str(path), "--solver", "gradient,least_squares", "--out", str(tmp_path / "reports")]) == 0
 
 
 def test_the_front_door_opens(tmp_path: Path) -> None:
