@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symphys.api.loading import Source, load
 from symphys.api.transcriptions import transcribed
 from symphys.api.values import by_name, vector
 from symphys.errors import SymphysError
 from symphys.problem import Problem
+from symphys.problem.loading import Source, load
 from symphys.shooting import Evaluator, Values
 from symphys.trajectory import Trajectory
 from symphys.transcription import Transcription

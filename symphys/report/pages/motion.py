@@ -34,7 +34,11 @@ def write_motion(trajectory_npz: Path, scene_json: Path, out: Path, title: str =
     Raises:
         ReportError: a file cannot be read or written.
     """
-    trajectory, scene = read_trajectory(trajectory_npz), read_scene(scene_json)
+    return write_motion_page(read_trajectory(trajectory_npz), read_scene(scene_json), out, title)
+
+
+def write_motion_page(trajectory: Trajectory, scene: Scene, out: Path, title: str = "Motion") -> Path:
+    """Write the page of a motion that is at hand; see ``write_motion``."""
     with style.paper():
         pictures = draw(trajectory, scene)
     style.write_figures(out.parent / FIGURES, pictures.values())

@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 
 from symphys import problems
-from symphys.problem import Problem, load_problem, problem_of_tables
+from symphys.problem.problem import Problem, load_problem, problem_of_tables
 
 Source = str | Path | Mapping[str, Any] | Problem
 """What names a problem."""
