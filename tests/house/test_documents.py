@@ -64,3 +64,18 @@ def test_names_that_documents_name_are_those_of_the_code(name: str) -> None:
         words |= set(re.findall(r"\w+", file.read_text(encoding="utf-8")))
     named = re.findall(r"`([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)+)`", text)
     assert [found for found in named if not words.issuperset(found.split("."))] == []
+
+
+def test_results_name_every_benchmark_and_only_what_exists() -> None:
+    """Scripts, targets of make, linked pages and figures; a script that prints results is on some page."""
+    texts = {page: page.read_text(encoding="utf-8") for page in sorted((ROOT / "docs" / "results").glob("*.md"))}
+    whole = "\n".join(texts.values())
+    scripts = set(re.findall(r"benchmarks/(\w+\.py)", whole))
+    targets = set(re.findall(r"^([a-z][\w-]*):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+    files = {file.name: file.read_text(encoding="utf-8") for file in (ROOT / "benchmarks").glob("*.py")}
+    assert scripts - set(files) == set()
+    assert {name for name, text in files.items() if "\ndef main(" in text} - scripts == set()
+    assert set(re.findall(r"`make ([a-z][\w-]*)", whole)) - targets == set()
+    links = {(page, link) for page, text in texts.items() for link in re.findall(r"\]\((?!https?:|#)([^)#\s]+)", text)}
+    assert len(links) > len(texts)
+    assert [(page.name, link) for page, link in sorted(links) if not (page.parent / link).is_file()] == []
