@@ -1,7 +1,7 @@
 """What the sweeps need to know of a contact over a substep of time, worked out once.
 
-Formulas: docs/time_step.md, "4. Contact constraint". Letters: t* instant of touch, s = dt - t* what is left of the step,
-n normal, r arms, v* velocity of approach at t*, f* relative acceleration of the touching points there,
+Formulas: docs/time_step.md, "4. Contact constraint". Letters: t* instant of touch, s = dt - t* what is left of the
+step, n normal, r arms, v* velocity of approach at t*, f* relative acceleration of the touching points there,
 u rebound speed, chi in [0, 1]: 1 where the rebound leaves the step, 0 where it falls back (rest).
 """
 
