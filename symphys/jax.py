@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +17,7 @@ from symphys.api.compiled import CompiledRollout, compile
 from symphys.api.loading import Source
 from symphys.api.stepping import CompiledStep, compile_step
 from symphys.errors import SymphysError
+from symphys.transcription.open_step import StepResult, StepStart
 from symphys.transcription.recorded_rollout import RecordedRollout
 
 try:
@@ -29,43 +30,54 @@ Array = Any
 """jax.Array"""
 
 
-class Begun(NamedTuple):
-    """Arrays of where motions begin: ``state`` (B, s), ``observation`` (B, o), ``inputs`` (B, N, i)."""
-
-    state: Array
-    observation: Array
-    inputs: Array
-
-
-class Stepped(NamedTuple):
-    """Arrays of what a step gives: ``state`` (B, s), ``observation`` (B, o), ``cost`` (B,)."""
-
-    state: Array
-    observation: Array
-    cost: Array
-
-
-class Rollout:
+def rollout(problem: Source, *quantities: str, smoothing: float = 0.0, backend: str = "auto") -> JaxRollout:
     """A problem's rollout as a function of Z (B, n): the value of each row, and quantities over time if asked for.
+
+    Args:
+        problem: what ``symphys.load`` takes.
+        quantities: formulas as in problem files, such as ``ball.position``.
+        smoothing: of the contacts [m/s].
+        backend: see ``symphys.compile``.
+
+    Raises:
+        SymphysError: a quantity is no formula, or names what the problem does not have.
 
     Example:
         >>> import jax, symphys.jax
         >>> jax.config.update("jax_enable_x64", True)
-        >>> rollout = symphys.jax.Rollout("ball_throw")
+        >>> rollout = symphys.jax.rollout("ball_throw")
         >>> Z = jax.numpy.tile(rollout.z(throw=[8, 0, 3]), (4, 1))
         >>> jax.grad(lambda Z: rollout(Z).sum())(Z).shape
         (4, 6)
     """
+    return JaxRollout(problem, *quantities, smoothing=smoothing, backend=backend)
+
+
+def step(problem: Source, controllers: Sequence[str] | None = None, **options: Any) -> JaxStep:
+    """One step with the commands open, for batches of states and actions.
+
+    Args:
+        problem: what ``symphys.load`` takes.
+        controllers: names of those that are left open; see ``symphys.compile_step`` for None, and for errors.
+        options: of ``symphys.compile_step``.
+
+    Example:
+        >>> import jax, symphys.jax
+        >>> jax.config.update("jax_enable_x64", True)
+        >>> step = symphys.jax.step("cart_pole")
+        >>> state, observation, inputs = step.start(4)
+        >>> cost = lambda action: step(state, action).cost.sum()
+        >>> jax.jit(jax.grad(cost))(jax.numpy.ones((4, step.action_size))).shape
+        (4, 1)
+    """
+    return JaxStep(problem, controllers, **options)
+
+
+class JaxRollout:
+    """A problem's rollout as a function of Z (B, n): the value of each row, and quantities over time if asked for."""
 
     def __init__(self, problem: Source, *quantities: str, smoothing: float = 0.0, backend: str = "auto") -> None:
-        """Compile it.
-
-        Args:
-            problem: what ``symphys.load`` takes.
-            quantities: formulas as in problem files, such as ``ball.position``.
-            smoothing: of the contacts [m/s].
-            backend: see ``symphys.compile``.
-        """
+        """See ``rollout``."""
         require_double()
         self.compiled: CompiledRollout = compile(problem, smoothing, backend)
         self.recording = self.compiled.recording(*quantities) if quantities else None
@@ -80,31 +92,21 @@ class Rollout:
         return rollout_value(self.compiled, rows) if self.recording is None else recorded_value(self.recording, rows)
 
 
-class Step:
-    """One step with the commands open, for batches of states and actions; see ``symphys.compile_step``.
-
-    Example:
-        >>> import jax, symphys.jax
-        >>> jax.config.update("jax_enable_x64", True)
-        >>> step = symphys.jax.Step("cart_pole")
-        >>> state, observation, inputs = step.start(4)
-        >>> cost = lambda action: step(state, action).cost.sum()
-        >>> jax.jit(jax.grad(cost))(jax.numpy.ones((4, step.action_size))).shape
-        (4, 1)
-    """
+class JaxStep:
+    """One step with the commands open, for batches of states and actions; see ``symphys.compile_step``."""
 
     def __init__(self, problem: Source, controllers: Sequence[str] | None = None, **options: Any) -> None:
-        """Compile it; see ``symphys.compile_step`` for the arguments and errors."""
+        """See ``step``."""
         require_double()
         self.compiled: CompiledStep = compile_step(problem, controllers, **options)
         self.state_size, self.action_size = self.compiled.state_size, self.compiled.action_size
         self.observation_size, self.steps = self.compiled.observation_size, self.compiled.steps
 
-    def start(self, count: int = 1, seed: int | None = None) -> Begun:
+    def start(self, count: int = 1, seed: int | None = None) -> StepStart:
         """Where motions begin; see ``CompiledStep.start``."""
-        return Begun(*(jnp.asarray(part) for part in self.compiled.start(count, seed)))
+        return StepStart(*(jnp.asarray(part) for part in self.compiled.start(count, seed)))
 
-    def __call__(self, state: Array, action: Array, inputs: Array | None = None) -> Stepped:
+    def __call__(self, state: Array, action: Array, inputs: Array | None = None) -> StepResult:
         """State and observation after a step, and its cost; gradients flow to the state, the action and the inputs.
 
         Args:
@@ -113,7 +115,7 @@ class Step:
             inputs: (B, i) what acts besides, ``start.inputs[:, k]``; None: what the guess has at that time.
         """
         given = None if inputs is None else jnp.asarray(inputs, np.float64)
-        return Stepped(*step_value(self.compiled, jnp.asarray(state), jnp.asarray(action, np.float64), given))
+        return StepResult(*step_value(self.compiled, jnp.asarray(state), jnp.asarray(action, np.float64), given))
 
 
 def require_double() -> None:
@@ -125,7 +127,7 @@ def require_double() -> None:
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
 def rollout_value(compiled: CompiledRollout, Z: Array) -> Array:
-    """See ``Rollout``."""
+    """See ``JaxRollout``."""
     return on_host(lambda rows: (compiled.value(rows),), [Z], [()])[0]
 
 
@@ -145,7 +147,7 @@ rollout_value.defvjp(rollout_forward, rollout_backward)
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
 def recorded_value(recording: RecordedRollout, Z: Array) -> tuple[Array, ...]:
-    """See ``Rollout``."""
+    """See ``JaxRollout``."""
 
     def called(rows: Any) -> tuple[Any, ...]:
         value, found = recording.forward(rows)
@@ -173,7 +175,7 @@ recorded_value.defvjp(recorded_forward, recorded_backward)
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
 def step_value(step: CompiledStep, state: Array, action: Array, inputs: Array | None) -> tuple[Array, ...]:
-    """See ``Step``."""
+    """See ``JaxStep``."""
     called = [state, action] if inputs is None else [state, action, inputs]
     return on_host(lambda *rows: tuple(step(*rows)), called, [(step.state_size,), (step.observation_size,), ()])
 

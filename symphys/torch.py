@@ -7,7 +7,7 @@ the precision and the device of the action. Gradients are those of the kernels; 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from symphys.api.compiled import CompiledRollout, compile
 from symphys.api.loading import Source
 from symphys.api.stepping import CompiledStep, compile_step
+from symphys.transcription.open_step import StepResult, StepStart
 from symphys.transcription.recorded_rollout import RecordedRollout
 
 try:
@@ -28,46 +29,58 @@ Tensor = Any
 Policy = Callable[[Tensor], Tensor]
 
 
-class Begun(NamedTuple):
-    """Tensors of where motions begin: ``state`` (B, s), ``observation`` (B, o), ``inputs`` (B, N, i)."""
-
-    state: Tensor
-    observation: Tensor
-    inputs: Tensor
-
-
-class Stepped(NamedTuple):
-    """Tensors of what a step gives: ``state`` (B, s), ``observation`` (B, o), ``cost`` (B,)."""
-
-    state: Tensor
-    observation: Tensor
-    cost: Tensor
-
-
-class Rollout:
+def rollout(problem: Source, *quantities: str, smoothing: float = 0.0, backend: str = "auto") -> TorchRollout:
     """A problem's rollout as a function of Z (B, n): the value of each row, and quantities over time if asked for.
+
+    Args:
+        problem: what ``symphys.load`` takes.
+        quantities: formulas as in problem files, such as ``ball.position``.
+        smoothing: of the contacts [m/s].
+        backend: see ``symphys.compile``.
+
+    Raises:
+        SymphysError: a quantity is no formula, or names what the problem does not have.
 
     Example:
         >>> import torch, symphys.torch
-        >>> rollout = symphys.torch.Rollout("ball_throw")
+        >>> rollout = symphys.torch.rollout("ball_throw")
         >>> Z = rollout.z(throw=[8, 0, 3]).repeat(4, 1).requires_grad_()
         >>> rollout(Z).sum().backward()
         >>> tuple(Z.grad.shape)
         (4, 6)
-        >>> value, position = symphys.torch.Rollout("ball_throw", "ball.position")(Z)
+        >>> value, position = symphys.torch.rollout("ball_throw", "ball.position")(Z)
         >>> tuple(position.shape)
         (4, 500, 3)
     """
+    return TorchRollout(problem, *quantities, smoothing=smoothing, backend=backend)
+
+
+def step(problem: Source, controllers: Sequence[str] | None = None, **options: Any) -> TorchStep:
+    """One step with the commands open, for batches of states and actions.
+
+    Args:
+        problem: what ``symphys.load`` takes.
+        controllers: names of those that are left open; see ``symphys.compile_step`` for None, and for errors.
+        options: of ``symphys.compile_step``.
+
+    Example:
+        >>> import torch, symphys.torch
+        >>> step = symphys.torch.step("cart_pole")
+        >>> state, observation, inputs = step.start(4)
+        >>> action = torch.ones(4, step.action_size, requires_grad=True)
+        >>> state, observation, cost = step(state, action)
+        >>> cost.sum().backward()
+        >>> tuple(action.grad.shape)
+        (4, 1)
+    """
+    return TorchStep(problem, controllers, **options)
+
+
+class TorchRollout:
+    """A problem's rollout as a function of Z (B, n): the value of each row, and quantities over time if asked for."""
 
     def __init__(self, problem: Source, *quantities: str, smoothing: float = 0.0, backend: str = "auto") -> None:
-        """Compile it.
-
-        Args:
-            problem: what ``symphys.load`` takes.
-            quantities: formulas as in problem files, such as ``ball.position``.
-            smoothing: of the contacts [m/s].
-            backend: see ``symphys.compile``.
-        """
+        """See ``rollout``."""
         self.compiled: CompiledRollout = compile(problem, smoothing, backend)
         self.recording = self.compiled.recording(*quantities) if quantities else None
 
@@ -82,32 +95,21 @@ class Rollout:
         return RecordingFunction.apply(Z, self.recording)
 
 
-class Step:
-    """One step with the commands open, for batches of states and actions; see ``symphys.compile_step``.
-
-    Example:
-        >>> import torch, symphys.torch
-        >>> step = symphys.torch.Step("cart_pole")
-        >>> state, observation, inputs = step.start(4)
-        >>> action = torch.ones(4, step.action_size, requires_grad=True)
-        >>> state, observation, cost = step(state, action)
-        >>> cost.sum().backward()
-        >>> tuple(action.grad.shape)
-        (4, 1)
-    """
+class TorchStep:
+    """One step with the commands open, for batches of states and actions; see ``symphys.compile_step``."""
 
     def __init__(self, problem: Source, controllers: Sequence[str] | None = None, **options: Any) -> None:
-        """Compile it; see ``symphys.compile_step`` for the arguments and errors."""
+        """See ``step``."""
         self.compiled: CompiledStep = compile_step(problem, controllers, **options)
         self.state_size, self.action_size = self.compiled.state_size, self.compiled.action_size
         self.observation_size, self.steps = self.compiled.observation_size, self.compiled.steps
 
-    def start(self, count: int = 1, seed: int | None = None, dtype: Any = None) -> Begun:
+    def start(self, count: int = 1, seed: int | None = None, dtype: Any = None) -> StepStart:
         """Where motions begin; see ``CompiledStep.start``. ``dtype``: of the observation; None: torch's default."""
         state, observation, inputs = (torch.from_numpy(part) for part in self.compiled.start(count, seed))
-        return Begun(state, observation.to(dtype or torch.get_default_dtype()), inputs)
+        return StepStart(state, observation.to(dtype or torch.get_default_dtype()), inputs)
 
-    def __call__(self, state: Tensor, action: Tensor, inputs: Tensor | None = None) -> Stepped:
+    def __call__(self, state: Tensor, action: Tensor, inputs: Tensor | None = None) -> StepResult:
         """State and observation after a step, and its cost; gradients flow to the state and to the action.
 
         Args:
@@ -115,7 +117,7 @@ class Step:
             action: (B, m).
             inputs: (B, i) what acts besides, ``start.inputs[:, k]``; None: what the guess has at that time.
         """
-        return Stepped(*StepFunction.apply(state, action, inputs, self.compiled))
+        return StepResult(*StepFunction.apply(state, action, inputs, self.compiled))
 
     def episode(self, policy: Policy, count: int = 1, seed: int | None = None, steps: int | None = None) -> Tensor:
         """(B,) the costs of whole motions, whose actions a policy gives; gradients flow through all of it.
@@ -139,7 +141,7 @@ class RolloutFunction(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, Z: Tensor, compiled: CompiledRollout) -> Tensor:
-        """See ``Rollout``."""
+        """See ``TorchRollout``."""
         rows = numbers(Z)
         if not Z.requires_grad:
             return like(Z, compiled.value(rows))
@@ -160,7 +162,7 @@ class RecordingFunction(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, Z: Tensor, recording: RecordedRollout) -> tuple[Tensor, ...]:
-        """See ``Rollout``."""
+        """See ``TorchRollout``."""
         ctx.called, ctx.kind = (recording, numbers(Z)), Z.new_empty(0)
         value, found = recording.forward(ctx.called[1])
         return tuple(like(Z, part) for part in (value, *found.values()))
@@ -181,7 +183,7 @@ class StepFunction(torch.autograd.Function):
     def forward(
         ctx: Any, state: Tensor, action: Tensor, inputs: Tensor | None, step: CompiledStep
     ) -> tuple[Tensor, ...]:
-        """See ``Step``."""
+        """See ``TorchStep``."""
         given = None if inputs is None else numbers(inputs)
         ctx.called = step, numbers(state), numbers(action), given
         ctx.kinds = [None if each is None else each.new_empty(0) for each in (state, action, inputs)]

@@ -23,11 +23,11 @@ def double() -> Iterator[None]:
 def test_single_precision_is_refused(problem: symphys.Problem) -> None:
     jax.config.update("jax_enable_x64", False)
     with pytest.raises(symphys.SymphysError, match="jax_enable_x64"):
-        symphys.jax.Step(problem)
+        symphys.jax.step(problem)
 
 
 def test_the_rollout_has_the_gradient_of_the_kernel(problem: symphys.Problem) -> None:
-    rollout = symphys.jax.Rollout(problem)
+    rollout = symphys.jax.rollout(problem)
     Z = np.asarray(rollout.z()) + 0.01 * np.random.default_rng(0).normal(size=(3, rollout.compiled.n))
     factors = np.array([1.0, -2.0, 0.5])
     slope = jax.jit(jax.grad(lambda Z: (factors * rollout(Z)).sum()))(Z)
@@ -38,7 +38,7 @@ def test_the_rollout_has_the_gradient_of_the_kernel(problem: symphys.Problem) ->
 
 def test_a_policy_has_the_gradient_of_the_rollout(problem: symphys.Problem) -> None:
     """Through lax.scan and jit, against the adjoint of the whole rollout."""
-    step, rollout = symphys.jax.Step(problem), symphys.compile(problem)
+    step, rollout = symphys.jax.step(problem), symphys.compile(problem)
     begun = step.start()
 
     def total(gains: Any) -> Any:
@@ -58,7 +58,7 @@ def test_a_policy_has_the_gradient_of_the_rollout(problem: symphys.Problem) -> N
 def test_the_adjoint_by_differences(problem: symphys.Problem) -> None:
     from jax.test_util import check_grads
 
-    step = symphys.jax.Step(problem)
+    step = symphys.jax.step(problem)
     state, _, inputs = step.start(2)
     for k in range(6):
         state = step(state, np.ones((2, 1)), inputs[:, k]).state
@@ -69,7 +69,7 @@ def test_the_adjoint_by_differences(problem: symphys.Problem) -> None:
 def test_quantities_over_time(problem: symphys.Problem) -> None:
     from jax.test_util import check_grads
 
-    rollout = symphys.jax.Rollout(problem, "ball.position", "rail.position")
+    rollout = symphys.jax.rollout(problem, "ball.position", "rail.position")
     Z = np.asarray(rollout.z())[None]
     motion = symphys.simulate(problem)
     _, position, place = jax.jit(rollout)(Z)

@@ -14,11 +14,11 @@ torch: Any = pytest.importorskip("torch")
 
 @pytest.fixture(scope="module")
 def step(problem: symphys.Problem) -> Any:
-    return symphys.torch.Step(problem)
+    return symphys.torch.step(problem)
 
 
 def test_the_rollout_has_the_gradient_of_the_kernel(problem: symphys.Problem) -> None:
-    rollout = symphys.torch.Rollout(problem)
+    rollout = symphys.torch.rollout(problem)
     Z = (rollout.z().repeat(3, 1) + 0.01 * torch.randn(3, rollout.z().numel(), dtype=torch.float64)).requires_grad_()
     factors = torch.tensor([1.0, -2.0, 0.5], dtype=torch.float64)
     (factors * rollout(Z)).sum().backward()
@@ -72,7 +72,7 @@ def test_precision_is_that_of_the_policy(step: Any) -> None:
 
 def test_quantities_over_time(problem: symphys.Problem) -> None:
     """Those of the motion; a loss of one's own has the slope that differences have."""
-    rollout = symphys.torch.Rollout(problem, "ball.position", "rail.position - 0.3")
+    rollout = symphys.torch.rollout(problem, "ball.position", "rail.position - 0.3")
     Z = rollout.z().repeat(2, 1).requires_grad_()
     value, position, place = rollout(Z)
     motion = symphys.simulate(problem)
@@ -86,4 +86,4 @@ def test_quantities_over_time(problem: symphys.Problem) -> None:
 
     assert torch.autograd.gradcheck(loss, (Z[:1].detach().requires_grad_(),), eps=1e-6, atol=1e-5, rtol=1e-5)
     with pytest.raises(symphys.SymphysError, match=r'there is no "ball.positon"; did you mean "ball.position"'):
-        symphys.torch.Rollout(problem, "ball.positon")
+        symphys.torch.rollout(problem, "ball.positon")

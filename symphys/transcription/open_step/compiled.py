@@ -18,7 +18,7 @@ from symphys.transcription.decision_variables import start_of
 from symphys.transcription.open_step.opening import Opening, opened
 from symphys.transcription.open_step.program import (
     RESULTS,
-    VirtualMachineStep,
+    VirtualMachineOpenStep,
     body_columns,
     looks_at_variables,
     moments,
@@ -32,7 +32,10 @@ Array = NDArray[np.float64]
 
 
 class StepStart(NamedTuple):
-    """Where motions begin: ``state`` (B, s), ``observation`` (B, o), and the ``inputs`` (B, N, i) of all steps."""
+    """Where motions begin: ``state`` (B, s), ``observation`` (B, o), and the ``inputs`` (B, N, i) of all steps.
+
+    Arrays of numpy, or of the library that they were asked of.
+    """
 
     state: Array
     observation: Array
@@ -40,7 +43,7 @@ class StepStart(NamedTuple):
 
 
 class StepResult(NamedTuple):
-    """What a step gives: ``state`` (B, s) and ``observation`` (B, o) after it, and the ``cost`` (B,) of it."""
+    """What a step gives: ``state`` (B, s) and ``observation`` (B, o) after it, and its ``cost`` (B,)."""
 
     state: Array
     observation: Array
@@ -332,7 +335,7 @@ def evaluated_by(rollout: Rollout, opening: Opening, exact: bool, backend: str, 
             return kernel, f"{kernel.report.precision} precision, lanes {kernel.report.lanes}, threads {kernel.threads}"
         except (KernelUnavailable, ProgramError) as error:
             note = f"; {error}"
-    return VirtualMachineStep(rollout, opening.sensors), f"casadi's virtual machine{note}"
+    return VirtualMachineOpenStep(rollout, opening.sensors), f"casadi's virtual machine{note}"
 
 
 def matrix(name: str, value: ArrayLike, columns: int) -> Array:

@@ -26,7 +26,7 @@ Value = Callable[[Formula, int], Expr]
 RESULTS = ("after", "sensed", "running", "moments")
 
 
-class StepPlaces:
+class OpenStepPlaces:
     """Where the program keeps one step; see ``Places``."""
 
     def __init__(self, rollout: Rollout) -> None:
@@ -103,7 +103,7 @@ def open_program(rollout: Rollout, sensors: Sequence[str], exact: bool) -> Progr
     Its outputs are the next state ``after``, what is sensed there ``sensed``, and the costs ``running`` and
     ``moments``; see ``costs``. ``exact``: for smoothing 0 only.
     """
-    places = StepPlaces(rollout)
+    places = OpenStepPlaces(rollout)
     body = [*control_calls(rollout, places), *step_calls(places, exact)]
     after, last = places.x.later().still(), list[FunctionCall]()
     sensed = places.layout.take(sensed_size(rollout, sensors))
@@ -165,7 +165,7 @@ def sensed_size(rollout: Rollout, sensors: Sequence[str]) -> int:
     return int(sense_function(rollout, sensors).size1_out(0))
 
 
-class VirtualMachineStep:
+class VirtualMachineOpenStep:
     """The same on casadi's virtual machine, row by row: for machines without a compiler."""
 
     def __init__(self, rollout: Rollout, sensors: Sequence[str]) -> None:
