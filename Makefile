@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 QUICK := $(addprefix tests/,house model expression findings problem solvers dynamics)
 
-.PHONY: help demo demo-walk test test-quick thorough lint typecheck bench bench-contact bench-robots bench-table1 bench-gpu bench-walk bench-lessons gallery clean
+.PHONY: help demo demo-walk test test-quick test-pipelines thorough lint typecheck bench bench-contact bench-robots bench-table1 bench-gpu bench-walk bench-lessons bench-pipelines gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
@@ -21,6 +21,9 @@ test: $(VENV)/.developing  ## run the tests; ARGS="-m 'not slow'" passes options
 test-quick: $(VENV)/.developing  ## run the tests that tell most in a minute: the house, problem files, the step, solvers
 	$(BIN)/pytest -n auto --dist loadfile -m "not slow" $(QUICK) $(ARGS)
 
+test-pipelines: $(VENV)/.pipelining  ## run the tests of symphys.torch, symphys.jax and symphys.env, and install what they need
+	$(BIN)/pytest tests/pipelines tests/house/test_code_blocks.py -k pipelines $(ARGS)
+
 thorough: $(VENV)/.developing  ## run the tests that take minutes: ten thousand random scenes, tall towers, long rolls
 	$(BIN)/pytest -n auto -m thorough $(ARGS)
 
@@ -32,7 +35,7 @@ typecheck: $(VENV)/.developing  ## check types on a folder of links laid out as 
 	cd build/farm/symphys && ln -s ../../../symphys/* ../../../solvers ../../../problems .
 	$(BIN)/mypy -p symphys
 
-bench: $(VENV)/.benching  ## measure what BENCHMARKS.md reports, contact aside; figures go to build/
+bench: $(VENV)/.benching  ## solvers, smoothing, kernels, MuJoCo with loose bodies, of docs/results; figures go to build/
 	$(BIN)/python benchmarks/ball_throw.py
 	$(BIN)/python benchmarks/continuation.py
 	$(BIN)/python benchmarks/spheres.py
@@ -41,7 +44,7 @@ bench: $(VENV)/.benching  ## measure what BENCHMARKS.md reports, contact aside; 
 	$(BIN)/python benchmarks/against_mujoco.py
 	$(BIN)/python benchmarks/front_door.py
 
-bench-contact: $(VENV)/.benching  ## errors of contact against the step, gradients, what each trick buys; an hour
+bench-contact: $(VENV)/.benching  ## errors of contact against the step, gradients, what each device buys; an hour
 	$(BIN)/python benchmarks/gradients.py build
 	$(BIN)/python benchmarks/ablation.py
 	$(BIN)/python benchmarks/consistency.py build
@@ -68,6 +71,9 @@ bench-lessons: $(VENV)/.benching  ## solvers on one walk against time, what doma
 	$(BIN)/python benchmarks/race.py quadruped_walk_net build
 	$(BIN)/python benchmarks/robustness.py build
 	$(BIN)/python benchmarks/lessons.py
+
+bench-pipelines: $(VENV)/.pipelining  ## steps for environments and nets against their kernel
+	$(BIN)/python benchmarks/step_rates.py
 
 bench-table1: $(VENV)/.benching  ## the timing table of Degrave et al. (1 and 128 robots, small and large net), cost against weights
 	$(BIN)/python benchmarks/table1.py
@@ -100,3 +106,7 @@ $(VENV)/.benching: $(VENV)/.installed
 
 $(VENV)/.developing: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --editable '.[dev]' && touch $@
+
+$(VENV)/.pipelining: $(VENV)/.developing  # PyTorch for processors is a tenth of what comes with a GPU's libraries
+	$(BIN)/python -m pip install --quiet torch --index-url https://download.pytorch.org/whl/cpu
+	$(BIN)/python -m pip install --quiet --editable '.[env,jax]' && touch $@

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from symphys.api.simulation import simulate
     from symphys.api.solution import Solution, read
     from symphys.api.solving import solve
+    from symphys.api.stepping import CompiledStep, compile_step
     from symphys.api.sweeping import solve_all
     from symphys.api.tools import cache, new, schema
     from symphys.doctor import doctor
@@ -47,6 +48,7 @@ __all__ = [
     "Capsule",
     "Checked",
     "CompiledRollout",
+    "CompiledStep",
     "Fixture",
     "Law",
     "Layout",
@@ -66,6 +68,7 @@ __all__ = [
     "cache",
     "check",
     "compile",
+    "compile_step",
     "doctor",
     "export",
     "initial_state",
@@ -95,6 +98,7 @@ _HOMES = {
     "api.simulation": ("simulate",),
     "api.solution": ("Solution", "read"),
     "api.solving": ("solve",),
+    "api.stepping": ("CompiledStep", "compile_step"),
     "errors": ("ProblemError", "SymphysError"),
     "problem": ("Problem", "load_problem"),
     "dynamics.horizon": ("roll_out",),
@@ -109,10 +113,13 @@ _HOMES = {
 _ROOMS = ("doctor", "export", "problems", "report", "solvers")
 """Rooms that need no import of their own; ``doctor``, ``export`` and ``report`` can be called."""
 
+_EXTRAS = ("env", "jax", "torch")
+"""Modules that need an extra."""
+
 
 def __getattr__(name: str) -> object:
     """A public name, from the room where it lives."""
-    if name in _ROOMS:
+    if name in _ROOMS or name in _EXTRAS:
         return import_module(f"symphys.{name}")
     for home, names in _HOMES.items():
         if name in names:

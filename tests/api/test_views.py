@@ -29,8 +29,8 @@ def test_importing_is_cheap() -> None:
 
 
 EXAMPLES = (
-    "Problem", "Solution", "cache", "check", "compile", "doctor", "export", "load", "new", "read", "report", "schema",
-    "show", "simulate", "solve", "solve_all",
+    "CompiledRollout", "Problem", "Solution", "cache", "check", "compile", "compile_step", "doctor", "export", "load",
+    "new", "read", "report", "schema", "show", "simulate", "solve", "solve_all",
 )  # fmt: skip
 
 
