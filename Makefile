@@ -41,7 +41,7 @@ docs-links: $(VENV)/.documenting  ## ask every external link of the site; needs 
 reference: $(VENV)/.installed  ## write docs/problem_reference.md again, after a change of the schema or of solver options
 	$(BIN)/symphys schema --markdown --out docs/problem_reference.md
 
-bench: $(VENV)/.benching  ## measure what BENCHMARKS.md reports, contact aside; figures go to build/
+bench: $(VENV)/.benching  ## solvers, smoothing, kernels, MuJoCo with loose bodies, of docs/results; figures go to build/
 	$(BIN)/python benchmarks/ball_throw.py
 	$(BIN)/python benchmarks/continuation.py
 	$(BIN)/python benchmarks/spheres.py
@@ -50,7 +50,7 @@ bench: $(VENV)/.benching  ## measure what BENCHMARKS.md reports, contact aside; 
 	$(BIN)/python benchmarks/against_mujoco.py
 	$(BIN)/python benchmarks/front_door.py
 
-bench-contact: $(VENV)/.benching  ## errors of contact against the step, gradients, what each trick buys; an hour
+bench-contact: $(VENV)/.benching  ## errors of contact against the step, gradients, what each device buys; an hour
 	$(BIN)/python benchmarks/gradients.py build
 	$(BIN)/python benchmarks/ablation.py
 	$(BIN)/python benchmarks/consistency.py build

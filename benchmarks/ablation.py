@@ -197,7 +197,7 @@ def row(scheme: Scheme) -> list[float]:
 
 
 def main() -> None:
-    """Print the table, in the form of BENCHMARKS.md."""
+    """Print the table, in the form of docs/results/contact.md."""
     names = [name for names in MEASURES for name in names]
     print("| |", " | ".join(names), "|")
     print("|---" * (len(names) + 1) + "|")

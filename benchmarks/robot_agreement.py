@@ -52,7 +52,7 @@ def scenes() -> list[JointedScene]:
 
 
 def main() -> None:
-    """Print the table, in the form of BENCHMARKS.md."""
+    """Print the table, in the form of docs/results/mujoco.md."""
     print("| step [ms] |", " | ".join(f"{1e3 * dt:g}" for dt in STEPS), "| order |")
     print("|---" * (len(STEPS) + 2) + "|")
     for scene in scenes():

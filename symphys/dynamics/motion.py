@@ -1,7 +1,7 @@
 """The free motion of one body inside a step: known parabolas, in which impacts find their instant.
 
 Time inside the step is t in [0, dt]; t = 0 is t_k. Velocities carried over lag half a step behind, so that the
-step reads as leapfrog; see ARCHITECTURE.md, "The time step".
+step reads as leapfrog; see docs/time_step.md, "2. Predicted motion".
 """
 
 from __future__ import annotations

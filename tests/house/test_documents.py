@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,14 @@ ROOT = Path(__file__).parents[2]
 MOST_TERMS = 60
 MADE = {"build/kernels"}
 """Paths that are made by running something."""
+WRITTEN = {"api.md", "problem_reference.md"}
+"""Pages of docs/ that a program writes."""
+PAGES = sorted(path.name for path in (ROOT / "docs").glob("*.md") if path.name not in WRITTEN)
+DOCUMENTS = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", *(f"docs/{page}" for page in PAGES)]
+FRONT_PAGE = "docs/index.md"
+MOST_LINES, MOST_WORDS = 200, 1500
+"""Of README.md, and of ARCHITECTURE.md: what is more goes to docs/."""
+FENCE = re.compile(r"^(```+).*?^\1$", flags=re.DOTALL | re.MULTILINE)
 
 
 def entries() -> list[tuple[str, str, str]]:
@@ -37,7 +46,7 @@ def test_every_term_lives_where_the_glossary_says() -> None:
     assert missing == []
 
 
-@pytest.mark.parametrize("name", ["ARCHITECTURE.md", "CONTRIBUTING.md", "docs/glossary.md", "docs/time_step.md"])
+@pytest.mark.parametrize("name", DOCUMENTS)
 def test_paths_that_documents_name_exist(name: str) -> None:
     """From the top, or below symphys/; with or without their ending."""
     text = (ROOT / name).read_text(encoding="utf-8")
@@ -53,14 +62,84 @@ def test_paths_that_documents_name_exist(name: str) -> None:
     assert missing == []
 
 
-@pytest.mark.parametrize("name", ["ARCHITECTURE.md", "CONTRIBUTING.md", "docs/glossary.md", "docs/time_step.md"])
-def test_names_that_documents_name_are_those_of_the_code(name: str) -> None:
-    """Of ``module.function`` and ``Class.attribute`` both."""
-    text = (ROOT / name).read_text(encoding="utf-8")
+def prose(name: str) -> str:
+    """A document without its code blocks."""
+    return FENCE.sub("", (ROOT / name).read_text(encoding="utf-8"))
+
+
+def anchors(path: Path) -> set[str]:
+    """The headings of a page as links name them: small letters, hyphens for blanks, no other marks."""
+    headings = re.findall(r"^#+ (.*)$", FENCE.sub("", path.read_text(encoding="utf-8")), flags=re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def broken(name: str) -> list[str]:
+    """The links of a document whose file does not exist, or has no such heading."""
+    found = []
+    for link in re.findall(r"\]\(([^)\s]+)\)", prose(name)):
+        if "://" in link:
+            continue
+        target, _, heading = link.partition("#")
+        path = (ROOT / name).parent / target if target else ROOT / name
+        if path.name not in WRITTEN and (not path.exists() or (heading and heading not in anchors(path))):
+            found.append(link)
+    return found
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_links_lead_to_pages_and_headings_that_exist(name: str) -> None:
+    assert broken(name) == []
+
+
+def test_every_page_is_in_the_contents_and_named_on_the_front_page() -> None:
+    text = (ROOT / FRONT_PAGE).read_text(encoding="utf-8")
+    trees = re.findall(r"^```{toctree}\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
+    listed = {line for tree in trees for line in tree.splitlines() if line and not line.startswith(":")}
+    pages = {page.removesuffix(".md") for page in PAGES} - {"index"}
+    assert pages - listed == set()
+    assert [page for page in pages if f"({page}.md)" not in text] == []
+
+
+def test_the_documents_that_people_open_first_are_short() -> None:
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= MOST_LINES
+    assert len((ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8").split()) <= MOST_WORDS
+
+
+def test_code_is_in_fences() -> None:
+    """An indented block is not checked by anything; lists may go on in lines that are indented by two or three."""
+    indented = [(name, line) for name in DOCUMENTS for line in prose(name).splitlines() if line.startswith("    ")]
+    assert indented == []
+
+
+@cache
+def words_of_the_code() -> set[str]:
+    """Every word in the files of the code, their names, and what libraries and formats are called."""
     rooms = [ROOT / room for room in ("symphys", "solvers", "problems", "tests", "benchmarks")]
     files = [file for room in rooms for file in room.rglob("*") if file.suffix in (".py", ".toml", ".c", ".h", ".js")]
     words = {file.stem for file in files} | {"casadi", "numpy", "py", "toml", "json", "md"}
     for file in files:
         words |= set(re.findall(r"\w+", file.read_text(encoding="utf-8")))
+    return words
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_names_that_documents_name_are_those_of_the_code(name: str) -> None:
+    """Of ``module.function`` and ``Class.attribute`` both."""
+    text = (ROOT / name).read_text(encoding="utf-8")
     named = re.findall(r"`([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)+)`", text)
-    assert [found for found in named if not words.issuperset(found.split("."))] == []
+    assert [found for found in named if not words_of_the_code().issuperset(found.split("."))] == []
+
+
+def test_results_name_every_benchmark_and_only_what_exists() -> None:
+    """Scripts, targets of make, linked pages and figures; a script that prints results is on some page."""
+    texts = {page: page.read_text(encoding="utf-8") for page in sorted((ROOT / "docs" / "results").glob("*.md"))}
+    whole = "\n".join(texts.values())
+    scripts = set(re.findall(r"benchmarks/(\w+\.py)", whole))
+    targets = set(re.findall(r"^([a-z][\w-]*):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+    files = {file.name: file.read_text(encoding="utf-8") for file in (ROOT / "benchmarks").glob("*.py")}
+    assert scripts - set(files) == set()
+    assert {name for name, text in files.items() if "\ndef main(" in text} - scripts == set()
+    assert set(re.findall(r"`make ([a-z][\w-]*)", whole)) - targets == set()
+    links = {(page, link) for page, text in texts.items() for link in re.findall(r"\]\((?!https?:|#)([^)#\s]+)", text)}
+    assert len(links) > len(texts)
+    assert [(page.name, link) for page, link in sorted(links) if not (page.parent / link).is_file()] == []

@@ -1,4 +1,4 @@
-"""What the README shows works as it stands there."""
+"""What the README and the page on Python show works as it stands there."""
 
 from __future__ import annotations
 
@@ -14,12 +14,17 @@ from symphys.cli.app import app
 from symphys.expression import FUNCTIONS
 from symphys.solvers import SOLVERS
 
-README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[2]
 
 
-def blocks(language: str) -> list[str]:
+def text(document: str) -> str:
+    """What is in a document."""
+    return (ROOT / document).read_text(encoding="utf-8")
+
+
+def blocks(language: str, document: str = "README.md") -> list[str]:
     """The code blocks of a language, in their order."""
-    return re.findall(rf"^```{language}\n(.*?)^```", README, flags=re.DOTALL | re.MULTILINE)
+    return re.findall(rf"^```{language}\n(.*?)^```", text(document), flags=re.DOTALL | re.MULTILINE)
 
 
 def printed(code: str, folder: Path) -> list[str]:
@@ -31,8 +36,9 @@ def printed(code: str, folder: Path) -> list[str]:
 @pytest.mark.slow
 def test_the_problem_of_your_own_is_solved(tmp_path: Path) -> None:
     path = tmp_path / "croquet.toml"
-    (text,) = blocks("toml")
-    path.write_text(text, encoding="utf-8")
+    (croquet,) = blocks("toml")
+    assert croquet == blocks("toml", "docs/first_problem.md")[0]
+    path.write_text(croquet, encoding="utf-8")
     assert main(["check", str(path)]) == 0
     assert main(["solve", str(path), "--solver", "gradient,least_squares", "--out", str(tmp_path / "reports")]) == 0
 
@@ -47,13 +53,15 @@ def test_the_front_door_opens(tmp_path: Path) -> None:
 
 
 def test_the_casadi_example_runs(tmp_path: Path) -> None:
-    lines = printed(blocks("python")[1], tmp_path)
+    lines = printed(blocks("python", "docs/python.md")[-1], tmp_path)
     throw = [float(number) for number in lines[-1].strip("[]").split()]
     assert 1.9 < throw[0] < 2.2
     assert any("Optimal Solution Found" in line for line in lines)
 
 
 def test_every_command_solver_and_function_is_named() -> None:
-    assert [name for name in app.commands if f"symphys {name}" not in README] == []
-    assert [name for name in SOLVERS if f"`{name}`" not in README] == []
-    assert [name for name in FUNCTIONS if not re.search(rf"\b{name}\b", README)] == []
+    commands, formulas = text("docs/command_line.md"), text("docs/formulas.md")
+    assert [name for name in app.commands if f"symphys {name}" not in commands] == []
+    assert [name for name in FUNCTIONS if not re.search(rf"\b{name}\(", formulas)] == []
+    for document in ("README.md", "docs/solvers.md"):
+        assert [name for name in SOLVERS if f"| `{name}` |" not in text(document)] == []

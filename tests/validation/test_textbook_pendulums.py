@@ -97,7 +97,7 @@ def test_double_pendulum_of_unequal_bobs(masses: tuple[float, float], dt: float)
 def test_how_heavy_a_load_may_hang(dt: float) -> None:
     """A mass m between two spans l under a tension T is stepped explicitly: w^2 = T / m (1 / l + 1 / l), w dt < 2.
 
-    That is a load of 1000 times the mass at dt = 0.01, as ARCHITECTURE has it; beyond, the mass flutters.
+    That is a load of 1000 times the mass at dt = 0.01, as docs/joints.md has it; beyond, the mass flutters.
     """
     length = 0.5
     for share, holds in ((0.98, True), (1.02, False)):

@@ -1,7 +1,7 @@
 """What the sweeps need to know of a contact over a substep of time, worked out once.
 
-Formulas: ARCHITECTURE.md, "The time step". Letters: t* instant of touch, s = dt - t* what is left of the step,
-n normal, r arms, v* velocity of approach at t*, f* relative acceleration of the touching points there,
+Formulas: docs/time_step.md, "4. Contact constraint". Letters: t* instant of touch, s = dt - t* what is left of the
+step, n normal, r arms, v* velocity of approach at t*, f* relative acceleration of the touching points there,
 u rebound speed, chi in [0, 1]: 1 where the rebound leaves the step, 0 where it falls back (rest).
 """
 
@@ -158,7 +158,7 @@ def _touch(
 
 
 def _delay(touch: _Touch, landing: Expr, lasts: Expr, half: Expr, terms: tuple[BodyTerm, ...]) -> Expr:
-    """How late the contact acts [s]. Lasting ones on trees: see ARCHITECTURE, "Feet that stand"."""
+    """How late the contact acts [s]. Lasting ones on trees: see docs/joints.md, "Feet that stand"."""
     delay = touch.hit * (touch.time + (1 - touch.leaving) * (landing - touch.time))
     return ca.if_else(lasts, half, delay) if any(term.jacobian is not None for term in terms) else delay
 
