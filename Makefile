@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 QUICK := $(addprefix tests/,house model expression findings problem solvers dynamics)
 
-.PHONY: help demo demo-walk test test-quick thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-table1 bench-gpu bench-walk bench-lessons gallery clean
+.PHONY: help demo demo-walk test test-quick test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-table1 bench-gpu bench-walk bench-lessons gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
@@ -20,6 +20,9 @@ test: $(VENV)/.developing  ## run the tests; ARGS="-m 'not slow'" passes options
 
 test-quick: $(VENV)/.developing  ## run the tests that tell most in a minute: the house, problem files, the step, solvers
 	$(BIN)/pytest -n auto --dist loadfile -m "not slow" $(QUICK) $(ARGS)
+
+test-pipelines: $(VENV)/.pipelining  ## run the tests of symphys.torch, symphys.jax and symphys.env, and install what they need
+	$(BIN)/pytest tests/pipelines tests/house/test_code_blocks.py -k pipelines $(ARGS)
 
 thorough: $(VENV)/.developing  ## run the tests that take minutes: ten thousand random scenes, tall towers, long rolls
 	$(BIN)/pytest -n auto -m thorough $(ARGS)
@@ -112,3 +115,7 @@ $(VENV)/.developing: $(VENV)/.installed
 
 $(VENV)/.documenting: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --editable '.[docs]' && touch $@
+
+$(VENV)/.pipelining: $(VENV)/.developing  # PyTorch for processors is a tenth of what comes with a GPU's libraries
+	$(BIN)/python -m pip install --quiet torch --index-url https://download.pytorch.org/whl/cpu
+	$(BIN)/python -m pip install --quiet --editable '.[env,jax]' && touch $@

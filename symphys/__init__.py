@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from symphys.api.simulation import simulate
     from symphys.api.solution import Solution, read
     from symphys.api.solving import solve
+    from symphys.api.stepping import CompiledStep, compile_step
     from symphys.dynamics.functions import step_function
     from symphys.dynamics.horizon import roll_out
     from symphys.errors import ProblemError, SymphysError
@@ -37,6 +38,7 @@ __all__ = [
     "Box",
     "Capsule",
     "CompiledRollout",
+    "CompiledStep",
     "Fixture",
     "Law",
     "Layout",
@@ -54,6 +56,7 @@ __all__ = [
     "World",
     "__version__",
     "compile",
+    "compile_step",
     "initial_state",
     "load",
     "load_problem",
@@ -72,6 +75,7 @@ _HOMES = {
     "api.simulation": ("simulate",),
     "api.solution": ("Solution", "read"),
     "api.solving": ("solve",),
+    "api.stepping": ("CompiledStep", "compile_step"),
     "errors": ("ProblemError", "SymphysError"),
     "problem": ("Problem", "load_problem"),
     "dynamics.horizon": ("roll_out",),
@@ -84,9 +88,14 @@ _HOMES = {
     "model.world": ("Body", "Law", "Scheme", "World", "make_world"),
 }
 
+_EXTRAS = ("env", "jax", "torch")
+"""Modules that need an extra."""
+
 
 def __getattr__(name: str) -> object:
     """A public name, from the room where it lives."""
+    if name in _EXTRAS:
+        return import_module(f"symphys.{name}")
     for home, names in _HOMES.items():
         if name in names:
             return getattr(import_module(f"symphys.{home}"), name)

@@ -35,7 +35,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     ),
     "codegen": ("errors shooting", "casadi cuda cupy numpy", "programs compiled to SIMD C and CUDA"),
     "transcription": (
-        "codegen dynamics errors expression maths model problem shooting trajectory",
+        "codegen dynamics errors expression maths model problem shooting suggest trajectory",
         "casadi numpy scipy",
         "problem to shooting problem",
     ),
@@ -73,6 +73,9 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "casadi matplotlib numpy",
         "what Python calls",
     ),
+    "torch": ("api transcription", "numpy torch", "rollouts and steps for PyTorch"),
+    "jax": ("api errors transcription", "jax numpy", "rollouts and steps for JAX"),
+    "env": ("api errors", "gymnasium numpy", "environments for Gymnasium"),
     "cli": (
         "codegen doctor errors export files findings problem problems report results runs solvers suggest threads "
         "trajectory transcription verification version",
