@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import os
 import re
+from dataclasses import is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 from docutils.nodes import Element, Node
 from sphinx.addnodes import pending_xref
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
+from sphinx.util.inspect import TypeAliasForwardRef
 
 import symphys
+import symphys.solvers
 
 ROOT = Path(__file__).parents[1]
 os.environ.setdefault("SYMPHYS_CACHE", str(ROOT / "build" / "kernels"))
@@ -41,14 +44,18 @@ nb_merge_streams = True
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
 autodoc_member_order = "bysource"
+autodoc_mock_imports = ["gymnasium", "jax", "torch"]
 autodoc_preserve_defaults = True
+TypeAliasForwardRef.__repr__ = lambda alias: alias.name  # Mapping[str, ArrayLike], not TypeAliasForwardRef('ArrayLike')
+autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Source")}
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
 # Types of other packages, and of the package's own rooms, which the page does not describe.
 nitpick_ignore_regex = [
+    ("py:class", "Array|ArrayLike|Source"),
     ("py:.*", r"symphys\.(codegen|dynamics|model|problem|results|solvers\.core|transcription)\..*"),
     ("py:.*", r"(collections|pathlib|types|typing|functools|enum|os)\..*"),
-    ("py:.*", r"(casadi|ca|matplotlib|numpy|np|npt|pandas|pydantic|xarray|cma)\..*"),
+    ("py:.*", r"(casadi|ca|cma|gymnasium|jax|matplotlib|np|npt|numpy|pandas|pydantic|torch|xarray)\..*"),
 ]
 
 # Fonts and styles lie in the site; only pages with formulas ask for MathJax on the network.
@@ -57,6 +64,9 @@ html_title = f"symphys {release}"
 html_show_copyright = False
 html_show_sphinx = False
 html_copy_source = False
+
+
+PUBLIC = {*symphys.__all__, *symphys.solvers.__all__}
 
 
 def resolve_by_public_name(app: Sphinx, env: BuildEnvironment, node: pending_xref, content: Element) -> Node | None:
@@ -97,8 +107,24 @@ def keep_sentences(app: Sphinx, what: str, name: str, described: object, options
             lines[k] = line.replace(shared[1], shared[1].replace(", ", "/"), 1)
 
 
+def show_shapes(app: Sphinx, what: str, name: str, described: object, options: object, lines: list[str]) -> None:
+    """``Annotated[Array, "N, B, 3"]`` of a field becomes the shape (N, B, 3); public classes go by their names alone."""
+    hints = get_type_hints(described, include_extras=True) if is_dataclass(described) else {}
+    texts = {field: getattr(hint, "__metadata__", ("",))[0] for field, hint in hints.items()}
+    shapes = {
+        field: text if "," in text else f"{text}," for field, text in texts.items() if isinstance(text, str) and text
+    }
+    for k, line in enumerate(lines):
+        field = re.match(r":ivar (\w+):", line)
+        if field and field[1] in shapes:
+            lines[k] = line.replace(field[0], f"{field[0]} ({shapes[field[1]]})", 1)
+        if line.startswith(":vartype "):
+            lines[k] = re.sub(r"\bsymphys\.[\w.]+\.(\w+)", lambda at: at[1] if at[1] in PUBLIC else at[0], line)
+
+
 def setup(app: Sphinx) -> None:
     """Add what Sphinx has no option for; napoleon reads docstrings at priority 500."""
     app.connect("missing-reference", resolve_by_public_name)
     app.connect("autodoc-process-docstring", keep_bars, priority=400)
     app.connect("autodoc-process-docstring", keep_sentences, priority=600)
+    app.connect("autodoc-process-docstring", show_shapes, priority=700)

@@ -51,8 +51,8 @@ def pages() -> list[str]:
 
 
 def needs(text: str) -> list[str]:
-    """The packages that a page's Python needs: ``% needs: torch, gymnasium`` on a line of its own."""
-    return [name.strip() for found in NEEDS.finditer(text) for name in (found[1] or found[2]).split(",")]
+    """The packages that a page's Python needs: ``% needs: torch gymnasium`` on a line of its own."""
+    return [name for found in NEEDS.finditer(text) for name in re.split(r"[,\s]+", found[1] or found[2])]
 
 
 def blocks(text: str, page: str) -> list[Block]:

@@ -27,7 +27,9 @@ def test_importing_is_cheap() -> None:
     assert done.stdout.strip() == "[]"
 
 
-@pytest.mark.parametrize("name", ["CompiledRollout", "compile", "compile_step", "load", "read", "simulate", "solve", "Problem"])
+@pytest.mark.parametrize(
+    "name", ["CompiledRollout", "compile", "compile_step", "load", "read", "simulate", "solve", "Problem"]
+)
 def test_examples_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     found = doctest.DocTestFinder(recurse=True).find(getattr(symphys, name), name, globs={})

@@ -1,7 +1,7 @@
 """Every block of code in the documents works as it stands there.
 
 - ``python``: the blocks of a page run in order, in one namespace and one fresh process, in an empty folder. A page with
-  a line ``% needs: torch, compiler`` is skipped where a package, or a C compiler, is missing.
+  a line ``% needs: torch compiler`` is skipped where a package, or a C compiler, is missing.
 - ``toml``: a whole problem, or after a line ``% fragment of: NAME`` (``<!-- fragment of: NAME -->`` where comments of
   MyST would show) tables that are put into a shipped problem, or into ``croquet``, the problem of the first page.
 - ``sh``: commands of symphys with options that exist, targets of the Makefile, and a few commands of the shell.
@@ -245,7 +245,8 @@ def test_faults_in_blocks_are_found(tmp_path: Path) -> None:
         ("{code-block}", 12, None),
     ]
     assert not DIRECTIVE.fullmatch("{code-block}") and DIRECTIVE.fullmatch("{toctree}")
-    assert needs("% needs: torch, jax\n") == ["torch", "jax"]
+    assert needs("% needs: torch jax\n") == ["torch", "jax"]
+    assert needs("text\n<!-- needs: torch, compiler -->\n") == ["torch", "compiler"]
 
 
 def test_fragments_go_into_their_problem() -> None:
