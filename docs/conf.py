@@ -108,7 +108,7 @@ def keep_sentences(app: Sphinx, what: str, name: str, described: object, options
 
 
 def show_shapes(app: Sphinx, what: str, name: str, described: object, options: object, lines: list[str]) -> None:
-    """``Annotated[Array, "N, B, 3"]`` of a field becomes the shape (N, B, 3); public classes go by their names alone."""
+    """``Annotated[Array, "N, B, 3"]`` of a field becomes (N, B, 3); public classes go by their names alone."""
     hints = get_type_hints(described, include_extras=True) if is_dataclass(described) else {}
     texts = {field: getattr(hint, "__metadata__", ("",))[0] for field, hint in hints.items()}
     shapes = {
