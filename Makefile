@@ -36,10 +36,10 @@ typecheck: $(VENV)/.developing  ## check types on a folder of links laid out as 
 	$(BIN)/mypy -p symphys
 
 docs: $(VENV)/.documenting  ## build the site into build/docs; a warning, a broken link or a failing notebook ends it
-	$(BIN)/python -m sphinx -n -W --keep-going -b html docs build/docs
+	$(BIN)/python -m sphinx -E -n -W --keep-going -b html docs build/docs
 
 docs-links: $(VENV)/.documenting  ## ask every external link of the site; needs a network
-	$(BIN)/python -m sphinx -b linkcheck docs build/docs-links
+	$(BIN)/python -m sphinx -D nb_execution_mode=off -b linkcheck docs build/docs-links
 
 reference: $(VENV)/.installed  ## write docs/problem_reference.md again, after a change of the schema or of solver options
 	$(BIN)/symphys schema --markdown --out docs/problem_reference.md

@@ -26,15 +26,15 @@ project_copyright = author
 version = release = symphys.__version__
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
-exclude_patterns = ["README.md"]
+smartquotes = False  # --set is no dash
+linkcheck_timeout = 20
 
 # Markdown: formulas between dollars, and an anchor for every heading, so that links to headings are checked.
 myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 4
 
-# The notebook is run when it has changed; a cell that fails ends the build. What it writes goes to a folder of its own.
-nb_execution_mode = "cache"
-nb_execution_cache_path = str(ROOT / "build" / "notebooks")
+# The notebook is run in a folder that is removed; a cell that fails ends the build.
+nb_execution_mode = "force"
 nb_execution_in_temp = True
 nb_execution_timeout = 300
 nb_execution_raise_on_error = True
