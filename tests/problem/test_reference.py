@@ -81,6 +81,7 @@ def test_types_are_short() -> None:
 
 def test_tables_within_texts_are_code() -> None:
     assert sentence("a box: { size = [0.2, 1] }, in [[pair]]") == "A box: `{ size = [0.2, 1] }`, in `[[pair]]`."
+    assert sentence("{ radius = 0.5 }") == "For instance `{ radius = 0.5 }`."
     assert sentence("z of all: [{ r = 1 }, ...]") == "z of all: `[{ r = 1 }, ...]`."
 
 

@@ -146,6 +146,7 @@ def sentence(text: str) -> str:
     text = with_code(" ".join(text.split()))
     first = re.match(r"(?![xyz]\b)[a-z]+\b(?![_.(\[=])", text)
     text = text[:1].upper() + text[1:] if first else text
+    text = f"For instance {text}" if re.fullmatch(r"`[^`]*`", text) else text
     return text if not text or text.endswith((".", "?", ":")) else f"{text}."
 
 
