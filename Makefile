@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 QUICK := $(addprefix tests/,house model expression findings problem solvers dynamics)
 
-.PHONY: help demo demo-walk test test-quick test-pipelines thorough lint typecheck bench bench-contact bench-robots bench-table1 bench-gpu bench-walk bench-lessons bench-pipelines gallery clean
+.PHONY: help demo demo-walk test test-quick test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-table1 bench-gpu bench-walk bench-lessons bench-pipelines gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
@@ -34,6 +34,15 @@ typecheck: $(VENV)/.developing  ## check types on a folder of links laid out as 
 	rm -rf build/farm && mkdir -p build/farm/symphys
 	cd build/farm/symphys && ln -s ../../../symphys/* ../../../solvers ../../../problems .
 	$(BIN)/mypy -p symphys
+
+docs: $(VENV)/.documenting  ## build the site into build/docs; a warning, a broken link or a failing notebook ends it
+	$(BIN)/python -m sphinx -E -n -W --keep-going -b html docs build/docs
+
+docs-links: $(VENV)/.documenting  ## ask every external link of the site; needs a network
+	$(BIN)/python -m sphinx -D nb_execution_mode=off -b linkcheck docs build/docs-links
+
+reference: $(VENV)/.installed  ## write docs/problem_reference.md again, after a change of the schema or of solver options
+	$(BIN)/symphys schema --markdown --out docs/problem_reference.md
 
 bench: $(VENV)/.benching  ## solvers, smoothing, kernels, MuJoCo with loose bodies, of docs/results; figures go to build/
 	$(BIN)/python benchmarks/ball_throw.py
@@ -106,6 +115,9 @@ $(VENV)/.benching: $(VENV)/.installed
 
 $(VENV)/.developing: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --editable '.[dev]' && touch $@
+
+$(VENV)/.documenting: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --editable '.[docs]' && touch $@
 
 $(VENV)/.pipelining: $(VENV)/.developing  # PyTorch for processors is a tenth of what comes with a GPU's libraries
 	$(BIN)/python -m pip install --quiet torch --index-url https://download.pytorch.org/whl/cpu

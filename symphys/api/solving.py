@@ -50,7 +50,7 @@ def solve(
         options: of the solver, as in its table [solver.NAME]: ``iterations=200``, ``max_seconds=10``.
 
     Returns:
-        The solution, whether or not it is one: see ``solved`` and ``verdict``.
+        The solution, whether or not it is one; see ``solved`` and ``verdict``.
 
     Raises:
         ProblemError: the problem or an option cannot be used; says what would be valid.

@@ -214,6 +214,11 @@ def test_schema_is_json_and_knows_the_solvers(run: Run) -> None:
     assert json.loads(Path("s.json").read_text(encoding="utf-8")) == json.loads(out)
 
 
+def test_schema_as_a_page(run: Run) -> None:
+    code, out, _ = run("schema", "--markdown")
+    assert code == 0 and out.startswith("# Reference of problem files\n") and "## `[solver.gradient]`" in out
+
+
 def test_version_and_help(run: Run) -> None:
     assert run("--version")[:2] == (0, f"symphys {symphys.__version__}\n")
     code, out, _ = run("solve", "--help")
