@@ -48,6 +48,13 @@ def duration(seconds: float | None) -> str:
     return f"{seconds:,.0f}" if seconds >= 100 else f"{seconds:.3g}"
 
 
+def time_words(seconds: float) -> str:
+    """A time to wait, rounded up, in the unit that suits it."""
+    if seconds <= 100:
+        return f"{math.ceil(seconds)} s"
+    return f"{math.ceil(seconds / 60)} min" if seconds <= 6000 else f"{seconds / 3600:.1f} h"
+
+
 def brief(job: Job, result: Result, skipped: bool) -> str:
     """One line on a run that is over."""
     if result.status == "failed" and skipped:

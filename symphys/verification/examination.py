@@ -19,6 +19,16 @@ from symphys.verification.tunnelling import tunnelling
 Array = NDArray[np.float64]
 Tell = Callable[[str], None]
 
+SIMULATING = "simulating"
+COMPARING = "comparing the gradient with differences"
+REFINING = "refining the time step and the sweeps"
+SWEEPING = "sweeping the sensitivity back through time"
+NEAR = "looking for near misses"
+SMOOTHING = "smoothing, and adding up energy and momentum"
+PARTS = {SIMULATING: 5.0, COMPARING: 20.0, REFINING: 55.0, SWEEPING: 4.0, NEAR: 2.0, SMOOTHING: 4.0}
+"""The parts of an examination that take time, in their order, and about how much of it each takes; measured with the
+shipped problems, beside some 8 for building the problem."""
+
 
 @np.errstate(invalid="ignore", over="ignore")  # numbers that are not finite are reported as such
 def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: None) -> dict[str, Any]:
@@ -30,17 +40,17 @@ def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: No
     Raises:
         NotFinite: there is no such motion; says where it ends and why.
     """
-    tell("simulating")
+    tell(SIMULATING)
     record = transcription.record(z)
-    tell("comparing the gradient with differences")
+    tell(COMPARING)
     compared = gradient.compare_gradient(transcription, z)
-    tell("refining the time step and the sweeps")
+    tell(REFINING)
     finer = refinement.refine(transcription, z)
-    tell("sweeping the sensitivity back through time")
+    tell(SWEEPING)
     grown = sensitivity_growth(transcription, record)
-    tell("looking for near misses")
+    tell(NEAR)
     near = near_misses(transcription, record)
-    tell("smoothing, and adding up energy and momentum")
+    tell(SMOOTHING)
     motion = survey(transcription, record)
     return {
         "gradient": compared,

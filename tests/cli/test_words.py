@@ -19,7 +19,7 @@ from symphys.cli.summary import advice, fitting_table, missed, table
 from symphys.cli.wording import brief, duration, many_pairs, number, whole
 from symphys.results.result import CheckRecord
 from symphys.runs import Result
-from symphys.solvers import TraceRow
+from symphys.solvers import CmaOptions, TraceRow
 
 NAN = float("nan")
 
@@ -38,6 +38,12 @@ class Job:
 
     class folder:
         path = "out/throw/cma-seed0"
+
+    options = CmaOptions(evaluations=8)
+
+    class problem:
+        class simulation:
+            smoothing = (0.0,)
 
 
 @given(st.recursive(st.booleans() | st.integers(-(2**60), 2**60) | st.floats(allow_nan=False), st.lists, max_leaves=5))
