@@ -12,8 +12,10 @@ from symphys.transcription import Record, Transcription, first_non_finite, first
 from symphys.verification import gradient, refinement, smoothing
 from symphys.verification.balance import balance
 from symphys.verification.contacts import contacts, slides
+from symphys.verification.held_bounds import held_bounds
 from symphys.verification.near_misses import near_misses
 from symphys.verification.sensitivity_growth import sensitivity_growth
+from symphys.verification.target_conflicts import target_conflicts
 from symphys.verification.tunnelling import tunnelling
 
 Array = NDArray[np.float64]
@@ -24,8 +26,9 @@ COMPARING = "comparing the gradient with differences"
 REFINING = "refining the time step and the sweeps"
 SWEEPING = "sweeping the sensitivity back through time"
 NEAR = "looking for near misses"
+CONFLICTS = "looking for targets and bounds that stand in the way"
 SMOOTHING = "smoothing, and adding up energy and momentum"
-PARTS = {SIMULATING: 5.0, COMPARING: 20.0, REFINING: 55.0, SWEEPING: 4.0, NEAR: 2.0, SMOOTHING: 4.0}
+PARTS = {SIMULATING: 5.0, COMPARING: 20.0, REFINING: 55.0, SWEEPING: 4.0, NEAR: 2.0, CONFLICTS: 2.0, SMOOTHING: 4.0}
 """The parts of an examination that take time, in their order, and about how much of it each takes; measured with the
 shipped problems, beside some 8 for building the problem."""
 
@@ -50,6 +53,8 @@ def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: No
     grown = sensitivity_growth(transcription, record)
     tell(NEAR)
     near = near_misses(transcription, record)
+    tell(CONFLICTS)
+    standing = {**target_conflicts(transcription, record), "bounds": held_bounds(transcription, z)}
     tell(SMOOTHING)
     motion = survey(transcription, record)
     return {
@@ -60,6 +65,7 @@ def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: No
         **motion,
         **refinement.settling(transcription, z, motion["residual"], motion["impulse"]),
         "misses": near,
+        **standing,
         "slides": slides(transcription.rollout, record),
         "fault": _fault(transcription, record, compared),
     }
