@@ -9,11 +9,13 @@ from typing import Any
 from symphys import files
 from symphys import verification as trust
 from symphys.errors import SymphysError
+from symphys.findings.examination import Examination
+from symphys.findings.obstacles import capital, obstacles
 from symphys.results.file_names import CHECKPOINT, GUESS, SCENE, TRAJECTORY
 from symphys.results.result import Result
 from symphys.results.scene_of_problem import make_scene
 from symphys.runs.job import Job
-from symphys.runs.record import Judgement, make_result, trace_row, used
+from symphys.runs.record import Judgement, judged, make_result, trace_row, used
 from symphys.shooting import Array, ShootingProblem
 from symphys.solvers import Monitor, Outcome, Status, solver
 from symphys.transcription import Record, Transcription
@@ -82,7 +84,15 @@ def judge(transcription: Transcription, outcome: Outcome, examine: bool = True) 
     except SymphysError as error:
         return Judgement(None, None, None, f"{outcome.advice} {error}".strip())
     smoothed = outcome.status is Status.MET and not verdict.solved and outcome.trace[-1].smoothing > 0
-    return Judgement(verdict, taken.motion, examined, outcome.advice or (SMOOTHED if smoothed else ""))
+    well = verdict.solved and outcome.status in (Status.MET, Status.CONVERGED)
+    found = () if well else obstacles(Examination.from_json(files.strict(examined or {})), judged(verdict))
+    return Judgement(verdict, taken.motion, examined, told([*found, outcome.advice or SMOOTHED * smoothed]))
+
+
+def told(clauses: list[str]) -> str:
+    """Clauses as sentences, empty ones left out; the first begins as it is written, and the last has no full stop."""
+    known = [clause for clause in clauses if clause]
+    return ". ".join([*known[:1], *map(capital, known[1:])])
 
 
 def measured(transcription: Transcription, taken: Record, examine: bool) -> dict[str, Any]:
