@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from symphys.cli.examined import Examined
-    from symphys.problem import Problem
+    from symphys.problem import Constraint, Cost, Problem, Target
     from symphys.transcription import Transcription
     from symphys.verification.examination import Tell
 
@@ -109,7 +109,7 @@ def describe(problem: Problem) -> list[str]:
     for kind, things in (("cost", problem.costs), ("target", problem.targets), ("constraint", problem.constraints)):
         for thing in things:
             formula = " ".join(thing.formula.text.split())
-            lines.append(f"  {kind:<12} {thing.name}: {formula} ({moment(thing.at)})")
+            lines.append(f"  {kind:<12} {thing.name}: {formula} ({moment(thing.at)}{in_unit(thing)})")
     if problem.termination is not None:
         lines.append(f"  over         where {' '.join(problem.termination.margin.text.split())} < 0")
     if problem.scenarios is not None:
@@ -120,6 +120,12 @@ def describe(problem: Problem) -> list[str]:
 def listed(names: Any) -> str:
     """Names with commas."""
     return ", ".join(names) or "none"
+
+
+def in_unit(thing: Cost | Target | Constraint) -> str:
+    """The unit of what is asked for, as far as it is known."""
+    unit = getattr(thing, "unit", "")
+    return f", in {unit}" if unit else ""
 
 
 def moment(at: str | float) -> str:

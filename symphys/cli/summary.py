@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from symphys.cli.wording import duration, first_line, number, verdict, whole
+from symphys.cli.wording import duration, first_line, measured, number, verdict, whole
 from symphys.findings.examination import Examination, HeldBound
 from symphys.findings.obstacles import MOST_BOUNDS, bound_words, holding
 from symphys.findings.verdict import BEST_FOUND, DOUBTED, NOT_SOLVED
@@ -146,6 +146,9 @@ def missed(result: Result) -> str:
     found = sorted((check for check in result.checks if not check.met), key=lambda check: -check.ratio)
     if not found:
         return ""
-    named = [f'"{each.name}" by {number(each.error)} (tolerance {number(each.tolerance)})' for each in found]
+    named = [
+        f'"{each.name}" by {measured(each.error, each.unit)} (tolerance {measured(each.tolerance, each.unit)})'
+        for each in found
+    ]
     more = f" and {len(found) - MOST_MISSED} more" if len(found) > MOST_MISSED else ""
     return f"missed: {', '.join(named[:MOST_MISSED])}{more}"

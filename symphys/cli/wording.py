@@ -30,6 +30,11 @@ def number(value: float | None, digits: int = 3) -> str:
     return f"{value:.{digits}g}"
 
 
+def measured(value: float, unit: str) -> str:
+    """A short number with its unit, if it has one."""
+    return " ".join(filter(None, (number(value), unit)))
+
+
 def labelled(name: str, value: float | None) -> str:
     """A number by its name, such as ``speed [m/s]``, with the unit behind it."""
     what, unit = name[:-1].rsplit(" [", 1) if name.endswith("]") and " [" in name else (name, "")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from symphys.findings.examination import Examination, HeldBound
-from symphys.findings.levels import FAIR, Finding, Judged
+from symphys.findings.levels import FAIR, UNKNOWN, Finding, Judged
 from symphys.findings.writing import listed, several, show
 
 TARGETS, BOUNDS = "targets", "bounds"
@@ -36,7 +36,7 @@ def obstacle_findings(trust: Examination, judged: Judged) -> list[Finding]:
                 lines.append(Finding(TARGETS, FAIR, what, number, capital(said_of(names, clause)) + "."))
         if trust.equations > trust.unknowns:
             number = f"{show(trust.equations)} for {several(int(trust.unknowns), 'unknown')}"
-            lines.append(Finding(TARGETS, FAIR, "Components of targets", number, EQUATIONS))
+            lines.append(Finding(TARGETS, UNKNOWN, "Components of targets", number, EQUATIONS))
     for bound in holding(trust, judged)[:MOST_BOUNDS]:
         lines.append(Finding(BOUNDS, FAIR, f"{capital(bound.side)} bound of {place(bound)}", extent(bound), HELD))
     return lines

@@ -29,10 +29,7 @@ def held_bounds(transcription: Transcription, z: Array) -> list[dict[str, Any]]:
     shooting = transcription.shooting
     lower, upper = shooting.stacked("lower"), shooting.stacked("upper")
     free = lower < upper
-    sides = {
-        "lower": free & (z <= lower + AT * (1 + np.abs(lower))),
-        "upper": free & (z >= upper - AT * (1 + np.abs(upper))),
-    }
+    sides = {side: free & lies_at(z, bound) for side, bound in (("lower", lower), ("upper", upper))}
     if not any(at.any() for at in sides.values()):
         return []
     values = shooting.evaluator.gradient(z[None], 0.0)
@@ -43,6 +40,12 @@ def held_bounds(transcription: Transcription, z: Array) -> list[dict[str, Any]]:
     gains = {"lower": np.where(sides["lower"], slope, 0.0), "upper": np.where(sides["upper"], -slope, 0.0)}
     rows = [row for block in shooting.blocks for side in gains for row in _rows(block, side, gains[side], least)]
     return sorted(rows, key=lambda row: -float(row["gain"]))
+
+
+def lies_at(z: Array, bound: Array) -> NDArray[np.bool_]:
+    """(n,): whether z lies at a bound (n,), which may be infinite."""
+    finite = np.where(np.isfinite(bound), bound, 0.0)
+    return np.asarray(np.isfinite(bound) & (np.abs(z - finite) <= AT * (1 + np.abs(finite))))
 
 
 def _rows(block: VariableBlock, side: str, gains: Array, least: float) -> list[dict[str, Any]]:

@@ -22,6 +22,7 @@ from symphys.problem.schema.types import (
     Texts,
 )
 
+UNIT = 'of the value, such as "m/s", for messages; default: that of its formula, where it is clear'
 Knots = Annotated[int, Field(ge=1, le=1_000_000)]
 
 
@@ -69,6 +70,7 @@ class TargetTable(SchemaTable):
     value: str = Field(description="formula of what should be zero")
     tolerance: Positive = Field(description="met where the Euclidean norm of the value is at most this")
     weight: NonNegative = 1.0
+    unit: Label | None = Field(default=None, description=UNIT)
 
 
 class ConstraintTable(SchemaTable):
@@ -84,6 +86,7 @@ class ConstraintTable(SchemaTable):
     penalty: Positive = Field(
         default=1e3, description="weight of squared violations for solvers that know no constraints"
     )
+    unit: Label | None = Field(default=None, description=UNIT)
 
 
 class OutputTable(SchemaTable):
