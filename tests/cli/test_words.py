@@ -175,6 +175,8 @@ def test_what_is_missed_is_named_the_worst_first() -> None:
         "(tolerance 0.1) and 1 more"
     )
     assert missed(result(checks=tuple(checks[:1]))) == ""
+    metres = CheckRecord("target", "there", 0.7, 0.1, 7.0, False, "m")
+    assert missed(result(solved=False, checks=(metres,))) == 'missed: "there" by 0.7 m (tolerance 0.1 m)'
 
 
 def test_the_time_of_a_command_is_told_by_its_parts() -> None:
