@@ -14,6 +14,7 @@ from symphys.problem import Target
 from symphys.shooting import ShootingProblem
 from symphys.trajectory import NotFinite
 from symphys.transcription import Record, Rollout, Transcription
+from symphys.verification.held_bounds import lies_at
 from symphys.verification.sensitivity_growth import DIRECTIONS
 
 Array = NDArray[np.float64]
@@ -124,8 +125,8 @@ def _by_arguments(sample: TargetSample) -> tuple[Array, Array, Array] | None:
 
 def pushed(shooting: ShootingProblem, z: Array, slope: Array) -> NDArray[np.bool_]:
     """(n,): which components lie at a bound that a step down the slope would leave."""
-    lower, upper = shooting.stacked("lower"), shooting.stacked("upper")
-    return np.asarray(((z <= lower) & (slope > 0)) | ((z >= upper) & (slope < 0)))
+    lower, upper = (lies_at(z, shooting.stacked(side)) for side in ("lower", "upper"))
+    return np.asarray((lower & (slope > 0)) | (upper & (slope < 0)))
 
 
 def opposed(slopes: Array, fixed: NDArray[np.bool_]) -> list[int]:
