@@ -49,8 +49,11 @@ def percent(share: float) -> str:
 
 
 def use_words(use: BudgetUse) -> str:
-    """The share of its budget that a run has used, and the time that is left at most; empty where nothing bounds it."""
-    left = f"at most {time_words(use.seconds_left)} left" if math.isfinite(use.seconds_left) else ""
+    """The share of its budget that a run has used, and the time that solving takes at most; empty without a bound.
+
+    The judging of its result is no part of it.
+    """
+    left = f"at most {time_words(use.seconds_left)} of solving left" if math.isfinite(use.seconds_left) else ""
     share = "" if math.isnan(use.share) else f"{percent(use.share)} of its budget"
     return ", ".join(filter(None, (share, left)))
 

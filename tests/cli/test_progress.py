@@ -71,7 +71,7 @@ def test_a_run_says_its_share_and_the_time_left_at_most() -> None:
     assert use_words(use) == "0 % of its budget"
     use.add(row(0, 40, 1.0))
     use.add(row(2, 120, 5.0))
-    assert use_words(use) == "30 % of its budget, at most 14 s left"
+    assert use_words(use) == "30 % of its budget, at most 14 s of solving left"
     assert use_words(BudgetUse(object(), (0.0,))) == ""
 
 
@@ -111,7 +111,7 @@ def test_plain_lines_say_share_and_time(clock: Clock, capsys: pytest.CaptureFixt
     plain.advanced(job, row(2, 120, 5.0))  # type: ignore[arg-type]
     line = capsys.readouterr().err.splitlines()[1]
     assert line == (
-        "throw cma seed 0: iteration 2, objective 1, worst 0.5; 30 % of its budget, at most 14 s left; "
+        "throw cma seed 0: iteration 2, objective 1, worst 0.5; 30 % of its budget, at most 14 s of solving left; "
         "0 of 2 runs done, 15 % of all"
     )
 
@@ -130,7 +130,7 @@ def test_live_lines_are_wrapped_and_not_cut(monkeypatch: pytest.MonkeyPatch) -> 
         live.advanced(Job(), row(2, 120, 5.0, outputs))  # type: ignore[arg-type]
         live.progress.refresh()
     shown = " ".join(buffer.getvalue().split())
-    assert "…" not in shown and "at most 14 s left" in shown
+    assert "…" not in shown and "at most 14 s of solving left" in shown
     assert "speed of the ball 12.5 m/s" in shown.replace("━", "").replace("  ", " ")
 
 

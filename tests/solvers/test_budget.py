@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from symphys.solvers import CmaOptions, GradientOptions, TraceRow
+from symphys.solvers import SOLVERS, CmaOptions, GradientOptions, TraceRow
 from symphys.solvers.core.budget import BudgetUse
 
 ROW = TraceRow(0, 1, 0, 0, 0, 0.0, 1.0, 1.0, 2.0, math.nan, math.nan, 0.0)
@@ -49,6 +49,11 @@ def test_the_bound_that_comes_first_counts() -> None:
     use = used(options, ROW, replace(ROW, iteration=10, seconds=10.0))
     assert (use.share, use.seconds_left) == (0.5, 10.0)
     assert used(options).seconds_left == 20
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_every_solver_has_a_budget(name: str) -> None:
+    assert BudgetUse(SOLVERS[name].Options(), (0.0,)).share == 0
 
 
 def test_nothing_is_said_of_what_nothing_bounds() -> None:
