@@ -157,11 +157,14 @@ class BatchProgress:
         self.runs, self.over, self.timed = runs, 0, 0
         self.began = monotonic()
         self.running: dict[str, BudgetUse] = {}
+        self.judged: dict[str, StepProgress] = {}
+        self.examined: set[str] = set()
         self.news: dict[str, float] = {}
 
     def started(self, job: Job) -> BudgetUse:
         """A run begins; its use of its budget."""
         self.news[job.name] = monotonic()
+        self.examined |= {job.name} if job.examine else set()
         return self.running.setdefault(job.name, BudgetUse(job.options, job.problem.simulation.smoothing))
 
     def advanced(self, job: Job, row: TraceRow) -> BudgetUse:
@@ -170,17 +173,28 @@ class BatchProgress:
         use.add(row)
         return use
 
+    def judging(self, job: Job, what: str) -> StepProgress:
+        """A part of judging what a run has found begins."""
+        from symphys.verification.examination import PARTS
+
+        self.started(job)
+        steps = self.judged.setdefault(job.name, StepProgress(PARTS))
+        steps.tell(what)
+        return steps
+
     def ended(self, job: Job, skipped: bool) -> None:
         """A run is over; what was done before takes no time."""
-        self.running.pop(job.name, None)
-        self.news.pop(job.name, None)
+        for known in (self.running, self.judged, self.news):
+            known.pop(job.name, None)
         self.over += 1
         self.timed += not skipped
 
     def quiet(self, seconds: float) -> dict[str, str]:
-        """Of runs that have brought no news for so long: what can be said of them, by their names."""
+        """Of runs that are judged, or have brought no news for so long: what can be said of them, by their names."""
         waited = {name: monotonic() - since for name, since in self.news.items()}
-        return {name: quiet_words(self.running[name], time) for name, time in waited.items() if time >= seconds}
+        judged = {name: judging_words(steps) for name, steps in self.judged.items()}
+        quiet = {name: quiet_words(self.running[name], time) for name, time in waited.items() if time >= seconds}
+        return quiet | judged
 
     @property
     def share(self) -> float:
@@ -197,8 +211,13 @@ class BatchProgress:
 
     @property
     def _begun(self) -> float:
-        shares = [use.share for use in self.running.values()]
-        return sum(share for share in shares if not math.isnan(share))
+        """The shares of the runs in work; of an examined one, solving and judging count as halves."""
+        total = 0.0
+        for name, use in self.running.items():
+            solved = 1.0 if name in self.judged else 0.0 if math.isnan(use.share) else use.share
+            steps = self.judged.get(name)
+            total += solved if name not in self.examined else (solved + (steps.share if steps else 0.0)) / 2
+        return total
 
     def __str__(self) -> str:
         """In a line."""
@@ -213,7 +232,12 @@ def quiet_words(use: BudgetUse, seconds: float) -> str:
     """A run that has brought no news for so long."""
     if use.row is None:
         return f"building and compiling for {time_words(seconds)}"
-    return f"no new iteration for {time_words(seconds)}: a long one, or its result is judged; {at(use.row)}"
+    return f"no new iteration for {time_words(seconds)}; {at(use.row)}"
+
+
+def judging_words(steps: StepProgress) -> str:
+    """A run whose solver is done."""
+    return f"judging what it found: {steps}"
 
 
 class Notes:
@@ -269,6 +293,12 @@ class Plain:
             if monotonic() - self.last >= self.every:
                 self.echo("; ".join(filter(None, (f"{job.name}: {at(row)}", use_words(use), self.whole()))))
 
+    def judging(self, job: Job, what: str) -> None:
+        """Keep it for the next line."""
+        with self.lock:
+            self.batch.judging(job, what)
+            self.beat()
+
     def beat(self) -> None:
         """Say that work goes on where nothing else was said for a while."""
         with self.lock:
@@ -323,6 +353,13 @@ class Live:
                 text = f"{job.name}: {words}"
                 self.progress.update(self.tasks[job.name], description=text, total=total, completed=done)
             self.move()
+
+    def judging(self, job: Job, what: str) -> None:
+        """Say so."""
+        with self.lock:
+            words = judging_words(self.batch.judging(job, what))
+            if job.name in self.tasks:
+                self.progress.update(self.tasks[job.name], description=f"{job.name}: {words}")
 
     def beat(self) -> None:
         """Say which runs bring no news, and let the time that is left run on."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Protocol
 
 from symphys.results.result import Result
@@ -24,6 +25,9 @@ class Observer(Protocol):
 
     def advanced(self, job: Job, row: TraceRow) -> None:
         """The run has come to this iteration."""
+
+    def judging(self, job: Job, what: str) -> None:
+        """The run's solver is done, and this part of judging what it found begins."""
 
     def ended(self, job: Job, result: Result, skipped: bool) -> None:
         """The run is over; ``skipped``: it was so before."""
@@ -84,7 +88,8 @@ def one_by_one(jobs: Mapping[int, Job], transcribe: Transcribe, ledger: Ledger, 
         here = {index: jobs[index] for index in group}
         solved = solve_group(here, transcriptions, watch) if len(group) > 1 else {}
         for index, job in here.items():
-            ledger.ended(index, execute(job, watch(index), transcriptions, solved.get(index)))
+            tell = partial(ledger.judging, index)
+            ledger.ended(index, execute(job, watch(index), transcriptions, solved.get(index), tell))
 
 
 @dataclass
@@ -124,6 +129,10 @@ class Ledger:
     def advanced(self, index: int, row: TraceRow) -> None:
         """Report an iteration."""
         self.observer.advanced(self.jobs[index], row)
+
+    def judging(self, index: int, what: str) -> None:
+        """Report that a part of judging a run begins."""
+        self.observer.judging(self.jobs[index], what)
 
     def ended(self, index: int, result: Result) -> None:
         """Keep a result and report it."""

@@ -25,6 +25,13 @@ SMOOTHED = (
     "such as smoothing = [0.1, 0.01, 0]"
 )
 
+JUDGING = "rolling it out exactly"
+"""What announces the judging of a solution."""
+
+
+def silent(what: str) -> None:
+    """Tell nobody."""
+
 
 def solve(
     job: Job,
@@ -34,10 +41,12 @@ def solve(
     checkpoint: dict[str, object] | None,
     earlier: Result | None,
     solved: Outcome | None = None,
+    tell: Callable[[str], None] = silent,
 ) -> Result:
     """Solve from the seed's guess, or go on from ``checkpoint`` of the ``earlier`` result; write what was found.
 
-    ``solved``: what was found already, side by side with other seeds; its seconds are those of the group.
+    ``solved``: what was found already, side by side with other seeds; its seconds are those of the group. ``tell``: is
+    called with a few words before each part of judging what was found.
     """
     shooting = transcription.shooting
     log(f"evaluated by {transcription.backend}")
@@ -49,7 +58,7 @@ def solve(
         log("solved side by side with other seeds: the seconds are those of all")
         outcome, spent = solved, solved.trace[-1].seconds if solved.trace else 0.0
     spent += (earlier.seconds if earlier else {}).get("solve", 0.0)
-    judgement = judge(transcription, outcome, job.examine)
+    judgement = judge(transcription, outcome, job.examine, tell)
     price = transcription.prices(used(outcome.counts))
     write(job, transcription, outcome, judgement, price)
     seconds = {"build": transcription.build_seconds, "compile": transcription.backend.seconds, "solve": spent}
@@ -74,13 +83,16 @@ def alone(
     return outcome, time.perf_counter() - began
 
 
-def judge(transcription: Transcription, outcome: Outcome, examine: bool = True) -> Judgement:
-    """Roll the solution out exactly, and examine it."""
+def judge(
+    transcription: Transcription, outcome: Outcome, examine: bool = True, tell: Callable[[str], None] = silent
+) -> Judgement:
+    """Roll the solution out exactly, and examine it; ``tell`` as in ``solve``."""
+    tell(JUDGING)
     try:
         verdict = transcription.judge(outcome.z)
         taken = transcription.record(outcome.z)
         over = outcome.status is not Status.INTERRUPTED
-        examined = measured(transcription, taken, examine) if over else None
+        examined = measured(transcription, taken, examine, tell) if over else None
     except SymphysError as error:
         return Judgement(None, None, None, f"{outcome.advice} {error}".strip())
     smoothed = outcome.status is Status.MET and not verdict.solved and outcome.trace[-1].smoothing > 0
@@ -95,9 +107,9 @@ def told(clauses: list[str]) -> str:
     return ". ".join([*known[:1], *map(capital, known[1:])])
 
 
-def measured(transcription: Transcription, taken: Record, examine: bool) -> dict[str, Any]:
+def measured(transcription: Transcription, taken: Record, examine: bool, tell: Callable[[str], None]) -> dict[str, Any]:
     """The object "trust" of the result."""
-    return trust.examine(transcription, taken.z) if examine else trust.survey(transcription, taken)
+    return trust.examine(transcription, taken.z, tell) if examine else trust.survey(transcription, taken)
 
 
 def write(

@@ -21,6 +21,7 @@ class Job:
     """As much of a job as progress needs."""
 
     options = CmaOptions(evaluations=400)
+    examine = False
 
     class problem:
         class simulation:
@@ -88,6 +89,17 @@ def test_a_batch_counts_the_shares_of_runs_in_work_and_no_time_for_what_was_done
     assert str(batch) == "2 of 5 runs done, 50 % of all, about 25 s left"
 
 
+def test_solving_and_judging_of_an_examined_run_are_halves() -> None:
+    batch, job = BatchProgress(2), Job()
+    job.examine = True
+    batch.advanced(job, row(0, 200, 5.0))  # type: ignore[arg-type]
+    assert batch.share == 0.125
+    batch.judging(job, "rolling it out exactly")  # type: ignore[arg-type]
+    assert batch.share == 0.25
+    steps = batch.judging(job, "comparing the gradient with differences")  # type: ignore[arg-type]
+    assert 0 < steps.share < 0.1 and batch.share == 0.25 + steps.share / 4
+
+
 def test_runs_without_news_say_what_they_are_at(clock: Clock, capsys: pytest.CaptureFixture[str]) -> None:
     plain, job = Plain(5.0), Job()
     plain.started(job, resumed=False)  # type: ignore[arg-type]
@@ -101,8 +113,28 @@ def test_runs_without_news_say_what_they_are_at(clock: Clock, capsys: pytest.Cap
     lines = capsys.readouterr().err.splitlines()
     assert lines[0] == "throw cma seed 0: begins"
     assert lines[1] == "throw cma seed 0: building and compiling for 7 s"
-    assert lines[2].startswith("throw cma seed 0: no new iteration for 6 s: a long one, or its result is judged; iter")
+    assert lines[2] == "throw cma seed 0: no new iteration for 6 s; iteration 0, objective 1, worst 0.5"
     assert len(lines) == 3
+
+
+def test_judging_says_its_parts_and_their_share(clock: Clock, capsys: pytest.CaptureFixture[str]) -> None:
+    plain, job = Plain(5.0), Job()
+    plain.advanced(job, row(0, 40, 1.0))  # type: ignore[arg-type]
+    plain.judging(job, "rolling it out exactly")  # type: ignore[arg-type]
+    plain.judging(job, "simulating")  # type: ignore[arg-type]
+    clock.now += 6
+    plain.beat()
+    plain.judging(job, "comparing the gradient with differences")  # type: ignore[arg-type]
+    clock.now += 6
+    plain.beat()
+    plain.batch.ended(job, skipped=False)  # type: ignore[arg-type]
+    clock.now += 6
+    plain.beat()
+    lines = capsys.readouterr().err.splitlines()
+    judging = "throw cma seed 0: judging what it found"
+    assert lines[0] == f"{judging}: simulating: 0 % done"
+    assert lines[1].startswith(f"{judging}: comparing the gradient with differences: 5 % done, about ")
+    assert len(lines) == 2
 
 
 def test_plain_lines_say_share_and_time(clock: Clock, capsys: pytest.CaptureFixture[str]) -> None:

@@ -40,6 +40,7 @@ class Job:
         path = "out/throw/cma-seed0"
 
     options = CmaOptions(evaluations=8)
+    examine = False
 
     class problem:
         class simulation:
