@@ -20,11 +20,12 @@ from rich.table import Column
 from rich.text import Text
 
 from symphys.cli.wording import brief, labelled, number, time_words
-from symphys.solvers.core.budget import BudgetUse
+from symphys.runs.progress import BatchProgress, StepProgress
 
 if TYPE_CHECKING:
     from symphys.runs import Job, Result
     from symphys.solvers import TraceRow
+    from symphys.solvers.core.budget import BudgetUse
 
 EVERY = 5.0
 """[s] between plain lines while work goes on."""
@@ -92,40 +93,10 @@ def watch(runs: int) -> Iterator[Plain | Live]:
             yield live
 
 
-class StepProgress:
-    """Work whose parts are known beforehand: what is done now, the share that is done, and the time that is left."""
-
-    def __init__(self, parts: Mapping[str, float]) -> None:
-        """Nothing is done; ``parts``: by the words that announce them, in their order, about how long each takes."""
-        self.parts, self.what = dict(parts), ""
-        self.began = self.since = monotonic()
-        self.done = 0.0
-
-    def tell(self, what: str) -> None:
-        """Say what begins; all parts before it are done. Words that announce no part are only shown."""
-        self.what = what
-        if what in self.parts:
-            before = list(self.parts)[: list(self.parts).index(what)]
-            self.done, self.since = sum(self.parts[each] for each in before), monotonic()
-
-    @property
-    def share(self) -> float:
-        """Done, 0 to 1."""
-        return self.done / sum(self.parts.values())
-
-    @property
-    def seconds_left(self) -> float:
-        """[s] at the pace of the parts that are done; inf before the first is."""
-        if not self.done:
-            return math.inf
-        pace = (self.since - self.began) / self.done
-        later = sum(self.parts.values()) - self.done
-        return max(pace * later - (monotonic() - self.since), pace * (later - self.parts.get(self.what, 0.0)))
-
-    def __str__(self) -> str:
-        """In a line."""
-        left = f", about {time_words(self.seconds_left)} left" if math.isfinite(self.seconds_left) else ""
-        return f"{self.what}: {percent(self.share)} done{left}"
+def step_words(steps: StepProgress) -> str:
+    """What is done now, the share that is done, and about how long the rest takes."""
+    left = f", about {time_words(steps.seconds_left)} left" if math.isfinite(steps.seconds_left) else ""
+    return f"{steps.what}: {percent(steps.share)} done{left}"
 
 
 @contextmanager
@@ -133,7 +104,7 @@ def working(name: str, parts: Mapping[str, float]) -> Iterator[Callable[[str], N
     """What takes the words that announce a part of a work, see ``StepProgress``; ``name``: of the work."""
     steps, console = StepProgress(parts), Console(stderr=True)
     if not console.is_terminal:
-        with heartbeat(lambda: click.echo(f"{name}: {steps}", err=True), EVERY):
+        with heartbeat(lambda: click.echo(f"{name}: {step_words(steps)}", err=True), EVERY):
             yield steps.tell
         return
     with console.status("") as status:
@@ -143,89 +114,25 @@ def working(name: str, parts: Mapping[str, float]) -> Iterator[Callable[[str], N
             show()
 
         def show() -> None:
-            status.update(Text(str(steps)))
+            status.update(Text(step_words(steps)))
 
         with heartbeat(show, TICK):
             yield tell
 
 
-class BatchProgress:
-    """The runs of a batch that are in work, the share of the batch that is done, and the time that is left."""
+def batch_words(batch: BatchProgress) -> str:
+    """How many runs are done; of several the share, and about how long the rest takes."""
+    text = f"{batch.over} of {batch.runs} runs done"
+    if batch.runs == 1 or batch.over == batch.runs:
+        return text
+    left = f", about {time_words(batch.seconds_left)} left" if math.isfinite(batch.seconds_left) else ""
+    return f"{text}, {percent(batch.share)} of all{left}"
 
-    def __init__(self, runs: int) -> None:
-        """None has begun."""
-        self.runs, self.over, self.timed = runs, 0, 0
-        self.began = monotonic()
-        self.running: dict[str, BudgetUse] = {}
-        self.judged: dict[str, StepProgress] = {}
-        self.examined: set[str] = set()
-        self.news: dict[str, float] = {}
 
-    def started(self, job: Job) -> BudgetUse:
-        """A run begins; its use of its budget."""
-        self.news[job.name] = monotonic()
-        self.examined |= {job.name} if job.examine else set()
-        return self.running.setdefault(job.name, BudgetUse(job.options, job.problem.simulation.smoothing))
-
-    def advanced(self, job: Job, row: TraceRow) -> BudgetUse:
-        """A run has come to an iteration; its use of its budget."""
-        use = self.started(job)
-        use.add(row)
-        return use
-
-    def judging(self, job: Job, what: str) -> StepProgress:
-        """A part of judging what a run has found begins."""
-        from symphys.verification.examination import PARTS
-
-        self.started(job)
-        steps = self.judged.setdefault(job.name, StepProgress(PARTS))
-        steps.tell(what)
-        return steps
-
-    def ended(self, job: Job, skipped: bool) -> None:
-        """A run is over; what was done before takes no time."""
-        for known in (self.running, self.judged, self.news):
-            known.pop(job.name, None)
-        self.over += 1
-        self.timed += not skipped
-
-    def quiet(self, seconds: float) -> dict[str, str]:
-        """Of runs that are judged, or have brought no news for so long: what can be said of them, by their names."""
-        waited = {name: monotonic() - since for name, since in self.news.items()}
-        judged = {name: judging_words(steps) for name, steps in self.judged.items()}
-        quiet = {name: quiet_words(self.running[name], time) for name, time in waited.items() if time >= seconds}
-        return quiet | judged
-
-    @property
-    def share(self) -> float:
-        """Done, 0 to 1: the runs that are over, and of those in work the share of their budget."""
-        return (self.over + self._begun) / self.runs if self.runs else 1.0
-
-    @property
-    def seconds_left(self) -> float:
-        """[s] at the pace so far; inf before the first run is over."""
-        if not self.timed:
-            return math.inf
-        rest = self.runs - self.over - self._begun
-        return (monotonic() - self.began) * rest / (self.timed + self._begun)
-
-    @property
-    def _begun(self) -> float:
-        """The shares of the runs in work; of an examined one, solving and judging count as halves."""
-        total = 0.0
-        for name, use in self.running.items():
-            solved = 1.0 if name in self.judged else 0.0 if math.isnan(use.share) else use.share
-            steps = self.judged.get(name)
-            total += solved if name not in self.examined else (solved + (steps.share if steps else 0.0)) / 2
-        return total
-
-    def __str__(self) -> str:
-        """In a line."""
-        text = f"{self.over} of {self.runs} runs done"
-        if self.runs == 1 or self.over == self.runs:
-            return text
-        left = f", about {time_words(self.seconds_left)} left" if math.isfinite(self.seconds_left) else ""
-        return f"{text}, {percent(self.share)} of all{left}"
+def waiting_words(batch: BatchProgress, seconds: float) -> dict[str, str]:
+    """Of the runs that are judged, or have brought no news for so long: what is said of them, by their names."""
+    quiet = {name: quiet_words(batch.running[name], time) for name, time in batch.quiet(seconds).items()}
+    return quiet | {name: judging_words(steps) for name, steps in batch.judged.items()}
 
 
 def quiet_words(use: BudgetUse, seconds: float) -> str:
@@ -237,7 +144,7 @@ def quiet_words(use: BudgetUse, seconds: float) -> str:
 
 def judging_words(steps: StepProgress) -> str:
     """A run whose solver is done."""
-    return f"judging what it found: {steps}"
+    return f"judging what it found: {step_words(steps)}"
 
 
 class Notes:
@@ -304,7 +211,7 @@ class Plain:
         with self.lock:
             if monotonic() - self.last < self.every:
                 return
-            for name, words in list(self.batch.quiet(self.every).items())[:MOST_QUIET]:
+            for name, words in list(waiting_words(self.batch, self.every).items())[:MOST_QUIET]:
                 self.echo(f"{name}: {words}")
 
     def ended(self, job: Job, result: Result, skipped: bool) -> None:
@@ -317,7 +224,7 @@ class Plain:
 
     def whole(self) -> str:
         """Where the batch is, if it is one."""
-        return str(self.batch) if self.batch.runs > 1 else ""
+        return batch_words(self.batch) if self.batch.runs > 1 else ""
 
     def echo(self, line: str) -> None:
         """Write a line."""
@@ -332,7 +239,7 @@ class Live:
         """Start at zero."""
         self.progress = progress
         self.batch = BatchProgress(runs)
-        self.whole = progress.add_task(str(self.batch), total=1.0)
+        self.whole = progress.add_task(batch_words(self.batch), total=1.0)
         self.tasks: dict[str, TaskID] = {}
         self.notes = Notes()
         self.lock = RLock()
@@ -364,7 +271,7 @@ class Live:
     def beat(self) -> None:
         """Say which runs bring no news, and let the time that is left run on."""
         with self.lock:
-            for name, words in self.batch.quiet(EVERY).items():
+            for name, words in waiting_words(self.batch, EVERY).items():
                 if name in self.tasks:
                     self.progress.update(self.tasks[name], description=f"{name}: {words}")
             self.move()
@@ -382,4 +289,4 @@ class Live:
 
     def move(self) -> None:
         """Show where the batch is."""
-        self.progress.update(self.whole, completed=self.batch.share, description=str(self.batch))
+        self.progress.update(self.whole, completed=self.batch.share, description=batch_words(self.batch))

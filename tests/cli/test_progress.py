@@ -11,8 +11,19 @@ import pytest
 from rich.console import Console
 
 from symphys.cli import progress
-from symphys.cli.progress import BatchProgress, Plain, StepProgress, heartbeat, percent, use_words, watch, working
+from symphys.cli.progress import (
+    Plain,
+    batch_words,
+    heartbeat,
+    percent,
+    step_words,
+    use_words,
+    watch,
+    working,
+)
 from symphys.cli.wording import time_words
+from symphys.runs import progress as runs_progress
+from symphys.runs.progress import BatchProgress, StepProgress
 from symphys.solvers import CmaOptions, TraceRow
 from symphys.solvers.core.budget import BudgetUse
 
@@ -43,7 +54,8 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     made = Clock()
-    monkeypatch.setattr(progress, "monotonic", made)
+    for module in (progress, runs_progress):
+        monkeypatch.setattr(module, "monotonic", made)
     return made
 
 
@@ -79,14 +91,14 @@ def test_a_run_says_its_share_and_the_time_left_at_most() -> None:
 def test_a_batch_counts_the_shares_of_runs_in_work_and_no_time_for_what_was_done(clock: Clock) -> None:
     batch, jobs = BatchProgress(5), [Job(k) for k in range(5)]
     batch.ended(jobs[0], skipped=True)  # type: ignore[arg-type]
-    assert str(batch) == "1 of 5 runs done, 20 % of all"
+    assert batch_words(batch) == "1 of 5 runs done, 20 % of all"
     batch.started(jobs[1])  # type: ignore[arg-type]
     clock.now += 10
     batch.ended(jobs[1], skipped=False)  # type: ignore[arg-type]
-    assert str(batch) == "2 of 5 runs done, 40 % of all, about 30 s left"
+    assert batch_words(batch) == "2 of 5 runs done, 40 % of all, about 30 s left"
     batch.advanced(jobs[2], row(0, 200, 5.0))  # type: ignore[arg-type]
     clock.now += 5
-    assert str(batch) == "2 of 5 runs done, 50 % of all, about 25 s left"
+    assert batch_words(batch) == "2 of 5 runs done, 50 % of all, about 25 s left"
 
 
 def test_solving_and_judging_of_an_examined_run_are_halves() -> None:
@@ -169,14 +181,14 @@ def test_live_lines_are_wrapped_and_not_cut(monkeypatch: pytest.MonkeyPatch) -> 
 def test_steps_say_what_is_done_and_the_time_at_the_pace_so_far(clock: Clock) -> None:
     steps = StepProgress({"one": 1.0, "two": 3.0, "three": 4.0})
     steps.tell("one")
-    assert str(steps) == "one: 0 % done"
+    assert step_words(steps) == "one: 0 % done"
     clock.now += 2
     steps.tell("two")
-    assert str(steps) == "two: 12 % done, about 14 s left"
+    assert step_words(steps) == "two: 12 % done, about 14 s left"
     clock.now += 5
-    assert str(steps) == "two: 12 % done, about 9 s left"
+    assert step_words(steps) == "two: 12 % done, about 9 s left"
     clock.now += 5
-    assert str(steps) == "two: 12 % done, about 8 s left", "no less than the parts that are not begun take"
+    assert step_words(steps) == "two: 12 % done, about 8 s left", "no less than the parts that are not begun take"
     steps.tell("words of no part")
     assert steps.share == 1 / 8
     steps.tell("three")
