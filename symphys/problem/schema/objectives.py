@@ -68,9 +68,9 @@ class TargetTable(SchemaTable):
     name: Label
     at: Instant = Field(default="end", description='"end" or a time [s]')
     value: str = Field(description="formula of what should be zero")
+    unit: Label | None = Field(default=None, description=UNIT)
     tolerance: Positive = Field(description="met where the Euclidean norm of the value is at most this")
     weight: NonNegative = 1.0
-    unit: Label | None = Field(default=None, description=UNIT)
 
 
 class ConstraintTable(SchemaTable):
