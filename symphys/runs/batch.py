@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from symphys.results.result import Result
 from symphys.runs.execute import execute
@@ -26,11 +26,16 @@ class Observer(Protocol):
     def advanced(self, job: Job, row: TraceRow) -> None:
         """The run has come to this iteration."""
 
-    def judging(self, job: Job, what: str) -> None:
-        """The run's solver is done, and this part of judging what it found begins."""
-
     def ended(self, job: Job, result: Result, skipped: bool) -> None:
         """The run is over; ``skipped``: it was so before."""
+
+
+@runtime_checkable
+class JudgingObserver(Protocol):
+    """An observer that also receives what comes after the solver."""
+
+    def judging(self, job: Job, what: str) -> None:
+        """The run's solver is done, and this part of judging what it found begins."""
 
 
 @dataclass(frozen=True)
@@ -131,8 +136,9 @@ class Ledger:
         self.observer.advanced(self.jobs[index], row)
 
     def judging(self, index: int, what: str) -> None:
-        """Report that a part of judging a run begins."""
-        self.observer.judging(self.jobs[index], what)
+        """Report that a part of judging a run begins, to an observer that takes it."""
+        if isinstance(self.observer, JudgingObserver):
+            self.observer.judging(self.jobs[index], what)
 
     def ended(self, index: int, result: Result) -> None:
         """Keep a result and report it."""
