@@ -20,7 +20,7 @@ from rich.table import Column
 from rich.text import Text
 
 from symphys.cli.wording import brief, labelled, number, time_words
-from symphys.runs.progress import BatchProgress, StepProgress
+from symphys.runs.progress import BatchShare, StepProgress
 
 if TYPE_CHECKING:
     from symphys.runs import Job, Result
@@ -120,7 +120,7 @@ def working(name: str, parts: Mapping[str, float]) -> Iterator[Callable[[str], N
             yield tell
 
 
-def batch_words(batch: BatchProgress) -> str:
+def batch_words(batch: BatchShare) -> str:
     """How many runs are done; of several the share, and about how long the rest takes."""
     text = f"{batch.over} of {batch.runs} runs done"
     if batch.runs == 1 or batch.over == batch.runs:
@@ -129,7 +129,7 @@ def batch_words(batch: BatchProgress) -> str:
     return f"{text}, {percent(batch.share)} of all{left}"
 
 
-def waiting_words(batch: BatchProgress, seconds: float) -> dict[str, str]:
+def waiting_words(batch: BatchShare, seconds: float) -> dict[str, str]:
     """Of the runs that are judged, or have brought no news for so long: what is said of them, by their names."""
     quiet = {name: quiet_words(batch.running[name], time) for name, time in batch.quiet(seconds).items()}
     return quiet | {name: judging_words(steps) for name, steps in batch.judged.items()}
@@ -183,7 +183,7 @@ class Plain:
 
     def __init__(self, every: float = EVERY, runs: int = 1) -> None:
         """Nothing is shown yet; ``every``: seconds between lines while runs go on."""
-        self.notes, self.batch = Notes(), BatchProgress(runs)
+        self.notes, self.batch = Notes(), BatchShare(runs)
         self.every, self.last = every, monotonic()
         self.lock = RLock()
 
@@ -238,7 +238,7 @@ class Live:
     def __init__(self, progress: Progress, runs: int) -> None:
         """Start at zero."""
         self.progress = progress
-        self.batch = BatchProgress(runs)
+        self.batch = BatchShare(runs)
         self.whole = progress.add_task(batch_words(self.batch), total=1.0)
         self.tasks: dict[str, TaskID] = {}
         self.notes = Notes()

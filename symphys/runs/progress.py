@@ -43,7 +43,7 @@ class StepProgress:
         return max(pace * later - (monotonic() - self.since), pace * (later - self.parts.get(self.what, 0.0)))
 
 
-class BatchProgress:
+class BatchShare:
     """The runs of a batch that are in work, the share of the batch that is done, and the time that is left."""
 
     def __init__(self, runs: int) -> None:

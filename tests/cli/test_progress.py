@@ -23,7 +23,7 @@ from symphys.cli.progress import (
 )
 from symphys.cli.wording import time_words
 from symphys.runs import progress as runs_progress
-from symphys.runs.progress import BatchProgress, StepProgress
+from symphys.runs.progress import BatchShare, StepProgress
 from symphys.solvers import CmaOptions, TraceRow
 from symphys.solvers.core.budget import BudgetUse
 
@@ -89,7 +89,7 @@ def test_a_run_says_its_share_and_the_time_left_at_most() -> None:
 
 
 def test_a_batch_counts_the_shares_of_runs_in_work_and_no_time_for_what_was_done(clock: Clock) -> None:
-    batch, jobs = BatchProgress(5), [Job(k) for k in range(5)]
+    batch, jobs = BatchShare(5), [Job(k) for k in range(5)]
     batch.ended(jobs[0], skipped=True)  # type: ignore[arg-type]
     assert batch_words(batch) == "1 of 5 runs done, 20 % of all"
     batch.started(jobs[1])  # type: ignore[arg-type]
@@ -102,7 +102,7 @@ def test_a_batch_counts_the_shares_of_runs_in_work_and_no_time_for_what_was_done
 
 
 def test_solving_and_judging_of_an_examined_run_are_halves() -> None:
-    batch, job = BatchProgress(2), Job()
+    batch, job = BatchShare(2), Job()
     job.examine = True
     batch.advanced(job, row(0, 200, 5.0))  # type: ignore[arg-type]
     assert batch.share == 0.125
