@@ -22,6 +22,7 @@ from symphys.problem.schema.types import (
     Texts,
 )
 
+UNIT = 'of the value, such as "m/s", for messages; default: that of its formula, where it is clear'
 Knots = Annotated[int, Field(ge=1, le=1_000_000)]
 
 
@@ -69,6 +70,7 @@ class TargetTable(SchemaTable):
     name: Label = Field(description="how results and reports refer to it")
     at: Instant = Field(default="end", description='"end" or a time [s]')
     value: str = Field(description="formula of what should be zero")
+    unit: Label | None = Field(default=None, description=UNIT)
     tolerance: Positive = Field(description="met where the Euclidean norm of the value is at most this")
     weight: NonNegative = Field(default=1.0, description="factor of the squared norm of the value in the objective")
 
@@ -86,6 +88,7 @@ class ConstraintTable(SchemaTable):
     penalty: Positive = Field(
         default=1e3, description="weight of squared violations for solvers that know no constraints"
     )
+    unit: Label | None = Field(default=None, description=UNIT)
 
 
 class OutputTable(SchemaTable):
