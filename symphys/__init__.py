@@ -23,9 +23,22 @@ if TYPE_CHECKING:
     from symphys.dynamics.functions import step_function
     from symphys.dynamics.horizon import roll_out
     from symphys.errors import ProblemError, SymphysError
+    from symphys.model.body import Body
+    from symphys.model.heightfield import Heightfield
+    from symphys.model.joints import (
+        BallJoint,
+        FixedJoint,
+        Hinge,
+        Servo,
+        Slider,
+        Spring,
+        TorqueMotor,
+        UniversalJoint,
+        VelocityMotor,
+    )
     from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain
     from symphys.model.state_layout import Layout, initial_state
-    from symphys.model.world import Body, Law, Scheme, World, make_world
+    from symphys.model.world import Law, Scheme, World, make_world
     from symphys.problem import Problem, load_problem
     from symphys.shooting import ShootingProblem
     from symphys.trajectory import Trajectory
@@ -33,24 +46,34 @@ if TYPE_CHECKING:
     from symphys.transcription.transcribe import transcribe
 
 __all__ = [
+    "BallJoint",
     "Body",
     "Box",
     "Capsule",
     "CompiledRollout",
+    "FixedJoint",
     "Fixture",
+    "Heightfield",
+    "Hinge",
     "Law",
     "Layout",
     "Plane",
     "Problem",
     "ProblemError",
     "Scheme",
+    "Servo",
     "ShootingProblem",
+    "Slider",
     "Solution",
     "Sphere",
+    "Spring",
     "SymphysError",
     "Terrain",
+    "TorqueMotor",
     "Trajectory",
     "Transcription",
+    "UniversalJoint",
+    "VelocityMotor",
     "World",
     "__version__",
     "compile",
@@ -81,7 +104,20 @@ _HOMES = {
     "trajectory": ("Trajectory",),
     "transcription": ("Transcription", "transcribe"),
     "model.shapes": ("Box", "Capsule", "Fixture", "Plane", "Sphere", "Terrain"),
-    "model.world": ("Body", "Law", "Scheme", "World", "make_world"),
+    "model.body": ("Body",),
+    "model.heightfield": ("Heightfield",),
+    "model.joints": (
+        "BallJoint",
+        "FixedJoint",
+        "Hinge",
+        "Slider",
+        "UniversalJoint",
+        "Servo",
+        "Spring",
+        "TorqueMotor",
+        "VelocityMotor",
+    ),
+    "model.world": ("Law", "Scheme", "World", "make_world"),
 }
 
 

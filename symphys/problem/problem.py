@@ -74,7 +74,8 @@ class Problem(ProblemData):
 
         Args:
             world: of numbers, without symbols; see ``make_world``.
-            start: states by name, ``"ball.position": [0, 0, 1]`` [m]; what is missing is zero, and upright.
+            start: states by name, ``"ball.position": [0, 0, 1]`` [m]; what is missing is as the bodies were placed,
+                else zero, and upright. Joints must hold together there; their coordinates need not be 0.
             duration: [s], a whole number of steps.
             dt: time step [s].
             variables: by name what each sets, ``{"throw": "ball.velocity"}``, or the keys of its table,
@@ -91,11 +92,11 @@ class Problem(ProblemData):
 
         Example:
             >>> from symphys import Body, Plane, Problem, make_world, solve
-            >>> world = make_world([Body.ball("ball", radius=0.1, mass=0.5)], [Plane.ground()])
+            >>> ball = Body.ball("ball", radius=0.1, mass=0.5, position=(0, 0, 1))
+            >>> world = make_world([ball], [Plane.ground()])
             >>> there = {"value": "ball.position - [3, 0, 1]", "tolerance": 0.01}
             >>> throw = {"sets": "ball.velocity", "guess": [6, 0, 2]}
-            >>> problem = Problem.from_world(world, {"ball.position": [0, 0, 1]}, duration=0.5,
-            ...                              variables={"throw": throw}, targets={"there": there})
+            >>> problem = Problem.from_world(world, duration=0.5, variables={"throw": throw}, targets={"there": there})
             >>> solve(problem, "least_squares", backend="casadi").solved
             True
         """
