@@ -17,7 +17,6 @@ from symphys.errors import SymphysError
 from symphys.model.body import Body
 from symphys.model.jointed import jointed
 from symphys.model.joints import Joint
-from symphys.model.joints.frames import WORLD
 from symphys.model.joints.specs import JointSpec
 from symphys.model.scalar import Scalar, is_zero
 from symphys.model.shapes import Static, Surface, contact_points, surface
@@ -197,10 +196,8 @@ def make_world(
     bodies, statics = tuple(bodies), tuple(statics)
     _check_names(bodies, statics, joints)
     bodies, held = jointed(bodies, joints) if joints else (bodies, ())
-    own: dict[frozenset[str], Law | None] = {
-        frozenset(joint.between): None for joint in joints if not joint.collide and WORLD not in joint.between
-    }
-    own |= {frozenset(names): each for names, each in laws.items()}
+    own = {frozenset(names): each for names, each in laws.items()}
+    own |= {frozenset(joint.between): None for joint in joints if not joint.collide}
     world = World(bodies, statics, all_pairs(bodies, statics, law or Law(), own), tuple(gravity), held)
     for names, each in laws.items():
         _check_law(world, names, each)
@@ -268,4 +265,6 @@ def _check_law(world: World, names: tuple[str, str], law: Law | None) -> None:
             raise SymphysError(f"laws: no body and no static surface is called {quote(name)}; {hint(name, known)}")
     met = {frozenset(owner(world.bodies, world.statics, side) for side in (p.first, p.second)) for p in world.pairs}
     if law is not None and frozenset(names) not in met:
-        raise SymphysError(f"laws: {' and '.join(names)} never touch, so that they have no law")
+        raise SymphysError(
+            f"laws: {' and '.join(names)} never touch; a joint keeps its bodies apart unless collide=True"
+        )

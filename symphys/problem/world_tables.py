@@ -14,6 +14,7 @@ from symphys.model.heightfield import Heightfield
 from symphys.model.shapes import Fixture, Plane, Shape, Static, Terrain
 from symphys.model.shapes.inertia import inertia_of, off_centre, specific
 from symphys.model.world import Law, Side, World
+from symphys.problem.formula_text import formula_text
 from symphys.problem.joint_tables import joint_tables
 from symphys.problem.plain import floats, numbers
 
@@ -105,13 +106,16 @@ def static_tables(statics: Sequence[Static]) -> dict[str, Any]:
 
 
 def terrain_table(terrain: Terrain) -> dict[str, Any]:
-    """A terrain of heights on a grid; SymphysError for one that a Python function gives."""
+    """A terrain by heights on a grid, or by its formula; SymphysError for a function that is none."""
     height = terrain.height
-    if not isinstance(height, Heightfield):
-        text = "its height is a Python function; build it from a Heightfield, or give the problem a formula"
-        raise SymphysError(f"terrain {terrain.name!r}: {text}")
-    grid = {"heights": [list(row) for row in height.heights], "spacing": list(height.spacing)}
-    return {"name": terrain.name, **grid, "origin": list(height.origin)}
+    if isinstance(height, Heightfield):
+        grid = {"heights": [list(row) for row in height.heights], "spacing": list(height.spacing)}
+        return {"name": terrain.name, **grid, "origin": list(height.origin)}
+    try:
+        return {"name": terrain.name, "height": formula_text(height)}
+    except SymphysError as error:
+        text = f"its height cannot be a formula of a problem file: {error}; build it from a Heightfield"
+        raise SymphysError(f"terrain {terrain.name!r}: {text}") from None
 
 
 def contact_tables(world: World) -> tuple[dict[str, float], list[dict[str, Any]]]:
