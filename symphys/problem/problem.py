@@ -68,6 +68,7 @@ class Problem(ProblemData):
         constraints: Mapping[str, Any] = NOTHING,
         outputs: Mapping[str, Any] = NOTHING,
         name: str = "problem",
+        functions: Mapping[str, ca.Function] = NOTHING,
         **tables: Any,
     ) -> Problem:
         """A problem about a world that was built in Python.
@@ -85,6 +86,7 @@ class Problem(ProblemData):
             constraints: likewise.
             outputs: likewise.
             name: of the problem.
+            functions: of controllers with ``function``; see ``load_problem``.
             tables: further tables of a problem file, such as ``solver={"gradient": {"iterations": 200}}``.
 
         Raises:
@@ -109,7 +111,7 @@ class Problem(ProblemData):
         }
         own = {key: entries for key, entries in lists.items() if entries}
         made = {"simulation": {"duration": duration, "dt": dt}, **world_tables(world, start or {}), **own}
-        return problem_of_tables({**made, **tables}, name)
+        return problem_of_tables({**made, **tables}, name, functions)
 
     def to_toml(self) -> str:
         """The text of a problem file that is this problem: its own, with what was changed in a table [set] at the end.

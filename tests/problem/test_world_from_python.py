@@ -139,6 +139,22 @@ def test_terrain_by_a_function_becomes_a_formula() -> None:
         assert float(ca.DM(height(x, y))) == pytest.approx(float(ca.DM(hills(x, y))), rel=1e-14)
 
 
+def test_a_controller_is_any_casadi_function() -> None:
+    """The force of a controller is what its function gives: 2 N on 0.5 kg for 0.1 s, without gravity."""
+    sensed, time, weights = ca.SX.sym("sensed", 3), ca.SX.sym("time"), ca.SX.sym("weights", 1)
+    world = make_world([Body.ball("ball", 0.1, 0.5)], gravity=(0, 0, 0))
+    made = Problem.from_world(
+        world,
+        duration=0.1,
+        functions={"brain": ca.Function("brain", [sensed, time, weights], [2 * weights])},
+        sensor=[{"name": "where", "reads": "ball.position"}],
+        controller=[
+            {"name": "brain", "drives": "ball.force[0]", "senses": ["where"], "function": {"weights": [1.0]}},
+        ],
+    )
+    assert symphys.simulate(made)["ball.velocity"][-1] == pytest.approx([0.4, 0, 0])
+
+
 def test_a_block_keeps_its_place() -> None:
     """And a body that touches it; a start that is given once more is the one that counts."""
     slab = Fixture("slab", Box((1, 1, 0.1), (0, 0, -0.1)))

@@ -17,6 +17,7 @@ from symphys import (
     Hinge,
     Law,
     Plane,
+    Problem,
     Slider,
     SymphysError,
     UniversalJoint,
@@ -43,21 +44,31 @@ def values(world: World) -> dict[str, list[float]]:
 
 
 def test_every_kind_begins_where_it_says() -> None:
-    """Also bodies that lie askew; a joint against the world moves all that hangs on it."""
-    askew = {"orientation": {"roll_deg": 20, "yaw_deg": 50}}
+    """Also bodies that lie askew; a joint moves all that hangs on it, and never what the world holds.
+
+    A problem file that is made of the world begins there too.
+    """
+    askew = {"orientation": {"roll_deg": 20, "yaw_deg": 50}, "velocity": (1, 2, 3), "angular_velocity": (2, 0, 1)}
     for joint, expected in (
         (Hinge("j", ("a", "b"), axis=(1, 2, 3), point=(0, 0, 0.6), start=0.7), [0.7]),
+        (Hinge("j", ("b", "a"), axis=(1, 2, 3), point=(0, 0, 0.6), start=0.7), [0.7]),
         (Slider("j", ("a", "b"), axis=(1, 2, 3), start=-0.2), [-0.2]),
         (
             UniversalJoint("j", ("a", "b"), axes=((0, 1, 0), (1, 0, 0)), point=(0, 0, 0.6), start=(0.5, -0.3)),
+            [0.5, -0.3],
+        ),
+        (
+            UniversalJoint("j", ("b", "a"), axes=((0, 1, 0), (1, 0, 0)), point=(0, 0, 0.6), start=(0.5, -0.3)),
             [0.5, -0.3],
         ),
         (BallJoint("j", ("a", "b"), point=(0, 0, 0.6)), []),
         (FixedJoint("j", ("a", "b")), []),
     ):
         world = make_world(rods(**askew), joints=[Hinge("top", ("world", "a"), **HINGE, start=1.1), joint])
-        found = values(world)
+        found, made = values(world), Problem.from_world(world, duration=0.1)
         assert found["top"] == pytest.approx([1.1], abs=1e-12) and found["j"] == pytest.approx(expected, abs=1e-12)
+        for name, value in world.start.items():
+            assert np.allclose(made.initial[name], value, rtol=0, atol=1e-12)
 
 
 def test_a_hinge_turns_by_the_right_hand() -> None:
