@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 QUICK := $(addprefix tests/,house model expression findings problem solvers dynamics)
 
-.PHONY: help demo demo-walk test test-quick thorough lint typecheck bench bench-contact bench-robots bench-table1 bench-gpu bench-walk bench-lessons gallery clean
+.PHONY: help demo demo-walk test test-quick test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-table1 bench-gpu bench-walk bench-lessons bench-pipelines gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
@@ -21,6 +21,9 @@ test: $(VENV)/.developing  ## run the tests; ARGS="-m 'not slow'" passes options
 test-quick: $(VENV)/.developing  ## run the tests that tell most in a minute: the house, problem files, the step, solvers
 	$(BIN)/pytest -n auto --dist loadfile -m "not slow" $(QUICK) $(ARGS)
 
+test-pipelines: $(VENV)/.pipelining  ## run the tests of symphys.torch, symphys.jax and symphys.env, and install what they need
+	$(BIN)/pytest tests/pipelines tests/house/test_code_blocks.py -k pipelines $(ARGS)
+
 thorough: $(VENV)/.developing  ## run the tests that take minutes: ten thousand random scenes, tall towers, long rolls
 	$(BIN)/pytest -n auto -m thorough $(ARGS)
 
@@ -31,6 +34,15 @@ typecheck: $(VENV)/.developing  ## check types on a folder of links laid out as 
 	rm -rf build/farm && mkdir -p build/farm/symphys
 	cd build/farm/symphys && ln -s ../../../symphys/* ../../../solvers ../../../problems .
 	$(BIN)/mypy -p symphys
+
+docs: $(VENV)/.documenting  ## build the site into build/docs; a warning, a broken link or a failing notebook ends it
+	$(BIN)/python -m sphinx -E -n -W --keep-going -b html docs build/docs
+
+docs-links: $(VENV)/.documenting  ## ask every external link of the site; needs a network
+	$(BIN)/python -m sphinx -D nb_execution_mode=off -b linkcheck docs build/docs-links
+
+reference: $(VENV)/.installed  ## write docs/problem_reference.md again, after a change of the schema or of solver options
+	$(BIN)/symphys schema --markdown --out docs/problem_reference.md
 
 bench: $(VENV)/.benching  ## solvers, smoothing, kernels, MuJoCo with loose bodies, of docs/results; figures go to build/
 	$(BIN)/python benchmarks/ball_throw.py
@@ -69,6 +81,9 @@ bench-lessons: $(VENV)/.benching  ## solvers on one walk against time, what doma
 	$(BIN)/python benchmarks/robustness.py build
 	$(BIN)/python benchmarks/lessons.py
 
+bench-pipelines: $(VENV)/.pipelining  ## steps for environments and nets against their kernel
+	$(BIN)/python benchmarks/step_rates.py
+
 bench-table1: $(VENV)/.benching  ## the timing table of Degrave et al. (1 and 128 robots, small and large net), cost against weights
 	$(BIN)/python benchmarks/table1.py
 	$(BIN)/python benchmarks/weights.py build
@@ -100,3 +115,10 @@ $(VENV)/.benching: $(VENV)/.installed
 
 $(VENV)/.developing: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --editable '.[dev]' && touch $@
+
+$(VENV)/.documenting: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --editable '.[docs]' && touch $@
+
+$(VENV)/.pipelining: $(VENV)/.developing  # PyTorch for processors is a tenth of what comes with a GPU's libraries
+	$(BIN)/python -m pip install --quiet torch --index-url https://download.pytorch.org/whl/cpu
+	$(BIN)/python -m pip install --quiet --editable '.[env,jax]' && touch $@

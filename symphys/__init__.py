@@ -3,8 +3,10 @@
     import symphys
     solution = symphys.solve("ball_throw")
 
-``load``, ``solve``, ``simulate``, ``compile`` and ``read`` are the front door; the classes below build worlds. Solvers
-are in ``symphys.solvers``, reports in ``symphys.report``. Everything is imported when it is first used.
+``load``, ``solve``, ``simulate``, ``compile`` and ``read`` are the front door; the classes below build worlds. What the
+command line does is here in the same words: ``new``, ``show``, ``check``, ``solve_all``, ``schema`` and ``cache``, and
+``report``, ``export`` and ``doctor``, which are rooms that can be called. Shipped problems are in
+``symphys.problems.catalogue()``, solvers in ``symphys.solvers.SOLVERS``. Everything is imported when it is first used.
 """
 
 from __future__ import annotations
@@ -15,14 +17,20 @@ from typing import TYPE_CHECKING
 from symphys.version import __version__
 
 if TYPE_CHECKING:
+    from symphys.api.checking import Checked, check
     from symphys.api.compiled import CompiledRollout, compile
-    from symphys.api.loading import load
+    from symphys.api.showing import show
     from symphys.api.simulation import simulate
     from symphys.api.solution import Solution, read
     from symphys.api.solving import solve
+    from symphys.api.stepping import CompiledStep, compile_step
+    from symphys.api.sweeping import solve_all
+    from symphys.api.tools import cache, new, schema
+    from symphys.doctor import doctor
     from symphys.dynamics.functions import step_function
     from symphys.dynamics.horizon import roll_out
     from symphys.errors import ProblemError, SymphysError
+    from symphys.export.writing import export
     from symphys.model.body import Body
     from symphys.model.heightfield import Heightfield
     from symphys.model.joints import (
@@ -40,6 +48,8 @@ if TYPE_CHECKING:
     from symphys.model.state_layout import Layout, initial_state
     from symphys.model.world import Law, Scheme, World, make_world
     from symphys.problem import Problem, load_problem
+    from symphys.problem.loading import load
+    from symphys.report.pages.folder import report
     from symphys.shooting import ShootingProblem
     from symphys.trajectory import Trajectory
     from symphys.transcription import Transcription
@@ -50,7 +60,9 @@ __all__ = [
     "Body",
     "Box",
     "Capsule",
+    "Checked",
     "CompiledRollout",
+    "CompiledStep",
     "FixedJoint",
     "Fixture",
     "Heightfield",
@@ -76,25 +88,40 @@ __all__ = [
     "VelocityMotor",
     "World",
     "__version__",
+    "cache",
+    "check",
     "compile",
+    "compile_step",
+    "doctor",
+    "export",
     "initial_state",
     "load",
     "load_problem",
     "make_world",
+    "new",
     "read",
+    "report",
     "roll_out",
+    "schema",
+    "show",
     "simulate",
     "solve",
+    "solve_all",
     "step_function",
     "transcribe",
 ]
 
 _HOMES = {
+    "api.checking": ("Checked", "check"),
+    "api.showing": ("show",),
+    "api.sweeping": ("solve_all",),
+    "api.tools": ("cache", "new", "schema"),
     "api.compiled": ("CompiledRollout", "compile"),
-    "api.loading": ("load",),
+    "problem.loading": ("load",),
     "api.simulation": ("simulate",),
     "api.solution": ("Solution", "read"),
     "api.solving": ("solve",),
+    "api.stepping": ("CompiledStep", "compile_step"),
     "errors": ("ProblemError", "SymphysError"),
     "problem": ("Problem", "load_problem"),
     "dynamics.horizon": ("roll_out",),
@@ -119,10 +146,17 @@ _HOMES = {
     ),
     "model.world": ("Law", "Scheme", "World", "make_world"),
 }
+_ROOMS = ("doctor", "export", "problems", "report", "solvers")
+"""Rooms that need no import of their own; ``doctor``, ``export`` and ``report`` can be called."""
+
+_EXTRAS = ("env", "jax", "torch")
+"""Modules that need an extra."""
 
 
 def __getattr__(name: str) -> object:
     """A public name, from the room where it lives."""
+    if name in _ROOMS or name in _EXTRAS:
+        return import_module(f"symphys.{name}")
     for home, names in _HOMES.items():
         if name in names:
             return getattr(import_module(f"symphys.{home}"), name)

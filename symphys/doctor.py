@@ -28,6 +28,7 @@ from symphys.codegen import (
 from symphys.codegen.cuda import compile_on, find_gpu
 from symphys.codegen.toolchain.compiler import find_compiler, processors
 from symphys.codegen.toolchain.processor import processor
+from symphys.verbs import make_callable
 
 PACKAGES = ("casadi", "click", "cma", "matplotlib", "numpy", "pydantic", "rich", "scipy")
 LINEAR_SOLVERS = ("mumps", "ma27", "ma57", "ma77", "ma86", "ma97", "pardiso", "spral")
@@ -72,6 +73,20 @@ def examine() -> Iterator[Capability]:
         yield from _kernels()
     else:
         yield Capability("kernels", "missing", f"not tried without a compiler; {WITHOUT}")
+
+
+def doctor() -> list[Capability]:
+    """What symphys finds on this machine, each thing tried. Also called as ``symphys.doctor``.
+
+    Example:
+        >>> import symphys
+        >>> {each.name: each.state for each in symphys.doctor()}["packages"]
+        'ok'
+    """
+    return list(examine())
+
+
+make_callable(__name__, doctor)
 
 
 def healthy(findings: list[Capability]) -> bool:

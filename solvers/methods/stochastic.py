@@ -43,9 +43,9 @@ class StochasticOptions(DescentOptions):
         adjoint_discount: [1/s] how fast adjoints decay on their way back; 0: not at all. Its old name is ``forget``.
         fallen: weight of a motion that was over before its time.
         horizons: [s] shorter motions that gradients begin with, one after the other.
-        growth: share of the iterations that these take together.
+        growth: share of the iterations that the ``horizons`` take together.
         evolution: share of the direction that comes from values alone.
-        sigma: its spread, in units of scale.
+        sigma: how far the points of these values lie from the current one, in units of scale.
     """
 
     clip: float = 1.0

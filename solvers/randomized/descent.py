@@ -40,7 +40,7 @@ class DescentOptions(SolverOptions):
         rate: of Adam, in units of scale.
         hold: share of the iterations at the full rate; from then on it falls in proportion, to ``last`` of it.
         last: share of the rate at the end.
-        betas: of Adam.
+        betas: of Adam: share of the mean gradient and of its mean square that is kept.
         validation: samples that decide which point is kept, the start among them; 0: the last point is.
         validation_width: how widely these vary.
         every: iterations between two validations.

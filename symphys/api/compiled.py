@@ -8,14 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symphys.api.loading import Source, load
-from symphys.api.transcriptions import transcribed
+from symphys.api.transcriptions import recorded, transcribed
 from symphys.api.values import by_name, vector
 from symphys.errors import SymphysError
 from symphys.problem import Problem
+from symphys.problem.loading import Source, load
 from symphys.shooting import Evaluator, Values
 from symphys.trajectory import Trajectory
 from symphys.transcription import Transcription
+from symphys.transcription.recorded_rollout import RecordedRollout
 
 Array = NDArray[np.float64]
 
@@ -35,6 +36,7 @@ class CompiledRollout:
     problem: Problem
     smoothing: float
     _made: Transcription
+    _settings: tuple[str, int | None]
 
     @property
     def n(self) -> int:
@@ -85,6 +87,21 @@ class CompiledRollout:
         """All that a rollout gives: ``objective`` (B,), ``errors`` (B, k) as error / tolerance, ``outputs`` (B, o)."""
         return self._evaluator.value(rows(Z, self.n)[0], self.smoothing)
 
+    def recording(self, *quantities: str) -> RecordedRollout:
+        """The rollout as a kernel that gives quantities over time, and takes adjoints of them back to Z.
+
+        Args:
+            quantities: formulas as in problem files: ``ball.position``, ``rotate(torso.orientation, [0, 0, 1])``.
+
+        Example:
+            >>> import numpy as np, symphys
+            >>> recording = symphys.compile("ball_throw").recording("ball.position")
+            >>> value, found = recording.forward(np.tile([8, 0, 3, 0, 0, 0.0], (4, 1)))
+            >>> found["ball.position"].shape  # at the ends of all steps
+            (4, 500, 3)
+        """
+        return recorded(self.problem, quantities, self.smoothing, *self._settings)
+
     def trajectory(self, z: ArrayLike) -> Trajectory:
         """The motion of one z (n,); NotFinite if there is none."""
         return self._made.simulate(np.asarray(z, float), self.smoothing)
@@ -118,7 +135,7 @@ def compile(
         ((4,), (4, 6))
     """
     read = load(problem)
-    return CompiledRollout(read, smoothing, transcribed(read, smoothing == 0, backend, threads))
+    return CompiledRollout(read, smoothing, transcribed(read, smoothing == 0, backend, threads), (backend, threads))
 
 
 def rows(Z: ArrayLike, n: int) -> tuple[Array, bool]:

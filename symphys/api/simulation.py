@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 from numpy.typing import ArrayLike
 
-from symphys.api.loading import Source, load
 from symphys.api.transcriptions import transcribed
 from symphys.api.values import vector
+from symphys.problem.loading import Source, load
 from symphys.trajectory import Trajectory
 
 

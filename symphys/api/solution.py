@@ -118,10 +118,29 @@ class Solution:
         return figures.plot(self.trajectory, self.trace, names)
 
     def report(self) -> Path:
-        """Write the report of the run into its folder; the path of the page."""
+        """Write the report of the run into its folder, with its figures as SVG and CSV; the path of the page."""
         from symphys.report import write_run_report
 
         return write_run_report(self.folder)
+
+    def save_figures(self, folder: str | Path) -> list[Path]:
+        """Write every figure of the report into a folder: NAME.svg, and NAME.csv with the numbers that it shows.
+
+        A column of a table belongs to the nearest column of time, work or knots to its left.
+
+        Returns:
+            The files: motion, states, contacts, convergence, and, where there is something to show, variables,
+            controls, joints, motors, gait, strip, growth and energy.
+
+        Example:
+            >>> import symphys
+            >>> solution = symphys.solve("ball_throw", "least_squares", backend="casadi")
+            >>> sorted({path.stem for path in solution.save_figures("paper")})
+            ['contacts', 'convergence', 'energy', 'motion', 'states']
+        """
+        from symphys.report import write_run_figures
+
+        return write_run_figures(self.folder, Path(folder))
 
     def to_pandas(self, what: str = "trajectory") -> Any:
         """A pandas.DataFrame: "trajectory", a row for each time, or "trace", a row for each iteration."""

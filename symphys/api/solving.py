@@ -9,11 +9,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from symphys.api.loading import Source, load
 from symphys.api.solution import Solution
 from symphys.api.transcriptions import transcribed
 from symphys.errors import SymphysError
 from symphys.problem import Problem
+from symphys.problem.loading import Source, load
 from symphys.results.run import read_run
 from symphys.runs import Job, Result, execute, make_jobs
 from symphys.runs.job import fitting
@@ -50,7 +50,7 @@ def solve(
         options: of the solver, as in its table [solver.NAME]: ``iterations=200``, ``max_seconds=10``.
 
     Returns:
-        The solution, whether or not it is one: see ``solved`` and ``verdict``.
+        The solution, whether or not it is one; see ``solved`` and ``verdict``.
 
     Raises:
         ProblemError: the problem or an option cannot be used; says what would be valid.

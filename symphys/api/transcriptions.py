@@ -6,6 +6,8 @@ from functools import lru_cache
 
 from symphys.problem import Problem
 from symphys.transcription import Transcription, transcribe
+from symphys.transcription.open_step import CompiledStep, compile_open_step
+from symphys.transcription.recorded_rollout import RecordedRollout, record_rollout
 
 KEPT = 8
 """How many are kept: the kernels of one problem may take hundreds of megabytes."""
@@ -15,3 +17,24 @@ KEPT = 8
 def transcribed(problem: Problem, exact: bool, backend: str, threads: int | None = None) -> Transcription:
     """See ``transcribe``; the same object for the same problem."""
     return transcribe(problem, exact, backend, threads)
+
+
+@lru_cache(maxsize=KEPT)
+def stepped(
+    problem: Problem,
+    controllers: tuple[str, ...] | None,
+    sensors: tuple[str, ...] | None,
+    smoothing: float,
+    backend: str,
+    threads: int | None,
+) -> CompiledStep:
+    """See ``compile_step``; the same object for the same problem."""
+    return compile_open_step(problem, controllers, sensors, smoothing, backend, threads)
+
+
+@lru_cache(maxsize=KEPT)
+def recorded(
+    problem: Problem, quantities: tuple[str, ...], smoothing: float, backend: str, threads: int | None = None
+) -> RecordedRollout:
+    """See ``record_rollout``; the same object for the same problem."""
+    return record_rollout(problem, quantities, smoothing, backend, threads)

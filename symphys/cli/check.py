@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,9 +14,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from symphys.cli.examined import Examined
-    from symphys.problem import Problem
+    from symphys.problem import Constraint, Cost, Problem, Target
     from symphys.transcription import Transcription
     from symphys.verification.examination import Tell
+
+BUILDING, BUILDING_TAKES = "building the problem", 8.0
+"""What comes before an examination, and about how long it takes beside the parts of that."""
 
 
 @click.command()
@@ -37,19 +38,23 @@ def check(source: str, assignments: tuple[str, ...], folder: Path | None) -> int
     Exit code 1: the gradient disagrees with differences, or something is not finite.
     """
     from symphys.cli.examined import print_examined
+    from symphys.cli.progress import working
     from symphys.problem import require_solvable
     from symphys.runs import check_tables
     from symphys.trajectory import NotFinite
     from symphys.transcription import transcribe
+    from symphys.verification.examination import PARTS
 
     (problem,) = read_problems([source], read_settings(assignments))
     check_tables(problem)
     click.echo("\n".join(describe(problem)))
     require_solvable(problem)
-    transcription = transcribe(problem, backend="casadi")
-    z = transcription.shooting.start(0) if folder is None else found(folder, transcription)
     try:
-        examined = look(transcription, z)
+        with working(f"check {problem.name}", {BUILDING: BUILDING_TAKES, **PARTS}) as tell:
+            tell(BUILDING)
+            transcription = transcribe(problem, backend="casadi")
+            z = transcription.shooting.start(0) if folder is None else found(folder, transcription)
+            examined = look(transcription, z, tell)
     except NotFinite as error:
         click.echo(f"\n{error}")
         return 1
@@ -57,22 +62,12 @@ def check(source: str, assignments: tuple[str, ...], folder: Path | None) -> int
     return 1 if examined.wrong else 0
 
 
-def look(transcription: Transcription, z: NDArray[Any]) -> Examined:
-    """Examine ``z``."""
+def look(transcription: Transcription, z: NDArray[Any], tell: Tell) -> Examined:
+    """Examine ``z``; ``tell`` as in ``examine``."""
     from symphys.cli.examined import Examined
     from symphys.verification import examine
 
-    with telling() as tell:
-        return Examined.of(transcription.judge(z), examine(transcription, z, tell))
-
-
-@contextmanager
-def telling() -> Iterator[Tell]:
-    """What goes on as a line on stderr, if that is a terminal."""
-    from rich.console import Console
-
-    with Console(stderr=True).status("") as status:
-        yield lambda what: status.update(f"{what} ...")
+    return Examined.of(transcription.judge(z), examine(transcription, z, tell))
 
 
 def found(folder: Path, transcription: Transcription) -> NDArray[Any]:
@@ -114,7 +109,7 @@ def describe(problem: Problem) -> list[str]:
     for kind, things in (("cost", problem.costs), ("target", problem.targets), ("constraint", problem.constraints)):
         for thing in things:
             formula = " ".join(thing.formula.text.split())
-            lines.append(f"  {kind:<12} {thing.name}: {formula} ({moment(thing.at)})")
+            lines.append(f"  {kind:<12} {thing.name}: {formula} ({moment(thing.at)}{in_unit(thing)})")
     if problem.termination is not None:
         lines.append(f"  over         where {' '.join(problem.termination.margin.text.split())} < 0")
     if problem.scenarios is not None:
@@ -125,6 +120,12 @@ def describe(problem: Problem) -> list[str]:
 def listed(names: Any) -> str:
     """Names with commas."""
     return ", ".join(names) or "none"
+
+
+def in_unit(thing: Cost | Target | Constraint) -> str:
+    """The unit of what is asked for, as far as it is known."""
+    unit = getattr(thing, "unit", "")
+    return f", in {unit}" if unit else ""
 
 
 def moment(at: str | float) -> str:

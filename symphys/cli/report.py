@@ -11,11 +11,7 @@ import click
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 def report(folder: Path) -> None:
     """Make the report of a run folder, or of all runs below a folder, again from its files alone."""
-    from symphys.report import write_batch_report, write_run_report
-    from symphys.results.discovery import run_folders
+    from symphys.report import write_pages
 
-    below = run_folders(folder)
-    for run in below:
-        click.echo(write_run_report(run))
-    if below != [folder]:
-        click.echo(write_batch_report(folder))
+    for page in write_pages(folder):
+        click.echo(page)

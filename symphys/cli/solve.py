@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 MOST_SEEDS = 10_000
 MOST_JOBS = 256
+BATCH_PAGE = "page of all runs"
 
 
 @click.command()
@@ -140,14 +141,18 @@ def time_line(total: float, parts: Mapping[str, float]) -> str:
 
 def write_reports(jobs: list[Job], out: Path) -> Path:
     """Write the pages of the runs that are new, and that of the batch; where that lies."""
+    from symphys.cli.progress import working
     from symphys.report import write_batch_report, write_run_report
     from symphys.report.pages.run import PAGE
     from symphys.runs import RESULT
 
-    for job in jobs:
-        if newer(job.folder.path / RESULT, job.folder.path / PAGE):
-            write_run_report(job.folder.path)
-    return write_batch_report(out)
+    new = {job.name: job.folder.path for job in jobs if newer(job.folder.path / RESULT, job.folder.path / PAGE)}
+    with working("reports", dict.fromkeys([*(f"page of {name}" for name in new), BATCH_PAGE], 1.0)) as tell:
+        for name, folder in new.items():
+            tell(f"page of {name}")
+            write_run_report(folder)
+        tell(BATCH_PAGE)
+        return write_batch_report(out)
 
 
 def newer(source: Path, page: Path) -> bool:

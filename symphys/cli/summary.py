@@ -12,8 +12,10 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from symphys.cli.wording import duration, first_line, number, verdict, whole
-from symphys.findings.verdict import BEST_FOUND, DOUBTED
+from symphys.cli.wording import duration, first_line, measured, number, verdict, whole
+from symphys.findings.examination import Examination, HeldBound
+from symphys.findings.obstacles import MOST_BOUNDS, bound_words, holding
+from symphys.findings.verdict import BEST_FOUND, DOUBTED, NOT_SOLVED
 
 if TYPE_CHECKING:
     from symphys.runs import BatchResult, Job, Result
@@ -110,7 +112,26 @@ def advice(groups: dict[tuple[str, str], list[Result]]) -> list[str]:
         for line in said(result)
         if line
     ]
-    return list(dict.fromkeys(lines))
+    held = [f"{problem} {solver}: {line}" for (problem, solver), group in groups.items() for line in held_back(group)]
+    return list(dict.fromkeys(lines + held))
+
+
+def held_back(group: list[Result]) -> list[str]:
+    """How many of several seeds end at the same bound, where a bound holds one of them back."""
+    if len(group) < 2:
+        return []
+    bounds = [bound for result in group if not result.solved for bound in held_bounds(result)]
+    counts = Counter(bound_words(bound, knots=False) for bound in bounds)
+    total = f"of {len(group)} seeds"
+    return [
+        f"{count} {total} {'ends' if count == 1 else 'end'} at {words}"
+        for words, count in counts.most_common(MOST_BOUNDS)
+    ]
+
+
+def held_bounds(result: Result) -> tuple[HeldBound, ...]:
+    """The bounds that hold a run back."""
+    return holding(Examination.from_json(dict(result.trust)), result.judge(result.verdict != NOT_SOLVED))
 
 
 def said(result: Result) -> list[str]:
@@ -125,6 +146,9 @@ def missed(result: Result) -> str:
     found = sorted((check for check in result.checks if not check.met), key=lambda check: -check.ratio)
     if not found:
         return ""
-    named = [f'"{each.name}" by {number(each.error)} (tolerance {number(each.tolerance)})' for each in found]
+    named = [
+        f'"{each.name}" by {measured(each.error, each.unit)} (tolerance {measured(each.tolerance, each.unit)})'
+        for each in found
+    ]
     more = f" and {len(found) - MOST_MISSED} more" if len(found) > MOST_MISSED else ""
     return f"missed: {', '.join(named[:MOST_MISSED])}{more}"

@@ -30,6 +30,11 @@ def number(value: float | None, digits: int = 3) -> str:
     return f"{value:.{digits}g}"
 
 
+def measured(value: float, unit: str) -> str:
+    """A short number with its unit, if it has one."""
+    return " ".join(filter(None, (number(value), unit)))
+
+
 def labelled(name: str, value: float | None) -> str:
     """A number by its name, such as ``speed [m/s]``, with the unit behind it."""
     what, unit = name[:-1].rsplit(" [", 1) if name.endswith("]") and " [" in name else (name, "")
@@ -46,6 +51,13 @@ def duration(seconds: float | None) -> str:
     if seconds is None:
         return "-"
     return f"{seconds:,.0f}" if seconds >= 100 else f"{seconds:.3g}"
+
+
+def time_words(seconds: float) -> str:
+    """A time to wait, rounded up, in the unit that suits it."""
+    if seconds <= 100:
+        return f"{math.ceil(seconds)} s"
+    return f"{math.ceil(seconds / 60)} min" if seconds <= 6000 else f"{seconds / 3600:.1f} h"
 
 
 def brief(job: Job, result: Result, skipped: bool) -> str:

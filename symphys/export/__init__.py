@@ -1,8 +1,12 @@
-"""A problem for other programs: C sources, functions that plain casadi loads, or a model for MuJoCo."""
+"""Files for other programs: C sources, casadi functions, MuJoCo models. ``symphys.export(problem, c=...)`` writes."""
 
 from symphys.export.casadi_files import casadi_files
 from symphys.export.folder import ExportError, write_folders
 from symphys.export.mjcf import mjcf, mjcf_files
 from symphys.export.sources import c_files
+from symphys.export.writing import export
+from symphys.verbs import make_callable
 
-__all__ = ["ExportError", "c_files", "casadi_files", "mjcf", "mjcf_files", "write_folders"]
+__all__ = ["ExportError", "c_files", "casadi_files", "export", "mjcf", "mjcf_files", "write_folders"]
+
+make_callable(__name__, export)

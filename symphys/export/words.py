@@ -4,61 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from symphys.model.joints import Joint, Servo, TorqueMotor, VelocityMotor
 from symphys.model.state_layout import Layout, input_columns, input_size
 from symphys.model.world import World
 from symphys.problem import Problem, Variable, VariableSlot
+from symphys.problem.units import quantity_unit
 from symphys.transcription import Transcription
 from symphys.transcription.rollout import Rollout
 
-UNITS = {
-    "position": "m",
-    "orientation": "-, unit quaternion w x y z",
-    "velocity": "m/s",
-    "angular_velocity": "rad/s",
-    "force": "N",
-    "torque": "N m",
-    "reaction_force": "N",
-    "reaction_torque": "N m",
-    "lag": "s",
-    "mass": "kg",
-    "radius": "m",
-    "offset": "m",
-    "gravity": "m/s^2",
-    "friction": "-",
-    "restitution": "-",
-}
-"""By the last part of a name; world frame."""
-
-
-TURNING = {
-    **dict.fromkeys(("motor", "lower", "upper", "spring", "torque"), "N m"),
-    **{"lock": "N, then N m", "gain": "1/s", "velocity": "rad/s", "rest": "rad"},
-    **{"stiffness": "N m/rad", "damping": "N m s/rad"},
-}
-SLIDING = {
-    **dict.fromkeys(("motor", "lower", "upper", "spring", "torque"), "N"),
-    **{"lock": "N, then N m", "gain": "1/s", "velocity": "m/s", "rest": "m"},
-    **{"stiffness": "N/m", "damping": "N s/m"},
-}
-"""Of what belongs to joints, likewise."""
+PURE = {"orientation": "-, unit quaternion w x y z"}
+"""How what has no unit is shown, where that is more than a dash."""
 
 
 def unit(name: str, world: World) -> str:
     """In brackets; nothing where it is not known."""
-    owner, _, key = name.rpartition(".")
-    joint = next((joint for joint in world.joints if joint.name == owner), None)
-    found = UNITS.get(key) if joint is None else joint_unit(joint, key)
-    return f" [{found}]" if found else ""
-
-
-def joint_unit(joint: Joint, key: str) -> str | None:
-    """Of a quantity of a joint; a command has that of what its motor follows."""
-    units = SLIDING if any(not coordinate.turns for coordinate in joint.kind.coordinates) else TURNING
-    if key != "command":
-        return units.get(key)
-    followed = {Servo: "rest", VelocityMotor: "velocity", TorqueMotor: "torque"}
-    return next(units[what] for kind, what in followed.items() if isinstance(joint.motor, kind))
+    found = quantity_unit(name, world)
+    return "" if found is None else f" [{found or PURE.get(name.rpartition('.')[2], '-')}]"
 
 
 def decision_lines(problem: Problem) -> list[str]:

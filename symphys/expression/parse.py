@@ -21,11 +21,11 @@ from symphys.expression.tree import Constant, Node, Reference, apply
 from symphys.suggest import hint, quote
 
 OPERATORS: dict[type[ast.operator], Callable[..., columns.Expr]] = {
-    ast.Add: ca.plus,
-    ast.Sub: ca.minus,
-    ast.Mult: ca.times,
-    ast.Div: ca.rdivide,
-    ast.Pow: ca.power,
+    ast.Add: elementwise(ca.plus),
+    ast.Sub: elementwise(ca.minus),
+    ast.Mult: elementwise(ca.times),
+    ast.Div: elementwise(ca.rdivide),
+    ast.Pow: elementwise(ca.power),
 }
 SIGNS: dict[type[ast.unaryop], Callable[..., columns.Expr]] = {ast.UAdd: pos, ast.USub: neg}
 ALLOWED = (
@@ -118,7 +118,7 @@ class Builder:
             advice = "powers are written **" if isinstance(syntax.op, ast.BitXor) else "the operators are + - * / **"
             raise FormulaError(f"the operator in {quote(self._piece(syntax))} is not allowed; {advice}")
         sides = (self.build(syntax.left), self.build(syntax.right))
-        return apply(elementwise(operation), sides, self._piece(syntax))
+        return apply(operation, sides, self._piece(syntax))
 
     def _list(self, syntax: ast.List) -> Node:
         if not syntax.elts:

@@ -26,6 +26,7 @@ from symphys.findings.numerics import (
     smoothed_findings,
     unfelt,
 )
+from symphys.findings.obstacles import capital, obstacle_findings, obstacles
 from symphys.findings.writing import listed, percent, show
 
 FAULT, NO_SLOPE = "fault", "zero"
@@ -41,6 +42,7 @@ def findings(trust: Examination, judged: Judged) -> list[Finding]:
     lines += [refined_finding(refined, judged) for refined in trust.refined]
     lines += slope_finding(trust)
     lines += miss_findings(trust)
+    lines += obstacle_findings(trust, judged)
     lines += [growth_finding(trust.growth)] if trust.growth.factor.size else []
     lines += smoothed_findings(trust.smoothed, judged)
     numbers = ((trust.gained, gains_finding), (trust.momentum, balance_finding))
@@ -79,8 +81,9 @@ def advice(trust: Examination, judged: Judged) -> str:
     parts = (
         of_influence(trust),
         of_misses(trust),
+        *(sentence(clause) for clause in obstacles(trust, judged)),
         of_gradient(level[GRADIENT], level[GROWTH]),
-        of_growth(trust, level[GROWTH]),
+        of_growth(trust, level[GROWTH], level[GRADIENT]),
         of_grid(trust, level[GRID], judged),
         of_smoothing(level[SMOOTHING]),
         of_physics(lines, level),
@@ -117,8 +120,8 @@ def of_gradient(level: str, growth: str) -> str:
     }.get(level, "")
 
 
-def of_growth(trust: Examination, level: str) -> str:
-    """What the growth of changes advises."""
+def of_growth(trust: Examination, level: str, gradient: str) -> str:
+    """What the growth of changes advises; that a gradient reaches far is said of one that is right, not of none."""
     far = reach(trust.growth)
     if not math.isnan(far.lost):
         return f"Derivatives break off going back from the end at t = {show(far.lost)} s: begin from another guess."
@@ -129,6 +132,8 @@ def of_growth(trust: Examination, level: str) -> str:
                 f"{show(far.end, 2)} s: shorten the horizon to less than that, or use a solver that needs none."
             )
         return "The end is too sensitive for any gradient: shorten the horizon, or use a solver that needs none."
+    if level == GOOD and gradient not in (GOOD, FAIR):
+        return ""
     return {
         GOOD: "It reaches over the whole horizon, since changes hardly grow on the way.",
         FAIR: "The end is sensitive to what comes before, so small steps are to be expected.",
@@ -178,4 +183,4 @@ def of_physics(lines: Sequence[Finding], level: dict[str, str]) -> str:
 
 def sentence(clause: str) -> str:
     """A clause with a capital letter and a full stop."""
-    return clause[:1].upper() + clause[1:] + "."
+    return capital(clause) + "."

@@ -12,6 +12,8 @@ CONTACTS = "contacts"
 
 RESIDUAL_LIMITS = (1e-3, 5e-2)
 """PGS residual as a share of the largest impulse."""
+SLID = 1e-9
+"""[m] below which a surface did not slide."""
 SETTLING = 0.5
 """Twice the sweeps help where they leave less than this share of a residual."""
 DEPTH_LIMITS = (0.02, 0.1)
@@ -133,12 +135,14 @@ def resolved(trust: Examination) -> bool:
 
 
 def sliding(trust: Examination) -> str:
-    """A sentence on how far surfaces slid; empty where none did."""
-    if not trust.slides:
-        return ""
+    """A sentence on how far surfaces slid; empty where none did beyond rounding."""
     slides = [
-        f"{slide.contact} {show(slide.distance, 2)} m (up to {show(slide.speed, 2)} m/s)" for slide in trust.slides
+        f"{slide.contact} {show(slide.distance, 2)} m (up to {show(slide.speed, 2)} m/s)"
+        for slide in trust.slides
+        if slide.distance > SLID
     ]
+    if not slides:
+        return ""
     return f"Under load these surfaces slid: {listed(slides)}; the slip of impacts is not counted."
 
 

@@ -137,6 +137,25 @@ class Slide:
 
 
 @dataclass(frozen=True)
+class HeldBound:
+    """A bound that a component of a variable lies at while what is minimised would fall beyond it.
+
+    ``component`` of ``components``; ``side``: "lower" or "upper". ``bound``: nan where it is not the same at all of the
+    ``knots`` that lie there, ``of`` all. ``gain``: of the change of the component by its scale at all of these knots,
+    to first order.
+    """
+
+    variable: str
+    component: int
+    components: int
+    side: str
+    bound: float
+    knots: int
+    of: int
+    gain: float
+
+
+@dataclass(frozen=True)
 class Examination:
     """How far a solution can be trusted: the measurements of one examination.
 
@@ -162,6 +181,11 @@ class Examination:
             bodies that meet at one instant, with friction that pulls surfaces together, of all.
         slides: the contacts that slid furthest.
         misses: surfaces that hardly miss or hardly touch each other.
+        equations, unknowns: components of all targets, and components of variables that may vary; 0 equations where
+            everything is met.
+        contradicting: names of targets that cannot all be met nearby.
+        opposed: names of targets whose gradients cancel.
+        bounds: those that hold the answer back.
         fault: where the first number that is not finite comes from; empty if all are finite.
     """
 
@@ -196,6 +220,11 @@ class Examination:
     steps: float = np.nan
     slides: tuple[Slide, ...] = ()
     misses: tuple[Miss, ...] = ()
+    equations: float = np.nan
+    unknowns: float = np.nan
+    contradicting: tuple[str, ...] = ()
+    opposed: tuple[str, ...] = ()
+    bounds: tuple[HeldBound, ...] = ()
     fault: str = ""
 
     @classmethod

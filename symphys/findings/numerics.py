@@ -89,7 +89,9 @@ def refined_finding(refined: Refined, judged: Judged) -> Finding:
 
 
 def slope_finding(trust: Examination) -> list[Finding]:
-    """What refinement does to the gradient; nothing where that was not measured."""
+    """What refinement does to the gradient; nothing where that was not measured, or where nothing is felt."""
+    if trust.gradient and all(unfelt(check) for check in trust.gradient):
+        return []
     changes = [(unbroken(refined.what), refined.change) for refined in trust.refined]
     known = [(what, change) for what, change in changes if not math.isnan(change)]
     if not known:

@@ -22,6 +22,7 @@ from symphys.problem.parametric.reposition import reposition
 from symphys.problem.problem import Problem, load_problem, problem_of_tables, robot_alone
 from symphys.problem.reading.solver_options import require_solvers, validate_options
 from symphys.problem.schema.json_schema import json_schema
+from symphys.problem.schema.reference import reference_page
 
 __all__ = [
     "ALIVE",
@@ -44,6 +45,7 @@ __all__ = [
     "json_schema",
     "load_problem",
     "problem_of_tables",
+    "reference_page",
     "reposition",
     "require_solvable",
     "require_solvers",

@@ -46,6 +46,7 @@ from symphys.problem.tables.simulation import read_simulation
 from symphys.problem.tables.statics import read_statics
 from symphys.problem.tables.termination import read_termination, with_termination_cost
 from symphys.problem.tables.variables import read_variables
+from symphys.problem.units import formula_units
 
 MEMBERS = ("body", "plane", "block", "terrain")
 SHARED_NAMES = (*MEMBERS, "joint", "sensor", "controller", "variable")
@@ -198,7 +199,8 @@ def read_termination_and_objectives(
     sensed = sensor_names(parametric, start)
     termination = read_termination(document, sensed, input_sizes(parametric.world({})), faults)
     names = formula_names(parametric, start, variables) | ({} if document.ending[1] is None else {ALIVE: ca.DM(1)})
-    objectives = read_objectives(document, simulation, names, faults)
+    units = formula_units(parametric.world({}), names, variables)
+    objectives = read_objectives(document, simulation, names, units, faults)
     objectives = replace(objectives, costs=with_termination_cost(document, objectives.costs, faults))
     faults.stop_if_any()
     return termination, objectives

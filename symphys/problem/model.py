@@ -122,6 +122,7 @@ class Target:
         at: ``end`` or a time [s].
         tolerance: met where the Euclidean norm is at most this.
         weight: factor.
+        unit: of the value; empty where it has none or where it is not known.
     """
 
     name: str
@@ -129,6 +130,7 @@ class Target:
     at: str | float
     tolerance: float
     weight: float
+    unit: str = ""
 
 
 @dataclass(frozen=True)
@@ -142,6 +144,7 @@ class Constraint:
         lower, upper: (components,) or (1,), may be infinite.
         tolerance: largest violation of a component that counts as met.
         penalty: weight of squared violations for solvers that know no constraints.
+        unit: of the value; empty where it has none or where it is not known.
     """
 
     name: str
@@ -151,6 +154,7 @@ class Constraint:
     upper: Array
     tolerance: float
     penalty: float
+    unit: str = ""
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ REACHED = frozenset(
 class CheckRecord:
     """One target, constraint or goal: ``error`` and ``tolerance`` in its own unit; met where ``ratio`` <= 1.
 
-    ``kind``: "target", "constraint" or "goal". ``name``: as in the problem file.
+    ``kind``: "target", "constraint" or "goal". ``name``: as in the problem file. ``unit``: empty where it is not known.
     """
 
     kind: str
@@ -43,6 +43,7 @@ class CheckRecord:
     tolerance: float
     ratio: float
     met: bool
+    unit: str = ""
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> CheckRecord:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from functools import partial
+from typing import Protocol, runtime_checkable
 
 from symphys.results.result import Result
 from symphys.runs.execute import execute
@@ -27,6 +28,14 @@ class Observer(Protocol):
 
     def ended(self, job: Job, result: Result, skipped: bool) -> None:
         """The run is over; ``skipped``: it was so before."""
+
+
+@runtime_checkable
+class JudgingObserver(Protocol):
+    """An observer that also receives what comes after the solver."""
+
+    def judging(self, job: Job, what: str) -> None:
+        """The run's solver is done, and this part of judging what it found begins."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +93,8 @@ def one_by_one(jobs: Mapping[int, Job], transcribe: Transcribe, ledger: Ledger, 
         here = {index: jobs[index] for index in group}
         solved = solve_group(here, transcriptions, watch) if len(group) > 1 else {}
         for index, job in here.items():
-            ledger.ended(index, execute(job, watch(index), transcriptions, solved.get(index)))
+            tell = partial(ledger.judging, index)
+            ledger.ended(index, execute(job, watch(index), transcriptions, solved.get(index), tell))
 
 
 @dataclass
@@ -124,6 +134,11 @@ class Ledger:
     def advanced(self, index: int, row: TraceRow) -> None:
         """Report an iteration."""
         self.observer.advanced(self.jobs[index], row)
+
+    def judging(self, index: int, what: str) -> None:
+        """Report that a part of judging a run begins, to an observer that takes it."""
+        if isinstance(self.observer, JudgingObserver):
+            self.observer.judging(self.jobs[index], what)
 
     def ended(self, index: int, result: Result) -> None:
         """Keep a result and report it."""

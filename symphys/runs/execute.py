@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import traceback
+from collections.abc import Callable
 
 from symphys import files
 from symphys.errors import SymphysError
@@ -11,16 +12,22 @@ from symphys.results.result import Result
 from symphys.runs.folder import FolderBusy
 from symphys.runs.job import Job
 from symphys.runs.record import failure
-from symphys.runs.solving import solve
+from symphys.runs.solving import silent, solve
 from symphys.runs.transcription_cache import Transcriptions
 from symphys.solvers import Monitor, Outcome
 
 
-def execute(job: Job, monitor: Monitor, transcriptions: Transcriptions, solved: Outcome | None = None) -> Result:
+def execute(
+    job: Job,
+    monitor: Monitor,
+    transcriptions: Transcriptions,
+    solved: Outcome | None = None,
+    tell: Callable[[str], None] = silent,
+) -> Result:
     """Do the run, or go on with it, unless it is done; write its folder; return what it found.
 
     ``monitor`` sees each iteration and may raise KeyboardInterrupt, which ends the run so that it can go on later.
-    ``solved``: what its solver has found already, side by side with other seeds.
+    ``solved``: what its solver has found already, side by side with other seeds. ``tell``: see ``solving.solve``.
     A run that fails is a result with the status "failed"; only a FileError, a folder that cannot be written, is raised.
     """
     try:
@@ -28,7 +35,7 @@ def execute(job: Job, monitor: Monitor, transcriptions: Transcriptions, solved: 
             earlier = job.folder.earlier(job.config)
             if earlier and not earlier.interrupted:
                 return earlier
-            return proceed(job, monitor, transcriptions, earlier, solved)
+            return proceed(job, monitor, transcriptions, earlier, solved, tell)
     except FolderBusy as error:
         return failure(job, str(error))
 
@@ -39,6 +46,7 @@ def proceed(
     transcriptions: Transcriptions,
     earlier: Result | None,
     solved: Outcome | None = None,
+    tell: Callable[[str], None] = silent,
 ) -> Result:
     """Solve and write down what came of it; ``earlier`` is the interrupted run to go on with."""
     checkpoint = job.folder.checkpoint() if earlier else None
@@ -47,7 +55,7 @@ def proceed(
         job.folder.begin(job.config, job.problem.text)
     log = Log(job)
     try:
-        result = solve(job, transcriptions(job), monitor, log, checkpoint, earlier, solved)
+        result = solve(job, transcriptions(job), monitor, log, checkpoint, earlier, solved, tell)
     except files.FileError:
         raise
     except SymphysError as error:

@@ -68,7 +68,7 @@ def make_result(
     if verdict:
         found = {"objective": verdict.objective, "costs": dict(verdict.costs), "outputs": dict(verdict.outputs)}
         found["checks"] = tuple(
-            CheckRecord(check.kind, check.name, check.error, check.tolerance, check.ratio, check.met)
+            CheckRecord(check.kind, check.name, check.error, check.tolerance, check.ratio, check.met, check.unit)
             for check in verdict.checks
         )
     return Result(

@@ -9,11 +9,13 @@ from typing import Any
 from symphys import files
 from symphys import verification as trust
 from symphys.errors import SymphysError
+from symphys.findings.examination import Examination
+from symphys.findings.obstacles import capital, obstacles
 from symphys.results.file_names import CHECKPOINT, GUESS, SCENE, TRAJECTORY
 from symphys.results.result import Result
 from symphys.results.scene_of_problem import make_scene
 from symphys.runs.job import Job
-from symphys.runs.record import Judgement, make_result, trace_row, used
+from symphys.runs.record import Judgement, judged, make_result, trace_row, used
 from symphys.shooting import Array, ShootingProblem
 from symphys.solvers import Monitor, Outcome, Status, solver
 from symphys.transcription import Record, Transcription
@@ -22,6 +24,13 @@ SMOOTHED = (
     "what the solver's smoothed rollout meets, the exact one does not: lower the smoothing, or add a stage at 0, "
     "such as smoothing = [0.1, 0.01, 0]"
 )
+
+JUDGING = "rolling it out exactly"
+"""What announces the judging of a solution."""
+
+
+def silent(what: str) -> None:
+    """Tell nobody."""
 
 
 def solve(
@@ -32,10 +41,12 @@ def solve(
     checkpoint: dict[str, object] | None,
     earlier: Result | None,
     solved: Outcome | None = None,
+    tell: Callable[[str], None] = silent,
 ) -> Result:
     """Solve from the seed's guess, or go on from ``checkpoint`` of the ``earlier`` result; write what was found.
 
-    ``solved``: what was found already, side by side with other seeds; its seconds are those of the group.
+    ``solved``: what was found already, side by side with other seeds; its seconds are those of the group. ``tell``: is
+    called with a few words before each part of judging what was found.
     """
     shooting = transcription.shooting
     log(f"evaluated by {transcription.backend}")
@@ -47,7 +58,7 @@ def solve(
         log("solved side by side with other seeds: the seconds are those of all")
         outcome, spent = solved, solved.trace[-1].seconds if solved.trace else 0.0
     spent += (earlier.seconds if earlier else {}).get("solve", 0.0)
-    judgement = judge(transcription, outcome, job.examine)
+    judgement = judge(transcription, outcome, job.examine, tell)
     price = transcription.prices(used(outcome.counts))
     write(job, transcription, outcome, judgement, price)
     seconds = {"build": transcription.build_seconds, "compile": transcription.backend.seconds, "solve": spent}
@@ -72,22 +83,33 @@ def alone(
     return outcome, time.perf_counter() - began
 
 
-def judge(transcription: Transcription, outcome: Outcome, examine: bool = True) -> Judgement:
-    """Roll the solution out exactly, and examine it."""
+def judge(
+    transcription: Transcription, outcome: Outcome, examine: bool = True, tell: Callable[[str], None] = silent
+) -> Judgement:
+    """Roll the solution out exactly, and examine it; ``tell`` as in ``solve``."""
+    tell(JUDGING)
     try:
         verdict = transcription.judge(outcome.z)
         taken = transcription.record(outcome.z)
         over = outcome.status is not Status.INTERRUPTED
-        examined = measured(transcription, taken, examine) if over else None
+        examined = measured(transcription, taken, examine, tell) if over else None
     except SymphysError as error:
         return Judgement(None, None, None, f"{outcome.advice} {error}".strip())
     smoothed = outcome.status is Status.MET and not verdict.solved and outcome.trace[-1].smoothing > 0
-    return Judgement(verdict, taken.motion, examined, outcome.advice or (SMOOTHED if smoothed else ""))
+    well = verdict.solved and outcome.status in (Status.MET, Status.CONVERGED)
+    found = () if well else obstacles(Examination.from_json(files.strict(examined or {})), judged(verdict))
+    return Judgement(verdict, taken.motion, examined, told([*found, outcome.advice or SMOOTHED * smoothed]))
 
 
-def measured(transcription: Transcription, taken: Record, examine: bool) -> dict[str, Any]:
+def told(clauses: list[str]) -> str:
+    """Clauses as sentences, empty ones left out; the first begins as it is written, and the last has no full stop."""
+    known = [clause for clause in clauses if clause]
+    return ". ".join([*known[:1], *map(capital, known[1:])])
+
+
+def measured(transcription: Transcription, taken: Record, examine: bool, tell: Callable[[str], None]) -> dict[str, Any]:
     """The object "trust" of the result."""
-    return trust.examine(transcription, taken.z) if examine else trust.survey(transcription, taken)
+    return trust.examine(transcription, taken.z, tell) if examine else trust.survey(transcription, taken)
 
 
 def write(

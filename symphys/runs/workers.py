@@ -28,8 +28,8 @@ TICK = 0.1
 CRASHED = "the process of this run died: killed from outside, out of memory, or a crash in compiled code"
 
 
-Message = tuple[int, TraceRow | None]
-"""From a worker: the index of a job; its newest iteration, or None: it begins."""
+Message = tuple[int, TraceRow | str | None]
+"""From a worker: the index of a job; its newest iteration, a part of judging it that begins, or None: it begins."""
 
 
 class Listener(Protocol):
@@ -40,6 +40,9 @@ class Listener(Protocol):
 
     def advanced(self, index: int, row: TraceRow) -> None:
         """The run has come to this iteration."""
+
+    def judging(self, index: int, what: str) -> None:
+        """This part of judging the run begins."""
 
     def ended(self, index: int, result: Result) -> None:
         """The run is over."""
@@ -130,9 +133,11 @@ class WorkerPool:
     def hear(self, messages: SimpleQueue[Message]) -> None:
         """Read the messages that are there."""
         while not messages.empty():
-            index, row = messages.get()
-            if row is not None:
-                self.listener.advanced(index, row)
+            index, news = messages.get()
+            if isinstance(news, str):
+                self.listener.judging(index, news)
+            elif news is not None:
+                self.listener.advanced(index, news)
             elif index not in self.begun:
                 self.begun.add(index)
                 self.listener.started(index)
@@ -166,7 +171,12 @@ class Worker:
     def work(self, index: int, job: Job) -> Result:
         """Do one job."""
         self.messages.put((index, None))
-        return execute(job, lambda row: self.watch(index, row), self.transcriptions)
+        return execute(
+            job,
+            lambda row: self.watch(index, row),
+            self.transcriptions,
+            tell=lambda what: self.messages.put((index, what)),
+        )
 
     def watch(self, index: int, row: TraceRow) -> None:
         """Report to the parent now and then; stop the solver when asked to."""

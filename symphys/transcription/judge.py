@@ -24,6 +24,7 @@ class Criterion:
         error: norm of a target's value, largest violation of a constraint, the objective for a goal.
         tolerance: largest error that counts as met.
         ratio: 1 at the tolerance, smaller is better.
+        unit: of error and tolerance; empty where it is not known.
     """
 
     kind: str
@@ -31,6 +32,7 @@ class Criterion:
     error: float
     tolerance: float
     ratio: float
+    unit: str = ""
 
     @property
     def met(self) -> bool:
@@ -62,10 +64,10 @@ class Assessment:
 def assessment(problem: Problem, objective: float, costs: Array, errors: Array, outputs: Array) -> Assessment:
     """The verdict from the numbers of the exact rollout; the arrays as in ``Terms``."""
     checks = []
-    held = [("target", t.name, t.tolerance) for t in problem.targets]
-    held += [("constraint", c.name, c.tolerance) for c in problem.constraints]
-    for (kind, name, tolerance), ratio in zip(held, errors, strict=False):
-        checks.append(Criterion(kind, name, float(ratio) * tolerance, tolerance, float(ratio)))
+    held = [("target", t.name, t.tolerance, t.unit) for t in problem.targets]
+    held += [("constraint", c.name, c.tolerance, c.unit) for c in problem.constraints]
+    for (kind, name, tolerance, unit), ratio in zip(held, errors, strict=False):
+        checks.append(Criterion(kind, name, float(ratio) * tolerance, tolerance, float(ratio), unit))
     if problem.goal is not None:
         checks.append(
             Criterion("goal", "objective", objective, problem.goal, float(goal_error(objective, problem.goal)))

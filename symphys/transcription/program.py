@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 import casadi as ca
@@ -21,6 +23,7 @@ from symphys.transcription.rollout import Rollout
 
 Expr = Any
 """casadi MX"""
+NOTHING: Mapping[str, Formula] = MappingProxyType({})
 
 
 class ProgramSamples:
@@ -64,14 +67,18 @@ class ProgramSamples:
         before = self._series(formula, 0)
         return ca.horzcat(before, self.after_steps(formula)) if self.rollout.moves(formula) else before
 
-    def _series(self, formula: Formula, shift: int) -> Expr:
+    def recorded(self, formula: Formula, shift: int = 1) -> Place:
+        """The formula's values of all steps, one after the other: at their starts (0) or at their ends (1)."""
         function = self.rollout.compiled(formula)
         size = int(function.size1_out(0))
         out = self.layout.series(size, self.steps)
         places = (self.x.later(shift), self.u, self.p, self.time.later(shift), self.z)
         self.calls.append(FunctionCall(dense(function), places, (out,)))
-        whole = self.symbol(Place(out.offset, size * self.steps))
-        return ca.reshape(whole, size, self.steps)
+        return Place(out.offset, size * self.steps)
+
+    def _series(self, formula: Formula, shift: int) -> Expr:
+        whole = self.recorded(formula, shift)
+        return ca.reshape(self.symbol(whole), whole.size // self.steps, self.steps)
 
 
 def dense(function: ca.Function) -> ca.Function:
@@ -81,18 +88,23 @@ def dense(function: ca.Function) -> ca.Function:
     return ca.Function(function.name(), arguments, results)
 
 
-def rollout_program(rollout: Rollout, exact: bool = False) -> Program:
+def rollout_program(rollout: Rollout, exact: bool = False, recorded: Mapping[str, Formula] = NOTHING) -> Program:
     """A program of z and smoothing, with all that is asked of a rollout: see ``_epilogue``; and ``alive``.
 
-    ``exact`` is for smoothing 0 only, whatever is given: it has less to compute.
+    Args:
+        rollout: of a problem.
+        exact: for smoothing 0 only, whatever is given: it has less to compute.
+        recorded: further outputs by name: what formulas are at the end of every step, one after the other.
     """
     samples = ProgramSamples(rollout)
     asked = terms(samples)
+    series = {name: samples.recorded(formula) for name, formula in recorded.items()}
     body = [*control_calls(rollout, samples), *step_calls(samples, exact)]
     epilogue, outputs = _epilogue(samples, asked)
     alive = _alive(samples)
     if alive is not None:
         outputs["alive"] = alive.later(rollout.steps).still()
+    outputs |= series
     times = tuple(np.arange(rollout.steps + 1) * rollout.dt)
     return Program(
         size=samples.layout.size,

@@ -12,12 +12,28 @@ from symphys.transcription import Record, Transcription, first_non_finite, first
 from symphys.verification import gradient, refinement, smoothing
 from symphys.verification.balance import balance
 from symphys.verification.contacts import contacts, slides
+from symphys.verification.held_bounds import held_bounds
 from symphys.verification.near_misses import near_misses
 from symphys.verification.sensitivity_growth import sensitivity_growth
+from symphys.verification.target_conflicts import target_conflicts
 from symphys.verification.tunnelling import tunnelling
 
 Array = NDArray[np.float64]
 Tell = Callable[[str], None]
+
+SIMULATING = "simulating"
+COMPARING = "comparing the gradient with differences"
+SWEEPING = "sweeping the sensitivity back through time"
+NEAR = "looking for near misses"
+CONFLICTS = "looking for targets and bounds that stand in the way"
+SMOOTHING = "smoothing, and adding up energy and momentum"
+PARTS = {
+    **{SIMULATING: 5.0, COMPARING: 20.0},
+    **dict.fromkeys(refinement.TOLD.values(), 18.0),
+    **{SWEEPING: 4.0, NEAR: 2.0, CONFLICTS: 3.0, SMOOTHING: 4.0},
+}
+"""The parts of an examination that take time, in their order, and about how much of it each takes; measured with the
+shipped problems, beside some 8 for building the problem."""
 
 
 @np.errstate(invalid="ignore", over="ignore")  # numbers that are not finite are reported as such
@@ -30,17 +46,18 @@ def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: No
     Raises:
         NotFinite: there is no such motion; says where it ends and why.
     """
-    tell("simulating")
+    tell(SIMULATING)
     record = transcription.record(z)
-    tell("comparing the gradient with differences")
+    tell(COMPARING)
     compared = gradient.compare_gradient(transcription, z)
-    tell("refining the time step and the sweeps")
-    finer = refinement.refine(transcription, z)
-    tell("sweeping the sensitivity back through time")
+    finer = refinement.refine(transcription, z, tell)
+    tell(SWEEPING)
     grown = sensitivity_growth(transcription, record)
-    tell("looking for near misses")
+    tell(NEAR)
     near = near_misses(transcription, record)
-    tell("smoothing, and adding up energy and momentum")
+    tell(CONFLICTS)
+    standing = {**target_conflicts(transcription, record), "bounds": held_bounds(transcription, z)}
+    tell(SMOOTHING)
     motion = survey(transcription, record)
     return {
         "gradient": compared,
@@ -50,6 +67,7 @@ def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: No
         **motion,
         **refinement.settling(transcription, z, motion["residual"], motion["impulse"]),
         "misses": near,
+        **standing,
         "slides": slides(transcription.rollout, record),
         "fault": _fault(transcription, record, compared),
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symphys.problem import Problem
 from symphys.shooting import VariableBlock
 from symphys.trajectory import NotFinite
 from symphys.transcription import Transcription, transcribe
@@ -18,14 +17,16 @@ from symphys.transcription import Transcription, transcribe
 Array = NDArray[np.float64]
 
 FINER_DT, FINEST_DT, MORE_SWEEPS = "dt / 2", "dt / 4", "sweeps x 2"
+TOLD = {what: f"simulating with {what}" for what in (FINER_DT, FINEST_DT, MORE_SWEEPS)}
+"""What announces each refinement, in their order."""
 SETTLED = 1e-3
 """Residuals below this share of the largest impulse are not looked into."""
 ROUNDING = 1e-9
 """Relative changes below this say nothing about the order of convergence."""
 
 
-def refine(transcription: Transcription, z: Array) -> dict[str, Any]:
-    """How ``z`` does in finer discretisations.
+def refine(transcription: Transcription, z: Array, tell: Callable[[str], None] = lambda what: None) -> dict[str, Any]:
+    """How ``z`` does in finer discretisations; ``tell`` is called with the words of each before it is simulated.
 
     Returns:
         "refined": for dt / 2, dt / 4 and twice the sweeps the "objective", the "worst" error / tolerance, and
@@ -36,7 +37,9 @@ def refine(transcription: Transcription, z: Array) -> dict[str, Any]:
     slopes = [transcription.probe.gradient(z)]
     objectives = [transcription.judge(z).objective]
     rows = []
-    for what, finer in finer_problems(transcription):
+    for what in TOLD:
+        tell(TOLD[what])
+        finer = finer_problem(transcription, what)
         verdict, slope = finer.judge(z), finer.probe.gradient(z)
         changes = {block.name: change(block, slopes[0], slope) for block in transcription.shooting.blocks}
         rows.append({"what": what, "objective": verdict.objective, "worst": verdict.worst, "gradient": changes})
@@ -52,7 +55,7 @@ def settling(transcription: Transcription, z: Array, residual: float, impulse: f
     """
     if not residual > SETTLED * impulse:
         return {}
-    finer = dict(finer_problems(transcription))[MORE_SWEEPS]
+    finer = finer_problem(transcription, MORE_SWEEPS)
     try:
         return {"residual_finer": float(finer.record(z).motion.residual.max(initial=0.0))}
     except NotFinite:
@@ -76,16 +79,14 @@ def order(values: Sequence[ArrayLike]) -> float | None:
     return float(np.log2(first / second))
 
 
-@lru_cache(maxsize=1)
-def finer_problems(transcription: Transcription) -> list[tuple[str, Transcription]]:
-    """Made once for all runs of a problem."""
-    return [(what, transcribe(problem, backend="casadi")) for what, problem in _variants(transcription.problem)]
-
-
-def _variants(problem: Problem) -> list[tuple[str, Problem]]:
+@lru_cache(maxsize=len(TOLD))
+def finer_problem(transcription: Transcription, what: str) -> Transcription:
+    """Refined so; made once for all runs of a problem."""
+    problem = transcription.problem
     simulation = problem.simulation
-    return [
-        (FINER_DT, replace(problem, simulation=replace(simulation, dt=simulation.dt / 2))),
-        (FINEST_DT, replace(problem, simulation=replace(simulation, dt=simulation.dt / 4))),
-        (MORE_SWEEPS, replace(problem, simulation=replace(simulation, sweeps=2 * simulation.sweeps))),
-    ]
+    finer = {
+        FINER_DT: replace(simulation, dt=simulation.dt / 2),
+        FINEST_DT: replace(simulation, dt=simulation.dt / 4),
+        MORE_SWEEPS: replace(simulation, sweeps=2 * simulation.sweeps),
+    }
+    return transcribe(replace(problem, simulation=finer[what]), backend="casadi")

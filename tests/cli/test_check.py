@@ -15,6 +15,15 @@ def test_check_describes_the_file_and_compares_gradients(run: Run, throw: Path) 
     assert code == 0
     for words in ("A short throw", "10 steps", "sets ball.velocity", "is at half a metre", "agrees"):
         assert words in out
+    assert "is at half a metre: ball.position[0:2] - [0.5, 0] (end, in m)" in out
+
+
+def test_check_calls_no_gradient_right_that_nothing_depends_on(run: Run, throw: Path) -> None:
+    text = throw.read_text(encoding="utf-8")
+    throw.write_text(text.replace("ball.position[0:2] - [0.5, 0]", "ball.position[2] - 3"), encoding="utf-8")
+    words = " ".join(run("check", throw)[1].split())
+    assert words.count("The gradient of throw is zero or next to it") == 2
+    assert "gradient is right" not in words and "reaches" not in words
 
 
 def test_check_tells_of_falls_and_scenarios(run: Run, throw: Path) -> None:

@@ -54,6 +54,16 @@ def test_one_unsolved_run_exits_1_and_the_others_are_done(run: Run, throw: Path,
     assert not read_result(Path("o/unreachable/least_squares-seed0/result.json")).solved
 
 
+def test_what_an_unsolved_run_misses_has_a_unit_and_the_bound_that_holds_it_back_is_named(
+    run: Run, unreachable: Path
+) -> None:
+    _, out, _ = run("solve", unreachable, "--solver", "least_squares", "--seeds", 2, "--backend", "casadi")
+    assert 'missed: "is at half a metre" by 0.2 m (tolerance 0.01 m)' in out
+    bound = "the upper bound 1.5 of throw[0]"
+    assert f"unreachable least_squares: {bound} holds the answer back, which would improve beyond. A stat" in out
+    assert f"unreachable least_squares: 2 of 2 seeds end at {bound}" in out
+
+
 def test_what_is_met_by_a_motion_that_cannot_be_exits_1_with_its_reasons(run: Run, throw: Path) -> None:
     """The ball may begin anywhere, and begins in the ground; with and without an examination."""
     text = throw.read_text(encoding="utf-8").replace("ball.velocity[0:2]", "ball.position[2]")
@@ -212,6 +222,11 @@ def test_schema_is_json_and_knows_the_solvers(run: Run) -> None:
     code, named, _ = run("schema", "--out", "s.json")
     assert code == 0 and named == "s.json\n"
     assert json.loads(Path("s.json").read_text(encoding="utf-8")) == json.loads(out)
+
+
+def test_schema_as_a_page(run: Run) -> None:
+    code, out, _ = run("schema", "--markdown")
+    assert code == 0 and out.startswith("# Reference of problem files\n") and "## `[solver.gradient]`" in out
 
 
 def test_version_and_help(run: Run) -> None:

@@ -19,7 +19,7 @@ from symphys.cli.summary import advice, fitting_table, missed, table
 from symphys.cli.wording import brief, duration, many_pairs, number, whole
 from symphys.results.result import CheckRecord
 from symphys.runs import Result
-from symphys.solvers import TraceRow
+from symphys.solvers import CmaOptions, TraceRow
 
 NAN = float("nan")
 
@@ -38,6 +38,13 @@ class Job:
 
     class folder:
         path = "out/throw/cma-seed0"
+
+    options = CmaOptions(evaluations=8)
+    examine = False
+
+    class problem:
+        class simulation:
+            smoothing = (0.0,)
 
 
 @given(st.recursive(st.booleans() | st.integers(-(2**60), 2**60) | st.floats(allow_nan=False), st.lists, max_leaves=5))
@@ -169,6 +176,8 @@ def test_what_is_missed_is_named_the_worst_first() -> None:
         "(tolerance 0.1) and 1 more"
     )
     assert missed(result(checks=tuple(checks[:1]))) == ""
+    metres = CheckRecord("target", "there", 0.7, 0.1, 7.0, False, "m")
+    assert missed(result(solved=False, checks=(metres,))) == 'missed: "there" by 0.7 m (tolerance 0.1 m)'
 
 
 def test_the_time_of_a_command_is_told_by_its_parts() -> None:

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from symphys.findings.advice import advice, findings, slopes
-from symphys.findings.contacts import IN_TIME, impact_findings, miss_findings, residual_finding
+from symphys.findings.contacts import IN_TIME, impact_findings, miss_findings, residual_finding, sliding
 from symphys.findings.energy import balance_finding
-from symphys.findings.examination import Energy, Examination, GradientCheck, Growth, Miss, Refined, Smoothed
+from symphys.findings.examination import Energy, Examination, GradientCheck, Growth, Miss, Refined, Slide, Smoothed
 from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Judged
 from symphys.findings.numerics import smoothed_findings
 
@@ -43,6 +43,12 @@ def test_a_variable_without_influence_is_named_first_and_its_gradient_not_called
     both = Examination(gradient=(*none.gradient, GradientCheck("kick", 0.0, 1.0, felt=1.0)))
     assert advice(both, NO_CHECKS).startswith("The gradient of push is zero")
     assert "The gradient is right" in advice(both, NO_CHECKS)
+
+
+def test_only_what_slid_beyond_rounding_is_said_to_have_slid() -> None:
+    slide = Slide("sled-ground", 0.5, 1.0, 0.1)
+    assert "sled-ground 0.5 m (up to 1 m/s)" in sliding(Examination(slides=(slide,)))
+    assert sliding(Examination(slides=(replace(slide, distance=1e-18),))) == ""
 
 
 def test_no_method_is_advised_that_there_is_not() -> None:

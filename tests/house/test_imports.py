@@ -18,6 +18,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "version": ("", "", "the version of the package"),
     "errors": ("", "", "errors that a user may meet"),
     "suggest": ("", "", "hints for error messages"),
+    "verbs": ("", "", "rooms that can be called"),
     "threads": ("", "", "one thread for linear algebra"),
     "files": ("errors", "numpy", "files appear at once and whole, or not at all"),
     "json_values": ("", "numpy", "tolerant readings of JSON"),
@@ -35,7 +36,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     ),
     "codegen": ("errors shooting", "casadi cuda cupy numpy", "programs compiled to SIMD C and CUDA"),
     "transcription": (
-        "codegen dynamics errors expression maths model problem shooting trajectory",
+        "codegen dynamics errors expression maths model problem shooting suggest trajectory",
         "casadi numpy scipy",
         "problem to shooting problem",
     ),
@@ -45,7 +46,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "how far a solution can be trusted, as numbers",
     ),
     "export": (
-        "codegen dynamics errors files maths model problem transcription",
+        "codegen dynamics errors files maths model problem transcription verbs version",
         "casadi numpy",
         "other programs' files",
     ),
@@ -63,18 +64,22 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "solve, judge, examine, write",
     ),
     "report": (
-        "files findings results trajectory",
+        "files findings results trajectory verbs",
         "matplotlib numpy",
         "pages and figures, made from run folders alone",
     ),
-    "doctor": ("codegen", "casadi numpy", "what there is on this machine"),
+    "doctor": ("codegen verbs", "casadi numpy", "what there is on this machine"),
     "api": (
-        "errors findings problem problems report results runs shooting solvers suggest trajectory transcription",
-        "casadi matplotlib numpy",
+        "codegen errors files findings problem problems report results runs shooting solvers suggest trajectory "
+        "transcription verification",
+        "matplotlib numpy",
         "what Python calls",
     ),
+    "torch": ("api transcription", "numpy torch", "rollouts and steps for PyTorch"),
+    "jax": ("api errors transcription", "jax numpy", "rollouts and steps for JAX"),
+    "env": ("api errors", "gymnasium numpy", "environments for Gymnasium"),
     "cli": (
-        "codegen doctor errors export files findings problem problems report results runs solvers suggest threads "
+        "codegen doctor errors export files findings problem problems report runs solvers suggest threads "
         "trajectory transcription verification version",
         "click numpy rich",
         "the commands",

@@ -99,7 +99,8 @@ def test_page_needs_nothing_else(shown: Shown) -> None:
     text = shown.text
     page = Page(text)
     assert page.references
-    assert [r for r in page.references if not r.startswith(("data:image/svg+xml;base64,", "#"))] == []
+    links = [r for r in page.references if not r.startswith(("data:image/svg+xml;base64,", "#"))]
+    assert all(re.fullmatch(r"figures/\w+\.(svg|csv)", link) for link in links)
     assert not {"link", "iframe", "object", "embed", "base"} & set(page.tags)
     assert "http://" not in text
     assert "https://" not in text
@@ -109,8 +110,13 @@ def test_page_needs_nothing_else(shown: Shown) -> None:
 
 def test_figures_are_files_too(shown: Shown) -> None:
     figures = list((shown.folder / "figures").iterdir())
-    assert {path.name for path in figures} == {"motion.svg", "states.svg", "contacts.svg", "convergence.svg"}
-    assert all(path.read_text(encoding="utf-8").lstrip().startswith("<?xml") for path in figures)
+    drawn = [path for path in figures if path.suffix == ".svg"]
+    assert (
+        {path.stem for path in drawn}
+        == {path.stem for path in figures}
+        == {*["motion", "states", "contacts", "convergence"]}
+    )
+    assert all(path.read_text(encoding="utf-8").lstrip().startswith("<?xml") for path in drawn)
 
 
 def test_knots_and_controls_are_drawn(batch: Path) -> None:
@@ -171,7 +177,7 @@ def test_text_from_files_is_escaped(run_dir: Path, edit: Callable[..., None]) ->
     assert "<script>alert" not in text
     assert Page(text).tags.count("script") == 2
     assert "onerror" not in re.sub(r"&lt;.*?&gt;", "", text)
-    assert all("<script" not in path.read_text(encoding="utf-8") for path in (run_dir / "figures").iterdir())
+    assert all("<script" not in path.read_text(encoding="utf-8") for path in (run_dir / "figures").glob("*.svg"))
 
 
 @pytest.mark.parametrize("text", ["$\\frac{$", "球 \N{ROCKET}", "\x00\x1b\ud800", "a" * 5000, ""])

@@ -126,12 +126,16 @@ class Recorder:
 
     def __init__(self) -> None:
         self.events: list[tuple[str, str]] = []
+        self.parts: list[tuple[str, str]] = []
 
     def started(self, job: Job, resumed: bool) -> None:
         self.events.append(("resumed" if resumed else "started", job.name))
 
     def advanced(self, job: Job, row: TraceRow) -> None:
         self.events.append(("advanced", job.name))
+
+    def judging(self, job: Job, what: str) -> None:
+        self.parts.append((job.name, what))
 
     def ended(self, job: Job, result: Any, skipped: bool) -> None:
         self.events.append(("skipped" if skipped else result.status, job.name))

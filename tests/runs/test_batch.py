@@ -17,8 +17,10 @@ import pytest
 
 from symphys.problem import Problem, load_problem
 from symphys.runs import Job, make_jobs, run_batch
+from symphys.runs.solving import JUDGING
 from symphys.solvers import SOLVERS, TraceRow
 from symphys.transcription import transcribe
+from symphys.verification.examination import PARTS
 
 MakeJob = Callable[..., Job]
 
@@ -41,6 +43,14 @@ def test_results_come_in_the_order_of_the_jobs(make_job: MakeJob, recorder: Any)
     again = run_batch(jobs, 1, recorder, transcribe)
     assert again.results == batch.results
     assert [event for event, _ in recorder.events[-3:]] == ["skipped"] * 3
+
+
+def test_the_judging_of_a_run_is_announced_by_its_parts(make_job: MakeJob, recorder: Any) -> None:
+    """All of those that an examination is known to have, in their order; a run that was done is not judged again."""
+    job = make_job(0, examine=True)
+    for _ in range(2):
+        run_batch([job], 1, recorder, transcribe)
+    assert recorder.parts == [(job.name, what) for what in (JUDGING, *PARTS)]
 
 
 def test_a_failing_run_stops_no_other(make_job: MakeJob, recorder: Any) -> None:

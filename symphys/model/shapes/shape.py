@@ -31,7 +31,7 @@ class SizeKey:
     """
 
     name: str
-    description: str = "[m]"
+    description: str = "of the round surface [m]"
     count: int = 1
     reason: str = ""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
 from inspect import cleandoc
@@ -9,6 +10,7 @@ from math import isnan
 from typing import Any, TypeVar, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
+from pydantic import Field as KeyInfo
 from pydantic_core import to_json
 
 from symphys.errors import Issue, ProblemError, SymphysError
@@ -89,14 +91,35 @@ def require_solvers(tables: Iterable[str], asked: Iterable[str], known: Iterable
 def options_model(cls: type[Any]) -> type[BaseModel]:
     """The pydantic model of a dataclass: the same keys, kinds and defaults, strict and without others."""
     kinds = get_type_hints(cls, include_extras=True)
-    entries: dict[str, Any] = {field.name: (kinds[field.name], default(field)) for field in fields(cls) if field.init}
+    meanings = option_descriptions(cls)
+    entries: dict[str, Any] = {
+        field.name: (kinds[field.name], KeyInfo(default(field), description=meanings.get(field.name)))
+        for field in fields(cls)
+        if field.init
+    }
 
     def add_old_names(schema: dict[str, Any]) -> None:
         for old, name in old_names(cls).items():
-            schema["properties"][old] = {**schema["properties"][name], "deprecated": True}
+            schema["properties"][old] = {
+                **schema["properties"][name],
+                "description": f"old name of {name}",
+                "deprecated": True,
+            }
 
     config = ConfigDict(extra="forbid", strict=True, json_schema_extra=add_old_names)
     return create_model(cls.__name__, __config__=config, __doc__=documentation(cls), **entries)
+
+
+def option_descriptions(cls: type[Any]) -> dict[str, str]:
+    """What each option means, from the ``Attributes:`` of the docstrings; those of the class itself count first."""
+    found: dict[str, str] = {}
+    for each in (each for each in cls.__mro__ if is_dataclass(each)):
+        _, _, listed = cleandoc(each.__doc__ or "").partition("Attributes:\n")
+        attributes, _, _ = listed.partition("\n\n")
+        for entry in re.split(r"\n(?=    \w)", f"\n{attributes}")[1:]:
+            name, _, meaning = entry.strip().partition(": ")
+            found.setdefault(name, " ".join(meaning.split()))
+    return found
 
 
 def documentation(cls: type[Any]) -> str:

@@ -33,13 +33,15 @@ class LinearTable(SchemaTable):
 class PeriodicTable(SchemaTable):
     """Sines of one frequency and its multiples, about offsets."""
 
-    frequency: Finite = Field(description="[Hz]")
-    harmonics: Annotated[int, Field(ge=1, le=100)] = 1
+    frequency: Finite = Field(description="of the first harmonic [Hz]")
+    harmonics: Annotated[int, Field(ge=1, le=100)] = Field(
+        default=1, description="number of sines: of the frequency, twice the frequency, and so on"
+    )
     offsets: Numbers | None = Field(default=None, description="a number for each output; default 0")
     sines: Numbers | None = Field(
         default=None, description="a number for each output, or a list of them for each harmonic; default 0"
     )
-    cosines: Numbers | None = Field(default=None, description="likewise")
+    cosines: Numbers | None = Field(default=None, description="likewise; default 0")
 
 
 class NetTable(SchemaTable):
@@ -48,7 +50,7 @@ class NetTable(SchemaTable):
     hidden: list[Width] = Field(default=[], description="the width of each hidden layer; none: one layer")
     activation: Activation = Field(default="tanh", description="of hidden layers")
     output: Activation = Field(default="linear", description='of the last layer; with "tanh" outputs are bounded')
-    biases: bool = True
+    biases: bool = Field(default=True, description="whether every layer adds a bias to each of its outputs")
     skip: bool = Field(default=False, description="adds a matrix from the inputs straight to the outputs")
     weights: str | None = Field(
         default=None, description="a .npy file with all of them, beside this file; default: random"

@@ -42,7 +42,7 @@ class UniversalTable(SchemaTable):
 class ServoTable(SchemaTable):
     """A motor whose command is an angle, or a position: the target velocity is gain (command - angle)."""
 
-    gain: Positive = Field(description="[1/s]")
+    gain: Positive = Field(description="target velocity per difference of angle or position [1/s]")
     torque: Positive = Field(description="the most that it gives [N m], or [N] where the joint slides")
     velocity: Positive = Field(description="the fastest that it aims at [rad/s], or [m/s]")
     range: Positive | None = Field(
@@ -74,8 +74,8 @@ class MotorTable(SchemaTable):
 class SpringTable(SchemaTable):
     """Along every coordinate: torque = -stiffness (angle - rest) - damping rate."""
 
-    stiffness: NonNegative = Field(default=0.0, description="[N m/rad], or [N/m]")
-    damping: NonNegative = Field(default=0.0, description="[N m s/rad], or [N s/m]")
+    stiffness: NonNegative = Field(default=0.0, description="torque per angle [N m/rad], or force per length [N/m]")
+    damping: NonNegative = Field(default=0.0, description="torque per rate [N m s/rad], or force per velocity [N s/m]")
     rest: Finite = Field(default=0.0, description="where it gives nothing [rad], or [m]")
 
 

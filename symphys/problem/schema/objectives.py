@@ -22,6 +22,7 @@ from symphys.problem.schema.types import (
     Texts,
 )
 
+UNIT = 'of the value, such as "m/s", for messages; default: that of its formula, where it is clear'
 Knots = Annotated[int, Field(ge=1, le=1_000_000)]
 
 
@@ -36,8 +37,10 @@ class VariableTable(SchemaTable):
     guess: Numbers | None = Field(
         default=None, description="where solvers start; default: what the file says (forces and commands: 0)"
     )
-    lower: Bounds | None = Field(default=None, description="default: none, or what is physical")
-    upper: Bounds | None = Field(default=None, description="default: none, or what is physical")
+    lower: Bounds | None = Field(
+        default=None, description="for all components, or one for each; default: none, or what is physical"
+    )
+    upper: Bounds | None = Field(default=None, description="likewise; default: none, or what is physical")
     scale: Numbers | None = Field(
         default=None, description="a typical change; default 1, for parameters their own size"
     )
@@ -54,42 +57,44 @@ class VariableTable(SchemaTable):
 class CostTable(SchemaTable):
     """A term of the objective: a number to make small, or a vector whose squares are summed."""
 
-    name: Label
+    name: Label = Field(description="how results and reports refer to it")
     at: Moment = Field(default="end", description='"end", "always" (integral over time) or a time [s]')
     value: str | None = Field(default=None, description="formula of a number")
     squares: str | None = Field(default=None, description="formula of a vector; the cost is the sum of its squares")
-    weight: Finite = Field(default=1.0, description="negative makes a value large")
+    weight: Finite = Field(default=1.0, description="factor of the term; a negative one makes the value large")
 
 
 class TargetTable(SchemaTable):
     """A vector that should be zero within a tolerance; the objective gets weight * |value|^2."""
 
-    name: Label
+    name: Label = Field(description="how results and reports refer to it")
     at: Instant = Field(default="end", description='"end" or a time [s]')
     value: str = Field(description="formula of what should be zero")
+    unit: Label | None = Field(default=None, description=UNIT)
     tolerance: Positive = Field(description="met where the Euclidean norm of the value is at most this")
-    weight: NonNegative = 1.0
+    weight: NonNegative = Field(default=1.0, description="factor of the squared norm of the value in the objective")
 
 
 class ConstraintTable(SchemaTable):
     """Bounds on every component of a vector."""
 
-    name: Label
+    name: Label = Field(description="how results and reports refer to it")
     at: Moment = Field(default="end", description='"end", "always" (every time step) or a time [s]')
     value: str = Field(description="formula of what is bounded")
-    lower: Bounds | None = None
-    upper: Bounds | None = None
+    lower: Bounds | None = Field(default=None, description="for all components, or one for each; default: none")
+    upper: Bounds | None = Field(default=None, description="likewise; default: none")
     equals: Numbers | None = Field(default=None, description="instead of lower and upper")
     tolerance: Positive = Field(default=1e-3, description="largest violation of a component that counts as met")
     penalty: Positive = Field(
         default=1e3, description="weight of squared violations for solvers that know no constraints"
     )
+    unit: Label | None = Field(default=None, description=UNIT)
 
 
 class OutputTable(SchemaTable):
     """A number that is reported: while solvers work, in results and in reports. Nothing depends on it."""
 
-    name: Label
+    name: Label = Field(description="how results and reports refer to it")
     at: Instant = Field(default="end", description='"end" or a time [s]')
     value: str = Field(description="formula of a number")
     unit: Label | None = Field(default=None, description='such as "m/s"')

@@ -76,7 +76,9 @@ class SimulationTable(SchemaTable):
 class WorldTable(SchemaTable):
     """What acts everywhere."""
 
-    gravity: Vector = Field(default=list(GRAVITY), description="[m/s^2], for instance [0, 0, -9.81]")
+    gravity: Vector = Field(
+        default=list(GRAVITY), description="acceleration of free bodies [m/s^2], for instance [0, 0, -9.81]"
+    )
 
 
 class SurfaceTable(SchemaTable):
@@ -112,7 +114,7 @@ class BodyTable(MemberTable):
 
     name: Identifier = Field(description="how formulas refer to it")
     shape: ShapeTable | None = Field(default=None, description="its surface; without one it touches nothing")
-    mass: Positive | None = Field(default=None, description="[kg]")
+    mass: Positive | None = Field(default=None, description="of the whole body [kg]; needed unless density is given")
     density: Positive | None = Field(default=None, description="[kg/m^3], instead of mass, for solid shapes")
     inertia: Inertia | None = Field(
         default=None,
@@ -120,8 +122,8 @@ class BodyTable(MemberTable):
     )
     position: Vector = Field(default=[0.0, 0.0, 0.0], description="of the centre of mass [m]")
     orientation: Orientation = Field(default=[1.0, 0.0, 0.0, 0.0], description=UPRIGHT)
-    velocity: Vector = Field(default=[0.0, 0.0, 0.0], description="[m/s]")
-    angular_velocity: Vector = Field(default=[0.0, 0.0, 0.0], description="[rad/s]")
+    velocity: Vector = Field(default=[0.0, 0.0, 0.0], description="of the centre of mass at the start [m/s]")
+    angular_velocity: Vector = Field(default=[0.0, 0.0, 0.0], description="at the start, world axes [rad/s]")
 
 
 class GroundTable(MemberTable):
@@ -171,8 +173,8 @@ class ContactTable(SchemaTable):
 
     friction: NonNegative = Field(default=0.5, description="Coulomb's coefficient")
     restitution: Share = Field(default=0.0, description="share of the speed that is left after a bounce")
-    torsion: NonNegative = Field(default=0.0, description="a radius [m]")
-    rolling: NonNegative = Field(default=0.0, description="a radius [m]")
+    torsion: NonNegative = Field(default=0.0, description="resists spinning about the normal: a radius [m]")
+    rolling: NonNegative = Field(default=0.0, description="resists rolling: a radius [m]")
     frequency: NonNegative = Field(default=0.0, description="of soft contacts [Hz]; 0: contacts are rigid")
     damping: NonNegative | None = Field(default=None, description="damping ratio of soft contacts; default 1")
 

@@ -33,7 +33,7 @@ class ScenarioTable(SchemaTable):
     )
     alike: bool = Field(default=False, description="one random number for all, instead of one for each")
     lasts: Positive | None = Field(
-        default=None, description="[s]: a force, torque or command acts so long, from an instant that is random, too"
+        default=None, description="a force, torque or command acts so long [s], from an instant that is random, too"
     )
     robot: Label | None = Field(default=None, description="a body: the pose of all that joints hold together with it")
     tilt: NonNegative = Field(default=0.0, description="of a robot: turned about each axis by at most so much [rad]")

@@ -48,21 +48,25 @@ class SolidTable(one_of_the_shapes()):  # type: ignore[misc]
 class PartTable(SolidTable):
     """One part of a compound: a shape, and its place in the body's frame."""
 
-    centre: Vector = Field(default=[0.0, 0.0, 0.0], description="[m], from the centre of mass")
+    centre: Vector = Field(
+        default=[0.0, 0.0, 0.0], description="of the part, from the centre of mass, in the body's frame [m]"
+    )
     orientation: Orientation = Field(default=[1.0, 0.0, 0.0, 0.0], description=UPRIGHT)
 
 
 class PlacedSphereTable(SchemaTable):
     """One sphere of a compound of spheres."""
 
-    radius: Positive = Field(description="[m]")
-    centre: Vector = Field(default=[0.0, 0.0, 0.0], description="[m], from the centre of mass, in the body's frame")
+    radius: Positive = Field(description="of the sphere [m]")
+    centre: Vector = Field(
+        default=[0.0, 0.0, 0.0], description="of the sphere, from the centre of mass, in the body's frame [m]"
+    )
 
 
 class SphereTable(SchemaTable):
     """A sphere about the centre of mass."""
 
-    radius: Positive = Field(description="[m]")
+    radius: Positive = Field(description="of the sphere [m]")
     hollow: bool = Field(
         default=False, description="a thin shell instead of a solid sphere: I = 2/3 m r^2 instead of 2/5"
     )

@@ -117,9 +117,9 @@ Stop = Literal["met", "converged"]
 class RollPitchYaw(SchemaTable):
     """An orientation as angles: turn by roll about x, then pitch about y, then yaw about z, all fixed world axes."""
 
-    roll_deg: Finite = 0.0
-    pitch_deg: Finite = 0.0
-    yaw_deg: Finite = 0.0
+    roll_deg: Finite = Field(default=0.0, description="about x, first [degrees]")
+    pitch_deg: Finite = Field(default=0.0, description="about y, second [degrees]")
+    yaw_deg: Finite = Field(default=0.0, description="about z, third [degrees]")
 
 
 Orientation = Annotated[

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.expression import Formula, FormulaError, parse
+from symphys.expression.units import unit_of
 from symphys.problem.model import Constraint, Cost, Output, Simulation, Target
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema import Document
@@ -31,10 +32,14 @@ class Objectives:
 
 
 def read_objectives(
-    document: Document, simulation: Simulation, sample: Mapping[str, Any], faults: Faults
+    document: Document,
+    simulation: Simulation,
+    sample: Mapping[str, Any],
+    units: Mapping[str, str],
+    faults: Faults,
 ) -> Objectives:
-    """All of them; ``sample`` has a value for each name that a formula may use."""
-    reader = ObjectiveReader(simulation, sample, faults)
+    """All of them; ``sample`` has a value for each name in formulas, ``units`` its unit where that is known."""
+    reader = ObjectiveReader(simulation, sample, units, faults)
     costs = [reader.cost(index, table) for index, table in enumerate(document.cost)]
     targets = [reader.target(index, table) for index, table in enumerate(document.target)]
     constraints = [reader.constraint(index, table) for index, table in enumerate(document.constraint)]
@@ -50,10 +55,13 @@ def read_objectives(
 class ObjectiveReader:
     """Reads one table at a time; None stands for one with a faulty formula."""
 
-    def __init__(self, simulation: Simulation, sample: Mapping[str, Any], faults: Faults) -> None:
+    def __init__(
+        self, simulation: Simulation, sample: Mapping[str, Any], units: Mapping[str, str], faults: Faults
+    ) -> None:
         """Keep what every table needs."""
         self.simulation = simulation
         self.sample = sample
+        self.units = units
         self.faults = faults
 
     def formula(self, place: Place, text: str, at: str | float) -> tuple[Formula, int] | None:
@@ -90,7 +98,10 @@ class ObjectiveReader:
         place = ("target", index)
         check_moment(table.at, self.simulation, (*place, "at"), self.faults)
         found = self.formula((*place, "value"), table.value, table.at)
-        return found and Target(table.name, found[0], table.at, table.tolerance, table.weight)
+        if not found:
+            return None
+        unit = table.unit or unit_of(found[0], self.units)
+        return Target(table.name, found[0], table.at, table.tolerance, table.weight, unit)
 
     def output(self, index: int, table: OutputTable) -> Output | None:
         """One output."""
@@ -116,7 +127,8 @@ class ObjectiveReader:
         lower, upper = (self.bound(place, table, key, default, found[1]) for key, default in ends.items())
         if lower.shape == upper.shape and np.any(lower > upper):
             self.faults.add((*place, "lower"), "exceeds upper")
-        return Constraint(table.name, found[0], table.at, lower, upper, table.tolerance, table.penalty)
+        unit = table.unit or unit_of(found[0], self.units)
+        return Constraint(table.name, found[0], table.at, lower, upper, table.tolerance, table.penalty, unit)
 
     def bound(self, place: Place, table: ConstraintTable, key: str, default: float, length: int) -> Array:
         """(length,): one of the two bounds."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from symphys.report.figures import style
+from symphys.report.figures.data import Column, DataFigure, keep
 from symphys.results.discovery import Study
 from symphys.trajectory import Array
 
@@ -36,7 +36,7 @@ def shown_checks(found: Ratios) -> list[str]:
     return [name for name in found if name in kept]
 
 
-def draw_checks(study: Study) -> Figure | None:
+def draw_checks(study: Study) -> DataFigure | None:
     """A row for each check, a lane for each solver: small dots for seeds, a mark for their median, a line at 1."""
     found = ratios(study)
     if not found:
@@ -45,7 +45,7 @@ def draw_checks(study: Study) -> Figure | None:
     marks = style.solver_marks(entry.solver for entry in study.entries)
     lane = 0.15
     row = max(lane * len(marks) + 0.16, 0.36)
-    figure = Figure(figsize=(style.WIDTH, 1.15 + row * len(names)), layout="constrained")
+    figure = DataFigure(figsize=(style.WIDTH, 1.15 + row * len(names)), layout="constrained")
     axes = figure.subplots()
     low, high = limits(found)
     dress(axes, names, low, high)
@@ -54,9 +54,24 @@ def draw_checks(study: Study) -> Figure | None:
             if solver in found[name]:
                 height = place + (order - (len(marks) - 1) / 2) * lane / row
                 draw_lane(axes, height, np.clip(found[name][solver], low, high), marks[solver], (low, high))
+    keep_ratios(axes, study, names)
     handles = [Line2D([], [], color=c, marker=m, linestyle="none", markersize=6) for c, m in marks.values()]
     style.legend_above(figure, handles, [style.short(name, 20) for name in marks])
     return figure
+
+
+def keep_ratios(axes: Axes, study: Study, names: list[str]) -> None:
+    """Every run's errors in these checks."""
+    rows = [(name, run, check) for name in names for run in study.runs for check in run.checks if check.name == name]
+    columns: dict[str, Column] = {
+        "check": [name for name, _, _ in rows],
+        "solver": [run.solver for _, run, _ in rows],
+        "seed": [run.seed for _, run, _ in rows],
+        "error": [check.error for _, _, check in rows],
+        "tolerance": [check.tolerance for _, _, check in rows],
+        "error / tolerance": [check.ratio for _, _, check in rows],
+    }
+    keep(axes, columns)
 
 
 def limits(found: Ratios) -> tuple[float, float]:

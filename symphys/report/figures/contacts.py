@@ -9,10 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from symphys.report.figures import style
+from symphys.report.figures.data import TIME, DataFigure, keep
 from symphys.report.scene.views import centres
 from symphys.results.scene import Scene, Solid
 from symphys.trajectory import Array, Trajectory
@@ -56,13 +56,13 @@ def shown_pairs(trajectory: Trajectory) -> list[int]:
     return [int(pair) for pair in nearest[:MOST_PAIRS]]
 
 
-def draw_contacts(trajectory: Trajectory, scene: Scene) -> Figure | None:
+def draw_contacts(trajectory: Trajectory, scene: Scene) -> DataFigure | None:
     """Normal and tangential force and the gap of ``shown_pairs``, point by point summed; None without pairs."""
     trajectory = by_surfaces(trajectory)
     pairs = shown_pairs(trajectory)
     if not pairs or len(trajectory.time) < 2:
         return None
-    figure = Figure(figsize=(style.WIDTH, 0.8 + 1.7 * len(pairs)), layout="constrained")
+    figure = DataFigure(figsize=(style.WIDTH, 0.8 + 1.7 * len(pairs)), layout="constrained")
     grid = figure.subplots(len(pairs), 2, sharex=True, squeeze=False, width_ratios=(1.7, 1))
     normals = dict(pair_normals(trajectory, scene))
     drawn: dict[str, str] = {}
@@ -91,6 +91,10 @@ def draw_forces(axes: Axes, trajectory: Trajectory, pair: int, normal: Array | N
         along = np.sum(force * normal, axis=1, keepdims=True)
         parts = np.hstack([np.abs(along), np.linalg.norm(force - along * normal, axis=1, keepdims=True)])
     time, parts = style.thin(middles, parts, 1200)
+    name = trajectory.contact_names[pair]
+    keep(
+        axes, {TIME: time} | {f"{name}.{kind} force [N]": column for kind, column in zip(colours, parts.T, strict=True)}
+    )
     for column, colour in zip(parts.T, colours.values(), strict=True):
         axes.fill_between(time, column, step="mid", color=colour, alpha=0.12, linewidth=0)
         axes.plot(time, column, drawstyle="steps-mid", color=colour, linewidth=1.2)
@@ -115,6 +119,7 @@ def fit_force_scale(axes: Axes, force: Array) -> None:
 def draw_gap(axes: Axes, trajectory: Trajectory, pair: int) -> None:
     """The distance of the two surfaces; below zero they overlap."""
     time, gap = style.thin(trajectory.time, trajectory.contact_gap[:, [pair]])
+    keep(axes, {TIME: time, f"{trajectory.contact_names[pair]}.gap [m]": gap[:, 0]})
     axes.axhline(0, color=style.FAINT, linewidth=0.9, zorder=1.5)
     axes.plot(time, gap[:, 0], color=GAP, linewidth=1.2)
     style.set_linear(axes, "x")

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from symphys.report.figures import style
+from symphys.report.figures.data import DataFigure, keep
 from symphys.results.discovery import Study
 from symphys.results.result import StageRecord, smoothed
 from symphys.results.run import Run
@@ -18,6 +19,8 @@ from symphys.results.trace import OUTPUT
 from symphys.trajectory import Array
 
 GRID = 300
+MOST_POINTS = 400
+"""Iterations of a run that are drawn, at most about."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +97,7 @@ VIOLATION_FLOOR = 1e-3
 """Errors below this share of the tolerance are drawn as this: nothing is gained below it."""
 
 
-def draw_convergence(study: Study) -> Figure | None:
+def draw_convergence(study: Study) -> DataFigure | None:
     """All solvers on one axis: objective, errors and reported quantities against rollout equivalents and time."""
     outputs = dict.fromkeys(name for run in study.runs for name in run.outputs)
     asked = [
@@ -105,7 +108,7 @@ def draw_convergence(study: Study) -> Figure | None:
     columns = [x for x in (WORK, SECONDS) if any(np.isfinite(run.trace[x]).any() for run in study.runs)]
     if not rows or not columns:
         return None
-    figure = Figure(figsize=(style.WIDTH, 0.9 + 2.45 * len(rows)), layout="constrained")
+    figure = DataFigure(figsize=(style.WIDTH, 0.9 + 2.45 * len(rows)), layout="constrained")
     grid = figure.subplots(len(rows), len(columns), sharex="col", sharey="row", squeeze=False)
     for row, (title, quantity) in enumerate(rows):
         for column, along in enumerate(columns):
@@ -114,8 +117,36 @@ def draw_convergence(study: Study) -> Figure | None:
         grid[row, 0].set_title(title)
         if quantity is violation_so_far:
             mark_tolerance(list(grid[row]))
+    keep_runs(grid[0, 0], study, columns, rows)
+    for row, column in itertools.product(rows, columns):
+        keep_medians(grid[0, 0], study, column, row)
     add_legend(figure, study)
     return figure
+
+
+def keep_runs(axes: Axes, study: Study, columns: Sequence[str], rows: Sequence[tuple[str, Quantity]]) -> None:
+    """Every run's quantities at its iterations, thinned."""
+    names = [*(AXIS_TITLES[along] for along in columns), *(title for title, _ in rows)]
+    found: list[tuple[list[str], list[int], Array]] = []
+    for run in study.runs:
+        numbers = [*(run.trace[along] for along in columns), *(quantity(run) for _, quantity in rows)]
+        _, thinned = style.thin(np.arange(float(run.trace.rows)), np.stack(numbers, axis=1), MOST_POINTS)
+        found.append(([run.solver] * len(thinned), [run.seed] * len(thinned), thinned))
+    numbers_of_all = np.concatenate([numbers for _, _, numbers in found])
+    words = {"solver": [name for names, _, _ in found for name in names]}
+    seeds = {"seed": [seed for _, seeds, _ in found for seed in seeds]}
+    keep(axes, words | seeds | dict(zip(names, numbers_of_all.T, strict=True)))
+
+
+def keep_medians(axes: Axes, study: Study, along: str, row: tuple[str, Quantity]) -> None:
+    """The median over the seeds of each solver that has several."""
+    title, quantity = row
+    for entry in study.entries:
+        curves = [found for run in entry.runs if (found := curve(run, along, quantity)) is not None]
+        if len(curves) > 1:
+            middle = median_curve(curves)
+            name = f"median of {entry.solver}"
+            keep(axes, {f"{AXIS_TITLES[along]} {name}": middle.x, f"{title} {name}": middle.y})
 
 
 def draw_panel(axes: Axes, study: Study, along: str, quantity: Quantity) -> None:
@@ -168,7 +199,7 @@ def fit_values(axes: Axes, values: Array, relative: bool) -> None:
 
 def draw_steps(axes: Axes, source: Curve, **look: object) -> None:
     """A step function, thinned; x = 0 is drawn just left of the first positive x."""
-    x, y = style.thin(source.x, source.y[:, None], 400)
+    x, y = style.thin(source.x, source.y[:, None], MOST_POINTS)
     positive = x[x > 0]
     first = float(positive.min()) * 0.8 if positive.size else 1.0
     axes.plot(np.where(x > 0, x, first), y[:, 0], drawstyle="steps-post", **look)  # type: ignore[arg-type]
@@ -194,7 +225,7 @@ def mark_tolerance(panels: Sequence[Axes]) -> None:
     )
 
 
-def add_legend(figure: Figure, study: Study) -> None:
+def add_legend(figure: DataFigure, study: Study) -> None:
     """Solvers by colour and mark, and what a hollow mark means."""
     marks = style.solver_marks(entry.solver for entry in study.entries)
     handles = [Line2D([], [], color=c, marker=m, markersize=6, linewidth=1.9) for c, m in marks.values()]

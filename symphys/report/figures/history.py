@@ -9,12 +9,12 @@ from itertools import pairwise
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from symphys.findings.writing import show
 from symphys.report.figures import style
 from symphys.report.figures.convergence import AXIS_TITLES, VIOLATION_FLOOR, WORK, fit_values, mark_tolerance
+from symphys.report.figures.data import DataFigure, keep
 from symphys.results.result import StageRecord, smoothed
 from symphys.results.run import Run
 from symphys.results.trace import OUTPUT
@@ -22,6 +22,8 @@ from symphys.trajectory import Array
 
 NARROWEST = 0.09
 """A stage that takes less of the axis has no room for its name."""
+MOST_ROWS = 2000
+"""Iterations in the figure's table, at most about; trace.csv has all."""
 HEADROOM = 0.16
 """Above and below the curves where names of stages stand over them, as a share of the axis."""
 
@@ -35,17 +37,22 @@ class HistoryPanel:
         values: (rows,).
         best: (rows,) the lowest so far of its stage; None where that is not drawn.
         exact: what a stage's end is in the exact rollout; None where there is no such thing.
-        relative: whether the values are errors / tolerance.
+        floor: of errors / tolerance; smaller ones are drawn there. nan where the values are something else.
     """
 
     title: str
     values: Array
     best: Array | None = None
     exact: Callable[[StageRecord], float] | None = None
-    relative: bool = False
+    floor: float = math.nan
+
+    @property
+    def relative(self) -> bool:
+        """Whether the values are errors / tolerance."""
+        return not math.isnan(self.floor)
 
 
-def draw_run(run: Run) -> Figure | None:
+def draw_run(run: Run) -> DataFigure | None:
     """Objective, errors, gradient norm, step, reported quantities; what was not recorded is left out."""
     x = run.trace[WORK]
     x = x if np.isfinite(x).any() else run.trace["iteration"]
@@ -54,12 +61,13 @@ def draw_run(run: Run) -> Figure | None:
         return None
     columns = 2 if len(shown) == 4 else min(len(shown), 3)
     rows = math.ceil(len(shown) / columns)
-    figure = Figure(figsize=(style.WIDTH, 0.6 + 0.25 * smoothed(run.stages) + 2.0 * rows), layout="constrained")
+    figure = DataFigure(figsize=(style.WIDTH, 0.6 + 0.25 * smoothed(run.stages) + 2.0 * rows), layout="constrained")
     grid = list(figure.subplots(rows, columns, sharex=True, squeeze=False).flat)
     colour = style.solver_marks([run.solver])[run.solver][0]
+    label = AXIS_TITLES[WORK] if np.isfinite(run.trace[WORK]).any() else "iteration"
     for place, (axes, panel) in enumerate(zip(grid, shown, strict=False)):
         draw_panel(axes, run, x, panel, colour, named=place < columns)
-    label = AXIS_TITLES[WORK] if np.isfinite(run.trace[WORK]).any() else "iteration"
+    keep_history(grid[0], run, label, x, shown)
     for axes in grid[len(shown) :]:
         axes.remove()
     for axes in grid[max(len(shown) - columns, 0) : len(shown)]:
@@ -77,9 +85,9 @@ def panels_of(run: Run) -> list[HistoryPanel]:
         HistoryPanel("Objective", trace["objective"], stage_best(run), lambda stage: stage.exact_objective),
         HistoryPanel(
             "Largest error / tolerance",
-            np.maximum(trace["max_violation"], VIOLATION_FLOOR),
-            exact=lambda stage: max(stage.exact_worst, VIOLATION_FLOOR),
-            relative=True,
+            trace["max_violation"],
+            exact=lambda stage: stage.exact_worst,
+            floor=VIOLATION_FLOOR,
         ),
         HistoryPanel("Norm of the gradient", trace["gradient_norm"]),
         HistoryPanel("Step" if not run.solver.startswith("cma") else "Step size σ", trace["step"]),  # noqa: RUF001
@@ -97,10 +105,12 @@ def stage_best(run: Run) -> Array:
 
 def draw_panel(axes: Axes, run: Run, x: Array, panel: HistoryPanel, colour: str, named: bool) -> None:
     """One column against the work; of a run in stages with their bands and exact ends."""
+    values = np.maximum(panel.values, panel.floor) if panel.relative else panel.values
     for part in segments(run):
-        draw_history(axes, x[part], panel.values[part], None if panel.best is None else panel.best[part], colour)
-    ends = exact_ends(run, x, panel.exact) if smoothed(run.stages) and panel.exact else []
-    fit_values(axes, np.append(panel.values, [y for _, y, _ in ends]), panel.relative)
+        draw_history(axes, x[part], values[part], None if panel.best is None else panel.best[part], colour)
+    found = exact_ends(run, x, panel.exact) if smoothed(run.stages) and panel.exact else []
+    ends = [(at, max(exact, panel.floor) if panel.relative else exact, met) for at, exact, met in found]
+    fit_values(axes, np.append(values, [y for _, y, _ in ends]), panel.relative)
     axes.set_title(panel.title)
     if named and smoothed(run.stages):
         axes.margins(y=HEADROOM)
@@ -109,6 +119,20 @@ def draw_panel(axes: Axes, run: Run, x: Array, panel: HistoryPanel, colour: str,
     if smoothed(run.stages):
         draw_bands(axes, run, x, named)
         draw_exact(axes, ends)
+
+
+def keep_history(axes: Axes, run: Run, label: str, x: Array, shown: Sequence[HistoryPanel]) -> None:
+    """The recorded columns, thinned, and the exact ends of stages."""
+    columns = {"smoothing [m/s]": run.trace["smoothing"]} | {panel.title: panel.values for panel in shown}
+    columns |= {f"{panel.title} lowest so far": panel.best for panel in shown if panel.best is not None}
+    known = np.isfinite(x)
+    work, values = style.thin(x[known], np.stack(list(columns.values()), axis=1)[known], MOST_ROWS)
+    keep(axes, {label: work} | dict(zip(columns, values.T, strict=True)))
+    for panel in shown:
+        ends = exact_ends(run, x, panel.exact) if smoothed(run.stages) and panel.exact else []
+        if ends:
+            at, exact, _ = zip(*ends, strict=True)
+            keep(axes, {f"{label} at the end of a stage": at, f"{panel.title} exact": exact})
 
 
 def draw_history(axes: Axes, x: Array, values: Array, best: Array | None, colour: str) -> None:

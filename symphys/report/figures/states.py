@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from symphys.report.figures import style
+from symphys.report.figures.data import TIME, DataFigure, keep, vector
 from symphys.report.scene.views import NAMES
 from symphys.trajectory import Array, Trajectory
 
@@ -29,37 +29,41 @@ def controlled_bodies(trajectory: Trajectory) -> list[int]:
     return [int(body) for body in np.flatnonzero(acting > 0)]
 
 
-def draw_states(trajectory: Trajectory) -> Figure:
+def draw_states(trajectory: Trajectory) -> DataFigure:
     """Position, velocity and angular velocity of ``shown_bodies``."""
     quantities = (
-        ("Position [m]", trajectory.time, trajectory.position),
-        ("Velocity [m/s]", trajectory.time, trajectory.velocity),
-        ("Angular velocity [rad/s]", trajectory.time, trajectory.angular_velocity),
+        ("position", "m", trajectory.time, trajectory.position),
+        ("velocity", "m/s", trajectory.time, trajectory.velocity),
+        ("angular_velocity", "rad/s", trajectory.time, trajectory.angular_velocity),
     )
     return draw_grid(trajectory, shown_bodies(trajectory), quantities)
 
 
-def draw_controls(trajectory: Trajectory) -> Figure | None:
+def draw_controls(trajectory: Trajectory) -> DataFigure | None:
     """Forces and torques that act on bodies; None where none does."""
     bodies = controlled_bodies(trajectory)[:MOST_BODIES]
     if not bodies:
         return None
     starts = trajectory.time[:-1]
-    quantities = [("Force [N]", starts, trajectory.force), ("Torque [N m]", starts, trajectory.torque)]
-    acting = [quantity for quantity in quantities if np.any(quantity[2] != 0)]
+    quantities = [("force", "N", starts, trajectory.force), ("torque", "N m", starts, trajectory.torque)]
+    acting = [quantity for quantity in quantities if np.any(quantity[3] != 0)]
     return draw_grid(trajectory, bodies, acting)
 
 
-def draw_grid(trajectory: Trajectory, bodies: Sequence[int], quantities: Sequence[tuple[str, Array, Array]]) -> Figure:
-    """Small multiples: a row for each body, a column for each quantity, its three components as lines."""
+def draw_grid(
+    trajectory: Trajectory, bodies: Sequence[int], quantities: Sequence[tuple[str, str, Array, Array]]
+) -> DataFigure:
+    """Small multiples: a row for each body, a column for each quantity (name, unit, times, values), its x, y, z."""
     rows, columns = len(bodies), len(quantities)
-    figure = Figure(figsize=(style.WIDTH, 0.75 + 1.75 * rows), layout="constrained")
+    figure = DataFigure(figsize=(style.WIDTH, 0.75 + 1.75 * rows), layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
     for row, body in enumerate(bodies):
-        for column, (title, time, values) in enumerate(quantities):
+        for column, (name, unit, time, values) in enumerate(quantities):
             axes = grid[row, column]
-            draw_components(axes, time, values[:, body])
-            axes.set_title(title if row == 0 else "")
+            times, shown = style.thin(time, values[:, body])
+            keep(axes, {TIME: times, **vector(f"{trajectory.body_names[body]}.{name}", unit, shown)})
+            draw_components(axes, times, shown)
+            axes.set_title(f"{name.replace('_', ' ').capitalize()} [{unit}]" if row == 0 else "")
             axes.set_xlabel("time [s]" if row == rows - 1 else "")
         if len(trajectory.body_names) > 1:
             grid[row, 0].set_ylabel(style.short(trajectory.body_names[body], 22), fontweight="bold", color=style.INK)
@@ -70,7 +74,6 @@ def draw_grid(trajectory: Trajectory, bodies: Sequence[int], quantities: Sequenc
 
 def draw_components(axes: Axes, time: Array, values: Array) -> None:
     """x, y and z of one quantity."""
-    time, values = style.thin(time, values)
     for component, (colour, width) in enumerate(zip(style.AXES, style.AXIS_WIDTHS, strict=True)):
         axes.plot(time, values[:, component], color=colour, linewidth=width)
     style.set_linear(axes, "x")

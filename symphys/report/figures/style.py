@@ -20,7 +20,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocato
 
 from symphys import files
 from symphys.findings import writing
-from symphys.results.file_names import FIGURES
+from symphys.report.figures.data import DataFigure, table
 from symphys.trajectory import Array
 
 WIDTH = 10.0
@@ -97,11 +97,12 @@ SETTINGS: Any = {
 
 @dataclass(frozen=True)
 class Picture:
-    """A finished figure: ``name`` is its file's stem, ``alt`` says what it shows."""
+    """A finished figure: ``name`` is the stem of its files, ``alt`` says what it shows, ``csv`` holds its numbers."""
 
     name: str
     alt: str
     svg: str
+    csv: str
 
 
 @contextmanager
@@ -114,15 +115,15 @@ def paper() -> Iterator[None]:
         yield
 
 
-def picture(name: str, alt: str, figure: Figure | None) -> list[Picture]:
-    """Save a figure as SVG text that depends on its content alone; nothing for no figure."""
+def picture(name: str, alt: str, figure: DataFigure | None) -> list[Picture]:
+    """A figure as texts of SVG and CSV that depend on its content alone; nothing for no figure."""
     if figure is None:
         return []
     buffer = io.StringIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     svg = re.sub(r"<!DOCTYPE[^>]*>\s*|<metadata>.*?</metadata>\s*", "", buffer.getvalue(), flags=re.DOTALL)
     svg = svg.replace("'DejaVu Sans'", FONTS).replace("font-weight: 700", "font-weight: 600")
-    return [Picture(name, alt, re.sub(r" +\n|\n+", "\n", svg))]
+    return [Picture(name, alt, re.sub(r" +\n|\n+", "\n", svg), table(figure))]
 
 
 def solver_marks(solvers: Iterable[str]) -> dict[str, tuple[str, str]]:
@@ -218,7 +219,11 @@ def legend_above(figure: Figure, handles: Sequence[Artist], labels: Sequence[str
     figure.legend(handles, labels, loc="outside upper left", ncols=min(len(labels), 8), borderaxespad=0.2)
 
 
-def write_figures(folder: Path, pictures: Iterable[Picture]) -> None:
-    """Write every picture into ``folder``/figures. Raises FileError."""
+def write_figures(folder: Path, pictures: Iterable[Picture]) -> list[Path]:
+    """Write NAME.svg and NAME.csv of every picture into a folder; their paths. Raises FileError."""
+    paths = []
     for picture in pictures:
-        files.write_text(folder / FIGURES / f"{picture.name}.svg", picture.svg)
+        for kind, text in (("svg", picture.svg), ("csv", picture.csv)):
+            paths.append(folder / f"{picture.name}.{kind}")
+            files.write_text(paths[-1], text)
+    return paths

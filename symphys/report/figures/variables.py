@@ -6,10 +6,10 @@ import re
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from symphys.report.figures import style
+from symphys.report.figures.data import DataFigure, keep
 from symphys.results.result import VariableRecord
 from symphys.results.run import Run
 from symphys.trajectory import Array
@@ -39,12 +39,12 @@ def knotted(run: Run) -> list[VariableRecord]:
     return [variable for variable in run.variables if variable.value.shape[1] > 1]
 
 
-def draw_variables(run: Run) -> Figure | None:
+def draw_variables(run: Run) -> DataFigure | None:
     """A panel for each variable with knots; None without any."""
     shown = knotted(run)[:MOST_PANELS]
     if not shown:
         return None
-    figure = Figure(figsize=(style.WIDTH, 0.7 + 2.1 * len(shown)), layout="constrained")
+    figure = DataFigure(figsize=(style.WIDTH, 0.7 + 2.1 * len(shown)), layout="constrained")
     panels = figure.subplots(len(shown), 1, squeeze=False)[:, 0]
     for axes, variable in zip(panels, shown, strict=True):
         draw_curves(axes, variable)
@@ -62,6 +62,9 @@ def draw_curves(axes: Axes, variable: VariableRecord) -> None:
     for component, (name, colour) in enumerate(zip(names, colours, strict=False)):
         before, guess = style.thin(knots, variable.guess[component][:, None], 600)
         shown, value = style.thin(knots, variable.value[component][:, None], 600)
+        label = ".".join(filter(None, [variable.name, name]))
+        keep(axes, {"knot": shown.astype(int), label: value[:, 0]})
+        keep(axes, {"knot": before.astype(int), f"{label} at the guess": guess[:, 0]})
         axes.plot(before, guess[:, 0], color=colour, linewidth=0.9, linestyle=(0, (4, 2)), alpha=0.8)
         axes.plot(shown, value[:, 0], color=colour, linewidth=widths[component])
         if name:
@@ -83,9 +86,12 @@ def draw_bounds(axes: Axes, variable: VariableRecord) -> None:
     if not shown.size:
         return
     room = max(float(np.ptp(shown)), 1e-9)
-    for bound in np.unique(finite(np.concatenate([variable.lower.ravel(), variable.upper.ravel()]))):
-        if shown.min() - room <= bound <= shown.max() + room:
-            axes.axhline(bound, color=style.GROUND_EDGE, linewidth=1, linestyle=(0, (1, 2)))
+    bounds = np.unique(finite(np.concatenate([variable.lower.ravel(), variable.upper.ravel()])))
+    near = bounds[(bounds >= shown.min() - room) & (bounds <= shown.max() + room)]
+    for bound in near:
+        axes.axhline(bound, color=style.GROUND_EDGE, linewidth=1, linestyle=(0, (1, 2)))
+    if near.size:
+        keep(axes, {f"bounds of {variable.name}": near})
 
 
 def finite(values: Array) -> Array:

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from symphys.findings.examination import Energy, Growth
 from symphys.findings.numerics import reach
 from symphys.findings.writing import show
 from symphys.report.figures import style
+from symphys.report.figures.data import TIME, DataFigure, keep
 from symphys.trajectory import Array, Trajectory
 
 HEIGHT = 2.3
@@ -20,15 +20,16 @@ LEAST_RANGE = 100.0
 MOST_TOUCHES = 150
 
 
-def draw_growth(growth: Growth, motion: Trajectory | None) -> Figure | None:
+def draw_growth(growth: Growth, motion: Trajectory | None) -> DataFigure | None:
     """|dx_T/dx_t| against t on a logarithmic axis, a tick below where a contact begins; None without two numbers."""
     known = np.isfinite(growth.factor) & (growth.factor > 0)
     if known.sum() < 2:
         return None
-    figure = Figure(figsize=(style.WIDTH, HEIGHT), layout="constrained")
+    figure = DataFigure(figsize=(style.WIDTH, HEIGHT), layout="constrained")
     axes = figure.subplots()
     factor = growth.factor[known]
     axes.plot(growth.time[known], factor, color=style.BODIES[0])
+    keep(axes, {TIME: growth.time[known], "growth of a change until the end": factor})
     low = 10 ** math.floor(math.log10(min(factor.min(), 1.0)))
     high = max(float(factor.max()) * 1.5, low * LEAST_RANGE)
     style.set_log(axes, "y", np.array([low, high]))
@@ -39,6 +40,7 @@ def draw_growth(growth: Growth, motion: Trajectory | None) -> Figure | None:
     mark_end(axes, reach(growth).end)
     if motion is not None:
         mark_touches(axes, touches(motion))
+        keep(axes, {"a contact begins at [s]": touches(motion)})
     return figure
 
 
@@ -74,17 +76,18 @@ def mark_touches(axes: Axes, times: Array) -> None:
         axes.vlines(times, 0, 0.05, transform=axes.get_xaxis_transform(), color=style.ORANGE, linewidth=1.2)
 
 
-def draw_energy(energy: Energy) -> Figure | None:
+def draw_energy(energy: Energy) -> DataFigure | None:
     """Kinetic, potential and total energy against time; None where it was not recorded."""
     total = energy.kinetic + energy.potential
     if energy.time.size < 2 or not np.isfinite(total).any():
         return None
-    figure = Figure(figsize=(style.WIDTH, HEIGHT + 0.25), layout="constrained")
+    figure = DataFigure(figsize=(style.WIDTH, HEIGHT + 0.25), layout="constrained")
     axes = figure.subplots()
     lines = [("kinetic", energy.kinetic, style.SKY, 1.2), ("potential", energy.potential, style.ORANGE, 1.2)]
     lines.append(("total", total, style.BODIES[0], 1.8))
     if np.any(energy.applied != 0):
         lines.append(("put in by forces", energy.applied, style.GREY, 1.0))
+    keep(axes, {TIME: energy.time} | {f"energy {name} [J]": values for name, values, *_ in lines})
     for _, values, colour, width in lines:
         axes.plot(energy.time, values, color=colour, linewidth=width)
     axes.set(title="Energy [J]", xlabel="time [s]")

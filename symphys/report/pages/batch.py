@@ -19,7 +19,7 @@ from symphys.report.scene.animation import NUMBERS, animation
 from symphys.report.scene.motion import draw_motion
 from symphys.results.discovery import Study, read_all, studies
 from symphys.results.drawable import OVERSIZED, drawable, oversized
-from symphys.results.file_names import GUESS, SCENE, TRAJECTORY
+from symphys.results.file_names import FIGURES, GUESS, SCENE, TRAJECTORY
 from symphys.results.run import Run
 from symphys.results.scene import Scene, read_scene
 from symphys.results.text_files import ReportError
@@ -31,7 +31,7 @@ CLOSEST = "run that came closest"
 
 
 def write_batch_report(batch_dir: Path) -> Path:
-    """Write index.html and figures/*.svg for all run folders found at or below a folder.
+    """Write index.html, and figures as SVG and CSV, for all run folders found at or below a folder.
 
     Args:
         batch_dir: what ``symphys solve --out`` has written, or any folder above it. Links go to the pages of the
@@ -97,7 +97,7 @@ def build_study(study: Study, root: Path, numbers: int, anchor: str, titled: boo
         drawn = draw_motion(motion, scene, guess) if motion else None
         moved = style.picture(f"{anchor}-strip", "The motion at even times", strip)
         moved += style.picture(f"{anchor}-motion", "Path and poses over time", drawn)
-    write_figures(root, converged + checked + moved)
+    write_figures(root / FIGURES, converged + checked + moved)
     played = animation(motion, scene, guess, numbers) if motion else tag("p", f"There is no motion to draw: {why}.")
     best = study.best
     kind = "best run" if best.verdict in ACCEPTED else "run with the lowest objective" if best.met else CLOSEST

@@ -8,8 +8,10 @@ import html
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from urllib.parse import quote
 
 from symphys.report.figures.style import Picture
+from symphys.results.file_names import FIGURES
 
 VOID = frozenset({"br", "img", "input", "link", "meta"})
 HERE = Path(__file__).parents[1] / "static"
@@ -87,9 +89,11 @@ def figures(pictures: Iterable[Picture], caption: Part = "") -> Html:
 
 
 def figure(picture: Picture) -> Html:
-    """A picture embedded in the page."""
+    """A picture embedded in the page, with links to its files, which lie in a folder beside the page."""
     code = base64.b64encode(picture.svg.encode()).decode("ascii")
-    return tag("figure", tag("img", alt=picture.alt, src=f"data:image/svg+xml;base64,{code}"))
+    svg, data = (f"{FIGURES}/{quote(picture.name)}.{kind}" for kind in ("svg", "csv"))
+    links = tag("figcaption", tag("a", "SVG", href=svg), " ", tag("a", "CSV", href=data, title="the numbers drawn"))
+    return tag("figure", tag("img", alt=picture.alt, src=f"data:image/svg+xml;base64,{code}"), links)
 
 
 def stats(pairs: Iterable[tuple[str, str]]) -> Html:

@@ -13,13 +13,14 @@ from symphys.report.pages import sections
 from symphys.report.pages.joints import gait_card, joint_card, joint_pictures
 from symphys.report.pages.markup import card, figures, join, page, tag
 from symphys.report.scene.motion import draw_motion
+from symphys.results.file_names import FIGURES
 from symphys.results.scene import Scene, read_scene
 from symphys.results.trajectories import read_trajectory
 from symphys.trajectory import Trajectory
 
 
 def write_motion(trajectory_npz: Path, scene_json: Path, out: Path, title: str = "Motion") -> Path:
-    """Write a page that plays and draws a recorded motion.
+    """Write a page that plays and draws a recorded motion, and its figures as SVG and CSV beside it.
 
     Args:
         trajectory_npz: as in a run folder.
@@ -33,9 +34,14 @@ def write_motion(trajectory_npz: Path, scene_json: Path, out: Path, title: str =
     Raises:
         ReportError: a file cannot be read or written.
     """
-    trajectory, scene = read_trajectory(trajectory_npz), read_scene(scene_json)
+    return write_motion_page(read_trajectory(trajectory_npz), read_scene(scene_json), out, title)
+
+
+def write_motion_page(trajectory: Trajectory, scene: Scene, out: Path, title: str = "Motion") -> Path:
+    """Write the page of a motion that is at hand; see ``write_motion``."""
     with style.paper():
         pictures = draw(trajectory, scene)
+    style.write_figures(out.parent / FIGURES, pictures.values())
     body = join(
         [
             tag("p", "Simulated motion", class_="kicker"),

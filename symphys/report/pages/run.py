@@ -24,7 +24,7 @@ from symphys.report.scene.motion import draw_motion
 from symphys.results import text_files as tables
 from symphys.results.discovery import is_run
 from symphys.results.drawable import OVERSIZED, drawable, oversized
-from symphys.results.file_names import CONFIG, GUESS, PROBLEM, SCENE, TRAJECTORY
+from symphys.results.file_names import CONFIG, FIGURES, GUESS, PROBLEM, SCENE, TRAJECTORY
 from symphys.results.result import smoothed
 from symphys.results.run import Run, read_run
 from symphys.results.scene import Scene, read_scene
@@ -47,7 +47,7 @@ class RecordedMotion:
 
 
 def write_run_report(run_dir: Path) -> Path:
-    """Write report.html and figures/*.svg into a run folder, from its files alone.
+    """Write report.html, and figures as SVG and CSV, into a run folder, from its files alone.
 
     Args:
         run_dir: a run folder, finished or not; what is missing is said in the page.
@@ -58,6 +58,29 @@ def write_run_report(run_dir: Path) -> Path:
     Raises:
         ReportError: there is no such folder, it is no run folder, or it cannot be written to.
     """
+    run, recording, pictures = drawn(run_dir)
+    write_figures(run_dir / FIGURES, pictures.values())
+    body = build(run, recording, pictures)
+    title = f"{run.title}: {run.solver}, seed {run.seed}"
+    files.write_text(run_dir / PAGE, page(title, body, animated=recording.trajectory is not None))
+    return run_dir / PAGE
+
+
+def write_run_figures(run_dir: Path, folder: Path) -> list[Path]:
+    """Write every figure of a run's page into a folder: NAME.svg, and NAME.csv with the numbers that it shows.
+
+    Returns:
+        The paths.
+
+    Raises:
+        ReportError: there is no such run folder.
+        FileError: ``folder`` cannot be written to.
+    """
+    return write_figures(folder, drawn(run_dir)[2].values())
+
+
+def drawn(run_dir: Path) -> tuple[Run, RecordedMotion, dict[str, Picture]]:
+    """A run folder as it was read, and every figure of its page by name."""
     if not run_dir.is_dir():
         raise ReportError(f"{run_dir}: there is no such folder")
     if not is_run([path.name for path in run_dir.iterdir()]):
@@ -65,12 +88,7 @@ def write_run_report(run_dir: Path) -> Path:
     run = read_run(run_dir, run_dir)
     recording = read_motions(run_dir)
     with style.paper():
-        pictures = draw(drawable(run), recording)
-    write_figures(run_dir, pictures.values())
-    body = build(run, recording, pictures)
-    title = f"{run.title}: {run.solver}, seed {run.seed}"
-    files.write_text(run_dir / PAGE, page(title, body, animated=recording.trajectory is not None))
-    return run_dir / PAGE
+        return run, recording, draw(drawable(run), recording)
 
 
 def read_motions(folder: Path) -> RecordedMotion:

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from symphys.findings.writing import percent
 from symphys.report.figures import style
 from symphys.report.figures.contacts import labels, pair_of
+from symphys.report.figures.data import DataFigure, keep
 from symphys.report.robots.branches import colours, linked
 from symphys.results.scene import Scene
 from symphys.trajectory import Array, Mask, Trajectory
@@ -75,17 +75,18 @@ BAR = 0.64
 """Height of a bar in rows."""
 
 
-def draw_gait(trajectory: Trajectory, scene: Scene) -> Figure | None:
+def draw_gait(trajectory: Trajectory, scene: Scene) -> DataFigure | None:
     """The diagram; None where no body comes down or leaves the ground."""
     found = stances(trajectory, scene)
     if not has_gait(found):
         return None
     rows = sorted(sorted(found, key=changes, reverse=True)[:MOST_ROWS], key=lambda stance: stance.body)
-    figure = Figure(figsize=(style.WIDTH, 0.75 + ROW * len(rows)), layout="constrained")
+    figure = DataFigure(figsize=(style.WIDTH, 0.75 + ROW * len(rows)), layout="constrained")
     axes = figure.subplots()
     colour = colours(trajectory, scene)
     for row, stance in enumerate(rows):
         draw_row(axes, row, trajectory.time, stance, colour[stance.body])
+        keep_row(axes, trajectory.time, stance, trajectory.body_names[stance.body])
     axes.set_yticks(range(len(rows)), [style.short(trajectory.body_names[stance.body], 24) for stance in rows])
     axes.set(xlim=(trajectory.time[0], trajectory.time[-1]), ylim=(len(rows) - 0.5, -0.5), xlabel="time [s]")
     axes.set_title("On the ground")
@@ -102,6 +103,12 @@ def draw_row(axes: Axes, row: int, time: Array, stance: Stance, colour: str) -> 
     bars = [(time[start], time[stop] - time[start]) for start, stop in spans(stance.stands)]
     axes.broken_barh(bars, (row - BAR / 2, BAR), facecolor=colour, linewidth=0, zorder=3)
     axes.text(1.007, row, percent(stance.duty), va="center", color=style.SOFT, transform=axes.get_yaxis_transform())
+
+
+def keep_row(axes: Axes, time: Array, stance: Stance, name: str) -> None:
+    """From when until when a body stands."""
+    ends = np.array(spans(stance.stands))
+    keep(axes, {f"{name}.stands from [s]": time[ends[:, 0]], f"{name}.stands until [s]": time[ends[:, 1]]})
 
 
 def changes(stance: Stance) -> int:

@@ -8,12 +8,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from symphys.findings.writing import percent
 from symphys.report.figures import style
+from symphys.report.figures.data import TIME, DataFigure, keep
 from symphys.report.robots.branches import branches, colours
 from symphys.report.robots.gait import spans
 from symphys.report.robots.joint_use import Channel, channels
@@ -31,7 +31,7 @@ LEAST_TURN, LEAST_SLIDE, LEAST_TORQUE = 0.1, 0.02, 1e-3
 Draw = Callable[[Axes, Array, Channel, str], None]
 
 
-def draw_joints(trajectory: Trajectory, scene: Scene) -> tuple[Figure | None, Figure | None]:
+def draw_joints(trajectory: Trajectory, scene: Scene) -> tuple[DataFigure | None, DataFigure | None]:
     """The angles, and the torques; of few joints one figure with both."""
     every = shown(channels(trajectory, scene))
     if not every or len(trajectory.time) < 2:
@@ -48,11 +48,11 @@ def draw_joints(trajectory: Trajectory, scene: Scene) -> tuple[Figure | None, Fi
     return angles, torques
 
 
-def draw_rows(every: list[Channel], trajectory: Trajectory, scene: Scene) -> Figure:
+def draw_rows(every: list[Channel], trajectory: Trajectory, scene: Scene) -> DataFigure:
     """A row for each coordinate, its torque beside it if any has a motor."""
     driven = [channel for channel in every if channel.driven]
     columns = 2 if driven else 1
-    figure = Figure(figsize=(style.WIDTH, 0.8 + 1.7 * len(every)), layout="constrained")
+    figure = DataFigure(figsize=(style.WIDTH, 0.8 + 1.7 * len(every)), layout="constrained")
     grid = figure.subplots(len(every), columns, sharex=True, squeeze=False)
     for row, channel in enumerate(every):
         colour = colour_of(channel, trajectory, scene)
@@ -72,10 +72,10 @@ def draw_rows(every: list[Channel], trajectory: Trajectory, scene: Scene) -> Fig
     return figure
 
 
-def draw_grid(grid: Grid, draw: Draw, trajectory: Trajectory, scene: Scene) -> Figure:
+def draw_grid(grid: Grid, draw: Draw, trajectory: Trajectory, scene: Scene) -> DataFigure:
     """A small picture for each coordinate."""
     rows, columns = len(grid), len(grid[0])
-    figure = Figure(figsize=(style.WIDTH, 0.7 + 1.25 * rows), layout="constrained")
+    figure = DataFigure(figsize=(style.WIDTH, 0.7 + 1.25 * rows), layout="constrained")
     places = figure.subplots(rows, columns, sharex=True, squeeze=False)
     for row, channels_of_row in enumerate(grid):
         for column, channel in enumerate(channels_of_row):
@@ -104,7 +104,26 @@ def draw_value(axes: Axes, time: Array, channel: Channel, colour: str) -> None:
     if channel.target is not None:
         target = np.append(channel.target, channel.target[-1])
         axes.plot(time, target, color=TARGET, linestyle=DASHES, linewidth=1.0, drawstyle="steps-post", zorder=3.5)
+    keep_value(
+        axes, time, channel, [edge for edge in (channel.joint.lower, channel.joint.upper) if low <= edge <= high]
+    )
     dress(axes, f"{channel.name} [{channel.unit}]", low, high)
+
+
+def keep_value(axes: Axes, time: Array, channel: Channel, limits: list[float]) -> None:
+    """The numbers of ``draw_value``, thinned, and the limits that it shows."""
+    target = [] if channel.target is None else [np.append(channel.target, channel.target[-1])]
+    times, (value, *command) = thinned(time, [channel.value, *target])
+    columns = {f"{channel.name}.{channel.quantity} [{channel.unit}]": value}
+    keep(axes, {TIME: times} | columns | {f"{channel.name}.command [{channel.unit}]": each for each in command})
+    if limits:
+        keep(axes, {f"limits of {channel.name} [{channel.unit}]": limits})
+
+
+def thinned(time: Array, columns: list[Array]) -> tuple[Array, Array]:
+    """Times, and (k, times) columns."""
+    times, values = style.thin(time, np.stack(columns, axis=1))
+    return times, values.T
 
 
 def draw_torque(axes: Axes, time: Array, channel: Channel, colour: str) -> None:
@@ -120,6 +139,11 @@ def draw_torque(axes: Axes, time: Array, channel: Channel, colour: str) -> None:
             ends = [time[start], time[stop]]
             axes.plot(ends, [sign * channel.bound] * 2, color=FULL, linewidth=2.4, zorder=3.2, solid_capstyle="butt")
             axes.fill_between(ends, 0, sign * channel.bound, color=FULL, alpha=0.16, linewidth=0, zorder=2)
+    times, (torque, saturated) = thinned(time[:-1], [channel.torque, channel.saturated.astype(float)])
+    name = f"{channel.name}.{channel.effort} [{channel.torque_unit}]"
+    keep(axes, {TIME: times, name: torque, f"{channel.name}.saturated": saturated.astype(int)})
+    if channel.bound > 0:
+        keep(axes, {f"most of {name}": [channel.bound]})
     dress(axes, f"{channel.name} [{channel.torque_unit}]", low, high)
     if channel.share > 0:
         axes.set_title(percent(channel.share), loc="right", color=FULL)
@@ -177,7 +201,7 @@ def torque_keys(driven: list[Channel]) -> list[Key]:
     return keys
 
 
-def add_keys(figure: Figure, keys: list[Key]) -> None:
+def add_keys(figure: DataFigure, keys: list[Key]) -> None:
     """A row above all."""
     if keys:
         style.legend_above(figure, [artist for artist, _ in keys], [label for _, label in keys])

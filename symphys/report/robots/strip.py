@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from symphys.report.figures import style
+from symphys.report.figures.data import TIME, DataFigure, keep, vector
 from symphys.report.robots.branches import linked
 from symphys.report.robots.joint_positions import draw_joint_positions
 from symphys.report.robots.poses import RobotDrawing, extents
@@ -42,7 +42,7 @@ class Strip:
     size: Array
 
 
-def draw_strip(trajectory: Trajectory, scene: Scene) -> Figure | None:
+def draw_strip(trajectory: Trajectory, scene: Scene) -> DataFigure | None:
     """The strip; None where no joint holds bodies that move."""
     if not linked(trajectory, scene) or len(trajectory.time) < 2:
         return None
@@ -61,14 +61,24 @@ def draw_strip(trajectory: Trajectory, scene: Scene) -> Figure | None:
             draw_frame(axes, panel, trajectory, scene, shot, scale)
             dress_frame(axes, panel, scale, column == 0, row == len(strips) - 1)
             axes.set_title(f"{trajectory.time[shot]:.2f} s" if row == 0 else "")
+    keep_poses(figure.axes[0], trajectory, linked(trajectory, scene), shots)
     return figure
+
+
+def keep_poses(axes: Axes, trajectory: Trajectory, bodies: Sequence[int], shots: Sequence[int]) -> None:
+    """Position and orientation of bodies in the pictures."""
+    for body in bodies:
+        name = trajectory.body_names[body]
+        place = vector(f"{name}.position", "m", trajectory.position[shots, body])
+        turned = vector(f"{name}.orientation", "", trajectory.orientation[shots, body], "wxyz")
+        keep(axes, {TIME: trajectory.time[shots]} | place | turned)
 
 
 Place = tuple[float, float, float, float]
 """(left, bottom, width, height) in shares of a figure."""
 
 
-def lay_out(strips: Sequence[Strip], width: float, scale: float) -> tuple[Figure, list[list[Place]]]:
+def lay_out(strips: Sequence[Strip], width: float, scale: float) -> tuple[DataFigure, list[list[Place]]]:
     """The figure, and the places of its pictures, each ``width`` [in] wide, strip by strip."""
     heights = [float(strip.size[1]) * scale for strip in strips]
     total = TOP + BOTTOM + sum(heights) + BETWEEN * (len(strips) - 1)
@@ -79,7 +89,7 @@ def lay_out(strips: Sequence[Strip], width: float, scale: float) -> tuple[Figure
         shares = width / style.WIDTH, height / total
         places.append([(left / style.WIDTH, (top - height) / total, *shares) for left in lefts])
         top -= height + BETWEEN
-    return Figure(figsize=(style.WIDTH, total)), places
+    return DataFigure(figsize=(style.WIDTH, total)), places
 
 
 def even_shots(count: int, size: Array) -> list[int]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from symphys.report.figures import style
+from symphys.report.figures.data import TIME, DataFigure, keep, vector
 from symphys.report.robots.branches import is_large, keys, traced
 from symphys.report.robots.joint_positions import draw_joint_positions
 from symphys.report.robots.poses import draw_robots
@@ -19,8 +20,11 @@ from symphys.report.scene.views import choose_views
 from symphys.results.scene import Scene
 from symphys.trajectory import Trajectory
 
+MOST_POSES = 300
+"""Poses of a body in the figure's table, at most about; trajectory.npz has all."""
 
-def draw_motion(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = None) -> Figure:
+
+def draw_motion(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = None) -> DataFigure:
     """Side and top view of the whole motion, to scale."""
     panels = [make_panel(view, trajectory, scene, guess) for view in choose_views(trajectory, scene)]
     stacked, scale = arrange(panels)
@@ -37,8 +41,23 @@ def draw_motion(trajectory: Trajectory, scene: Scene, guess: Trajectory | None =
         else:
             draw_bodies(axes, panel, trajectory, scene, scale)
             draw_joint_positions(axes, panel.view, trajectory, scene, len(trajectory.time) - 1, scale)
+    keep_paths(figure.axes[0], trajectory, traced(trajectory, scene), "")
+    if guess is not None:
+        keep_paths(figure.axes[0], guess, traced(guess, scene), " at the guess")
     add_legend(figure, trajectory, scene, guess is not None)
     return figure
+
+
+def keep_paths(axes: Axes, trajectory: Trajectory, names: Sequence[str], whose: str) -> None:
+    """Position and orientation of these bodies, thinned: those whose paths are drawn."""
+    for body, name in enumerate(trajectory.body_names):
+        if name in names:
+            place, turned = trajectory.position[:, body], trajectory.orientation[:, body]
+            times, poses = style.thin(trajectory.time, np.concatenate([place, turned], axis=1), MOST_POSES)
+            columns = vector(f"{name}.position", "m", poses[:, :3]) | vector(
+                f"{name}.orientation", "", poses[:, 3:], "wxyz"
+            )
+            keep(axes, {TIME: times} | {f"{column}{whose}": values for column, values in columns.items()})
 
 
 def draw_guess(axes: Axes, panel: ViewPanel, guess: Trajectory, names: Sequence[str]) -> None:
@@ -49,7 +68,7 @@ def draw_guess(axes: Axes, panel: ViewPanel, guess: Trajectory, names: Sequence[
         axes.plot(*path.T, color="#98a4af", linewidth=0.9, linestyle=(0, (4, 2.5)), zorder=2)
 
 
-def add_legend(figure: Figure, trajectory: Trajectory, scene: Scene, guessed: bool) -> None:
+def add_legend(figure: DataFigure, trajectory: Trajectory, scene: Scene, guessed: bool) -> None:
     """Bodies or kinematic branches by colour, and the guess; nothing where the picture explains itself."""
     handles = [Line2D([], [], color=colour, label=style.short(name, 20)) for name, colour in keys(trajectory, scene)]
     if guessed:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from symphys.report.figures import style
+from symphys.report.figures.data import DataFigure
 from symphys.report.scene.views import NAMES, View, corners, reach
 from symphys.results.scene import UPRIGHT, Scene, SceneFixture, ScenePlane, SceneTerrain
 from symphys.trajectory import Array, Trajectory
@@ -101,12 +101,12 @@ def widen(panel: ViewPanel, scale: float) -> ViewPanel:
 
 def lay_out(
     panels: list[ViewPanel], stacked: bool, scale: float
-) -> tuple[Figure, list[tuple[float, float, float, float]]]:
+) -> tuple[DataFigure, list[tuple[float, float, float, float]]]:
     """The figure, and (left, bottom, width, height) of each panel in shares of it."""
     sizes = [panel.span * scale for panel in panels]
     gaps = GAP * (len(panels) - 1)
     height = (sum(s[1] for s in sizes) + gaps if stacked else max(s[1] for s in sizes)) + BOTTOM + TOP
-    figure = Figure(figsize=(style.WIDTH, height))
+    figure = DataFigure(figsize=(style.WIDTH, height))
     places = []
     widths = [float(size[0]) for size in sizes]
     used = max(widths) if stacked else sum(widths) + (len(sizes) - 1) * (LEFT + 0.2)

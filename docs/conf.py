@@ -1,0 +1,130 @@
+"""The site: Markdown pages of this folder, the notebook, and the reference of the package; ``make docs`` builds it."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import is_dataclass
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from docutils.nodes import Element, Node
+from sphinx.addnodes import pending_xref
+from sphinx.application import Sphinx
+from sphinx.environment import BuildEnvironment
+from sphinx.util.inspect import TypeAliasForwardRef
+
+import symphys
+import symphys.solvers
+
+ROOT = Path(__file__).parents[1]
+os.environ.setdefault("SYMPHYS_CACHE", str(ROOT / "build" / "kernels"))
+
+project = "symphys"
+author = "symphys contributors"
+project_copyright = author
+version = release = symphys.__version__
+
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
+smartquotes = False  # --set is no dash
+linkcheck_timeout = 20
+
+# Markdown: formulas between dollars, and an anchor for every heading, so that links to headings are checked.
+myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 4
+
+# The notebook is run in a folder that is removed; a cell that fails ends the build.
+nb_execution_mode = "force"
+nb_execution_in_temp = True
+nb_execution_timeout = 300
+nb_execution_raise_on_error = True
+nb_merge_streams = True
+
+# The reference: names as users write them, types in the text, members in the order of the source.
+autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented"
+autodoc_member_order = "bysource"
+autodoc_mock_imports = ["gymnasium", "jax", "torch"]
+autodoc_preserve_defaults = True
+TypeAliasForwardRef.__repr__ = lambda alias: alias.name  # Mapping[str, ArrayLike], not TypeAliasForwardRef('ArrayLike')
+autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Source")}
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True
+# Types of other packages, and of the package's own rooms, which the page does not describe.
+nitpick_ignore_regex = [
+    ("py:class", "Array|ArrayLike|Source"),
+    ("py:.*", r"symphys\.(codegen|dynamics|model|problem|results|solvers\.core|transcription)\..*"),
+    ("py:.*", r"(collections|pathlib|types|typing|functools|enum|os)\..*"),
+    ("py:.*", r"(casadi|ca|cma|gymnasium|jax|matplotlib|np|npt|numpy|pandas|pydantic|torch|xarray)\..*"),
+]
+
+# Fonts and styles lie in the site; only pages with formulas ask for MathJax on the network.
+html_theme = "furo"
+html_title = f"symphys {release}"
+html_show_copyright = False
+html_show_sphinx = False
+html_copy_source = False
+
+
+PUBLIC = {*symphys.__all__, *symphys.solvers.__all__}
+
+
+def resolve_by_public_name(app: Sphinx, env: BuildEnvironment, node: pending_xref, content: Element) -> Node | None:
+    """A reference to ``symphys.problem.problem.Problem`` leads to ``symphys.Problem``, which the page documents."""
+    if node.get("refdomain") != "py":
+        return None
+    domain: Any = env.get_domain("py")
+    name = str(node.get("reftarget", "")).rpartition(".")[2]
+    for place in ("symphys", "symphys.solvers"):
+        if f"{place}.{name}" in domain.objects:
+            arguments = (env, node.get("refdoc", ""), app.builder, "obj", f"{place}.{name}", node, content)
+            found: Node | None = domain.resolve_xref(*arguments)
+            return found
+    return None
+
+
+def keep_bars(app: Sphinx, what: str, name: str, described: object, options: object, lines: list[str]) -> None:
+    """``|merit|`` in a docstring is a norm, not a substitution; code in backquotes stays as it is."""
+    for k, line in enumerate(lines):
+        lines[k] = re.sub(r"(``.*?``)|\|", lambda found: found[1] or r"\|", line)
+
+
+def keep_sentences(app: Sphinx, what: str, name: str, described: object, options: object, lines: list[str]) -> None:
+    """Undo what napoleon makes of colons and commas.
+
+    The docstring of a property is a sentence, of which the part before a colon is no type; and attributes that share
+    a line, ``lower, upper: (n,)``, are no name with a type.
+    """
+    if what in ("attribute", "property"):
+        for k, line in enumerate(lines):
+            if line.startswith(":type: "):
+                lines[0] = f"{line.removeprefix(':type: ')}: {lines[0]}"
+                del lines[k]
+                break
+    for k, line in enumerate(lines):
+        shared = re.match(r":ivar (\w+(?:, \w+)+):", line)
+        if shared:
+            lines[k] = line.replace(shared[1], shared[1].replace(", ", "/"), 1)
+
+
+def show_shapes(app: Sphinx, what: str, name: str, described: object, options: object, lines: list[str]) -> None:
+    """``Annotated[Array, "N, B, 3"]`` of a field becomes (N, B, 3); public classes go by their names alone."""
+    hints = get_type_hints(described, include_extras=True) if is_dataclass(described) else {}
+    texts = {field: getattr(hint, "__metadata__", ("",))[0] for field, hint in hints.items()}
+    shapes = {
+        field: text if "," in text else f"{text}," for field, text in texts.items() if isinstance(text, str) and text
+    }
+    for k, line in enumerate(lines):
+        field = re.match(r":ivar (\w+):", line)
+        if field and field[1] in shapes:
+            lines[k] = line.replace(field[0], f"{field[0]} ({shapes[field[1]]})", 1)
+        if line.startswith(":vartype "):
+            lines[k] = re.sub(r"\bsymphys\.[\w.]+\.(\w+)", lambda at: at[1] if at[1] in PUBLIC else at[0], line)
+
+
+def setup(app: Sphinx) -> None:
+    """Add what Sphinx has no option for; napoleon reads docstrings at priority 500."""
+    app.connect("missing-reference", resolve_by_public_name)
+    app.connect("autodoc-process-docstring", keep_bars, priority=400)
+    app.connect("autodoc-process-docstring", keep_sentences, priority=600)
+    app.connect("autodoc-process-docstring", show_shapes, priority=700)

@@ -1,0 +1,134 @@
+"""Batches: problems times solvers times seeds, as ``symphys solve`` does them."""
+
+from __future__ import annotations
+
+import shutil
+import weakref
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+from symphys.api.solution import Solution
+from symphys.api.solving import kept
+from symphys.problem import Problem
+from symphys.problem.loading import Source, load
+from symphys.results.run import read_run
+from symphys.runs import BatchResult, Job, Result, make_jobs, run_batch
+from symphys.solvers import TraceRow
+from symphys.transcription import transcribe
+
+BatchProgress = Callable[[str, TraceRow], None]
+"""Sees which run it is, ``"ball_throw gradient seed 0"``, and its iteration."""
+
+
+def solve_all(
+    problems: Iterable[Source],
+    solvers: Sequence[str] | None = None,
+    seeds: int | Iterable[int] = 1,
+    *,
+    jobs: int = 1,
+    folder: str | Path | None = None,
+    examine: bool = False,
+    multi_start: bool = False,
+    backend: str = "auto",
+    progress: BatchProgress | None = None,
+) -> list[Solution]:
+    """Solve problems with solvers from seeds. No run's failure stops the others.
+
+    Args:
+        problems: each what ``load`` takes. Those of one name, such as one problem with several masses, get numbers
+            behind their names, in their order: ``ball_throw``, ``ball_throw-2``.
+        solvers: their names; None: for each problem those that it names, else those that fit it.
+        seeds: how many, from 0 on, or which; 0 starts from the guess.
+        jobs: how many runs go on at once, in processes; a script then needs ``if __name__ == "__main__":``.
+        folder: where run folders are kept, as by ``symphys solve --out``: what is done already is not done again, what
+            was interrupted goes on, and ``symphys.report(folder)`` compares all. None: nothing is kept.
+        examine: whether to examine how far solutions can be trusted.
+        multi_start: whether to solve the seeds of a problem side by side, their evaluations in batches.
+        backend: as in ``solve``.
+        progress: sees each iteration.
+
+    Returns:
+        Problems times solvers times seeds, in this order; of a run that failed ``run.status`` is "failed", and
+        ``advice`` says why.
+
+    Raises:
+        ProblemError: a problem, or an option of a solver, cannot be used; before anything is solved.
+        KeyboardInterrupt: after Ctrl-C; with a ``folder``, the same call goes on from there.
+
+    Example:
+        >>> import symphys
+        >>> problem = symphys.load("ball_throw")
+        >>> heavier = [problem.set("ball.mass", mass) for mass in (1.0, 2.0)]
+        >>> found = symphys.solve_all(heavier, ["least_squares"], backend="casadi")
+        >>> [(solution.run.problem, solution.solved) for solution in found]
+        [('ball_throw', True), ('ball_throw-2', True)]
+    """
+    asked = list(numbered(map(load, problems)))
+    counted = range(seeds) if isinstance(seeds, int) else tuple(seeds)
+    with kept(folder) as out:
+        todo = [
+            job
+            for each in asked
+            for job in make_jobs([each], solvers, counted, dict(each.settings), out, "", backend, examine)
+        ]
+        made = partial(transcribe, backend=backend, threads=1 if jobs > 1 else None)
+        batch = run_batch(todo, jobs, ProgressObserver(progress), made, multi_start)
+        solutions = list(solutions_of(todo, batch))
+    if folder is None:
+        drop_with(solutions, out)
+    return solutions
+
+
+def numbered(problems: Iterable[Problem]) -> Iterator[Problem]:
+    """Problems with names of their own."""
+    seen: Counter[str] = Counter()
+    for problem in problems:
+        seen[problem.name] += 1
+        count = seen[problem.name]
+        yield replace(problem, name=f"{problem.name}-{count}") if count > 1 else problem
+
+
+def solutions_of(jobs: Sequence[Job], batch: BatchResult) -> Iterator[Solution]:
+    """The solutions in the order of the jobs; KeyboardInterrupt where the batch was interrupted."""
+    if batch.interrupted:
+        over = sum(result is not None and not result.interrupted for result in batch.results)
+        raise KeyboardInterrupt(f"{over} of {len(jobs)} runs are done; with a folder, the same call goes on from there")
+    for job in jobs:
+        path = job.folder.path
+        yield Solution(path, read_run(path, path), given=job.problem)
+
+
+def drop_with(solutions: Sequence[Solution], out: Path) -> None:
+    """Remove a temporary folder when the last of its solutions is gone."""
+    left = set(range(len(solutions)))
+
+    def gone(index: int) -> None:
+        left.discard(index)
+        if not left:
+            shutil.rmtree(out, ignore_errors=True)
+
+    for index, solution in enumerate(solutions):
+        weakref.finalize(solution, gone, index)
+    if not solutions:
+        shutil.rmtree(out, ignore_errors=True)
+
+
+@dataclass(frozen=True)
+class ProgressObserver:
+    """Passes on the iterations of a batch."""
+
+    progress: BatchProgress | None
+
+    def started(self, job: Job, resumed: bool) -> None:
+        """Nothing is said of it."""
+
+    def advanced(self, job: Job, row: TraceRow) -> None:
+        """Pass it on."""
+        if self.progress:
+            self.progress(job.name, row)
+
+    def ended(self, job: Job, result: Result, skipped: bool) -> None:
+        """Nothing is said of it."""

@@ -1,0 +1,98 @@
+"""What stands in the way of an answer: targets that contradict or oppose each other, too many equations, bounds."""
+
+from __future__ import annotations
+
+import math
+
+from symphys.findings.examination import Examination, HeldBound
+from symphys.findings.levels import FAIR, UNKNOWN, Finding, Judged
+from symphys.findings.writing import listed, several, show
+
+TARGETS, BOUNDS = "targets", "bounds"
+TINY = 1e-12
+"""A sum of costs below this is none."""
+MOST_BOUNDS = 3
+"""How many bounds are named."""
+CONTRADICTING = (
+    "{names} cannot {all} be met near here: whatever is varied, some combination of their values stays the same, and "
+    "too large for their tolerances; change what one of them asks for, or let more vary"
+)
+OPPOSED = (
+    "{names} hold each other: here, what brings one nearer takes another away as much; give the one that matters more "
+    "weight, allow another more tolerance, or let more vary"
+)
+EQUATIONS = "More equations than numbers that may vary: all are met only where some of them depend on each other."
+HELD = "It ends there, and what is minimised falls beyond: the bound holds it back. Widen it, if it may be wider."
+
+
+def obstacle_findings(trust: Examination, judged: Judged) -> list[Finding]:
+    """Every line on what stands in the way; of targets only where something is missed."""
+    lines = []
+    if not judged.met:
+        kinds = ((trust.contradicting, "contradict", CONTRADICTING), (against(trust), "oppose", OPPOSED))
+        for names, verb, clause in kinds:
+            if names:
+                what, number = f"Targets that {verb} each other", several(len(names), "target")
+                lines.append(Finding(TARGETS, FAIR, what, number, capital(said_of(names, clause)) + "."))
+        if trust.equations > trust.unknowns:
+            number = f"{show(trust.equations)} for {several(int(trust.unknowns), 'unknown')}"
+            lines.append(Finding(TARGETS, UNKNOWN, "Components of targets", number, EQUATIONS))
+    for bound in holding(trust, judged)[:MOST_BOUNDS]:
+        lines.append(Finding(BOUNDS, FAIR, f"{capital(bound.side)} bound of {place(bound)}", extent(bound), HELD))
+    return lines
+
+
+def obstacles(trust: Examination, judged: Judged) -> tuple[str, ...]:
+    """A clause for each of them: what they do and what to try. Equations are no reason by themselves."""
+    clauses = []
+    if not judged.met:
+        if trust.contradicting:
+            clauses.append(said_of(trust.contradicting, CONTRADICTING))
+        if against(trust):
+            clauses.append(said_of(against(trust), OPPOSED))
+    bounds = holding(trust, judged)
+    if bounds:
+        named = [bound_words(bound) for bound in bounds[:MOST_BOUNDS]]
+        more = [f"{len(bounds) - MOST_BOUNDS} more"] if len(bounds) > MOST_BOUNDS else []
+        verb = "holds" if len(bounds) == 1 else "hold"
+        clauses.append(f"{listed([*named, *more])} {verb} the answer back, which would improve beyond")
+    return tuple(clauses)
+
+
+def against(trust: Examination) -> tuple[str, ...]:
+    """The targets that oppose each other, unless they are said to contradict each other anyway."""
+    return () if set(trust.opposed) <= set(trust.contradicting) else trust.opposed
+
+
+def holding(trust: Examination, judged: Judged) -> tuple[HeldBound, ...]:
+    """The bounds that hold something back; none where everything is met and nothing is minimised."""
+    wanted = not judged.met or not judged.checked or abs(judged.costs) > TINY
+    return trust.bounds if wanted else ()
+
+
+def said_of(names: tuple[str, ...], clause: str) -> str:
+    """A clause on targets by their names."""
+    return clause.format(names=listed([f'"{name}"' for name in names]), all="both" if len(names) == 2 else "all")
+
+
+def bound_words(bound: HeldBound, knots: bool = True) -> str:
+    """``the upper bound 5 of throw[0]``; ``knots``: with those that lie there, where there are several."""
+    value = "" if math.isnan(bound.bound) else f" {show(bound.bound)}"
+    where = f" (at {bound.knots} of {bound.of} knots)" if knots and bound.of > 1 else ""
+    return f"the {bound.side} bound{value} of {place(bound)}{where}"
+
+
+def place(bound: HeldBound) -> str:
+    """Variable and component."""
+    return f"{bound.variable}[{bound.component}]" if bound.components > 1 else bound.variable
+
+
+def extent(bound: HeldBound) -> str:
+    """The bound, and how many knots lie there."""
+    knots = f"{bound.knots} of {bound.of} knots" if bound.of > 1 else ""
+    return ", ".join(filter(None, ("" if math.isnan(bound.bound) else show(bound.bound), knots)))
+
+
+def capital(clause: str) -> str:
+    """With a capital letter."""
+    return clause[:1].upper() + clause[1:]

@@ -1,0 +1,219 @@
+"""Rollouts and steps as differentiable functions of JAX arrays; needs the extra ``symphys[jax]``.
+
+Batches go to the compiled kernels by a callback to the host, in double precision, under ``jit``, ``grad`` and ``vmap``
+alike. Gradients are those of the kernels; they cannot be differentiated again, nor forwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from symphys.api.compiled import CompiledRollout, compile
+from symphys.api.loading import Source
+from symphys.api.stepping import CompiledStep, compile_step
+from symphys.errors import SymphysError
+from symphys.transcription.open_step import StepResult, StepStart
+from symphys.transcription.recorded_rollout import RecordedRollout
+
+try:
+    import jax
+    import jax.numpy as jnp
+except ImportError as error:
+    raise ImportError('symphys.jax needs JAX: pip install "symphys[jax]"') from error
+
+Array = Any
+"""jax.Array"""
+
+
+def rollout(problem: Source, *quantities: str, smoothing: float = 0.0, backend: str = "auto") -> JaxRollout:
+    """A problem's rollout as a function of Z (B, n): the value of each row, and quantities over time if asked for.
+
+    Args:
+        problem: what ``symphys.load`` takes.
+        quantities: formulas as in problem files, such as ``ball.position``.
+        smoothing: of the contacts [m/s].
+        backend: see ``symphys.compile``.
+
+    Raises:
+        SymphysError: a quantity is no formula, or names what the problem does not have.
+
+    Example:
+        >>> import jax, symphys.jax
+        >>> jax.config.update("jax_enable_x64", True)
+        >>> rollout = symphys.jax.rollout("ball_throw")
+        >>> Z = jax.numpy.tile(rollout.z(throw=[8, 0, 3]), (4, 1))
+        >>> jax.grad(lambda Z: rollout(Z).sum())(Z).shape
+        (4, 6)
+    """
+    return JaxRollout(problem, *quantities, smoothing=smoothing, backend=backend)
+
+
+def step(problem: Source, controllers: Sequence[str] | None = None, **options: Any) -> JaxStep:
+    """One step with the commands open, for batches of states and actions.
+
+    Args:
+        problem: what ``symphys.load`` takes.
+        controllers: names of those that are left open; see ``symphys.compile_step`` for None, and for errors.
+        options: of ``symphys.compile_step``.
+
+    Example:
+        >>> import jax, symphys.jax
+        >>> jax.config.update("jax_enable_x64", True)
+        >>> step = symphys.jax.step("cart_pole")
+        >>> state, observation, inputs = step.start(4)
+        >>> cost = lambda action: step(state, action).cost.sum()
+        >>> jax.jit(jax.grad(cost))(jax.numpy.ones((4, step.action_size))).shape
+        (4, 1)
+    """
+    return JaxStep(problem, controllers, **options)
+
+
+class JaxRollout:
+    """A problem's rollout as a function of Z (B, n): the value of each row, and quantities over time if asked for."""
+
+    def __init__(self, problem: Source, *quantities: str, smoothing: float = 0.0, backend: str = "auto") -> None:
+        """See ``rollout``."""
+        require_double()
+        self.compiled: CompiledRollout = compile(problem, smoothing, backend)
+        self.recording = self.compiled.recording(*quantities) if quantities else None
+
+    def z(self, values: Mapping[str, ArrayLike] | None = None, /, **variables: ArrayLike) -> Array:
+        """(n,): the guess, with some variables replaced by name."""
+        return jnp.asarray(self.compiled.z(values, **variables))
+
+    def __call__(self, Z: Array) -> Any:
+        """(B,) the values of Z (B, n); with quantities (value, quantity, ...), each (B, N, k) at the ends of steps."""
+        rows = jnp.asarray(Z, np.float64)
+        return rollout_value(self.compiled, rows) if self.recording is None else recorded_value(self.recording, rows)
+
+
+class JaxStep:
+    """One step with the commands open, for batches of states and actions; see ``symphys.compile_step``."""
+
+    def __init__(self, problem: Source, controllers: Sequence[str] | None = None, **options: Any) -> None:
+        """See ``step``."""
+        require_double()
+        self.compiled: CompiledStep = compile_step(problem, controllers, **options)
+        self.state_size, self.action_size = self.compiled.state_size, self.compiled.action_size
+        self.observation_size, self.steps = self.compiled.observation_size, self.compiled.steps
+
+    def start(self, count: int = 1, seed: int | None = None) -> StepStart:
+        """Where motions begin; see ``CompiledStep.start``."""
+        return StepStart(*(jnp.asarray(part) for part in self.compiled.start(count, seed)))
+
+    def __call__(self, state: Array, action: Array, inputs: Array | None = None) -> StepResult:
+        """State and observation after a step, and its cost; gradients flow to the state, the action and the inputs.
+
+        Args:
+            state: (B, s).
+            action: (B, m).
+            inputs: (B, i) what acts besides, ``start.inputs[:, k]``; None: what the guess has at that time.
+        """
+        given = None if inputs is None else jnp.asarray(inputs, np.float64)
+        return StepResult(*step_value(self.compiled, jnp.asarray(state), jnp.asarray(action, np.float64), given))
+
+
+def require_double() -> None:
+    """SymphysError where JAX computes in single precision."""
+    if not jax.config.jax_enable_x64:
+        text = 'JAX is set to single precision; say jax.config.update("jax_enable_x64", True) first'
+        raise SymphysError(f"symphys.jax computes in double precision: {text}")
+
+
+@partial(jax.custom_vjp, nondiff_argnums=(0,))
+def rollout_value(compiled: CompiledRollout, Z: Array) -> Array:
+    """See ``JaxRollout``."""
+    return on_host(lambda rows: (compiled.value(rows),), [Z], [()])[0]
+
+
+def rollout_forward(compiled: CompiledRollout, Z: Array) -> tuple[Array, Array]:
+    """The value, and the gradient for the way back."""
+    value, slope = on_host(compiled.value_and_gradient, [Z], [(), (compiled.n,)])
+    return value, slope
+
+
+def rollout_backward(_compiled: CompiledRollout, slope: Array, adjoint: Array) -> tuple[Array]:
+    """The adjoint of Z."""
+    return (adjoint[..., None] * slope,)
+
+
+rollout_value.defvjp(rollout_forward, rollout_backward)
+
+
+@partial(jax.custom_vjp, nondiff_argnums=(0,))
+def recorded_value(recording: RecordedRollout, Z: Array) -> tuple[Array, ...]:
+    """See ``JaxRollout``."""
+
+    def called(rows: Any) -> tuple[Any, ...]:
+        value, found = recording.forward(rows)
+        return (value, *found.values())
+
+    return on_host(called, [Z], [(), *((recording.steps, size) for size in recording.quantities.values())])
+
+
+def recorded_forward(recording: RecordedRollout, Z: Array) -> tuple[tuple[Array, ...], Array]:
+    """The same, and Z for the way back."""
+    return recorded_value(recording, Z), Z
+
+
+def recorded_backward(recording: RecordedRollout, Z: Array, adjoints: tuple[Array, ...]) -> tuple[Array]:
+    """The adjoint of Z."""
+
+    def pulled(rows: Any, value: Any, *found: Any) -> tuple[Any]:
+        return (recording.pull(rows, value, dict(zip(recording.quantities, found, strict=True))),)
+
+    return (on_host(pulled, [Z, *adjoints], [Z.shape[-1:]])[0],)
+
+
+recorded_value.defvjp(recorded_forward, recorded_backward)
+
+
+@partial(jax.custom_vjp, nondiff_argnums=(0,))
+def step_value(step: CompiledStep, state: Array, action: Array, inputs: Array | None) -> tuple[Array, ...]:
+    """See ``JaxStep``."""
+    called = [state, action] if inputs is None else [state, action, inputs]
+    return on_host(lambda *rows: tuple(step(*rows)), called, [(step.state_size,), (step.observation_size,), ()])
+
+
+def step_forward(
+    step: CompiledStep, state: Array, action: Array, inputs: Array | None
+) -> tuple[tuple[Array, ...], tuple[Array, Array, Array | None]]:
+    """The step, and what it was called with for the way back."""
+    return step_value(step, state, action, inputs), (state, action, inputs)
+
+
+def step_backward(step: CompiledStep, called: tuple[Array, ...], adjoints: tuple[Array, ...]) -> tuple[Array, ...]:
+    """The adjoints of state, action and inputs."""
+    state, action, inputs = called
+    rows = [state, action, *adjoints] + ([] if inputs is None else [inputs])
+    sizes = [(step.state_size,), (step.action_size,), (step.input_size,)]
+    slopes = on_host(step.pull, rows, sizes)
+    return (*slopes[:2], None if inputs is None else slopes[2])
+
+
+step_value.defvjp(step_forward, step_backward)
+
+
+def on_host(function: Any, arguments: Sequence[Array], sizes: Sequence[tuple[int, ...]]) -> tuple[Array, ...]:
+    """A function of batches, called from the host; axes before the last are all the batch.
+
+    Args:
+        function: of arrays with one axis for the batch, or two axes; gives a tuple of such arrays.
+        arguments: (..., k) or, of numbers, (...).
+        sizes: of the results behind the batch: (k,), or () for numbers.
+    """
+    batch = arguments[0].shape[:-1]
+
+    def called(*given: Any) -> tuple[Any, ...]:
+        lead = np.shape(given[0])[:-1]
+        rows = [np.reshape(each, (-1, *np.shape(each)[len(lead) :])) for each in map(np.asarray, given)]
+        return tuple(np.reshape(part, (*lead, *size)) for part, size in zip(function(*rows), sizes, strict=True))
+
+    results = tuple(jax.ShapeDtypeStruct((*batch, *size), np.float64) for size in sizes)
+    found: tuple[Array, ...] = jax.pure_callback(called, results, *arguments, vmap_method="broadcast_all")
+    return found

@@ -1,0 +1,69 @@
+"""Units of the quantities that formulas name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from symphys.model.joints import Joint, Servo, TorqueMotor, VelocityMotor
+from symphys.model.world import World
+from symphys.problem.model import ALIVE, Variable
+
+UNITS = {
+    "position": "m",
+    "orientation": "",
+    "velocity": "m/s",
+    "angular_velocity": "rad/s",
+    "gyro": "rad/s",
+    "accelerometer": "m/s^2",
+    "force": "N",
+    "torque": "N m",
+    "contact_force": "N",
+    "reaction_force": "N",
+    "reaction_torque": "N m",
+    "lag": "s",
+    "mass": "kg",
+    "radius": "m",
+    "offset": "m",
+    "gravity": "m/s^2",
+    "friction": "",
+    "restitution": "",
+}
+"""By the last part of a name; world frame. A pure number has none."""
+TURNING = {
+    **dict.fromkeys(("motor", "lower", "upper", "spring", "torque"), "N m"),
+    **{"lock": "N, then N m", "gain": "1/s", "angle": "rad", "rate": "rad/s", "velocity": "rad/s", "rest": "rad"},
+    **{"stiffness": "N m/rad", "damping": "N m s/rad"},
+}
+SLIDING = {
+    **dict.fromkeys(("motor", "lower", "upper", "spring", "torque"), "N"),
+    **{"lock": "N, then N m", "gain": "1/s", "position": "m", "rate": "m/s", "velocity": "m/s", "rest": "m"},
+    **{"stiffness": "N/m", "damping": "N s/m"},
+}
+"""Of what belongs to joints, likewise."""
+
+
+def quantity_unit(name: str, world: World) -> str | None:
+    """Of a quantity by its name; None where it is not known."""
+    owner, _, key = name.rpartition(".")
+    joint = next((joint for joint in world.joints if joint.name == owner), None)
+    return UNITS.get(key) if joint is None else joint_unit(joint, key)
+
+
+def joint_unit(joint: Joint, key: str) -> str | None:
+    """Of a quantity of a joint; a command has that of what its motor follows."""
+    units = SLIDING if any(not coordinate.turns for coordinate in joint.kind.coordinates) else TURNING
+    if key != "command":
+        return units.get(key)
+    followed = {Servo: "rest", VelocityMotor: "velocity", TorqueMotor: "torque"}
+    return next((units[what] for kind, what in followed.items() if isinstance(joint.motor, kind)), None)
+
+
+def formula_units(world: World, names: Iterable[str], variables: Iterable[Variable]) -> dict[str, str]:
+    """The units of those of the names in formulas that are known; of a variable, that of all that it sets."""
+    mixed = {joint.name for joint in world.joints if len({each.turns for each in joint.kind.coordinates}) > 1}
+    known = {name: quantity_unit(name, world) for name in names if name.rpartition(".")[0] not in mixed}
+    for variable in variables:
+        units = {quantity_unit(slot.name, world) for slot in variable.slots}
+        known[variable.name] = units.pop() if len(units) == 1 else None
+    known |= {"time": "s", ALIVE: ""}
+    return {name: unit for name, unit in known.items() if unit is not None}

@@ -1,0 +1,351 @@
+"""One step for batches of states and actions: values, and what adjoints become on their way back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple, Protocol
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from symphys.codegen import Kernel, KernelUnavailable, ProgramError, processors
+from symphys.codegen.backends import BEST, PRECISIONS, build_kernel
+from symphys.problem import ALIVE, Problem
+from symphys.transcription.decision_variables import start_of
+from symphys.transcription.open_step.opening import Opening, opened
+from symphys.transcription.open_step.program import (
+    RESULTS,
+    VirtualMachineOpenStep,
+    body_columns,
+    looks_at_variables,
+    moments,
+    open_program,
+    sense_function,
+)
+from symphys.transcription.randomization.sampler import Sampler
+from symphys.transcription.rollout import Rollout, symbolic_rollout
+
+Array = NDArray[np.float64]
+
+
+class StepStart(NamedTuple):
+    """Where motions begin: ``state`` (B, s), ``observation`` (B, o), and the ``inputs`` (B, N, i) of all steps.
+
+    Arrays of numpy, or of the library that they were asked of.
+    """
+
+    state: Array
+    observation: Array
+    inputs: Array
+
+
+class StepResult(NamedTuple):
+    """What a step gives: ``state`` (B, s) and ``observation`` (B, o) after it, and its ``cost`` (B,)."""
+
+    state: Array
+    observation: Array
+    cost: Array
+
+
+class Evaluated(Protocol):
+    """What computes rows: a kernel, or casadi's virtual machine."""
+
+    def forward(self, rows: Array, parameters: Sequence[float]) -> Mapping[str, Array]:
+        """(B, m) -> results by name."""
+
+    def gradient(self, rows: Array, seeds: Array, parameters: Sequence[float]) -> tuple[Any, Array]:
+        """(B, m), (B, all sizes) -> something, and the slopes (B, m) of seeds . results."""
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledStep:
+    """One time step of a problem whose commands are actions, for batches of states.
+
+    A state is a row of numbers, with the parameters that vary and the time in it. It begins with the positions and
+    velocities of the bodies; ``columns`` says where each lies. Costs of all steps of a horizon add up to the
+    objective of the problem; its constraints are no part of them.
+
+    Attributes:
+        problem: that was opened, without the controllers whose place the actions take.
+        actions: what each action adds to, such as ``knee.command``.
+        lower, upper: (m,) bounds of the actions, which are not enforced; may be infinite.
+        smoothing: of the contacts [m/s].
+        backend: what evaluates, in words.
+    """
+
+    problem: Problem
+    actions: tuple[str, ...]
+    lower: Array
+    upper: Array
+    smoothing: float
+    backend: str
+    _opening: Opening
+    _place: Array
+    _rollout: Rollout
+    _sampler: Sampler | None
+    _evaluated: Evaluated
+
+    @property
+    def state_size(self) -> int:
+        """Numbers in a state."""
+        return sum(self._sizes)
+
+    @property
+    def action_size(self) -> int:
+        """Numbers in an action."""
+        return len(self.actions)
+
+    @property
+    def input_size(self) -> int:
+        """Numbers that act on the world in a step: forces, torques and commands, in all."""
+        return len(self._place)
+
+    @cached_property
+    def observation_size(self) -> int:
+        """Numbers in an observation."""
+        return int(self._start.size1_out(3))
+
+    @cached_property
+    def observations(self) -> tuple[str, ...]:
+        """What each number of an observation is: ``feeling[0]`` of a sensor, or ``ball.position[2]``."""
+        sizes = {sensor.name: sensor.size for sensor in self.problem.sensors}
+        parts = [(name, sizes[name]) for name in self._opening.sensors]
+        parts = parts or [(name, part.stop - part.start) for name, part in body_columns(self._rollout)]
+        return tuple(f"{name}[{k}]" for name, count in parts for k in range(count))
+
+    @cached_property
+    def columns(self) -> dict[str, slice]:
+        """Where quantities lie in a state: ``ball.position`` (3) [m], ``ball.velocity``, ..., world frame."""
+        return dict(body_columns(self._rollout))
+
+    @property
+    def steps(self) -> int:
+        """N, in the duration of the problem."""
+        return self._rollout.steps
+
+    def start(self, count: int = 1, seed: int | None = None) -> StepStart:
+        """Where motions begin.
+
+        Args:
+            count: B.
+            seed: None: all begin as the guess does. A number: samples of the problem's [[scenario]] tables, the first
+                of them the problem's own; without such tables all are alike.
+        """
+        guess = np.concatenate([np.zeros(0), *(variable.guess for variable in self._opening.problem.variables)])
+        if self._sampler is None or seed is None:
+            hidden = np.zeros(0) if self._sampler is None else self._sampler.nominal
+            rows = [np.concatenate([guess, hidden])]
+        else:
+            drawn = self._sampler.draw(np.random.default_rng(seed), count, 1.0)
+            rows = [np.concatenate([guess, row]) for row in drawn]
+        return self.start_at(rows) if len(rows) == count else StepStart(*(tiled(p, count) for p in self.start_at(rows)))
+
+    def start_at(self, rows: Sequence[Array]) -> StepStart:
+        """Where motions begin, of values of all variables, a row each."""
+        x, inputs, p, sensed = (np.array(part) for part in zip(*map(self._started, rows), strict=True))
+        z = [np.array(rows)] if self._sizes[-1] else []
+        state = np.concatenate([x, p, np.zeros((len(x), 1)), *z], axis=1)
+        return StepStart(state, sensed, inputs.reshape(len(x), self.steps, -1))
+
+    def __call__(self, state: ArrayLike, action: ArrayLike, inputs: ArrayLike | None = None) -> StepResult:
+        """Take a step.
+
+        Args:
+            state: (B, s).
+            action: (B, m).
+            inputs: (B, i) what acts besides, ``start.inputs[:, k]``; None: what the guess has at that time.
+
+        Returns:
+            State and observation after it, and its cost. Numbers that are not finite are returned as they are.
+        """
+        states = matrix("state", state, self.state_size)
+        rows = self._rows(states, matrix("action", action, self.action_size), inputs)
+        found = self._evaluated.forward(rows, (self.smoothing,))
+        after = states.copy()
+        after[:, : self._sizes[0]] = found["after"]
+        after[:, self._clock] += self._rollout.dt
+        cost = np.array(found["running"][:, 0])
+        if "moments" in found:
+            cost += np.sum(np.where(self._now(states), found["moments"], 0.0), axis=1)
+        return StepResult(after, np.array(found.get("sensed", np.zeros((len(rows), 0)))), cost)
+
+    def pull(
+        self,
+        state: ArrayLike,
+        action: ArrayLike,
+        after: ArrayLike,
+        observation: ArrayLike,
+        cost: ArrayLike,
+        inputs: ArrayLike | None = None,
+    ) -> tuple[Array, Array, Array]:
+        """Adjoints (B, s) of the state, (B, m) of the action and (B, i) of the inputs, from those of what a step gives.
+
+        Args:
+            state: (B, s), and the others as the step was called.
+            action: (B, m).
+            after: (B, s) adjoint of the state after the step.
+            observation: (B, o).
+            cost: (B,).
+            inputs: (B, i).
+        """
+        states = matrix("state", state, self.state_size)
+        rows = self._rows(states, matrix("action", action, self.action_size), inputs)
+        later, costs = matrix("after", after, self.state_size), np.asarray(cost, float)
+        nx, nu, np_, n = self._sizes[0], self._place.shape[0], self._sizes[1], self._sizes[-1]
+        seeds = {
+            "after": later[:, :nx],
+            "sensed": matrix("observation", observation, self.observation_size),
+            "running": costs[:, None],
+            "moments": np.where(self._now(states), costs[:, None], 0.0),
+        }
+        whole = np.concatenate([seeds[name] for name in RESULTS], axis=1)
+        _, slopes = self._evaluated.gradient(rows, np.ascontiguousarray(whole), (self.smoothing,))
+        x, u, p, now, then, z = np.split(slopes, np.cumsum([nx, nu, np_, 1, 1]), axis=1)
+        back = np.concatenate([x, p, now + then, z[:, :n]], axis=1)
+        back[:, nx:] += later[:, nx:]
+        return back, u @ self._place, u
+
+    def rest(self, state: ArrayLike) -> Array:
+        """(B,) what all steps that are left cost motions that are over, in which nothing moves any more."""
+        states = np.array(matrix("state", state, self.state_size))
+        still, special = np.zeros((len(states), self.action_size)), self._instants
+        ticks, total = self._ticks(states), np.zeros(len(states))
+        usual = next((k for k in range(self.steps) if k not in special), None)
+        for tick in [*special, *([] if usual is None else [usual])]:
+            states[:, self._clock] = tick * self._rollout.dt
+            ahead = (tick >= ticks).astype(float)
+            if tick == usual:
+                ahead = np.maximum(self.steps - ticks, 0) - sum(((k >= ticks).astype(float) for k in special), 0.0)
+            total += ahead * self(states, still).cost
+        return total
+
+    def alive(self, state: ArrayLike) -> NDArray[np.bool_]:
+        """(B,) whether a motion is not over by the problem's [termination]."""
+        states = matrix("state", state, self.state_size)
+        memory = self._rollout.memory
+        if not memory.terminates:
+            return np.ones(len(states), np.bool_)
+        return np.asarray(states[:, memory.columns[ALIVE].start] > 0)
+
+    def tick(self, state: ArrayLike) -> NDArray[np.int64]:
+        """(B,) how many steps lie behind a state."""
+        return self._ticks(matrix("state", state, self.state_size))
+
+    def _ticks(self, states: Array) -> NDArray[np.int64]:
+        return np.rint(states[:, self._clock] / self._rollout.dt).astype(np.int64)
+
+    def _now(self, states: Array) -> NDArray[np.bool_]:
+        """(B, moments): which instants fall into the step from here."""
+        wanted = [min(tick, self.steps - 1) for tick in moments(self.problem)]
+        return np.equal(self._ticks(states)[:, None], np.array(wanted, np.int64).reshape(1, -1))
+
+    @cached_property
+    def _instants(self) -> list[int]:
+        """The steps, by number, into which an instant falls."""
+        return sorted({min(tick, self.steps - 1) for tick in moments(self.problem)})
+
+    def _rows(self, states: Array, actions: Array, inputs: ArrayLike | None) -> Array:
+        """(B, m) of the kernel."""
+        nx, np_, count = self._sizes[0], self._sizes[1], len(states)
+        if len(actions) != count:
+            raise ValueError(f"{count} states and {len(actions)} actions: give one for each")
+        if inputs is None:
+            ticks = np.clip(self._ticks(states), 0, self.steps - 1)
+            given = self._nominal[ticks]
+        else:
+            given = matrix("inputs", inputs, self._place.shape[0])
+        u = given + actions @ self._place.T
+        now = states[:, self._clock, None]
+        parts = [states[:, :nx], u, states[:, nx : nx + np_], now, now + self._rollout.dt, states[:, self._clock + 1 :]]
+        return np.concatenate(parts, axis=1)
+
+    @cached_property
+    def _sizes(self) -> tuple[int, int, int, int]:
+        """Of x, p, time and z in a state."""
+        rollout = self._rollout
+        n = int(rollout.z.shape[0]) if looks_at_variables(self.problem) else 0
+        return int(rollout.x0.shape[0]), int(rollout.p.shape[0]), 1, n
+
+    @property
+    def _clock(self) -> int:
+        """The column of the time."""
+        return self._sizes[0] + self._sizes[1]
+
+    @cached_property
+    def _nominal(self) -> Array:
+        """(N, i) what acts besides, as the guess has it."""
+        return np.asarray(self.start().inputs[0])
+
+    @cached_property
+    def _start(self) -> ca.Function:
+        """(z) -> x0, the inputs of all steps one after the other, p, what is observed."""
+        rollout = self._rollout
+        start = start_of(rollout.problem, rollout.world, rollout.inputs, rollout.parameters, rollout.z)
+        x0 = rollout.memory.start(start.x0)
+        sensed = sense_function(rollout, self._opening.sensors)(x0, start.p, 0.0)
+        results = [x0, ca.vec(start.u), start.p, sensed]
+        return ca.Function("start", [rollout.z], [ca.densify(result) for result in results]).expand()
+
+    def _started(self, z: Array) -> list[Array]:
+        return [np.array(part).ravel() for part in self._start.call([z])]
+
+
+def compile_open_step(
+    problem: Problem,
+    controllers: Sequence[str] | None = None,
+    sensors: Sequence[str] | None = None,
+    smoothing: float = 0.0,
+    backend: str = BEST,
+    threads: int | None = None,
+) -> CompiledStep:
+    """The step of a problem whose commands are actions; see ``symphys.compile_step``."""
+    opening = opened(problem, controllers, sensors)
+    sampler = None if opening.problem.scenarios is None else Sampler(opening.problem)
+    whole = opening.problem if sampler is None else sampler.problem
+    rollout = symbolic_rollout(whole, opening.inputs(whole))
+    count = processors() if threads is None else threads
+    evaluated, words = evaluated_by(rollout, opening, smoothing == 0, backend, count)
+    rest = replace(opening.problem, scenarios=None)
+    return CompiledStep(
+        problem=rest,
+        actions=opening.names(),
+        lower=opening.bounds("lower"),
+        upper=opening.bounds("upper"),
+        smoothing=smoothing,
+        backend=words,
+        _opening=opening,
+        _place=opening.place(rollout.world, rollout.inputs),
+        _rollout=rollout,
+        _sampler=sampler,
+        _evaluated=evaluated,
+    )
+
+
+def evaluated_by(rollout: Rollout, opening: Opening, exact: bool, backend: str, threads: int) -> tuple[Evaluated, str]:
+    """What computes the step, and that in words; casadi's virtual machine where there can be no kernel."""
+    note = ""
+    if backend in PRECISIONS:
+        try:
+            program = open_program(rollout, opening.sensors, exact)
+            seeded = [name for name in RESULTS if name in program.outputs]
+            kernel: Kernel = build_kernel(backend, program, seeded, threads)
+            return kernel, f"{kernel.report.precision} precision, lanes {kernel.report.lanes}, threads {kernel.threads}"
+        except (KernelUnavailable, ProgramError) as error:
+            note = f"; {error}"
+    return VirtualMachineOpenStep(rollout, opening.sensors), f"casadi's virtual machine{note}"
+
+
+def matrix(name: str, value: ArrayLike, columns: int) -> Array:
+    """(B, columns); ValueError, which names the shape that fits."""
+    array = np.asarray(value, float)
+    if array.ndim != 2 or array.shape[1] != columns:
+        raise ValueError(f"{name} must be (batch, {columns}), not {array.shape}")
+    return array
+
+
+def tiled(row: Array, count: int) -> Array:
+    """One row, as often as that."""
+    return np.repeat(row, count, axis=0)

@@ -1,0 +1,188 @@
+"""A problem with its controllers taken off: what acts instead of them, and within which bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.errors import Issue, ProblemError, SymphysError
+from symphys.model.controllers import Net
+from symphys.model.joints import Joint, Servo, TorqueMotor
+from symphys.model.state_layout import input_columns, input_sizes, inputs_size
+from symphys.model.world import World
+from symphys.problem import Controller, Problem, Variable
+from symphys.suggest import hint, quote
+from symphys.transcription.formula_names import input_names
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Action:
+    """One number that acts: what it is added to, times ``scale``, and its bounds."""
+
+    input: str
+    component: int
+    scale: float
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
+class Opening:
+    """A problem whose commands are actions from outside.
+
+    Attributes:
+        problem: without the controllers and variables whose place the actions take.
+        acting: what acts.
+        sensors: names of the sensors that are observed; empty: the states of all bodies are.
+    """
+
+    problem: Problem
+    acting: tuple[Action, ...]
+    sensors: tuple[str, ...]
+
+    def names(self) -> tuple[str, ...]:
+        """The input and component that each action adds to: ``knee.command``, ``ball.force[2]``."""
+        sizes = input_sizes(self.problem.world())
+        return tuple(a.input if sizes[a.input] == 1 else f"{a.input}[{a.component}]" for a in self.acting)
+
+    def bounds(self, end: Literal["lower", "upper"]) -> Array:
+        """(m,) of the actions; may be infinite."""
+        return np.array([getattr(action, end) for action in self.acting], float)
+
+    def inputs(self, problem: Problem) -> tuple[str, ...]:
+        """What u stacks: the inputs of a problem, and those that actions add to."""
+        return tuple(dict.fromkeys([*input_names(problem), *(action.input for action in self.acting)]))
+
+    def place(self, world: World, inputs: Sequence[str]) -> Array:
+        """(nu, m) what an action adds to u, which stacks ``inputs``."""
+        columns = input_columns(world, inputs)
+        place = np.zeros((inputs_size(world, inputs), len(self.acting)))
+        for k, action in enumerate(self.acting):
+            place[columns[action.input].start + action.component, k] = action.scale
+        return place
+
+
+def opened(problem: Problem, controllers: Sequence[str] | None = None, sensors: Sequence[str] | None = None) -> Opening:
+    """Take controllers off a problem.
+
+    Args:
+        problem: any.
+        controllers: names of those whose outputs become actions. None: those whose numbers a variable sets, or else
+            all; without any, the inputs that variables set over time; without these, the commands of all motors.
+        sensors: names of those that are observed. None: those that the controllers sense, or else all.
+
+    Raises:
+        SymphysError: there is no such controller or sensor, or nothing that could act.
+        ProblemError: a formula looks at the numbers of a controller that is taken off.
+    """
+    taken = chosen(problem, controllers)
+    names = {name for controller in taken for name in controller.weights}
+    dropped = [variable for variable in problem.variables if any(slot.name in names for slot in variable.slots)]
+    actions = [action for controller in taken for action in outputs(controller)]
+    if not taken:
+        dropped = [variable for variable in problem.variables if variable.kind == "control"]
+        actions = [action for variable in dropped for action in knots(variable)] or commands(problem)
+    if not actions:
+        text = "nothing can act: it has no controller, no motor, and no variable that sets an input over time"
+        raise SymphysError(f"{problem.name}: {text}")
+    refuse_formulas(problem, {**dict.fromkeys(names, "nothing else"), **{v.name: slots(v) for v in dropped}})
+    rest = replace(
+        problem,
+        variables=tuple(variable for variable in problem.variables if variable not in dropped),
+        controllers=tuple(controller for controller in problem.controllers if controller not in taken),
+    )
+    return Opening(rest, tuple(actions), observed(problem, taken, sensors))
+
+
+def chosen(problem: Problem, names: Sequence[str] | None) -> tuple[Controller, ...]:
+    """The controllers that are taken off."""
+    known = {controller.name: controller for controller in problem.controllers}
+    if names is None:
+        varied = {slot.name for variable in problem.variables for slot in variable.slots}
+        learning = tuple(each for each in known.values() if not varied.isdisjoint(each.weights))
+        return learning or tuple(known.values())
+    return tuple(known[known_name(name, known, "controller")] for name in names)
+
+
+def observed(problem: Problem, taken: Sequence[Controller], names: Sequence[str] | None) -> tuple[str, ...]:
+    """The sensors that are observed."""
+    known = [sensor.name for sensor in problem.sensors]
+    if names is not None:
+        return tuple(known_name(name, known, "sensor") for name in names)
+    return tuple(dict.fromkeys(name for controller in taken for name in controller.senses)) or tuple(known)
+
+
+def known_name(name: str, known: Sequence[str] | dict[str, Controller], kind: str) -> str:
+    """The name; SymphysError where nothing is called so."""
+    if name not in known:
+        there = hint(name, known) if known else "there is none"
+        raise SymphysError(f"no {kind} is called {quote(name)}; {there}")
+    return name
+
+
+def outputs(controller: Controller) -> list[Action]:
+    """What a controller gives, before it is scaled."""
+    law = controller.law
+    most = 1.0 if isinstance(law, Net) and law.output == "tanh" and not law.skip else np.inf
+    return [
+        Action(name, component, float(scale), -most, most)
+        for (name, component), scale in zip(controller.drives, controller.scale, strict=True)
+    ]
+
+
+def knots(variable: Variable) -> list[Action]:
+    """What a variable sets over time, with the widest bounds of its knots."""
+    count = variable.components
+    lower, upper = variable.lower.reshape(-1, count).min(axis=0), variable.upper.reshape(-1, count).max(axis=0)
+    return [
+        Action(slot.name, component, 1.0, float(lower[k]), float(upper[k]))
+        for slot in variable.slots
+        for k, component in enumerate(slot.components)
+    ]
+
+
+def commands(problem: Problem) -> list[Action]:
+    """The commands of all motors."""
+    found = []
+    for joint in problem.world().joints:
+        if joint.motor is not None:
+            for k in range(len(joint.kind.coordinates)):
+                found.append(Action(f"{joint.name}.command", k, 1.0, *reach(joint, k)))
+    return found
+
+
+def reach(joint: Joint, k: int) -> tuple[float, float]:
+    """Bounds of a command: the limits of the joint for a servo, else the largest torque or velocity."""
+    motor = joint.motor
+    if isinstance(motor, Servo):
+        widest = np.pi if joint.kind.coordinates[k].turns else np.inf
+        widest = widest if motor.range is None else float(motor.range)
+        lower, upper = joint.limits.lower, joint.limits.upper
+        return -widest if lower is None else float(lower), widest if upper is None else float(upper)
+    assert motor is not None, "a joint without a motor has no commands"
+    most = float(motor.torque if isinstance(motor, TorqueMotor) else motor.velocity)
+    return -most, most
+
+
+def slots(variable: Variable) -> str:
+    """What a variable sets, as formulas name it."""
+    return " or ".join(slot.name for slot in variable.slots)
+
+
+def refuse_formulas(problem: Problem, taken: Mapping[str, str]) -> None:
+    """ProblemError if a cost or target looks at what is taken off, by name; the values say what to look at instead."""
+    issues = [
+        Issue(f'{kind} "{each.name}"', f"looks at {name}, whose place the actions take; it may look at {instead}")
+        for kind, every in (("cost", problem.costs), ("target", problem.targets))
+        for each in every
+        for name, instead in taken.items()
+        if name in each.formula.names
+    ]
+    if issues:
+        raise ProblemError(problem.file, issues)

@@ -1,0 +1,207 @@
+"""Targets that cannot be met together: counted against the unknowns, contradicting near z, or opposed at z."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.problem import Target
+from symphys.shooting import ShootingProblem
+from symphys.trajectory import NotFinite
+from symphys.transcription import Record, Rollout, Transcription
+from symphys.verification.held_bounds import lies_at
+from symphys.verification.sensitivity_growth import DIRECTIONS
+
+Array = NDArray[np.float64]
+
+MOST_COMPONENTS = 16
+"""Components of targets up to which contradictions are looked for."""
+MORE_SAMPLES = 2
+"""Points beside z beyond one for each component."""
+NEAREST, FURTHEST = 1e-2, 0.5
+"""Between these distances from z the points lie, in units of the variables' scales."""
+DEPENDENT = 1e-6
+"""Changes whose combination is below this share of theirs depend on each other."""
+STILL = 1e-9
+"""A component that changes by less, relative to 1 + its size, does not change."""
+OPPOSED = 1e-2
+"""Gradients whose sum is below this share of the sum of their lengths hold each other."""
+SHARE = 0.05
+"""Who takes part in less than this share of the largest part is not named."""
+
+
+@dataclass(frozen=True)
+class TargetSample:
+    """A target at its own instant of a rollout: its value (m,), tolerance, and where its formula is evaluated."""
+
+    target: Target
+    function: ca.Function
+    k: int
+    arguments: tuple[Array, ...]
+    value: Array
+
+    @property
+    def missed(self) -> bool:
+        """Whether it is not within its tolerance."""
+        return not float(np.linalg.norm(self.value)) <= self.target.tolerance
+
+
+def target_conflicts(transcription: Transcription, record: Record) -> dict[str, Any]:
+    """Which targets stand against each other at the z of ``record``.
+
+    Returns:
+        "equations", the number of components of all targets, and "unknowns", that of the components of z that may vary;
+        0 equations where everything is met. "contradicting": names of targets that cannot all be met as long as the
+        motion changes with z as it does nearby, since some combination of their values stays the same, and too large.
+        "opposed": names of targets whose gradients cancel at z: what brings one nearer takes another away. Both are
+        empty where none was found, or for problems with large nets.
+    """
+    shooting = transcription.shooting
+    functions = [transcription.rollout.compiled(target.formula) for target in transcription.problem.targets]
+    samples = target_samples(transcription.rollout, record, functions)
+    if not any(sample.missed for sample in samples):
+        return {"equations": 0, "unknowns": 0, "contradicting": [], "opposed": []}
+    free = shooting.stacked("lower") < shooting.stacked("upper")
+    found = {"equations": sum(sample.value.size for sample in samples), "unknowns": int(free.sum())}
+    slopes = target_slopes(transcription, record, samples) if len(samples) > 1 else None
+    if slopes is None or not np.isfinite(slopes).all():
+        return found | {"contradicting": [], "opposed": []}
+    names = [sample.target.name for sample in samples]
+    held = opposed(slopes * shooting.stacked("scale"), pushed(shooting, record.z, slopes.sum(axis=0)) | ~free)
+    missed = any(samples[i].missed for i in held)
+    return found | {
+        "contradicting": [names[i] for i in contradicting(transcription, samples, record.z, free)],
+        "opposed": [names[i] for i in held if missed],
+    }
+
+
+def target_samples(rollout: Rollout, record: Record, functions: Sequence[ca.Function]) -> list[TargetSample]:
+    """Every target of a rollout, whose formulas are compiled to these ``functions``."""
+    arrays, found = record.arrays, []
+    for target, function in zip(rollout.problem.targets, functions, strict=True):
+        k = rollout.tick(target.at)
+        u = arrays.u[min(k, rollout.steps - 1)]
+        arguments = (arrays.x[k], u, arrays.p, np.array([k * rollout.dt]), arrays.z)
+        found.append(TargetSample(target, function, k, arguments, np.array(function(*arguments)).ravel()))
+    return found
+
+
+def target_slopes(transcription: Transcription, record: Record, samples: list[TargetSample]) -> Array | None:
+    """(T, n): of weight * |value|^2 by z; None where a formula depends on inputs, or for problems with large nets."""
+    rows: list[Array] = []
+    for first in range(0, len(samples), DIRECTIONS):
+        some, states = samples[first : first + DIRECTIONS], dict[int, Array]()
+        by_p = np.zeros((record.arrays.p.size, DIRECTIONS))
+        direct = np.zeros((record.arrays.z.size, DIRECTIONS))
+        for column, sample in enumerate(some):
+            parts = _by_arguments(sample)
+            if parts is None:
+                return None
+            by_x, by_p[:, column], direct[:, column] = parts
+            states.setdefault(sample.k, np.zeros((by_x.size, DIRECTIONS)))[:, column] = by_x
+        pulled = transcription.pull(record, states, by_p)
+        if pulled is None:
+            return None
+        rows += list((pulled + direct).T[: len(some)])
+    return np.array(rows)
+
+
+def _by_arguments(sample: TargetSample) -> tuple[Array, Array, Array] | None:
+    """Derivatives of weight * |value|^2 by x, p and z; None where inputs have a part in it."""
+    inputs = sample.function.sx_in()
+    (value,) = sample.function.call(inputs)
+    if inputs[1].shape[0] and ca.depends_on(value, inputs[1]):
+        return None
+    number = sample.target.weight * ca.sumsqr(value)
+    slopes = [ca.densify(ca.gradient(number, inputs[i])) for i in (0, 2, 4)]
+    x, p, z = ca.Function("slopes", inputs, slopes)(*sample.arguments)
+    return np.array(x).ravel(), np.array(p).ravel(), np.array(z).ravel()
+
+
+def pushed(shooting: ShootingProblem, z: Array, slope: Array) -> NDArray[np.bool_]:
+    """(n,): which components lie at a bound that a step down the slope would leave."""
+    lower, upper = (lies_at(z, shooting.stacked(side)) for side in ("lower", "upper"))
+    return np.asarray((lower & (slope > 0)) | (upper & (slope < 0)))
+
+
+def opposed(slopes: Array, fixed: NDArray[np.bool_]) -> list[int]:
+    """Which of the gradients (T, n), ``fixed`` (n,) components left out, cancel; none or at least two."""
+    slopes = np.where(fixed, 0.0, slopes)
+    lengths = np.linalg.norm(slopes, axis=1)
+    if float(np.linalg.norm(slopes.sum(axis=0))) > OPPOSED * float(lengths.sum()):
+        return []
+    parts = np.flatnonzero(lengths > max(SHARE * float(lengths.max(initial=0.0)), STILL))
+    return parts.tolist() if parts.size > 1 else []
+
+
+def contradicting(
+    transcription: Transcription, samples: list[TargetSample], z: Array, free: NDArray[np.bool_]
+) -> list[int]:
+    """Which targets cannot all be met near z; none or at least two.
+
+    Points beside z show which combinations of components stay the same. As these do not change, no z nearby makes all
+    components, in units of their tolerances, smaller than their part in such combinations. Where that is longer than
+    sqrt(T), one of the T targets is missed.
+    """
+    here = joined(samples)
+    owners = np.repeat(np.arange(len(samples)), [sample.value.size for sample in samples])
+    if here.size > MOST_COMPONENTS:
+        return []
+    changes = _changes(transcription, samples, z, free)
+    if changes is None:
+        return []
+    tolerances = np.array([samples[i].target.tolerance for i in owners])
+    part = constant_part(here / tolerances, changes / tolerances[:, None], 1 / tolerances)
+    if float(np.linalg.norm(part)) <= np.sqrt(len(samples)):
+        return []
+    shares = np.array([np.linalg.norm(part[owners == i]) for i in range(len(samples))])
+    found = np.flatnonzero(shares > SHARE * shares.max())
+    return found.tolist() if found.size > 1 else []
+
+
+def constant_part(values: Array, changes: Array, sizes: Array) -> Array:
+    """(m,): the part of ``values`` (m,) in the combinations that ``changes`` (m, k) leave as they are.
+
+    A component that does not change at all, beside rounding of ``sizes`` (m,) + |values|, takes no part.
+    """
+    lengths = np.linalg.norm(changes, axis=1)
+    moving = lengths > STILL * (sizes + np.abs(values))
+    part = np.zeros(values.size)
+    if moving.sum() < 2:
+        return part
+    left, singular, _ = np.linalg.svd(changes[moving] / lengths[moving, None])
+    constant = left[:, singular <= DEPENDENT * singular[0]]
+    if constant.shape[1]:
+        basis = np.linalg.qr(constant / lengths[moving, None])[0]
+        part[moving] = basis @ (basis.T @ values[moving])
+    return part
+
+
+def joined(samples: Sequence[TargetSample]) -> Array:
+    """(m,): the values of all targets, one after the other."""
+    return np.concatenate([sample.value for sample in samples])
+
+
+def _changes(
+    transcription: Transcription, samples: Sequence[TargetSample], z: Array, free: NDArray[np.bool_]
+) -> Array | None:
+    """(m, k >= m): what the components change by from z to points beside it; None where too few are simulated."""
+    shooting, rng = transcription.shooting, np.random.default_rng(3)
+    here, lower, upper = joined(samples), shooting.stacked("lower"), shooting.stacked("upper")
+    changes = []
+    for distance in np.geomspace(NEAREST, FURTHEST, here.size + MORE_SAMPLES):
+        way = np.where(free, rng.standard_normal(z.size), 0.0)
+        step = distance * shooting.stacked("scale") * way / (float(np.linalg.norm(way)) or 1.0)
+        inside = (z + step >= lower) & (z + step <= upper)
+        try:
+            record = transcription.record(np.clip(z + np.where(inside, step, -step), lower, upper))
+        except NotFinite:
+            continue
+        beside = target_samples(transcription.rollout, record, [sample.function for sample in samples])
+        changes.append(joined(beside) - here)
+    return np.array(changes).T if len(changes) >= here.size else None

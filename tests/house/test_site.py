@@ -1,0 +1,125 @@
+"""The site is whole: its reference is current, its pages are listed, its links lead somewhere, its notebook runs."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+from urllib.parse import unquote
+
+import pytest
+from markdown_it import MarkdownIt
+from markdown_pages import ROOT, pages
+
+import symphys
+from symphys.codegen import KernelUnavailable
+from symphys.codegen.toolchain.compiler import find_compiler
+from symphys.problem import reference_page
+from symphys.solvers import SOLVERS
+
+DOCS = ROOT / "docs"
+NOTEBOOK = DOCS / "ball_throw.ipynb"
+RUNNER = ROOT / "tests" / "run_notebook.py"
+INCLUDE = re.compile(r"^```\{include\} (\S+)$", re.MULTILINE)
+ADDRESS = re.compile(r"\w+://|mailto:")
+
+
+def test_the_reference_is_what_the_schema_says() -> None:
+    written = (DOCS / "problem_reference.md").read_text(encoding="utf-8")
+    current = reference_page({name: each.Options for name, each in SOLVERS.items()})
+    assert written == current, "the schema or an option of a solver has changed: run `make reference`"
+
+
+def test_every_public_name_is_in_the_reference_of_the_package() -> None:
+    """As an entry of its own; a new name needs a line in docs/api.md."""
+    text = (DOCS / "api.md").read_text(encoding="utf-8")
+    entries = set(re.findall(r"^\.\. (?:auto|py:)\w+:: (?:symphys\.)?([\w.]+)(?:\(.*\))?$", text, re.MULTILINE))
+    assert [name for name in dir(symphys) if name not in entries] == []
+
+
+def test_every_page_is_in_the_index() -> None:
+    """Once, in a table of contents of its folder's index; what those name exists."""
+    for index in sorted(DOCS.rglob("index.md")):
+        tables = re.findall(r"^```\{toctree\}\n(.*?)^```", index.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+        lines = [line.strip() for table in tables for line in table.splitlines()]
+        listed = [line for line in lines if line and not line.startswith(":")]
+        here = {path.stem for path in index.parent.iterdir() if path.suffix in (".md", ".ipynb")} - {"index"}
+        below = {f"{path.parent.name}/index" for path in index.parent.glob("*/index.md")}
+        assert sorted(listed) == sorted(here | below), f"{index.relative_to(ROOT)} and its folder"
+
+
+@cache
+def anchors(path: Path) -> frozenset[str]:
+    """The anchors of a page's headings, as code hosts and the site make them; those of included pages, too."""
+    text = path.read_text(encoding="utf-8")
+    tokens = MarkdownIt("commonmark").parse(text)
+    titles = [tokens[k + 1].content for k, token in enumerate(tokens) if token.type == "heading_open"]
+    plain = [re.sub(r"\[([^\]]*)\]\([^)]*\)|[*`]", r"\1", title) for title in titles]
+    found = [re.sub(r"[^\w\- ]", "", title.lower()).strip().replace(" ", "-") for title in plain]
+    numbered = [name if not (n := found[:k].count(name)) else f"{name}-{n}" for k, name in enumerate(found)]
+    return frozenset(numbered).union(*(anchors(path.parent / name) for name in INCLUDE.findall(text)))
+
+
+def links(page: str) -> list[str]:
+    """What the links and pictures of a page lead to, addresses on the network aside."""
+    tokens = MarkdownIt("commonmark").enable("table").parse((ROOT / page).read_text(encoding="utf-8"))
+    inner = [child for token in tokens for child in token.children or []]
+    targets = [str(token.attrs.get("href") or token.attrs.get("src") or "") for token in inner]
+    return [unquote(target) for target in targets if target and not ADDRESS.match(target)]
+
+
+@pytest.mark.parametrize("page", pages())
+def test_links_lead_to_files_and_headings(page: str) -> None:
+    broken = []
+    for target in links(page):
+        name, _, heading = target.partition("#")
+        path = (ROOT / page).parent / name if name else ROOT / page
+        if not path.exists() or (heading and path.suffix == ".md" and heading not in anchors(path)):
+            broken.append(target)
+    assert broken == []
+
+
+def test_anchors_are_those_of_code_hosts(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("# A `b.c`, [d](e.md)\n\n## Twice\n\n## Twice\n\n```sh\n# no heading\n```\n", encoding="utf-8")
+    assert anchors(page) == {"a-bc-d", "twice", "twice-1"}
+
+
+def test_the_notebook_has_no_outputs() -> None:
+    """It is stored as it was written; its cells have ids that stay."""
+    notebook = json.loads(NOTEBOOK.read_text(encoding="utf-8"))
+    cells = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    assert notebook["nbformat"] == 4 and all(cell["outputs"] == [] for cell in cells)
+    assert [cell["execution_count"] for cell in cells] == [None] * len(cells)
+    assert len({cell["id"] for cell in notebook["cells"]}) == len(notebook["cells"])
+
+
+@pytest.mark.slow
+def test_the_notebook_runs(tmp_path: Path) -> None:
+    """In an empty folder, as it stands; its figures show, and what its text says of the numbers holds."""
+    pytest.importorskip("nbclient")
+    pytest.importorskip("ipykernel")
+    try:
+        find_compiler()
+    except KernelUnavailable:
+        pytest.skip("without a C compiler the notebook's batches of gradients take minutes")
+    done = subprocess.run(
+        [sys.executable, str(RUNNER), str(NOTEBOOK)],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+        env=os.environ | {"IPYTHONDIR": str(tmp_path / "ipython"), "CUDA_VISIBLE_DEVICES": ""},
+    )
+    assert done.returncode == 0, done.stderr
+    outputs = [output for cell in json.loads(done.stdout.splitlines()[-1]) for output in cell]
+    texts = "\n".join(text for _, text in outputs)
+    assert sum("image/png" in kinds for kinds, _ in outputs) == 3
+    assert "by least_squares: solved" in texts and "((128,), (128, 6))" in texts
+    arrived = re.search(r"(\d+) of 128 throws end below 0.01", texts)
+    assert arrived is not None and int(arrived[1]) > 64
+    assert (tmp_path / "reports" / "ball_throw" / "least_squares-seed0" / "result.json").exists()
