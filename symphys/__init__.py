@@ -31,9 +31,22 @@ if TYPE_CHECKING:
     from symphys.dynamics.horizon import roll_out
     from symphys.errors import ProblemError, SymphysError
     from symphys.export.writing import export
+    from symphys.model.body import Body
+    from symphys.model.heightfield import Heightfield
+    from symphys.model.joints import (
+        BallJoint,
+        FixedJoint,
+        Hinge,
+        Servo,
+        Slider,
+        Spring,
+        TorqueMotor,
+        UniversalJoint,
+        VelocityMotor,
+    )
     from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain
     from symphys.model.state_layout import Layout, initial_state
-    from symphys.model.world import Body, Law, Scheme, World, make_world
+    from symphys.model.world import Law, Scheme, World, make_world
     from symphys.problem import Problem, load_problem
     from symphys.problem.loading import load
     from symphys.report.pages.folder import report
@@ -43,26 +56,36 @@ if TYPE_CHECKING:
     from symphys.transcription.transcribe import transcribe
 
 __all__ = [
+    "BallJoint",
     "Body",
     "Box",
     "Capsule",
     "Checked",
     "CompiledRollout",
     "CompiledStep",
+    "FixedJoint",
     "Fixture",
+    "Heightfield",
+    "Hinge",
     "Law",
     "Layout",
     "Plane",
     "Problem",
     "ProblemError",
     "Scheme",
+    "Servo",
     "ShootingProblem",
+    "Slider",
     "Solution",
     "Sphere",
+    "Spring",
     "SymphysError",
     "Terrain",
+    "TorqueMotor",
     "Trajectory",
     "Transcription",
+    "UniversalJoint",
+    "VelocityMotor",
     "World",
     "__version__",
     "cache",
@@ -108,7 +131,20 @@ _HOMES = {
     "trajectory": ("Trajectory",),
     "transcription": ("Transcription", "transcribe"),
     "model.shapes": ("Box", "Capsule", "Fixture", "Plane", "Sphere", "Terrain"),
-    "model.world": ("Body", "Law", "Scheme", "World", "make_world"),
+    "model.body": ("Body",),
+    "model.heightfield": ("Heightfield",),
+    "model.joints": (
+        "BallJoint",
+        "FixedJoint",
+        "Hinge",
+        "Slider",
+        "UniversalJoint",
+        "Servo",
+        "Spring",
+        "TorqueMotor",
+        "VelocityMotor",
+    ),
+    "model.world": ("Law", "Scheme", "World", "make_world"),
 }
 _ROOMS = ("doctor", "export", "problems", "report", "solvers")
 """Rooms that need no import of their own; ``doctor``, ``export`` and ``report`` can be called."""

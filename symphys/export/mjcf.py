@@ -33,11 +33,12 @@ from symphys.dynamics.motion import inertia_matrix
 from symphys.export.folder import ExportError
 from symphys.export.mjcf_joints import StartState, actuators, freedoms, plain
 from symphys.export.mjcf_surfaces import geoms, pairs, text
+from symphys.model.body import Body
 from symphys.model.joints import Link, kinematic_trees, tree_joints
 from symphys.model.joints.kinematic_tree import FLOATING
 from symphys.model.scalar import is_zero
 from symphys.model.shapes import Terrain
-from symphys.model.world import Body, World
+from symphys.model.world import World
 from symphys.problem import Problem
 
 Array = NDArray[np.float64]

@@ -18,7 +18,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.model.joints import tree_joints
-from symphys.model.world import World
+from symphys.model.world import NOTHING, World
 
 BODY_FIELDS = (
     ("position", 3),
@@ -85,16 +85,18 @@ class Layout:
         return ca.vertcat(*(values[name] for name in self._slices))
 
 
-def initial_state(world: World, values: Mapping[str, Any]) -> Any:
-    """x at t = 0 (a casadi column) from positions, orientations and velocities by name; unnamed ones are zero.
+def initial_state(world: World, values: Mapping[str, Any] = NOTHING) -> Any:
+    """x at t = 0 (a casadi column) from positions, orientations and velocities by name.
 
-    ``values`` maps names such as ``ball.velocity`` to numbers or casadi expressions; velocities are the true ones.
+    ``values`` maps names such as ``ball.velocity`` to numbers or casadi expressions; velocities are the true ones. What
+    is not named is as the bodies' own ``start`` has it, else zero.
     """
     layout = Layout(world)
     given = {f"{body.name}.{field}" for body in world.bodies for field in GIVEN}
     for name in values:
         if name not in given:
             raise KeyError(f"an initial state cannot set {name!r}; it can set {', '.join(sorted(given))}")
+    values = {**world.start, **values}
     filled: dict[str, Any] = {}
     for name in layout.names():
         part = layout[name]

@@ -7,44 +7,26 @@ SI units; vectors are in world coordinates unless a field says "body frame".
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, prod
+from types import MappingProxyType
 from typing import Any
 
+from symphys.errors import SymphysError
+from symphys.model.body import Body
+from symphys.model.jointed import jointed
 from symphys.model.joints import Joint
-from symphys.model.scalar import is_zero
-from symphys.model.shapes import SOLID_SPHERE, Scalar, Shape, Sphere, Static, Surface, contact_points, surface
+from symphys.model.joints.specs import JointSpec
+from symphys.model.scalar import Scalar, is_zero
+from symphys.model.shapes import Static, Surface, contact_points, surface
+from symphys.suggest import hint, quote
 
 Vector = Sequence[Any]
 """three of them"""
 
 GRAVITY = (0.0, 0.0, -9.81)
-HOLLOW_SPHERE = 2 / 3
-
-
-@dataclass(frozen=True)
-class Body:
-    """A rigid body.
-
-    Attributes:
-        name: how states, inputs and parameters refer to it.
-        mass: [kg].
-        inertia: about the centre of mass [kg m^2]: a scalar (the same about every axis),
-            (3,) principal moments along the body's axes, or a symmetric (3, 3) tensor, body frame.
-        shapes: the parts of its surface.
-    """
-
-    name: str
-    mass: Scalar
-    inertia: Scalar
-    shapes: tuple[Shape, ...] = ()
-
-    @classmethod
-    def ball(cls, name: str, radius: Scalar, mass: Scalar, hollow: bool = False) -> Body:
-        """A uniform solid sphere, or a thin hollow one: I = 2/5 m r^2 or 2/3 m r^2."""
-        share = HOLLOW_SPHERE if hollow else SOLID_SPHERE
-        return cls(name, mass, share * mass * radius * radius, (Sphere(radius),))
+NOTHING: Mapping[Any, Any] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -134,6 +116,11 @@ class World:
                 return index
         raise KeyError(f"no body is called {name!r}; there are {', '.join(b.name for b in self.bodies)}")
 
+    @property
+    def start(self) -> dict[str, Any]:
+        """Where bodies begin that say so, by names such as ``ball.position``; see ``Body.start``."""
+        return {f"{body.name}.{key}": value for body in self.bodies for key, value in body.start.items()}
+
     def surface(self, side: Side) -> Surface:
         """The surface on one side of a pair."""
         return surface_of(self.bodies, self.statics, side)
@@ -178,21 +165,62 @@ def make_world(
     statics: Sequence[Static] = (),
     law: Law | None = None,
     gravity: Vector = GRAVITY,
+    *,
+    joints: Sequence[JointSpec] = (),
+    laws: Mapping[tuple[str, str], Law | None] = NOTHING,
 ) -> World:
-    """A world where everything may touch everything under one law; change ``pairs`` for anything finer."""
+    """A world where everything may touch everything, but for bodies that a joint holds together.
+
+    Args:
+        bodies: with where they begin; see ``Body.start``.
+        statics: what stands still: planes, fixtures, terrain.
+        law: of every contact that ``laws`` has not; default ``Law()``.
+        gravity: (3,) [m/s^2].
+        joints: between bodies by name, placed and directed as the bodies lie. One with a ``start`` then carries what
+            hangs on it there.
+        laws: of two bodies, or of a body and what stands still, by name, in any order; None where they never touch.
+
+    Raises:
+        SymphysError: names the body, joint or pair, and what would be valid.
+
+    Example:
+        >>> from symphys import Body, Law, Plane, Problem, make_world, simulate
+        >>> ball = Body.ball("ball", radius=0.1, mass=0.5, position=(0, 0, 1), velocity=(3, 0, 2))
+        >>> crate = Body.box("crate", size=(0.4, 0.4, 0.4), density=100, position=(2, 0, 0.2))
+        >>> laws = {("ball", "ground"): Law(friction=0.3, restitution=0.8)}
+        >>> world = make_world([ball, crate], [Plane.ground()], Law(friction=0.6), laws=laws)
+        >>> motion = simulate(Problem.from_world(world, duration=1.0))
+        >>> motion["ball.position"].shape
+        (101, 3)
+    """
     bodies, statics = tuple(bodies), tuple(statics)
-    return World(bodies, statics, all_pairs(bodies, statics, law or Law()), tuple(gravity))
+    _check_names(bodies, statics, joints)
+    bodies, held = jointed(bodies, joints) if joints else (bodies, ())
+    own = {frozenset(names): each for names, each in laws.items()}
+    own |= {frozenset(joint.between): None for joint in joints if not joint.collide}
+    world = World(bodies, statics, all_pairs(bodies, statics, law or Law(), own), tuple(gravity), held)
+    for names, each in laws.items():
+        _check_law(world, names, each)
+    return world
 
 
-def all_pairs(bodies: Sequence[Body], statics: Sequence[Static], law: Law) -> tuple[Pair, ...]:
+def all_pairs(
+    bodies: Sequence[Body], statics: Sequence[Static], law: Law, laws: Mapping[frozenset[str], Law | None] = NOTHING
+) -> tuple[Pair, ...]:
     """Every shape of every body against every static surface, then against every shape of every later body.
 
-    Surfaces that no rule covers (``shapes.contact_points`` is 0) are left out.
+    ``laws`` are those of two of them by name, None where they never touch. Surfaces that no rule covers
+    (``shapes.contact_points`` is 0) are left out.
     """
     sides = [Side(i, j) for i, body in enumerate(bodies) for j in range(len(body.shapes))]
     both = [(a, Side(None, k)) for a in sides for k in range(len(statics))]
     both += [(a, b) for i, a in enumerate(sides) for b in sides[i + 1 :] if a.body != b.body]
-    return tuple(pair for a, b in both for pair in points_of(bodies, statics, a, b, law))
+    found: list[Pair] = []
+    for a, b in both:
+        own = laws.get(frozenset((owner(bodies, statics, a), owner(bodies, statics, b))), law) if laws else law
+        if own is not None:
+            found += points_of(bodies, statics, a, b, own)
+    return tuple(found)
 
 
 def points_of(bodies: Sequence[Body], statics: Sequence[Static], a: Side, b: Side, law: Law) -> list[Pair]:
@@ -207,9 +235,36 @@ def surface_of(bodies: Sequence[Body], statics: Sequence[Static], side: Side) ->
     return surface(statics[side.shape]) if side.body is None else bodies[side.body].shapes[side.shape]
 
 
+def owner(bodies: Sequence[Body], statics: Sequence[Static], side: Side) -> str:
+    """The name of the body, or of the static surface, on one side of a pair."""
+    return statics[side.shape].name if side.body is None else bodies[side.body].name
+
+
 def side_name(bodies: Sequence[Body], statics: Sequence[Static], side: Side) -> str:
     """``ball``; a body with several shapes adds the index of the shape: ``dumbbell[1]``."""
     if side.body is None:
         return statics[side.shape].name
     body = bodies[side.body]
     return f"{body.name}[{side.shape}]" if len(body.shapes) > 1 else body.name
+
+
+def _check_names(bodies: Sequence[Body], statics: Sequence[Static], joints: Sequence[JointSpec]) -> None:
+    """Bodies, what stands still and joints share one set of names."""
+    seen: set[str] = set()
+    for part in (*bodies, *statics, *joints):
+        if part.name in seen:
+            raise SymphysError(f"two bodies, static surfaces or joints are called {quote(part.name)}; rename one")
+        seen.add(part.name)
+
+
+def _check_law(world: World, names: tuple[str, str], law: Law | None) -> None:
+    """The two must exist, and touch if they have a law."""
+    known = [part.name for part in (*world.bodies, *world.statics)]
+    for name in names:
+        if name not in known:
+            raise SymphysError(f"laws: no body and no static surface is called {quote(name)}; {hint(name, known)}")
+    met = {frozenset(owner(world.bodies, world.statics, side) for side in (p.first, p.second)) for p in world.pairs}
+    if law is not None and frozenset(names) not in met:
+        raise SymphysError(
+            f"laws: {' and '.join(names)} never touch; a joint keeps its bodies apart unless collide=True"
+        )

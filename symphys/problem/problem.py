@@ -68,13 +68,15 @@ class Problem(ProblemData):
         constraints: Mapping[str, Any] = NOTHING,
         outputs: Mapping[str, Any] = NOTHING,
         name: str = "problem",
+        functions: Mapping[str, ca.Function] = NOTHING,
         **tables: Any,
     ) -> Problem:
         """A problem about a world that was built in Python.
 
         Args:
             world: of numbers, without symbols; see ``make_world``.
-            start: states by name, ``"ball.position": [0, 0, 1]`` [m]; what is missing is zero, and upright.
+            start: states by name, ``"ball.position": [0, 0, 1]`` [m]; what is missing is as the bodies were placed,
+                else zero, and upright. Joints must hold together there; their coordinates need not be 0.
             duration: [s], a whole number of steps.
             dt: time step [s].
             variables: by name what each sets, ``{"throw": "ball.velocity"}``, or the keys of its table,
@@ -84,6 +86,7 @@ class Problem(ProblemData):
             constraints: likewise.
             outputs: likewise.
             name: of the problem.
+            functions: of controllers with ``function``; see ``load_problem``.
             tables: further tables of a problem file, such as ``solver={"gradient": {"iterations": 200}}``.
 
         Raises:
@@ -91,11 +94,11 @@ class Problem(ProblemData):
 
         Example:
             >>> from symphys import Body, Plane, Problem, make_world, solve
-            >>> world = make_world([Body.ball("ball", radius=0.1, mass=0.5)], [Plane.ground()])
+            >>> ball = Body.ball("ball", radius=0.1, mass=0.5, position=(0, 0, 1))
+            >>> world = make_world([ball], [Plane.ground()])
             >>> there = {"value": "ball.position - [3, 0, 1]", "tolerance": 0.01}
             >>> throw = {"sets": "ball.velocity", "guess": [6, 0, 2]}
-            >>> problem = Problem.from_world(world, {"ball.position": [0, 0, 1]}, duration=0.5,
-            ...                              variables={"throw": throw}, targets={"there": there})
+            >>> problem = Problem.from_world(world, duration=0.5, variables={"throw": throw}, targets={"there": there})
             >>> solve(problem, "least_squares", backend="casadi").solved
             True
         """
@@ -108,7 +111,7 @@ class Problem(ProblemData):
         }
         own = {key: entries for key, entries in lists.items() if entries}
         made = {"simulation": {"duration": duration, "dt": dt}, **world_tables(world, start or {}), **own}
-        return problem_of_tables({**made, **tables}, name)
+        return problem_of_tables({**made, **tables}, name, functions)
 
     def to_toml(self) -> str:
         """The text of a problem file that is this problem: its own, with what was changed in a table [set] at the end.

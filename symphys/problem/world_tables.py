@@ -6,20 +6,22 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.errors import SymphysError
-from symphys.maths import rotation
+from symphys.model.body import HOLLOW_SPHERE, Body
 from symphys.model.heightfield import Heightfield
-from symphys.model.joints import Joint, JointFrame, Motor, Servo, VelocityMotor
 from symphys.model.shapes import Fixture, Plane, Shape, Static, Terrain
-from symphys.model.world import Body, Law, Side, World
+from symphys.model.shapes.inertia import inertia_of, off_centre, specific
+from symphys.model.world import Law, Side, World
+from symphys.problem.formula_text import formula_text
+from symphys.problem.joint_tables import joint_tables
+from symphys.problem.plain import floats, numbers
 
-Array = NDArray[np.float64]
 Start = Mapping[str, Any]
 """States by name, such as ``ball.position``; what is missing is zero, and upright."""
+ROUNDING = 1e-13
+"""Inertias whose difference is below this share of the trace are the same."""
 GIVEN = ("position", "orientation", "velocity", "angular_velocity")
 
 
@@ -28,7 +30,7 @@ def world_tables(world: World, start: Start) -> dict[str, Any]:
 
     Args:
         world: of numbers, without symbols.
-        start: where bodies are and how they move; joints have their coordinates 0 there.
+        start: where bodies are and how they move; what is missing is as ``world.start`` has it.
 
     Raises:
         SymphysError: names what a problem file cannot say.
@@ -37,25 +39,42 @@ def world_tables(world: World, start: Start) -> dict[str, Any]:
     if unknown:
         raise SymphysError(f"start: there is no {', '.join(sorted(unknown))}; valid: <body>.{', <body>.'.join(GIVEN)}")
     law, pairs = contact_tables(world)
+    joints, start = joint_tables(world, {**world.start, **start})
     tables = {
         "world": {"gravity": floats(world.gravity)},
         "contact": law,
         "pair": pairs,
         "body": [body_table(body, start) for body in world.bodies],
-        "joint": [joint_table(world, joint, start) for joint in world.joints],
+        "joint": joints,
         **static_tables(world.statics),
     }
     return {key: table for key, table in tables.items() if table}
 
 
 def body_table(body: Body, start: Start) -> dict[str, Any]:
-    """A body and its start; its inertia is as it was given."""
+    """A body and its start; its inertia is left to the file where that would make the same of mass and shape."""
     state = {key: floats(start[f"{body.name}.{key}"]) for key in GIVEN if f"{body.name}.{key}" in start}
-    parts = [part_table(shape) for shape in body.shapes]
-    shape: dict[str, Any] = {"shape": {"parts": parts}} if parts else {}
-    if len(parts) == 1 and body.shapes[0].central:
-        shape = {"shape": size_table(body.shapes[0])}
-    return {"name": body.name, "mass": floats(body.mass), "inertia": floats(body.inertia), **shape, **state}
+    parts, mass = [part_table(shape) for shape in body.shapes], floats(body.mass)
+    table: dict[str, Any] = {"name": body.name, "mass": mass, **state}
+    if parts:
+        shape = body.shapes[0]
+        alone = len(parts) == 1 and parts[0] == {**size_table(shape), "centre": [0, 0, 0], "orientation": [1, 0, 0, 0]}
+        table["shape"] = size_table(shape) if alone else {"parts": parts}
+        if alone and "sphere" in table["shape"] and same_inertia(body.inertia, HOLLOW_SPHERE * mass * shape.extent**2):
+            table["shape"]["sphere"]["hollow"] = True
+            return table
+        if not off_centre(body.shapes) and same_inertia(body.inertia, inertia_of(specific(body.shapes), mass)):
+            return table
+    return {**table, "inertia": floats(body.inertia)}
+
+
+def same_inertia(given: Any, other: Any) -> bool:
+    """Whether two inertias agree up to rounding; each is a number, three moments or a (3, 3) tensor."""
+    one, two = (
+        value * np.eye(3) if value.ndim == 0 else np.diag(value) if value.ndim == 1 else value
+        for value in (np.array(floats(each), float) for each in (given, other))
+    )
+    return bool(np.allclose(one, two, rtol=0, atol=ROUNDING * float(np.trace(two))))
 
 
 def size_table(shape: Shape) -> dict[str, Any]:
@@ -87,13 +106,16 @@ def static_tables(statics: Sequence[Static]) -> dict[str, Any]:
 
 
 def terrain_table(terrain: Terrain) -> dict[str, Any]:
-    """A terrain of heights on a grid; SymphysError for one that a Python function gives."""
+    """A terrain by heights on a grid, or by its formula; SymphysError for a function that is none."""
     height = terrain.height
-    if not isinstance(height, Heightfield):
-        text = "its height is a Python function; build it from a Heightfield, or give the problem a formula"
-        raise SymphysError(f"terrain {terrain.name!r}: {text}")
-    grid = {"heights": [list(row) for row in height.heights], "spacing": list(height.spacing)}
-    return {"name": terrain.name, **grid, "origin": list(height.origin)}
+    if isinstance(height, Heightfield):
+        grid = {"heights": [list(row) for row in height.heights], "spacing": list(height.spacing)}
+        return {"name": terrain.name, **grid, "origin": list(height.origin)}
+    try:
+        return {"name": terrain.name, "height": formula_text(height)}
+    except SymphysError as error:
+        text = f"its height cannot be a formula of a problem file: {error}; build it from a Heightfield"
+        raise SymphysError(f"terrain {terrain.name!r}: {text}") from None
 
 
 def contact_tables(world: World) -> tuple[dict[str, float], list[dict[str, Any]]]:
@@ -135,64 +157,3 @@ def meetings(world: World) -> Iterator[tuple[str, str]]:
 def side_name(world: World, side: Side) -> str:
     """The body, or what stands still, on a side of a pair."""
     return world.statics[side.shape].name if side.body is None else world.bodies[side.body].name
-
-
-def joint_table(world: World, joint: Joint, start: Start) -> dict[str, Any]:
-    """A joint, by its anchors and by its axes as they lie at the start."""
-    second = "world" if joint.second is None else world.bodies[joint.second].name
-    x, y, _ = axes_at_start(joint.frames[1], second, start).T
-    y_first = axes_at_start(joint.frames[0], world.bodies[joint.first].name, start).T[1]
-    if joint.kind.coordinates and not np.allclose(y, y_first, atol=1e-9) and joint.kind.name != "ball":
-        raise SymphysError(f"joint {joint.name!r}: its coordinates are not 0 at the start; place its bodies so")
-    kinds: dict[str, dict[str, Any]] = {
-        "hinge": {"axis": x.tolist()},
-        "slider": {"axis": x.tolist()},
-        "universal": {"axes": [y.tolist(), x.tolist()]},
-    }
-    table: dict[str, Any] = {
-        "name": joint.name,
-        "between": [second, world.bodies[joint.first].name],
-        joint.kind.name: kinds.get(joint.kind.name, {}),
-        "anchors": [floats(joint.frames[1].point), floats(joint.frames[0].point)],
-        "collide": any({pair.first.body, pair.second.body} == set(joint.bodies) for pair in world.pairs),
-        "frequency": floats(joint.frequency),
-    }
-    if table["frequency"]:
-        table["damping"] = floats(joint.damping)
-    if joint.motor is not None:
-        table["motor"] = motor_table(joint.motor)
-    if joint.spring is not None:
-        table["spring"] = numbers(joint.spring)
-    limits = (joint.limits.lower, joint.limits.upper)
-    if limits != (None, None):
-        table["limits"] = [
-            sign * np.inf if end is None else floats(end) for sign, end in zip((-1, 1), limits, strict=True)
-        ]
-    return table
-
-
-def motor_table(motor: Motor) -> dict[str, Any]:
-    """A motor by its kind."""
-    kind = "servo" if isinstance(motor, Servo) else "velocity" if isinstance(motor, VelocityMotor) else "torque"
-    return {kind: numbers(motor)}
-
-
-def axes_at_start(frame: JointFrame, name: str, start: Start) -> Array:
-    """(3, 3): the axes of a joint's frame on a body, or on the world, as columns, world coordinates."""
-    own = np.array(rotation.matrix(np.array(frame.orientation, float)))
-    orientation = start.get(f"{name}.orientation", (1.0, 0.0, 0.0, 0.0))
-    return np.asarray(np.array(rotation.matrix(np.array(orientation, float))) @ own)
-
-
-def numbers(thing: Any) -> dict[str, float]:
-    """The fields of a law, a motor or a spring that are not None."""
-    return {key: floats(value) for key, value in vars(thing).items() if value is not None}
-
-
-def floats(value: Any) -> Any:
-    """Plain numbers, in lists as deep as they were given; SymphysError for symbols."""
-    if isinstance(value, list | tuple):
-        return [floats(each) for each in value]
-    if isinstance(value, ca.SX | ca.MX) and not value.is_constant():
-        raise SymphysError(f"{value} is no number: give one, and let a variable of the problem set it")
-    return np.asarray(value, float).tolist()

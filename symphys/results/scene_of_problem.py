@@ -9,9 +9,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from symphys.model.body import Body
 from symphys.model.joints import Joint, Motor, Servo, TorqueMotor, VelocityMotor
 from symphys.model.shapes import Fixture, Plane, Scalar, Shape, Terrain
-from symphys.model.world import Body, World
+from symphys.model.world import World
 from symphys.problem import Problem
 from symphys.results.scene import Scene, SceneBody, SceneFixture, ScenePlane, SceneTerrain, Solid
 from symphys.results.scene_joints import SceneCoordinate, SceneJoint, SceneJointFrame, SceneMotor

@@ -8,13 +8,12 @@ import casadi as ca
 import numpy as np
 import pytest
 from mixed import mixed
-from robots import Pose, state_of
-from scipy.spatial.transform import Rotation
 
 import symphys
 from symphys import Body, Box, Capsule, Fixture, Law, Plane, Problem, Scheme, SymphysError, Terrain, World, make_world
 from symphys.dynamics.functions import step_function
 from symphys.model.heightfield import Heightfield
+from symphys.model.joints import HINGE, Joint, JointFrame
 from symphys.model.state_layout import Layout, initial_state
 
 TURNED = (np.cos(0.3), 0.0, np.sin(0.3), 0.0)
@@ -50,18 +49,15 @@ def test_a_world_is_what_the_file_says() -> None:
 
 
 def test_joints_move_alike() -> None:
-    """Of every kind, on either side of bodies, with motors, springs and limits; thirty steps from coordinates 0."""
-    world, _ = mixed()
-    rng = np.random.default_rng(5)
-    counts = {joint.name: len(joint.kind.coordinates) for joint in world.joints}
-    rates = {name: rng.uniform(-1, 1, count) for name, count in counts.items() if count}
-    root = Pose(Rotation.random(rng=rng), *rng.uniform(-1, 1, (3, 3)))
-    start = state_of(world, {}, rates, root) | Pose(root.turn.inv(), *rng.uniform(-1, 1, (3, 3))).values("b12")
+    """Of every kind, on either side of bodies, with motors, springs and limits; thirty steps, all bent at the start."""
+    world, start = mixed()
     made = Problem.from_world(world, start, duration=0.3)
     commands = [f"{joint.name}.command" for joint in world.joints if joint.driven]
+    states = [np.array(initial_state(*each)) for each in ((world, start), (made.world(), made.initial))]
+    assert np.allclose(*states, rtol=0, atol=1e-12)
     ends = []
-    for each, initial in ((world, start), (made.world(), made.initial)):
-        step, x = step_function(each, Scheme(dt=0.01, sweeps=5), commands), initial_state(each, initial)
+    for each, x in zip((world, made.world()), states, strict=True):
+        step = step_function(each, Scheme(dt=0.01, sweeps=5), commands)
         for _ in range(30):
             x = step(x, np.full(len(commands), 0.5), [], 0)
         ends.append(np.array(x[Layout(each)["b4.position"]]))
@@ -69,18 +65,25 @@ def test_joints_move_alike() -> None:
     assert {joint.name: joint.limits for joint in made.world().joints} == {j.name: j.limits for j in world.joints}
 
 
-def test_bent_joints_are_refused() -> None:
-    """A file has bodies as they lie at coordinates 0."""
+def test_joints_that_do_not_hold_are_refused() -> None:
+    """A body beside its joint; a loop whose coordinates are not 0."""
     world, start = mixed()
-    with pytest.raises(SymphysError, match=r"joint 'hinge0': its coordinates are not 0 at the start"):
-        Problem.from_world(world, start, duration=0.3)
+    with pytest.raises(SymphysError, match=r"joint 'hinge0': its two sides are 0\.1 m and .* rad from where"):
+        Problem.from_world(world, start | {"b1.position": start["b1.position"] + [0.1, 0, 0]}, duration=0.3)
+    rod = Body("rod", 1.0, 0.1)
+    frames = (JointFrame((0, 0, 0.5)), JointFrame())
+    loop = World((rod,), joints=tuple(Joint(name, HINGE, 0, None, frames) for name in ("one", "other")))
+    turned = {"rod.orientation": [np.cos(0.2), np.sin(0.2), 0, 0]}
+    turned["rod.position"] = [0, 0.5 * np.sin(0.4), -0.5 * np.cos(0.4)]
+    with pytest.raises(SymphysError, match="'other': its coordinates are not 0 at the start, and it closes a loop"):
+        Problem.from_world(loop, turned, duration=0.3)
 
 
 def test_what_a_file_cannot_say_is_named() -> None:
     ball = Body.ball("ball", 0.1, 0.5)
     for world, said in (
         (make_world([Body.ball("ball", ca.SX.sym("r"), 1.0)]), "no number"),
-        (make_world([ball], [Terrain("hills", lambda x, y: 0 * x)]), "hills"),
+        (make_world([ball], [Terrain("hills", lambda x, y: ca.if_else(x > 0, x, 0))]), "hills"),
     ):
         with pytest.raises(SymphysError, match=said):
             Problem.from_world(world, duration=1.0)

@@ -25,7 +25,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "trajectory": ("errors suggest", "numpy", "a simulated motion as arrays"),
     "shooting": ("", "numpy", "the shooting problem: all that a solver sees"),
     "maths": ("", "casadi", "rotations and smoothed primitives"),
-    "model": ("", "casadi numpy", "what a world is, as data"),
+    "model": ("errors maths suggest", "casadi numpy", "what a world is, as data"),
     "dynamics": ("maths model", "casadi numpy", "one time step"),
     "expression": ("errors maths suggest", "casadi", "the formula language"),
     "problems": ("errors suggest", "", "shipped problem files"),

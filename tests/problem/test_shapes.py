@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from symphys.maths import rotation
 from symphys.model.shapes import Box, Capsule, Shape, Sphere
+from symphys.model.shapes.inertia import specific
 from symphys.problem import Problem
-from symphys.problem.checks.inertia import specific
 
 Array = NDArray[np.float64]
 Load = Callable[..., Problem]

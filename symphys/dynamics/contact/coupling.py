@@ -10,8 +10,9 @@ import numpy as np
 
 from symphys.dynamics.motion import inertia_matrix
 from symphys.maths.smoothing import length
+from symphys.model.body import Body
 from symphys.model.scalar import is_zero
-from symphys.model.world import Body, Law, Pair, World
+from symphys.model.world import Law, Pair, World
 
 Expr = Any
 """casadi SX, MX or DM"""

@@ -8,6 +8,7 @@ from symphys.model.joints.kind import Coordinate, Kind, PlacedFrames
 from symphys.model.joints.kinematic_tree import KinematicTree, Link, carriers, kinematic_trees, tree_joints
 from symphys.model.joints.motor import Motor, Servo, TorqueMotor, VelocityMotor
 from symphys.model.joints.slider import SLIDER
+from symphys.model.joints.specs import BallJoint, FixedJoint, Hinge, JointSpec, MovingJoint, Slider, UniversalJoint
 from symphys.model.joints.universal import UNIVERSAL
 
 KINDS: dict[str, Kind] = {kind.name: kind for kind in (BALL, FIXED, HINGE, SLIDER, UNIVERSAL)}
@@ -19,18 +20,25 @@ __all__ = [
     "KINDS",
     "SLIDER",
     "UNIVERSAL",
+    "BallJoint",
     "Coordinate",
+    "FixedJoint",
+    "Hinge",
     "Joint",
     "JointFrame",
+    "JointSpec",
     "Kind",
     "KinematicTree",
     "Limits",
     "Link",
     "Motor",
+    "MovingJoint",
     "PlacedFrames",
     "Servo",
+    "Slider",
     "Spring",
     "TorqueMotor",
+    "UniversalJoint",
     "VelocityMotor",
     "carriers",
     "kinematic_trees",

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.problem.checks.inertia import specific
+from symphys.model.shapes.inertia import specific
 from symphys.problem.parametric.parts import ParametricBody
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.physics import BodyTable

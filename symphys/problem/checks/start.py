@@ -10,15 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.dynamics.observation import accelerometers, body_quantities, gap_function, joint_quantities, readings
+from symphys.model.joints.frames import MEET, WORLD
 from symphys.model.state_layout import GIVEN, initial_state
 from symphys.model.world import World
 from symphys.problem.model import Variable
-from symphys.problem.parametric.joints import WORLD
 from symphys.problem.parametric.reposition import reposition
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.quantities import Quantity
 from symphys.problem.reading.faults import Faults
-from symphys.problem.tables.joint_frames import MEET
 
 Array = NDArray[np.float64]
 OVERLAP = 1e-3

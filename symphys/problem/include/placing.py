@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.model.joints.frames import WORLD
+from symphys.model.orientation import turned
 from symphys.problem.include.merge import MergedFiles
-from symphys.problem.parametric.joints import WORLD
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema import Document, SchemaTable
 from symphys.problem.schema.include import IncludeTable
 from symphys.problem.schema.joints import JointTable
 from symphys.problem.schema.physics import BlockTable, BodyTable, PlaneTable, TerrainTable
-from symphys.problem.tables.shapes import read_orientation, turned
+from symphys.problem.tables.shapes import read_orientation
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,6 @@ from typing import TypeVar
 from symphys.model.joints import Joint, JointFrame, Kind, Limits, Motor, Spring
 from symphys.problem.parametric.parts import Numbers, PairRule, Value
 
-WORLD = "world"
 Part = TypeVar("Part", bound=Motor | Spring)
 
 

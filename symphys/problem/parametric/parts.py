@@ -7,9 +7,10 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
+from symphys.model.body import Body
 from symphys.model.shapes import Scalar, Shape, Sphere, Static, Surface
-from symphys.model.world import Body, Law
-from symphys.problem.checks.inertia import Tensor, simplest, specific
+from symphys.model.shapes.inertia import Tensor, inertia_of, specific
+from symphys.model.world import Law
 
 Numbers = float | tuple[float, ...]
 Value = Callable[[str], Any]
@@ -89,12 +90,7 @@ class ParametricBody:
         return specific(self.shapes) if self.inertia is None else []
 
     def _inertia(self, mass: Scalar, tensor: Tensor) -> Any:
-        if self.inertia is not None:
-            return self.inertia
-        simple = simplest(tensor)
-        if not isinstance(simple, tuple):
-            return simple * mass
-        return tuple(tuple(x * mass for x in row) if isinstance(row, tuple) else row * mass for row in simple)
+        return inertia_of(tensor, mass) if self.inertia is None else self.inertia
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,11 @@ import numpy as np
 
 from symphys.dynamics.observation import gap_function
 from symphys.maths import rotation
+from symphys.model.joints.frames import WORLD
+from symphys.model.joints.start import Tree, spanning_tree, subtree
 from symphys.model.state_layout import initial_state
 from symphys.problem.model import Variable
-from symphys.problem.parametric.forward_kinematics import Tree, spanning_tree, subtree
-from symphys.problem.parametric.joints import WORLD, ParametricJoint
+from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.reading.faults import Faults
 

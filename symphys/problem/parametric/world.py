@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.model.body import Body
 from symphys.model.shapes import Scalar, Static
-from symphys.model.world import Body, Law, Pair, Side, World, points_of
+from symphys.model.world import Law, Pair, Side, World, points_of
 from symphys.problem.parametric.collision_filter import CollisionFilter
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.parametric.parts import (

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symphys.model.shapes import Shape
-from symphys.problem.checks.inertia import centre_of_mass, inertia_fault
+from symphys.model.shapes.inertia import centring, off_centre
+from symphys.problem.checks.inertia import inertia_fault
 from symphys.problem.checks.magnitude import check_magnitudes
 from symphys.problem.parametric.parts import COMBINE, ParametricBody
 from symphys.problem.reading.faults import Faults
@@ -17,8 +17,6 @@ from symphys.problem.schema.physics import BodyTable, MemberTable, SurfaceTable
 from symphys.problem.tables.shapes import read_orientation, read_shape
 
 Array = NDArray[np.float64]
-OFF_CENTRE = 1e-6
-"""How far a compound's centre of mass may be from the body's origin, relative to the size of the compound."""
 
 
 def read_body(index: int, table: BodyTable, faults: Faults) -> ParametricBody:
@@ -66,18 +64,9 @@ def check_inertia(place: tuple[str, int], table: BodyTable, shapes: Sequence[Sha
             faults.add((*place, "inertia"), reason)
     elif table.shape is None:
         faults.add((*place, "inertia"), "this key is required for a body without a shape")
-    elif shapes:
-        centre = centre_of_mass(shapes)
-        off = float(np.linalg.norm(centre))
-        size = max(hypot(*shape.centre) + shape.extent for shape in shapes)
-        if not off <= OFF_CENTRE * size:
-            key = "spheres" if table.shape.spheres else "parts"
-            listed = ", ".join(f"{c:.6g}" for c in centre)
-            faults.add(
-                (*place, "shape", key),
-                f"the centre of mass of these {key} is {off:.4g} m from the body's origin, at [{listed}]; "
-                "subtract that from every centre, or give inertia",
-            )
+    elif shapes and off_centre(shapes):
+        key = "spheres" if table.shape.spheres else "parts"
+        faults.add((*place, "shape", key), f"{centring(shapes, key)}, or give inertia")
 
 
 def read_state(table: BodyTable, index: int, faults: Faults) -> dict[str, Array]:

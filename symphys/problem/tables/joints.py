@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.model.joints import KINDS, Kind, Limits, Motor, Servo, Spring, TorqueMotor, VelocityMotor
-from symphys.problem.parametric.joints import WORLD, ParametricJoint
+from symphys.model.joints.frames import WORLD
+from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.joints import JointTable, MotorTable, SpringTable
 from symphys.problem.tables.joint_frames import read_joint_frames

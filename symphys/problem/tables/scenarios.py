@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.model.joints.frames import WORLD
+from symphys.model.joints.start import spanning_tree
 from symphys.model.state_layout import GIVEN
 from symphys.problem.model import (
     Discretisation,
@@ -18,8 +20,7 @@ from symphys.problem.model import (
     Variable,
     VariableSlot,
 )
-from symphys.problem.parametric.forward_kinematics import spanning_tree
-from symphys.problem.parametric.joints import WORLD, ParametricJoint
+from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.quantities import Quantity, SlotError, limits, read_slot
 from symphys.problem.reading.faults import Faults, Place

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.maths import rotation
+from symphys.model.orientation import roll_pitch_yaw, unit_quaternion
 from symphys.model.shapes import SHAPES, UPRIGHT, Shape, Sphere
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.reading.value_texts import listed
@@ -90,20 +90,9 @@ def three(numbers: Sequence[float]) -> tuple[float, float, float]:
 def read_orientation(place: Place, given: Any, faults: Faults) -> Array:
     """(4,): the unit quaternion w x y z, from four numbers or from angles."""
     if isinstance(given, RollPitchYaw):
-        quaternion = np.array(UPRIGHT)
-        for axis, degrees in enumerate((given.roll_deg, given.pitch_deg, given.yaw_deg)):
-            quaternion = turned(quaternion, axis, degrees)
-        return quaternion
-    length = float(np.linalg.norm(given))
-    if not 1e-6 < length < 1e6:
-        faults.add(place, "a quaternion must not be zero; [1, 0, 0, 0] is no rotation")
+        return roll_pitch_yaw(given.roll_deg, given.pitch_deg, given.yaw_deg)
+    try:
+        return unit_quaternion(given)
+    except ValueError as fault:
+        faults.add(place, str(fault))
         return np.array(UPRIGHT)
-    return np.array(given) / length
-
-
-def turned(quaternion: Array, axis: int, degrees: float) -> Array:
-    """The orientation after a turn about a world axis."""
-    half = np.deg2rad(degrees % 360) / 2
-    turn = np.zeros(4)
-    turn[0], turn[1 + axis] = np.cos(half), np.sin(half)
-    return np.asarray(rotation.multiply(turn, quaternion), float).ravel()

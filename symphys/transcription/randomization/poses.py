@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from symphys.dynamics.observation import gap_function
+from symphys.model.joints.start import placed_frames, spanning_tree, subtree
 from symphys.model.state_layout import GIVEN, initial_state
 from symphys.problem import Problem, RandomizedPose, VariableSlot
-from symphys.problem.parametric.forward_kinematics import placed_frames, spanning_tree, subtree
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.transcription.randomization.numbers import hidden
 
@@ -34,7 +34,7 @@ class PoseSampler:
             for name in self.names
         )
         tree = spanning_tree(problem.parametric.joints)
-        self.hinges = [Hinge(joint, subtree(joint.first, joint, tree), initial) for joint in posed.joints]
+        self.hinges = [SampledHinge(joint, subtree(joint.first, joint, tree), initial) for joint in posed.joints]
         robot = {i for i, body in enumerate(self.world.bodies) if body.name in posed.bodies}
         below = [k for k, p in enumerate(self.world.pairs) if p.second.body is None and p.first.body in robot]
         symbols = {name: ca.SX.sym(name, value.size) for name, value in initial.items()}
@@ -67,7 +67,7 @@ class PoseSampler:
         return np.asarray(-gaps.min(axis=0))
 
 
-class Hinge:
+class SampledHinge:
     """A joint with all that its first body carries."""
 
     def __init__(self, joint: ParametricJoint, moved: list[str], initial: State) -> None:
