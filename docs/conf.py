@@ -52,8 +52,8 @@ napoleon_numpy_docstring = False
 napoleon_use_ivar = True
 # Types of other packages, and of the package's own rooms, which the page does not describe.
 nitpick_ignore_regex = [
-    ("py:class", "Array|ArrayLike|Source"),
-    ("py:.*", r"symphys\.(codegen|dynamics|model|problem|results|solvers\.core|transcription)\..*"),
+    ("py:class", "Array|ArrayLike|Figure|Path|Source"),
+    ("py:.*", r"symphys\.[a-z_]+\..*"),
     ("py:.*", r"(collections|pathlib|types|typing|functools|enum|os)\..*"),
     ("py:.*", r"(casadi|ca|cma|gymnasium|jax|matplotlib|np|npt|numpy|pandas|pydantic|torch|xarray)\..*"),
 ]
@@ -92,8 +92,8 @@ def keep_bars(app: Sphinx, what: str, name: str, described: object, options: obj
 def keep_sentences(app: Sphinx, what: str, name: str, described: object, options: object, lines: list[str]) -> None:
     """Undo what napoleon makes of colons and commas.
 
-    The docstring of a property is a sentence, of which the part before a colon is no type; and attributes that share
-    a line, ``lower, upper: (n,)``, are no name with a type.
+    What a property is, and what a function returns, is a sentence, of which the part before a colon is no type; types
+    are in annotations. Attributes that share a line, ``lower, upper: (n,)``, are no name with a type.
     """
     if what in ("attribute", "property"):
         for k, line in enumerate(lines):
@@ -101,6 +101,10 @@ def keep_sentences(app: Sphinx, what: str, name: str, described: object, options
                 lines[0] = f"{line.removeprefix(':type: ')}: {lines[0]}"
                 del lines[k]
                 break
+    returned = [k for k, line in enumerate(lines) if line.startswith((":returns: ", ":rtype: "))]
+    if len(returned) == 2:
+        said = lines.pop(returned[1]).removeprefix(":rtype: ")
+        lines[returned[0]] = lines[returned[0]].replace(":returns: ", f":returns: {said}: ", 1)
     for k, line in enumerate(lines):
         shared = re.match(r":ivar (\w+(?:, \w+)+):", line)
         if shared:

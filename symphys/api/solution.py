@@ -129,8 +129,8 @@ class Solution:
         A column of a table belongs to the nearest column of time, work or knots to its left.
 
         Returns:
-            The files: motion, states, contacts, convergence, and, where there is something to show, variables,
-            controls, joints, motors, gait, strip, growth and energy.
+            Their paths. There are motion, states, contacts and convergence, and, where there is something to show,
+            variables, controls, joints, motors, gait, strip, growth and energy.
 
         Example:
             >>> import symphys

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
+from click.shell_completion import CompletionItem
 
 from symphys import files
 from symphys.errors import SymphysError
@@ -22,6 +23,37 @@ REPORTS = Path("reports")
 
 class UsageFault(SymphysError):
     """An argument that cannot be used."""
+
+
+def complete_problem(_context: click.Context, _argument: click.Parameter, begun: str) -> list[CompletionItem]:
+    """Shipped problems, robots and tasks, and TOML files, whose names begin so; where there is none, any path."""
+    from symphys import problems
+
+    folder = Path(begun) if begun.endswith("/") else Path(begun).parent
+    entries = sorted(folder.iterdir()) if folder.is_dir() else []
+    there = [f"{entry}/" if entry.is_dir() else str(entry) for entry in entries if is_problem_or_folder(entry)]
+    found = [name for name in (*problems.catalogue(), *problems.parts(), *there) if name.startswith(begun)]
+    return [CompletionItem(name) for name in found] or [CompletionItem(begun, type="file")]
+
+
+def is_problem_or_folder(path: Path) -> bool:
+    """Whether it may be, or hold, a problem file."""
+    return path.suffix == ".toml" or (path.is_dir() and not path.name.startswith("."))
+
+
+def complete_solvers(_context: click.Context, _option: click.Parameter, begun: str) -> list[CompletionItem]:
+    """Names of solvers after those that a comma ends."""
+    from symphys.solvers import SOLVERS
+
+    before, comma, last = begun.rpartition(",")
+    return [CompletionItem(f"{before}{comma}{name}") for name in SOLVERS if name.startswith(last)]
+
+
+def complete_backend(_context: click.Context, _option: click.Parameter, begun: str) -> list[CompletionItem]:
+    """Names of backends."""
+    from symphys.codegen.backends import NAMES
+
+    return [CompletionItem(name) for name in NAMES if name.startswith(begun)]
 
 
 def settings_option(command: F) -> F:
@@ -42,6 +74,7 @@ def backend_option(command: F) -> F:
         default="auto",
         show_default=True,
         metavar="auto|casadi|c|simd|simd32|cuda|cuda32",
+        shell_complete=complete_backend,
         help="What evaluates: SIMD kernels (simd32: in single precision), casadi's C (all need a C compiler), a GPU "
         "(cuda32: in single precision; needs the extra symphys[cuda]), or casadi's virtual machine.",
     )(command)

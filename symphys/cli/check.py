@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from symphys.cli.arguments import UsageFault, read_problems, read_settings, settings_option
+from symphys.cli.arguments import UsageFault, complete_problem, read_problems, read_settings, settings_option
 from symphys.findings.writing import several
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ BUILDING, BUILDING_TAKES = "building the problem", 8.0
 
 
 @click.command()
-@click.argument("source", metavar="FILE")
+@click.argument("source", metavar="FILE", shell_complete=complete_problem)
 @settings_option
 @click.option(
     "--at",

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import click
 
-from symphys.cli.arguments import UsageFault, read_problems, read_settings, settings_option
+from symphys.cli.arguments import UsageFault, complete_problem, read_problems, read_settings, settings_option
 
 FOLDER = click.Path(path_type=Path, file_okay=False)
 
 
 @click.command()
-@click.argument("source", metavar="FILE")
+@click.argument("source", metavar="FILE", shell_complete=complete_problem)
 @click.option("--c", "c", type=FOLDER, metavar="DIR", help="Folder for C sources: step, rollout and gradient.")
 @click.option("--casadi", type=FOLDER, metavar="DIR", help="Folder for functions that plain casadi loads.")
 @click.option(

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from symphys import files
-from symphys.cli.arguments import UsageFault
+from symphys.cli.arguments import UsageFault, complete_problem
 
 
 @click.command("list")
@@ -36,6 +36,7 @@ def listing() -> None:
     default="ball_throw",
     show_default=True,
     metavar="NAME",
+    shell_complete=complete_problem,
     help="A shipped problem, robot or task (see `symphys list`).",
 )
 def new(file: Path, source: str) -> None:

@@ -7,11 +7,11 @@ from pathlib import Path
 import click
 
 from symphys import files
-from symphys.cli.arguments import out_option, read_problems, read_settings, settings_option
+from symphys.cli.arguments import complete_problem, out_option, read_problems, read_settings, settings_option
 
 
 @click.command()
-@click.argument("source", metavar="FILE")
+@click.argument("source", metavar="FILE", shell_complete=complete_problem)
 @settings_option
 @click.option("--text", is_flag=True, help="Print the file instead; also of a shipped robot or task.")
 @out_option

@@ -15,6 +15,8 @@ import click
 from symphys import threads
 from symphys.cli.arguments import (
     backend_option,
+    complete_problem,
+    complete_solvers,
     out_option,
     read_backend,
     read_problems,
@@ -33,9 +35,13 @@ BATCH_PAGE = "page of all runs"
 
 
 @click.command()
-@click.argument("sources", metavar="FILE...", nargs=-1, required=True)
+@click.argument("sources", metavar="FILE...", nargs=-1, required=True, shell_complete=complete_problem)
 @click.option(
-    "--solver", "names", metavar="A,B", help="Solvers, separated by commas.  [default: the file's `solvers`, else all]"
+    "--solver",
+    "names",
+    metavar="A,B",
+    shell_complete=complete_solvers,
+    help="Solvers, separated by commas.  [default: the file's `solvers`, else all]",
 )
 @click.option(
     "--seeds",

@@ -103,8 +103,8 @@ def checks(run: Run) -> Html:
     rows = [
         [
             join([check.name, Html(" "), tag("small", check.kind)]),
-            show(check.error),
-            show(check.tolerance),
+            joined(show(check.error), check.unit),
+            joined(show(check.tolerance), check.unit),
             show(check.ratio),
             gauge(check),
             pill("good", "met") if check.met else pill("bad", "missed"),
@@ -122,6 +122,11 @@ def checks(run: Run) -> Html:
         anchor="checks",
         note=HOW_JUDGED,
     )
+
+
+def joined(number: str, unit: str) -> str:
+    """A number and its unit, where it has one."""
+    return f"{number} {unit}" if unit else number
 
 
 def output_line(run: Run, name: str) -> str:
