@@ -201,6 +201,9 @@ def _checked_start(name: str, start: Mapping[str, Any]) -> dict[str, tuple[float
         try:
             value = unit_quaternion(given) if key == "orientation" else np.array(given, float)
         except (TypeError, ValueError) as error:
+            if "CasADi" in str(error):
+                text = f"{key} must be plain numbers; symbols go into initial_state(world, {{...}})"
+                raise _refused(name, text) from None
             raise _refused(name, f"{key}: {error}") from None
         if value.shape != (count,) or not np.isfinite(value).all():
             raise _refused(name, f"{key} must be {count} numbers, not {given}")

@@ -196,6 +196,9 @@ def make_world(
     bodies, statics = tuple(bodies), tuple(statics)
     _check_names(bodies, statics, joints)
     bodies, held = jointed(bodies, joints) if joints else (bodies, ())
+    for names, each in laws.items():
+        if isinstance(names, str) or len(names) != 2 or not (each is None or isinstance(each, Law)):
+            raise SymphysError(f'laws: write ("ball", "ground"): Law(friction=0.5), or None, not {names!r}: {each!r}')
     own = {frozenset(names): each for names, each in laws.items()}
     own |= {frozenset(joint.between): None for joint in joints if not joint.collide}
     world = World(bodies, statics, all_pairs(bodies, statics, law or Law(), own), tuple(gravity), held)
@@ -251,7 +254,7 @@ def side_name(bodies: Sequence[Body], statics: Sequence[Static], side: Side) -> 
 def _check_names(bodies: Sequence[Body], statics: Sequence[Static], joints: Sequence[JointSpec]) -> None:
     """Bodies, what stands still and joints share one set of names."""
     seen: set[str] = set()
-    for part in (*bodies, *statics, *joints):
+    for part in (*bodies, *statics, *(joint for joint in joints if isinstance(joint, JointSpec))):
         if part.name in seen:
             raise SymphysError(f"two bodies, static surfaces or joints are called {quote(part.name)}; rename one")
         seen.add(part.name)

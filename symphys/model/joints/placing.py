@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from symphys.errors import SymphysError
 from symphys.model.joints.frames import WORLD, Pose, check_meeting, placed_joint_frames, pose
-from symphys.model.joints.joint import Joint, JointFrame, Limits
+from symphys.model.joints.joint import Joint, JointFrame
 from symphys.model.joints.kind import Kind
 from symphys.model.joints.specs import JointSpec, MovingJoint
 from symphys.model.joints.start import State, moved_to_start, spanning_tree, unmoved
@@ -45,6 +45,14 @@ def placed_joints(
     Raises:
         SymphysError: names the joint and what would be valid.
     """
+    for spec in specs:
+        if not isinstance(spec, JointSpec):
+            text = "must be Hinge, Slider, UniversalJoint, BallJoint or FixedJoint"
+            raise SymphysError(
+                f"joints: {text}, not {type(spec).__name__}; those with frames go into World(joints=...)"
+            )
+    if WORLD in names:
+        raise SymphysError(f'a body is called "{WORLD}", which joints call what stands still; give it another name')
     placed = [_placed(spec, names, state) for spec in specs]
     tree = spanning_tree(placed)
     for joint in placed:
@@ -64,7 +72,10 @@ def _placed(spec: JointSpec, names: Sequence[str], state: Mapping[str, Array]) -
     try:
         poses = [pose(name, state) for name in (first, second)]
         frames = placed_joint_frames(poses, _points(spec, poses), spec.frame_axes)
-        start = spec.start_coordinates if isinstance(spec, MovingJoint) else ()
+        start: tuple[float, ...] = ()
+        if isinstance(spec, MovingJoint):
+            spec.check_acting()
+            start = spec.start_coordinates
     except ValueError as fault:
         raise _refused(spec.name, str(fault)) from None
     other = None if second == WORLD else second
@@ -77,15 +88,7 @@ def _joint(spec: JointSpec, placed: PlacedJoint, places: Mapping[str, int]) -> J
     soft = {"frequency": spec.frequency, "damping": spec.damping}
     if not isinstance(spec, MovingJoint):
         return Joint(spec.name, spec.kind, *sides, placed.frames, **soft)
-    return Joint(spec.name, spec.kind, *sides, placed.frames, spec.motor, _bounds(spec), spec.spring, **soft)
-
-
-def _bounds(spec: MovingJoint) -> Limits:
-    """The limits of a joint."""
-    try:
-        return spec.bounds
-    except ValueError as fault:
-        raise _refused(spec.name, str(fault)) from None
+    return Joint(spec.name, spec.kind, *sides, placed.frames, spec.motor, spec.bounds, spec.spring, **soft)
 
 
 def _check_between(spec: JointSpec, names: Sequence[str]) -> None:

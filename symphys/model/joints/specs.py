@@ -94,11 +94,20 @@ class MovingJoint(JointSpec):
     spring: Spring | None = field(default=None, kw_only=True)
     start: float | Sequence[float] | None = field(default=None, kw_only=True)
 
+    def check_acting(self) -> None:
+        """ValueError for a motor or a spring that is none."""
+        if not (self.motor is None or isinstance(self.motor, Motor)):
+            raise ValueError(f"motor must be a Servo, a VelocityMotor or a TorqueMotor, not {self.motor!r}")
+        if not (self.spring is None or isinstance(self.spring, Spring)):
+            raise ValueError(f"spring must be a Spring, not {self.spring!r}")
+
     @property
     def bounds(self) -> Limits:
         """The limits; ValueError for bounds that cannot be."""
         if self.limits is None:
             return Limits()
+        if np.shape(np.array(self.limits, object)) != (2,):
+            raise ValueError(f"limits must be (lower, upper), not {self.limits}")
         low, high = self.limits
         lower, upper = -inf if low is None else low, inf if high is None else high
         if not lower < upper:
@@ -110,14 +119,17 @@ class MovingJoint(JointSpec):
     @property
     def start_coordinates(self) -> tuple[float, ...]:
         """One for each coordinate, empty if all are 0; ValueError for a wrong number of them or one out of bounds."""
+        bounds = self.bounds
         if self.start is None:
             return ()
         count = len(self.kind.coordinates)
         values = tuple(np.atleast_1d(np.asarray(self.start, float)).tolist())
+        if not np.isfinite(values).all():
+            raise ValueError(f"start must be finite, not {self.start}")
         if len(values) != count:
             which = f"a {self.kind.name} has {count} coordinate{'s' * (count > 1)}"
             raise ValueError(f"start: {which}, but {len(values)} are given")
-        lower, upper = self.bounds.lower, self.bounds.upper
+        lower, upper = bounds.lower, bounds.upper
         for value in values:
             if self.kind.coordinates[0].turns and abs(value) > pi:
                 raise ValueError("start: an angle lies between -pi and pi")

@@ -114,6 +114,10 @@ def test_joined_bodies_do_not_touch() -> None:
         (lambda: Hinge("j", ("a", "b"), **HINGE, start=(1, 2)), "a hinge has 1 coordinate, but 2 are given"),
         (lambda: Hinge("j", ("a", "b"), **HINGE, limits=(None, 1), start=2), "2 is beyond the limits"),
         (lambda: Hinge("j", ("a", "b"), **HINGE, frequency=3, start=1), "gives way, so it begins where"),
+        (lambda: Hinge("j", ("a", "b"), **HINGE, start=np.nan), "start must be finite, not nan"),
+        (lambda: Hinge("j", ("a", "b"), **HINGE, limits=1.5), r"limits must be \(lower, upper\), not 1.5"),
+        (lambda: Hinge("j", ("a", "b"), **HINGE, motor=5), "motor must be a Servo, .*, not 5"),
+        (lambda: Hinge("j", ("a", "b"), **HINGE, spring=5), "spring must be a Spring, not 5"),
         (lambda: BallJoint("j", ("a", "b"), anchors=((0, 0, 0), (0, 0, 0))), "anchors are 0.4 m apart"),
         (lambda: BallJoint("j", ("a", "b"), point=(0, 0, 1), anchors=((0, 0, 0), (0, 0, 0))), "leave one out"),
         (lambda: UniversalJoint("j", ("a", "b"), axes=((0, 1, 0), (0, 1, 1)), point=(0, 0, 1)), "45 degrees"),
@@ -131,6 +135,12 @@ def test_loops_of_starts_and_names_are_refused() -> None:
     ]
     with pytest.raises(SymphysError, match='joint "k": this joint closes a loop'):
         make_world(rods(), joints=loop)
+    with pytest.raises(SymphysError, match=r'write \("ball", "ground"\): Law\(.*not \(.a., .b.\): 0.5'):
+        make_world(rods(), laws={("a", "b"): 0.5})  # type: ignore[dict-item]
+    with pytest.raises(SymphysError, match=r"must be Hinge, .*, not Body"):
+        make_world(rods(), joints=rods())  # type: ignore[arg-type]
+    with pytest.raises(SymphysError, match='a body is called "world"'):
+        make_world([Body.ball("world", 0.1, 1.0)], joints=[FixedJoint("j", ("world", "world"))])
     with pytest.raises(SymphysError, match='are called "a"; rename one'):
         make_world([*rods(), *rods()])
     with pytest.raises(
