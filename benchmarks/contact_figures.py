@@ -127,7 +127,7 @@ def save(figure: Figure, path: Path) -> None:
         FigureCanvasAgg(figure)
         figure.savefig(path, dpi=110)
         return
-    path.write_text(style.picture(path.stem, "", figure)[0].svg, encoding="utf-8")
+    path.write_text(style.svg_text(figure), encoding="utf-8")
 
 
 def gradient_figure(panels: dict[str, list[Curve]], path: Path) -> None:

@@ -117,13 +117,16 @@ def paper() -> Iterator[None]:
 
 def picture(name: str, alt: str, figure: DataFigure | None) -> list[Picture]:
     """A figure as texts of SVG and CSV that depend on its content alone; nothing for no figure."""
-    if figure is None:
-        return []
+    return [] if figure is None else [Picture(name, alt, svg_text(figure), table(figure))]
+
+
+def svg_text(figure: Figure) -> str:
+    """A figure as SVG text that depends on its content alone."""
     buffer = io.StringIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     svg = re.sub(r"<!DOCTYPE[^>]*>\s*|<metadata>.*?</metadata>\s*", "", buffer.getvalue(), flags=re.DOTALL)
     svg = svg.replace("'DejaVu Sans'", FONTS).replace("font-weight: 700", "font-weight: 600")
-    return [Picture(name, alt, re.sub(r" +\n|\n+", "\n", svg), table(figure))]
+    return re.sub(r" +\n|\n+", "\n", svg)
 
 
 def solver_marks(solvers: Iterable[str]) -> dict[str, tuple[str, str]]:

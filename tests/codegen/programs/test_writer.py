@@ -40,9 +40,10 @@ def compare(functions: list[Any], cache: Cache, z: Any, precision: Any = "double
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.lists(st.lists(step, min_size=1, max_size=25), min_size=4, max_size=4),
-    st.lists(st.lists(st.floats(-3, 3, width=16), min_size=5, max_size=5), min_size=3, max_size=3),
+    st.lists(st.lists(st.floats(-3, 3, width=16).filter(bool), min_size=5, max_size=5), min_size=3, max_size=3),
 )
 def test_random_functions(cache: Cache, steps: list[list[tuple[int, int, int]]], z: list[list[float]]) -> None:
+    """Not of zeros, whose sign may differ: casadi's selection is a sum, which loses it, and atan2 makes pi of it."""
     compare([build(s) for s in steps], cache, np.array(z))
 
 
