@@ -41,9 +41,12 @@ def test_a_world_is_what_the_file_says() -> None:
     found = made.world()
     assert {pair.name: pair.law for pair in found.pairs} == {pair.name: pair.law for pair in world.pairs}
     assert tuple(map(float, found.gravity)) == (0, 0, -5)
-    states = [np.array(initial_state(*each)) for each in ((world, start), (found, made.initial))]
+    some = list(dict.fromkeys(pair.name.partition(":")[0] for pair in world.pairs))[::3]  # all would take half a minute
+    kept = [tuple(pair for pair in each.pairs if pair.name.partition(":")[0] in some) for each in (world, found)]
+    few = [replace(each, pairs=pairs) for each, pairs in zip((world, found), kept, strict=True)]
+    states = [np.array(initial_state(*each)) for each in zip(few, (start, made.initial), strict=True)]
     assert np.allclose(states[0], states[1], atol=1e-15)
-    steps = [step_function(each, Scheme(dt=0.01, cuts=0)) for each in (world, found)]
+    steps = [step_function(each, Scheme(dt=0.01, cuts=0)) for each in few]
     after = [np.array(step(x, [], [], 0)) for step, x in zip(steps, states, strict=True)]
     assert np.allclose(*after, rtol=0, atol=1e-12)
 
