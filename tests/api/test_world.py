@@ -41,7 +41,7 @@ def test_a_world_is_what_the_file_says() -> None:
     found = made.world()
     assert {pair.name: pair.law for pair in found.pairs} == {pair.name: pair.law for pair in world.pairs}
     assert tuple(map(float, found.gravity)) == (0, 0, -5)
-    some = list(dict.fromkeys(pair.name.partition(":")[0] for pair in world.pairs))[::3]  # all would take half a minute
+    some = list(dict.fromkeys(pair.name.partition(":")[0] for pair in world.pairs))[::5]  # all would take half a minute
     kept = [tuple(pair for pair in each.pairs if pair.name.partition(":")[0] in some) for each in (world, found)]
     few = [replace(each, pairs=pairs) for each, pairs in zip((world, found), kept, strict=True)]
     states = [np.array(initial_state(*each)) for each in zip(few, (start, made.initial), strict=True)]

@@ -40,7 +40,8 @@ def test_the_problem_of_your_own_is_solved(tmp_path: Path) -> None:
     assert croquet == blocks("toml", "docs/first_problem.md")[0]
     path.write_text(croquet, encoding="utf-8")
     assert main(["check", str(path)]) == 0
-    assert main(["solve", str(path), "--solver", "gradient,least_squares", "--out", str(tmp_path / "reports")]) == 0
+    solvers = ["--solver", "gradient,least_squares", "--unexamined"]
+    assert main(["solve", str(path), *solvers, "--out", str(tmp_path / "reports")]) == 0
 
 
 def test_the_front_door_opens(tmp_path: Path) -> None:
