@@ -65,6 +65,12 @@ class Trajectory:
         joint_units: (J,) of the coordinates, "rad" or "m"; empty in older files.
 
     Quantities also go by the names of formulas: ``motion["ball.position"]``, ``motion["knee.angle"]``; see ``units``.
+
+    Example:
+        >>> import symphys
+        >>> motion = symphys.simulate("ball_throw", throw=[8, 0, 3])
+        >>> motion["ball.position"].shape, motion.units["ball.velocity"], motion.contact_names
+        ((501, 3), 'm/s', ('ball-ground',))
     """
 
     time: Array

@@ -40,6 +40,14 @@ def step_function(
 
     Returns:
         A function of x (see ``Layout``), u, p and smoothing [m/s] >= 0, where 0 is the exact step.
+
+    Example:
+        >>> from symphys import Body, Layout, Plane, Scheme, initial_state, make_world, step_function
+        >>> world = make_world([Body.ball("ball", radius=0.1, mass=0.5, position=(0, 0, 1))], [Plane.ground()])
+        >>> step = step_function(world, Scheme(dt=0.01), ["ball.force"])
+        >>> x = step(initial_state(world), [0.5, 0, 0], [], 0)
+        >>> round(float(x[Layout(world)["ball.velocity"]][0]), 12)
+        0.01
     """
     arguments = arguments_of(world, inputs, parameters)
     tracer, layout = inline(world, arguments), Layout(world)

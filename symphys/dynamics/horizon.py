@@ -23,6 +23,13 @@ def roll_out(step: ca.Function, steps: int, x0: Expr, u: Expr, p: Expr, smoothin
 
     Returns:
         The states (nx, N + 1) that include x0, then each further output of ``step``, N columns of them.
+
+    Example:
+        >>> from symphys import Body, Layout, Plane, initial_state, make_world, roll_out, step_function
+        >>> world = make_world([Body.ball("ball", radius=0.1, mass=0.5, position=(0, 0, 1))], [Plane.ground()])
+        >>> (x,) = roll_out(step_function(world), 100, initial_state(world), [], [], 0)
+        >>> x[Layout(world)["ball.position"], :].shape  # expressions, in any casadi problem
+        (3, 101)
     """
     horizon = step.mapaccum(f"{step.name()}_{steps}", steps)
     outputs: Any = horizon(x0, u, ca.repmat(p, 1, steps), ca.repmat(ca.MX(smoothing), 1, steps))

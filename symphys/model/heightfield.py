@@ -30,6 +30,12 @@ class Heightfield:
         heights: rows along y, columns along x [m]; two or more of each.
         spacing: (2,) between neighbours along x and along y [m].
         origin: (2,) x and y of the first height [m].
+
+    Example:
+        >>> from symphys import Heightfield, Terrain
+        >>> hills = Terrain("hills", Heightfield(((0, 0, 0), (0, 0.2, 0), (0, 0, 0)), spacing=(1, 1), origin=(-1, -1)))
+        >>> float(hills.height(0, 0))
+        0.2
     """
 
     heights: tuple[tuple[float, ...], ...]

@@ -90,6 +90,13 @@ def initial_state(world: World, values: Mapping[str, Any] = NOTHING) -> Any:
 
     ``values`` maps names such as ``ball.velocity`` to numbers or casadi expressions; velocities are the true ones. What
     is not named is as the bodies' own ``start`` has it, else zero.
+
+    Example:
+        >>> from symphys import Body, Layout, initial_state, make_world
+        >>> world = make_world([Body.ball("ball", radius=0.1, mass=0.5, position=(0, 0, 1))])
+        >>> x = initial_state(world, {"ball.velocity": [3, 0, 2]})
+        >>> x[Layout(world)["ball.velocity"]]
+        DM([3, 0, 2])
     """
     layout = Layout(world)
     given = {f"{body.name}.{field}" for body in world.bodies for field in GIVEN}

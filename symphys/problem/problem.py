@@ -139,6 +139,11 @@ def load_problem(
 
     Raises:
         ProblemError: names the file and every fault found, each with table, key and what would be valid.
+
+    Example:
+        >>> import symphys
+        >>> symphys.load_problem(symphys.new("mine.toml"), {"simulation.dt": 0.005}).simulation.dt
+        0.005
     """
     path = Path(path)
     return _made(path, read_source(path), settings, functions)

@@ -26,6 +26,12 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
         exact: whether smoothing 0 is all that will be asked for; kernels then leave the smoothing out.
         backend: what evaluates it, a name of ``symphys.codegen.backends.NAMES``.
         threads: that share a batch; None: one for each processor.
+
+    Example:
+        >>> import symphys
+        >>> made = symphys.transcribe(symphys.load("ball_throw"), backend="casadi")
+        >>> made.judge(made.shooting.start(0)).solved, made.shooting.n
+        (False, 6)
     """
     if problem.scenarios is not None:
         require_small_nets(problem, "a problem with scenarios")

@@ -29,8 +29,9 @@ def test_importing_is_cheap() -> None:
 
 
 EXAMPLES = (
-    "CompiledRollout", "Problem", "Solution", "cache", "check", "compile", "compile_step", "doctor", "export", "load",
-    "new", "read", "report", "schema", "show", "simulate", "solve", "solve_all",
+    "CompiledRollout", "Heightfield", "Problem", "Slider", "Solution", "Trajectory", "cache", "check",
+    "compile", "compile_step", "doctor", "export", "initial_state", "load", "load_problem", "new", "read",
+    "report", "roll_out", "schema", "show", "simulate", "solve", "solve_all", "step_function", "transcribe",
 )  # fmt: skip
 
 

@@ -175,6 +175,15 @@ class Slider(MovingJoint):
 
     Attributes:
         axis: (3,) of any length but 0, as the bodies lie, world coordinates.
+
+    Example:
+        >>> from symphys import Body, Problem, Slider, TorqueMotor, make_world, simulate
+        >>> cart = Body.box("cart", size=(0.2, 0.2, 0.1), mass=1)
+        >>> rail = Slider("rail", ("world", "cart"), axis=(1, 0, 0), motor=TorqueMotor(torque=10))
+        >>> push = {"sets": "rail.command", "guess": [2.0]}
+        >>> pushed = Problem.from_world(make_world([cart], joints=[rail]), duration=1.0, variables={"push": push})
+        >>> round(float(simulate(pushed)["rail.position"][-1]), 6)
+        1.0
     """
 
     kind: ClassVar[Kind] = SLIDER
