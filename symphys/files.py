@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import io
 import json
 import math
 import os
+import stat
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,13 @@ from typing import Any
 from symphys.errors import SymphysError
 
 NON_FINITE = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
+SPECIAL = {
+    stat.S_IFIFO: "a named pipe",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
+"""Kinds of files that have no end, or are read only as fast as another process writes."""
 
 
 class FileError(SymphysError):
@@ -69,9 +78,17 @@ def remove(path: Path) -> None:
         raise FileError(f"cannot remove {path}: {reason(error)}") from error
 
 
+def check_regular(path: Path) -> None:
+    """Raise OSError, whose text says what is valid, if reading a path could wait for ever; the path is not opened."""
+    kind = SPECIAL.get(stat.S_IFMT(path.stat().st_mode))
+    if kind:
+        raise OSError(errno.EINVAL, f"this is {kind}, a regular file is needed", str(path))
+
+
 def read_text(path: Path) -> str:
     """The UTF-8 text of a file; FileError if there is none."""
     try:
+        check_regular(path)
         return path.read_text(encoding="utf-8")
     except OSError as error:
         raise FileError(f"cannot read {path}: {reason(error)}") from error

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from symphys import json_values as values
+from symphys.files import check_regular
 from symphys.results.drawable import largest, oversized
-from symphys.results.text_files import ReportError
+from symphys.results.text_files import ReportError, reason
 from symphys.trajectory import Array, Trajectory, shapes
 
 ABSENT = {"force": 0.0, "torque": 0.0, "contact_force": 0.0}
@@ -33,10 +34,11 @@ def read_trajectory(path: Path) -> Trajectory:
             drawn.
     """
     try:
+        check_regular(path)
         with path.open("rb") as file:
             arrays = unpack(np.load(file, allow_pickle=False))
-    except FileNotFoundError as error:
-        raise ReportError(f"{path.name}: there is no such file") from error
+    except OSError as error:
+        raise ReportError(f"{path.name}: {reason(error)}") from error
     except UNREADABLE as error:
         raise ReportError(f"{path.name}: not an archive of plain arrays ({values.name(str(error))})") from error
     try:

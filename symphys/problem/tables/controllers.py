@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.expression import Formula, FormulaError, parse
+from symphys.files import check_regular
 from symphys.model.controllers import ControlLaw, Custom, Linear, Net, Periodic
 from symphys.problem.checks.memory import check_net
 from symphys.problem.feedback import Controller, Sensor
@@ -227,6 +228,7 @@ def read_weights(faults: Faults, place: Place, name: str, net: Net) -> Array:
     path = Path(faults.origin(place).file).parent / name
     count = net.sizes["weights"]
     try:
+        check_regular(path)
         array = np.load(path, allow_pickle=False)
     except (OSError, ValueError, EOFError) as error:
         reason = getattr(error, "strerror", None) or "it is no .npy file of numbers"
