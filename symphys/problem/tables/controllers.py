@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -229,8 +230,9 @@ def read_weights(faults: Faults, place: Place, name: str, net: Net) -> Array:
     count = net.sizes["weights"]
     try:
         check_regular(path)
-        array = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
+        with path.open("rb") as file:
+            array = np.load(file, allow_pickle=False)
+    except (OSError, ValueError, EOFError, MemoryError, zipfile.BadZipFile) as error:
         reason = getattr(error, "strerror", None) or "it is no .npy file of numbers"
         faults.add(place, f"{path} cannot be read: {reason}")
         return np.zeros(count)
