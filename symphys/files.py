@@ -8,6 +8,7 @@ import io
 import json
 import math
 import os
+import re
 import stat
 from collections.abc import Mapping
 from pathlib import Path
@@ -23,10 +24,17 @@ SPECIAL = {
     stat.S_IFBLK: "a device",
 }
 """Kinds of files that have no end, or are read only as fast as another process writes."""
+LONE_SURROGATE = re.compile("[\ud800-\udfff]")
+"""What stands in a text for bytes of a file name that are no UTF-8."""
 
 
 class FileError(SymphysError):
     """A file or folder that cannot be read or written; names it and says why."""
+
+
+def printable(name: str) -> str:
+    """The text with U+FFFD for what is no UTF-8 in the name of a file."""
+    return LONE_SURROGATE.sub("\ufffd", name)
 
 
 def make_folder(path: Path) -> None:
@@ -52,8 +60,8 @@ def write_bytes(path: Path, content: bytes) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write UTF-8 text with the line ends as they are."""
-    write_bytes(path, text.encode())
+    """Write UTF-8 text with the line ends as they are; parts of file names that are no UTF-8 are replaced."""
+    write_bytes(path, printable(text).encode())
 
 
 def write_json(path: Path, value: object) -> None:
