@@ -148,13 +148,14 @@ def _processor() -> str:
 
 
 def _cache() -> str:
-    folder = default_cache().folder
+    cache = default_cache()
+    folder = cache.folder
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        cache.make()
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        why = f"{folder} cannot be written ({error.strerror})"
+        why = f"{folder} cannot be used ({error.strerror})"
         raise OSError(f"{why}: kernels are compiled anew each time; set SYMPHYS_CACHE to another folder") from error
     return f"{folder}, writable"
 

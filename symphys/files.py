@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import io
 import json
 import math
 import os
+import re
+import stat
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,10 +17,24 @@ from typing import Any
 from symphys.errors import SymphysError
 
 NON_FINITE = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
+SPECIAL = {
+    stat.S_IFIFO: "a named pipe",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
+"""Kinds of files that have no end, or are read only as fast as another process writes."""
+LONE_SURROGATE = re.compile("[\ud800-\udfff]")
+"""What stands in a text for bytes of a file name that are no UTF-8."""
 
 
 class FileError(SymphysError):
     """A file or folder that cannot be read or written; names it and says why."""
+
+
+def printable(name: str) -> str:
+    """The text with U+FFFD for what is no UTF-8 in the name of a file."""
+    return LONE_SURROGATE.sub("\ufffd", name)
 
 
 def make_folder(path: Path) -> None:
@@ -43,8 +60,8 @@ def write_bytes(path: Path, content: bytes) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write UTF-8 text with the line ends as they are."""
-    write_bytes(path, text.encode())
+    """Write UTF-8 text with the line ends as they are; parts of file names that are no UTF-8 are replaced."""
+    write_bytes(path, printable(text).encode())
 
 
 def write_json(path: Path, value: object) -> None:
@@ -69,9 +86,17 @@ def remove(path: Path) -> None:
         raise FileError(f"cannot remove {path}: {reason(error)}") from error
 
 
+def check_regular(path: Path) -> None:
+    """Raise OSError, whose text says what is valid, if reading a path could wait for ever; the path is not opened."""
+    kind = SPECIAL.get(stat.S_IFMT(path.stat().st_mode))
+    if kind:
+        raise OSError(errno.EINVAL, f"this is {kind}, a regular file is needed", str(path))
+
+
 def read_text(path: Path) -> str:
     """The UTF-8 text of a file; FileError if there is none."""
     try:
+        check_regular(path)
         return path.read_text(encoding="utf-8")
     except OSError as error:
         raise FileError(f"cannot read {path}: {reason(error)}") from error

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -21,7 +23,8 @@ from symphys.errors import SymphysError
 from symphys.suggest import hint
 from symphys.version import __version__
 
-SOLVED, UNSOLVED, WRONG, INTERRUPTED = 0, 1, 2, 130
+SOLVED, WRONG, INTERRUPTED, UNREAD = 0, 2, 130, 141
+"""Interrupted is 128 and the number of SIGINT; output that nobody reads is 128 and the number of SIGPIPE."""
 
 
 class Commands(click.Group):
@@ -52,12 +55,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     0: every run solved, or found its best where there is nothing to meet; 1: some run not solved, not to be trusted, or
     failed, or a gradient that is wrong; 2: wrong usage or problem file;
-    130: interrupted.
+    130: interrupted; 141: nobody reads the output any more.
     """
+    with contextlib.ExitStack() as opened:
+        prepare(opened)
+        streams = sys.stdout, sys.stderr
+        try:
+            code = run(arguments)
+            for stream in streams:
+                stream.flush()
+        except (BrokenPipeError, SystemExit):  # click exits, with streams of its own, if nobody reads
+            sys.stdout, sys.stderr = streams
+            close_quietly()
+            return UNREAD
+        return code
+
+
+def run(arguments: Sequence[str] | None) -> int:
+    """Run a command, and say what is wrong; the exit code. BrokenPipeError if nobody reads what it says."""
     try:
-        code = app.main(args=arguments, prog_name="symphys", standalone_mode=False)
-        sys.stdout.flush()
-        return int(code or SOLVED)
+        return int(app.main(args=arguments, prog_name="symphys", standalone_mode=False) or SOLVED)
     except click.ClickException as error:
         error.show()
         return WRONG
@@ -68,13 +85,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
         click.echo("symphys: stopped at once; runs that had ended are kept, the same command does the rest", err=True)
         return INTERRUPTED
     except BrokenPipeError:
-        return close_quietly()
+        raise
     except OSError as error:
         click.echo(f"symphys: {error}", err=True)
         return WRONG
 
 
-def close_quietly() -> int:
-    """The reader of the output has gone: print nothing more, not even at exit."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return UNSOLVED
+def prepare(opened: contextlib.ExitStack) -> None:
+    """Let outputs take every name, and nothing go wrong where one was closed before the start (``>&-``)."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            nowhere = io.TextIOWrapper(io.FileIO(os.devnull, "w"), encoding="utf-8")
+            opened.callback(setattr, sys, name, None)
+            setattr(sys, name, opened.enter_context(nowhere))
+        elif stream.errors in ("strict", "surrogateescape") and hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
+
+
+def close_quietly() -> None:
+    """The reader of an output has gone: print nothing more to it, not even at exit."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except BrokenPipeError:
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, stream.fileno())
+            os.close(nowhere)

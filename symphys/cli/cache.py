@@ -15,11 +15,14 @@ def info() -> None:
     """Say where compiled kernels are kept, how many, and how much room they take."""
     from symphys.codegen import default_cache
 
-    found = default_cache().info()
+    kept = default_cache()
+    found = kept.info()
     click.echo(f"folder   {found.folder}{'' if found.folder.is_dir() else ' (not made yet)'}")
     click.echo(f"kernels  {found.kernels}")
     click.echo(f"size     {size(found.bytes)}")
     click.echo(f"limit    {size(found.limit)}; those not used for longest go first")
+    if why := kept.distrust():
+        click.echo(f"unused   {why}")
 
 
 @cache.command()

@@ -57,6 +57,7 @@ def _require_ours(path: Path, sums: set[str]) -> None:
     if not path.exists() and not path.is_symlink():
         return
     try:
+        files.check_regular(path)
         ours = not path.is_symlink() and _sum(path.read_bytes()) in sums
     except OSError:
         ours = False

@@ -11,6 +11,7 @@ import casadi as ca
 from pydantic import ValidationError
 
 from symphys.errors import Issue, ProblemError
+from symphys.files import printable
 from symphys.model.state_layout import input_sizes
 from symphys.problem.checks.memory import check_rollout
 from symphys.problem.checks.pair_limit import check_pair_limit
@@ -147,8 +148,8 @@ def build(
         document, simulation, parametric, at_guess(parametric, known, variables), variables, faults
     )
     return ProblemData(
-        name=path.stem,
-        title=document.title or path.stem,
+        name=printable(path.stem),
+        title=document.title or printable(path.stem),
         description=document.description,
         file=str(path),
         text=text,

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 from symphys.errors import SymphysError
+from symphys.files import check_regular
 from symphys.json_values import name, table, words
 
 
@@ -16,6 +17,7 @@ class ReportError(SymphysError):
 def read_words(path: Path) -> str:
     """The text of a file; bytes that are no UTF-8 are replaced. Raises ReportError."""
     try:
+        check_regular(path)
         return words(path.read_text(encoding="utf-8", errors="replace"))
     except OSError as error:
         raise ReportError(f"{path.name}: {reason(error)}") from error
@@ -24,6 +26,7 @@ def read_words(path: Path) -> str:
 def read_table(path: Path) -> dict[str, object]:
     """The JSON object in a file. Raises ReportError that names the file and the fault."""
     try:
+        check_regular(path)
         content = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ReportError(f"{path.name}: {reason(error)}") from error

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from symphys import json_values as values
+from symphys.files import check_regular
 from symphys.json_values import Array
 from symphys.results.text_files import reason
 
@@ -77,6 +78,7 @@ def trace_text(rows: Iterable[Mapping[str, object]]) -> str:
 def read_trace(path: Path, faults: list[str]) -> Trace:
     """The columns of trace.csv; rows that are cut short are left out, which ``faults`` then says."""
     try:
+        check_regular(path)
         with path.open(encoding="utf-8", errors="replace", newline="") as file:
             rows = list(csv.reader(file))
     except OSError as error:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import zipfile
-import zlib
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from symphys import json_values as values
+from symphys.results.archives import MOST_BYTES, NUMBER, read_archive
 from symphys.results.drawable import largest, oversized
 from symphys.results.text_files import ReportError
 from symphys.trajectory import Array, Trajectory, shapes
@@ -21,24 +21,15 @@ ABSENT = {"force": 0.0, "torque": 0.0, "contact_force": 0.0}
 UNUSED = ("residual", "crowded", "ambiguous", "paradox")
 """Numbers on the contact solver: nothing that draws a motion depends on them, so they may be anything."""
 
-UNREADABLE = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError, MemoryError)
-"""What numpy and zipfile raise at files that are no archives of plain arrays."""
-
 
 def read_trajectory(path: Path) -> Trajectory:
     """Read a recorded motion, up to the first state that is not finite.
 
     Raises:
-        ReportError: no such file, not an archive of plain arrays, shapes that do not fit, or numbers beyond what can be
-            drawn.
+        ReportError: no such file, not an archive of plain arrays, too large, shapes that do not fit, or numbers beyond
+            what can be drawn.
     """
-    try:
-        with path.open("rb") as file:
-            arrays = unpack(np.load(file, allow_pickle=False))
-    except FileNotFoundError as error:
-        raise ReportError(f"{path.name}: there is no such file") from error
-    except UNREADABLE as error:
-        raise ReportError(f"{path.name}: not an archive of plain arrays ({values.name(str(error))})") from error
+    arrays = read_archive(path)
     try:
         motion = trim(make_trajectory(arrays))
     except (ValueError, KeyError, TypeError) as error:
@@ -49,14 +40,6 @@ def read_trajectory(path: Path) -> Trajectory:
     return motion
 
 
-def unpack(content: object) -> dict[str, Array]:
-    """Every array of an archive; ValueError for anything else that numpy reads."""
-    if not isinstance(content, np.lib.npyio.NpzFile):
-        raise ValueError("one array, not an archive of several")
-    with content as archive:
-        return {key: archive[key] for key in archive.files}
-
-
 def make_trajectory(arrays: Mapping[str, Array]) -> Trajectory:
     """Check the shapes; quantities that are absent become nan, forces on bodies and contacts 0, orientations 1."""
     time = np.asarray(arrays["time"], float).reshape(-1)
@@ -65,9 +48,16 @@ def make_trajectory(arrays: Mapping[str, Array]) -> Trajectory:
     value = np.asarray(arrays.get("joint_value", np.zeros((0, 0, 0))))
     coordinates = value.shape[2] if value.ndim == 3 else 0
     sizes = {"N + 1": count, "N": count - 1, "B": bodies, "C": len(contacts), "J": len(joints), "K": coordinates}
+    expected = {
+        name: tuple(sizes[letter] if letter in sizes else int(letter) for letter in letters)
+        for name, letters in shapes().items()
+    }
+    if sum(math.prod(shape) for shape in expected.values()) * NUMBER > MOST_BYTES:
+        raise ValueError(
+            f"{count} times, {bodies} bodies, {len(contacts)} contacts and {len(joints)} joints are too many"
+        )
     found: dict[str, Any] = {}
-    for name, letters in shapes().items():
-        shape = tuple(sizes[letter] if letter in sizes else int(letter) for letter in letters)
+    for name, shape in expected.items():
         found[name] = np.asarray(arrays[name], float) if name in arrays else np.full(shape, ABSENT.get(name, np.nan))
         if found[name].shape != shape and name not in UNUSED:
             raise ValueError(f"{name} has shape {found[name].shape}, {shape} is expected")

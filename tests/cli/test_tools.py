@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -43,6 +44,13 @@ def test_cache_info_and_clear(run: Run, cache: Path) -> None:
     assert code == 0
     assert out == f"removed 2 of 2 kernels, 1.5 MB, from {cache}\n"
     assert list(cache.iterdir()) == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="folders have no group there")
+def test_cache_info_says_why_a_cache_is_not_used(run: Run, cache: Path) -> None:
+    cache.mkdir()
+    cache.chmod(0o770)
+    assert "unused   others may write to the folder" in run("cache", "info")[1]
 
 
 def test_a_kernel_that_cannot_be_removed(run: Run, cache: Path) -> None:

@@ -30,7 +30,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "expression": ("errors maths suggest", "casadi", "the formula language"),
     "problems": ("errors suggest", "", "shipped problem files"),
     "problem": (
-        "dynamics errors expression maths model problems suggest",
+        "dynamics errors expression files maths model problems suggest",
         "casadi numpy pydantic pydantic_core tomli_w",
         "problem file to problem; of the dynamics only what is observed",
     ),

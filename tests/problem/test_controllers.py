@@ -101,6 +101,11 @@ def test_files_are_never_unpickled(tmp_path: Path) -> None:
     assert "no .npy file of numbers" in refused(tmp_path, "hidden = [3]", 'hidden = [3], weights = "w.npy"')
 
 
+def test_half_an_archive_of_weights(tmp_path: Path) -> None:
+    (tmp_path / "w.npy").write_bytes(b"PK\x03\x04 half an archive")
+    assert "no .npy file of numbers" in refused(tmp_path, "hidden = [3]", 'hidden = [3], weights = "w.npy"')
+
+
 def test_weights_of_a_file(tmp_path: Path) -> None:
     """What is in the file is what the controller has."""
     np.save(tmp_path / "w.npy", np.arange(13, dtype=np.float32))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -61,3 +63,45 @@ def test_joints_that_do_not_fit_are_named(tmp_path: Path) -> None:
     np.savez(tmp_path / "trajectory.npz", **BODIES, **{**JOINTS, "joint_rate": VALUE[:3]})
     with pytest.raises(ReportError, match="joint_rate has shape"):
         read_trajectory(tmp_path / "trajectory.npz")
+
+
+def declaring(path: Path, **arrays: tuple[tuple[int, ...], str]) -> None:
+    """An archive of the bodies and of arrays that have a header, with a shape and a type, and no numbers."""
+    np.savez_compressed(path, **BODIES)
+    with zipfile.ZipFile(path, "a") as archive:
+        for name, (shape, kind) in arrays.items():
+            head = io.BytesIO()
+            np.lib.format.write_array_header_1_0(head, {"shape": shape, "fortran_order": False, "descr": kind})
+            archive.writestr(f"{name}.npy", head.getvalue())
+
+
+@pytest.mark.parametrize(
+    ("shape", "kind", "size"),
+    [
+        ((4, 2**26, 3), "<f8", "6 GiB"),
+        ((2**29,), "|b1", "4 GiB"),
+        ((2**28,), "<U0", "25 GiB"),
+        ((10**12, 10**12), "<f8", "GiB"),
+    ],
+)
+def test_what_takes_too_much_memory_is_refused_before_it_is_unpacked(
+    tmp_path: Path, shape: tuple[int, ...], kind: str, size: str
+) -> None:
+    declaring(tmp_path / "trajectory.npz", velocity=(shape, kind))
+    with pytest.raises(ReportError, match=rf"trajectory.npz: velocity takes .*{size} in memory; at most 1 GiB"):
+        read_trajectory(tmp_path / "trajectory.npz")
+
+
+def test_what_takes_too_much_together_is_refused(tmp_path: Path) -> None:
+    torque = (3, 14 * 2**20, 3), "|i1"
+    declaring(tmp_path / "guess.npz", velocity=((4, 2**23, 2), "<f8"), torque=torque)
+    with pytest.raises(ReportError, match=r"torque takes 0.984 GiB in memory, 1.48 GiB with the arrays before it"):
+        read_trajectory(tmp_path / "guess.npz")
+
+
+def test_quantities_that_are_absent_are_not_made_up_beyond_memory(tmp_path: Path) -> None:
+    names = np.array(["c"] * 10_000)
+    many = {"time": np.zeros(10_000), "position": np.zeros((10_000, 1, 3)), "contact_names": names}
+    np.savez_compressed(tmp_path / "guess.npz", **many)
+    with pytest.raises(ReportError, match="10000 times, 1 bodies, 10000 contacts and 0 joints are too many"):
+        read_trajectory(tmp_path / "guess.npz")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import shutil
-import tempfile
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -15,6 +14,7 @@ from symphys import codegen as kernel
 from symphys.codegen import Fixed, ProcessorKernel
 from symphys.codegen.backends.interface import Function
 from symphys.codegen.backends.seeds import Seeds
+from symphys.codegen.toolchain.temporary import TemporaryFolder
 from symphys.shooting import Array, Nlp
 
 ROOM = "symphys.codegen.backends"
@@ -71,7 +71,7 @@ def load(sizes: dict[str, int], tasks: Sequence[Task]) -> list[Function]:
     text = head + files(ROOM).joinpath("external.c").read_text(encoding="utf-8")
     with (
         kernel.shared_library([kernel.SourceFile(text)], kernel.default_cache()) as built,
-        tempfile.TemporaryDirectory(prefix="symphys-external-", ignore_cleanup_errors=True) as folder,
+        TemporaryFolder("symphys-external-") as folder,
     ):
         copy = Path(folder) / "external.so"
         shutil.copyfile(built.path, copy)

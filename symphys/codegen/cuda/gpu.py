@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
@@ -15,6 +14,7 @@ from numpy.typing import DTypeLike, NDArray
 from symphys.codegen.cuda.compiler import ADVICE, image
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.toolchain.cache import Cache, default_cache
+from symphys.codegen.toolchain.temporary import TemporaryFolder
 
 SPARED = 2**28
 """[bytes] left to others, and to what a launch needs: stacks of all resident threads."""
@@ -31,9 +31,9 @@ class Gpu:
         self.architecture = f"sm_{properties['major']}{properties['minor']}"
 
     @cached_property
-    def folder(self) -> tempfile.TemporaryDirectory[str]:
+    def folder(self) -> TemporaryFolder:
         """For images that no cache takes."""
-        return tempfile.TemporaryDirectory(prefix="symphys-cuda-", ignore_cleanup_errors=True)
+        return TemporaryFolder("symphys-cuda-")
 
     def load(self, texts: Sequence[str]) -> tuple[Any, str, bool, str]:
         """See ``Device``."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -21,6 +20,7 @@ from symphys.codegen.toolchain.cache import Cache, default_cache
 from symphys.codegen.toolchain.compiler import Compiler, find_compiler
 from symphys.codegen.toolchain.processor import processor
 from symphys.codegen.toolchain.report import BuildReport
+from symphys.codegen.toolchain.temporary import TemporaryFolder
 
 
 def compile_program(
@@ -118,8 +118,8 @@ def _kept(cache: Cache, key: str, path: Path) -> tuple[Path, str]:
         return path, why
 
 
-def _folder() -> tempfile.TemporaryDirectory[str]:
+def _folder() -> TemporaryFolder:
     try:
-        return tempfile.TemporaryDirectory(prefix="symphys-kernel-", ignore_cleanup_errors=True)
+        return TemporaryFolder("symphys-kernel-")
     except OSError as error:
         raise KernelUnavailable(f"no temporary folder to compile a kernel in: {error.strerror}; set TMPDIR") from error

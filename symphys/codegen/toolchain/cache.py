@@ -2,14 +2,19 @@
 
 A file appears whole under its name or not at all, so that readers need no lock; a file whose content is not that of
 its name is removed and built again. Processes that want the same kernel wait for the first one to build it.
+
+A kernel is code that runs as the user, so it is loaded only from a folder, and a file, that nobody else may write to.
 """
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import hashlib
 import os
 import shutil
+import stat
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -44,11 +49,34 @@ class Cache:
     limit: int = LIMIT
     suffix: str = KINDS[0]
 
+    def distrust(self) -> str:
+        """Why kernels in the folder cannot be trusted, and what to do; empty if they can, or if there is no folder."""
+        try:
+            status = self.folder.stat()
+        except OSError:
+            return ""
+        if not _own(status):
+            return (
+                "the folder belongs to somebody else, whose kernels are not run; set SYMPHYS_CACHE to one of your own"
+            )
+        if _others_write(status):
+            way = f"run chmod go-w {self.folder}, or set SYMPHYS_CACHE to another folder"
+            return f"others may write to the folder, and their kernels would run as yours; {way}"
+        return ""
+
+    def make(self) -> None:
+        """Make the folder, for the user alone; OSError if that cannot be, or if it is there and cannot be trusted."""
+        self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if why := self.distrust():
+            raise PermissionError(errno.EPERM, why, str(self.folder))
+
     def find(self, key: str) -> Path | None:
-        """The kernel of this key; None if there is none or if it is damaged."""
+        """The kernel of this key; None if there is none, if it is damaged, or if it cannot be trusted."""
+        if self.distrust():
+            return None
         for path in self._files(f"{key}-*{self.suffix}"):
             with contextlib.suppress(OSError):
-                if path.stem.split("-")[1] == _checksum(path):
+                if _safe(path) and path.stem.split("-")[1] == _checksum(path):
                     with contextlib.suppress(OSError):
                         os.utime(path)
                     return path
@@ -58,7 +86,7 @@ class Cache:
 
     def store(self, key: str, built: Path) -> Path:
         """Take over a library; OSError if the folder does not take it."""
-        self.folder.mkdir(parents=True, exist_ok=True)
+        self.make()
         target = self.folder / f"{key}-{_checksum(built)}{self.suffix}"
         handle, name = tempfile.mkstemp(prefix=".new-", dir=self.folder)
         os.close(handle)
@@ -76,7 +104,7 @@ class Cache:
         try:
             import fcntl
 
-            self.folder.mkdir(parents=True, exist_ok=True)
+            self.make()
             lock = (self.folder / f".{key}.lock").open("w")
         except (ImportError, OSError):
             yield
@@ -148,6 +176,22 @@ def default_cache() -> Cache:
         return Cache((Path(base) if base else Path.home() / ".cache") / "symphys" / "kernels")
     except RuntimeError as error:
         raise KernelUnavailable("no home folder in which to keep kernels; set SYMPHYS_CACHE to a folder") from error
+
+
+def _safe(path: Path) -> bool:
+    """Whether nobody else has written this file, or may."""
+    status = path.lstat()
+    return stat.S_ISREG(status.st_mode) and _own(status) and not _others_write(status)
+
+
+def _own(status: os.stat_result) -> bool:
+    """Whether it belongs to the user, or to root; Windows keeps others out of the user's folders by itself."""
+    return sys.platform == "win32" or status.st_uid in (os.geteuid(), 0)
+
+
+def _others_write(status: os.stat_result) -> bool:
+    """Whether group or others may write to it."""
+    return sys.platform != "win32" and bool(status.st_mode & (stat.S_IWGRP | stat.S_IWOTH))
 
 
 def _checksum(path: Path) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from symphys.errors import Issue, ProblemError
+from symphys.files import check_regular
 
 MAX_BYTES = 10_000_000
 MAX_KEY_PARTS = 20
@@ -30,6 +31,7 @@ def read_source(path: Path) -> str:
             raise refuse(path, "this is a folder; name a problem file in it")
         if not path.exists():
             raise refuse(path, "there is no such file")
+        check_regular(path)
         with path.open("rb") as stream:
             content = stream.read(MAX_BYTES + 1)
     except OSError as error:

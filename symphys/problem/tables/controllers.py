@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.expression import Formula, FormulaError, parse
+from symphys.files import check_regular
 from symphys.model.controllers import ControlLaw, Custom, Linear, Net, Periodic
 from symphys.problem.checks.memory import check_net
 from symphys.problem.feedback import Controller, Sensor
@@ -227,8 +229,10 @@ def read_weights(faults: Faults, place: Place, name: str, net: Net) -> Array:
     path = Path(faults.origin(place).file).parent / name
     count = net.sizes["weights"]
     try:
-        array = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
+        check_regular(path)
+        with path.open("rb") as file:
+            array = np.load(file, allow_pickle=False)
+    except (OSError, ValueError, EOFError, MemoryError, zipfile.BadZipFile) as error:
         reason = getattr(error, "strerror", None) or "it is no .npy file of numbers"
         faults.add(place, f"{path} cannot be read: {reason}")
         return np.zeros(count)

@@ -164,7 +164,7 @@ def seed_chip(run: Run) -> Html:
     if not (run.folder / RUN_PAGE).is_file():
         return tag("span", content, class_=f"pill {level}", title=label)
     place = f"{run.place}/{RUN_PAGE}" if run.place not in ("", ".") else RUN_PAGE
-    return tag("a", content, class_=f"pill {level}", href=quote(f"./{place}"), title=label)
+    return tag("a", content, class_=f"pill {level}", href=quote(f"./{place}", errors="surrogateescape"), title=label)
 
 
 def statuses(entry: Entry) -> Html:

@@ -127,6 +127,75 @@ def test_what_killed_processes_left_is_swept(tmp_path: Path) -> None:
     assert list(own.folder.iterdir()) == []
 
 
+def planted(own: Cache) -> Path:
+    """A kernel of the key "k"."""
+    built = own.folder.parent / "built"
+    built.write_bytes(b"code")
+    return own.store("k", built)
+
+
+def given_away(path: Path, monkeypatch: Patch) -> None:
+    """Make it somebody else's; who is not root becomes somebody else."""
+    if os.geteuid() == 0:
+        os.chown(path, 4321, -1)
+    else:
+        monkeypatch.setattr("os.geteuid", lambda: 4321)
+
+
+@UNIX
+def test_a_new_cache_is_for_the_user_alone(tmp_path: Path) -> None:
+    before = os.umask(0)
+    try:
+        kernel = planted(Cache(tmp_path / "cache"))
+    finally:
+        os.umask(before)
+    assert kernel.parent.stat().st_mode & 0o777 == 0o700
+    assert kernel.stat().st_mode & 0o077 == 0
+    assert Cache(tmp_path / "cache").find("k") == kernel
+
+
+@UNIX
+@pytest.mark.parametrize("mode", [0o770, 0o707])
+def test_a_cache_that_others_may_write_to_is_not_used(
+    pendulum: Kernel, cache: Cache, tmp_path: Path, mode: int
+) -> None:
+    own = Cache(tmp_path / "cache")
+    shutil.copytree(cache.folder, own.folder)
+    own.folder.chmod(mode)
+    before = sorted(own.folder.iterdir())
+    kernel = compile_program(pendulum.program, cache=own, threads=1)
+    assert not kernel.report.cached
+    assert f"run chmod go-w {own.folder}, or set SYMPHYS_CACHE" in kernel.report.note
+    assert sorted(own.folder.iterdir()) == before
+    kernel.forward([0.0] * 30, [1.0])
+    own.folder.chmod(0o700)
+    assert compile_program(pendulum.program, cache=own, threads=1).report.cached
+
+
+@UNIX
+def test_a_cache_of_somebody_else_is_not_used(tmp_path: Path, monkeypatch: Patch) -> None:
+    own = Cache(tmp_path / "cache")
+    kernel = planted(own)
+    given_away(own.folder, monkeypatch)
+    assert own.find("k") is None
+    with pytest.raises(OSError, match="belongs to somebody else"):
+        own.store("new", kernel)
+
+
+@UNIX
+def test_a_kernel_of_somebody_else_is_not_used(tmp_path: Path, monkeypatch: Patch) -> None:
+    own = Cache(tmp_path / "cache")
+    given_away(planted(own), monkeypatch)
+    assert own.find("k") is None
+
+
+@UNIX
+def test_a_kernel_that_others_may_write_is_not_used(tmp_path: Path) -> None:
+    own = Cache(tmp_path / "cache")
+    planted(own).chmod(0o666)
+    assert own.find("k") is None
+
+
 def test_a_user_without_a_home(monkeypatch: Patch) -> None:
     def homeless() -> Path:
         raise RuntimeError("Could not determine home directory.")

@@ -1,0 +1,79 @@
+"""Temporary folders of killed processes go with the next build; those in use stay."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from compilers import building, fake, wait_for
+
+from symphys.codegen.toolchain.temporary import LOCK, OLD, YOUNG, TemporaryFolder
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no files are locked there")
+KIND = "symphys-kernel-"
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where temporary folders are made."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(folder))
+    monkeypatch.setenv("TMPDIR", str(folder))
+    return folder
+
+
+def aged(folder: Path, seconds: float) -> Path:
+    """The folder, as if it had been left alone for so long."""
+    os.utime(folder, (time.time() - seconds, time.time() - seconds))
+    return folder
+
+
+def made(place: Path, name: str, locked: bool = False) -> Path:
+    """A folder with something in it, which no process uses."""
+    folder = place / f"{KIND}{name}"
+    folder.mkdir()
+    (folder / "part.c").write_text("int x;", "utf-8")
+    if locked:
+        (folder / LOCK).touch()
+    return folder
+
+
+def test_what_a_killed_build_left_goes_with_the_next(tmp_path: Path, place: Path) -> None:
+    process = building(tmp_path, fake(tmp_path, f"echo $$ > {tmp_path}/started; exec sleep 5"))
+    try:
+        wait_for(tmp_path / "started")
+        (left,) = place.iterdir()
+        aged(left, 2 * OLD)
+        with TemporaryFolder(KIND):
+            assert left.is_dir(), "its process is at work"
+    finally:
+        process.kill()
+        process.communicate(timeout=20)
+    aged(left, 2 * YOUNG)
+    with TemporaryFolder(KIND) as own:
+        assert list(place.iterdir()) == [Path(own)]
+    assert list(place.iterdir()) == []
+
+
+def test_what_may_be_in_use_stays(place: Path) -> None:
+    new = aged(made(place, "new", locked=True), YOUNG / 2)
+    unlocked = aged(made(place, "unlocked"), OLD / 2)
+    old, other = aged(made(place, "old"), 2 * OLD), made(place, "other")
+    other = aged(other.rename(place / "other-folder"), 2 * OLD)
+    elsewhere = place.parent / "elsewhere"
+    elsewhere.mkdir()
+    (place / f"{KIND}link").symlink_to(aged(elsewhere, 2 * OLD))
+    with TemporaryFolder(KIND):
+        assert new.is_dir() and unlocked.is_dir() and other.is_dir() and elsewhere.is_dir()
+        assert not old.exists()
+
+
+def test_folders_of_one_process_do_not_remove_each_other(place: Path) -> None:
+    with TemporaryFolder(KIND) as first:
+        aged(Path(first), 2 * OLD)
+        with TemporaryFolder("symphys-external-") as second:
+            assert {Path(first), Path(second)} == set(place.iterdir())
