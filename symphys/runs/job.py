@@ -55,7 +55,7 @@ def make_jobs(
     backend: str = BEST,
     examine: bool = True,
 ) -> list[Job]:
-    """Every problem with every solver and seed, below the folder ``out``.
+    """Every problem with every solver and seed, below the folder ``out``; other settings, another folder.
 
     ``solvers`` None: those that each problem names, or those that fit it.
 
@@ -71,7 +71,7 @@ def make_jobs(
             plain = recorded_options(options)
             for seed in seeds:
                 config = make_config(problem.name, problem.identity, name, seed, settings, plain, backend)
-                folder = RunFolder.of(out, problem.name, name, seed)
+                folder = RunFolder.of(out, problem.name, name, seed, settings)
                 jobs.append(Job(problem, config, options, folder, command, examine))
     return jobs
 
