@@ -16,7 +16,6 @@ from symphys.cli.wording import duration, first_line, measured, number, verdict,
 from symphys.findings.examination import Examination, HeldBound
 from symphys.findings.obstacles import MOST_BOUNDS, bound_words, holding
 from symphys.findings.verdict import BEST_FOUND, DOUBTED, NOT_SOLVED
-from symphys.results.case_name import case_name
 
 if TYPE_CHECKING:
     from symphys.runs import BatchResult, Job, Result
@@ -34,7 +33,7 @@ def print_summary(jobs: list[Job], batch: BatchResult) -> None:
     """Print the table, and the advice of what is not solved."""
     groups: dict[tuple[str, str], list[Result]] = {}
     for job, result in zip(jobs, batch.results, strict=True):
-        group = groups.setdefault((case_name(job.config.problem, job.config.settings), job.config.solver), [])
+        group = groups.setdefault((job.case, job.config.solver), [])
         if result is not None:
             group.append(result)
     console = Console()

@@ -9,6 +9,7 @@ from typing import Any
 
 from symphys.codegen.backends import BEST
 from symphys.problem import Problem, require_solvable, require_solvers, validate_options
+from symphys.results.case_name import case_name
 from symphys.results.config import Config, make_config
 from symphys.runs.folder import RunFolder
 from symphys.solvers import SOLVERS, recorded_options, solver
@@ -38,6 +39,11 @@ class Job:
     def name(self) -> str:
         """For messages: ``ball_throw gradient seed 0``."""
         return f"{self.config.problem} {self.config.solver} seed {self.config.seed}"
+
+    @property
+    def case(self) -> str:
+        """The problem with its settings, as its folder is called: ``ball_throw@ground.friction=0.6``."""
+        return case_name(self.config.problem, self.config.settings)
 
     @property
     def smooth(self) -> bool:
