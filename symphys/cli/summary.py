@@ -33,7 +33,7 @@ def print_summary(jobs: list[Job], batch: BatchResult) -> None:
     """Print the table, and the advice of what is not solved."""
     groups: dict[tuple[str, str], list[Result]] = {}
     for job, result in zip(jobs, batch.results, strict=True):
-        group = groups.setdefault((job.config.problem, job.config.solver), [])
+        group = groups.setdefault((job.case, job.config.solver), [])
         if result is not None:
             group.append(result)
     console = Console()

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from symphys.findings.verdict import BEST_FOUND, DOUBTED, SOLVED
+from symphys.results.case_name import settings_words
 from symphys.results.file_names import CONFIG, FIGURES, PROBLEM, RESULT
 from symphys.results.run import Run, read_run
 from symphys.results.text_files import ReportError
@@ -58,6 +59,11 @@ class Study:
     def title(self) -> str:
         """The problem's title."""
         return self.runs[0].title
+
+    @property
+    def settings(self) -> str:
+        """What the command line changed in the problem's file; empty if nothing."""
+        return settings_words(self.runs[0].settings)
 
     @property
     def best(self) -> Run:

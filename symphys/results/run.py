@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ class Run(Result):
         place: the folder's path below the report's folder, with forward slashes.
         readable: whether there is a result; if not, only names and ``faults`` mean anything.
         description: of the problem.
+        settings: what the command line changed in the problem's file, by dotted key.
         met: whether nothing is missed.
         examination: how far the solution can be trusted.
         trace: the iterations.
@@ -36,6 +38,7 @@ class Run(Result):
     place: str = ""
     readable: bool = False
     description: str = ""
+    settings: Mapping[str, Any] = field(default_factory=dict)
     met: bool = False
     examination: Examination = field(default_factory=Examination)
     trace: Trace = field(default_factory=lambda: Trace({}, 0))
@@ -76,6 +79,7 @@ def read_run(folder: Path, root: Path) -> Run:
         "place": folder.relative_to(root).as_posix(),
         "readable": readable,
         "description": values.words(written.get("description")),
+        "settings": asked.settings,
         "examination": Examination.from_json(result.get("trust")),
         "trace": trace,
         "met": False,

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from symphys import files
+from symphys.results.case_name import case_name
 from symphys.results.config import Config, read_config
 from symphys.results.file_names import CHECKPOINT, CONFIG, GUESS, LOG, PROBLEM, RESULT, SCENE, TRACE, TRAJECTORY
 from symphys.results.result import Result, read_result
@@ -31,11 +32,13 @@ class RunFolder:
     path: Path
 
     @classmethod
-    def of(cls, out: Path, problem: str, solver: str, seed: int) -> RunFolder:
-        """OUT/<problem>/<solver>-seed<k>; FileError for a problem whose name would lead out of OUT."""
+    def of(
+        cls, out: Path, problem: str, solver: str, seed: int, settings: Mapping[str, object] | None = None
+    ) -> RunFolder:
+        """OUT/<case>/<solver>-seed<k>; FileError for a problem whose name would lead out of OUT."""
         if problem in {"", ".", ".."}:
             raise files.FileError(f"a problem called {problem!r} can have no folder: rename its file")
-        return cls(out / problem / f"{solver}-seed{seed}")
+        return cls(out / case_name(problem, settings or {}) / f"{solver}-seed{seed}")
 
     def earlier(self, config: Config) -> Result | None:
         """The result of the very run that ``config`` asks for, interrupted or finished; None if there is none."""

@@ -9,6 +9,7 @@ from typing import Any
 
 from symphys.codegen.backends import BEST
 from symphys.problem import Problem, require_solvable, require_solvers, validate_options
+from symphys.results.case_name import case_name
 from symphys.results.config import Config, make_config
 from symphys.runs.folder import RunFolder
 from symphys.solvers import SOLVERS, recorded_options, solver
@@ -40,6 +41,11 @@ class Job:
         return f"{self.config.problem} {self.config.solver} seed {self.config.seed}"
 
     @property
+    def case(self) -> str:
+        """The problem with its settings, as its folder is called: ``ball_throw@ground.friction=0.6``."""
+        return case_name(self.config.problem, self.config.settings)
+
+    @property
     def smooth(self) -> bool:
         """Whether the solver will ask for rollouts at a smoothing above 0."""
         return self.problem.simulation.smoothing[0] > 0
@@ -55,7 +61,7 @@ def make_jobs(
     backend: str = BEST,
     examine: bool = True,
 ) -> list[Job]:
-    """Every problem with every solver and seed, below the folder ``out``.
+    """Every problem with every solver and seed, below the folder ``out``; other settings, another folder.
 
     ``solvers`` None: those that each problem names, or those that fit it.
 
@@ -71,7 +77,7 @@ def make_jobs(
             plain = recorded_options(options)
             for seed in seeds:
                 config = make_config(problem.name, problem.identity, name, seed, settings, plain, backend)
-                folder = RunFolder.of(out, problem.name, name, seed)
+                folder = RunFolder.of(out, problem.name, name, seed, settings)
                 jobs.append(Job(problem, config, options, folder, command, examine))
     return jobs
 

@@ -14,13 +14,17 @@ import pytest
 
 import symphys
 from symphys import problems
+from symphys.results.case_name import case_name
 from symphys.runs import read_result
 
 LONG = ("--set", "simulation.dt=1e-4", "--set", "objective.stop=converged")
 """Makes of a throw a solve of several seconds."""
+LONG_FOLDER = case_name("throw", {"simulation.dt": 1e-4, "objective.stop": "converged"})
 
 QUICK = ("--backend", "casadi", "--unexamined")
 """Where neither a kernel nor an examination matters."""
+
+FINER = "throw@simulation.dt=0.01,solver.least_squares.iterations=30"
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -98,10 +102,26 @@ def test_seeds_and_settings_reach_the_runs(run: Run, throw: Path) -> None:
     options = ("--seeds", "2", "--set", "simulation.dt=0.01", "--set", "solver.least_squares.iterations=30")
     code, out, _ = run("solve", throw, "--solver", "least_squares", *options, *QUICK)
     assert code == 0 and "2/2" in out
-    config = json.loads(Path("reports/throw/least_squares-seed1/config.json").read_text(encoding="utf-8"))
+    config = json.loads(Path(f"reports/{FINER}/least_squares-seed1/config.json").read_text(encoding="utf-8"))
     assert config["seed"] == 1
     assert config["settings"] == {"simulation.dt": 0.01, "solver.least_squares.iterations": 30}
     assert config["options"]["iterations"] == 30
+
+
+def test_other_settings_overwrite_nothing_in_either_order(run: Run, throw: Path) -> None:
+    """The file as it is, two settings, and all again: every run is kept, and the page and the table name them."""
+    asked = [(), ("--set", "ground.friction=0.3"), ("--set", "ground.friction=0.6")]
+    for settings in asked:
+        code, out, _ = run("solve", throw, "--solver", "least_squares", *settings, *QUICK)
+        assert code == 0
+    assert "throw@ground.friction=0.6" in out
+    folders = sorted(path.name for path in Path("reports").iterdir() if path.is_dir() and path.name != "figures")
+    assert folders == ["throw", "throw@ground.friction=0.3", "throw@ground.friction=0.6"]
+    page = Path("reports/index.html").read_text(encoding="utf-8")
+    assert "With ground.friction=0.3." in page and "With ground.friction=0.6." in page
+    for settings in reversed(asked):
+        err = run("solve", throw, "--solver", "least_squares", *settings, *QUICK)[2]
+        assert err.splitlines() == ["throw least_squares seed 0: done before (solved)"]
 
 
 def test_workers_solve_too(run: Run, throw: Path) -> None:
@@ -263,7 +283,7 @@ def test_ctrl_c_saves_and_the_same_command_goes_on(throw: Path, tmp_path: Path, 
     assert process.returncode == 130
     assert "Traceback" not in err
     assert "the same command goes on from there" in err
-    folders = [tmp_path / "reports" / "throw" / f"cma-seed{seed}" for seed in range(jobs)]
+    folders = [tmp_path / "reports" / LONG_FOLDER / f"cma-seed{seed}" for seed in range(jobs)]
     assert all(read_result(folder / "result.json").interrupted for folder in folders)
     assert all((folder / "checkpoint.json").exists() for folder in folders)
 

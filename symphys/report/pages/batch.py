@@ -64,10 +64,15 @@ def write_batch_report(batch_dir: Path) -> Path:
 def build_studies(found: Sequence[Study], root: Path) -> list[Html]:
     """The problems one after the other; with links to each and headings where there are several."""
     names = anchors(found)
-    links = [tag("a", study.title, href=f"#{anchor}") for study, anchor in zip(found, names, strict=True)]
+    links = [tag("a", linked(study), href=f"#{anchor}") for study, anchor in zip(found, names, strict=True)]
     several = len(found) > 1
     parts = [build_study(s, root, NUMBERS // len(found), name, several) for s, name in zip(found, names, strict=True)]
     return [tag("nav", *links, aria_label="Problems"), *parts] if several else parts
+
+
+def linked(study: Study) -> str:
+    """The title, with the settings that tell it from another study of the same problem."""
+    return f"{study.title}, {study.settings}" if study.settings else study.title
 
 
 def name_of(folder: Path) -> str:
@@ -107,6 +112,7 @@ def build_study(study: Study, root: Path, numbers: int, anchor: str, titled: boo
         "section",
         tag("h2", study.title) if titled else "",
         tag("p", f"{study.problem}{place}", class_="kicker") if titled else "",
+        tag("p", f"With {study.settings}.", class_="note") if study.settings else "",
         comparison.study_verdict(study),
         tag("p", OVERSIZED, class_="note") if oversized(study) else "",
         card("Solvers", comparison.solver_table(study), note=comparison.table_note(study)),

@@ -18,6 +18,7 @@ from symphys.report.pages import words
 from symphys.report.pages.markup import Html, banner, card, facts, figures, fold, join, pill, stats, table, tag
 from symphys.report.robots.branches import is_large
 from symphys.report.scene.animation import animation
+from symphys.results.case_name import settings_words
 from symphys.results.result import CheckRecord, Result, VariableRecord
 from symphys.results.run import Run
 from symphys.results.scene import Scene
@@ -59,6 +60,7 @@ def header(run: Run, cards: Sequence[Html]) -> Html:
     return join(
         [
             tag("p", f"Run report · {run.problem} · {run.solver} · seed {run.seed}", class_="kicker"),
+            tag("p", f"With {settings_words(run.settings)}.", class_="note") if run.settings else "",
             tag("h1", run.title),
             *(tag("p", part, class_="lead") for part in re.split(r"\n\s*\n", run.description.strip()) if part),
             banner(words.level(run), words.headline(run), words.verdict(run), run.advice, *unread),
