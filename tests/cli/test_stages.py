@@ -9,8 +9,11 @@ from pathlib import Path
 import pytest
 
 from symphys.cli.progress import at
+from symphys.results.case_name import case_name
 from symphys.runs import read_result
 from symphys.solvers import TraceRow
+
+FOLDER = Path("reports", case_name("throw", {"simulation.smoothing": [0.1, 0.01, 0]}), "least_squares-seed0")
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -18,10 +21,10 @@ Run = Callable[..., tuple[int, str, str]]
 @pytest.mark.usefixtures("whole_report")
 def test_a_setting_makes_stages(run: Run, throw: Path) -> None:
     code, _, _ = run("solve", throw, "--solver", "least_squares", "--set", "simulation.smoothing=[0.1, 0.01, 0]")
-    found = read_result(Path("reports/throw/least_squares-seed0/result.json"))
+    found = read_result(FOLDER / "result.json")
     assert code == 0
     assert [(stage.smoothing, stage.solved) for stage in found.stages] == [(0.1, True), (0.01, True), (0.0, True)]
-    assert "Stages of smoothing" in Path("reports/throw/least_squares-seed0/report.html").read_text(encoding="utf-8")
+    assert "Stages of smoothing" in (FOLDER / "report.html").read_text(encoding="utf-8")
 
 
 def test_a_setting_that_cannot_be(run: Run, throw: Path) -> None:

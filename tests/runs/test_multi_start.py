@@ -30,7 +30,9 @@ def test_results_are_those_of_one_after_another(problem_file: Path, tmp_path: Pa
     for one, other in zip(alone.results, beside.results, strict=True):
         assert one is not None and other is not None
         assert (one.seed, one.solver, one.z, one.counts) == (other.seed, other.solver, other.z, other.counts)
-    log = (tmp_path / "b" / "short_throw" / "gradient-seed1" / "log.txt").read_text(encoding="utf-8")
+    log = (tmp_path / "b" / "short_throw@variable.0.spread=0.2" / "gradient-seed1" / "log.txt").read_text(
+        encoding="utf-8"
+    )
     assert "side by side" in log
 
 
