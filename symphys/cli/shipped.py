@@ -6,8 +6,7 @@ from pathlib import Path
 
 import click
 
-from symphys import files
-from symphys.cli.arguments import UsageFault, complete_problem
+from symphys.cli.arguments import complete_problem
 
 
 @click.command("list")
@@ -45,12 +44,10 @@ def new(file: Path, source: str) -> None:
     What it includes is found from anywhere. A file that is there already is not overwritten.
     """
     from symphys import problems
+    from symphys.api.tools import new as copy
 
-    path = problems.shipped(source)
-    if file.exists():
-        raise UsageFault(f"{file}: is there already, and is not overwritten; choose another name")
-    files.write_text(file, path.read_text(encoding="utf-8"))
-    if problems.is_part(path):
+    copy(file, source)
+    if problems.is_part(problems.shipped(source)):
         click.echo(f'{file}: to be included in a problem, by [[include]] with file = "{file.name}"')
     else:
         click.echo(f"{file}: try `symphys show {file}`, then `symphys check {file}` and `symphys solve {file}`")

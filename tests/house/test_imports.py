@@ -79,7 +79,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "jax": ("api errors transcription", "jax numpy", "rollouts and steps for JAX"),
     "env": ("api errors", "gymnasium numpy", "environments for Gymnasium"),
     "cli": (
-        "codegen doctor errors export files findings problem problems report runs solvers suggest threads "
+        "api codegen doctor errors export files findings problem problems report runs solvers suggest threads "
         "trajectory transcription verification version",
         "click numpy rich",
         "the commands",
