@@ -19,8 +19,8 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 from rich.table import Column
 from rich.text import Text
 
+from symphys.batches.progress import BatchShare, StepProgress
 from symphys.cli.wording import brief, labelled, number, time_words
-from symphys.runs.progress import BatchShare, StepProgress
 
 if TYPE_CHECKING:
     from symphys.runs import Job, Result

@@ -27,7 +27,8 @@ from symphys.cli.arguments import (
 from symphys.cli.wording import duration, many_pairs
 
 if TYPE_CHECKING:
-    from symphys.runs import BatchResult, Job
+    from symphys.batches import BatchResult
+    from symphys.runs import Job
 
 MOST_SEEDS = 10_000
 MOST_JOBS = 256
@@ -92,8 +93,9 @@ def solve(
     """
     began = perf_counter()
     threads.limit()
+    from symphys.batches import run_batch
     from symphys.cli.progress import watch
-    from symphys.runs import make_jobs, run_batch
+    from symphys.runs import make_jobs
     from symphys.transcription import transcribe
 
     settings = read_settings(assignments)

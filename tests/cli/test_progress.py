@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from rich.console import Console
 
+from symphys.batches.progress import BatchShare, StepProgress
 from symphys.cli import progress
 from symphys.cli.progress import (
     Plain,
@@ -23,7 +24,6 @@ from symphys.cli.progress import (
 )
 from symphys.cli.wording import time_words
 from symphys.runs import progress as runs_progress
-from symphys.runs.progress import BatchShare, StepProgress
 from symphys.solvers import CmaOptions, TraceRow
 from symphys.solvers.core.budget import BudgetUse
 

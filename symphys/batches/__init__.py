@@ -1,0 +1,7 @@
+"""Batches: many runs, in any number of processes and commands."""
+
+from symphys.batches.batch import BatchResult, run_batch
+from symphys.batches.ledger import Observer
+from symphys.batches.limits import BatchLimits
+
+__all__ = ["BatchLimits", "BatchResult", "Observer", "run_batch"]
