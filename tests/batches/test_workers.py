@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import importlib
-import os
+import pickle
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -152,28 +154,32 @@ def test_a_folder_that_cannot_be_written_fails_its_run_alone(make_job: Callable[
     assert batch.results[0] and "cannot make the folder" in batch.results[0].advice
 
 
-def test_a_killed_run_goes_on_from_its_checkpoint(
-    make: Any, recorder: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+KILLED = """
+import os, pickle, signal, sys
+from symphys.batches import run_batch
+from symphys.transcription import transcribe
+import symphys.runs
+execution = sys.modules["symphys.runs.execute"]
+execution.KEPT = execution.SHARE = 0
+
+class Killer:
+    rows = 0
+    def started(self, job, resumed): pass
+    def ended(self, job, result, skipped): pass
+    def advanced(self, job, row):
+        if row.iteration == 1:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+run_batch([pickle.loads(sys.stdin.buffer.read())], 1, Killer(), transcribe)
+"""
+
+
+def test_a_killed_run_goes_on_from_its_checkpoint(make: Any, recorder: Any) -> None:
     """To the same end, to the bit, as if nothing had been."""
-    monkeypatch.setattr("symphys.runs.execute.KEPT", 0.0)
-    monkeypatch.setattr("symphys.runs.execute.SHARE", 0)
-    (whole,) = make("whole")
+    (whole,), (job,) = make("whole"), make("broken")
     run_batch([whole], 1, recorder, transcribe)
-    (job,) = make("broken")
-    child = os.fork()
-    if not child:
-
-        def kill(*_: object) -> None:
-            if len(seen) == 2:
-                os.kill(os.getpid(), signal.SIGKILL)
-            seen.append(0)
-
-        seen: list[int] = []
-        recorder.advanced = kill
-        run_batch([job], 1, recorder, transcribe)
-        os._exit(0)
-    assert os.waitpid(child, 0)[1] == signal.SIGKILL
+    killed = subprocess.run([sys.executable, "-c", KILLED], input=pickle.dumps(job), check=False)
+    assert killed.returncode == -signal.SIGKILL
     assert not (job.folder.path / "result.json").exists()
     recorder.events.clear()
     assert run_batch([job], 1, recorder, transcribe).accepted
