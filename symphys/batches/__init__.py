@@ -3,5 +3,6 @@
 from symphys.batches.batch import BatchResult, run_batch
 from symphys.batches.ledger import Observer
 from symphys.batches.limits import BatchLimits
+from symphys.batches.preview import Preview, previews
 
-__all__ = ["BatchLimits", "BatchResult", "Observer", "run_batch"]
+__all__ = ["BatchLimits", "BatchResult", "Observer", "Preview", "previews", "run_batch"]
