@@ -53,7 +53,7 @@ OPTIONS = (
     click.option(
         "--rerun",
         type=click.Choice(("failed", "changed", "all")),
-        default="",
+        default=None,
         help="Do again what is over: runs that failed, those of another version of symphys, or all.",
     ),
     click.option("--dry-run", is_flag=True, help="Say what would be done, and why, and do nothing."),
@@ -66,19 +66,10 @@ def batch_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Give a command these options, as its argument ``how``."""
 
     @functools.wraps(command)
-    def taking(
-        *,
-        retries: int,
-        timeout: str | None,
-        budget: str | None,
-        rerun: str | None,
-        dry_run: bool,
-        json: bool,
-        quiet: bool,
-        **rest: Any,
-    ) -> Any:
-        times = read_time("--timeout", timeout), read_time("--budget", budget)
-        return command(how=BatchOptions(retries, *times, rerun or "", dry_run, json, quiet), **rest)
+    def taking(*, timeout: str | None, budget: str | None, rerun: str | None, **rest: Any) -> Any:
+        times = {"timeout": read_time("--timeout", timeout), "budget": read_time("--budget", budget)}
+        switches = {name: rest.pop(name) for name in ("retries", "dry_run", "json", "quiet")}
+        return command(how=BatchOptions(**times, **switches, rerun=rerun or ""), **rest)
 
     for option in reversed(OPTIONS):
         taking = option(taking)
