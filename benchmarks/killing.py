@@ -185,7 +185,7 @@ def main(given: list[str] | None = None) -> int:
         )
         wild = time.monotonic() - began
         missing = differences(folder / "calm", folder / "wild")
-        claims = [path for path in (folder / "wild").glob("*/*/.*")]
+        claims = list((folder / "wild").glob("*/*/.*"))
     print(f"{len(watcher.seen)} of {seeds * len(SOLVERS)} results; undisturbed {calm:.0f} s, disturbed {wild:.0f} s")
     print(f"{asked.kills} kills, {drivers} of drivers; {started} commands started, {asked.drivers} at a time")
     print(f"{len(missing)} differences, {len(watcher.again)} results written again, {len(claims)} hidden files left")
