@@ -1,0 +1,19 @@
+"""A batch whose processes are killed at random loses nothing and does nothing twice; ``make stress`` does more of it."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+from killing import main
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="finds processes by /proc")
+
+
+def test_a_batch_whose_processes_are_killed_is_whole(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    asked = {"runs": 16, "kills": 5, "drivers": 2, "evaluations": 2000, "pause": 0.8, "folder": tmp_path}
+    code = main([f"--{name}={value}" for name, value in asked.items()])
+    out = capsys.readouterr().out
+    assert code == 0, out
+    assert "16 of 16 results" in out and "5 kills" in out
