@@ -121,7 +121,7 @@ class Ledger:
         earlier = job.folder.earlier(job.config)
         if earlier is not None and earlier.interrupted:
             self.halfway.add(index)
-        if earlier is None or earlier.interrupted:
+        if earlier is None or earlier.interrupted or earlier.again:
             return False
         self.results[index] = earlier
         self.observer.ended(job, earlier, skipped=True)

@@ -6,12 +6,13 @@ import traceback
 from collections.abc import Callable
 
 from symphys import files
-from symphys.errors import SymphysError
+from symphys.errors import SymphysError, Unavailable
 from symphys.results.file_names import CHECKPOINT, LOG, RESULT
 from symphys.results.result import Result
 from symphys.runs.folder import FolderBusy
 from symphys.runs.job import Job
 from symphys.runs.record import failure
+from symphys.runs.requirements import transcribed
 from symphys.runs.solving import silent, solve
 from symphys.runs.transcription_cache import Transcriptions
 from symphys.solvers import Monitor, Outcome
@@ -33,7 +34,7 @@ def execute(
     try:
         with job.folder.locked():
             earlier = job.folder.earlier(job.config)
-            if earlier and not earlier.interrupted:
+            if earlier and not (earlier.interrupted or earlier.again):
                 return earlier
             return proceed(job, monitor, transcriptions, earlier, solved, tell)
     except FolderBusy as error:
@@ -48,16 +49,18 @@ def proceed(
     solved: Outcome | None = None,
     tell: Callable[[str], None] = silent,
 ) -> Result:
-    """Solve and write down what came of it; ``earlier`` is the interrupted run to go on with."""
+    """Solve and write down what came of it; ``earlier`` is the run to go on with."""
     checkpoint = job.folder.checkpoint() if earlier else None
     if not checkpoint:
         checkpoint = earlier = None
         job.folder.begin(job.config, job.problem.text)
     log = Log(job)
     try:
-        result = solve(job, transcriptions(job), monitor, log, checkpoint, earlier, solved, tell)
+        result = solve(job, transcribed(job, transcriptions), monitor, log, checkpoint, earlier, solved, tell)
     except files.FileError:
         raise
+    except Unavailable as error:
+        result = failure(job, str(error), again=True)
     except SymphysError as error:
         result = failure(job, str(error))
     except Exception as error:  # one broken run must not take the others with it
@@ -87,9 +90,12 @@ class Log:
 
 
 def finish(job: Job, result: Result) -> None:
-    """Write the result, last of all files, so that it exists only where the others are whole."""
+    """Write the result, last of all files, so that it exists only where the others are whole.
+
+    What an interrupted run left stays where the same command goes on from there.
+    """
     files.write_json(job.folder.path / RESULT, result.to_json())
-    if not result.interrupted:
+    if not (result.interrupted or result.again):
         files.remove(job.folder.path / CHECKPOINT)
 
 
