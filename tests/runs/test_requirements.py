@@ -1,4 +1,4 @@
-"""What a machine lacks is refused before anything is built, named as what it is, and tried again by the same command."""
+"""What a machine lacks is refused before anything is built, by its name, and tried again by the same command."""
 
 from __future__ import annotations
 

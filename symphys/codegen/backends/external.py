@@ -11,10 +11,10 @@ from pathlib import Path
 import casadi as ca
 
 from symphys import codegen as kernel
-from symphys.codegen import Fixed, ProcessorKernel
+from symphys.codegen import Fixed, KernelUnavailable, ProcessorKernel
 from symphys.codegen.backends.interface import Function
 from symphys.codegen.backends.seeds import Seeds
-from symphys.codegen.toolchain.temporary import TemporaryFolder
+from symphys.codegen.toolchain.build import temporary_folder
 from symphys.shooting import Array, Nlp
 
 ROOM = "symphys.codegen.backends"
@@ -71,12 +71,16 @@ def load(sizes: dict[str, int], tasks: Sequence[Task]) -> list[Function]:
     text = head + files(ROOM).joinpath("external.c").read_text(encoding="utf-8")
     with (
         kernel.shared_library([kernel.SourceFile(text)], kernel.default_cache()) as built,
-        TemporaryFolder("symphys-external-") as folder,
+        temporary_folder("symphys-external-") as folder,
     ):
         copy = Path(folder) / "external.so"
-        shutil.copyfile(built.path, copy)
+        try:
+            shutil.copyfile(built.path, copy)
+            library = ctypes.CDLL(str(copy))
+        except OSError as error:
+            raise KernelUnavailable(f"the library {copy} cannot be used: {error.strerror or error}") from error
         functions = [ca.external(name, str(copy)) for name in NAMES]
-        ctypes.CDLL(str(copy)).bind((Task * 3)(*tasks))
+        library.bind((Task * 3)(*tasks))
     return functions
 
 
