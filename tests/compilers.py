@@ -70,13 +70,8 @@ def building(folder: Path, compiler: str, first: str = "", **places: str) -> sub
         "PYTHONPATH": os.pathsep.join([str(Path(programs.__file__).parent), *sys.path]),
         **places,
     }
-    return subprocess.Popen(
-        [sys.executable, "-c", first + BUILD],
-        env=environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    command = [sys.executable, "-c", first + BUILD]
+    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
 def wait_for(path: Path) -> None:
