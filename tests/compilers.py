@@ -14,13 +14,6 @@ from pathlib import Path
 import programs
 
 BUILD = "import programs; from symphys.codegen import compile_program as c; print(c(programs.pendulum()).report.cached)"
-NO_LOCKS = """
-import errno, fcntl
-def refuse(*given):
-    raise OSError(errno.ENOLCK, "no locks available")
-fcntl.flock = refuse
-"""
-"""Before BUILD: a file system that has no locks."""
 
 
 def fake(folder: Path, script: str) -> str:
@@ -59,10 +52,10 @@ def until(done: Callable[[], bool]) -> None:
         time.sleep(0.02)
 
 
-def building(folder: Path, compiler: str, first: str = "", **places: str) -> subprocess.Popen[str]:
+def building(folder: Path, compiler: str, **places: str) -> subprocess.Popen[str]:
     """A process that builds the pendulum with a compiler, into a cache in the folder.
 
-    ``compiler``: what CC names; empty: that of PATH. ``first``: what it does before. ``places``: of its environment.
+    ``compiler``: what CC names; empty: that of PATH. ``places``: of its environment.
     """
     environment = os.environ | {
         "CC": compiler,
@@ -70,7 +63,7 @@ def building(folder: Path, compiler: str, first: str = "", **places: str) -> sub
         "PYTHONPATH": os.pathsep.join([str(Path(programs.__file__).parent), *sys.path]),
         **places,
     }
-    command = [sys.executable, "-c", first + BUILD]
+    command = [sys.executable, "-c", BUILD]
     return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 

@@ -59,13 +59,8 @@ def test_names_that_are_no_text(throw: Path, tmp_path: Path, monkeypatch: pytest
     assert Path(os.fsdecode(b"new\xff.toml")).is_file()
 
 
-def test_messages_that_a_full_disk_does_not_take_end_nothing(
-    throw: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_messages_that_a_full_disk_does_not_take_end_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     with Path("/dev/full").open("w", encoding="utf-8") as full:
         monkeypatch.setattr("sys.stderr", full)
-        quick = ["--solver", "least_squares", "--backend", "casadi", "--unexamined"]
-        assert main(["solve", str(throw), "--out", str(tmp_path / "out"), *quick]) == 0
-        assert sys.stderr is full
         assert main(["solf"]) == 2
-    assert (tmp_path / "out" / "throw" / "least_squares-seed0" / "result.json").is_file()
+        assert sys.stderr is full

@@ -16,9 +16,11 @@ import pytest
 
 from symphys import files
 from symphys.cli import main
+from symphys.cli.solve import newer
 from symphys.codegen import Cache, KernelUnavailable, compile_program
 from symphys.codegen.toolchain.compiler import find_compiler
 from symphys.problem import load_problem
+from symphys.report import write_run_report
 from symphys.runs import Job, execute
 from symphys.runs.transcription_cache import TranscriptionCache
 from symphys.transcription import transcribe
@@ -37,6 +39,10 @@ def compiler() -> None:
         find_compiler()
     except KernelUnavailable as error:
         pytest.skip(str(error))
+
+
+def run(job: Job) -> None:
+    execute(job, lambda row: None, TranscriptionCache(transcribe))
 
 
 def refusing(number: int) -> Callable[..., None]:
@@ -193,8 +199,8 @@ def test_a_cache_on_a_disk_that_can_only_be_read_is_used(
 def test_a_run_and_a_report_on_a_disk_that_can_only_be_read_say_so(
     disk: SmallDisk, make_job: Callable[..., Job], problem_file: Path, tmp_path: Path, capsys: Capture
 ) -> None:
-    job = make_job()
-    execute(job, lambda row: None, TranscriptionCache(transcribe))
+    job = make_job(does="refuse")
+    run(job)
     shutil.copytree(job.folder.path, disk.path / "run")
     disk.close()
     for command in (
@@ -208,20 +214,15 @@ def test_a_run_and_a_report_on_a_disk_that_can_only_be_read_say_so(
         assert "Traceback" not in printed.err + printed.out
 
 
-def test_a_page_that_is_later_than_a_newer_result_is_made_again(
-    make_job: Callable[..., Job], problem_file: Path, tmp_path: Path, capsys: Capture
-) -> None:
-    """The clock was a day ahead when it was made; a page with the time of its result is left alone."""
-    folder = tmp_path / "out" / "short_throw" / "told-seed0"
-    page, result, later = folder / "report.html", folder / "result.json", time.time() + DAY
-    command = ["solve", str(problem_file), "--solver", "told", "--unexamined", "--out", str(tmp_path / "out")]
-    execute(make_job(), lambda row: None, TranscriptionCache(transcribe))
+def test_a_page_that_is_later_than_a_newer_result_is_made_again(make_job: Callable[..., Job]) -> None:
+    """The clock was a day ahead when it was made; a page has the time of its result."""
+    job, later = make_job(does="refuse"), time.time() + DAY
+    page, result = job.folder.path / "report.html", job.folder.path / "result.json"
+    run(job)
     page.write_text("of an earlier result", "utf-8")
     os.utime(page, (later, later))
-    assert main(command) == 0
-    assert "A short throw" in page.read_text("utf-8")
-    assert files.modified(page) == files.modified(result)
-    page.write_text("left alone", "utf-8")
-    files.date(page, files.modified(result))
-    assert main(command) == 0
-    assert page.read_text("utf-8") == "left alone"
+    assert newer(result, page)
+    write_run_report(job.folder.path)
+    assert not newer(result, page)
+    files.write_text(result, result.read_text("utf-8"))
+    assert newer(result, page)
