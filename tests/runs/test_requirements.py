@@ -13,11 +13,12 @@ import pytest
 from compilers import fake
 
 from symphys import solvers
+from symphys.batches import run_batch
 from symphys.cli import main
 from symphys.codegen import KernelUnavailable
 from symphys.codegen.toolchain.compiler import find_compiler
 from symphys.problem import load_problem
-from symphys.runs import Job, Result, execute, make_jobs, read_result, run_batch
+from symphys.runs import Job, Result, execute, make_jobs, read_result
 from symphys.runs.transcription_cache import TranscriptionCache
 from symphys.solvers import TraceRow
 from symphys.transcription import Transcription, transcribe
