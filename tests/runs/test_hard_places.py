@@ -23,6 +23,7 @@ from symphys.problem import load_problem
 from symphys.report import write_run_report
 from symphys.runs import Job, execute
 from symphys.runs.transcription_cache import TranscriptionCache
+from symphys.solvers import solver
 from symphys.transcription import transcribe
 
 Patch = pytest.MonkeyPatch
@@ -92,22 +93,47 @@ def test_processes_of_one_number_on_two_machines_do_not_write_into_one_file(tmp_
     assert names(tmp_path) == ["index.html"]
 
 
-@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EROFS])
-@pytest.mark.parametrize("call", ["tempfile.mkdtemp", "shutil.copyfile", "pathlib.Path.write_text"])
+@pytest.mark.parametrize("call", ["tempfile.mkdtemp", "pathlib.Path.write_text"])
 def test_without_room_for_a_kernel_casadi_evaluates_and_the_note_says_where(
-    problem_file: Path, tmp_path: Path, compiler: None, monkeypatch: Patch, call: str, number: int
+    problem_file: Path, tmp_path: Path, compiler: None, monkeypatch: Patch, call: str
 ) -> None:
-    """While its folder is made, its C is written, or its functions for IPOPT are copied."""
-    problem = load_problem(problem_file)
-    if call == "shutil.copyfile":
-        transcribe(problem)  # so that nothing needs to be built but what is copied
-    else:
-        monkeypatch.setenv("SYMPHYS_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(call, refusing(number))
-    found = transcribe(problem).backend
+    """While its folder is made, and while its C is written."""
+    monkeypatch.setenv("SYMPHYS_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(call, refusing(errno.ENOSPC))
+    found = transcribe(load_problem(problem_file)).backend
     assert found.name == "casadi"
-    assert REFUSED[number] in found.note.lower()
-    assert "symphys-" in found.note or "TMPDIR" in found.note
+    assert FULL in found.note.lower()
+    assert found.note.endswith("make room there, or set TMPDIR to another folder")
+
+
+def test_without_room_for_its_copy_ipopt_does_without_the_kernel(
+    problem_file: Path, compiler: None, monkeypatch: Patch
+) -> None:
+    """All others are evaluated by it."""
+    problem = load_problem(problem_file)
+    whole = transcribe(problem)  # so that nothing needs to be built but what is copied
+    monkeypatch.setattr("shutil.copyfile", refusing(errno.ENOSPC))
+    found = transcribe(problem)
+    assert (found.backend.name, found.backend.cached) == ("simd", True)
+    assert "for ipopt casadi's virtual machine evaluates" in found.backend.note
+    assert "symphys-external-" in found.backend.note and FULL in found.backend.note.lower()
+    assert whole.shooting.nlp.gradient is not None and found.shooting.nlp.gradient is None
+    assert (
+        solver("ipopt").solve(found.shooting, found.shooting.start(0), solver("ipopt").Options()).status.value == "met"
+    )
+
+
+def test_compiled_functions_that_cannot_be_loaded_give_way_to_casadi(
+    problem_file: Path, compiler: None, monkeypatch: Patch
+) -> None:
+    """As where the cache lies on a disk from which nothing may be run."""
+
+    def refuse(*given: object) -> None:
+        raise RuntimeError("failed to map segment\nfrom shared object")
+
+    monkeypatch.setattr("casadi.external", refuse)
+    found = transcribe(load_problem(problem_file), backend="c").backend
+    assert (found.name, found.note.count("failed to map segment from shared object")) == ("casadi", 1)
 
 
 @dataclass

@@ -145,6 +145,7 @@ def test_a_gpu_needs_no_compiler_where_it_is_asked_for(
         result = run(job_of(varied, tmp_path, backend), unbuilt)
     assert lacks(result) == refused
     assert ("something was built" in result.advice) != refused
+    assert ("no GPU that CUDA can use; no C compiler was found" in result.advice) == (refused and not gpu)
 
 
 def test_solvers_that_draw_nothing_need_none(varied: Path, tmp_path: Path, monkeypatch: Patch) -> None:

@@ -15,6 +15,7 @@ from symphys.codegen import Fixed, KernelUnavailable, ProcessorKernel
 from symphys.codegen.backends.interface import Function
 from symphys.codegen.backends.seeds import Seeds
 from symphys.codegen.toolchain.build import temporary_folder
+from symphys.codegen.toolchain.processes import ELSEWHERE
 from symphys.shooting import Array, Nlp
 
 ROOM = "symphys.codegen.backends"
@@ -52,7 +53,10 @@ class External:
 
 
 def external_nlp(made: ProcessorKernel, expression: Function, rows: Seeds | None) -> Nlp:
-    """Objective and constraints by the kernel; ``rows``: of the constraints, where there are any."""
+    """Objective and constraints by the kernel; ``rows``: of the constraints, where there are any.
+
+    KernelUnavailable where there is no room for the library, or none that may be loaded.
+    """
     external = External(made, rows)
     value, gradient, slopes = external.functions
     jacobian = sparse(slopes, rows) if rows else None
@@ -78,7 +82,7 @@ def load(sizes: dict[str, int], tasks: Sequence[Task]) -> list[Function]:
             shutil.copyfile(built.path, copy)
             library = ctypes.CDLL(str(copy))
         except OSError as error:
-            raise KernelUnavailable(f"the library {copy} cannot be used: {error.strerror or error}") from error
+            raise KernelUnavailable(f"{copy} cannot be used: {error.strerror or error}; {ELSEWHERE}") from error
         functions = [ca.external(name, str(copy)) for name in NAMES]
         library.bind((Task * 3)(*tasks))
     return functions

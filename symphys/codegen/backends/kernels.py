@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import replace
 from typing import Literal
 
@@ -49,11 +48,18 @@ def require_kernels(name: str) -> None:
 
     Nothing is compiled. ``name``: of ``PRECISIONS``.
     """
+    refused = ""
     if name in ON_DEVICE:
-        with suppress(KernelUnavailable):
+        try:
             find_gpu()
+        except KernelUnavailable as error:
+            refused = str(error)
+        else:
             return
-    find_compiler()
+    try:
+        find_compiler()
+    except KernelUnavailable as error:
+        raise KernelUnavailable(joined(refused, str(error))) from error
 
 
 def described(kernel: Kernel, seconds: float, precision: str | None = None, note: str = "") -> Description:
