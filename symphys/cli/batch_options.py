@@ -67,9 +67,10 @@ def batch_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(command)
     def taking(*, timeout: str | None, budget: str | None, rerun: str | None, **rest: Any) -> Any:
-        times = {"timeout": read_time("--timeout", timeout), "budget": read_time("--budget", budget)}
-        switches = {name: rest.pop(name) for name in ("retries", "dry_run", "json", "quiet")}
-        return command(how=BatchOptions(**times, **switches, rerun=rerun or ""), **rest)
+        switches: dict[str, Any] = {name: rest.pop(name) for name in ("retries", "dry_run", "json", "quiet")}
+        times = read_time("--timeout", timeout), read_time("--budget", budget)
+        how = BatchOptions(**switches, timeout=times[0], budget=times[1], rerun=rerun or "")
+        return command(how=how, **rest)
 
     for option in reversed(OPTIONS):
         taking = option(taking)

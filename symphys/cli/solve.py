@@ -29,7 +29,7 @@ from symphys.cli.wording import duration, many_pairs
 
 if TYPE_CHECKING:
     from symphys.batches import BatchResult
-    from symphys.cli.watching.watch import Shown
+    from symphys.cli.watching.choice import Shown
     from symphys.runs import Job
 
 MOST_SEEDS = 10_000

@@ -92,6 +92,7 @@ def proceed(
     tell: Callable[[str], None],
 ) -> Result:
     """Solve and write down what came of it."""
+    job.folder.clear()
     if not found.checkpoint:
         job.folder.begin(job.config, job.problem.text)
     log = Log(job)

@@ -12,6 +12,9 @@ from symphys.results.config import Config
 from symphys.results.file_names import CHECKPOINT, CONFIG, GUESS, LOG, PROBLEM, RESULT, SCENE, TRACE, TRAJECTORY
 from symphys.results.trace import trace_text
 
+WRITTEN = (RESULT, CHECKPOINT, CONFIG, TRAJECTORY, GUESS, SCENE, TRACE, LOG)
+"""What a run writes beside the problem; the result first, since nothing counts without it."""
+
 
 @dataclasses.dataclass(frozen=True)
 class RunFolder:
@@ -39,10 +42,17 @@ class RunFolder:
     def begin(self, config: Config, problem_text: str) -> None:
         """Take away what an earlier run of another configuration left, then write down what is asked for."""
         files.make_folder(self.path)
-        for name in (RESULT, CHECKPOINT, CONFIG, TRAJECTORY, GUESS, SCENE, TRACE, LOG):
+        for name in WRITTEN:
             files.remove(self.path / name)
         files.write_text(self.path / PROBLEM, problem_text)
         files.write_json(self.path / CONFIG, config.to_json())
+
+    def clear(self) -> None:
+        """Take away what killed processes left under temporary names; whoever calls has claimed the folder."""
+        begun = (*(f".{name}." for name in (PROBLEM, *WRITTEN)), ".claiming-")
+        for path in self.path.iterdir():
+            if path.name.startswith(begun):
+                files.remove(path)
 
     def write_trace(self, rows: Iterable[Mapping[str, object]]) -> None:
         """Write one line per iteration under a header with the names of the columns; what a row lacks is nan."""

@@ -181,8 +181,10 @@ def test_a_killed_run_goes_on_from_its_checkpoint(make: Any, recorder: Any) -> N
     killed = subprocess.run([sys.executable, "-c", KILLED], input=pickle.dumps(job), check=False)
     assert killed.returncode == -signal.SIGKILL
     assert not (job.folder.path / "result.json").exists()
+    (job.folder.path / ".trajectory.npz.4711-abc").write_bytes(b"half")
     recorder.events.clear()
     assert run_batch([job], 1, recorder, transcribe).accepted
     assert recorder.counted("resumed") == 1 and recorder.counted("started") == 0
     first, second = (read_result(each.folder.path / "result.json") for each in (whole, job))
     assert (first.z, first.counts, first.iterations) == (second.z, second.counts, second.iterations)
+    assert not [path.name for path in job.folder.path.iterdir() if path.name.startswith(".")]

@@ -161,7 +161,7 @@ def test_live_lines_are_wrapped_and_not_cut(monkeypatch: pytest.MonkeyPatch) -> 
     def console(**given: Any) -> Console:
         return Console(file=buffer, force_terminal=True, width=80, color_system=None)
 
-    monkeypatch.setattr("symphys.cli.watching.watch.Console", console)
+    monkeypatch.setattr("symphys.cli.watching.choice.Console", console)
     outputs = {"height of the hand [m]": 1.25, "speed of the ball [m/s]": 12.5}
     with watch(1) as live:
         live.started(Job(), resumed=False)  # type: ignore[arg-type]

@@ -86,7 +86,7 @@ def test_a_run_in_a_line() -> None:
     assert brief(job, result(), skipped=True) == "done before (solved)"
     failed = result(solved=False, status="failed", advice="broken\nin two")
     assert brief(job, failed, skipped=False) == "failed: broken"
-    assert brief(job, failed, skipped=True) == "failed before: broken (to try again, remove out/throw/cma-seed0)"
+    assert brief(job, failed, skipped=True) == "failed before: broken (--rerun failed tries again)"
 
 
 def test_seeds_share_a_row_of_medians() -> None:

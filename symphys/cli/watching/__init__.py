@@ -4,7 +4,7 @@ A share done and a time left go with them: of a run from its budget, of a batch 
 work from the parts that it is known to have.
 """
 
+from symphys.cli.watching.choice import watch
 from symphys.cli.watching.heartbeat import working
-from symphys.cli.watching.watch import watch
 
 __all__ = ["watch", "working"]
