@@ -32,7 +32,7 @@ from symphys.verbs import make_callable
 
 PACKAGES = ("casadi", "click", "cma", "matplotlib", "numpy", "pydantic", "rich", "scipy")
 LINEAR_SOLVERS = ("mumps", "ma27", "ma57", "ma77", "ma86", "ma97", "pardiso", "spral")
-WITHOUT = "symphys works all the same, by casadi's evaluation"
+WITHOUT = "symphys works all the same, by casadi's evaluation, but for samples of scenarios"
 CLOSE = 1e-12
 """Largest relative difference of a kernel's values from casadi's."""
 STEPS, DT, ROWS = 20, 0.05, 37

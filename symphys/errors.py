@@ -10,6 +10,10 @@ class SymphysError(Exception):
     """Something the user can mend: the command line prints the message and exits with code 2."""
 
 
+class Unavailable(SymphysError):
+    """Something that this machine lacks, such as a C compiler; says what to do. Elsewhere the same command may work."""
+
+
 @dataclass(frozen=True)
 class Issue:
     """One fault of a problem file.

@@ -48,7 +48,8 @@ def make_folder(path: Path) -> None:
 def write_bytes(path: Path, content: bytes) -> None:
     """Write to a temporary name in the same folder, then replace; FileError if that cannot be."""
     make_folder(path.parent)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    own = f"{os.getpid()}-{os.urandom(3).hex()}"  # two machines may have processes of one number
+    temporary = path.with_name(f".{path.name}.{own}")
     try:
         temporary.write_bytes(content)
         temporary.replace(path)
@@ -84,6 +85,24 @@ def remove(path: Path) -> None:
         path.unlink(missing_ok=True)
     except OSError as error:
         raise FileError(f"cannot remove {path}: {reason(error)}") from error
+
+
+def modified(path: Path) -> int | None:
+    """When a file was written [ns], by the clock of that time; None if there is none."""
+    try:
+        return path.stat().st_mtime_ns
+    except OSError:
+        return None
+
+
+def date(path: Path, time: int | None) -> None:
+    """Give a file the time [ns] of what it was made from; nothing where that cannot be.
+
+    A file is up to date where the two times are equal. Which is later says nothing once a clock was set.
+    """
+    if time is not None:
+        with contextlib.suppress(OSError):
+            os.utime(path, ns=(time, time))
 
 
 def check_regular(path: Path) -> None:

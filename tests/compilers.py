@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import shlex
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import programs
@@ -21,16 +24,47 @@ def fake(folder: Path, script: str) -> str:
     return str(path)
 
 
-def building(folder: Path, compiler: str) -> subprocess.Popen[str]:
-    """A process that builds the pendulum with a compiler, into a cache in the folder."""
+def logged(folder: Path, log: Path, gate: Path, real: Sequence[str]) -> str:
+    """A PATH whose gcc logs the process that calls it and its arguments, waits for a gate, and does as the real one."""
+    folder.mkdir()
+    version = f'if [ "$1" = --version ]; then exec {shlex.join(real)} --version; fi\n'
+    wait = f"n=0; while [ ! -e {gate} ] && [ $n -lt 1500 ]; do n=$((n + 1)); sleep 0.02; done\n"
+    (folder / "gcc").write_text(
+        f'#!/bin/sh\n{version}echo "$PPID $@" >> {log}\n{wait}exec {shlex.join(real)} "$@"\n', "utf-8"
+    )
+    (folder / "gcc").chmod(0o755)
+    return f"{folder}{os.pathsep}{os.environ['PATH']}"
+
+
+def waits(process: subprocess.Popen[str]) -> bool:
+    """Whether a process has opened a lock."""
+    opened = Path("/proc") / str(process.pid) / "fd"
+    with contextlib.suppress(OSError):
+        return any(each.readlink().suffix == ".lock" for each in opened.iterdir())
+    return False
+
+
+def until(done: Callable[[], bool]) -> None:
+    """Wait, at most half a minute."""
+    end = time.monotonic() + 30
+    while not done():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def building(folder: Path, compiler: str, **places: str) -> subprocess.Popen[str]:
+    """A process that builds the pendulum with a compiler, into a cache in the folder.
+
+    ``compiler``: what CC names; empty: that of PATH. ``places``: of its environment.
+    """
     environment = os.environ | {
         "CC": compiler,
         "SYMPHYS_CACHE": str(folder / "cache"),
         "PYTHONPATH": os.pathsep.join([str(Path(programs.__file__).parent), *sys.path]),
+        **places,
     }
-    return subprocess.Popen(
-        [sys.executable, "-c", BUILD], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    command = [sys.executable, "-c", BUILD]
+    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
 def wait_for(path: Path) -> None:

@@ -7,6 +7,7 @@ import io
 import os
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 import click
 
@@ -91,6 +92,42 @@ def run(arguments: Sequence[str] | None) -> int:
         return WRONG
 
 
+class LossyFile(io.RawIOBase):
+    """A file of messages: what a full disk does not take is lost, so that no message ends the work that it is about."""
+
+    def __init__(self, raw: io.FileIO) -> None:
+        """``raw``: where it goes; it stays open."""
+        self.raw = raw
+
+    def write(self, text: Any) -> int:
+        """Write what can be written; BrokenPipeError if nobody reads it."""
+        try:
+            return self.raw.write(text)
+        except BrokenPipeError:
+            raise
+        except OSError:
+            return len(text)
+
+    def writable(self) -> bool:
+        """It is."""
+        return True
+
+    def fileno(self) -> int:
+        """Of the file."""
+        return self.raw.fileno()
+
+    def isatty(self) -> bool:
+        """Whether it is a terminal."""
+        return self.raw.isatty()
+
+
+def file_of(stream: Any) -> io.FileIO | None:
+    """The file that an output writes to; None if it is none, as in tests."""
+    buffer = getattr(stream, "buffer", None)
+    raw = getattr(buffer, "raw", buffer)
+    return raw if isinstance(raw, io.FileIO) else None
+
+
 def prepare(opened: contextlib.ExitStack) -> None:
     """Let outputs take every name, and nothing go wrong where one was closed before the start (``>&-``)."""
     for name in ("stdout", "stderr"):
@@ -99,6 +136,10 @@ def prepare(opened: contextlib.ExitStack) -> None:
             nowhere = io.TextIOWrapper(io.FileIO(os.devnull, "w"), encoding="utf-8")
             opened.callback(setattr, sys, name, None)
             setattr(sys, name, opened.enter_context(nowhere))
+        elif name == "stderr" and (raw := file_of(stream)):
+            opened.callback(setattr, sys, name, stream)
+            whole = io.BufferedWriter(LossyFile(raw))
+            sys.stderr = io.TextIOWrapper(whole, stream.encoding, "replace", line_buffering=True)
         elif stream.errors in ("strict", "surrogateescape") and hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
 

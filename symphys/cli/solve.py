@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from symphys import threads
+from symphys import files, threads
 from symphys.cli.arguments import (
     backend_option,
     complete_problem,
@@ -200,5 +200,5 @@ def write_reports(jobs: list[Job], out: Path) -> Path:
 
 
 def newer(source: Path, page: Path) -> bool:
-    """Whether there is something that the page does not show yet."""
-    return source.exists() and not (page.exists() and page.stat().st_mtime >= source.stat().st_mtime)
+    """Whether there is something that the page does not show yet; it has the time of what it shows."""
+    return source.exists() and files.modified(page) != files.modified(source)

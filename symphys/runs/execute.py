@@ -8,12 +8,13 @@ from collections.abc import Callable
 from time import monotonic
 
 from symphys import files
-from symphys.errors import SymphysError
+from symphys.errors import SymphysError, Unavailable
 from symphys.results.file_names import CHECKPOINT, LOG, RESULT
 from symphys.results.result import Result
 from symphys.runs.claim import Claim, FolderBusy, claimed
 from symphys.runs.job import Job
 from symphys.runs.record import failure
+from symphys.runs.requirements import transcribed
 from symphys.runs.solving import silent, solve
 from symphys.runs.standing import MISSING, Standing, Stands, standing
 from symphys.runs.transcription_cache import Transcriptions
@@ -97,9 +98,11 @@ def proceed(
     log = Log(job)
     keeper = CheckpointKeeper(job, log)
     try:
-        result = solve(job, transcriptions(job), monitor, log, keeper, found, solved, tell)
+        result = solve(job, transcribed(job, transcriptions), monitor, log, keeper, found, solved, tell)
     except files.FileError:
         raise
+    except Unavailable as error:
+        result = failure(job, str(error), again=True)
     except SymphysError as error:
         result = failure(job, str(error))
     except Exception as error:  # one broken run must not take the others with it
@@ -153,10 +156,13 @@ class CheckpointKeeper:
 
 
 def finish(job: Job, claim: Claim, result: Result) -> None:
-    """Write the result, last of all files, so that it exists only where the others are whole."""
+    """Write the result, last of all files, so that it exists only where the others are whole.
+
+    The checkpoint stays where the same command goes on from there.
+    """
     claim.check()
     files.write_json(job.folder.path / RESULT, result.to_json())
-    if not result.interrupted:
+    if not (result.interrupted or result.again):
         files.remove(job.folder.path / CHECKPOINT)
 
 

@@ -1,4 +1,4 @@
-"""A batch whose processes are killed at random loses nothing and does nothing twice; ``make stress`` does more of it."""
+"""A batch whose processes are killed at random loses nothing, does nothing twice; ``make stress`` does more of it."""
 
 from __future__ import annotations
 

@@ -57,3 +57,10 @@ def test_names_that_are_no_text(throw: Path, tmp_path: Path, monkeypatch: pytest
     assert main(["new", os.fsdecode(b"new\xff.toml")]) == 0
     assert "new?.toml: try" in printed.getvalue().decode()
     assert Path(os.fsdecode(b"new\xff.toml")).is_file()
+
+
+def test_messages_that_a_full_disk_does_not_take_end_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    with Path("/dev/full").open("w", encoding="utf-8") as full:
+        monkeypatch.setattr("sys.stderr", full)
+        assert main(["solf"]) == 2
+        assert sys.stderr is full

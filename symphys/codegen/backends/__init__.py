@@ -5,7 +5,7 @@
 
 from symphys.codegen.backends.choose import BACKENDS, NAMES, choose
 from symphys.codegen.backends.interface import Backend, BackendSource, Description, ProblemFunctions
-from symphys.codegen.backends.kernels import BEST, PRECISIONS, build_kernel, described
+from symphys.codegen.backends.kernels import BEST, PRECISIONS, build_kernel, described, require_kernels
 
 __all__ = [
     "BACKENDS",
@@ -19,4 +19,5 @@ __all__ = [
     "build_kernel",
     "choose",
     "described",
+    "require_kernels",
 ]

@@ -25,7 +25,11 @@ def c(source: BackendSource, threads: int) -> Backend:
     asked = {name: function for name, function in made.items() if function is not None}
     texts = [kernel.SourceFile(written(name, function)) for name, function in asked.items()]
     with kernel.shared_library(texts, kernel.default_cache()) as built:
-        compiled = {name: ca.external(name, str(built.path)) for name in asked}
+        try:
+            compiled = {name: ca.external(name, str(built.path)) for name in asked}
+        except RuntimeError as error:
+            why = " ".join(str(error).split())
+            raise kernel.KernelUnavailable(f"the compiled functions cannot be loaded: {why}") from error
     functions = SimpleNamespace(**{name: compiled.get(name) for name in EVALUATED})
     nlp = Nlp(source.functions.nlp, *(compiled.get(name) for name in ("nlp", "nlp_gradient", "nlp_jacobian")))
     spent = time.perf_counter() - began

@@ -11,10 +11,11 @@ from pathlib import Path
 import casadi as ca
 
 from symphys import codegen as kernel
-from symphys.codegen import Fixed, ProcessorKernel
+from symphys.codegen import Fixed, KernelUnavailable, ProcessorKernel
 from symphys.codegen.backends.interface import Function
 from symphys.codegen.backends.seeds import Seeds
-from symphys.codegen.toolchain.temporary import TemporaryFolder
+from symphys.codegen.toolchain.build import temporary_folder
+from symphys.codegen.toolchain.processes import ELSEWHERE
 from symphys.shooting import Array, Nlp
 
 ROOM = "symphys.codegen.backends"
@@ -52,7 +53,10 @@ class External:
 
 
 def external_nlp(made: ProcessorKernel, expression: Function, rows: Seeds | None) -> Nlp:
-    """Objective and constraints by the kernel; ``rows``: of the constraints, where there are any."""
+    """Objective and constraints by the kernel; ``rows``: of the constraints, where there are any.
+
+    KernelUnavailable where there is no room for the library, or none that may be loaded.
+    """
     external = External(made, rows)
     value, gradient, slopes = external.functions
     jacobian = sparse(slopes, rows) if rows else None
@@ -71,12 +75,16 @@ def load(sizes: dict[str, int], tasks: Sequence[Task]) -> list[Function]:
     text = head + files(ROOM).joinpath("external.c").read_text(encoding="utf-8")
     with (
         kernel.shared_library([kernel.SourceFile(text)], kernel.default_cache()) as built,
-        TemporaryFolder("symphys-external-") as folder,
+        temporary_folder("symphys-external-") as folder,
     ):
         copy = Path(folder) / "external.so"
-        shutil.copyfile(built.path, copy)
+        try:
+            shutil.copyfile(built.path, copy)
+            library = ctypes.CDLL(str(copy))
+        except OSError as error:
+            raise KernelUnavailable(f"{copy} cannot be used: {error.strerror or error}; {ELSEWHERE}") from error
         functions = [ca.external(name, str(copy)) for name in NAMES]
-        ctypes.CDLL(str(copy)).bind((Task * 3)(*tasks))
+        library.bind((Task * 3)(*tasks))
     return functions
 
 

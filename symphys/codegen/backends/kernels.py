@@ -10,6 +10,7 @@ from symphys.codegen import Kernel, KernelUnavailable, Program, compile_program
 from symphys.codegen.backends.fastest import FastestKernel
 from symphys.codegen.backends.interface import Description, joined, nothing
 from symphys.codegen.cuda import DeviceKernel, compile_on, find_gpu
+from symphys.codegen.toolchain.compiler import find_compiler
 
 BEST = "auto"
 PRECISIONS: dict[str, Literal["double", "single"]] = {
@@ -40,6 +41,25 @@ def build_kernel(name: str, program: Program, seeded: Sequence[str], threads: in
     if name == BEST:
         return FastestKernel(kernel, lambda: compile_on(find_gpu(), program, precision, seeded))
     return kernel
+
+
+def require_kernels(name: str) -> None:
+    """KernelUnavailable, with what to install, if this machine has nothing that compiles kernels for a backend.
+
+    Nothing is compiled. ``name``: of ``PRECISIONS``.
+    """
+    refused = ""
+    if name in ON_DEVICE:
+        try:
+            find_gpu()
+        except KernelUnavailable as error:
+            refused = str(error)
+        else:
+            return
+    try:
+        find_compiler()
+    except KernelUnavailable as error:
+        raise KernelUnavailable(joined(refused, str(error))) from error
 
 
 def described(kernel: Kernel, seconds: float, precision: str | None = None, note: str = "") -> Description:

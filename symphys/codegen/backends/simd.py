@@ -88,8 +88,11 @@ def by_kernel(source: BackendSource, threads: int, name: str) -> Backend:
         )
         if output in program.outputs
     }
-    nlp = Nlp(source.functions.nlp)
+    nlp, note = Nlp(source.functions.nlp), ""
     if isinstance(kernel, ProcessorKernel):
-        nlp = external_nlp(kernel, source.functions.nlp, rows.get("constraints"))
+        try:
+            nlp = external_nlp(kernel, source.functions.nlp, rows.get("constraints"))
+        except KernelUnavailable as error:
+            note = f"for ipopt casadi's virtual machine evaluates, which is slower: {error}"
     evaluator = KernelEvaluator(kernel, rows.get("residuals"), source.exact)
-    return Backend(described(kernel, time.perf_counter() - began), evaluator, nlp)
+    return Backend(described(kernel, time.perf_counter() - began, note=note), evaluator, nlp)

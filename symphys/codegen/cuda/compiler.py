@@ -12,6 +12,7 @@ from typing import Any
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.toolchain.cache import KINDS, Cache
 from symphys.codegen.toolchain.compiler import processors
+from symphys.codegen.toolchain.processes import ELSEWHERE
 
 ADVICE = "pip install 'symphys[cuda]'"
 FLAGS = ("--std=c++17", "--fmad=false", "--relocatable-device-code=true")
@@ -47,7 +48,11 @@ def image(texts: Sequence[str], architecture: str, cache: Cache, folder: Path) -
         if (path := own.find(key)) is not None:  # another process may have built it meanwhile
             return Image(path, version, cached=True)
         built = folder / f"{key}.cubin"
-        built.write_bytes(linked([part for part, _ in compiled(texts, architecture)], architecture))
+        content = linked([part for part, _ in compiled(texts, architecture)], architecture)
+        try:
+            built.write_bytes(content)
+        except OSError as error:
+            raise KernelUnavailable(f"cannot write a kernel to {folder}: {error.strerror}; {ELSEWHERE}") from error
         try:
             stored = own.store(key, built)
         except OSError as error:

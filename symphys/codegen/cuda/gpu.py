@@ -13,6 +13,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from symphys.codegen.cuda.compiler import ADVICE, image
 from symphys.codegen.errors import KernelUnavailable
+from symphys.codegen.toolchain.build import temporary_folder
 from symphys.codegen.toolchain.cache import Cache, default_cache
 from symphys.codegen.toolchain.temporary import TemporaryFolder
 
@@ -32,8 +33,8 @@ class Gpu:
 
     @cached_property
     def folder(self) -> TemporaryFolder:
-        """For images that no cache takes."""
-        return TemporaryFolder("symphys-cuda-")
+        """For images that no cache takes; KernelUnavailable if there is no room for one."""
+        return temporary_folder("symphys-cuda-")
 
     def load(self, texts: Sequence[str]) -> tuple[Any, str, bool, str]:
         """See ``Device``."""

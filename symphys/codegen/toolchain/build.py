@@ -18,6 +18,7 @@ from symphys.codegen.runtime.kernel import ProcessorKernel
 from symphys.codegen.runtime.library import Loaded
 from symphys.codegen.toolchain.cache import Cache, default_cache
 from symphys.codegen.toolchain.compiler import Compiler, find_compiler
+from symphys.codegen.toolchain.processes import ELSEWHERE
 from symphys.codegen.toolchain.processor import processor
 from symphys.codegen.toolchain.report import BuildReport
 from symphys.codegen.toolchain.temporary import TemporaryFolder
@@ -102,7 +103,7 @@ def shared_library(parts: Sequence[SourceFile], cache: Cache) -> Iterator[Built]
     if (path := cache.find(key)) is not None:
         yield Built(path, compiler, flags, cached=True)
         return
-    with _folder() as folder:
+    with temporary_folder("symphys-kernel-") as folder:
         with cache.building(key):
             found = cache.find(key)  # another process may have built it meanwhile
             path, note = (found, "") if found else _kept(cache, key, compiler.build(parts, flags, Path(folder)))
@@ -118,8 +119,10 @@ def _kept(cache: Cache, key: str, path: Path) -> tuple[Path, str]:
         return path, why
 
 
-def _folder() -> TemporaryFolder:
+def temporary_folder(kind: str) -> TemporaryFolder:
+    """See ``TemporaryFolder``; KernelUnavailable if there is no room for one."""
     try:
-        return TemporaryFolder("symphys-kernel-")
+        return TemporaryFolder(kind)
     except OSError as error:
-        raise KernelUnavailable(f"no temporary folder to compile a kernel in: {error.strerror}; set TMPDIR") from error
+        where = f"the temporary folder {error.filename}" if error.filename else "a temporary folder"
+        raise KernelUnavailable(f"{where} cannot be made: {error.strerror or error}; {ELSEWHERE}") from error

@@ -3,6 +3,9 @@
 A file appears whole under its name or not at all, so that readers need no lock; a file whose content is not that of
 its name is removed and built again. Processes that want the same kernel wait for the first one to build it.
 
+Clocks that are set, and those of file servers, may give files times that are still to come. Nothing depends on them but
+which kernels go first when the cache is full.
+
 A kernel is code that runs as the user, so it is loaded only from a folder, and a file, that nobody else may write to.
 """
 
@@ -20,15 +23,26 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 from symphys.codegen.errors import KernelUnavailable
+from symphys.codegen.toolchain.temporary import lock as lock_file
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
 
 LIMIT = 512 * 2**20
 """Bytes that the kernels may take together; those not used for longest go first."""
 KINDS = (".so", ".cubin")
 """Endings of kernels for processors and for devices."""
 LEFT = 3600.0
-"""Seconds after which an unfinished file belongs to a process that was killed."""
+"""[s] after which an unfinished file, or a lock that nobody holds, belongs to a process that was killed."""
+PATIENCE, TICK = 900.0, 0.05
+"""[s] that another process is waited for, which may have been stopped as by Ctrl-Z; [s] between two looks."""
+AHEAD = 60.0
+"""[s] that the clocks of two machines may differ by."""
 
 
 @dataclass(frozen=True)
@@ -75,13 +89,17 @@ class Cache:
         if self.distrust():
             return None
         for path in self._files(f"{key}-*{self.suffix}"):
+            try:
+                whole = _safe(path) and path.stem.split("-")[1] == _checksum(path)
+            except OSError:  # such as too many open files: what cannot be read now is not damaged
+                continue
             with contextlib.suppress(OSError):
-                if _safe(path) and path.stem.split("-")[1] == _checksum(path):
-                    with contextlib.suppress(OSError):
-                        os.utime(path)
-                    return path
-            with contextlib.suppress(OSError):
-                path.unlink()
+                if whole:
+                    os.utime(path)
+                else:
+                    path.unlink()
+            if whole:
+                return path
         return None
 
     def store(self, key: str, built: Path) -> Path:
@@ -100,18 +118,22 @@ class Cache:
 
     @contextlib.contextmanager
     def building(self, key: str) -> Iterator[None]:
-        """Hold the right to build a kernel; where files cannot be locked, several may build at once, which is safe."""
-        try:
-            import fcntl
+        """Hold the right to build a kernel.
 
+        Where files cannot be locked, and where the process that has the right does not end, several may build at once.
+        That is safe: each stores a file of its own content, whole.
+        """
+        if fcntl is None:
+            yield
+            return
+        try:
             self.make()
             lock = (self.folder / f".{key}.lock").open("w")
-        except (ImportError, OSError):
+        except OSError:
             yield
             return
         with lock:
-            with contextlib.suppress(OSError):
-                fcntl.flock(lock, fcntl.LOCK_EX)
+            _wait_for(lock)
             try:
                 yield
             finally:
@@ -130,14 +152,14 @@ class Cache:
             with contextlib.suppress(OSError):
                 path.unlink()
                 gone += 1
-        self._sweep(time.time())
+        self._sweep(0.0)
         return gone
 
-    def _sweep(self, before: float) -> None:
-        """Remove what processes that were killed have left unfinished, if it is older than this."""
-        for path in self._files(".new-*"):
+    def _sweep(self, age: float) -> None:
+        """Remove what processes that were killed have left, if its time is at least ``age`` [s] away from now."""
+        for path in [*self._files(".new-*"), *self._files(".*.lock")]:
             with contextlib.suppress(OSError):
-                if path.stat().st_mtime <= before:
+                if abs(time.time() - path.stat().st_mtime) >= age and (path.suffix != ".lock" or _free(path)):
                     path.unlink()
 
     def _files(self, pattern: str) -> list[Path]:
@@ -156,7 +178,12 @@ class Cache:
         return sorted(found)
 
     def _shrink(self, keep: Path) -> None:
-        self._sweep(time.time() - LEFT)
+        self._sweep(LEFT)
+        now = time.time()
+        for used, _, path in self._entries():
+            if used > now + AHEAD:  # it would be the last to go for as long as that time is still to come
+                with contextlib.suppress(OSError):
+                    os.utime(path, (now, now))
         entries = self._entries()
         total = sum(size for _, size, _ in entries)
         for _, size, path in entries:
@@ -176,6 +203,30 @@ def default_cache() -> Cache:
         return Cache((Path(base) if base else Path.home() / ".cache") / "symphys" / "kernels")
     except RuntimeError as error:
         raise KernelUnavailable("no home folder in which to keep kernels; set SYMPHYS_CACHE to a folder") from error
+
+
+def _wait_for(lock: IO[str]) -> None:
+    """Lock an open file; go on without where files cannot be locked, and after PATIENCE."""
+    end = time.monotonic() + PATIENCE
+    while True:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() >= end:
+                return
+            time.sleep(TICK)
+        except OSError:
+            return
+        else:
+            return
+
+
+def _free(path: Path) -> bool:
+    """Whether no process holds a lock; False where that is not known."""
+    if (handle := lock_file(path)) is None:
+        return False
+    os.close(handle)
+    return True
 
 
 def _safe(path: Path) -> bool:

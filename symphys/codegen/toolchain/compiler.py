@@ -14,7 +14,7 @@ from pathlib import Path
 
 from symphys.codegen.emit.source import SourceFile
 from symphys.codegen.errors import KernelUnavailable
-from symphys.codegen.toolchain.processes import ADVICE, run, run_all
+from symphys.codegen.toolchain.processes import ADVICE, ELSEWHERE, run, run_all
 from symphys.codegen.toolchain.processor import Processor
 
 FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-fvisibility=hidden", "-fno-math-errno", "-fno-trapping-math", "-w")
@@ -52,9 +52,9 @@ class Compiler:
             _write(file, source.text)
             fusing = f"-ffp-contract={'fast' if source.fused else 'off'}"
             commands.append([*self.command, *flags, fusing, "-c", str(file), "-o", str(target)])
-        run_all(commands, LIMIT, processors())
+        run_all(commands, LIMIT, processors(), folder)
         library = folder / "kernel.so"
-        run([*self.command, *flags, "-shared", *map(str, objects), "-o", str(library), "-lm"], LIMIT)
+        run([*self.command, *flags, "-shared", *map(str, objects), "-o", str(library), "-lm"], LIMIT, folder)
         return library
 
 
@@ -93,4 +93,6 @@ def _write(path: Path, text: str) -> None:
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise KernelUnavailable(f"cannot write the sources of a kernel to {path.parent}: {error.strerror}") from error
+        raise KernelUnavailable(
+            f"cannot write the sources of a kernel to {path.parent}: {error.strerror}; {ELSEWHERE}"
+        ) from error

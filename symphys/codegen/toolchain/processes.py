@@ -17,6 +17,7 @@ from symphys.codegen.errors import KernelUnavailable
 PARTING = 10.0
 """[s] that a thread is waited for whose compiler was stopped."""
 ADVICE = "install gcc or clang (or `pip install ziglang`), or set CC to a C compiler"
+ELSEWHERE = "make room there, or set TMPDIR to another folder"
 MEMORY_WORDS = (
     "memory exhausted",
     "out of memory",
@@ -25,17 +26,25 @@ MEMORY_WORDS = (
     "bad_alloc",
     "failed to map segment",
 )
+ROOM_WORDS = ("no space left on device", "disk quota exceeded", "read-only file system")
 Ended = SimpleQueue[BaseException | None]
 """An error, or None, of each command that is over."""
 
 
 @dataclass
 class Running:
-    """A compiler at work; on POSIX it leads a group, so that what it starts ends with it."""
+    """A compiler at work; on POSIX it leads a group, so that what it starts ends with it.
+
+    Attributes:
+        name: of the program.
+        limit: [s] that it may take.
+        folder: where it writes; None: wherever it does.
+    """
 
     name: str
     process: subprocess.Popen[str]
     limit: float
+    folder: Path | None = None
 
     def said(self) -> str:
         """What it printed; KernelUnavailable says how it failed."""
@@ -50,7 +59,7 @@ class Running:
                 self.stop()
                 raise
         if self.process.returncode:
-            raise KernelUnavailable(_failure(self.name, self.process.returncode, err.strip()))
+            raise KernelUnavailable(_failure(self.name, self.process.returncode, err.strip(), self.folder))
         return out
 
     def stop(self) -> None:
@@ -61,16 +70,19 @@ class Running:
             self.process.kill()
 
 
-def run(command: Sequence[str], limit: float) -> str:
-    """What a command prints, within so many seconds; KernelUnavailable says how it failed."""
-    return _start(command, limit).said()
+def run(command: Sequence[str], limit: float, folder: Path | None = None) -> str:
+    """What a command prints, within so many seconds; KernelUnavailable says how it failed.
+
+    ``folder``: where the command keeps what is temporary, so that nothing of it stays when the command is killed.
+    """
+    return _start(command, limit, folder).said()
 
 
-def run_all(commands: Sequence[Sequence[str]], limit: float, at_once: int) -> None:
-    """Run commands side by side; the first that fails ends the others, and so does Ctrl-C."""
+def run_all(commands: Sequence[Sequence[str]], limit: float, at_once: int, folder: Path | None = None) -> None:
+    """Run commands side by side; the first that fails ends the others, and so does Ctrl-C. ``folder``: see ``run``."""
     ended: Ended = SimpleQueue()
     with _interrupted(ended):
-        _Crew(commands, limit, ended).run(at_once)
+        _Crew(commands, limit, ended, folder).run(at_once)
 
 
 @contextlib.contextmanager
@@ -92,8 +104,10 @@ def _interrupted(ended: Ended) -> Iterator[None]:
 class _Crew:
     """Threads that run commands, each a process, one after the other."""
 
-    def __init__(self, commands: Sequence[Sequence[str]], limit: float, ended: Ended) -> None:
-        self.limit, self.ended = limit, ended
+    def __init__(
+        self, commands: Sequence[Sequence[str]], limit: float, ended: Ended, folder: Path | None = None
+    ) -> None:
+        self.limit, self.ended, self.folder = limit, ended, folder
         self.over, self.started = threading.Event(), list[Running]()
         self.waiting: SimpleQueue[Sequence[str]] = SimpleQueue()
         for command in commands:
@@ -121,7 +135,7 @@ class _Crew:
         """Run one command after the other; each leaves an error, or None."""
         while not self.over.is_set():
             try:
-                running = _start(self.waiting.get_nowait(), self.limit)
+                running = _start(self.waiting.get_nowait(), self.limit, self.folder)
                 self.started.append(running)
                 if self.over.is_set():
                     running.stop()
@@ -134,8 +148,9 @@ class _Crew:
                 self.ended.put(None)
 
 
-def _start(command: Sequence[str], limit: float) -> Running:
+def _start(command: Sequence[str], limit: float, folder: Path | None = None) -> Running:
     name = Path(command[0]).name
+    places = {} if folder is None else dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(folder))
     try:
         process = subprocess.Popen(
             command,
@@ -145,13 +160,16 @@ def _start(command: Sequence[str], limit: float) -> Running:
             text=True,
             errors="replace",
             start_new_session=True,
+            env=os.environ | places,
         )
     except OSError as error:
         raise KernelUnavailable(f"the compiler {name} cannot be run ({error.strerror}): {ADVICE}") from error
-    return Running(name, process, limit)
+    return Running(name, process, limit, folder)
 
 
-def _failure(name: str, code: int, said: str) -> str:
+def _failure(name: str, code: int, said: str, folder: Path | None = None) -> str:
+    if folder and (why := next((words for words in ROOM_WORDS if words in said.lower()), "")):
+        return f"the compiler {name} cannot write to {folder}: {why}; {ELSEWHERE}"
     if any(word in said.lower() for word in MEMORY_WORDS):
         return f"the compiler {name} ran out of memory; close other programs or use fewer processes"
     if code < 0 or "signal" in said.lower():

@@ -55,7 +55,7 @@ def sweep(place: Path) -> None:
 def is_left(folder: Path) -> bool:
     """Whether no process uses the folder any more; False if that is not known. OSError if it has gone meanwhile."""
     status = folder.lstat()
-    age = time.time() - status.st_mtime
+    age = abs(time.time() - status.st_mtime)  # a clock that was set back makes times that are still to come
     if not stat.S_ISDIR(status.st_mode) or age < YOUNG or (hasattr(os, "geteuid") and status.st_uid != os.geteuid()):
         return False
     if fcntl is None or not (folder / LOCK).exists():

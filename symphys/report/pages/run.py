@@ -24,7 +24,7 @@ from symphys.report.scene.motion import draw_motion
 from symphys.results import text_files as tables
 from symphys.results.discovery import is_run
 from symphys.results.drawable import OVERSIZED, drawable, oversized
-from symphys.results.file_names import CONFIG, FIGURES, GUESS, PROBLEM, SCENE, TRAJECTORY
+from symphys.results.file_names import CONFIG, FIGURES, GUESS, PROBLEM, RESULT, SCENE, TRAJECTORY
 from symphys.results.result import smoothed
 from symphys.results.run import Run, read_run
 from symphys.results.scene import Scene, read_scene
@@ -49,6 +49,8 @@ class RecordedMotion:
 def write_run_report(run_dir: Path) -> Path:
     """Write report.html, and figures as SVG and CSV, into a run folder, from its files alone.
 
+    The page has the time of the result that it shows.
+
     Args:
         run_dir: a run folder, finished or not; what is missing is said in the page.
 
@@ -58,11 +60,13 @@ def write_run_report(run_dir: Path) -> Path:
     Raises:
         ReportError: there is no such folder, it is no run folder, or it cannot be written to.
     """
+    shown = files.modified(run_dir / RESULT)
     run, recording, pictures = drawn(run_dir)
     write_figures(run_dir / FIGURES, pictures.values())
     body = build(run, recording, pictures)
     title = f"{run.title}: {run.solver}, seed {run.seed}"
     files.write_text(run_dir / PAGE, page(title, body, animated=recording.trajectory is not None))
+    files.date(run_dir / PAGE, shown)
     return run_dir / PAGE
 
 

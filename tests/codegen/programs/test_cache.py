@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import shlex
 import shutil
 import sys
 import time
@@ -12,13 +11,14 @@ from pathlib import Path
 
 import programs
 import pytest
-from compilers import building, fake, wait_for
+from compilers import building, fake, logged, until, wait_for, waits
 
 from symphys.codegen import Cache, Kernel, KernelUnavailable, compile_program, default_cache
 from symphys.codegen.toolchain.compiler import find_compiler
 
 Patch = pytest.MonkeyPatch
 UNIX = pytest.mark.skipif(sys.platform == "win32", reason="the fake compilers are shell scripts")
+LINUX = pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="nothing says which files a process has opened")
 
 
 @UNIX
@@ -231,13 +231,97 @@ def test_where_the_cache_lies(monkeypatch: Patch) -> None:
     assert default_cache().folder == Path("base", "symphys", "kernels")
 
 
-@UNIX
-def test_two_processes_build_a_kernel_once(pendulum: Kernel, tmp_path: Path) -> None:
-    real = shlex.join(find_compiler().command)
-    script = f'echo "$@" >> {tmp_path}/log; exec {real} "$@"'
-    started = [building(tmp_path, fake(tmp_path, script)) for _ in range(2)]
-    said = sorted(process.communicate(timeout=60)[0].strip() for process in started)
+def kernels(folder: Path) -> list[str]:
+    """What is in the cache but locks: the endings of its files."""
+    return [path.suffix for path in (folder / "cache").iterdir() if path.suffix != ".lock"]
+
+
+@LINUX
+def test_one_process_builds_a_kernel_while_others_wait_and_one_of_these_where_it_is_killed(
+    pendulum: Kernel, tmp_path: Path
+) -> None:
+    log, gate = tmp_path / "log", tmp_path / "gate"
+    path = logged(tmp_path / "bin", log, gate, find_compiler().command)
+    started = [building(tmp_path, "", PATH=path, TMPDIR=str(tmp_path)) for _ in range(3)]
+    wait_for(log)
+    until(lambda: all(map(waits, started)))
+    first = next(process for process in started if {process.pid} == callers(log))
+    first.kill()
+    first.communicate(timeout=20)
+    gate.touch()
+    said = sorted(process.communicate(timeout=60)[0].strip() for process in started if process is not first)
     assert said == ["False", "True"]
-    assert (tmp_path / "log").read_text("utf-8").count("-shared") == 1
-    assert len(list((tmp_path / "cache").glob("*.so"))) == 1
-    assert [p.name for p in (tmp_path / "cache").iterdir() if p.suffix != ".so"] == []
+    assert log.read_text("utf-8").count("-shared") == 1
+    assert len(callers(log)) == 2
+    assert [path.suffix for path in (tmp_path / "cache").iterdir()] == [".so"]
+
+
+def callers(log: Path) -> set[int]:
+    """The processes that have called the compiler."""
+    return {int(line.split()[0]) for line in log.read_text("utf-8").splitlines()}
+
+
+@UNIX
+def test_without_locks_nobody_waits_and_one_kernel_is_kept(tmp_path: Path, monkeypatch: Patch) -> None:
+    def refuse(*given: object) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr("fcntl.flock", refuse)
+    own, began = Cache(tmp_path / "cache"), time.monotonic()
+    with own.building("k"), own.building("k"):
+        kernel = planted(own)
+        assert planted(own) == kernel
+    assert time.monotonic() - began < 1
+    assert own.find("k") == kernel
+    assert list(own.folder.iterdir()) == [kernel]
+
+
+@UNIX
+def test_a_builder_that_stands_still_is_not_waited_for_for_ever(tmp_path: Path, monkeypatch: Patch) -> None:
+    monkeypatch.setattr("symphys.codegen.toolchain.cache.PATIENCE", 0.3)
+    own, began = Cache(tmp_path / "cache"), time.monotonic()
+    with own.building("k"), own.building("k"):
+        assert 0.3 <= time.monotonic() - began < 10
+    began = time.monotonic()
+    with own.building("k"):
+        assert time.monotonic() - began < 0.3
+
+
+def test_a_kernel_that_cannot_be_read_now_is_kept(tmp_path: Path, monkeypatch: Patch) -> None:
+    def refuse(path: Path) -> bytes:
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+
+    own = Cache(tmp_path / "cache")
+    kernel = planted(own)
+    with monkeypatch.context() as patch:
+        patch.setattr("pathlib.Path.read_bytes", refuse)
+        assert own.find("k") is None
+    assert own.find("k") == kernel
+
+
+def test_kernels_of_a_clock_that_was_ahead_do_not_stay_for_ever(tmp_path: Path) -> None:
+    """Those that are used now would go instead, one after the other."""
+    built, small = tmp_path / "built", Cache(tmp_path / "cache", limit=250)
+    for i, key in enumerate("abcd"):
+        built.write_bytes(bytes([i]) * 100)
+        stored = small.store(key, built)
+        if key == "a":
+            os.utime(stored, (time.time() + 86400, time.time() + 86400))
+    assert [key for key in "abcd" if small.find(key)] == ["c", "d"]
+
+
+@UNIX
+@pytest.mark.parametrize("ahead", [86400, -86400])
+def test_what_was_left_goes_whatever_the_clock_says(tmp_path: Path, monkeypatch: Patch, ahead: float) -> None:
+    """As one that was set forward, and back, by a day; what a process holds stays."""
+    own, now = Cache(tmp_path / "cache"), time.time() + ahead
+    built = planted(own)
+    for name in (".new-left", ".left.lock"):
+        (own.folder / name).touch()
+    with own.building("held"):
+        monkeypatch.setattr("time.time", lambda: now)
+        own.store("k", built)
+        assert sorted(path.name for path in own.folder.iterdir() if path != built) == [".held.lock"]
+        (own.folder / ".new-left").touch()
+        own.clear()
+        assert [path.name for path in own.folder.iterdir()] == [".held.lock"]

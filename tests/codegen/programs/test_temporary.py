@@ -77,3 +77,14 @@ def test_folders_of_one_process_do_not_remove_each_other(place: Path) -> None:
         aged(Path(first), 2 * OLD)
         with TemporaryFolder("symphys-external-") as second:
             assert {Path(first), Path(second)} == set(place.iterdir())
+
+
+@pytest.mark.parametrize("seconds", [2 * OLD, -2 * OLD])
+def test_a_clock_that_was_set_removes_nothing_in_use_and_keeps_nothing_else(place: Path, seconds: float) -> None:
+    """Forward: all that there is is old. Back: it was made at a time that is still to come."""
+    left = aged(made(place, "left", locked=True), seconds)
+    with TemporaryFolder(KIND) as own:
+        aged(Path(own), seconds)
+        with TemporaryFolder(KIND):
+            assert Path(own).is_dir()
+            assert not left.exists()
