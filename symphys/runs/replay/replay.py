@@ -1,0 +1,164 @@
+"""The stored variables of a run, rolled out again by the exact rollout from problem.toml and the settings beside it.
+
+Nothing of the folder is run: it has a problem, settings and numbers. What is compared was judged and recorded by the
+same rollout, so it is the same to the bit where versions and processor are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys import json_values as values
+from symphys.errors import SymphysError
+from symphys.files import FileError
+from symphys.problem import Problem, load_problem
+from symphys.provenance import machine, versions
+from symphys.results.archives import read_archive
+from symphys.results.config import Config
+from symphys.results.file_names import CONFIG, PROBLEM, RESULT, TRAJECTORY
+from symphys.results.result import Result
+from symphys.results.text_files import ReportError, read_table
+from symphys.results.trajectories import make_trajectory
+from symphys.runs.replay.comparison import QuantityDifference, compare_motions, compare_numbers
+from symphys.trajectory import NotFinite, Trajectory
+from symphys.transcription import Assessment, Transcription, transcribe
+
+Array = NDArray[np.float64]
+
+
+class ReplayError(SymphysError):
+    """A run that cannot be rolled out again; says which file is missing or does not fit."""
+
+
+@dataclass(frozen=True)
+class Replay:
+    """How a run does when it is rolled out again.
+
+    Attributes:
+        folder: of the run.
+        instants: of the recorded motion.
+        quantities: how many were compared.
+        differences: those that are not the same to the bit, those of the motion first.
+        elsewhere: what the run was made with and what is here, by name, where the two differ: versions, processor,
+            platform.
+        fault: why there is no motion now where one is recorded; empty if there is one.
+    """
+
+    folder: Path
+    instants: int
+    quantities: int
+    differences: tuple[QuantityDifference, ...]
+    elsewhere: Mapping[str, tuple[str, str]]
+    fault: str = ""
+
+    @property
+    def same(self) -> bool:
+        """Whether everything is the same, to the bit."""
+        return not self.differences and not self.fault
+
+    def __str__(self) -> str:
+        """The differences, a line each, or that there are none; then what is not as it was."""
+        if self.same:
+            lines = [f"{self.folder}: the same, to the bit ({self.quantities} quantities, {self.instants} instants)"]
+        else:
+            why = self.fault or f"{len(self.differences)} of {self.quantities} quantities differ, by at most"
+            lines = [f"{self.folder}: not the same: {why}", *(f"  {each}" for each in self.differences)]
+        lines += [f"  {name}: {then} then, {now} now" for name, (then, now) in self.elsewhere.items()]
+        if not self.same and not self.elsewhere:
+            lines.append("  versions, processor and platform are those of then")
+        return "\n".join(lines)
+
+
+def replay(folder: Path) -> Replay:
+    """Roll out the variables of a run again, and compare with what is recorded.
+
+    Raises:
+        ReplayError: no such folder, a file that is missing or damaged, or variables that do not fit the problem.
+        ProblemError: problem.toml cannot be read, or has controllers that Python gives.
+    """
+    result, recorded, problem = read_parts(folder)
+    transcription = transcribe(problem, backend="casadi")
+    z = stored_variables(folder, result, transcription)
+    known = judged_numbers(result)
+    try:
+        again, judged = transcription.simulate(z), assessed_numbers(transcription.judge(z))
+    except NotFinite as error:
+        return Replay(folder, len(recorded.time), 0, (), elsewhere(result), str(error))
+    check_fits(folder, recorded, again)
+    differences = (*compare_motions(recorded, again), *compare_numbers(known, judged))
+    quantities = len(list(again.units)) + len(judged)
+    return Replay(folder, len(recorded.time), quantities, differences, elsewhere(result))
+
+
+def read_parts(folder: Path) -> tuple[Result, Trajectory, Problem]:
+    """Result, motion and problem of a run folder. Raises as ``replay`` does."""
+    if not folder.is_dir():
+        raise ReplayError(f"{folder}: there is no such folder; a run folder is one as reports/ball_throw/cma-seed0")
+    try:
+        config = Config.from_json(read_table(folder / CONFIG), values.verbatim)
+        result = Result.from_json(read_table(folder / RESULT), values.verbatim)
+        if not result.z:
+            raise ReportError(f"{RESULT}: the run has no variables, its solver failed: {result.advice}")
+        recorded = make_trajectory(read_archive(folder / TRAJECTORY))
+    except (ReportError, FileError, ValueError, KeyError, TypeError) as error:
+        raise ReplayError(f"{folder}: cannot be rolled out again: {error}") from error
+    return result, recorded, load_problem(folder / PROBLEM, config.settings)
+
+
+def stored_variables(folder: Path, result: Result, transcription: Transcription) -> Array:
+    """(n,): the decision vector of a result."""
+    parts = []
+    for block in transcription.shooting.blocks:
+        found = result.z[block.name].value.T.ravel() if block.name in result.z else np.zeros(0)
+        if found.size != block.stop - block.start:
+            raise ReplayError(
+                f"{folder}: {RESULT} has {found.size} numbers for variable {block.name!r}, {PROBLEM} has "
+                f"{block.stop - block.start}"
+            )
+        parts.append(found)
+    return np.concatenate(parts)
+
+
+def judged_numbers(result: Result) -> dict[str, float]:
+    """What the judge said of the run."""
+    return {
+        "objective": result.objective,
+        **{f"output: {name}": value for name, value in result.outputs.items()},
+        **{f"cost: {name}": value for name, value in result.costs.items()},
+        **{f"{check.kind}: {check.name}": check.error for check in result.checks},
+    }
+
+
+def assessed_numbers(judged: Assessment) -> dict[str, float]:
+    """The same of what is judged now."""
+    return {
+        "objective": judged.objective,
+        **{f"output: {name}": value for name, value in judged.outputs.items()},
+        **{f"cost: {name}": value for name, value in judged.costs.items()},
+        **{f"{check.kind}: {check.name}": check.error for check in judged.checks},
+    }
+
+
+def check_fits(folder: Path, recorded: Trajectory, again: Trajectory) -> None:
+    """ReplayError where the recorded motion is of other things, or has another number of instants."""
+    pair = (recorded, again)
+    for what, (first, second) in {
+        "bodies": [each.body_names for each in pair],
+        "contacts": [each.contact_names for each in pair],
+        "joints": [each.joint_names for each in pair],
+        "instants": [len(each.time) for each in pair],
+    }.items():
+        if first != second:
+            raise ReplayError(f"{folder}: {TRAJECTORY} and {PROBLEM} have other {what}: {first} and {second}")
+
+
+def elsewhere(result: Result) -> dict[str, tuple[str, str]]:
+    """What the run was made with and what is here, by name, where both are known and differ; hosts may."""
+    then, now = {**result.versions, **result.provenance}, {**versions(), **machine()}
+    del now["host"]
+    return {name: (str(then[name]), now[name]) for name in then if name in now and str(then[name]) != now[name]}
