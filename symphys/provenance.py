@@ -24,8 +24,9 @@ PATIENCE = 2.0
 def provenance() -> dict[str, Any]:
     """The machine, this process and the working copy; what is not known is left out.
 
-    Keys: "host", "processor", "python_platform" (that Python is built for), "pid", "peak_memory" [bytes] of this process so
-    far, "commit" of the working folder where it is in a git repository, "dirty", whether tracked files differ from it.
+    Keys: "host", "processor", "python_platform" (that Python is built for), "pid", "peak_memory" [bytes] of this
+    process so far, "commit" of the working folder where it is in a git repository, "dirty", whether tracked files
+    differ from it.
     """
     found = {**machine(), "pid": os.getpid(), "peak_memory": peak_memory(), **working_copy()}
     return {key: value for key, value in found.items() if value not in ("", None)}

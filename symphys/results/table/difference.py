@@ -23,6 +23,8 @@ ALWAYS = ("pid", "peak_memory")
 """Of the provenance: what differs from run to run."""
 TEXT = "problem.toml"
 """The part whose differences are lines of a unified diff."""
+FILES = "files"
+"""The part that says what could not be read."""
 CONTEXT = 3
 """Lines around a change."""
 
@@ -47,8 +49,15 @@ class Difference:
         """In a line."""
         if self.part == TEXT:
             return self.name
+        if self.part == FILES:
+            return "; ".join(f"{which} run: {fault}" for which, fault in self.faults if fault)
         change = f" ({self.change:+.3g})" if self.change else ""
         return f"{self.name}: {shown(self.first, self.second)} -> {shown(self.second, self.first)}{change}"
+
+    @property
+    def faults(self) -> tuple[tuple[str, Any], ...]:
+        """What could not be read of which run."""
+        return ("first", self.first), ("second", self.second)
 
     @property
     def change(self) -> float | None:
@@ -94,7 +103,8 @@ def result_differences(*results: Mapping[str, Any]) -> Iterator[Difference]:
 
 def tables(first: Path, second: Path, name: str, found: list[Difference]) -> list[dict[str, Any]]:
     """The objects of a file of both; empty, and the fault among those found, where one cannot be read."""
-    read, faults = [], []
+    read: list[dict[str, Any]] = []
+    faults: list[str | None] = []
     for folder in (first, second):
         try:
             read.append(read_table(folder / name))
@@ -102,7 +112,7 @@ def tables(first: Path, second: Path, name: str, found: list[Difference]) -> lis
         except ReportError as error:
             faults.append(str(error))
     if any(faults):
-        found.append(Difference("files", name, *faults))
+        found.append(Difference(FILES, name, *faults))
         return []
     return read
 
@@ -110,13 +120,18 @@ def tables(first: Path, second: Path, name: str, found: list[Difference]) -> lis
 def text_difference(first: Path, second: Path) -> list[Difference]:
     """The lines of a unified diff of the problems' texts."""
     texts: list[list[str]] = []
+    faults: list[str | None] = []
     for folder in (first, second):
         try:
             texts.append(read_words(folder / PROBLEM).splitlines())
+            faults.append(None)
         except ReportError as error:
-            return [Difference("files", f"{folder}/{PROBLEM}", str(error))]
+            faults.append(str(error))
+    if any(faults):
+        return [Difference(FILES, PROBLEM, *faults)]
     names = (f"{first}/{PROBLEM}", f"{second}/{PROBLEM}")
-    return [Difference(TEXT, line) for line in difflib.unified_diff(*texts, *names, lineterm="", n=CONTEXT)]
+    lines = difflib.unified_diff(texts[0], texts[1], *names, lineterm="", n=CONTEXT)
+    return [Difference(TEXT, line) for line in lines]
 
 
 def compared(part: str, first: Mapping[str, Any], second: Mapping[str, Any]) -> list[Difference]:

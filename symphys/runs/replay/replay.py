@@ -146,15 +146,12 @@ def assessed_numbers(judged: Assessment) -> dict[str, float]:
 
 def check_fits(folder: Path, recorded: Trajectory, again: Trajectory) -> None:
     """ReplayError where the recorded motion is of other things, or has another number of instants."""
-    pair = (recorded, again)
-    for what, (first, second) in {
-        "bodies": [each.body_names for each in pair],
-        "contacts": [each.contact_names for each in pair],
-        "joints": [each.joint_names for each in pair],
-        "instants": [len(each.time) for each in pair],
-    }.items():
-        if first != second:
-            raise ReplayError(f"{folder}: {TRAJECTORY} and {PROBLEM} have other {what}: {first} and {second}")
+    for what in ("body_names", "contact_names", "joint_names", "time"):
+        first, second = (np.asarray(getattr(each, what)) for each in (recorded, again))
+        same = first.size == second.size if what == "time" else first.tolist() == second.tolist()
+        if not same:
+            sizes = f"{first.size} and {second.size}"
+            raise ReplayError(f"{folder}: {TRAJECTORY} and {PROBLEM} do not belong together: {what}, {sizes}")
 
 
 def elsewhere(result: Result) -> dict[str, tuple[str, str]]:
