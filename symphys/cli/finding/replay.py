@@ -18,8 +18,11 @@ def replay(folder: Path) -> int:
     of each quantity is printed, and which versions and which processor are others than then.
     """
     threads.limit()
+    from symphys.cli.progress import working
+    from symphys.runs.replay import PARTS
     from symphys.runs.replay import replay as rolled_again
 
-    found = rolled_again(folder)
+    with working(f"replay {folder}", PARTS) as tell:
+        found = rolled_again(folder, tell)
     click.echo(str(found))
     return 0 if found.same else 1

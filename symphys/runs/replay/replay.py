@@ -6,7 +6,7 @@ same rollout, so it is the same to the bit where versions and processor are.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,6 +29,9 @@ from symphys.trajectory import NotFinite, Trajectory
 from symphys.transcription import Assessment, Transcription, transcribe
 
 Array = NDArray[np.float64]
+BUILDING, ROLLING = "building the problem", "rolling it out"
+PARTS = {BUILDING: 8.0, ROLLING: 2.0}
+"""What ``replay`` announces, and about how the time is shared."""
 
 
 class ReplayError(SymphysError):
@@ -74,15 +77,21 @@ class Replay:
         return "\n".join(lines)
 
 
-def replay(folder: Path) -> Replay:
-    """Roll out the variables of a run again, and compare with what is recorded.
+def silent(what: str) -> None:
+    """Tell nobody."""
+
+
+def replay(folder: Path, tell: Callable[[str], None] = silent) -> Replay:
+    """Roll out the variables of a run again, and compare with what is recorded; ``tell`` is called with each of PARTS.
 
     Raises:
         ReplayError: no such folder, a file that is missing or damaged, or variables that do not fit the problem.
         ProblemError: problem.toml cannot be read, or has controllers that Python gives.
     """
     result, recorded, problem = read_parts(folder)
+    tell(BUILDING)
     transcription = transcribe(problem, backend="casadi")
+    tell(ROLLING)
     z = stored_variables(folder, result, transcription)
     known = judged_numbers(result)
     try:
