@@ -225,10 +225,17 @@ def test_damage_is_named_and_the_other_runs_are_there(
 
 
 def test_a_result_whose_configuration_is_damaged_is_there_with_the_fault(tmp_path: Path) -> None:
-    (record(tmp_path, recorded(), ground__friction=0.5) / CONFIG).write_text("{", encoding="utf-8")
-    (row,) = read_rows(tmp_path).rows
-    assert row["verdict"] == "solved" and row["fault"].startswith("config.json: not valid JSON")
-    assert "ground.friction" not in row
+    """Until it is mended."""
+    folder = record(tmp_path, recorded(), ground__friction=0.5)
+    whole = (folder / CONFIG).read_bytes()
+    (folder / CONFIG).write_text("{", encoding="utf-8")
+    Journal(tmp_path).add(folder)
+    for _ in range(2):
+        (row,) = read_rows(tmp_path).rows
+        assert row["verdict"] == "solved" and row["fault"].startswith("config.json: not valid JSON")
+        assert "ground.friction" not in row
+    (folder / CONFIG).write_bytes(whole)
+    assert read_rows(tmp_path).rows[0]["ground.friction"] == 0.5
 
 
 def test_values_of_any_kind_are_read(tmp_path: Path) -> None:

@@ -62,7 +62,9 @@ class Journal:
             place = folder.absolute().relative_to(self.out.absolute()).as_posix()
         except (OSError, ValueError):
             return
-        self.append({place: Kept(stamp, read_row(folder))})
+        row = read_row(folder)
+        if "fault" not in row:
+            self.append({place: Kept(stamp, row)})
 
     def append(self, found: Mapping[str, Kept]) -> bool:
         """Add lines by one write; whether that could be done."""

@@ -160,8 +160,8 @@ class Keeper:
     refused: bool = False
 
     def keep(self, place: str, stamp: Stamp | None, row: Mapping[str, object]) -> None:
-        """Keep the row of a run that has a result."""
-        if stamp is None:
+        """Keep the row of a run that has a result, if nothing was wrong with its files: they may be mended."""
+        if stamp is None or "fault" in row:
             return
         self.waiting[joined(self.prefix, place)] = Kept(stamp, row)
         if len(self.waiting) >= AT_ONCE:
