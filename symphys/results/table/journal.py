@@ -109,8 +109,12 @@ def stamp_of(status: os.stat_result) -> Stamp:
 
 def line(place: str, kept: Kept) -> bytes:
     """A line with its end."""
-    content = {"rows": ROWS, "run": place, "stamp": kept.stamp, "row": files.strict(kept.row)}
-    body = json.dumps(content, separators=(",", ":"), allow_nan=False)[1:].encode()
+    content = {"rows": ROWS, "run": place, "stamp": kept.stamp, "row": kept.row}
+    try:
+        text = json.dumps(content, separators=(",", ":"), allow_nan=False)
+    except ValueError:  # few rows have a number that is not finite
+        text = json.dumps(files.strict(content), separators=(",", ":"), allow_nan=False)
+    body = text[1:].encode()
     return MARK + b'%08x",' % zlib.crc32(body) + body + b"\n"
 
 

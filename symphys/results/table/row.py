@@ -59,15 +59,14 @@ def whole_row(folder: Path) -> Row:
 def make_row(folder: Path, config: Mapping[str, Any], result: Mapping[str, Any], faults: Sequence[str] = ()) -> Row:
     """The row of a run by the objects of its files."""
     ruled = result if result.get("verdict") else whole_result(folder)
-    seconds, checks = values.table(result.get("seconds")), values.tables(result.get("checks"))
-    provenance, backend = values.table(result.get("provenance")), values.table(result.get("backend"))
+    seconds, provenance, backend = (table(result.get(key)) for key in ("seconds", "provenance", "backend"))
     return {
         **asked(folder, config, result),
         "verdict": values.name(ruled.get("verdict")),
         "status": values.name(result.get("status")),
         "solved": ruled.get("solved") is True,
         "objective": number(result.get("objective")),
-        "worst": worst(checks),
+        "worst": worst(result.get("checks")),
         **named(OUTPUT, result.get("outputs")),
         **named(COST, result.get("costs")),
         "iterations": number(result.get("iterations")),
@@ -93,21 +92,25 @@ def without_result(folder: Path, config: Mapping[str, Any], word: str, why: str,
 def asked(folder: Path, config: Mapping[str, Any], result: Mapping[str, Any]) -> Row:
     """Problem, case, solver, seed and settings; where no file says so, problem and solver by the folders' names."""
     both = {**config, **result}
-    here = folder.absolute()
-    problem = values.name(both.get("problem")) or here.parent.name
-    settings = values.table(config.get("settings"))
+    problem = values.name(both.get("problem")) or folder.absolute().parent.name
+    settings = table(config.get("settings"))
     return {
         "problem": problem,
         "case": case_name(problem, settings),
-        "solver": values.name(both.get("solver")) or here.name,
+        "solver": values.name(both.get("solver")) or folder.absolute().name,
         "seed": number(both.get("seed")),
-        **{setting_column(key): plain(settings[key]) for key in sorted(settings)},
+        **{setting_column(values.name(key)): plain(settings[key]) for key in sorted(settings)},
     }
 
 
-def named(prefix: str, table: object) -> Row:
+def named(prefix: str, numbers: object) -> Row:
     """Numbers by the names of their columns."""
-    return {prefix + key: number(value) for key, value in values.table(table).items()}
+    return {prefix + values.name(key): number(value) for key, value in table(numbers).items()}
+
+
+def table(value: object) -> Mapping[str, Any]:
+    """A JSON object; empty for anything else."""
+    return value if isinstance(value, dict) else {}
 
 
 def number(value: object) -> float | int | None:
@@ -127,11 +130,12 @@ def plain(value: object) -> bool | float | int | str | None:
     return values.name(value) if isinstance(value, str) else values.name(json.dumps(strict(value)))
 
 
-def worst(checks: Sequence[Mapping[str, object]]) -> float | int | None:
+def worst(checks: object) -> float | int | None:
     """The largest error / tolerance, inf where one is not known; None without checks."""
-    if not checks:
+    asked = [check for check in checks if isinstance(check, dict)] if isinstance(checks, list) else []
+    if not asked:
         return None
-    ratios = [check["ratio"] if "ratio" in check else CheckRecord.from_json(dict(check)).ratio for check in checks]
+    ratios = [check["ratio"] if "ratio" in check else CheckRecord.from_json(check).ratio for check in asked]
     found = [number(ratio) for ratio in ratios]
     return max(math.inf if ratio is None else ratio for ratio in found)
 

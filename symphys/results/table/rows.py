@@ -72,7 +72,8 @@ def read_rows(root: Path, tell: Tell | None = None) -> Rows:
     kept, lines = kept_rows(root, journal, prefix, scan)
     missing = [place for place, stamp in scan.runs.items() if stamp is None or not is_right(kept.get(place), stamp)]
     found = Rows(faults=scan.faults, read=len(missing))
-    fresh = dict(read_missing(root, missing, scan, Keeper(journal, prefix, len(missing)), tell))
+    keeper = Keeper(journal, prefix, len(missing))
+    fresh = dict(read_missing(root, missing, scan, keeper, tell)) if missing else {}
     for place in scan.runs:
         row = fresh[place] if place in fresh else kept[place].row
         found.rows.append({"run": place, **{column: restored(column, value) for column, value in row.items()}})
@@ -89,7 +90,7 @@ def scanned(root: Path) -> Scan:
     while waiting:
         place = waiting.pop()
         try:
-            with os.scandir(root / place) as listing:
+            with os.scandir(f"{root}/{place}") as listing:
                 entries = {entry.name: entry for entry in listing}
         except OSError as error:
             found.faults.append(f"{root / place}: {files.reason(error)}")
