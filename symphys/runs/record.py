@@ -13,7 +13,8 @@ from symphys import files
 from symphys.codegen.backends import Description
 from symphys.findings.levels import Judged
 from symphys.findings.verdict import rule
-from symphys.provenance import provenance, versions
+from symphys.provenance import provenance as origin
+from symphys.provenance import versions
 from symphys.results.result import (
     REACHED,
     BackendRecord,
@@ -70,7 +71,7 @@ def make_result(
             for check in verdict.checks
         )
     return Result(
-        **asked(job, transcription.backend.flags),
+        **provenance(job, transcription.backend.flags),
         **found,
         backend=evaluated_by(transcription.backend),
         **ruled(rule(outcome.status.value, judged(verdict), files.strict(judgement.trust))),
@@ -91,7 +92,7 @@ def make_result(
 
 def failure(job: Job, message: str) -> Result:
     """The result of a run that could not be done."""
-    return Result(**asked(job), solved=False, status="failed", advice=message, absent=REACHED)
+    return Result(**provenance(job), solved=False, status="failed", advice=message, absent=REACHED)
 
 
 def judged(verdict: Assessment | None) -> Judged:
@@ -165,7 +166,7 @@ def equivalents(counts: Counts | TraceRow, price: Mapping[str, float]) -> float:
     return float(counts.rollouts + sum(count * price[kind] for kind, count in priced(counts).items() if count))
 
 
-def asked(job: Job, flags: Sequence[str] = ()) -> dict[str, Any]:
+def provenance(job: Job, flags: Sequence[str] = ()) -> dict[str, Any]:
     """The fields of a result that are known however the run ends: which run, and where it comes from.
 
     ``flags``: with which a compiler made what evaluated; none where nothing was compiled.
@@ -176,7 +177,7 @@ def asked(job: Job, flags: Sequence[str] = ()) -> dict[str, Any]:
         "solver": job.config.solver,
         "seed": job.config.seed,
         "versions": versions(),
-        "provenance": provenance() | ({"flags": " ".join(flags)} if flags else {}),
+        "provenance": origin() | ({"flags": " ".join(flags)} if flags else {}),
         "when": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "command": job.command,
     }
