@@ -63,9 +63,10 @@ class Difference:
     def change(self) -> float | None:
         """The second number less the first; None where they are no numbers, or not finite."""
         pair = self.first, self.second
-        if any(isinstance(each, bool) or not isinstance(each, int | float) or not math.isfinite(each) for each in pair):
+        if any(isinstance(each, bool) or not isinstance(each, int | float) for each in pair):
             return None
-        return float(self.second) - float(self.first)
+        change = values.number(self.second) - values.number(self.first)
+        return change if math.isfinite(change) else None
 
 
 def differences(first: Path, second: Path) -> list[Difference]:

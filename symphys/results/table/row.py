@@ -14,6 +14,7 @@ from typing import Any
 
 from symphys import json_values as values
 from symphys.files import check_regular, strict
+from symphys.findings.verdict import NOT_SOLVED
 from symphys.results.case_name import case_name
 from symphys.results.file_names import CONFIG, RESULT
 from symphys.results.result import CheckRecord, Result
@@ -62,7 +63,7 @@ def make_row(folder: Path, config: Mapping[str, Any], result: Mapping[str, Any],
     seconds, provenance, backend = (table(result.get(key)) for key in ("seconds", "provenance", "backend"))
     return {
         **asked(folder, config, result),
-        "verdict": values.name(ruled.get("verdict")),
+        "verdict": values.name(ruled.get("verdict")) or NOT_SOLVED,
         "status": values.name(result.get("status")),
         "solved": ruled.get("solved") is True,
         "objective": number(result.get("objective")),
