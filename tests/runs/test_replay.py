@@ -63,6 +63,15 @@ def test_one_bit_is_found_and_named_with_its_place(folder: Path) -> None:
     assert "versions, processor and platform are those of then" in str(found)
 
 
+def test_what_an_older_file_lacks_is_not_compared(folder: Path) -> None:
+    with np.load(folder / TRAJECTORY) as archive:
+        arrays = {name: array for name, array in archive.items() if name not in ("velocity", "paradox")}
+    files.write_npz(folder / TRAJECTORY, arrays)
+    found = replay(folder)
+    assert found.same and found.lacking == ("velocity", "paradox")
+    assert str(found).splitlines()[1] == "  not in trajectory.npz, and not compared: velocity, paradox"
+
+
 def test_another_setting_is_another_motion(folder: Path) -> None:
     """So the folder's settings are what is rolled out."""
     config = files.read_json(folder / CONFIG)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +50,7 @@ class Replay:
         differences: those that are not the same to the bit, those of the motion first.
         elsewhere: what the run was made with and what is here, by name, where the two differ: versions, processor,
             platform.
+        lacking: arrays that trajectory.npz does not have, as in older files; they are not compared.
         fault: why there is no motion now where one is recorded; empty if there is one.
     """
 
@@ -57,6 +59,7 @@ class Replay:
     quantities: int
     differences: tuple[QuantityDifference, ...]
     elsewhere: Mapping[str, tuple[str, str]]
+    lacking: tuple[str, ...] = ()
     fault: str = ""
 
     @property
@@ -71,6 +74,8 @@ class Replay:
         else:
             why = self.fault or f"{len(self.differences)} of {self.quantities} quantities differ, by at most"
             lines = [f"{self.folder}: not the same: {why}", *(f"  {each}" for each in self.differences)]
+        if self.lacking:
+            lines.append(f"  not in {TRAJECTORY}, and not compared: {', '.join(self.lacking)}")
         lines += [f"  {name}: {then} then, {now} now" for name, (then, now) in self.elsewhere.items()]
         if not self.same and not self.elsewhere:
             lines.append("  versions, processor and platform are those of then")
@@ -88,7 +93,8 @@ def replay(folder: Path, tell: Callable[[str], None] = silent) -> Replay:
         ReplayError: no such folder, a file that is missing or damaged, or variables that do not fit the problem.
         ProblemError: problem.toml cannot be read, or has controllers that Python gives.
     """
-    result, recorded, problem = read_parts(folder)
+    result, arrays, problem = read_parts(folder)
+    recorded = motion_of(folder, arrays)
     tell(BUILDING)
     transcription = transcribe(problem, backend="casadi")
     tell(ROLLING)
@@ -97,15 +103,17 @@ def replay(folder: Path, tell: Callable[[str], None] = silent) -> Replay:
     try:
         again, judged = transcription.simulate(z), assessed_numbers(transcription.judge(z))
     except NotFinite as error:
-        return Replay(folder, len(recorded.time), 0, (), elsewhere(result), str(error))
+        return Replay(folder, len(recorded.time), 0, (), elsewhere(result), fault=str(error))
     check_fits(folder, recorded, again)
+    lacking = tuple(name for name in again.arrays() if name not in arrays)
+    recorded = motion_of(folder, {**again.arrays(), **arrays})
     differences = (*compare_motions(recorded, again), *compare_numbers(known, judged))
-    quantities = len(list(again.units)) + len(judged)
-    return Replay(folder, len(recorded.time), quantities, differences, elsewhere(result))
+    quantities = len(again.units) + len(judged)
+    return Replay(folder, len(recorded.time), quantities, differences, elsewhere(result), lacking)
 
 
-def read_parts(folder: Path) -> tuple[Result, Trajectory, Problem]:
-    """Result, motion and problem of a run folder. Raises as ``replay`` does."""
+def read_parts(folder: Path) -> tuple[Result, dict[str, Array], Problem]:
+    """Result, the arrays of a motion, and problem of a run folder. Raises as ``replay`` does."""
     if not folder.is_dir():
         raise ReplayError(f"{folder}: there is no such folder; a run folder is one as reports/ball_throw/cma-seed0")
     try:
@@ -113,10 +121,19 @@ def read_parts(folder: Path) -> tuple[Result, Trajectory, Problem]:
         result = Result.from_json(read_table(folder / RESULT), values.verbatim)
         if not result.z:
             raise ReportError(f"{RESULT}: the run has no variables, its solver failed: {result.advice}")
-        recorded = make_trajectory(read_archive(folder / TRAJECTORY))
-    except (ReportError, FileError, ValueError, KeyError, TypeError) as error:
+        arrays = read_archive(folder / TRAJECTORY)
+    except (ReportError, FileError) as error:
         raise ReplayError(f"{folder}: cannot be rolled out again: {error}") from error
-    return result, recorded, load_problem(folder / PROBLEM, config.settings)
+    return result, arrays, load_problem(folder / PROBLEM, config.settings)
+
+
+def motion_of(folder: Path, arrays: Mapping[str, Any]) -> Trajectory:
+    """The motion in the arrays of trajectory.npz; ReplayError if their shapes do not fit."""
+    try:
+        return make_trajectory(arrays)
+    except (ValueError, KeyError, TypeError) as error:
+        why = f"{TRAJECTORY}: not a recorded motion ({values.name(str(error))})"
+        raise ReplayError(f"{folder}: cannot be rolled out again: {why}") from error
 
 
 def stored_variables(folder: Path, result: Result, transcription: Transcription) -> Array:
