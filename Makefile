@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 QUICK := $(addprefix tests/,house model expression findings problem solvers dynamics)
 
-.PHONY: help demo demo-walk test test-quick test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-table1 bench-gpu bench-walk bench-lessons bench-pipelines gallery clean
+.PHONY: help demo demo-walk test test-quick test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-table1 bench-gpu bench-walk bench-lessons bench-pipelines bench-runs gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
@@ -83,6 +83,9 @@ bench-lessons: $(VENV)/.benching  ## solvers on one walk against time, what doma
 
 bench-pipelines: $(VENV)/.pipelining  ## steps for environments and nets against their kernel
 	$(BIN)/python benchmarks/step_rates.py
+
+bench-runs: $(VENV)/.developing  ## the table of ten thousand runs
+	$(BIN)/python benchmarks/table_of_runs.py
 
 bench-table1: $(VENV)/.benching  ## the timing table of Degrave et al. (1 and 128 robots, small and large net), cost against weights
 	$(BIN)/python benchmarks/table1.py

@@ -5,7 +5,7 @@
 
 ``load``, ``solve``, ``simulate``, ``compile`` and ``read`` are the front door; the classes below build worlds. What the
 command line does is here in the same words: ``new``, ``show``, ``check``, ``solve_all``, ``schema`` and ``cache``, and
-``report``, ``export`` and ``doctor``, which are rooms that can be called. Shipped problems are in
+``report``, ``results``, ``export`` and ``doctor``, which are rooms that can be called. Shipped problems are in
 ``symphys.problems.catalogue()``, solvers in ``symphys.solvers.SOLVERS``. Everything is imported when it is first used.
 """
 
@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from symphys.problem import Problem, load_problem
     from symphys.problem.loading import load
     from symphys.report.pages.folder import report
+    from symphys.results import results
     from symphys.shooting import ShootingProblem
     from symphys.trajectory import Trajectory
     from symphys.transcription import Transcription
@@ -101,6 +102,7 @@ __all__ = [
     "new",
     "read",
     "report",
+    "results",
     "roll_out",
     "schema",
     "show",
@@ -146,8 +148,8 @@ _HOMES = {
     ),
     "model.world": ("Law", "Scheme", "World", "make_world"),
 }
-_ROOMS = ("doctor", "export", "problems", "report", "solvers")
-"""Rooms that need no import of their own; ``doctor``, ``export`` and ``report`` can be called."""
+_ROOMS = ("doctor", "export", "problems", "report", "results", "solvers")
+"""Rooms that need no import of their own; ``doctor``, ``export``, ``report`` and ``results`` can be called."""
 
 _EXTRAS = ("env", "jax", "torch")
 """Modules that need an extra."""

@@ -28,6 +28,8 @@ from symphys.trajectory import Trajectory
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from symphys.runs.replay import Replay
+
 Array = NDArray[np.float64]
 
 
@@ -122,6 +124,19 @@ class Solution:
         from symphys.report import write_run_report
 
         return write_run_report(self.folder)
+
+    def replay(self) -> Replay:
+        """Roll out what was found again, from the problem and the settings in its folder, and compare to the bit.
+
+        Returns:
+            ``same``, the ``differences`` of quantities, and which versions and processor are not those of the run.
+
+        Raises:
+            SymphysError: a file is missing or damaged, or the solver found nothing.
+        """
+        from symphys.runs.replay import replay  # late: most read, and roll nothing out
+
+        return replay(self.folder)
 
     def save_figures(self, folder: str | Path) -> list[Path]:
         """Write every figure of the report into a folder: NAME.svg, and NAME.csv with the numbers that it shows.

@@ -15,6 +15,10 @@ from symphys.cli.cache import cache
 from symphys.cli.check import check
 from symphys.cli.doctor import doctor
 from symphys.cli.export import export
+from symphys.cli.finding.best import best
+from symphys.cli.finding.diff import diff
+from symphys.cli.finding.ls import ls
+from symphys.cli.finding.replay import replay
 from symphys.cli.report import report
 from symphys.cli.schema import schema
 from symphys.cli.shipped import listing, new
@@ -47,7 +51,7 @@ def app() -> None:
     """Trajectory optimisation through contact: a problem file in, a solution and a report out."""
 
 
-for command in (new, solve, report, show, check, export, listing, schema, doctor, cache):
+for command in (new, solve, report, show, check, ls, best, diff, replay, export, listing, schema, doctor, cache):
     app.add_command(command)
 
 

@@ -19,7 +19,7 @@ from symphys.json_values import Array, Text
 from symphys.results.trace import renamed
 
 FORMAT = 1
-ADDED_LATER = {"verdict", "doubts", "again"}
+ADDED_LATER = {"verdict", "doubts", "again", "provenance"}
 """Fields that older files do not have."""
 REACHED = frozenset(
     (
@@ -195,6 +195,8 @@ class Result:
         stages: those of smoothing that were begun, in their order; the solution is the point of the last, unless that
             of another or the guess is better exactly.
         versions: of everything that took part.
+        provenance: the machine, the process and the working copy, with the keys of ``symphys.provenance.provenance``,
+            and "flags", those of the compiler, where something was compiled.
         when: UTC time of the end, ISO 8601.
         command: what was typed.
         backend: what evaluated the functions.
@@ -225,6 +227,7 @@ class Result:
     guess: Mapping[str, float] = field(default_factory=dict)
     stages: tuple[StageRecord, ...] = ()
     versions: Mapping[str, str] = field(default_factory=dict)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
     when: str = ""
     command: str = ""
     backend: BackendRecord = field(default_factory=BackendRecord)

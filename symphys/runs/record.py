@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import datetime
-import platform
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -15,6 +13,8 @@ from symphys import files
 from symphys.codegen.backends import Description
 from symphys.findings.levels import Judged
 from symphys.findings.verdict import rule
+from symphys.provenance import provenance as origin
+from symphys.provenance import versions
 from symphys.results.result import (
     REACHED,
     BackendRecord,
@@ -30,7 +30,6 @@ from symphys.shooting import Array
 from symphys.solvers import Counts, Outcome, StageResult, TraceRow
 from symphys.trajectory import Trajectory
 from symphys.transcription import Assessment, Transcription
-from symphys.version import __version__
 
 JUDGED = frozenset(("objective", "costs", "outputs", "checks"))
 """What is not known where the exact rollout cannot be simulated."""
@@ -72,7 +71,7 @@ def make_result(
             for check in verdict.checks
         )
     return Result(
-        **provenance(job),
+        **provenance(job, transcription.backend.flags),
         **found,
         backend=evaluated_by(transcription.backend),
         **ruled(rule(outcome.status.value, judged(verdict), files.strict(judgement.trust))),
@@ -167,19 +166,18 @@ def equivalents(counts: Counts | TraceRow, price: Mapping[str, float]) -> float:
     return float(counts.rollouts + sum(count * price[kind] for kind, count in priced(counts).items() if count))
 
 
-def provenance(job: Job) -> dict[str, Any]:
-    """The fields of a result that are known however the run ends: which run, versions, machine, time."""
+def provenance(job: Job, flags: Sequence[str] = ()) -> dict[str, Any]:
+    """The fields of a result that are known however the run ends: which run, and where it comes from.
+
+    ``flags``: with which a compiler made what evaluated; none where nothing was compiled.
+    """
     return {
         "problem": job.config.problem,
         "title": job.problem.title,
         "solver": job.config.solver,
         "seed": job.config.seed,
-        "versions": {
-            "symphys": __version__,
-            "python": platform.python_version(),
-            **{name: version(name) for name in ("casadi", "numpy", "scipy", "cma")},
-            "platform": f"{platform.system()} {platform.machine()}",
-        },
+        "versions": versions(),
+        "provenance": origin() | ({"flags": " ".join(flags)} if flags else {}),
         "when": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "command": job.command,
     }

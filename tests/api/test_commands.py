@@ -17,7 +17,7 @@ from symphys.cli.app import app
 from symphys.cli.examined import Examined
 from symphys.report import write_run_report
 
-ROOM_OF_COMMAND = {"list": "problems"}
+ROOM_OF_COMMAND = {"list": "problems", "ls": "results", "best": "results", "diff": "results", "replay": "Solution"}
 
 
 def test_every_command_has_its_name_here() -> None:

@@ -20,6 +20,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "suggest": ("", "", "hints for error messages"),
     "verbs": ("", "", "rooms that can be called"),
     "threads": ("", "", "one thread for linear algebra"),
+    "provenance": ("version", "", "where a run comes from: versions, machine, process, commit"),
     "files": ("errors", "numpy", "files appear at once and whole, or not at all"),
     "json_values": ("", "numpy", "tolerant readings of JSON"),
     "trajectory": ("errors suggest", "numpy", "a simulated motion as arrays"),
@@ -53,13 +54,13 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "solvers": ("errors shooting", "casadi cma numpy scipy", "optimisation methods"),
     "findings": ("json_values", "numpy", "what the numbers of an examination mean"),
     "results": (
-        "errors files findings json_values model problem shooting trajectory",
-        "casadi numpy scipy",
+        "errors files findings json_values model problem shooting suggest trajectory verbs",
+        "casadi numpy pandas pyarrow scipy",
         "what a run folder holds",
     ),
     "runs": (
-        "codegen errors files findings json_values problem results shooting solvers trajectory transcription "
-        "verification version",
+        "codegen errors files findings json_values problem provenance results shooting solvers trajectory "
+        "transcription verification version",
         "numpy",
         "solve, judge, examine, write one run, and who may",
     ),
@@ -84,8 +85,8 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "jax": ("api errors transcription", "jax numpy", "rollouts and steps for JAX"),
     "env": ("api errors", "gymnasium numpy", "environments for Gymnasium"),
     "cli": (
-        "api batches codegen doctor errors export files findings problem problems report runs solvers suggest threads "
-        "trajectory transcription verification version",
+        "api batches codegen doctor errors export files findings problem problems report results runs solvers "
+        "suggest threads trajectory transcription verification version",
         "click numpy rich",
         "the commands",
     ),

@@ -33,7 +33,9 @@ def c(source: BackendSource, threads: int) -> Backend:
     functions = SimpleNamespace(**{name: compiled.get(name) for name in EVALUATED})
     nlp = Nlp(source.functions.nlp, *(compiled.get(name) for name in ("nlp", "nlp_gradient", "nlp_jacobian")))
     spent = time.perf_counter() - began
-    told = Description("c", 1, threads, "double", built.compiler.version, built.cached, spent, built.note)
+    told = Description(
+        "c", 1, threads, "double", built.compiler.version, built.cached, spent, built.note, flags=built.flags
+    )
     return Backend(told, FunctionEvaluator(cast(ProblemFunctions, functions), threads), nlp)
 
 

@@ -77,6 +77,7 @@ class Description:
         seconds: until it could evaluate.
         note: what the user should know, such as why it is not the backend that was wanted; or empty.
         later: what was decided while it evaluated, to be asked when that is over; or empty.
+        flags: with which the compiler was called.
     """
 
     name: str
@@ -88,6 +89,7 @@ class Description:
     seconds: float = 0.0
     note: str = ""
     later: Callable[[], str] = field(default=nothing, repr=False, compare=False)
+    flags: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         """In a line."""

@@ -72,6 +72,7 @@ def described(kernel: Kernel, seconds: float, precision: str | None = None, note
         threads=kernel.threads,
         precision=wanted,
         compiler=report.compiler,
+        flags=report.flags,
         cached=report.cached,
         seconds=seconds,
         note=joined(report.note, note),

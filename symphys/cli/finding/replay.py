@@ -1,0 +1,28 @@
+"""``symphys replay``: does a run come out the same again?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from symphys import threads
+
+
+@click.command()
+@click.argument("folder", metavar="RUN", type=click.Path(path_type=Path))
+def replay(folder: Path) -> int:
+    """Roll out what a run found again, from the problem and the settings in its folder, and compare.
+
+    Exit code 0: the motion and all numbers are the same, to the bit. Exit code 1: they are not; the largest difference
+    of each quantity is printed, and which versions and which processor are others than then.
+    """
+    threads.limit()
+    from symphys.cli.watching import working
+    from symphys.runs.replay import PARTS
+    from symphys.runs.replay import replay as rolled_again
+
+    with working(f"replay {folder}", PARTS) as tell:
+        found = rolled_again(folder, tell)
+    click.echo(str(found))
+    return 0 if found.same else 1

@@ -1,0 +1,188 @@
+"""What the commands on tables of runs share: their options, and rows as text, CSV or JSON."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from symphys import files
+from symphys.cli.arguments import UsageFault
+
+if TYPE_CHECKING:
+    from symphys.results.table import Rows
+    from symphys.results.table.columns import Row
+
+F = TypeVar("F", bound=Callable[..., Any])
+SHOWN = ("run", "verdict", "objective", "worst", "OUTPUTS", "equivalents", "solve_seconds", "why")
+"""Columns of a table on the terminal; outputs where there are few."""
+MOST_OUTPUTS = 3
+GAP = "  "
+LONGEST_TEXT = 100
+"""Characters of the last column where the output is no terminal."""
+SHORTEST_TEXT = 20
+MOST_FAULTS = 10
+STYLES = {"solved": "green", "best_found": "yellow", "doubted": "red", "not_solved": "red", "unreadable": "red"}
+"""Of verdicts on a terminal."""
+QUIET, EVERY = 1.0, 10.0
+"""[s] Before reading shows its progress, and between its lines where the output is no terminal."""
+
+
+def where_option(command: F) -> F:
+    """``--where CONDITION``, as often as you like."""
+    return click.option(
+        "--where",
+        "conditions",
+        multiple=True,
+        metavar="CONDITION",
+        help="Only runs of which this holds: objective<0.5, solver=cma, run=ball*, ground.friction>=0.3. Repeatable: "
+        "all must hold.",
+    )(command)
+
+
+def format_options(command: F) -> F:
+    """``--columns A,B``, ``--csv`` and ``--json``."""
+    for option in (
+        click.option("--json", "as_json", is_flag=True, help="Print a JSON list with an object for each run."),
+        click.option("--csv", "as_csv", is_flag=True, help="Print CSV."),
+        click.option(
+            "--columns",
+            "names",
+            metavar="A,B",
+            help="Columns, separated by commas; `all` for every one, which --csv and --json print anyway.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+def print_rows(rows: Sequence[Row], found: Rows, names: Sequence[str], as_csv: bool, as_json: bool) -> None:
+    """Print columns of rows as they are asked for, and on stderr what could not be read.
+
+    ``names``: the columns; none for the usual ones, which are all in CSV and JSON.
+    """
+    from symphys.results.table.columns import columns
+    from symphys.results.table.writing import csv_text, json_lines
+
+    if as_csv and as_json:
+        raise UsageFault("--csv and --json: give one of them")
+    if as_csv:
+        click.echo(csv_text(rows, names or columns(found.rows)), nl=False)
+    elif as_json:
+        click.echo("\n".join(json_lines(rows, names or columns(found.rows))))
+    elif rows:
+        click.echo("\n".join(lines(rows, names or usual_columns(rows))))
+    print_faults(found)
+
+
+def read_columns(names: str | None, found: Rows) -> list[str]:
+    """The columns that are asked for; none if nothing is."""
+    from symphys.results.table.columns import columns, find_column
+
+    if names is None:
+        return []
+    known = columns(found.rows)
+    return known if names.strip() == "all" else [find_column(name, known) for name in names.split(",")]
+
+
+def usual_columns(rows: Sequence[Row]) -> list[str]:
+    """Those in SHOWN that some run has."""
+    from symphys.results.table.columns import OUTPUT, columns
+
+    outputs = [name for name in columns(rows) if name.startswith(OUTPUT)]
+    few = outputs if len(outputs) <= MOST_OUTPUTS else []
+    names = [each for name in SHOWN for each in (few if name == "OUTPUTS" else [name])]
+    return [name for name in names if any(name in row for row in rows)]
+
+
+def lines(rows: Sequence[Row], names: Sequence[str]) -> Iterator[str]:
+    """A header and a line for each row; numbers are rounded, and only the last column may be cut."""
+    texts = [[text(row.get(name)) for row in rows] for name in names]
+    rights = [any(isinstance(row.get(name), float | int) for row in rows) and name != "solved" for name in names]
+    widths = [max(map(len, (name, *column))) for name, column in zip(names, texts, strict=True)]
+    if names and not rights[-1]:
+        widths[-1] = min(widths[-1], room(sum(widths[:-1]) + len(GAP) * (len(names) - 1)))
+    yield click.style(GAP.join(map(padded, names, widths, rights)).rstrip(), bold=True)
+    for cells in zip(*texts, strict=True):
+        whole = GAP.join(map(styled, names, cells, map(padded, cells, widths, rights)))
+        yield whole.rstrip()
+
+
+def room(taken: int) -> int:
+    """Characters that the last column may have."""
+    if not sys.stdout.isatty():
+        return LONGEST_TEXT
+    return max(shutil.get_terminal_size().columns - taken, SHORTEST_TEXT)
+
+
+def text(value: object) -> str:
+    """A value in a cell: printable, on one line."""
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    words = str(value)
+    return words if words.isprintable() else "".join(c if c.isprintable() else "\ufffd" for c in words)
+
+
+def padded(cell: str, width: int, right: bool) -> str:
+    """A cell of that width."""
+    if len(cell) > width:
+        return cell[: width - 3] + "..."
+    return cell.rjust(width) if right else cell.ljust(width)
+
+
+def styled(name: str, cell: str, shown: str) -> str:
+    """A verdict in its colour."""
+    return click.style(shown, fg=STYLES[cell]) if name == "verdict" and cell in STYLES else shown
+
+
+def summary(rows: Sequence[Row]) -> str:
+    """How many runs there are, by verdict."""
+    counts = Counter(row["verdict"].replace("_", " ") for row in rows)
+    listed = ", ".join(f"{count:,} {word}" for word, count in counts.most_common())
+    return f"{len(rows):,} run{'s' * (len(rows) != 1)}: {listed}" if rows else "no run"
+
+
+def print_faults(found: Rows) -> None:
+    """Say on stderr which files and folders could not be read."""
+    faults = [*found.faults, *(f"{row['run']}: {row['fault']}" for row in found.rows if row.get("fault"))]
+    for fault in faults[:MOST_FAULTS]:
+        click.echo(f"symphys: {files.printable(text(fault))}", err=True)
+    if len(faults) > MOST_FAULTS:
+        click.echo(f"symphys: and {len(faults) - MOST_FAULTS} more; --columns run,fault lists them", err=True)
+
+
+class ReadingProgress:
+    """Says on stderr how many folders are read, once that takes its time; on a terminal in one line."""
+
+    def __init__(self) -> None:
+        """Nothing is said yet."""
+        self.began = self.said = time.monotonic()
+        self.shown = False
+
+    def __call__(self, done: int, total: int) -> None:
+        """So many are done."""
+        if done % 50 and done < total:
+            return
+        now, terminal = time.monotonic(), sys.stderr.isatty()
+        if now - self.began < QUIET or (now - self.said < EVERY and not terminal):
+            return
+        self.said, self.shown = now, terminal
+        click.echo(f"{chr(13) * terminal}reading run folders: {done:,} of {total:,}", nl=not terminal, err=True)
+
+    def __enter__(self) -> ReadingProgress:
+        """Itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Clear the line."""
+        if self.shown:
+            click.echo(f"\r{' ' * 60}\r", nl=False, err=True)

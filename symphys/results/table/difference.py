@@ -1,0 +1,199 @@
+"""What differs between two runs: what was asked for, the problem's text, what was found, and where both come from."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from symphys import json_values as values
+from symphys.files import FileError
+from symphys.results.file_names import CONFIG, PROBLEM, RESULT
+from symphys.results.result import VariableRecord
+from symphys.results.text_files import ReportError, read_table, read_words
+
+CONFIGURED = ("problem", "solver", "seed", "backend")
+FOUND = ("verdict", "status", "objective", "iterations", "equivalents")
+ALWAYS = ("pid", "peak_memory")
+"""Of the provenance: what differs from run to run."""
+TEXT = "problem.toml"
+"""The part whose differences are lines of a unified diff."""
+FILES = "files"
+"""The part that says what could not be read."""
+CONTEXT = 3
+"""Lines around a change."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One thing that differs.
+
+    Attributes:
+        part: "asked for", "settings", "options", "problem.toml", "found", "checks", "outputs", "costs", "variables",
+            "versions", "provenance" or "files".
+        name: in its part; a line of a unified diff in "problem.toml".
+        first, second: the values, None where one has none; texts of what could not be read in "files".
+    """
+
+    part: str
+    name: str
+    first: Any = None
+    second: Any = None
+
+    def __str__(self) -> str:
+        """In a line."""
+        if self.part == TEXT:
+            return self.name
+        if self.part == FILES:
+            return "; ".join(f"{which} run: {fault}" for which, fault in self.faults if fault)
+        change = f" ({self.change:+.3g})" if self.change else ""
+        return f"{self.name}: {shown(self.first, self.second)} -> {shown(self.second, self.first)}{change}"
+
+    @property
+    def faults(self) -> tuple[tuple[str, Any], ...]:
+        """What could not be read of which run."""
+        return ("first", self.first), ("second", self.second)
+
+    @property
+    def change(self) -> float | None:
+        """The second number less the first; None where they are no numbers, or not finite."""
+        pair = self.first, self.second
+        if any(isinstance(each, bool) or not isinstance(each, int | float) for each in pair):
+            return None
+        change = values.number(self.second) - values.number(self.first)
+        return change if math.isfinite(change) else None
+
+
+def differences(first: Path, second: Path) -> list[Difference]:
+    """All that differs between two run folders; a file that only one of them has, or that cannot be read, is named.
+
+    Raises:
+        FileError: one is no folder.
+    """
+    for folder in (first, second):
+        if not folder.is_dir():
+            raise FileError(f"{folder}: there is no such folder; a run folder is one as reports/ball_throw/cma-seed0")
+    found: list[Difference] = []
+    configs, results = (tables(first, second, name, found) for name in (CONFIG, RESULT))
+    if configs:
+        found += compared("asked for", *(chosen(config, CONFIGURED) for config in configs))
+        for part in ("settings", "options"):
+            found += compared(part, *(flat(config.get(part)) for config in configs))
+    found += text_difference(first, second)
+    if results:
+        found += result_differences(*results)
+    return found
+
+
+def result_differences(*results: Mapping[str, Any]) -> Iterator[Difference]:
+    """What differs between two results."""
+    yield from compared("found", *(chosen(result, FOUND) for result in results))
+    yield from compared("checks", *(errors(result) for result in results))
+    for part in ("outputs", "costs"):
+        yield from compared(part, *(values.measures(result.get(part)) for result in results))
+    yield from variable_differences(*results)
+    yield from compared("versions", *(values.table(result.get("versions")) for result in results))
+    origins = [values.table(result.get("provenance")) for result in results]
+    yield from compared("provenance", *({k: v for k, v in each.items() if k not in ALWAYS} for each in origins))
+
+
+def tables(first: Path, second: Path, name: str, found: list[Difference]) -> list[dict[str, Any]]:
+    """The objects of a file of both; empty, and the fault among those found, where one cannot be read."""
+    read: list[dict[str, Any]] = []
+    faults: list[str | None] = []
+    for folder in (first, second):
+        try:
+            read.append(read_table(folder / name))
+            faults.append(None)
+        except ReportError as error:
+            faults.append(str(error))
+    if any(faults):
+        found.append(Difference(FILES, name, *faults))
+        return []
+    return read
+
+
+def text_difference(first: Path, second: Path) -> list[Difference]:
+    """The lines of a unified diff of the problems' texts."""
+    texts: list[list[str]] = []
+    faults: list[str | None] = []
+    for folder in (first, second):
+        try:
+            texts.append(read_words(folder / PROBLEM).splitlines())
+            faults.append(None)
+        except ReportError as error:
+            faults.append(str(error))
+    if any(faults):
+        return [Difference(FILES, PROBLEM, *faults)]
+    names = (f"{first}/{PROBLEM}", f"{second}/{PROBLEM}")
+    lines = difflib.unified_diff(texts[0], texts[1], *names, lineterm="", n=CONTEXT)
+    return [Difference(TEXT, line) for line in lines]
+
+
+def compared(part: str, first: Mapping[str, Any], second: Mapping[str, Any]) -> list[Difference]:
+    """The entries of two tables that are not the same."""
+    names = dict.fromkeys([*first, *second])
+    return [
+        Difference(part, name, first.get(name), second.get(name))
+        for name in names
+        if not same(first.get(name), second.get(name))
+    ]
+
+
+def same(first: Any, second: Any) -> bool:
+    """Whether two values are equal; nan is itself, and true is no 1."""
+    both_nan = all(isinstance(each, float) and math.isnan(each) for each in (first, second))
+    return both_nan or (first == second and isinstance(first, bool) is isinstance(second, bool))
+
+
+def chosen(table: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
+    """Some entries of a table."""
+    return {name: table.get(name) for name in names}
+
+
+def flat(table: object, before: str = "") -> dict[str, Any]:
+    """The entries of a table and of those inside by dotted keys."""
+    found: dict[str, Any] = {}
+    for key, value in values.table(table).items():
+        found |= flat(value, f"{before}{key}.") if isinstance(value, dict) else {before + key: value}
+    return found
+
+
+def errors(result: Mapping[str, Any]) -> dict[str, Any]:
+    """The error of every check by its kind and name."""
+    checks = values.tables(result.get("checks"))
+    return {f"{check.get('kind', 'check')}: {check.get('name', '')}": check.get("error") for check in checks}
+
+
+def variable_differences(first: Mapping[str, Any], second: Mapping[str, Any]) -> Iterator[Difference]:
+    """Of every variable the component that differs most."""
+    read = [
+        {name: VariableRecord.from_json(entry).value for name, entry in values.table(each.get("z")).items()}
+        for each in (first, second)
+    ]
+    for name in dict.fromkeys([*read[0], *read[1]]):
+        one, other = (each.get(name) for each in read)
+        if one is None or other is None or one.shape != other.shape:
+            sizes = ("none" if each is None else f"{each.size} numbers" for each in (one, other))
+            yield Difference("variables", name, *sizes)
+        elif not np.array_equal(one, other, equal_nan=True):
+            gaps = np.nan_to_num(np.abs(one - other), nan=np.inf)
+            gaps[np.isnan(one) & np.isnan(other)] = 0
+            component, knot = np.unravel_index(int(np.argmax(gaps)), gaps.shape)
+            place = f"[{component}]" + (f" at knot {knot}" if one.shape[1] > 1 else "")
+            yield Difference("variables", name + place, float(one[component, knot]), float(other[component, knot]))
+
+
+def shown(value: Any, other: Any) -> str:
+    """A value in short, but with all of its digits where the other reads the same in short."""
+    if value is None:
+        return "-"
+    if isinstance(value, float):
+        short = f"{value:.6g}"
+        return repr(value) if isinstance(other, float) and f"{other:.6g}" == short else short
+    return values.name(str(value))

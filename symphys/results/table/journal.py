@@ -1,0 +1,131 @@
+"""Rows kept beside the run folders, one JSON line each, to which any number of processes and machines may append.
+
+A line is written by a single append, and begins with a checksum. So a line that was torn, or written into by another
+machine, is recognised and skipped: its run is read again. Of several lines of one run the last counts. A row counts
+only as long as result.json has the size and the time of change that its line names, so the journal may be out of date,
+damaged or missing, and the table is right all the same.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import zlib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from symphys import files
+from symphys.results.file_names import RESULT
+
+NAME = ".runs.jsonl"
+"""Of the journal, in the folder that `symphys solve --out` names."""
+ROWS = 1
+"""The format of rows: lines of another are skipped."""
+MARK = b'{"crc":"'
+"""What every line begins with; eight digits follow, then ``",``, then what they are the checksum of."""
+BODY = len(MARK) + 10
+"""Where that begins."""
+Stamp = tuple[int, int]
+"""Time of change [ns] and size [bytes] of a result.json."""
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A row of a journal, and the stamp of the result.json that it was made from."""
+
+    stamp: Stamp
+    row: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Journal:
+    """The journal of the runs below a folder; runs go by their paths below it, with forward slashes."""
+
+    out: Path
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.out / NAME
+
+    def add(self, folder: Path) -> None:
+        """Keep the row of a run that has ended, once its result.json is written.
+
+        Never fails, and does nothing where nothing can be written: whoever needs the row reads it from the folder.
+        """
+        from symphys.results.table.row import read_row  # late: whoever finds rows in a journal needs none of that
+
+        try:
+            stamp = stamp_of((folder / RESULT).stat())
+            place = folder.absolute().relative_to(self.out.absolute()).as_posix()
+        except (OSError, ValueError):
+            return
+        row = read_row(folder)
+        if "fault" not in row:
+            self.append({place: Kept(stamp, row)})
+
+    def append(self, found: Mapping[str, Kept]) -> bool:
+        """Add lines by one write; whether that could be done."""
+        text = b"".join(line(place, kept) for place, kept in found.items())
+        try:
+            handle = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
+        except OSError:
+            return False
+        try:
+            return os.write(handle, text) == len(text)
+        except OSError:
+            return False
+        finally:
+            os.close(handle)
+
+    def read(self) -> tuple[dict[str, Kept], int]:
+        """The last row of every run, and how many lines the file has; nothing where it cannot be read."""
+        found: dict[str, Kept] = {}
+        count = 0
+        try:
+            files.check_regular(self.path)
+            with self.path.open("rb") as file:
+                for each in file:
+                    count += 1
+                    found.update(entry(each))
+        except OSError:
+            pass
+        return found, count
+
+    def rewrite(self, found: Mapping[str, Kept]) -> None:
+        """Replace the file, so that it has one line for each run; FileError if that cannot be.
+
+        What others append meanwhile is lost, and read from their folders again.
+        """
+        files.write_bytes(self.path, b"".join(line(place, kept) for place, kept in found.items()))
+
+
+def stamp_of(status: os.stat_result) -> Stamp:
+    """By which a changed file is recognised."""
+    return status.st_mtime_ns, status.st_size
+
+
+def line(place: str, kept: Kept) -> bytes:
+    """A line with its end."""
+    content = {"rows": ROWS, "run": place, "stamp": kept.stamp, "row": kept.row}
+    try:
+        text = json.dumps(content, separators=(",", ":"), allow_nan=False)
+    except ValueError:  # few rows have a number that is not finite
+        text = json.dumps(files.strict(content), separators=(",", ":"), allow_nan=False)
+    body = text[1:].encode()
+    return MARK + b'%08x",' % zlib.crc32(body) + body + b"\n"
+
+
+def entry(text: bytes) -> Iterable[tuple[str, Kept]]:
+    """The run and its row in a line; nothing for one that is damaged. What a torn line was glued to is found."""
+    text = text[max(text.rfind(MARK), 0) :].rstrip(b"\n")
+    body = text[BODY:]
+    if not text.startswith(MARK) or text[len(MARK) : BODY] != b'%08x",' % zlib.crc32(body):
+        return []
+    found = json.loads(b"{" + body)
+    if found["rows"] != ROWS:
+        return []
+    time, size = found["stamp"]
+    return [(found["run"], Kept((time, size), found["row"]))]

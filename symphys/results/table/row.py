@@ -1,0 +1,201 @@
+"""The row of one run: what result.json and config.json say of it, without what takes long to read.
+
+The variables and the numbers of the examination are most of a result.json and no row has them. They are cut out of the
+text before it is parsed, where it is laid out as this program lays it out.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from symphys import json_values as values
+from symphys.files import check_regular, strict
+from symphys.findings.verdict import NOT_SOLVED
+from symphys.results.case_name import case_name
+from symphys.results.file_names import CONFIG, RESULT
+from symphys.results.result import CheckRecord, Result
+from symphys.results.table.columns import COST, OUTPUT, UNFINISHED, UNREADABLE, Row, setting_column
+from symphys.results.text_files import ReportError, reason
+
+HEAVY = ("z", "trust")
+"""Tables of result.json that no row needs."""
+MOST_EXACT = 2**53
+"""Whole numbers below are doubles, too."""
+WAITING = "there is no result yet: the run goes on, or was stopped before its end"
+
+
+def read_row(folder: Path) -> Row:
+    """The row of a run folder, without its "run" and without what is not known.
+
+    Never fails: "fault" says what could not be read. A run without result.json is "unfinished"; one whose result.json
+    cannot be read is "unreadable".
+    """
+    return {column: value for column, value in whole_row(folder).items() if value is not None and value != ""}
+
+
+def whole_row(folder: Path) -> Row:
+    """The row with None and empty texts for what is not known."""
+    faults: list[str] = []
+    config = read_or_note(folder / CONFIG, faults)
+    try:
+        result = read_light(folder / RESULT)
+    except FileNotFoundError:
+        return without_result(folder, config, UNFINISHED, WAITING, faults)
+    except ReportError as error:
+        return without_result(folder, config, UNREADABLE, str(error), [str(error), *faults])
+    if not ("solver" in result and "problem" in result):
+        why = f"{RESULT}: not a result of symphys (it names no problem and solver)"
+        return without_result(folder, config, UNREADABLE, why, [why, *faults])
+    try:
+        return make_row(folder, config, result, faults)
+    except (OSError, ValueError, RecursionError) as error:
+        why = f"{RESULT}: cannot be ruled on ({values.name(str(error))})"
+        return without_result(folder, config, UNREADABLE, why, [why, *faults])
+
+
+def make_row(folder: Path, config: Mapping[str, Any], result: Mapping[str, Any], faults: Sequence[str] = ()) -> Row:
+    """The row of a run by the objects of its files."""
+    ruled = result if result.get("verdict") else whole_result(folder)
+    seconds, provenance, backend = (table(result.get(key)) for key in ("seconds", "provenance", "backend"))
+    return {
+        **asked(folder, config, result),
+        "verdict": values.name(ruled.get("verdict")) or NOT_SOLVED,
+        "status": values.name(result.get("status")),
+        "solved": ruled.get("solved") is True,
+        "objective": number(result.get("objective")),
+        "worst": worst(result.get("checks")),
+        **named(OUTPUT, result.get("outputs")),
+        **named(COST, result.get("costs")),
+        "iterations": number(result.get("iterations")),
+        "equivalents": number(result.get("equivalents")),
+        "solve_seconds": number(seconds.get("solve")),
+        "compile_seconds": number(seconds.get("compile")),
+        "build_seconds": number(seconds.get("build")),
+        "peak_memory": number(provenance.get("peak_memory")),
+        "backend": values.name(backend.get("name")),
+        "host": values.name(provenance.get("host")),
+        "when": values.name(result.get("when")),
+        "why": why_not(ruled, result),
+        "fault": "; ".join(faults),
+    }
+
+
+def without_result(folder: Path, config: Mapping[str, Any], word: str, why: str, faults: Sequence[str]) -> Row:
+    """The row of a folder in which no result can be read."""
+    known = asked(folder, config, {})
+    return {**known, "verdict": word, "status": word, "solved": False, "why": why, "fault": "; ".join(faults)}
+
+
+def asked(folder: Path, config: Mapping[str, Any], result: Mapping[str, Any]) -> Row:
+    """Problem, case, solver, seed and settings; where no file says so, problem and solver by the folders' names."""
+    both = {**config, **result}
+    problem = values.name(both.get("problem")) or folder.absolute().parent.name
+    settings = table(config.get("settings"))
+    return {
+        "problem": problem,
+        "case": case_name(problem, settings),
+        "solver": values.name(both.get("solver")) or folder.absolute().name,
+        "seed": number(both.get("seed")),
+        **{setting_column(values.name(key)): plain(settings[key]) for key in sorted(settings)},
+    }
+
+
+def named(prefix: str, numbers: object) -> Row:
+    """Numbers by the names of their columns."""
+    return {prefix + values.name(key): number(value) for key, value in table(numbers).items()}
+
+
+def table(value: object) -> Mapping[str, Any]:
+    """A JSON object; empty for anything else."""
+    return value if isinstance(value, dict) else {}
+
+
+def number(value: object) -> float | int | None:
+    """A number, whole where it is; None for what is not known."""
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) < MOST_EXACT:
+        return value
+    read = values.number(value)
+    return None if math.isnan(read) else read
+
+
+def plain(value: object) -> bool | float | int | str | None:
+    """A setting as it is; a list or table as JSON text."""
+    if isinstance(value, bool) or value is None:
+        return value
+    if isinstance(value, int | float):
+        return number(value)
+    return values.name(value) if isinstance(value, str) else values.name(json.dumps(strict(value)))
+
+
+def worst(checks: object) -> float | int | None:
+    """The largest error / tolerance, inf where one is not known; None without checks."""
+    asked = [check for check in checks if isinstance(check, dict)] if isinstance(checks, list) else []
+    if not asked:
+        return None
+    ratios = [check["ratio"] if "ratio" in check else CheckRecord.from_json(check).ratio for check in asked]
+    found = [number(ratio) for ratio in ratios]
+    return max(math.inf if ratio is None else ratio for ratio in found)
+
+
+def why_not(ruled: Mapping[str, Any], result: Mapping[str, Any]) -> str:
+    """Why a run is not to be trusted, or what its solver says; empty for one that is solved."""
+    doubts = values.names(ruled.get("doubts"))
+    if doubts:
+        return values.name("; ".join(doubts))
+    return "" if ruled.get("solved") is True else values.name(result.get("advice"))
+
+
+def whole_result(folder: Path) -> dict[str, Any]:
+    """Verdict, solved and doubts of a file that is older than verdicts: it is ruled on anew, which needs all of it."""
+    found = Result.from_json(json.loads((folder / RESULT).read_bytes()))
+    return {"verdict": found.verdict, "solved": found.solved, "doubts": list(found.doubts)}
+
+
+def read_or_note(path: Path, faults: list[str]) -> dict[str, Any]:
+    """The object in a file; empty, with a clause in ``faults``, where there is none."""
+    try:
+        return read_light(path)
+    except FileNotFoundError:
+        faults.append(f"{path.name}: there is no such file")
+    except ReportError as error:
+        faults.append(str(error))
+    return {}
+
+
+def read_light(path: Path) -> dict[str, Any]:
+    """The JSON object in a file without the tables in HEAVY.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ReportError: names the file and says why it cannot be read.
+    """
+    try:
+        check_regular(path)
+        found = json.loads(lightened(path.read_bytes()))
+    except FileNotFoundError:
+        raise
+    except OSError as error:
+        raise ReportError(f"{path.name}: {reason(error)}") from error
+    except (ValueError, RecursionError) as error:
+        raise ReportError(f"{path.name}: not valid JSON, perhaps half written ({values.name(str(error))})") from error
+    if not isinstance(found, dict):
+        raise ReportError(f"{path.name}: a JSON object is expected, this is a {type(found).__name__}")
+    return found
+
+
+def lightened(text: bytes) -> bytes:
+    """The text of a JSON object with empty tables for those in HEAVY; another layout is left as it is.
+
+    Keys of the outermost object begin with one space on a line of their own, and its tables end so. No JSON text has
+    the end of a line within a word, so nothing else does.
+    """
+    for name in HEAVY:
+        start = text.find(b'\n "%s": {\n' % name.encode())
+        end = text.find(b"\n }", start)
+        if start >= 0 and end >= 0:
+            text = text[:start] + b'\n "%s": {' % name.encode() + text[end + 2 :]
+    return text

@@ -1,0 +1,146 @@
+"""The table of runs as files and as data frames: CSV, JSON, Parquet, pandas."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from symphys import files
+from symphys.errors import SymphysError
+from symphys.results.table.choosing import best, chosen, ordered
+from symphys.results.table.columns import FIXED, Row, columns, numeric
+from symphys.results.table.rows import Rows, Tell, read_rows
+
+CSV, PARQUET = "runs.csv", "runs.parquet"
+"""The names of the files, in the folder that `symphys solve --out` names."""
+NEEDED = 'this needs {0}: pip install {0}, or pip install "symphys[tables]" for all that tables need'
+
+
+class MissingPackage(SymphysError):
+    """A package that need not be there is needed; says how to get it."""
+
+
+def write_table(out: Path, tell: Tell | None = None) -> list[Path]:
+    """Write the rows of all runs below a folder as runs.csv, and as runs.parquet where pyarrow is installed.
+
+    Args:
+        out: the folder that `symphys solve --out` names.
+        tell: is called with how many folders are read, of how many that must be.
+
+    Returns:
+        The paths of the files, each of which appears at once and whole.
+
+    Raises:
+        FileError: there is no such folder, or a file cannot be written.
+    """
+    rows = read_rows(out, tell).rows
+    names = columns(rows)
+    files.write_text(out / CSV, csv_text(rows, names))
+    try:
+        content = parquet_bytes(rows, names)
+    except MissingPackage:
+        return [out / CSV]
+    files.write_bytes(out / PARQUET, content)
+    return [out / CSV, out / PARQUET]
+
+
+def csv_text(rows: Sequence[Row], names: Sequence[str]) -> str:
+    """A line for each row under a header; empty where nothing is known, ``true`` and ``false`` for booleans."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows([cell(row.get(name)) for name in names] for row in rows)
+    return buffer.getvalue()
+
+
+def cell(value: object) -> object:
+    """A value as CSV has it: every digit of a number."""
+    return str(value).lower() if isinstance(value, bool) else value
+
+
+def json_lines(rows: Sequence[Row], names: Sequence[str]) -> Iterator[str]:
+    """A JSON list, an object for each row on a line of its own; what is not known is left out."""
+    yield "["
+    for number, row in enumerate(rows, 1):
+        known = {name: row[name] for name in names if name in row}
+        end = "," if number < len(rows) else ""
+        yield json.dumps(files.strict(known), ensure_ascii=False, allow_nan=False) + end
+    yield "]"
+
+
+def data(rows: Sequence[Row], names: Sequence[str]) -> dict[str, list[Any]]:
+    """The columns: numbers, booleans or texts, and None where nothing is known."""
+    return {name: alike(name, [row.get(name) for row in rows]) for name in names}
+
+
+def alike(name: str, values: list[Any]) -> list[Any]:
+    """The values of a column, all of one type or None. A setting may be a number in one run and a text in another."""
+    known = [value for value in values if value is not None]
+    kinds = {type(value) for value in known}
+    if kinds == {bool} or (kinds == {int} and len(known) == len(values)):
+        return values
+    if numeric(name) or (kinds and kinds <= {int, float}):
+        return [None if value is None else float(value) for value in values]
+    return [None if value is None else str(cell(value)) for value in values]
+
+
+def parquet_bytes(rows: Sequence[Row], names: Sequence[str]) -> bytes:
+    """The content of a Parquet file. Raises MissingPackage where there is no pyarrow."""
+    try:
+        import pyarrow as arrow  # late: most need none, and it takes its time
+        from pyarrow import parquet
+    except ImportError:
+        raise MissingPackage(NEEDED.format("pyarrow")) from None
+    buffer = io.BytesIO()
+    types = {name: arrow.string() for name in FIXED} | {"solved": arrow.bool_()}
+    types |= {name: arrow.float64() for name in names if numeric(name)}
+    arrays = {name: arrow.array(column, type=types.get(name)) for name, column in data(rows, names).items()}
+    parquet.write_table(arrow.table(arrays), buffer)
+    return buffer.getvalue()
+
+
+def frame(folder: str | Path, where: str | Sequence[str] = (), sort: str = "") -> Any:
+    """All runs below a folder as a pandas.DataFrame, a row each. Also called as ``symphys.results``.
+
+    Args:
+        folder: what `symphys solve --out` has written, or any folder above or below.
+        where: conditions that a run must meet, such as ``"objective<0.5"`` or ``["solver=cma", "seed>3"]``.
+        sort: the column to sort by, ``-`` before it for the largest first; by problem, case, solver and seed if empty.
+
+    Returns:
+        The columns are those of `symphys ls`; ``attrs["faults"]`` lists the folders that could not be read.
+
+    Raises:
+        SymphysError: no such folder, a condition that cannot be read, an unknown column, or no pandas.
+
+    Example:
+        >>> import symphys
+        >>> solution = symphys.solve("ball_throw", "least_squares", backend="casadi", folder="reports")
+        >>> table = symphys.results("reports", where="problem=ball_throw")
+        >>> list(table["verdict"]), int(table["seed"].max())
+        (['solved'], 0)
+    """
+    found = read_rows(Path(folder))
+    rows = chosen(found.rows, [where] if isinstance(where, str) else where)
+    return framed(ordered(rows, sort) if sort else rows, found)
+
+
+def best_frame(folder: str | Path, by: str = "objective", overall: bool = False) -> Any:
+    """The best runs below a folder as a pandas.DataFrame; see ``symphys.results.table.best``."""
+    found = read_rows(Path(folder))
+    return framed(best(found.rows, by, overall), found)
+
+
+def framed(rows: Sequence[Row], found: Rows) -> Any:
+    """Some of the rows that were found as a pandas.DataFrame with all of their columns."""
+    try:
+        import pandas as pd  # late, as above
+    except ImportError:
+        raise MissingPackage(NEEDED.format("pandas")) from None
+    table = pd.DataFrame(data(rows, columns(found.rows)))
+    table.attrs["faults"] = list(found.faults)
+    return table
