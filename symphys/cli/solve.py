@@ -18,11 +18,14 @@ from symphys.cli.arguments import (
     complete_problem,
     complete_solvers,
     out_option,
+    points_of,
     read_backend,
     read_problems,
     read_settings,
     read_solvers,
+    read_sweeps,
     settings_option,
+    sweep_options,
 )
 from symphys.cli.wording import duration, many_pairs
 
@@ -51,6 +54,7 @@ BATCH_PAGE = "page of all runs"
     help="How many seeds; seed 0 starts from the guess as it is, the others from one perturbed by its spread.",
 )
 @settings_option
+@sweep_options
 @click.option(
     "--jobs",
     type=click.IntRange(1, MOST_JOBS),
@@ -79,6 +83,8 @@ def solve(
     names: str | None,
     seeds: int,
     assignments: tuple[str, ...],
+    sweeps: tuple[str, ...],
+    samples: str | None,
     jobs: int,
     multi_start: bool,
     unexamined: bool,
@@ -92,15 +98,18 @@ def solve(
     """
     began = perf_counter()
     threads.limit()
-    from symphys.cli.progress import watch
+    from symphys.cli.progress import watch, working
     from symphys.runs import make_jobs, run_batch
     from symphys.transcription import transcribe
 
-    settings = read_settings(assignments)
-    solvers = read_solvers(names)
-    problems = read_problems(sources, settings)
+    solvers, backend = read_solvers(names), read_backend(backend)
+    problems = read_problems(sources, read_settings(assignments))
     command = shlex.join(["symphys", *sys.argv[1:]])
-    asked = make_jobs(problems, solvers, range(seeds), settings, out, command, read_backend(backend), not unexamined)
+    asked = [
+        job
+        for each in points_of(read_sweeps(problems, sweeps, samples), working)
+        for job in make_jobs([each], solvers, range(seeds), dict(each.settings), out, command, backend, not unexamined)
+    ]
     for problem in problems:
         if note := many_pairs(problem.name, len(problem.world().pairs)):
             click.echo(note, err=True)
