@@ -9,6 +9,7 @@ from pydantic import ConfigDict, Field
 from symphys.problem.schema.types import Finite, SchemaTable
 
 MOST_SAMPLES = 1_000_000
+MOST_VALUES = 10_000
 Samples = Literal["grid", "latin hypercube", "sobol"]
 
 
@@ -17,7 +18,7 @@ class RangeTable(SchemaTable):
 
     start: Finite = Field(alias="from", description="the first value")
     to: Finite = Field(description="the last value; it is included")
-    count: Annotated[int, Field(ge=2, le=MOST_SAMPLES)] | None = Field(
+    count: Annotated[int, Field(ge=2, le=MOST_VALUES)] | None = Field(
         default=None, description="how many values; samples may do without, and then take any number between the ends"
     )
     spacing: Literal["linear", "log"] = Field(default="linear", description='"log": by equal factors')
@@ -31,7 +32,7 @@ AXIS: dict[str, Any] = {
             "properties": {
                 "from": {"type": "number"},
                 "to": {"type": "number"},
-                "count": {"type": "integer", "minimum": 2, "maximum": MOST_SAMPLES},
+                "count": {"type": "integer", "minimum": 2, "maximum": MOST_VALUES},
                 "spacing": {"enum": ["linear", "log"]},
             },
         },

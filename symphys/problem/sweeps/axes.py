@@ -9,6 +9,7 @@ from typing import Literal
 
 from symphys.errors import SymphysError
 from symphys.problem.reading.value_texts import shown
+from symphys.problem.schema.sweep import MOST_VALUES
 
 Spacing = Literal["linear", "log"]
 SPACINGS: tuple[Spacing, ...] = ("linear", "log")
@@ -78,8 +79,8 @@ Axis = Levels | Interval
 def spaced(key: str, ends: tuple[float, float], count: int, spacing: Spacing = "linear") -> Levels:
     """``count`` values from one end to the other, both included."""
     check_ends(*ends, spacing)
-    if count < 2:
-        raise SweepError(f"needs a count of 2 or more from one end to the other, not {count}")
+    if not 2 <= count <= MOST_VALUES:
+        raise SweepError(f"needs a count of 2 to {MOST_VALUES:,} from one end to the other, not {count}")
     inner = [between(*ends, k / (count - 1), spacing) for k in range(1, count - 1)]
     return Levels(key, (shortest(ends[0]), *inner, shortest(ends[1])))
 

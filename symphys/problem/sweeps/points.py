@@ -59,7 +59,7 @@ def overlap(one: Place, other: Place) -> bool:
 
 def by_both(key: str, axis: Axis, own: Sweep | None, axes: Sequence[Axis]) -> str:
     """What to say of a key that has one value by a setting and several by a sweep."""
-    text = f"{key} is set to one value, and swept"
+    text = f"{key} is set to one value (--set), and swept"
     if axis in axes or own is None:
         return f"{text}; leave one of the two out"
     return f"{text} by [sweep] of the file; --sweep {axis.key}=VALUE sweeps that value alone, --sweep none nothing"

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
+from symphys.problem.schema.sweep import MOST_SAMPLES
 from symphys.problem.sweeps.axes import SweepError
 
 Kind = Literal["grid", "latin hypercube", "sobol"]
 KINDS: tuple[Kind, ...] = ("grid", "latin hypercube", "sobol")
-MOST_POINTS = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,8 @@ class Samples:
             if self.count:
                 raise SweepError("a grid has as many points as its axes make; a count belongs to samples")
             return
-        if not 1 <= self.count <= MOST_POINTS:
-            raise SweepError(f"{self.kind} samples need a count of 1 to {MOST_POINTS:,}")
+        if not 1 <= self.count <= MOST_SAMPLES:
+            raise SweepError(f"{self.kind} samples need a count of 1 to {MOST_SAMPLES:,}")
         if self.kind == "sobol" and self.count & (self.count - 1):
             below = 1 << (self.count.bit_length() - 1)
             raise SweepError(f"a count of Sobol points is a power of two, such as {below} or {2 * below}")

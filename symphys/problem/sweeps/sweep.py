@@ -6,8 +6,9 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from symphys.problem.schema.sweep import MOST_SAMPLES
 from symphys.problem.sweeps.axes import Axis, Interval, Levels, SweepError, product
-from symphys.problem.sweeps.samples import GRID, MOST_POINTS, Samples
+from symphys.problem.sweeps.samples import GRID, Samples
 
 
 @dataclass(frozen=True)
@@ -26,12 +27,20 @@ class Sweep:
         """The number of points."""
         return self.samples.count or product(self.grid())
 
+    def words(self) -> str:
+        """What it is, on a line: ``30 points, a grid of ball.mass, ground.friction``."""
+        keys = ", ".join(axis.key for axis in self.axes)
+        if self.samples.count:
+            return f"{self.samples.count} points, {self.samples.kind} samples of {keys}"
+        complete = all(isinstance(axis, Levels) for axis in self.axes)
+        return f"{len(self)} points, a grid of {keys}" if complete else f"samples of {keys}, of which there is no count"
+
     def grid(self) -> list[Levels]:
         """The axes of a grid; SweepError where one has no values of its own."""
         for axis in self.axes:
             if isinstance(axis, Interval):
                 low, high = axis.ends
-                text = f"of a grid needs a count: {low:g}:{high:g}:10, or count = 10 in a file"
+                text = f"needs a count in a grid: --sweep {axis.key}={low:g}:{high:g}:10, or count = 10 in a file"
                 raise SweepError(f"{axis.key} {text}; or take samples: --samples lhs:64")
         return [axis for axis in self.axes if isinstance(axis, Levels)]
 
@@ -39,9 +48,9 @@ class Sweep:
         """SweepError where there is no point, or more than can be."""
         if not self.axes:
             raise SweepError("there is nothing to sample; add an axis: --sweep ball.mass=0.2:2")
-        if self.samples.kind == "grid" and len(self) > MOST_POINTS:
+        if self.samples.kind == "grid" and len(self) > MOST_SAMPLES:
             sizes = " x ".join(str(len(axis.values)) for axis in self.grid())
-            raise SweepError(f"a grid of {sizes} points is too large; at most {MOST_POINTS:,} are allowed")
+            raise SweepError(f"a grid of {sizes} points is too large; at most {MOST_SAMPLES:,} are allowed")
 
     def points(self) -> Iterator[dict[str, object]]:
         """Every point: values by key. Of a grid, the last key changes fastest.

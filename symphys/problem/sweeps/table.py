@@ -97,6 +97,8 @@ def without_sweep(path: Path, text: str, data: Mapping[str, Any]) -> str:
         header = HEADER.fullmatch(line.rstrip("\n"))
         if header:
             inside = OWN_HEADER.fullmatch(header["name"]) is not None
+            while inside and kept and kept[-1].lstrip().startswith("#"):
+                kept.pop()  # a comment right above the table
             if not inside:
                 kept += lately[next((k for k, each in enumerate(lately) if each.strip()), len(lately)) :]
                 lately = []
