@@ -94,7 +94,7 @@ def without_sweep(path: Path, text: str, data: Mapping[str, Any]) -> str:
     kept = list[str]()
     inside, lately = False, list[str]()
     for line in text.splitlines(keepends=True):
-        header = HEADER.fullmatch(line.rstrip("\n"))
+        header = HEADER.fullmatch(line.rstrip())
         if header:
             inside = OWN_HEADER.fullmatch(header["name"]) is not None
             while inside and kept and kept[-1].lstrip().startswith("#"):
@@ -104,7 +104,7 @@ def without_sweep(path: Path, text: str, data: Mapping[str, Any]) -> str:
                 lately = []
         if not inside:
             kept.append(line)
-        elif BLANK.fullmatch(line):
+        elif BLANK.fullmatch(line.rstrip()):
             lately.append(line)  # what comments the next table stays with it
         else:
             lately = []
