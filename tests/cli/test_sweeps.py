@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -120,7 +121,6 @@ def outcome(solved: bool, number: float) -> Result:
     check = CheckRecord("target", "there", 0.1 * number, 0.1, number, solved, "m")
     status, said = ("met", "") if solved else ("converged", "Try.")
     made = Result(problem="p", title="", solver="s", seed=0, solved=solved, status=status, advice=said)
-    verdict = "solved" if solved else "not solved"
     objective = number if solved else 0.0
     return replace(made, verdict="solved" if solved else "not solved", objective=objective, checks=(check,))
 
@@ -133,7 +133,7 @@ def test_of_many_rows_the_best_and_the_worst_are_shown() -> None:
     assert [name for name, _ in shown[-half:]] == [f"p@x={k}" for k in range(100 - 2 * half + 1, 100, 2)]
     few = dict(list(groups.items())[:MOST_ROWS])
     assert list(best_and_worst(few)) == list(few)
-    console = Console(width=120, record=True, quiet=True)
+    console = Console(width=120, record=True, file=io.StringIO())
     console.print(fitting_table(best_and_worst(groups), 120, 100 - len(shown)))
     rows = [line for line in console.export_text().splitlines() if line.strip()]
     assert any("... 70 more ..." in row for row in rows)
