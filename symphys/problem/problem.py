@@ -27,10 +27,12 @@ class Problem(ProblemData):
     Attributes:
         settings: what was changed in the text, by dotted key.
         functions: of controllers with ``function``, by name.
+        varied: names of parameters in which it differs from others of its sweep, whose kernel takes them as inputs.
     """
 
     settings: Mapping[str, object] = field(default_factory=dict)
     functions: Mapping[str, ca.Function] = field(default_factory=dict, repr=False)
+    varied: frozenset[str] = frozenset()
 
     def set(self, key: str | Mapping[str, object], value: object = None) -> Problem:
         """The same problem with another value, or with several from a mapping.

@@ -13,6 +13,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from symphys.problem.model import Simulation
 from symphys.problem.problem import Problem
 from symphys.problem.reader import ProblemReader
@@ -37,6 +39,7 @@ class Family:
 
     Attributes:
         settings: those that all of them have.
+        varied: names of the parameters in which those that were read so far differ.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -44,16 +47,18 @@ class Family:
         self.name, self.file, self.text = problem.name, problem.file, problem.text
         self.settings = dict(problem.settings)
         self.functions = dict(problem.functions)
+        self.varied: set[str] = set()
+        self.first = dict(problem.parameters)
         self._begin()
 
     def _begin(self) -> None:
         self._reader: ProblemReader | None = None
-        self._last: tuple[Mapping[str, object], Problem] | None = None
+        self._last: tuple[str, Problem] | None = None
         self._simulation: Simulation | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """What travels to other processes: nothing that can be made there."""
-        return {key: value for key, value in vars(self).items() if not key.startswith("_")}
+        return {key: value for key, value in vars(self).items() if not key.startswith("_")} | {"first": {}}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Arrive in another process."""
@@ -70,11 +75,18 @@ class Family:
 
     def problem(self, settings: Mapping[str, object]) -> Problem:
         """The whole problem under these settings; that of the last call is kept."""
-        if self._last is None or self._last[0] != settings:
+        asked = repr(settings)  # 1 and true are not the same
+        if self._last is None or self._last[0] != asked:
             data = self.reader.read(settings)
             fields = {**vars(data), "name": self.name, "sweep": None}
-            self._last = settings, Problem(**fields, settings=settings, functions=self.functions)
+            self._last = asked, Problem(**fields, settings=settings, functions=self.functions)
         return self._last[1]
+
+    def note(self, whole: Problem) -> None:
+        """See in which parameters a problem differs from the one that all are made of."""
+        for name, value in whole.parameters.items():
+            if name not in self.varied and not np.array_equal(value, self.first.get(name, value)):
+                self.varied.add(name)
 
     def simulation(self, whole: Problem) -> Simulation:
         """That of a problem; one for all neighbours that have it equal."""
@@ -102,6 +114,7 @@ class LazyProblem(Problem):
 
     def __init__(self, family: Family, whole: Problem) -> None:
         """Keep the facts of a problem that was read."""
+        family.note(whole)
         vars(self).update({key: getattr(whole, key) for key in KEPT})
         weights = b"".join(value.tobytes() for value in whole.weights.values())
         digest = hashlib.sha256(weights).hexdigest() if whole.controllers else ""
@@ -116,6 +129,12 @@ class LazyProblem(Problem):
         """The problem, read."""
         family: Family = vars(self)["_family"]
         return family.problem(self.settings)
+
+    @property
+    def varied(self) -> frozenset[str]:
+        """Known when all problems of the sweep were read."""
+        family: Family = vars(self)["_family"]
+        return frozenset(family.varied)
 
     @property
     def identity(self) -> str:
@@ -136,5 +155,5 @@ def _read(name: str) -> property:
 
 
 for _field in fields(Problem):
-    if _field.name not in KEPT:
+    if _field.name not in (*KEPT, "varied"):
         setattr(LazyProblem, _field.name, _read(_field.name))
