@@ -1,20 +1,24 @@
-"""Batches: problems times solvers times seeds, as ``symphys solve`` does them."""
+"""Batches: problems times points of sweeps times solvers times seeds, as ``symphys solve`` does them."""
 
 from __future__ import annotations
 
 import shutil
 import weakref
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from symphys.api.solution import Solution
 from symphys.api.solving import kept
 from symphys.batches import BatchResult, run_batch
 from symphys.problem import Problem
 from symphys.problem.loading import Source, load
+from symphys.problem.problem import plain
+from symphys.problem.sweeps.points import combined, swept
+from symphys.problem.sweeps.table import read_sweep
 from symphys.results.run import read_run
 from symphys.runs import Job, Result, make_jobs
 from symphys.solvers import TraceRow
@@ -35,12 +39,12 @@ def solve_all(
     multi_start: bool = False,
     backend: str = "auto",
     progress: BatchProgress | None = None,
+    sweep: Mapping[str, Any] | None = None,
 ) -> list[Solution]:
     """Solve problems with solvers from seeds. No run's failure stops the others.
 
     Args:
-        problems: each what ``load`` takes. Those of one name, such as one problem with several masses, get numbers
-            behind their names, in their order: ``ball_throw``, ``ball_throw-2``.
+        problems: each what ``load`` takes. Those of one name get numbers behind it: ``ball_throw``, ``ball_throw-2``.
         solvers: their names; None: for each problem those that it names, else those that fit it.
         seeds: how many, from 0 on, or which; 0 starts from the guess.
         jobs: how many runs go on at once, in processes; a script then needs ``if __name__ == "__main__":``.
@@ -50,29 +54,30 @@ def solve_all(
         multi_start: whether to solve the seeds of a problem side by side, their evaluations in batches.
         backend: as in ``solve``.
         progress: sees each iteration.
+        sweep: a table like [sweep] in a problem file, in its place; None: the file's; ``{}``: nothing is swept.
 
     Returns:
-        Problems times solvers times seeds, in this order; of a run that failed ``run.status`` is "failed", and
-        ``advice`` says why.
+        Problems times points of the sweep times solvers times seeds, in this order; of a run that failed
+        ``run.status`` is "failed", and ``advice`` says why.
 
     Raises:
-        ProblemError: a problem, or an option of a solver, cannot be used; before anything is solved.
+        ProblemError: a problem, a point, or an option of a solver, cannot be used; before anything is solved.
         KeyboardInterrupt: after Ctrl-C; with a ``folder``, the same call goes on from there.
 
     Example:
         >>> import symphys
-        >>> problem = symphys.load("ball_throw")
-        >>> heavier = [problem.set("ball.mass", mass) for mass in (1.0, 2.0)]
-        >>> found = symphys.solve_all(heavier, ["least_squares"], backend="casadi")
-        >>> [(solution.run.problem, solution.solved) for solution in found]
-        [('ball_throw', True), ('ball_throw-2', True)]
+        >>> masses = {"ball.mass": [1, 2]}
+        >>> found = symphys.solve_all(["ball_throw"], ["least_squares"], backend="casadi", sweep=masses)
+        >>> [(solution.problem.settings["ball.mass"], solution.solved) for solution in found]
+        [(1, True), (2, True)]
     """
     asked = list(numbered(map(load, problems)))
     counted = range(seeds) if isinstance(seeds, int) else tuple(seeds)
     with kept(folder) as out:
         todo = [
             job
-            for each in asked
+            for problem in asked
+            for each in points_of(problem, sweep)
             for job in make_jobs([each], solvers, counted, dict(each.settings), out, "", backend, examine)
         ]
         made = partial(transcribe, backend=backend, threads=1 if jobs > 1 else None)
@@ -81,6 +86,14 @@ def solve_all(
     if folder is None:
         drop_with(solutions, out)
     return solutions
+
+
+def points_of(problem: Problem, table: Mapping[str, Any] | None) -> Iterable[Problem]:
+    """The problems of a sweep, that of a table or the problem's own; the problem itself where nothing is swept."""
+    own = problem.sweep
+    if table is not None:
+        own = read_sweep(plain(table), "solve_all") if table else None
+    return [problem] if own is None else swept(problem, combined(own, problem))
 
 
 def numbered(problems: Iterable[Problem]) -> Iterator[Problem]:

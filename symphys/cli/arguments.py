@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 from click.shell_completion import CompletionItem
 
-from symphys import files
 from symphys.errors import SymphysError
 from symphys.suggest import hint
 
 if TYPE_CHECKING:
     from symphys.problem import Problem
+    from symphys.problem.sweeps.sweep import Sweep
 
 F = TypeVar("F", bound=Callable[..., Any])
 REPORTS = Path("reports")
+MOST_TOLD = 100
+"""How often at most the reading of a sweep is told of."""
 
 
 class UsageFault(SymphysError):
@@ -67,6 +69,25 @@ def settings_option(command: F) -> F:
     )(command)
 
 
+def sweep_options(command: F) -> F:
+    """``--sweep KEY=VALUES``, as often as you like, and ``--samples KIND:COUNT``."""
+    sweep = click.option(
+        "--sweep",
+        "sweeps",
+        multiple=True,
+        metavar="KEY=VALUES",
+        help="Solve for several values of a key: ball.mass=0.2:2:10 (10 values from 0.2 to 2), ball.mass=0.1:10:5:log, "
+        "ground.friction=0.2,0.5,1. Repeatable: every combination. `none`: without what the file sweeps.",
+    )
+    samples = click.option(
+        "--samples",
+        metavar="KIND:COUNT",
+        help="Samples in place of every combination: lhs:100 (Latin hypercube), sobol:64, with a seed sobol:64:1; or "
+        "grid. Keys may then have a range without a count: ball.mass=0.2:2.",
+    )
+    return sweep(samples(command))
+
+
 def backend_option(command: F) -> F:
     """``--backend NAME``."""
     return click.option(
@@ -102,6 +123,8 @@ def out_option(command: F) -> F:
 
 def read_settings(assignments: Iterable[str]) -> dict[str, object]:
     """``KEY=VALUE`` pairs by key; a value is read as TOML, and as plain text where it is none."""
+    from symphys.problem.reading.value_texts import read_value
+
     settings: dict[str, object] = {}
     for assignment in assignments:
         key, equals, text = assignment.partition("=")
@@ -109,16 +132,6 @@ def read_settings(assignments: Iterable[str]) -> dict[str, object]:
             raise UsageFault(f"--set {assignment!r}: write KEY=VALUE, for instance simulation.dt=0.005")
         settings[key.strip()] = read_value(text.strip())
     return settings
-
-
-def read_value(text: str) -> object:
-    """A TOML value that JSON has too, else the text itself."""
-    try:
-        table = tomllib.loads(f"value = {text}")
-        files.strict(table)
-    except (ValueError, TypeError, RecursionError):
-        return text
-    return table["value"] if table.keys() == {"value"} else text
 
 
 def read_problems(sources: Sequence[str], settings: dict[str, object]) -> list[Problem]:
@@ -133,6 +146,41 @@ def read_problems(sources: Sequence[str], settings: dict[str, object]) -> list[P
             raise UsageFault(f"{seen[problem.name]} and {path} have one name: rename one, or solve them apart")
         seen[problem.name] = path
     return problems
+
+
+def read_sweeps(
+    problems: Iterable[Problem], sweeps: Sequence[str], samples: str | None
+) -> list[tuple[Problem, Sweep | None]]:
+    """The problems, each with what is swept of it, as its file says, --sweep and --samples; None for nothing."""
+    from symphys.problem.sweeps.points import combined
+    from symphys.problem.sweeps.texts import read_axes, read_samples
+
+    axes, alone = read_axes(sweeps)
+    chosen = None if samples is None else read_samples(samples)
+    found: list[tuple[Problem, Sweep | None]] = []
+    for problem in problems:
+        own = None if alone else problem.sweep
+        asked = axes or chosen is not None or own is not None
+        found.append((problem, combined(own, problem, axes, chosen) if asked else None))
+    return found
+
+
+def points_of(
+    found: Sequence[tuple[Problem, Sweep | None]], working: Callable[..., AbstractContextManager[Callable[[str], None]]]
+) -> Iterator[Problem]:
+    """Every problem, and each point of those that are swept, validated one by one; ``working`` shows how far it is."""
+    from symphys.problem.sweeps.points import swept
+
+    count = sum(len(sweep) for _, sweep in found if sweep is not None)
+    seen = 0
+    shown = {f"point {k + 1:,} of {count:,}": 1.0 for k in range(0, count, max(count // MOST_TOLD, 1))}
+    with working("checking the sweep", shown) if count > MOST_TOLD else nullcontext(str) as tell:
+        for problem, sweep in found:
+            for point in [problem] if sweep is None else swept(problem, sweep):
+                yield point
+                seen += sweep is not None
+                if (words := f"point {seen + 1:,} of {count:,}") in shown:
+                    tell(words)
 
 
 def problem_path(source: str) -> Path:

@@ -114,6 +114,8 @@ def describe(problem: Problem) -> list[str]:
         lines.append(f"  over         where {' '.join(problem.termination.margin.text.split())} < 0")
     if problem.scenarios is not None:
         lines.append(f"  differs      {listed(each.name for each in problem.scenarios)}")
+    if problem.sweep is not None:
+        lines.append(f"  sweep        {problem.sweep.words()}")
     return lines
 
 

@@ -18,11 +18,14 @@ from symphys.cli.arguments import (
     complete_problem,
     complete_solvers,
     out_option,
+    points_of,
     read_backend,
     read_problems,
     read_settings,
     read_solvers,
+    read_sweeps,
     settings_option,
+    sweep_options,
 )
 from symphys.cli.batch_options import BatchOptions, batch_options
 from symphys.cli.wording import duration, many_pairs
@@ -54,6 +57,7 @@ BATCH_PAGE = "page of all runs"
     help="How many seeds; seed 0 starts from the guess as it is, the others from one perturbed by its spread.",
 )
 @settings_option
+@sweep_options
 @click.option(
     "--jobs",
     type=click.IntRange(1, MOST_JOBS),
@@ -83,6 +87,8 @@ def solve(
     names: str | None,
     seeds: int,
     assignments: tuple[str, ...],
+    sweeps: tuple[str, ...],
+    samples: str | None,
     jobs: int,
     multi_start: bool,
     unexamined: bool,
@@ -98,15 +104,18 @@ def solve(
     began = perf_counter()
     threads.limit()
     from symphys.batches import BatchLimits, run_batch
-    from symphys.cli.watching import watch
+    from symphys.cli.watching import watch, working
     from symphys.runs import make_jobs
     from symphys.transcription import transcribe
 
-    settings = read_settings(assignments)
-    solvers = read_solvers(names)
-    problems = read_problems(sources, settings)
+    solvers, backend = read_solvers(names), read_backend(backend)
+    problems = read_problems(sources, read_settings(assignments))
     command = shlex.join(["symphys", *sys.argv[1:]])
-    asked = make_jobs(problems, solvers, range(seeds), settings, out, command, read_backend(backend), not unexamined)
+    asked = [
+        job
+        for each in points_of(read_sweeps(problems, sweeps, samples), working)
+        for job in make_jobs([each], solvers, range(seeds), dict(each.settings), out, command, backend, not unexamined)
+    ]
     if how.dry_run:
         return print_previews(asked, how.rerun)
     for problem in problems:

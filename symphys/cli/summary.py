@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import statistics
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from rich.box import SIMPLE_HEAD
@@ -21,11 +22,17 @@ if TYPE_CHECKING:
     from symphys.batches import BatchResult
     from symphys.runs import Job, Result
 
+Groups = Mapping[tuple[str, str], list["Result"]]
+"""Results by problem, with its settings, and solver."""
 NARROWEST = 120
 """Columns of the table where the output is no terminal."""
 NUMBERS = ("solved", "objective", "worst", "iterations", "work", "seconds", "ended")
 GIVES_WAY = ("work", "iterations", "seconds", "objective", "ended")
 """Columns that are left out where a terminal is too narrow, in this order; no number is cut."""
+MOST_ROWS = 30
+"""Rows of the table; of more, the best and the worst are shown."""
+MOST_ADVICE = 10
+"""Lines of advice below a table of the best and the worst."""
 MOST_MISSED = 3
 """How many missed checks of a run are named."""
 
@@ -40,23 +47,51 @@ def print_summary(jobs: list[Job], batch: BatchResult) -> None:
     console = Console()
     if not console.is_terminal:
         console = Console(width=max(console.width, NARROWEST))
-    console.print(fitting_table(groups, console.width))
-    for line in advice(groups):
+    shown = best_and_worst(groups)
+    console.print(fitting_table(shown, console.width, len(groups) - len(shown)))
+    if len(shown) < len(groups):
+        console.print(Text(counts(batch, len(groups))), soft_wrap=True)
+    for line in advice(shown) if len(shown) == len(groups) else advice_together(shown):
         console.print(Text(line), soft_wrap=True)
 
 
-def fitting_table(groups: dict[tuple[str, str], list[Result]], width: int) -> Table:
+def best_and_worst(groups: Groups) -> Groups:
+    """All groups, as they are; of more than fit into a table the best and the worst, from best to worst."""
+    if len(groups) <= MOST_ROWS:
+        return groups
+    ranked = sorted(groups, key=lambda name: rank(groups[name]))
+    half = MOST_ROWS // 2
+    return {name: groups[name] for name in (*ranked[:half], *ranked[-half:])}
+
+
+def rank(group: list[Result]) -> tuple[float, float, float]:
+    """The lower the better: how many did not do what was asked, how much is missed, and the objective."""
+    missed = sum(not result.accepted for result in group) / len(group) if group else math.inf
+    worst = median(result.worst_ratio for result in group if not result.accepted)
+    objective = median(known(result, "objective") for result in group)
+    worst, objective = (math.inf if each is None or math.isnan(each) else each for each in (worst, objective))
+    return missed, worst, objective
+
+
+def counts(batch: BatchResult, groups: int) -> str:
+    """How many runs ended how."""
+    ends = Counter("not begun" if result is None else verdict(result) for result in batch.results)
+    listed = ", ".join(f"{count:,} {words}" for words, count in ends.most_common())
+    return f"{len(batch.results):,} runs: {listed}. The best and the worst of {groups:,} rows are shown."
+
+
+def fitting_table(groups: Groups, width: int, left_out: int = 0) -> Table:
     """The table with as many columns as fit; where even the least do not, names are wrapped."""
     for count in range(len(GIVES_WAY) + 1):
         columns = [name for name in NUMBERS if name not in GIVES_WAY[:count]]
-        shown = table(groups, columns)
+        shown = table(groups, columns, left_out)
         if Console(width=1000).measure(shown).maximum <= width:
             break
     return shown
 
 
-def table(groups: dict[tuple[str, str], list[Result]], columns: Sequence[str] = NUMBERS) -> Table:
-    """The table of all groups, by problem and solver, with these columns."""
+def table(groups: Groups, columns: Sequence[str] = NUMBERS, left_out: int = 0) -> Table:
+    """The table of all groups, by problem and solver, with these columns; in its middle, how many are left out."""
     several = any(len(group) > 1 for group in groups.values())
     caption = "worst: largest error / tolerance, met at 1; work in rollouts" + ("; medians over the seeds" * several)
     shown = Table(box=SIMPLE_HEAD, caption=caption, caption_justify="left")
@@ -64,7 +99,9 @@ def table(groups: dict[tuple[str, str], list[Result]], columns: Sequence[str] = 
         shown.add_column(name, overflow="fold")
     for name in columns:
         shown.add_column(name, justify="left" if name == "ended" else "right", no_wrap=name != "ended")
-    for (problem, solver), group in groups.items():
+    for row, ((problem, solver), group) in enumerate(groups.items()):
+        if left_out and 2 * row == len(groups):
+            shown.add_row(Text(f"... {left_out:,} more ...", style="dim"))
         found = cells(group)
         shown.add_row(Text(problem), Text(solver), *(found[name] for name in columns))
     return shown
@@ -104,7 +141,7 @@ def median(values: Iterable[float | None]) -> float | None:
     return statistics.median(found) if found else None
 
 
-def advice(groups: dict[tuple[str, str], list[Result]]) -> list[str]:
+def advice(groups: Groups) -> list[str]:
     """Why runs are not to be trusted, and what to try for the unsolved, each once per problem and solver."""
     lines = [
         f"{problem} {solver}: {line}"
@@ -115,6 +152,20 @@ def advice(groups: dict[tuple[str, str], list[Result]]) -> list[str]:
     ]
     held = [f"{problem} {solver}: {line}" for (problem, solver), group in groups.items() for line in held_back(group)]
     return list(dict.fromkeys(lines + held))
+
+
+def advice_together(groups: Groups) -> list[str]:
+    """The same for many groups: what is said of several of them is said once, with the first as an example."""
+    examples: dict[str, list[str]] = {}
+    for (problem, solver), group in groups.items():
+        for line in advice({("", ""): group}):
+            examples.setdefault(line.removeprefix(" : "), []).append(f"{problem} {solver}")
+    lines = [
+        f"{names[0]}{f' and {len(names) - 1} more' if len(names) > 1 else ''}: {line}"
+        for line, names in sorted(examples.items(), key=lambda item: -len(item[1]))
+    ]
+    more = [f"and {len(lines) - MOST_ADVICE} more such lines"] if len(lines) > MOST_ADVICE else []
+    return lines[:MOST_ADVICE] + more
 
 
 def held_back(group: list[Result]) -> list[str]:

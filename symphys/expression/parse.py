@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import copyreg
 from collections.abc import Callable
-from functools import partial
+from functools import lru_cache, partial
 from math import isfinite
 from operator import neg, pos
 
@@ -33,6 +33,7 @@ ALLOWED = (
 )
 
 
+@lru_cache(maxsize=1024)
 def parse(text: str) -> Formula:
     """Read a formula; FormulaError names the piece at fault, what is allowed and the nearest valid names."""
     builder = Builder(flatten(text))

@@ -1,4 +1,4 @@
-"""From the text of a problem file to its data; everything that can be wrong with a file is found here."""
+"""From the tables of a problem file to its data; everything that can be wrong with them is found here."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from pydantic import ValidationError
 from symphys.errors import Issue, ProblemError
 from symphys.files import printable
 from symphys.model.state_layout import input_sizes
+from symphys.model.world import World
 from symphys.problem.checks.memory import check_rollout
 from symphys.problem.checks.pair_limit import check_pair_limit
 from symphys.problem.checks.start import at_guess, check_joints, check_overlap, formula_names, sensor_names
+from symphys.problem.checks.start_values import StartValues
 from symphys.problem.feedback import Controller, Sensor
-from symphys.problem.include.files import with_included
-from symphys.problem.include.placing import placed
-from symphys.problem.model import ALIVE, NOTHING, Array, ProblemData, Simulation, Termination, Variable
+from symphys.problem.model import ALIVE, Array, ProblemData, Simulation, Termination, Variable
 from symphys.problem.parametric.collision_filter import CollisionFilter
 from symphys.problem.parametric.forward_kinematics import forward_kinematics
 from symphys.problem.parametric.parts import Part
@@ -28,9 +28,8 @@ from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.quantities import Quantity, quantities, weight_quantities
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.reading.messages import report
-from symphys.problem.reading.settings import apply_settings, own_settings
-from symphys.problem.reading.source import parse_toml
 from symphys.problem.schema import Document
+from symphys.problem.sweeps.sweep import Sweep
 from symphys.problem.tables.bodies import read_body, read_state
 from symphys.problem.tables.contact import (
     check_collides_with,
@@ -52,38 +51,6 @@ from symphys.problem.units import formula_units
 MEMBERS = ("body", "plane", "block", "terrain")
 SHARED_NAMES = (*MEMBERS, "joint", "sensor", "controller", "variable")
 OWN_NAMES = ("cost", "target", "constraint", "output", "scenario")
-
-
-def read_problem(
-    path: Path, text: str, settings: Mapping[str, object] = NOTHING, functions: Mapping[str, ca.Function] = NOTHING
-) -> ProblemData:
-    """Read and validate the text of a problem file.
-
-    Args:
-        path: of the file; files that it includes are looked for beside it.
-        text: what is in it.
-        settings: see ``load_problem``; those of the table [set] come before them.
-        functions: see ``load_problem``.
-
-    Raises:
-        ProblemError: names the file and every fault found, each with table, key and what would be valid.
-    """
-    data = parse_toml(path, text)
-    settings = {**own_settings(data, str(path)), **settings}
-    early, late = (
-        {key: value for key, value in settings.items() if of_includes(key) is which} for which in (True, False)
-    )
-    apply_settings(data, early, str(path))
-    merged = with_included(path, text, data)
-    apply_settings(merged.data, late, str(path), merged.shared)
-    faults = Faults(str(path), merged.data, merged.origins)
-    document = placed(read_document(merged.data, faults), merged, faults)
-    return build(path, merged.text, document, faults, functions)
-
-
-def of_includes(key: str) -> bool:
-    """Whether a setting says what is included, and must be known before all others."""
-    return key.partition(".")[0] in ("include", "included")
 
 
 def read_document(data: Mapping[str, Any], faults: Faults) -> Document:
@@ -128,24 +95,35 @@ def groups(document: Document) -> list[tuple[Place, str]]:
 
 
 def build(
-    path: Path, text: str, document: Document, faults: Faults, functions: Mapping[str, ca.Function] = NOTHING
+    path: Path,
+    text: str,
+    document: Document,
+    faults: Faults,
+    functions: Mapping[str, ca.Function],
+    starts: StartValues,
+    sweep: Sweep | None,
 ) -> ProblemData:
     """The problem; each stage needs the ones before without fault."""
     simulation = read_simulation(document.simulation, faults)
     parametric, initial = read_world(document, faults)
     faults.stop_if_any()
-    check_laws(parametric, faults)
-    known = quantities(initial, parametric.parameters(), input_sizes(parametric.world({})))
-    sensors, controllers = read_control(document, parametric, known, functions, faults)
+    nominal = parametric.world({})
+    check_laws(parametric, nominal, faults)
+    known = quantities(initial, parametric.parameters(), input_sizes(nominal))
+    sensors, controllers = read_control(document, parametric, known, functions, starts, faults)
     known |= weight_quantities(controllers)
     variables = read_variables(document.variable, known, simulation, faults)
-    check_rollout(parametric, simulation, variables, faults)
-    check_varied(parametric, variables, faults)
+    check_rollout(nominal, simulation, variables, faults)
+    check_varied(parametric, nominal, variables, faults)
     check_anchors(parametric, variables, faults)
     scenarios = read_scenarios(document.scenario, known, parametric, simulation, variables, faults)
     faults.stop_if_any()
+    values = at_guess(parametric, known, variables)
+    start = starts.of(parametric, values)
+    check_overlap(parametric, start, faults)
+    check_joints(parametric, start, faults)
     termination, objectives = read_termination_and_objectives(
-        document, simulation, parametric, at_guess(parametric, known, variables), variables, faults
+        document, simulation, nominal, formula_names(values, start, variables), variables, faults
     )
     return ProblemData(
         name=printable(path.stem),
@@ -167,6 +145,7 @@ def build(
         solvers=None if document.solvers is None else tuple(dict.fromkeys(document.solvers)),
         termination=termination,
         scenarios=scenarios or None,
+        sweep=sweep,
     )
 
 
@@ -175,11 +154,15 @@ def read_control(
     parametric: ParametricWorld,
     known: Mapping[str, Quantity],
     functions: Mapping[str, ca.Function],
+    starts: StartValues,
     faults: Faults,
 ) -> tuple[tuple[Sensor, ...], tuple[Controller, ...]]:
     """Sensors and controllers without fault."""
-    sensors = read_sensors(document.sensor, sensor_names(parametric, at_guess(parametric, known, ())), faults)
-    faults.stop_if_any()
+    sensors: tuple[Sensor, ...] = ()
+    if document.sensor:
+        values = at_guess(parametric, known, ())
+        sensors = read_sensors(document.sensor, sensor_names(values, starts.of(parametric, values)), faults)
+        faults.stop_if_any()
     varied = {name.partition("[")[0].strip() for table in document.variable for name in table.sets}
     controllers = read_controllers(document.controller, sensors, known, functions, faults, varied)
     faults.stop_if_any()
@@ -189,18 +172,16 @@ def read_control(
 def read_termination_and_objectives(
     document: Document,
     simulation: Simulation,
-    parametric: ParametricWorld,
-    start: Mapping[str, Array],
+    nominal: World,
+    named: Mapping[str, Any],
     variables: Sequence[Variable],
     faults: Faults,
 ) -> tuple[Termination | None, Objectives]:
-    """Termination and objectives; ``start`` is as the guess has it, and must be one that can be."""
-    check_overlap(parametric, start, faults)
-    check_joints(parametric, start, faults)
-    sensed = sensor_names(parametric, start)
-    termination = read_termination(document, sensed, input_sizes(parametric.world({})), faults)
-    names = formula_names(parametric, start, variables) | ({} if document.ending[1] is None else {ALIVE: ca.DM(1)})
-    units = formula_units(parametric.world({}), names, variables)
+    """Termination and objectives; ``named`` has a value for each name in formulas, as the guess has it."""
+    sensed = {name: value for name, value in named.items() if name not in {each.name for each in variables}}
+    termination = read_termination(document, sensed, input_sizes(nominal), faults)
+    names = {**named} | ({} if document.ending[1] is None else {ALIVE: ca.DM(1)})
+    units = formula_units(nominal, names, variables)
     objectives = read_objectives(document, simulation, names, units, faults)
     objectives = replace(objectives, costs=with_termination_cost(document, objectives.costs, faults))
     faults.stop_if_any()

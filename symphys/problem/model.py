@@ -17,6 +17,7 @@ from symphys.model.world import Scheme, World
 from symphys.problem.feedback import Controller, Sensor
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.parametric.world import ParametricWorld
+from symphys.problem.sweeps.sweep import Sweep
 
 Array = NDArray[np.float64]
 NOTHING: Mapping[str, Any] = MappingProxyType({})
@@ -284,6 +285,7 @@ class ProblemData:
         termination: where a motion is over before its time; None: nowhere.
         scenarios: what differs from sample to sample; None: nothing.
         outputs: numbers that are reported, in the file's order.
+        sweep: what [sweep] says; None without one. ``text`` is without it.
     """
 
     name: str
@@ -308,6 +310,7 @@ class ProblemData:
     termination: Termination | None = None
     scenarios: Scenarios | None = None
     outputs: tuple[Output, ...] = ()
+    sweep: Sweep | None = None
 
     @property
     def weights(self) -> dict[str, Array]:

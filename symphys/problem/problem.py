@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +11,8 @@ import casadi as ca
 import tomli_w
 
 from symphys.model.world import World
-from symphys.problem.load import read_problem
 from symphys.problem.model import NOTHING, ProblemData
+from symphys.problem.reader import read_problem
 from symphys.problem.reading.source import parse_toml, read_source
 from symphys.problem.world_tables import world_tables
 
@@ -27,10 +27,12 @@ class Problem(ProblemData):
     Attributes:
         settings: what was changed in the text, by dotted key.
         functions: of controllers with ``function``, by name.
+        varied: names of parameters in which it differs from others of its sweep, whose kernel takes them as inputs.
     """
 
     settings: Mapping[str, object] = field(default_factory=dict)
     functions: Mapping[str, ca.Function] = field(default_factory=dict, repr=False)
+    varied: frozenset[str] = frozenset()
 
     def set(self, key: str | Mapping[str, object], value: object = None) -> Problem:
         """The same problem with another value, or with several from a mapping.
@@ -52,7 +54,8 @@ class Problem(ProblemData):
             (1.0, 2.0)
         """
         changes = key if isinstance(key, Mapping) else {key: value}
-        return _made(Path(self.file), self.text, {**self.settings, **changes}, self.functions)
+        made = _made(Path(self.file), self.text, {**self.settings, **changes}, self.functions)
+        return made if self.sweep is None else replace(made, sweep=self.sweep)
 
     @classmethod
     def from_world(
@@ -116,7 +119,7 @@ class Problem(ProblemData):
     def to_toml(self) -> str:
         """The text of a problem file that is this problem: its own, with what was changed in a table [set] at the end.
 
-        Files that it includes are in the text. Numbers of nets from other files are not.
+        Files that it includes are in the text. Numbers of nets from other files are not, nor is a table [sweep].
         """
         if not self.settings:
             return self.text

@@ -15,6 +15,7 @@ from symphys.transcription.objective import limits, terms
 from symphys.transcription.program import rollout_program
 from symphys.transcription.randomization import with_scenarios
 from symphys.transcription.rollout import symbolic_rollout
+from symphys.transcription.shared_kernel import inputs_of, shared_backend
 from symphys.transcription.transcription import Transcription
 
 
@@ -44,7 +45,11 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
     asked = terms(rollout)
     functions = ExpressionFunctions(rollout, asked)
     built = perf_counter() - began
-    chosen = choose(backend, BackendSource(functions, lambda: rollout_program(rollout, exact), exact), threads)
+    inputs = () if backend == "casadi" else inputs_of(problem)
+    if inputs:
+        chosen = shared_backend(problem, inputs, functions.nlp, exact, backend, threads)
+    else:
+        chosen = choose(backend, BackendSource(functions, lambda: rollout_program(rollout, exact), exact), threads)
     shooting = ShootingProblem(
         name=problem.name,
         blocks=blocks(problem),

@@ -12,13 +12,14 @@ from hypothesis import strategies as st
 from rich.console import Console
 from rich.progress import Progress
 
-from symphys.cli.arguments import UsageFault, read_settings, read_value
+from symphys.cli.arguments import UsageFault, read_settings
 from symphys.cli.solve import time_line
 from symphys.cli.summary import advice, fitting_table, missed, table
 from symphys.cli.watching.live import Live
 from symphys.cli.watching.plain import Notes, Plain
 from symphys.cli.watching.words import at
 from symphys.cli.wording import brief, duration, many_pairs, number, whole
+from symphys.problem.reading.value_texts import read_value
 from symphys.results.result import CheckRecord
 from symphys.runs import Result
 from symphys.solvers import CmaOptions, TraceRow

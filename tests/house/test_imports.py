@@ -32,7 +32,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "problems": ("errors suggest", "", "shipped problem files"),
     "problem": (
         "dynamics errors expression files maths model problems suggest",
-        "casadi numpy pydantic pydantic_core tomli_w",
+        "casadi numpy pydantic pydantic_core scipy tomli_w",
         "problem file to problem; of the dynamics only what is observed",
     ),
     "codegen": ("errors shooting", "casadi cuda cupy numpy", "programs compiled to SIMD C and CUDA"),

@@ -23,15 +23,19 @@ Expr = Any
 """casadi SX, MX or DM"""
 
 
-def gap_function(world: World) -> ca.Function:
-    """The gaps [m] of a state: x -> (pairs,); candidates that cannot touch as things lie have a large one."""
-    arguments = arguments_of(world, (), ())
+def gap_function(world: World, parameters: Sequence[Any] | None = None) -> ca.Function:
+    """The gaps [m] of a state: x -> (pairs,); candidates that cannot touch as things lie have a large one.
+
+    With SX ``parameters`` of the world, also none, it is a function of (x, p).
+    """
+    arguments = arguments_of(world, (), parameters or ())
     tracer = inline(world, arguments, reduces=False)
     with tracing(tracer):
         context = context_of(world, None, (), arguments)
         motions, duration = _motions(world, context, arguments[0])
         gaps = map(tracer.value, along_paths(_gaps, context, motions, duration))
-    return ca.Function("gaps", arguments[:1], [ca.densify(ca.vertcat(ca.SX(0, 1), *gaps))])
+    taken = [arguments[0]] if parameters is None else [arguments[0], arguments[2]]
+    return ca.Function("gaps", taken, [ca.densify(ca.vertcat(ca.SX(0, 1), *gaps))])
 
 
 def slip_function(

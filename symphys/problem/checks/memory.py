@@ -16,8 +16,8 @@ from math import floor, inf, log10
 from pathlib import Path
 
 from symphys.model.state_layout import Layout
+from symphys.model.world import World
 from symphys.problem.model import Simulation, Variable
-from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.reading.faults import Faults, Place
 
 LOOP, RECORD, NUMBER, WEIGHT = 500, 128, 300, 40
@@ -58,11 +58,9 @@ def check_net(place: Place, weights: int, varied: bool, faults: Faults) -> bool:
     return need <= have
 
 
-def check_rollout(
-    parametric: ParametricWorld, simulation: Simulation, variables: Sequence[Variable], faults: Faults
-) -> None:
+def check_rollout(world: World, simulation: Simulation, variables: Sequence[Variable], faults: Faults) -> None:
     """Notes steps and knots that there is no memory for."""
-    states, have = Layout(parametric.world({})).size, available()
+    states, have = Layout(world).size, available()
     need = steps_need(states, simulation.steps)
     if need > have:
         text = f"{simulation.steps} steps of {states} states take about {shown(need)} of memory, {shown(have)} can be"

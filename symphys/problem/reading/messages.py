@@ -67,7 +67,7 @@ def message(finding: Finding, model: type[BaseModel]) -> str:
 def keys_at(model: type[BaseModel], place: Place) -> list[str]:
     """The keys of the table at a place."""
     table = inner_model(type_at(model, place))
-    return list(table.model_fields) if table else []
+    return [field.alias or name for name, field in table.model_fields.items()] if table else []
 
 
 def type_at(model: type[BaseModel], place: Place) -> Any:

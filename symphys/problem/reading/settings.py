@@ -36,6 +36,8 @@ def apply_settings(
     issues = []
     for path, value in settings.items():
         try:
+            if path.partition(".")[0] == "sweep":
+                raise SettingError("a setting has one value; --sweep and --samples change what is swept")
             if path in shared:
                 raise SettingError("included files have tables in this list; set what is in them by name")
             assign(data, path, value)
@@ -91,6 +93,24 @@ def assign(data: dict[str, Any], path: str, value: object) -> None:
             node[key] = {}
         open_below = open_below or (node is data and key == "solver")
         node, rest = node[key], remainder
+
+
+def place_of(data: Mapping[str, Any], path: str) -> tuple[str | int, ...]:
+    """Keys and indices of what a dotted path means; of a path that means nothing, its parts."""
+    node: Any = data
+    place: tuple[str | int, ...] = ()
+    rest: str | None = path
+    try:
+        rest = located(data, path)
+        while rest is not None:
+            key, rest = step(node, rest, top=node is data)
+            key = RENAMED.get(str(key), key) if isinstance(node, dict) else key
+            place = (*place, key)
+            former = FORMER.get(str(key), "")
+            node = node.get(key, node.get(former, {})) if isinstance(node, dict) else node[key]
+    except SettingError:
+        return (*place, *(rest or "").split("."))
+    return place
 
 
 def step(node: Any, rest: str, top: bool) -> tuple[str | int, str | None]:

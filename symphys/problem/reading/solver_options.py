@@ -19,6 +19,8 @@ from symphys.problem.reading.messages import report
 from symphys.suggest import hint, quote
 
 Options = TypeVar("Options")
+MODELS: dict[type[Any], type[BaseModel]] = {}
+"""Models of dataclasses: making one takes a millisecond, and a batch asks for one in each of its runs."""
 
 
 def validate_options(cls: type[Options], table: Mapping[str, object], file: str, where: str) -> Options:
@@ -90,6 +92,13 @@ def require_solvers(tables: Iterable[str], asked: Iterable[str], known: Iterable
 
 def options_model(cls: type[Any]) -> type[BaseModel]:
     """The pydantic model of a dataclass: the same keys, kinds and defaults, strict and without others."""
+    if cls not in MODELS:
+        MODELS[cls] = made_model(cls)
+    return MODELS[cls]
+
+
+def made_model(cls: type[Any]) -> type[BaseModel]:
+    """The model of a dataclass, made anew."""
     kinds = get_type_hints(cls, include_extras=True)
     meanings = option_descriptions(cls)
     entries: dict[str, Any] = {

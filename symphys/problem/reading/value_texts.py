@@ -1,9 +1,11 @@
-"""How values of a file are shown in messages."""
+"""How values of a file are shown in messages, and what a value means that was typed."""
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping, Sequence
 
+from symphys import files
 from symphys.suggest import quote
 
 
@@ -23,3 +25,13 @@ def shown(value: object) -> str:
 def listed(words: Sequence[str], last: str) -> str:
     """``a, b or c``; ``last`` is the word before the last one."""
     return f"{', '.join(words[:-1])} {last} {words[-1]}"
+
+
+def read_value(text: str) -> object:
+    """A TOML value that JSON has too, else the text itself."""
+    try:
+        table = tomllib.loads(f"value = {text}")
+        files.strict(table)
+    except (ValueError, TypeError, RecursionError):
+        return text
+    return table["value"] if table.keys() == {"value"} else text

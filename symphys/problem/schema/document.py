@@ -30,6 +30,7 @@ from symphys.problem.schema.physics import (
     WorldTable,
 )
 from symphys.problem.schema.scenarios import ScenarioTable
+from symphys.problem.schema.sweep import SweepTable
 from symphys.problem.schema.types import Label, SchemaTable, deprecated
 
 
@@ -69,6 +70,7 @@ class Document(SchemaTable):
     solver: dict[str, dict[str, Any]] = Field(
         default={}, description="options by solver: [solver.gradient], [solver.cma], ..."
     )
+    sweep: SweepTable | None = None
     set: dict[str, Any] = Field(
         default={}, description='values that replace others, such as those of included files: "body.torso.mass" = 3'
     )

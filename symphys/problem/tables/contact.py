@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from symphys.model.world import Law
+from symphys.model.world import Law, World
 from symphys.problem.model import Variable
 from symphys.problem.parametric.parts import LAW, PairRule
 from symphys.problem.parametric.world import ParametricWorld
@@ -110,10 +110,10 @@ def rival_of(parametric: ParametricWorld, index: int, name: str, rivals: Rivals)
     return None
 
 
-def check_laws(parametric: ParametricWorld, faults: Faults) -> None:
+def check_laws(parametric: ParametricWorld, nominal: World, faults: Faults) -> None:
     """A contact is either soft or has restitution; a [[pair]] table must belong to surfaces that may touch."""
     check_ranks(parametric, faults)
-    laws = {parametric.owners(pair): pair.law for pair in parametric.world({}).pairs}
+    laws = {parametric.owners(pair): pair.law for pair in nominal.pairs}
     used = set()
     for owners, law in laws.items():
         table = parametric.pair(*owners)
@@ -126,9 +126,11 @@ def check_laws(parametric: ParametricWorld, faults: Faults) -> None:
     check_damping(parametric, faults)
 
 
-def check_varied(parametric: ParametricWorld, variables: Sequence[Variable | None], faults: Faults) -> None:
+def check_varied(
+    parametric: ParametricWorld, nominal: World, variables: Sequence[Variable | None], faults: Faults
+) -> None:
     """A variable must not give restitution to soft contacts."""
-    soft = {name for pair in parametric.world({}).pairs if pair.law.soft for name in parametric.owners(pair)}
+    soft = {name for pair in nominal.pairs if pair.law.soft for name in parametric.owners(pair)}
     soft |= {pair.name for pair in parametric.pairs if pair.states.get("frequency", parametric.contact.frequency)}
     for index, variable in enumerate(variables):
         for slot in variable.slots if variable else ():

@@ -1,0 +1,130 @@
+"""What can be read of a world at its start: gaps, joints, quantities in formulas.
+
+Building these as expressions takes most of the time of reading a problem. So they are built as functions of the
+parameters in which worlds have differed so far, and evaluated for every further world of the same structure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.dynamics.observation import accelerometers, body_quantities, gap_function, joint_quantities, readings
+from symphys.dynamics.tracing.pytree import dismantle
+from symphys.model.state_layout import GIVEN, Layout, initial_state
+from symphys.model.world import World
+from symphys.problem.parametric.world import ParametricWorld
+
+Array = NDArray[np.float64]
+MOST_KEPT = 8
+"""How many structures of worlds are kept at once."""
+
+
+class StartFunctions:
+    """Functions of a state x and of parameters p, of worlds of one structure; each is built when first asked for."""
+
+    def __init__(self, world: World, parameters: list[Any]) -> None:
+        """``parameters``: the symbols in the world."""
+        self.world = world
+        self.parameters = parameters
+        self.x = ca.SX.sym("x", Layout(world).size)
+
+    @cached_property
+    def gaps(self) -> ca.Function:
+        """(pairs,) [m]."""
+        return gap_function(self.world, self.parameters)
+
+    @cached_property
+    def quantities(self) -> tuple[list[str], ca.Function]:
+        """Names of formulas, and their values: of joints, and what is felt on bodies that are not accelerated."""
+        layout = Layout(self.world)
+        still = {body.name: self.x[layout[f"{body.name}.velocity"]] for body in self.world.bodies}
+        found = joint_quantities(self.world, self.x) | body_quantities(self.world, self.x)
+        found |= accelerometers(self.world, self.x, still, 1.0)
+        return list(found), self._function("quantities", list(found.values()))
+
+    @cached_property
+    def joints(self) -> ca.Function:
+        """Of each joint its separation, tilt and coordinates."""
+        found = readings(self.world, self.x).values()
+        return self._function("joints", [part for each in found for part in (each.separation, each.tilt, each.value)])
+
+    def _function(self, name: str, values: list[Any]) -> ca.Function:
+        return ca.Function(name, [self.x, ca.vertcat(ca.SX(0, 1), *self.parameters)], [ca.SX(each) for each in values])
+
+
+@dataclass(frozen=True)
+class Start:
+    """A world at its start, by functions of its structure at a state x and parameters p."""
+
+    functions: StartFunctions
+    x: Any
+    p: Any
+
+    @property
+    def world(self) -> World:
+        """The world, in which symbols stand for parameters."""
+        return self.functions.world
+
+    def gaps(self) -> Array:
+        """(pairs,) [m]."""
+        return np.array(self.functions.gaps(self.x, self.p)).ravel()
+
+    def quantities(self) -> dict[str, Any]:
+        """Names of formulas, with casadi's DM: of joints, and what is felt on bodies that are not accelerated."""
+        names, function = self.functions.quantities
+        return dict(zip(names, function.call([self.x, self.p]), strict=True))
+
+    def joints(self) -> list[tuple[float, float, Array]]:
+        """Of each joint its separation [m], its tilt [rad], and (k,) its coordinates."""
+        found = self.functions.joints.call([self.x, self.p])
+        parts = zip(found[::3], found[1::3], found[2::3], strict=True)
+        return [(float(apart), float(tilt), np.array(value).ravel()) for apart, tilt, value in parts]
+
+
+class StartValues:
+    """The starts of worlds, of which most differ in a few parameters."""
+
+    def __init__(self) -> None:
+        """No world is known."""
+        self._first: dict[str, Array] = {}
+        self._symbols: dict[str, Any] = {}
+        self._kept: dict[Hashable, StartFunctions] = {}
+
+    def of(self, parametric: ParametricWorld, values: Mapping[str, Array]) -> Start:
+        """A world at its start; ``values`` has those of all of its parameters, and the state of every body."""
+        used = {name: values[name] for name in parametric.parameters()}
+        for name, value in used.items():
+            first = self._first.setdefault(name, value.copy())
+            if name not in self._symbols and not name.endswith(".anchor") and not np.array_equal(first, value):
+                self._symbols[name] = ca.SX.sym(name, value.size)
+        symbols = {name: symbol for name, symbol in self._symbols.items() if name in used}
+        numbers = {name: parameter(value) for name, value in used.items() if name not in symbols}
+        world = parametric.world({**numbers, **symbols})
+        given = {f"{body.name}.{field}": values[f"{body.name}.{field}"] for body in world.bodies for field in GIVEN}
+        functions = self._functions(world, list(symbols.values()))
+        p = ca.vertcat(ca.DM(0, 1), *(ca.DM(used[name]) for name in symbols))
+        return Start(functions, initial_state(world, given), p)
+
+    def _functions(self, world: World, symbols: list[Any]) -> StartFunctions:
+        """Those of the structure of this world: it is equal to another, but for what the symbols stand for."""
+        leaves: list[Any] = []
+        shape = dismantle(world, leaves)
+        column = ca.vertcat(ca.SX(0, 1), *(ca.vec(ca.densify(leaf)) for leaf in leaves))
+        structure = (shape, ca.Function("world", [ca.vertcat(ca.SX(0, 1), *symbols)], [column]).serialize())
+        if structure not in self._kept:
+            if len(self._kept) >= MOST_KEPT:
+                self._kept.clear()
+            self._kept[structure] = StartFunctions(world, symbols)
+        return self._kept[structure]
+
+
+def parameter(value: Array) -> float | tuple[float, ...]:
+    """A parameter's value as worlds take it."""
+    return float(value[0]) if value.size == 1 else tuple(value.tolist())

@@ -1,0 +1,57 @@
+"""The table of a sweep: keys of the file that take several values, each a problem of its own."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field
+
+from symphys.problem.schema.types import Finite, SchemaTable
+
+MOST_SAMPLES = 1_000_000
+MOST_VALUES = 10_000
+Samples = Literal["grid", "latin hypercube", "sobol"]
+
+
+class RangeTable(SchemaTable):
+    """Numbers from one end to the other."""
+
+    start: Finite = Field(alias="from", description="the first value")
+    to: Finite = Field(description="the last value; it is included")
+    count: Annotated[int, Field(ge=2, le=MOST_VALUES)] | None = Field(
+        default=None, description="how many values; samples may do without, and then take any number between the ends"
+    )
+    spacing: Literal["linear", "log"] = Field(default="linear", description='"log": by equal factors')
+
+
+AXIS: dict[str, Any] = {
+    "anyOf": [
+        {"type": "array", "minItems": 1},
+        {
+            "type": "object",
+            "properties": {
+                "from": {"type": "number"},
+                "to": {"type": "number"},
+                "count": {"type": "integer", "minimum": 2, "maximum": MOST_VALUES},
+                "spacing": {"enum": ["linear", "log"]},
+            },
+        },
+    ]
+}
+"""The JSON Schema of an axis; a table without ``from`` holds further keys, as TOML reads ``ball.mass = [1, 2]``."""
+
+
+class SweepTable(SchemaTable):
+    """Keys that take several values; `symphys solve` solves each combination, or samples of them.
+
+    Further keys are those of `--set`, such as `"ball.mass"`, each with a list of values or with a table
+    { from = 0.2, to = 2, count = 10, spacing = "log" }. [Sweeps](command_line.md#sweeps) has examples.
+    """
+
+    model_config = ConfigDict(extra="allow", json_schema_extra={"additionalProperties": AXIS})
+
+    samples: Samples = Field(default="grid", description='every combination, or samples that fill the space: "sobol"')
+    count: Annotated[int, Field(ge=1, le=MOST_SAMPLES)] | None = Field(
+        default=None, description="how many samples; a grid has none, and Sobol samples a power of two"
+    )
+    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="of the random numbers of samples")

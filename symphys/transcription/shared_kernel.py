@@ -1,0 +1,119 @@
+"""Kernels that the problems of a sweep share: numbers in which these differ are inputs, behind the decision variables.
+
+A kernel has all other numbers of its problem as constants, so each problem would need one of its own, and compiling
+takes longer than many a solve. Programs of problems that differ in inputs alone are equal, and compiled once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.codegen.backends import Backend, BackendSource, choose
+from symphys.problem import Problem, Variable, VariableSlot
+from symphys.shooting import Evaluator, Nlp, Values
+from symphys.transcription.functions import ExpressionFunctions
+from symphys.transcription.objective import terms
+from symphys.transcription.program import rollout_program
+from symphys.transcription.randomization.numbers import hidden
+from symphys.transcription.rollout import symbolic_rollout
+
+Array = NDArray[np.float64]
+
+
+def inputs_of(problem: Problem) -> tuple[Variable, ...]:
+    """A variable for each parameter in which the problems of its sweep differ, and that no variable of its own sets.
+
+    Anchors of joints are not among them: they decide where bodies start.
+    """
+    own = {slot.name for variable in problem.variables for slot in variable.slots}
+    names = sorted(name for name in problem.varied if name in problem.parameters and name not in own)
+    values = {name: problem.parameters[name] for name in names if not name.endswith(".anchor")}
+    return tuple(
+        hidden(f"{name} of the sweep", "parameter", VariableSlot(name, tuple(range(value.size))), value)
+        for name, value in values.items()
+    )
+
+
+def shared_backend(
+    problem: Problem, inputs: tuple[Variable, ...], nlp: Any, exact: bool, backend: str, threads: int | None
+) -> Backend:
+    """The backend of a problem by a kernel that takes some of its numbers as inputs.
+
+    Args:
+        problem: of a sweep.
+        inputs: see ``inputs_of``.
+        nlp: of the problem itself, see ``Nlp.expression``.
+        exact: as for ``transcribe``.
+        backend: likewise.
+        threads: likewise.
+    """
+    rollout = symbolic_rollout(replace(problem, variables=(*problem.variables, *inputs)))
+    functions = ExpressionFunctions(rollout, terms(rollout))
+    chosen = choose(backend, BackendSource(functions, lambda: rollout_program(rollout, exact), exact), threads)
+    numbers = np.concatenate([variable.guess for variable in inputs])
+    return replace(chosen, evaluator=BoundEvaluator(chosen.evaluator, numbers), nlp=bound_nlp(chosen.nlp, nlp, numbers))
+
+
+class BoundEvaluator:
+    """Evaluates points with the same numbers behind each of them; see ``Evaluator``."""
+
+    def __init__(self, evaluator: Evaluator, numbers: Array) -> None:
+        """``numbers``: (s,) what stands behind z."""
+        self.evaluator, self.numbers = evaluator, numbers
+
+    def value(self, Z: Array, smoothing: float) -> Values:
+        """See ``Evaluator``."""
+        return self.evaluator.value(self.joined(Z), smoothing)
+
+    def gradient(self, Z: Array, smoothing: float) -> Values:
+        """See ``Evaluator``."""
+        return self.cut(self.evaluator.gradient(self.joined(Z), smoothing))
+
+    def residuals(self, Z: Array, smoothing: float) -> Values:
+        """See ``Evaluator``."""
+        return self.evaluator.residuals(self.joined(Z), smoothing)
+
+    def jacobian(self, Z: Array, smoothing: float) -> Values:
+        """See ``Evaluator``."""
+        return self.cut(self.evaluator.jacobian(self.joined(Z), smoothing))
+
+    def joined(self, Z: Array) -> Array:
+        """(batch, n + s)."""
+        return np.hstack([Z, np.broadcast_to(self.numbers, (len(Z), self.numbers.size))])
+
+    def cut(self, found: Values) -> Values:
+        """Derivatives by z alone."""
+        count = self.numbers.size
+        slopes = {name: getattr(found, name) for name in ("gradient", "jacobian")}
+        return replace(
+            found, **{name: np.ascontiguousarray(d[..., :-count]) for name, d in slopes.items() if d is not None}
+        )
+
+
+def bound_nlp(shared: Nlp, expression: Any, numbers: Array) -> Nlp:
+    """Objective and constraints with these numbers behind z; ``expression``: of the problem itself."""
+    if shared.value is None:
+        return Nlp(expression)
+    z, smoothing = ca.MX.sym("z", expression.size1_in(0)), ca.MX.sym("smoothing")
+    joined, count = ca.vertcat(z, ca.DM(numbers)), expression.size1_in(0)
+
+    def bound(name: str, function: Any, columns: bool | None) -> Any:
+        if function is None:
+            return None
+        first, second = function(joined, smoothing)
+        if columns is not None:
+            second = second[:, :count] if columns else second[:count]
+        return ca.Function(name, [z, smoothing], [first, second])
+
+    return Nlp(
+        expression,
+        bound("value", shared.value, None),
+        bound("gradient", shared.gradient, False),
+        bound("jacobian", shared.jacobian, True),
+        keep=shared.keep,
+    )
