@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -24,14 +24,15 @@ from symphys.cli.arguments import (
     read_solvers,
     settings_option,
 )
+from symphys.cli.report import make_shown, pages_option
 from symphys.cli.wording import duration, many_pairs
 
 if TYPE_CHECKING:
+    from symphys.report.making.batch import MadePages
     from symphys.runs import BatchResult, Job
 
 MOST_SEEDS = 10_000
 MOST_JOBS = 256
-BATCH_PAGE = "page of all runs"
 
 
 @click.command()
@@ -72,6 +73,8 @@ BATCH_PAGE = "page of all runs"
     help="Leave out how far solutions can be trusted, which for long motions takes as long as solving them; "
     "`symphys check --at RUN_FOLDER` does it later.",
 )
+@click.option("--no-report", is_flag=True, help="Make no pages; `symphys report DIR` makes them later.")
+@pages_option
 @backend_option
 @out_option
 def solve(
@@ -82,6 +85,8 @@ def solve(
     jobs: int,
     multi_start: bool,
     unexamined: bool,
+    no_report: bool,
+    pages: str,
     backend: str,
     out: Path,
 ) -> int:
@@ -108,21 +113,29 @@ def solve(
     with watch(len(asked)) as observer:
         batch = run_batch(asked, jobs, observer, made, multi_start)
     parts = observer.notes.seconds if jobs == 1 and not multi_start else {}
-    return conclude(asked, batch, out, began, parts)
+    write = None if no_report else partial(write_reports, asked, out, pages, jobs)
+    return conclude(asked, batch, out, began, parts, write)
 
 
-def conclude(jobs: list[Job], batch: BatchResult, out: Path, began: float, parts: Mapping[str, float]) -> int:
-    """Show what came of it; the exit code."""
+def conclude(
+    jobs: list[Job],
+    batch: BatchResult,
+    out: Path,
+    began: float,
+    parts: Mapping[str, float],
+    write: Callable[[], MadePages] | None,
+) -> int:
+    """Show what came of it; ``write``: makes the pages; the exit code."""
     from symphys.cli.summary import print_summary
 
     print_summary(jobs, batch)
     if batch.interrupted:
         click.echo(last_words(batch, out), err=True)
         return 130
-    page = write_reports(jobs, out)
+    made = write() if write else None
     click.echo(time_line(perf_counter() - began, parts))
-    click.echo(f"report: {page}")
-    return 0 if batch.accepted else 1
+    click.echo(f"report: {made.page}" if made else f"no report; `symphys report {shlex.quote(str(out))}` makes one")
+    return 0 if batch.accepted and not (made and made.faults) else 1
 
 
 def last_words(batch: BatchResult, out: Path) -> str:
@@ -145,22 +158,9 @@ def time_line(total: float, parts: Mapping[str, float]) -> str:
     return f"time: {duration(total)} s in all; {', '.join(f'{word} {duration(part)}' for word, part in told.items())}"
 
 
-def write_reports(jobs: list[Job], out: Path) -> Path:
-    """Write the pages of the runs that are new, and that of the batch; where that lies."""
-    from symphys.cli.progress import working
-    from symphys.report import write_batch_report, write_run_report
-    from symphys.report.pages.run import PAGE
-    from symphys.runs import RESULT
+def write_reports(jobs: list[Job], out: Path, pages: str, processes: int) -> MadePages:
+    """Make the pages of the runs that are new, and that of the batch."""
+    from symphys.report import WantedPages, outdated
 
-    new = {job.name: job.folder.path for job in jobs if newer(job.folder.path / RESULT, job.folder.path / PAGE)}
-    with working("reports", dict.fromkeys([*(f"page of {name}" for name in new), BATCH_PAGE], 1.0)) as tell:
-        for name, folder in new.items():
-            tell(f"page of {name}")
-            write_run_report(folder)
-        tell(BATCH_PAGE)
-        return write_batch_report(out)
-
-
-def newer(source: Path, page: Path) -> bool:
-    """Whether there is something that the page does not show yet."""
-    return source.exists() and not (page.exists() and page.stat().st_mtime >= source.stat().st_mtime)
+    new = dict.fromkeys(job.folder.path for job in jobs if outdated(job.folder.path))
+    return make_shown(WantedPages(out, tuple(new)), pages, processes)

@@ -153,17 +153,27 @@ def use_numbers(axes: Axes) -> None:
         axis.set_major_formatter(FuncFormatter(number_label))
 
 
-def fit_scale(axes: Axes, which: str, values: Array) -> None:
-    """Linear where the numbers are of one size, logarithmic where not, symmetric-logarithmic where some are <= 0."""
+def scale_of(values: Array) -> float:
+    """0 for a linear axis, -1 for a logarithmic one, else the size up to which a symmetric-logarithmic one is linear.
+
+    Linear where the numbers are of one size, logarithmic where not, symmetric-logarithmic where some are <= 0.
+    """
     known = values[np.isfinite(values)]
     sizes = np.abs(known[known != 0])
     if sizes.size == 0 or sizes.max() < 30 * sizes.min():
+        return 0.0
+    return -1.0 if (known > 0).all() else float(max(np.quantile(sizes, 0.1), sizes.max() * 1e-6))
+
+
+def fit_scale(axes: Axes, which: str, values: Array) -> None:
+    """The axis that ``scale_of`` says."""
+    scale = scale_of(values)
+    if scale == 0:
         set_linear(axes, which)
-    elif (known > 0).all():
-        set_log(axes, which, known)
+    elif scale < 0:
+        set_log(axes, which, values[np.isfinite(values)])
     else:
-        linear = float(max(np.quantile(sizes, 0.1), sizes.max() * 1e-6))
-        set_symlog(axes, which, linear)
+        set_symlog(axes, which, scale)
 
 
 def axis_of(axes: Axes, which: str) -> matplotlib.axis.Axis:
