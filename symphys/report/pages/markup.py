@@ -19,7 +19,8 @@ from symphys.results.file_names import FIGURES
 VOID = frozenset({"br", "img", "input", "link", "meta"})
 HERE = Path(__file__).parents[1] / "static"
 SCRIPTS = ("geometry.js", "solids.js", "terrain.js", "painter.js", "joints.js", "animation.js")
-CHARTS, UNPACK = "charts.js", "unpack.js"
+CHARTS, ROWS = ("numbers.js", "charts.js"), ("numbers.js", "rows.js")
+UNPACK = "unpack.js"
 PACKED = "packed"
 """Class of what ``unpack.js`` unpacks."""
 ICONS = {"good": "✓", "fair": "!", "bad": "✕", "unknown": "?"}
@@ -112,6 +113,12 @@ def chart(found: Chart) -> Html:
     return tag("figure", tag("div", role="img", aria_label=found.alt), data, class_="chart", data_name=found.name)
 
 
+def embedded(data: str) -> Html:
+    """A text of JSON for scripts of the page, harmless in HTML whatever it holds."""
+    inert = data.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
+    return tag("script", Html(inert), type="application/json")
+
+
 def stats(pairs: Iterable[tuple[str, str]]) -> Html:
     """Key numbers side by side."""
     return tag("dl", *(tag("div", tag("dt", key), tag("dd", value)) for key, value in pairs), class_="stats")
@@ -128,11 +135,14 @@ def fold(title: str, text: str) -> Html:
     return tag("details", tag("summary", title), tag("pre", text)) if text.strip() else Html("")
 
 
-def page(title: str, body: Part, animated: bool = False) -> str:
-    """The whole document: no part of it is loaded from elsewhere, and no script but our own may run."""
-    script = read_static(*SCRIPTS) if animated else ""
-    scripts = tag("script", Html(script)) if animated else Html("")
-    return document(title, body, scripts, [script] if animated else [])
+def page(title: str, body: Part, animated: bool = False, rows: bool = False) -> str:
+    """The whole document: no part of it is loaded from elsewhere, and no script but our own may run.
+
+    ``animated``: whether it plays a motion; ``rows``: whether it has a table that is shown a page at a time.
+    """
+    script = read_static(*(SCRIPTS if animated else ()), *(ROWS if rows else ()))
+    scripts = tag("script", Html(script)) if script else Html("")
+    return document(title, body, scripts, [script] if script else [])
 
 
 def light_page(title: str, body: Part, animated: bool) -> str:
@@ -145,7 +155,7 @@ def light_page(title: str, body: Part, animated: bool) -> str:
 @cache
 def light_scripts(animated: bool) -> tuple[str, str, str]:
     """What unpacks, what is unpacked, and that compressed."""
-    then = squeezed(read_static(*(SCRIPTS if animated else ()), CHARTS))
+    then = squeezed(read_static(*(SCRIPTS if animated else ()), *CHARTS))
     return read_static(UNPACK), then, pack(then)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from symphys.report.charts.packed import pack_json
 from symphys.report.figures import style
-from symphys.report.pages.markup import PACKED, Html, dot, join, tag
+from symphys.report.pages.markup import PACKED, Html, dot, embedded, join, tag
 from symphys.report.robots.branches import colours, keys, linked, traced
 from symphys.report.robots.joint_positions import SQUARE, axes_of, drawable
 from symphys.report.scene.views import SIDE_YZ, TOP, choose_views, reach, solids_of
@@ -30,9 +30,8 @@ LEAST_PLAY = 3.0
 def animation(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = None, numbers: int = NUMBERS) -> Html:
     """A canvas with play, time and view controls, and its data; works without any network."""
     data = json.dumps(motion_data(trajectory, scene, guess, numbers), separators=(",", ":"), allow_nan=False)
-    inert = data.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
-    held = tag("script", Html(inert), type="application/json")
-    return player(trajectory, scene, "The motion plays only with JavaScript; the figure below shows it without.", held)
+    without = "The motion plays only with JavaScript; the figure below shows it without."
+    return player(trajectory, scene, without, embedded(data))
 
 
 def light_animation(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = None) -> Html:

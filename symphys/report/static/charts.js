@@ -1,4 +1,4 @@
-// Draws the curves of a light page as SVG, from the numbers that it holds; shows those below the pointer.
+// Draws the curves of a light page as SVG, from the numbers that it holds; shows those below the pointer. Comes after numbers.js.
 
 const WIDTH = 1000, TOP = 26, BOTTOM = 34, LEFT = 58, GAP = 14, HEIGHT = 170, BAR = 20;
 
@@ -6,17 +6,6 @@ function numbers(packed) { // differences in steps of one size, or numbers as th
   if (!packed.d) return packed;
   let whole = 0;
   return packed.d.map((d) => { whole += d; return whole * packed.q; });
-}
-
-function escaped(text) { return text.replace(/[&<>"]/g, (c) => `&#${c.charCodeAt(0)};`); }
-
-function written(value) { // a number as people write it
-  if (!value) return "0";
-  const power = Math.floor(Math.log10(Math.abs(value)) + 1e-9);
-  if (power > -4 && power < 6) return String(Number(value.toPrecision(4))).replace("-", "−");
-  const mantissa = Number((value / 10 ** power).toPrecision(3)), digits = "⁰¹²³⁴⁵⁶⁷⁸⁹";
-  const raised = String(power).replace("-", "⁻").replace(/\d/g, (d) => digits[d]);
-  return `${Math.abs(mantissa) === 1 ? (mantissa < 0 ? "−" : "") : `${mantissa} × `.replace("-", "−")}10${raised}`;
 }
 
 function transform(scale) { // of numbers to heights: linear, logarithmic, or linear near 0 and logarithmic beyond
