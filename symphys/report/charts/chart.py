@@ -62,6 +62,7 @@ class Panel:
         met: whether what is at 1 or below is met, which is marked.
         least: (low, high) that the vertical axis shows at least; empty for what the lines need.
         bars: rows of bars in place of lines.
+        ticks: marks along the bottom.
     """
 
     title: str
@@ -72,6 +73,7 @@ class Panel:
     met: bool = False
     least: tuple[float, ...] = ()
     bars: tuple[Bars, ...] = ()
+    ticks: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -129,6 +131,7 @@ def panel_data(panel: Panel) -> dict[str, Any]:
         "met": panel.met,
         "least": list(panel.least),
         "bars": bars,
+        "ticks": rough(np.array(panel.ticks)),
     }
     return {key: value for key, value in asked.items() if value}
 

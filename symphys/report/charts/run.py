@@ -10,18 +10,18 @@ from symphys.report.figures import style
 from symphys.report.figures.convergence import AXIS_TITLES
 from symphys.report.figures.history import HistoryPanel, exact_ends, segments, shown_panels, work_of
 from symphys.report.figures.variables import MOST_PANELS, component_colours, component_names, knotted, near_bounds
-from symphys.report.figures.verification import energy_lines, known_growth
+from symphys.report.figures.verification import MOST_TOUCHES, energy_lines, known_growth, touches
 from symphys.results.result import VariableRecord, smoothed
 from symphys.results.run import Run
-from symphys.trajectory import Array
+from symphys.trajectory import Array, Trajectory
 
 COLUMNS = 3
 
 
-def run_charts(run: Run) -> list[Chart]:
+def run_charts(run: Run, motion: Trajectory | None) -> list[Chart]:
     """All that there are."""
     found = [convergence_chart(run), variables_chart(run)]
-    found += [growth_chart(run.examination.growth), energy_chart(run.examination.energy)]
+    found += [growth_chart(run.examination.growth, motion), energy_chart(run.examination.energy)]
     return [chart for chart in found if chart is not None]
 
 
@@ -34,7 +34,9 @@ def convergence_chart(run: Run) -> Chart | None:
     colour = style.solver_marks([run.solver])[run.solver][0]
     panels = tuple(history_panel(run, x, along, panel, colour) for panel in shown)
     keys = (("at the stage's own smoothing", colour), ("exact, at its end", style.INK)) * smoothed(run.stages)
-    return Chart("convergence", "Convergence of this run", panels, min(len(panels), COLUMNS), keys)
+    return Chart(
+        "convergence", "Convergence of this run", panels, 2 if len(panels) == 4 else min(len(panels), COLUMNS), keys
+    )
 
 
 def history_panel(run: Run, x: Array, along: str, panel: HistoryPanel, colour: str) -> Panel:
@@ -77,13 +79,15 @@ def variable_panel(variable: VariableRecord) -> Panel:
     return Panel(title, guess + lines(knots, few, names, colours), "knot", edges=tuple(near_bounds(variable).tolist()))
 
 
-def growth_chart(growth: Growth) -> Chart | None:
-    """|dx_T/dx_t| against t; None without two numbers."""
+def growth_chart(growth: Growth, motion: Trajectory | None) -> Chart | None:
+    """|dx_T/dx_t| against t, with a tick where a contact begins; None without two numbers."""
     time, factor = known_growth(growth)
     if time.size < 2:
         return None
     drawn = lines(time, factor[:, None], ["growth"], [style.BODIES[0]])
-    panel = Panel("Growth of a change at t until the end", drawn, "time t [s]", -1.0, edges=(1.0,))
+    ticks = () if motion is None else tuple(touches(motion).tolist())
+    ticks = ticks if len(ticks) <= MOST_TOUCHES else ()
+    panel = Panel("Growth of a change at t until the end", drawn, "time t [s]", -1.0, edges=(1.0,), ticks=ticks)
     return Chart("growth", "Growth of changes until the end", (panel,))
 
 

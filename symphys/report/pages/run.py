@@ -74,7 +74,7 @@ def write_light_report(run_dir: Path) -> Path:
     It takes some 20 ms, and 50 kB on disk. Arguments, result and errors are those of ``write_run_report``.
     """
     run, recording = read_recorded(run_dir)
-    charts: dict[str, Drawn] = {chart.name: chart for chart in run_charts(drawable(run))}
+    charts: dict[str, Drawn] = {chart.name: chart for chart in run_charts(drawable(run), recording.trajectory)}
     if recording.trajectory is not None:
         charts |= {chart.name: chart for chart in motion_charts(recording.trajectory, recording.scene)}
     body = join([build(run, recording, charts), sections.LIGHT])

@@ -99,7 +99,7 @@ class Panel {
     const { left, top, width, height, data } = this, bottom = top + height;
     const level = (v, c) => `<path d="M${left} ${this.y(v).toFixed(1)}h${width}" class="${c}"/>`;
     const out = [`<text x="${left}" y="${top - 9}" class="title">${escaped(data.title)}</text>`];
-    for (const v of evenTicks(...this.wide, Math.max(2, Math.round(width / 90)))) {
+    for (const v of evenTicks(...this.wide, Math.max(2, Math.round(width / 60)))) {
       out.push(`<path d="M${this.x(v).toFixed(1)} ${top}v${height}" class="grid"/>`);
       out.push(`<text x="${this.x(v).toFixed(1)}" y="${bottom + 14}" text-anchor="middle">${written(v)}</text>`);
     }
@@ -108,6 +108,7 @@ class Panel {
     for (const v of ticksOf(data.scale, ...this.tall)) {
       out.push(level(v, "grid"), `<text x="${left - 6}" y="${(this.y(v) + 3.5).toFixed(1)}" text-anchor="end">${written(v)}</text>`);
     }
+    out.push(...(data.ticks || []).map((v) => `<path d="M${this.x(v).toFixed(1)} ${bottom}v-6" class="tick"/>`));
     out.push(...(data.edges || []).map((v) => level(v, "edge")));
     if (data.met) out.push(`<rect x="${left}" y="${this.y(1).toFixed(1)}" width="${width}" height="${(bottom - this.y(1)).toFixed(1)}" class="met"/>`, level(1, "limit"));
     return out.join("");
