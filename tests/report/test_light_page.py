@@ -139,7 +139,8 @@ def test_script_unpacks_what_was_packed() -> None:
 def test_ticks_lie_within_the_panel(scale: float, values: list[float]) -> None:
     panel = Panel("p", lines(np.arange(len(values)), np.array(values)[:, None], ["y"], ["red"]), "x", scale)
     data = json.dumps(Chart("c", "", (panel,)).to_json()["panels"][0])
-    code = f"(() => {{ const p = new Panel({data}, 0, 0, 500); return [p.tall, ticksOf({scale}, ...p.tall).map(p.up)]; }})()"
+    made = f"const p = new Panel({data}, 0, 0, 500);"
+    code = f"(() => {{ {made} return [p.tall, ticksOf({scale}, ...p.tall).map(p.up)]; }})()"
     (low, high), ticks = run_script(code, "numbers.js", "charts.js")
     assert 3 <= len(ticks) <= 9
     assert all(low - 1e-9 <= tick <= high + 1e-9 for tick in ticks)

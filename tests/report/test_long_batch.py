@@ -184,6 +184,7 @@ def test_the_script_sorts_filters_and_turns_pages(long: tuple[Path, str]) -> Non
 @NODE
 def test_infinite_and_unknown_numbers_come_last_and_are_shown() -> None:
     data = {"columns": [NumberColumn("x", [np.inf, np.nan, -np.inf, 1e-7]).to_json()], "noun": "run", "page": 9}
-    code = f"(() => {{ const r = new Rows({json.dumps(data)}); r.sort(r.data.columns[0]); r.filter(''); return r.body(); }})()"
+    made = f"const r = new Rows({json.dumps(data)});"
+    code = f"(() => {{ {made} r.sort(r.data.columns[0]); r.filter(''); return r.body(); }})()"
     cells = re.findall(r">([^<>]+)</td>", run_script(code, "numbers.js", "rows.js"))
     assert cells == ["−∞", "10⁻⁷", "∞", "–"]  # noqa: RUF001

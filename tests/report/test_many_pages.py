@@ -1,4 +1,4 @@
-"""Many pages at once: one that fails keeps no other away, workers change no byte, and an end leaves whole pages only."""
+"""Many pages at once: one that fails keeps no other away, workers change no byte, an end leaves whole pages only."""
 
 from __future__ import annotations
 

@@ -15,6 +15,7 @@ import matplotlib
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator, SymmetricalLogLocator
 
@@ -123,7 +124,9 @@ def picture(name: str, alt: str, figure: DataFigure | None) -> list[Picture]:
 def svg_text(figure: Figure) -> str:
     """A figure as SVG text that depends on its content alone."""
     buffer = io.StringIO()
-    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    # Figure.savefig gives the same, but lays the figure out and draws it a first time for nothing.
+    canvas: Any = FigureCanvasSVG(figure)
+    canvas.print_svg(buffer, metadata={"Date": None, "Creator": None})
     svg = re.sub(r"<!DOCTYPE[^>]*>\s*|<metadata>.*?</metadata>\s*", "", buffer.getvalue(), flags=re.DOTALL)
     svg = svg.replace("'DejaVu Sans'", FONTS).replace("font-weight: 700", "font-weight: 600")
     return re.sub(r" +\n|\n+", "\n", svg)

@@ -26,7 +26,7 @@ from symphys.results.file_names import FIGURES, GUESS, SCENE, TRAJECTORY
 from symphys.results.run import Run
 from symphys.results.scene import Scene, read_scene
 from symphys.results.text_files import ReportError
-from symphys.results.trajectories import read_trajectory
+from symphys.results.trajectories import POSES, read_trajectory
 from symphys.trajectory import Trajectory
 
 PAGE = "index.html"
@@ -168,7 +168,7 @@ def best_motion(run: Run) -> tuple[Trajectory | None, Trajectory | None, Scene, 
     except ReportError:
         scene = Scene()
     try:
-        guess = read_trajectory(run.folder / GUESS)
+        guess = read_trajectory(run.folder / GUESS, POSES)
     except ReportError:
         guess = None
     return motion, guess, scene, ""

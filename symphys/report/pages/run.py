@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,7 +32,7 @@ from symphys.results.result import smoothed
 from symphys.results.run import Run, read_run
 from symphys.results.scene import Scene, read_scene
 from symphys.results.text_files import ReportError
-from symphys.results.trajectories import read_trajectory
+from symphys.results.trajectories import POSES, read_trajectory
 from symphys.trajectory import Trajectory
 
 PAGE = "report.html"
@@ -120,7 +120,7 @@ def read_motions(folder: Path) -> RecordedMotion:
     """Read what there is; the guess is no loss where it is missing."""
     faults: list[str] = []
     trajectory = read_or_note(folder / TRAJECTORY, faults)
-    guess = read_or_note(folder / GUESS, faults)
+    guess = read_or_note(folder / GUESS, faults, POSES)
     try:
         scene = read_scene(folder / SCENE)
     except ReportError as error:
@@ -129,10 +129,10 @@ def read_motions(folder: Path) -> RecordedMotion:
     return RecordedMotion(trajectory, guess, scene, tuple(faults))
 
 
-def read_or_note(path: Path, faults: list[str]) -> Trajectory | None:
-    """A recorded motion; None, with a sentence in ``faults``, if there is none."""
+def read_or_note(path: Path, faults: list[str], only: Sequence[str] = ()) -> Trajectory | None:
+    """A recorded motion, or ``only`` some arrays of it; None, with a sentence in ``faults``, if there is none."""
     try:
-        return read_trajectory(path)
+        return read_trajectory(path, only)
     except ReportError as error:
         faults.append(str(error))
         return None
