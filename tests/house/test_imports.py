@@ -64,7 +64,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "solve, judge, examine, write",
     ),
     "report": (
-        "files findings results trajectory verbs",
+        "files findings json_values results trajectory verbs",
         "matplotlib numpy",
         "pages and figures, made from run folders alone",
     ),

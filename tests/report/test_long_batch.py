@@ -16,8 +16,8 @@ from page_scripts import NODE, run_script
 from symphys import files
 from symphys.report import write_batch_report
 from symphys.report.pages.batch import MOST_STUDIES
+from symphys.report.pages.brief import BriefReader, read_brief_table, without_large
 from symphys.report.pages.rows import NumberColumn, WordColumn, setting_columns
-from symphys.results.brief import BriefReader, read_brief_table, without_large
 from symphys.results.discovery import Entry, Study, read_all, run_folders, sample
 from symphys.results.result import Result
 from symphys.results.run import read_run

@@ -13,13 +13,13 @@ from symphys.report.figures.checks import MOST_CHECKS, MOST_DOTS, draw_checks, r
 from symphys.report.figures.convergence import draw_convergence
 from symphys.report.figures.style import Picture, write_figures
 from symphys.report.pages import comparison
+from symphys.report.pages.brief import BriefReader, with_trace
 from symphys.report.pages.comparison import page_links
 from symphys.report.pages.markup import Html, card, facts, figures, join, page, slug, table, tag
 from symphys.report.pages.rows import run_card, study_card
 from symphys.report.robots.strip import draw_strip
 from symphys.report.scene.animation import NUMBERS, animation
 from symphys.report.scene.motion import draw_motion
-from symphys.results.brief import BriefReader, with_trace
 from symphys.results.discovery import Entry, Study, read_all, sample, studies
 from symphys.results.drawable import OVERSIZED, drawable, oversized
 from symphys.results.file_names import FIGURES, GUESS, SCENE, TRAJECTORY
