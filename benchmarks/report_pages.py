@@ -12,6 +12,7 @@ import json
 import sys
 import tempfile
 from pathlib import Path
+from resource import RUSAGE_CHILDREN, RUSAGE_SELF, getrusage
 from time import perf_counter
 
 import symphys
@@ -37,9 +38,10 @@ def main() -> None:
         measured("full", few, "full", jobs)
         every = wanted_below(root / "batch")
         measured("light", WantedPages(every.root, every.runs, batch=False), "light", jobs)
-        began = perf_counter()
+        began, worked = perf_counter(), processor_seconds()
         page = write_batch_report(root / "batch")
-        print(f"page of the batch of {runs} runs: {perf_counter() - began:.1f} s, {megabytes([page]):.2f} MB")
+        took = f"{perf_counter() - began:.1f} s ({processor_seconds() - worked:.1f} s of processors)"
+        print(f"page of the batch of {runs} runs: {took}, {megabytes([page]):.2f} MB")
 
 
 def copy(originals: list[Path], into: Path, runs: int) -> None:
@@ -58,12 +60,18 @@ def copy(originals: list[Path], into: Path, runs: int) -> None:
 
 def measured(name: str, wanted: WantedPages, kind: str, jobs: int) -> None:
     """Make pages, and say what they took."""
-    began = perf_counter()
+    began, worked = perf_counter(), processor_seconds()
     made = make_pages(wanted, kind, jobs)
-    seconds, count = perf_counter() - began, len(made.runs)
+    seconds, worked, count = perf_counter() - began, processor_seconds() - worked, len(made.runs)
     size = megabytes([path for page in made.runs for path in (page, *(page.parent / "figures").glob("*"))])
-    each = f"{1000 * seconds / count:.0f} ms and {1000 * size / count:.0f} kB each"
-    print(f"{count} {name} pages in {jobs} processes: {seconds:.1f} s, {size:.1f} MB; {each}", flush=True)
+    took = f"{seconds:.1f} s ({worked:.1f} s of processors), {size:.1f} MB"
+    each = f"{1000 * worked / count:.0f} ms and {1000 * size / count:.0f} kB each"
+    print(f"{count} {name} pages in {jobs} processes: {took}; {each}", flush=True)
+
+
+def processor_seconds() -> float:
+    """That this process and those that it has waited for have used [s]."""
+    return sum(used.ru_utime + used.ru_stime for used in map(getrusage, (RUSAGE_SELF, RUSAGE_CHILDREN)))
 
 
 def megabytes(paths: list[Path]) -> float:

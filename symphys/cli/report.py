@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+import shlex
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from time import monotonic
@@ -50,11 +51,12 @@ def report(folder: Path, pages: str, only_new: bool, jobs: int | None) -> int:
     from symphys.report import wanted_below
 
     made = make_shown(wanted_below(folder, only_new), pages, jobs or processors())
-    shown = [page for page in made.runs if page != made.page]
-    if len(shown) > MOST_PRINTED:
-        click.echo(f"{len(shown)} pages of runs" + (", light ones; --pages full makes full ones" if made.light else ""))
-        shown = []
-    for page in shown:
+    printed = [page for page in made.runs if page != made.page]
+    if len(printed) > MOST_PRINTED:
+        kind = ", light ones; --pages full makes full ones" if made.light else ""
+        click.echo(f"{len(printed)} pages of runs{kind}")
+        printed = []
+    for page in printed:
         click.echo(page)
     if all(fault.page != made.page for fault in made.faults):
         click.echo(made.page)
@@ -65,8 +67,14 @@ def make_shown(wanted: WantedPages, kind: str, jobs: int) -> MadePages:
     """Make pages, say how far it is, and name those that could not be made."""
     from symphys.report import make_pages
 
-    with shown_progress(len(wanted.runs)) as tell:
-        made = make_pages(wanted, kind, jobs, tell)
+    progress = PageProgress(len(wanted.runs))
+    try:
+        with shown(progress):
+            made = make_pages(wanted, kind, jobs, progress.tell)
+    except KeyboardInterrupt:
+        again = shlex.join(["symphys", "report", str(wanted.root), "--new"])
+        click.echo(f"symphys: {progress.over} of {progress.runs} pages were made; `{again}` makes the others", err=True)
+        raise
     for fault in made.faults[:MOST_NAMED]:
         click.echo(f"symphys: {fault}", err=True)
     if len(made.faults) > MOST_NAMED:
@@ -75,20 +83,20 @@ def make_shown(wanted: WantedPages, kind: str, jobs: int) -> MadePages:
 
 
 @contextmanager
-def shown_progress(runs: int) -> Iterator[Callable[[int], None]]:
-    """Takes how many pages of runs are made; on a terminal a live line, elsewhere one every few seconds."""
+def shown(progress: PageProgress) -> Iterator[None]:
+    """Show how many pages are made; on a terminal by a live line, elsewhere by one every few seconds."""
     from rich.console import Console
     from rich.text import Text
 
     from symphys.cli.progress import EVERY, TICK, heartbeat
 
-    progress, console = PageProgress(runs), Console(stderr=True)
+    console = Console(stderr=True)
     if not console.is_terminal:
         with heartbeat(lambda: click.echo(f"reports: {progress.words()}", err=True), EVERY):
-            yield progress.tell
+            yield
         return
     with console.status("") as status, heartbeat(lambda: status.update(Text(progress.words())), TICK):
-        yield progress.tell
+        yield
 
 
 class PageProgress:

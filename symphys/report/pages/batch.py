@@ -80,7 +80,7 @@ def build_studies(found: Sequence[Study], root: Path) -> list[Html]:
     """The problems one after the other; with links to each and headings where there are several."""
     names = anchors(found)
     links = [tag("a", linked(study), href=f"#{anchor}") for study, anchor in zip(found, names, strict=True)]
-    curves = max(MOST_CURVES // sum(len(study.entries) for study in found), LEAST_CURVES)
+    curves = max(MOST_CURVES // max(sum(len(study.entries) for study in found), 1), LEAST_CURVES)
     runs = [run for study in found for run in study.runs]
     long = any(len(entry.runs) > comparison.MOST_CHIPS for study in found for entry in study.entries)
     every = run_card(found, page_links(runs)) if long else Html("")
