@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from symphys.model.world import Law, Scheme, World, make_world
     from symphys.problem import Problem, load_problem
     from symphys.problem.loading import load
-    from symphys.report.pages.folder import report
+    from symphys.report.making.batch import report
     from symphys.results import results
     from symphys.shooting import ShootingProblem
     from symphys.trajectory import Trajectory

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, fields, is_dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -25,6 +25,8 @@ UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u206
 
 def number(value: object) -> float:
     """A float; the strings ``nan``, ``inf``, ``-inf`` are read as such; nan for anything that is no number."""
+    if type(value) is float:
+        return value
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         return np.nan
     try:
@@ -73,10 +75,23 @@ def words(value: object) -> str:
 
 def name(value: object) -> str:
     """A text of one line and bounded length; empty for anything that is neither text nor number."""
+    if type(value) is str and len(value) <= NAME_LENGTH:
+        return _line(value)
     if isinstance(value, int | float) and not isinstance(value, bool):
         value = repr(value)
+    return one_line(value)
+
+
+def one_line(value: object) -> str:
+    """A text without line ends, cut to ``NAME_LENGTH``."""
     line = " ".join(words(value).split())
     return line if len(line) <= NAME_LENGTH else line[: NAME_LENGTH - 1] + "\N{HORIZONTAL ELLIPSIS}"
+
+
+@lru_cache(maxsize=4096)
+def _line(text: str) -> str:
+    """The same of a short text: thousands of results have the same names in them."""
+    return one_line(text)
 
 
 def names(value: object) -> tuple[str, ...]:
@@ -96,7 +111,7 @@ def record(kind: type[T], value: object, text: Text = name, /, **given: Any) -> 
     text or an empty collection. A field reads another key, or one in an object inside, where its metadata has ``key``
     (``"deepest_at.time"``). ``given``: fields that are read already.
     """
-    entry = table(value)
+    entry = value if isinstance(value, dict) else {}
     found = dict(given)
     plan: Any = _plan(kind)  # type: ignore[arg-type]  # a class is hashable
     for each, hint, path, required in plan:

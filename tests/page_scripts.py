@@ -40,7 +40,7 @@ def run_script(code: str, *more: str) -> Any:
     script = "".join((HERE / name).read_text(encoding="utf-8") for name in names)
     done = subprocess.run(
         ["node", "-"],
-        input=f"{script}\nconsole.log(JSON.stringify({code}));",
+        input=f"const document = {{ querySelectorAll: () => [] }};\n{script}\nconsole.log(JSON.stringify({code}));",
         capture_output=True,
         text=True,
         check=False,

@@ -120,7 +120,7 @@ class Solution:
         return figures.plot(self.trajectory, self.trace, names)
 
     def report(self) -> Path:
-        """Write the report of the run into its folder, with its figures as SVG and CSV; the path of the page."""
+        """Write the full page of the run into its folder, with its figures as SVG and CSV; the path of the page."""
         from symphys.report import write_run_report
 
         return write_run_report(self.folder)

@@ -1,17 +1,122 @@
-"""``symphys report``: make reports again."""
+"""``symphys report``, and how commands make pages: their options, their progress, and what is said of failures."""
 
 from __future__ import annotations
 
+import math
+import shlex
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING
 
 import click
+
+from symphys import threads
+
+if TYPE_CHECKING:
+    from symphys.report import WantedPages
+    from symphys.report.making.batch import MadePages
+
+MOST_JOBS = 256
+MOST_PRINTED = 50
+"""Pages of runs are printed one by one up to so many."""
+MOST_NAMED = 20
+"""The same of pages that failed."""
+
+pages_option = click.option(
+    "--pages",
+    type=click.Choice(["auto", "full", "light"]),
+    default="auto",
+    show_default=True,
+    help="The pages of runs: full ones have their figures as SVG and CSV beside them, light ones draw their curves in "
+    "the browser and are made 20 times faster; auto: light where more than 50 are made at once.",
+)
 
 
 @click.command()
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-def report(folder: Path) -> None:
+@pages_option
+@click.option("--new", "only_new", is_flag=True, help="Of runs make only pages that are missing or out of date.")
+@click.option(
+    "--jobs",
+    type=click.IntRange(1, MOST_JOBS),
+    default=None,
+    help="How many processes make pages.  [default: one for each processor]",
+)
+def report(folder: Path, pages: str, only_new: bool, jobs: int | None) -> int:
     """Make the report of a run folder, or of all runs below a folder, again from its files alone."""
-    from symphys.report import write_pages
+    threads.limit()
+    from symphys.codegen.toolchain.compiler import processors
+    from symphys.report import wanted_below
 
-    for page in write_pages(folder):
+    made = make_shown(wanted_below(folder, only_new), pages, jobs or processors())
+    printed = [page for page in made.runs if page != made.page]
+    if len(printed) > MOST_PRINTED:
+        kind = ", light ones; --pages full makes full ones" if made.light else ""
+        click.echo(f"{len(printed)} pages of runs{kind}")
+        printed = []
+    for page in printed:
         click.echo(page)
+    if all(fault.page != made.page for fault in made.faults):
+        click.echo(made.page)
+    return 1 if made.faults else 0
+
+
+def make_shown(wanted: WantedPages, kind: str, jobs: int) -> MadePages:
+    """Make pages, say how far it is, and name those that could not be made."""
+    from symphys.report import make_pages
+
+    progress = PageProgress(len(wanted.runs))
+    try:
+        with shown(progress):
+            made = make_pages(wanted, kind, jobs, progress.tell)
+    except KeyboardInterrupt:
+        again = shlex.join(["symphys", "report", str(wanted.root), "--new"])
+        click.echo(f"symphys: {progress.over} of {progress.runs} pages were made; `{again}` makes the others", err=True)
+        raise
+    for fault in made.faults[:MOST_NAMED]:
+        click.echo(f"symphys: {fault}", err=True)
+    if len(made.faults) > MOST_NAMED:
+        click.echo(f"symphys: {len(made.faults) - MOST_NAMED} more pages could not be made", err=True)
+    return made
+
+
+@contextmanager
+def shown(progress: PageProgress) -> Iterator[None]:
+    """Show how many pages are made; on a terminal by a live line, elsewhere by one every few seconds."""
+    from rich.console import Console
+    from rich.text import Text
+
+    from symphys.cli.watching.heartbeat import EVERY, TICK, heartbeat
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        with heartbeat(lambda: click.echo(f"reports: {progress.words()}", err=True), EVERY):
+            yield
+        return
+    with console.status("") as status, heartbeat(lambda: status.update(Text(progress.words())), TICK):
+        yield
+
+
+class PageProgress:
+    """How many pages of runs are made, and how long the rest takes."""
+
+    def __init__(self, runs: int) -> None:
+        """None is made."""
+        self.runs, self.over, self.began = runs, 0, monotonic()
+
+    def tell(self, over: int) -> None:
+        """So many are made by now."""
+        self.over = over
+
+    def words(self) -> str:
+        """In a line."""
+        from symphys.cli.watching.words import percent
+        from symphys.cli.wording import time_words
+
+        if self.over == self.runs:
+            return "page of all runs"
+        text = f"{self.over} of {self.runs} pages of runs, {percent(self.over / self.runs)}"
+        left = (monotonic() - self.began) * (self.runs - self.over) / self.over if self.over else math.inf
+        return text + (f", about {time_words(left)} left" if math.isfinite(left) else "")

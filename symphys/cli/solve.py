@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from symphys import files, threads
+from symphys import threads
 from symphys.cli.arguments import (
     backend_option,
     complete_problem,
@@ -28,16 +28,18 @@ from symphys.cli.arguments import (
     sweep_options,
 )
 from symphys.cli.batch_options import BatchOptions, batch_options
+from symphys.cli.report import make_shown, pages_option
 from symphys.cli.wording import duration, many_pairs
 
 if TYPE_CHECKING:
     from symphys.batches import BatchResult
     from symphys.cli.watching.choice import Shown
+    from symphys.report.making.batch import MadePages
     from symphys.runs import Job
 
 MOST_SEEDS = 10_000
 MOST_JOBS = 256
-BATCH_PAGE = "page of all runs"
+INTERRUPTED = 130
 
 
 @click.command()
@@ -79,6 +81,8 @@ BATCH_PAGE = "page of all runs"
     help="Leave out how far solutions can be trusted, which for long motions takes as long as solving them; "
     "`symphys check --at RUN_FOLDER` does it later.",
 )
+@click.option("--no-report", is_flag=True, help="Make no pages; `symphys report DIR` makes them later.")
+@pages_option
 @backend_option
 @out_option
 @batch_options
@@ -92,6 +96,8 @@ def solve(
     jobs: int,
     multi_start: bool,
     unexamined: bool,
+    no_report: bool,
+    pages: str,
     backend: str,
     out: Path,
     how: BatchOptions,
@@ -125,12 +131,11 @@ def solve(
     limits = BatchLimits(how.retries, how.timeout, how.budget)
     with watch(len(asked), how.quiet, how.json) as observer:
         batch = run_batch(asked, jobs, observer, made, multi_start, limits, how.rerun)
-    code = 130 if batch.interrupted else 0 if batch.accepted else 1
+    write = None if no_report or batch.interrupted else partial(write_reports, asked, out, pages, jobs)
     if how.json or how.quiet:
-        return conclude_silently(asked, batch, out, observer, code)
+        return conclude_silently(batch, observer, write)
     parts = observer.notes.seconds if jobs == 1 and not multi_start else {}
-    conclude(asked, batch, out, began, parts)
-    return code
+    return conclude(asked, batch, out, began, parts, write)
 
 
 def print_previews(jobs: list[Job], rerun: str) -> int:
@@ -145,30 +150,44 @@ def print_previews(jobs: list[Job], rerun: str) -> int:
     return 0
 
 
-def conclude(jobs: list[Job], batch: BatchResult, out: Path, began: float, parts: Mapping[str, float]) -> None:
-    """Show what came of it."""
+def conclude(
+    jobs: list[Job],
+    batch: BatchResult,
+    out: Path,
+    began: float,
+    parts: Mapping[str, float],
+    write: Callable[[], MadePages] | None,
+) -> int:
+    """Show what came of it; ``write``: makes the pages; the exit code."""
     from symphys.cli.summary import print_summary
 
     print_summary(jobs, batch)
     if batch.interrupted:
         click.echo(last_words(batch, out), err=True)
-        return
-    page = write_reports(jobs, out)
+        return INTERRUPTED
+    made = write() if write else None
     if batch.spent:
         click.echo(last_words(batch, out), err=True)
     click.echo(time_line(perf_counter() - began, parts))
-    click.echo(f"report: {page}")
+    click.echo(f"report: {made.page}" if made else f"no report; `symphys report {shlex.quote(str(out))}` makes one")
+    return exit_code(batch, made)
 
 
-def conclude_silently(jobs: list[Job], batch: BatchResult, out: Path, observer: Shown, code: int) -> int:
+def conclude_silently(batch: BatchResult, observer: Shown, write: Callable[[], MadePages] | None) -> int:
     """Write the reports, and say no more than events; the exit code."""
     from symphys.cli.watching.events import Events
 
-    if not batch.interrupted:
-        write_reports(jobs, out)
+    code = exit_code(batch, write() if write else None)
     if isinstance(observer, Events):
         observer.finished(batch, code)
     return code
+
+
+def exit_code(batch: BatchResult, made: MadePages | None) -> int:
+    """Of a batch and its pages."""
+    if batch.interrupted:
+        return INTERRUPTED
+    return 0 if batch.accepted and not (made and made.faults) else 1
 
 
 def last_words(batch: BatchResult, out: Path) -> str:
@@ -192,22 +211,9 @@ def time_line(total: float, parts: Mapping[str, float]) -> str:
     return f"time: {duration(total)} s in all; {', '.join(f'{word} {duration(part)}' for word, part in told.items())}"
 
 
-def write_reports(jobs: list[Job], out: Path) -> Path:
-    """Write the pages of the runs that are new, and that of the batch; where that lies."""
-    from symphys.cli.watching import working
-    from symphys.report import write_batch_report, write_run_report
-    from symphys.report.pages.run import PAGE
-    from symphys.runs import RESULT
+def write_reports(jobs: list[Job], out: Path, pages: str, processes: int) -> MadePages:
+    """Make the pages of the runs that are new, and that of the batch."""
+    from symphys.report import WantedPages, outdated
 
-    new = {job.name: job.folder.path for job in jobs if newer(job.folder.path / RESULT, job.folder.path / PAGE)}
-    with working("reports", dict.fromkeys([*(f"page of {name}" for name in new), BATCH_PAGE], 1.0)) as tell:
-        for name, folder in new.items():
-            tell(f"page of {name}")
-            write_run_report(folder)
-        tell(BATCH_PAGE)
-        return write_batch_report(out)
-
-
-def newer(source: Path, page: Path) -> bool:
-    """Whether there is something that the page does not show yet; it has the time of what it shows."""
-    return source.exists() and files.modified(page) != files.modified(source)
+    new = dict.fromkeys(job.folder.path for job in jobs if outdated(job.folder.path))
+    return make_shown(WantedPages(out, tuple(new)), pages, processes)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import zipfile
 import zlib
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -24,8 +25,8 @@ UNREADABLE = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.
 """What numpy and zipfile raise at files that are no archives of plain arrays."""
 
 
-def read_archive(path: Path) -> dict[str, Array]:
-    """Every array of an archive.
+def read_archive(path: Path, only: Sequence[str] = ()) -> dict[str, Array]:
+    """Every array of an archive, or ``only`` those of these names that it has.
 
     Raises:
         ReportError: no such file, not an archive of plain arrays, or arrays of more than MOST_BYTES.
@@ -33,27 +34,29 @@ def read_archive(path: Path) -> dict[str, Array]:
     try:
         check_regular(path)
         with path.open("rb") as file:
-            return unpack(path, np.load(file, allow_pickle=False))
+            return unpack(path, np.load(file, allow_pickle=False), only)
     except UNREADABLE as error:
         if isinstance(error, OSError) and error.strerror:
             raise ReportError(f"{path.name}: {reason(error)}") from error
         raise ReportError(f"{path.name}: not an archive of plain arrays ({values.name(str(error))})") from error
 
 
-def unpack(path: Path, content: object) -> dict[str, Array]:
+def unpack(path: Path, content: object, only: Sequence[str]) -> dict[str, Array]:
     """The arrays, if they are not too large; ValueError for anything else that numpy reads."""
     if not isinstance(content, np.lib.npyio.NpzFile):
         raise ValueError("one array, not an archive of several")
     with content as archive:
         assert archive.zip is not None
-        check_size(path, archive.zip)
-        return {key: archive[key] for key in archive.files}
+        names = [key for key in archive.files if not only or key in only]
+        members = set(archive.zip.namelist())
+        check_size(path, archive.zip, [f"{key}.npy" if f"{key}.npy" in members else key for key in names])
+        return {key: archive[key] for key in names}
 
 
-def check_size(path: Path, archive: zipfile.ZipFile) -> None:
+def check_size(path: Path, archive: zipfile.ZipFile, members: Sequence[str]) -> None:
     """ReportError names the array with which the arrays are too large."""
     total = 0
-    for name in archive.namelist():
+    for name in members:
         size = unpacked_bytes(archive, name)
         total += size
         if total > MOST_BYTES:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -93,25 +93,36 @@ def is_run(files: list[str]) -> bool:
     return RESULT in files or (CONFIG in files and PROBLEM in files)
 
 
-def read_all(root: Path) -> tuple[list[Run], list[Run]]:
-    """Runs with a result, and folders without a readable one."""
-    runs = [read_run(folder, root) for folder in run_folders(root)]
+def read_all(root: Path, read: Callable[[Path], Run] | None = None) -> tuple[list[Run], list[Run]]:
+    """Runs with a result, and folders without a readable one; ``read``: ``read_run``, or a ``BriefReader``."""
+    runs = [read(folder) if read else read_run(folder, root) for folder in run_folders(root)]
     return [run for run in runs if run.readable], [run for run in runs if not run.readable]
 
 
-def studies(runs: list[Run]) -> list[Study]:
+def studies(runs: Sequence[Run]) -> list[Study]:
     """Group runs: same problem and same parent folder make one study."""
-    keys = sorted({(run.problem, parent(run)) for run in runs})
-    return [make_study(problem, place, runs) for problem, place in keys]
+    groups: dict[tuple[str, str], list[Run]] = {}
+    for run in runs:
+        groups.setdefault((run.problem, parent(run)), []).append(run)
+    return [make_study(*key, groups[key]) for key in sorted(groups)]
 
 
-def make_study(problem: str, place: str, runs: list[Run]) -> Study:
+def make_study(problem: str, place: str, runs: Sequence[Run]) -> Study:
     """The study of one problem in one place; its solvers in order of name, seeds in order."""
-    own = [run for run in runs if (run.problem, parent(run)) == (problem, place)]
-    own.sort(key=lambda run: (run.solver, run.seed, run.place))
-    solvers = sorted({run.solver for run in own})
-    entries = tuple(Entry(solver, tuple(run for run in own if run.solver == solver)) for solver in solvers)
-    return Study(problem, place, entries)
+    solvers: dict[str, list[Run]] = {}
+    for run in sorted(runs, key=lambda run: (run.solver, run.seed, run.place)):
+        solvers.setdefault(run.solver, []).append(run)
+    return Study(problem, place, tuple(Entry(solver, tuple(own)) for solver, own in solvers.items()))
+
+
+def sample(study: Study, most: int) -> Study:
+    """The study with at most so many runs of each solver, evenly among its seeds, the first and the last of them."""
+
+    def some(runs: tuple[Run, ...]) -> tuple[Run, ...]:
+        chosen = np.linspace(0, len(runs) - 1, min(len(runs), most)).round().astype(int)
+        return tuple(runs[place] for place in chosen)
+
+    return Study(study.problem, study.place, tuple(Entry(each.solver, some(each.runs)) for each in study.entries))
 
 
 def parent(run: Run) -> str:

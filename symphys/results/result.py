@@ -48,7 +48,7 @@ class CheckRecord:
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> CheckRecord:
         """A check without a kind is a "check", one without a name has that of its kind."""
-        entry = values.table(value)
+        entry = value if isinstance(value, dict) else {}
         kind = text(entry.get("kind")) or "check"
         read = values.record(cls, value, text, kind=kind, name=text(entry.get("name")) or kind)
         return read if "ratio" in entry else dataclasses.replace(read, ratio=_share(read.error, read.tolerance))
@@ -287,7 +287,7 @@ class Result:
 
         A file that is older than verdicts, whose ``solved`` means that everything is met, is ruled on anew.
         """
-        entry = values.table(value)
+        entry = value if isinstance(value, dict) else {}
         read = values.record(
             cls,
             value,

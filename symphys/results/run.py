@@ -59,11 +59,7 @@ def read_run(folder: Path, root: Path) -> Run:
     """Read ``folder``; places are given relative to ``root``."""
     faults: list[str] = []
     result = read_or_note(folder / RESULT, faults)
-    readable = "solver" in result and "problem" in result
-    if not readable and not faults:
-        faults.append(f"{RESULT}: not a result of symphys (it names no problem and solver)")
-    elif readable and result.get("format") != FORMAT:
-        faults.append(f"{RESULT}: format {values.name(result.get('format')) or 'unknown'}, this report reads {FORMAT}")
+    readable = is_result(result, faults)
     config = read_or_note(folder / CONFIG, faults)
     asked = Config.from_json({**config, **result} if readable else config)
     result = result if readable else {}
@@ -92,6 +88,16 @@ def read_run(folder: Path, root: Path) -> Run:
         met=everything_met(result, run),
         z={name: replace(v, sets=written_sets(written, name) or v.sets) for name, v in run.z.items()},
     )
+
+
+def is_result(result: Mapping[str, object], faults: list[str]) -> bool:
+    """Whether a table is a result; ``faults`` says so where it is none, or of another format."""
+    readable = "solver" in result and "problem" in result
+    if not readable and not faults:
+        faults.append(f"{RESULT}: not a result of symphys (it names no problem and solver)")
+    elif readable and result.get("format") != FORMAT:
+        faults.append(f"{RESULT}: format {values.name(result.get('format')) or 'unknown'}, this report reads {FORMAT}")
+    return readable
 
 
 def read_or_note(path: Path, faults: list[str]) -> dict[str, object]:

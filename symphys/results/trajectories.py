@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,14 +22,18 @@ UNUSED = ("residual", "crowded", "ambiguous", "paradox")
 """Numbers on the contact solver: nothing that draws a motion depends on them, so they may be anything."""
 
 
-def read_trajectory(path: Path) -> Trajectory:
-    """Read a recorded motion, up to the first state that is not finite.
+POSES = ("time", "body_names", "position", "orientation")
+"""What is read of a guess, of which only its path is drawn: a quarter of the time of all."""
+
+
+def read_trajectory(path: Path, only: Sequence[str] = ()) -> Trajectory:
+    """Read a recorded motion, up to the first state that is not finite; ``only`` these arrays of it, if any are named.
 
     Raises:
         ReportError: no such file, not an archive of plain arrays, too large, shapes that do not fit, or numbers beyond
             what can be drawn.
     """
-    arrays = read_archive(path)
+    arrays = read_archive(path, only)
     try:
         motion = trim(make_trajectory(arrays))
     except (ValueError, KeyError, TypeError) as error:

@@ -54,8 +54,8 @@ class Job:
 
     @property
     def size(self) -> int:
-        """How much work an evaluation is, roughly: time steps times quantities of the state."""
-        return self.problem.simulation.steps * max(len(self.problem.initial), 1)
+        """How much work an evaluation is, roughly: time steps times the length of what is simulated."""
+        return self.problem.simulation.steps * len(self.problem.text)
 
     @property
     def smooth(self) -> bool:

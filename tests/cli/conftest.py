@@ -57,7 +57,9 @@ def whole_report() -> None:
 def _without_pages_of_runs(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Which have tests of their own, and take longer than the solves of this room."""
     if "whole_report" not in request.fixturenames:
-        monkeypatch.setattr("symphys.report.write_run_report", lambda folder: (folder / PAGE).write_text(""))
+        monkeypatch.setattr(
+            "symphys.report.making.page.write_run_report", lambda folder: (folder / PAGE).write_text("")
+        )
 
 
 @pytest.fixture

@@ -114,7 +114,7 @@ def test_other_settings_overwrite_nothing_in_either_order(
 ) -> None:
     """The file as it is, two settings, and all again: every run is kept, and the page and the table name them."""
     draw = write_batch_report
-    monkeypatch.setattr("symphys.report.write_batch_report", lambda out: out / "index.html")
+    monkeypatch.setattr("symphys.report.making.batch.write_batch_report", lambda out: out / "index.html")
     asked = [(), ("--set", "ground.friction=0.3"), ("--set", "ground.friction=0.6")]
     for settings in asked:
         code, out, _ = run("solve", throw, "--solver", "least_squares", *settings, *QUICK)
@@ -328,3 +328,27 @@ def test_the_help_names_every_backend(run: Run) -> None:
 
     _, out, _ = run("solve", "--help")
     assert "|".join(sorted(NAMES, key=["auto", "casadi", "c", "simd", "simd32", "cuda", "cuda32"].index)) in out
+
+
+def test_no_report_leaves_pages_out_and_report_makes_them_later(run: Run, throw: Path) -> None:
+    code, out, _ = run("solve", throw, "--solver", "least_squares", "--no-report", *QUICK)
+    assert code == 0 and "no report; `symphys report reports` makes one" in out
+    page = Path("reports/throw/least_squares-seed0/report.html")
+    assert not page.exists() and not Path("reports/index.html").exists()
+    assert run("report", "reports", "--new", "--jobs", "1")[1].split() == [str(page), "reports/index.html"]
+    assert run("report", "reports", "--new", "--jobs", "1")[1].split() == ["reports/index.html"]
+
+
+@pytest.mark.usefixtures("whole_report")
+def test_a_page_that_cannot_be_made_is_named_and_exits_1(run: Run, throw: Path) -> None:
+    """Of two runs that are solved one has no place for its page; the other page and that of the batch are made."""
+    places = [Path(f"reports/throw/least_squares-seed{seed}/report.html") for seed in range(2)]
+    (places[0] / "full").mkdir(parents=True)
+    solve = ("solve", throw, "--solver", "least_squares", "--seeds", "2", "--pages", "light", *QUICK)
+    code, out, err = run(*solve)
+    assert code == 1 and "2/2" in out and "report: reports/index.html" in out
+    assert f"symphys: {places[0]} could not be made: " in err
+    assert places[1].read_text(encoding="utf-8").endswith("</html>\n") and Path("reports/index.html").is_file()
+    code, out, err = run("report", "reports", "--pages", "light", "--jobs", "1")
+    assert code == 1 and out.split() == [str(places[1]), "reports/index.html"] and str(places[0]) in err
+    assert run("report", "reports", "--pages", "small")[0] == 2

@@ -70,7 +70,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "many runs, in any number of processes and commands",
     ),
     "report": (
-        "files findings results trajectory verbs",
+        "files findings json_values results trajectory verbs",
         "matplotlib numpy",
         "pages and figures, made from run folders alone",
     ),

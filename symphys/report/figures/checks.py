@@ -8,10 +8,12 @@ from matplotlib.lines import Line2D
 
 from symphys.report.figures import style
 from symphys.report.figures.data import Column, DataFigure, keep
-from symphys.results.discovery import Study
+from symphys.results.discovery import Study, sample
 from symphys.trajectory import Array
 
 MOST_CHECKS = 16
+MOST_DOTS = 200
+"""Seeds of a solver that are drawn as dots, at most."""
 LOWEST, HIGHEST = 1e-3, 1e4
 """Ratios are drawn between these at most; beyond them stands an arrow."""
 
@@ -20,13 +22,12 @@ Ratios = dict[str, dict[str, Array]]
 
 def ratios(study: Study) -> Ratios:
     """Error / tolerance by check and solver, one per seed; nan counts as inf."""
-    found: Ratios = {}
+    found: dict[str, dict[str, list[float]]] = {}
     for run in study.runs:
         for check in run.checks:
             ratio = np.inf if np.isnan(check.ratio) else check.ratio
-            solvers = found.setdefault(check.name, {})
-            solvers[run.solver] = np.append(solvers.get(run.solver, np.zeros(0)), ratio)
-    return found
+            found.setdefault(check.name, {}).setdefault(run.solver, []).append(ratio)
+    return {name: {key: np.array(seeds) for key, seeds in solvers.items()} for name, solvers in found.items()}
 
 
 def shown_checks(found: Ratios) -> list[str]:
@@ -54,7 +55,7 @@ def draw_checks(study: Study) -> DataFigure | None:
             if solver in found[name]:
                 height = place + (order - (len(marks) - 1) / 2) * lane / row
                 draw_lane(axes, height, np.clip(found[name][solver], low, high), marks[solver], (low, high))
-    keep_ratios(axes, study, names)
+    keep_ratios(axes, sample(study, MOST_DOTS), names)
     handles = [Line2D([], [], color=c, marker=m, linestyle="none", markersize=6) for c, m in marks.values()]
     style.legend_above(figure, handles, [style.short(name, 20) for name in marks])
     return figure
@@ -104,7 +105,8 @@ def draw_lane(axes: Axes, height: float, seeds: Array, mark: tuple[str, str], en
     middle = float(np.median(seeds))
     if seeds.size > 1:
         axes.plot([seeds.min(), seeds.max()], [height, height], color=colour, linewidth=0.8, alpha=0.4, zorder=2)
-        axes.plot(seeds, np.full(seeds.size, height), "o", color=colour, markersize=3, alpha=0.35, zorder=2.5)
+        dots = seeds[np.linspace(0, seeds.size - 1, min(seeds.size, MOST_DOTS)).round().astype(int)]
+        axes.plot(dots, np.full(dots.size, height), "o", color=colour, markersize=3, alpha=0.35, zorder=2.5)
     face = colour if middle <= 1 else "white"
     beyond = {ends[0]: "<", ends[1]: ">"}
     axes.plot(middle, height, beyond.get(middle, marker), color=colour, markerfacecolor=face, markersize=6, zorder=3)

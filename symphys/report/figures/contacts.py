@@ -81,16 +81,9 @@ def draw_contacts(trajectory: Trajectory, scene: Scene) -> DataFigure | None:
 
 def draw_forces(axes: Axes, trajectory: Trajectory, pair: int, normal: Array | None) -> dict[str, str]:
     """Normal and tangential magnitude, or the whole where the pair's normal is not known; the colours by name."""
-    force = trajectory.contact_force[:, pair]
-    middles = (trajectory.time[1:] + trajectory.time[:-1]) / 2
-    if normal is None:
-        colours = {"whole": WHOLE}
-        parts = np.linalg.norm(force, axis=1)[:, None]
-    else:
-        colours = {"normal": NORMAL, "tangential": TANGENTIAL}
-        along = np.sum(force * normal, axis=1, keepdims=True)
-        parts = np.hstack([np.abs(along), np.linalg.norm(force - along * normal, axis=1, keepdims=True)])
-    time, parts = style.thin(middles, parts, 1200)
+    middles, found = force_parts(trajectory, pair, normal)
+    colours = {kind: colour for kind, colour, _ in found}
+    time, parts = style.thin(middles, np.stack([force for _, _, force in found], axis=1), 1200)
     name = trajectory.contact_names[pair]
     keep(
         axes, {TIME: time} | {f"{name}.{kind} force [N]": column for kind, column in zip(colours, parts.T, strict=True)}
@@ -105,11 +98,30 @@ def draw_forces(axes: Axes, trajectory: Trajectory, pair: int, normal: Array | N
     return colours
 
 
-def fit_force_scale(axes: Axes, force: Array) -> None:
-    """Linear, unless impacts tower over lasting contact: then logarithmic above a small force."""
+def force_parts(trajectory: Trajectory, pair: int, normal: Array | None) -> tuple[Array, list[tuple[str, str, Array]]]:
+    """The middles of the steps, and (kind, colour, (N,) [N]): normal and tangential force, or the whole."""
+    force = trajectory.contact_force[:, pair]
+    middles = (trajectory.time[1:] + trajectory.time[:-1]) / 2
+    if normal is None:
+        return middles, [("whole", WHOLE, np.linalg.norm(force, axis=1))]
+    along = np.sum(force * normal, axis=1, keepdims=True)
+    across = np.linalg.norm(force - along * normal, axis=1)
+    return middles, [("normal", NORMAL, np.abs(along[:, 0])), ("tangential", TANGENTIAL, across)]
+
+
+def force_scale(force: Array) -> float:
+    """0 for linear; where impacts tower over lasting contact the small force above which it is logarithmic."""
     acting = force[np.isfinite(force) & (force > 0)]
     if acting.size and acting.max() > 20 * np.median(acting):
-        style.set_symlog(axes, "y", float(max(np.quantile(acting, 0.1), acting.max() * 1e-3)))
+        return float(max(np.quantile(acting, 0.1), acting.max() * 1e-3))
+    return 0.0
+
+
+def fit_force_scale(axes: Axes, force: Array) -> None:
+    """Linear, or logarithmic above ``force_scale``."""
+    acting = force[np.isfinite(force) & (force > 0)]
+    if least := force_scale(force):
+        style.set_symlog(axes, "y", least)
         axes.set_ylim(top=float(acting.max()) * 2)
     else:
         style.set_linear(axes, "y")

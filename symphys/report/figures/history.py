@@ -54,9 +54,8 @@ class HistoryPanel:
 
 def draw_run(run: Run) -> DataFigure | None:
     """Objective, errors, gradient norm, step, reported quantities; what was not recorded is left out."""
-    x = run.trace[WORK]
-    x = x if np.isfinite(x).any() else run.trace["iteration"]
-    shown = [panel for panel in panels_of(run) if np.isfinite(panel.values).any()]
+    x, along = work_of(run)
+    shown = shown_panels(run)
     if run.trace.rows < 2 or not shown:
         return None
     columns = 2 if len(shown) == 4 else min(len(shown), 3)
@@ -64,7 +63,7 @@ def draw_run(run: Run) -> DataFigure | None:
     figure = DataFigure(figsize=(style.WIDTH, 0.6 + 0.25 * smoothed(run.stages) + 2.0 * rows), layout="constrained")
     grid = list(figure.subplots(rows, columns, sharex=True, squeeze=False).flat)
     colour = style.solver_marks([run.solver])[run.solver][0]
-    label = AXIS_TITLES[WORK] if np.isfinite(run.trace[WORK]).any() else "iteration"
+    label = AXIS_TITLES.get(along, along)
     for place, (axes, panel) in enumerate(zip(grid, shown, strict=False)):
         draw_panel(axes, run, x, panel, colour, named=place < columns)
     keep_history(grid[0], run, label, x, shown)
@@ -76,6 +75,17 @@ def draw_run(run: Run) -> DataFigure | None:
     if smoothed(run.stages):
         style.legend_above(figure, *legend(colour))
     return figure
+
+
+def work_of(run: Run) -> tuple[Array, str]:
+    """(rows,) what the history is drawn over, and the name of its column."""
+    along = WORK if np.isfinite(run.trace[WORK]).any() else "iteration"
+    return run.trace[along], along
+
+
+def shown_panels(run: Run) -> list[HistoryPanel]:
+    """Those of which anything was recorded."""
+    return [panel for panel in panels_of(run) if np.isfinite(panel.values).any()]
 
 
 def panels_of(run: Run) -> list[HistoryPanel]:

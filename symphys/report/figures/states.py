@@ -14,6 +14,8 @@ from symphys.report.scene.views import NAMES
 from symphys.trajectory import Array, Trajectory
 
 MOST_BODIES = 5
+Quantity = tuple[str, str, Array, Array]
+"""Name, unit, times, and values (times, B, 3)."""
 
 
 def shown_bodies(trajectory: Trajectory) -> list[int]:
@@ -31,12 +33,16 @@ def controlled_bodies(trajectory: Trajectory) -> list[int]:
 
 def draw_states(trajectory: Trajectory) -> DataFigure:
     """Position, velocity and angular velocity of ``shown_bodies``."""
-    quantities = (
+    return draw_grid(trajectory, shown_bodies(trajectory), state_quantities(trajectory))
+
+
+def state_quantities(trajectory: Trajectory) -> list[Quantity]:
+    """Position, velocity and angular velocity."""
+    return [
         ("position", "m", trajectory.time, trajectory.position),
         ("velocity", "m/s", trajectory.time, trajectory.velocity),
         ("angular_velocity", "rad/s", trajectory.time, trajectory.angular_velocity),
-    )
-    return draw_grid(trajectory, shown_bodies(trajectory), quantities)
+    ]
 
 
 def draw_controls(trajectory: Trajectory) -> DataFigure | None:
@@ -44,16 +50,18 @@ def draw_controls(trajectory: Trajectory) -> DataFigure | None:
     bodies = controlled_bodies(trajectory)[:MOST_BODIES]
     if not bodies:
         return None
+    return draw_grid(trajectory, bodies, control_quantities(trajectory))
+
+
+def control_quantities(trajectory: Trajectory) -> list[Quantity]:
+    """Forces and torques on bodies, as far as any acts."""
     starts = trajectory.time[:-1]
     quantities = [("force", "N", starts, trajectory.force), ("torque", "N m", starts, trajectory.torque)]
-    acting = [quantity for quantity in quantities if np.any(quantity[3] != 0)]
-    return draw_grid(trajectory, bodies, acting)
+    return [quantity for quantity in quantities if np.any(quantity[3] != 0)]
 
 
-def draw_grid(
-    trajectory: Trajectory, bodies: Sequence[int], quantities: Sequence[tuple[str, str, Array, Array]]
-) -> DataFigure:
-    """Small multiples: a row for each body, a column for each quantity (name, unit, times, values), its x, y, z."""
+def draw_grid(trajectory: Trajectory, bodies: Sequence[int], quantities: Sequence[Quantity]) -> DataFigure:
+    """Small multiples: a row for each body, a column for each quantity, its x, y, z."""
     rows, columns = len(bodies), len(quantities)
     figure = DataFigure(figsize=(style.WIDTH, 0.75 + 1.75 * rows), layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, squeeze=False)

@@ -15,6 +15,7 @@ import matplotlib
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator, SymmetricalLogLocator
 
@@ -123,7 +124,9 @@ def picture(name: str, alt: str, figure: DataFigure | None) -> list[Picture]:
 def svg_text(figure: Figure) -> str:
     """A figure as SVG text that depends on its content alone."""
     buffer = io.StringIO()
-    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    # Figure.savefig gives the same, but lays the figure out and draws it a first time for nothing.
+    canvas: Any = FigureCanvasSVG(figure)
+    canvas.print_svg(buffer, metadata={"Date": None, "Creator": None})
     svg = re.sub(r"<!DOCTYPE[^>]*>\s*|<metadata>.*?</metadata>\s*", "", buffer.getvalue(), flags=re.DOTALL)
     svg = svg.replace("'DejaVu Sans'", FONTS).replace("font-weight: 700", "font-weight: 600")
     return re.sub(r" +\n|\n+", "\n", svg)
@@ -153,17 +156,27 @@ def use_numbers(axes: Axes) -> None:
         axis.set_major_formatter(FuncFormatter(number_label))
 
 
-def fit_scale(axes: Axes, which: str, values: Array) -> None:
-    """Linear where the numbers are of one size, logarithmic where not, symmetric-logarithmic where some are <= 0."""
+def scale_of(values: Array) -> float:
+    """0 for a linear axis, -1 for a logarithmic one, else the size up to which a symmetric-logarithmic one is linear.
+
+    Linear where the numbers are of one size, logarithmic where not, symmetric-logarithmic where some are <= 0.
+    """
     known = values[np.isfinite(values)]
     sizes = np.abs(known[known != 0])
     if sizes.size == 0 or sizes.max() < 30 * sizes.min():
+        return 0.0
+    return -1.0 if (known > 0).all() else float(max(np.quantile(sizes, 0.1), sizes.max() * 1e-6))
+
+
+def fit_scale(axes: Axes, which: str, values: Array) -> None:
+    """The axis that ``scale_of`` says."""
+    scale = scale_of(values)
+    if scale == 0:
         set_linear(axes, which)
-    elif (known > 0).all():
-        set_log(axes, which, known)
+    elif scale < 0:
+        set_log(axes, which, values[np.isfinite(values)])
     else:
-        linear = float(max(np.quantile(sizes, 0.1), sizes.max() * 1e-6))
-        set_symlog(axes, which, linear)
+        set_symlog(axes, which, scale)
 
 
 def axis_of(axes: Axes, which: str) -> matplotlib.axis.Axis:

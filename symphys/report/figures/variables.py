@@ -56,7 +56,7 @@ def draw_variables(run: Run) -> DataFigure | None:
 def draw_curves(axes: Axes, variable: VariableRecord) -> None:
     """The components of one variable against the number of the knot."""
     knots = np.arange(1, variable.value.shape[1] + 1, dtype=float)
-    colours = [*style.AXES, style.PURPLE, style.ORANGE, style.SKY]
+    colours = component_colours()
     names = component_names(variable)[: len(colours)]
     widths = [*style.AXIS_WIDTHS, 1.4, 1.4, 1.4]
     for component, (name, colour) in enumerate(zip(names, colours, strict=False)):
@@ -79,15 +79,25 @@ def draw_curves(axes: Axes, variable: VariableRecord) -> None:
     axes.margins(x=0.01)
 
 
-def draw_bounds(axes: Axes, variable: VariableRecord) -> None:
-    """Lines at bounds that are near the values."""
-    shown = np.concatenate([variable.value.ravel(), variable.guess.ravel()])
-    shown = shown[np.isfinite(shown)]
+def component_colours() -> list[str]:
+    """Of the components of a variable, in their order."""
+    return [*style.AXES, style.PURPLE, style.ORANGE, style.SKY]
+
+
+def near_bounds(variable: VariableRecord) -> Array:
+    """The bounds that are near the values, each once."""
+    shown = finite(np.concatenate([variable.value.ravel(), variable.guess.ravel()]))
     if not shown.size:
-        return
+        return shown
     room = max(float(np.ptp(shown)), 1e-9)
     bounds = np.unique(finite(np.concatenate([variable.lower.ravel(), variable.upper.ravel()])))
-    near = bounds[(bounds >= shown.min() - room) & (bounds <= shown.max() + room)]
+    near: Array = bounds[(bounds >= shown.min() - room) & (bounds <= shown.max() + room)]
+    return near
+
+
+def draw_bounds(axes: Axes, variable: VariableRecord) -> None:
+    """Lines at bounds that are near the values."""
+    near = near_bounds(variable)
     for bound in near:
         axes.axhline(bound, color=style.GROUND_EDGE, linewidth=1, linestyle=(0, (1, 2)))
     if near.size:

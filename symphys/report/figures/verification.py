@@ -22,14 +22,13 @@ MOST_TOUCHES = 150
 
 def draw_growth(growth: Growth, motion: Trajectory | None) -> DataFigure | None:
     """|dx_T/dx_t| against t on a logarithmic axis, a tick below where a contact begins; None without two numbers."""
-    known = np.isfinite(growth.factor) & (growth.factor > 0)
-    if known.sum() < 2:
+    time, factor = known_growth(growth)
+    if time.size < 2:
         return None
     figure = DataFigure(figsize=(style.WIDTH, HEIGHT), layout="constrained")
     axes = figure.subplots()
-    factor = growth.factor[known]
-    axes.plot(growth.time[known], factor, color=style.BODIES[0])
-    keep(axes, {TIME: growth.time[known], "growth of a change until the end": factor})
+    axes.plot(time, factor, color=style.BODIES[0])
+    keep(axes, {TIME: time, "growth of a change until the end": factor})
     low = 10 ** math.floor(math.log10(min(factor.min(), 1.0)))
     high = max(float(factor.max()) * 1.5, low * LEAST_RANGE)
     style.set_log(axes, "y", np.array([low, high]))
@@ -42,6 +41,12 @@ def draw_growth(growth: Growth, motion: Trajectory | None) -> DataFigure | None:
         mark_touches(axes, touches(motion))
         keep(axes, {"a contact begins at [s]": touches(motion)})
     return figure
+
+
+def known_growth(growth: Growth) -> tuple[Array, Array]:
+    """Times [s] and factors, as far as they are known."""
+    known = np.isfinite(growth.factor) & (growth.factor > 0)
+    return growth.time[known], growth.factor[known]
 
 
 def mark_end(axes: Axes, end: float) -> None:
@@ -76,17 +81,25 @@ def mark_touches(axes: Axes, times: Array) -> None:
         axes.vlines(times, 0, 0.05, transform=axes.get_xaxis_transform(), color=style.ORANGE, linewidth=1.2)
 
 
-def draw_energy(energy: Energy) -> DataFigure | None:
-    """Kinetic, potential and total energy against time; None where it was not recorded."""
+def energy_lines(energy: Energy) -> list[tuple[str, Array, str, float]]:
+    """Name, values [J], colour and width of each; nothing where no energy was recorded."""
     total = energy.kinetic + energy.potential
     if energy.time.size < 2 or not np.isfinite(total).any():
-        return None
-    figure = DataFigure(figsize=(style.WIDTH, HEIGHT + 0.25), layout="constrained")
-    axes = figure.subplots()
+        return []
     lines = [("kinetic", energy.kinetic, style.SKY, 1.2), ("potential", energy.potential, style.ORANGE, 1.2)]
     lines.append(("total", total, style.BODIES[0], 1.8))
     if np.any(energy.applied != 0):
         lines.append(("put in by forces", energy.applied, style.GREY, 1.0))
+    return lines
+
+
+def draw_energy(energy: Energy) -> DataFigure | None:
+    """Kinetic, potential and total energy against time; None where it was not recorded."""
+    lines = energy_lines(energy)
+    if not lines:
+        return None
+    figure = DataFigure(figsize=(style.WIDTH, HEIGHT + 0.25), layout="constrained")
+    axes = figure.subplots()
     keep(axes, {TIME: energy.time} | {f"energy {name} [J]": values for name, values, *_ in lines})
     for _, values, colour, width in lines:
         axes.plot(energy.time, values, color=colour, linewidth=width)

@@ -9,25 +9,33 @@ from symphys import files
 from symphys.findings import writing
 from symphys.findings.verdict import ACCEPTED
 from symphys.report.figures import style
-from symphys.report.figures.checks import MOST_CHECKS, draw_checks, ratios
+from symphys.report.figures.checks import MOST_CHECKS, MOST_DOTS, draw_checks, ratios
 from symphys.report.figures.convergence import draw_convergence
 from symphys.report.figures.style import Picture, write_figures
 from symphys.report.pages import comparison
+from symphys.report.pages.brief import BriefReader, with_trace
+from symphys.report.pages.comparison import page_links
 from symphys.report.pages.markup import Html, card, facts, figures, join, page, slug, table, tag
+from symphys.report.pages.rows import run_card, study_card
 from symphys.report.robots.strip import draw_strip
 from symphys.report.scene.animation import NUMBERS, animation
 from symphys.report.scene.motion import draw_motion
-from symphys.results.discovery import Study, read_all, studies
+from symphys.results.discovery import Entry, Study, read_all, sample, studies
 from symphys.results.drawable import OVERSIZED, drawable, oversized
 from symphys.results.file_names import FIGURES, GUESS, SCENE, TRAJECTORY
 from symphys.results.run import Run
 from symphys.results.scene import Scene, read_scene
 from symphys.results.text_files import ReportError
-from symphys.results.trajectories import read_trajectory
+from symphys.results.trajectories import POSES, read_trajectory
 from symphys.trajectory import Trajectory
 
 PAGE = "index.html"
 CLOSEST = "run that came closest"
+ROWS_MARK = 'class="rows"'
+MOST_STUDIES = 20
+"""Problems and settings that have a section each, at most; of more the page has tables only."""
+MOST_CURVES, LEAST_CURVES = 80, 5
+"""Runs whose convergence a page draws at most about, and at least of each solver."""
 
 
 def write_batch_report(batch_dir: Path) -> Path:
@@ -43,7 +51,7 @@ def write_batch_report(batch_dir: Path) -> Path:
     Raises:
         ReportError: there is no such folder, it holds no run folder, or it cannot be written to.
     """
-    runs, broken = read_all(batch_dir)
+    runs, broken = read_all(batch_dir, BriefReader(batch_dir))
     if not runs and not broken:
         raise ReportError(f"{batch_dir}: no run folder at or below it; `symphys solve --out` writes them")
     found = studies(runs)
@@ -52,22 +60,35 @@ def write_batch_report(batch_dir: Path) -> Path:
         tag("p", "Batch report", class_="kicker"),
         tag("h1", title),
         tag("p", comparison.summary(found, broken), class_="lead"),
-        *build_studies(found, batch_dir),
+        *(build_tables(found) if len(found) > MOST_STUDIES else build_studies(found, batch_dir)),
         comparison.broken_card(broken),
         provenance(runs),
         tag("footer", "Made by symphys from the run folders alone; make it again with “symphys report”."),
     ]
-    files.write_text(batch_dir / PAGE, page(title, join(parts), animated=any("<canvas" in part for part in parts)))
+    animated, rows = (any(mark in part for part in parts) for mark in ("<canvas", ROWS_MARK))
+    files.write_text(batch_dir / PAGE, page(title, join(parts), animated, rows))
     return batch_dir / PAGE
+
+
+def build_tables(found: Sequence[Study]) -> list[Html]:
+    """Many problems, or one under many settings, and all their runs: as tables."""
+    links = page_links([run for study in found for run in study.runs])
+    return [study_card(found, links, MOST_STUDIES), run_card(found, links)]
 
 
 def build_studies(found: Sequence[Study], root: Path) -> list[Html]:
     """The problems one after the other; with links to each and headings where there are several."""
     names = anchors(found)
     links = [tag("a", linked(study), href=f"#{anchor}") for study, anchor in zip(found, names, strict=True)]
-    several = len(found) > 1
-    parts = [build_study(s, root, NUMBERS // len(found), name, several) for s, name in zip(found, names, strict=True)]
-    return [tag("nav", *links, aria_label="Problems"), *parts] if several else parts
+    curves = max(MOST_CURVES // max(sum(len(study.entries) for study in found), 1), LEAST_CURVES)
+    runs = [run for study in found for run in study.runs]
+    long = any(len(entry.runs) > comparison.MOST_CHIPS for study in found for entry in study.entries)
+    every = run_card(found, page_links(runs)) if long else Html("")
+    if len(found) == 1:
+        return [build_study(found[0], root, NUMBERS, names[0], curves, every)]
+    room = NUMBERS // len(found)
+    parts = [build_study(study, root, room, name, curves) for study, name in zip(found, names, strict=True)]
+    return [tag("nav", *links, aria_label="Problems"), every, *parts]
 
 
 def linked(study: Study) -> str:
@@ -92,11 +113,22 @@ def anchors(found: Sequence[Study]) -> list[str]:
     return names
 
 
-def build_study(study: Study, root: Path, numbers: int, anchor: str, titled: bool) -> Html:
-    """Everything about one problem; ``titled`` where the page has several."""
+def build_study(study: Study, root: Path, numbers: int, anchor: str, curves: int, every: Html | None = None) -> Html:
+    """Everything about one problem.
+
+    Args:
+        study: the problem's runs, read for tables.
+        root: the folder of the batch.
+        numbers: that its motion takes at most.
+        anchor: of its section, and before the names of its figures.
+        curves: runs of a solver whose convergence is drawn, at most.
+        every: the table of all runs; None where the page has several problems.
+    """
+    titled, few = every is None, sample(study, curves)
+    whole = Study(few.problem, few.place, tuple(Entry(e.solver, tuple(map(with_trace, e.runs))) for e in few.entries))
     motion, guess, scene, why = best_motion(study.best)
     with style.paper():
-        converged = style.picture(f"{anchor}-convergence", "Objective and errors", draw_convergence(drawable(study)))
+        converged = style.picture(f"{anchor}-convergence", "Objective and errors", draw_convergence(drawable(whole)))
         checked = style.picture(f"{anchor}-checks", "Errors against tolerances", draw_checks(study))
         strip = draw_strip(motion, scene) if motion else None
         drawn = draw_motion(motion, scene, guess) if motion else None
@@ -114,9 +146,10 @@ def build_study(study: Study, root: Path, numbers: int, anchor: str, titled: boo
         tag("p", f"{study.problem}{place}", class_="kicker") if titled else "",
         tag("p", f"With {study.settings}.", class_="note") if study.settings else "",
         comparison.study_verdict(study),
-        tag("p", OVERSIZED, class_="note") if oversized(study) else "",
+        tag("p", OVERSIZED, class_="note") if oversized(whole) or oversized([r.objective for r in study.runs]) else "",
         card("Solvers", comparison.solver_table(study), note=comparison.table_note(study)),
-        card("Convergence", figures(converged, comparison.convergence_note(study))),
+        every or "",
+        card("Convergence", figures(converged, comparison.convergence_note(study, curves))),
         card("The motion", played, figures(moved), note=which),
         targets(study, checked),
         class_="study" if titled else None,
@@ -135,7 +168,7 @@ def best_motion(run: Run) -> tuple[Trajectory | None, Trajectory | None, Scene, 
     except ReportError:
         scene = Scene()
     try:
-        guess = read_trajectory(run.folder / GUESS)
+        guess = read_trajectory(run.folder / GUESS, POSES)
     except ReportError:
         guess = None
     return motion, guess, scene, ""
@@ -148,8 +181,11 @@ def targets(study: Study, pictures: list[Picture]) -> Html:
     caption = "Dots: single seeds; marks: their median, hollow where it misses; arrows go on beyond the axis."
     if hidden > 0:
         caption += f" Shown: the {MOST_CHECKS} of {len(found)} checks with the largest errors."
+    if any(len(entry.runs) > MOST_DOTS for entry in study.entries):
+        caption += f" Of more than {MOST_DOTS} seeds so many are dots; medians and ranges are of all."
     solvers = [entry.solver for entry in study.entries]
-    rows = [[name, *(comparison.check_cell(study, name, solver) for solver in solvers)] for name in found]
+    checks = comparison.checks_by_solver(study)
+    rows = [[name, *(comparison.check_cell(checks.get((name, solver), [])) for solver in solvers)] for name in found]
     content = table(["error, median over seeds", *solvers], rows, "t" + "n" * len(solvers), "Errors by name")
     return card("Targets and constraints", figures(pictures, caption), content if rows else "")
 

@@ -14,12 +14,14 @@ from symphys.report.figures import style
 from symphys.report.pages import words
 from symphys.report.pages.markup import ICONS, Html, banner, card, dot, join, pill, table, tag
 from symphys.results.discovery import Entry, Study, middle
-from symphys.results.result import smoothed
+from symphys.results.result import CheckRecord, smoothed
 from symphys.results.run import Run
 
 RUN_PAGE = "report.html"
 MOST_BROKEN = 50
 MOST_NAMED = 4
+MOST_CHIPS = 40
+"""Runs of a solver that have a chip each, at most; of more the page has a table."""
 NOTHING_TO_MEET = (
     "The problem states nothing to meet, and no solver converged: what was found is the best of what was tried."
 )
@@ -152,7 +154,11 @@ def least(study: Study, numbers: Sequence[float]) -> float:
 
 
 def seeds(entry: Entry) -> Html:
-    """A chip for each run, linked to its page if there is one."""
+    """A chip for each run, linked to its page if there is one; of many runs how many ended in which way."""
+    if len(entry.runs) > MOST_CHIPS:
+        counted = Counter(map(words.level, entry.runs))
+        chips = [pill(level, str(counted[level])) for level in ICONS if counted[level]]
+        return tag("span", *chips, tag("a", "all runs", href="#runs"), class_="seeds")
     return tag("span", *map(seed_chip, entry.runs), class_="seeds", style=f"min-width:{42 * min(len(entry.runs), 5)}px")
 
 
@@ -161,10 +167,23 @@ def seed_chip(run: Run) -> Html:
     level = words.level(run)
     content = join([tag("i", ICONS[level], aria_hidden="true"), str(run.seed)])
     label = f"{run.solver}, seed {run.seed}: {words.headline(run).lower()}"
-    if not (run.folder / RUN_PAGE).is_file():
+    link = page_link(run)
+    if not link:
         return tag("span", content, class_=f"pill {level}", title=label)
+    return tag("a", content, class_=f"pill {level}", href=link, title=label)
+
+
+def page_link(run: Run) -> str:
+    """Where the page of a run is, seen from that of the batch; empty if there is none."""
+    if not (run.folder / RUN_PAGE).is_file():
+        return ""
     place = f"{run.place}/{RUN_PAGE}" if run.place not in ("", ".") else RUN_PAGE
-    return tag("a", content, class_=f"pill {level}", href=quote(f"./{place}", errors="surrogateescape"), title=label)
+    return quote(f"./{place}", errors="surrogateescape")
+
+
+def page_links(runs: Sequence[Run]) -> dict[str, str]:
+    """``page_link`` by the places of runs."""
+    return {run.place: page_link(run) for run in runs}
 
 
 def statuses(entry: Entry) -> Html:
@@ -202,19 +221,29 @@ def stages_of(run: Run) -> str:
     return writing.listed([show(stage.smoothing) for stage in run.stages])
 
 
-def convergence_note(study: Study) -> str:
-    """The caption: what the figure does not show."""
+def convergence_note(study: Study, curves: int) -> str:
+    """The caption: what the figure does not show; ``curves``: runs of a solver that it shows at most."""
+    most = max(len(entry.runs) for entry in study.entries)
+    some = f"Drawn are {curves} of up to {most} runs of a solver, evenly among the seeds. " if most > curves else ""
     marked = any(len(entry.runs) > 1 for entry in study.entries)
     text = "Strong: the median over seeds; a run that has ended keeps its last value. " if marked else ""
-    text += "Errors below a thousandth of the tolerance are drawn there."
+    text = f"{some}{text}Errors below a thousandth of the tolerance are drawn there."
     if any(smoothed(run.stages) for run in study.runs):
         text += " Of a stage with smoothing only start and end are drawn, where they stand exactly."
     return text
 
 
-def check_cell(study: Study, name: str, solver: str) -> Html:
+def checks_by_solver(study: Study) -> dict[tuple[str, str], list[CheckRecord]]:
+    """The checks of all seeds, by their name and the solver."""
+    found: dict[tuple[str, str], list[CheckRecord]] = {}
+    for run in study.runs:
+        for check in run.checks:
+            found.setdefault((check.name, run.solver), []).append(check)
+    return found
+
+
+def check_cell(found: Sequence[CheckRecord]) -> Html:
     """The median error of one check for one solver, and how many seeds met it."""
-    found = [check for run in study.runs if run.solver == solver for check in run.checks if check.name == name]
     if not found:
         return Html(writing.DASH)
     met = sum(check.met for check in found)

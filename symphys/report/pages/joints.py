@@ -9,7 +9,7 @@ import numpy as np
 
 from symphys.findings.writing import listed, percent, several, show
 from symphys.report.figures.style import Picture, picture
-from symphys.report.pages.markup import Html, Part, card, figures, join, pill, table, tag
+from symphys.report.pages.markup import Drawn, Html, Part, card, figures, join, pill, table, tag
 from symphys.report.robots.gait import LOADED, draw_gait, stances, weight
 from symphys.report.robots.joint_figures import draw_joints, shown
 from symphys.report.robots.joint_use import Channel, channels, separation
@@ -36,7 +36,7 @@ def joint_pictures(trajectory: Trajectory, scene: Scene) -> list[Picture]:
     ]
 
 
-def joint_card(trajectory: Trajectory, scene: Scene, pictures: Mapping[str, Picture]) -> Html:
+def joint_card(trajectory: Trajectory, scene: Scene, pictures: Mapping[str, Drawn]) -> Html:
     """What joints and motors did; nothing without joints."""
     every = channels(trajectory, scene)
     drawn = [pictures[name] for name in ("joints", "motors") if name in pictures]
@@ -126,7 +126,7 @@ def share_words(channel: Channel) -> Html:
     return pill("fair", percent(channel.share)) if channel.share >= OFTEN else Html(percent(channel.share))
 
 
-def gait_card(trajectory: Trajectory, scene: Scene, pictures: Mapping[str, Picture]) -> Html:
+def gait_card(trajectory: Trajectory, scene: Scene, pictures: Mapping[str, Drawn]) -> Html:
     """When which foot stands; nothing where none comes down or leaves the ground."""
     if "gait" not in pictures:
         return Html("")

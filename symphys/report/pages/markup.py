@@ -7,15 +7,22 @@ import hashlib
 import html
 import re
 from collections.abc import Iterable, Sequence
+from functools import cache
 from pathlib import Path
 from urllib.parse import quote
 
+from symphys.report.charts.chart import Chart
+from symphys.report.charts.packed import pack, pack_json
 from symphys.report.figures.style import Picture
 from symphys.results.file_names import FIGURES
 
 VOID = frozenset({"br", "img", "input", "link", "meta"})
 HERE = Path(__file__).parents[1] / "static"
 SCRIPTS = ("geometry.js", "solids.js", "terrain.js", "painter.js", "joints.js", "animation.js")
+CHARTS, ROWS = ("numbers.js", "charts.js"), ("numbers.js", "rows.js")
+UNPACK = "unpack.js"
+PACKED = "packed"
+"""Class of what ``unpack.js`` unpacks."""
 ICONS = {"good": "✓", "fair": "!", "bad": "✕", "unknown": "?"}
 
 
@@ -80,9 +87,13 @@ def dot(colour: str) -> Html:
     return tag("span", class_="dot", style=f"background:{colour}", aria_hidden="true")
 
 
-def figures(pictures: Iterable[Picture], caption: Part = "") -> Html:
+Drawn = Picture | Chart
+"""What a page shows as a figure: drawn already, or by the page's own script."""
+
+
+def figures(pictures: Iterable[Drawn], caption: Part = "") -> Html:
     """Pictures embedded in the page, with one caption."""
-    parts = [figure(picture) for picture in pictures]
+    parts = [chart(picture) if isinstance(picture, Chart) else figure(picture) for picture in pictures]
     if parts and caption:
         parts.append(tag("p", caption, class_="caption"))
     return join(parts)
@@ -94,6 +105,18 @@ def figure(picture: Picture) -> Html:
     svg, data = (f"{FIGURES}/{quote(picture.name)}.{kind}" for kind in ("svg", "csv"))
     links = tag("figcaption", tag("a", "SVG", href=svg), " ", tag("a", "CSV", href=data, title="the numbers drawn"))
     return tag("figure", tag("img", alt=picture.alt, src=f"data:image/svg+xml;base64,{code}"), links)
+
+
+def chart(found: Chart) -> Html:
+    """The place of a chart, and its numbers, compressed."""
+    data = tag("script", Html(pack_json(found.to_json())), type="application/json", class_=PACKED)
+    return tag("figure", tag("div", role="img", aria_label=found.alt), data, class_="chart", data_name=found.name)
+
+
+def embedded(data: str) -> Html:
+    """A text of JSON for scripts of the page, harmless in HTML whatever it holds."""
+    inert = data.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
+    return tag("script", Html(inert), type="application/json")
 
 
 def stats(pairs: Iterable[tuple[str, str]]) -> Html:
@@ -112,21 +135,54 @@ def fold(title: str, text: str) -> Html:
     return tag("details", tag("summary", title), tag("pre", text)) if text.strip() else Html("")
 
 
-def page(title: str, body: Part, animated: bool = False) -> str:
-    """The whole document: no part of it is loaded from elsewhere, and no script but our own may run."""
-    script = "".join((HERE / name).read_text(encoding="utf-8") for name in SCRIPTS) if animated else ""
-    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
-    allowed = f"'sha256-{digest}'" if animated else "'none'"
-    policy = f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src {allowed}"
+def page(title: str, body: Part, animated: bool = False, rows: bool = False) -> str:
+    """The whole document: no part of it is loaded from elsewhere, and no script but our own may run.
+
+    ``animated``: whether it plays a motion; ``rows``: whether it has a table that is shown a page at a time.
+    """
+    script = read_static(*(SCRIPTS if animated else ()), *(ROWS if rows else ()))
+    scripts = tag("script", Html(script)) if script else Html("")
+    return document(title, body, scripts, [script] if script else [])
+
+
+def light_page(title: str, body: Part, animated: bool) -> str:
+    """The same with its scripts compressed, among them what draws charts."""
+    first, then, packed = light_scripts(animated)
+    held = tag("script", Html(packed), type="text/plain", class_=PACKED, id="scripts")
+    return document(title, body, join([held, tag("script", Html(first))]), [first, then])
+
+
+@cache
+def light_scripts(animated: bool) -> tuple[str, str, str]:
+    """What unpacks, what is unpacked, and that compressed."""
+    then = squeezed(read_static(*(SCRIPTS if animated else ()), *CHARTS))
+    return read_static(UNPACK), then, pack(then)
+
+
+def squeezed(script: str) -> str:
+    """The script without indentation and comments that end a line."""
+    return "\n".join(filter(None, (re.sub(r"(^|\s+)// [^\"'`]*$", "", line).strip() for line in script.split("\n"))))
+
+
+@cache
+def read_static(*names: str) -> str:
+    """Files of the page, one after the other."""
+    return "".join((HERE / name).read_text(encoding="utf-8") for name in names)
+
+
+def document(title: str, body: Part, scripts: Html, allowed: Sequence[str]) -> str:
+    """Head and body; ``allowed``: the texts of the scripts that may run."""
+    digests = [base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii") for script in allowed]
+    sources = " ".join(f"'sha256-{digest}'" for digest in digests) or "'none'"
+    policy = f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src {sources}"
     head = tag(
         "head",
         tag("meta", charset="utf-8"),
         tag("meta", http_equiv="Content-Security-Policy", content=policy),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
         tag("title", title),
-        tag("style", Html((HERE / "page.css").read_text(encoding="utf-8"))),
+        tag("style", Html(read_static("page.css"))),
     )
-    scripts = tag("script", Html(script)) if animated else Html("")
     return "<!doctype html>\n" + tag("html", head, tag("body", tag("main", body), scripts), lang="en") + "\n"
 
 

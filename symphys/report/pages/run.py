@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from symphys import files
 from symphys.findings import writing
+from symphys.report.charts.motion import motion_charts
+from symphys.report.charts.run import run_charts
 from symphys.report.figures import style
 from symphys.report.figures.contacts import by_surfaces, draw_contacts, shown_pairs
 from symphys.report.figures.history import draw_run
@@ -17,7 +20,7 @@ from symphys.report.figures.variables import draw_variables
 from symphys.report.figures.verification import draw_energy, draw_growth
 from symphys.report.pages import sections
 from symphys.report.pages.joints import gait_card, joint_card, joint_pictures
-from symphys.report.pages.markup import Html, card, figures, join, page, tag
+from symphys.report.pages.markup import Drawn, Html, card, figures, join, light_page, page, tag
 from symphys.report.pages.stages import stage_card
 from symphys.report.pages.verification import trusted
 from symphys.report.scene.motion import draw_motion
@@ -29,7 +32,7 @@ from symphys.results.result import smoothed
 from symphys.results.run import Run, read_run
 from symphys.results.scene import Scene, read_scene
 from symphys.results.text_files import ReportError
-from symphys.results.trajectories import read_trajectory
+from symphys.results.trajectories import POSES, read_trajectory
 from symphys.trajectory import Trajectory
 
 PAGE = "report.html"
@@ -63,11 +66,31 @@ def write_run_report(run_dir: Path) -> Path:
     shown = files.modified(run_dir / RESULT)
     run, recording, pictures = drawn(run_dir)
     write_figures(run_dir / FIGURES, pictures.values())
-    body = build(run, recording, pictures)
-    title = f"{run.title}: {run.solver}, seed {run.seed}"
-    files.write_text(run_dir / PAGE, page(title, body, animated=recording.trajectory is not None))
+    body = join([build(run, recording, pictures), sections.FOOTER])
+    files.write_text(run_dir / PAGE, page(title_of(run), body, animated=recording.trajectory is not None))
     files.date(run_dir / PAGE, shown)
     return run_dir / PAGE
+
+
+def write_light_report(run_dir: Path) -> Path:
+    """Write a light report.html: all but figures as files; its curves and its motion are drawn in the browser.
+
+    It takes some 20 ms, and 50 kB on disk. Arguments, result and errors are those of ``write_run_report``.
+    """
+    shown = files.modified(run_dir / RESULT)
+    run, recording = read_recorded(run_dir)
+    charts: dict[str, Drawn] = {chart.name: chart for chart in run_charts(drawable(run), recording.trajectory)}
+    if recording.trajectory is not None:
+        charts |= {chart.name: chart for chart in motion_charts(recording.trajectory, recording.scene)}
+    body = join([build(run, recording, charts), sections.LIGHT])
+    files.write_text(run_dir / PAGE, light_page(title_of(run), body, animated=recording.trajectory is not None))
+    files.date(run_dir / PAGE, shown)
+    return run_dir / PAGE
+
+
+def title_of(run: Run) -> str:
+    """Of the page."""
+    return f"{run.title}: {run.solver}, seed {run.seed}"
 
 
 def write_run_figures(run_dir: Path, folder: Path) -> list[Path]:
@@ -85,21 +108,25 @@ def write_run_figures(run_dir: Path, folder: Path) -> list[Path]:
 
 def drawn(run_dir: Path) -> tuple[Run, RecordedMotion, dict[str, Picture]]:
     """A run folder as it was read, and every figure of its page by name."""
+    run, recording = read_recorded(run_dir)
+    with style.paper():
+        return run, recording, draw(drawable(run), recording)
+
+
+def read_recorded(run_dir: Path) -> tuple[Run, RecordedMotion]:
+    """A run folder as it was read; ReportError if it is none."""
     if not run_dir.is_dir():
         raise ReportError(f"{run_dir}: there is no such folder")
     if not is_run([path.name for path in run_dir.iterdir()]):
         raise ReportError(f"{run_dir}: no run folder; one holds result.json, or config.json and problem.toml")
-    run = read_run(run_dir, run_dir)
-    recording = read_motions(run_dir)
-    with style.paper():
-        return run, recording, draw(drawable(run), recording)
+    return read_run(run_dir, run_dir), read_motions(run_dir)
 
 
 def read_motions(folder: Path) -> RecordedMotion:
     """Read what there is; the guess is no loss where it is missing."""
     faults: list[str] = []
     trajectory = read_or_note(folder / TRAJECTORY, faults)
-    guess = read_or_note(folder / GUESS, faults)
+    guess = read_or_note(folder / GUESS, faults, POSES)
     try:
         scene = read_scene(folder / SCENE)
     except ReportError as error:
@@ -108,10 +135,10 @@ def read_motions(folder: Path) -> RecordedMotion:
     return RecordedMotion(trajectory, guess, scene, tuple(faults))
 
 
-def read_or_note(path: Path, faults: list[str]) -> Trajectory | None:
-    """A recorded motion; None, with a sentence in ``faults``, if there is none."""
+def read_or_note(path: Path, faults: list[str], only: Sequence[str] = ()) -> Trajectory | None:
+    """A recorded motion, or ``only`` some arrays of it; None, with a sentence in ``faults``, if there is none."""
     try:
-        return read_trajectory(path)
+        return read_trajectory(path, only)
     except ReportError as error:
         faults.append(str(error))
         return None
@@ -135,7 +162,7 @@ def draw(run: Run, recording: RecordedMotion) -> dict[str, Picture]:
     return {picture.name: picture for picture in made}
 
 
-def build(run: Run, recording: RecordedMotion, pictures: dict[str, Picture]) -> Html:
+def build(run: Run, recording: RecordedMotion, pictures: Mapping[str, Drawn]) -> Html:
     """The page, from the verdict to the sources."""
     cards = [
         sections.checks(run),
@@ -154,7 +181,7 @@ def build(run: Run, recording: RecordedMotion, pictures: dict[str, Picture]) -> 
     ]
     header = sections.header(run, cards)
     note = [tag("p", OVERSIZED, class_="note")] if oversized(run) else []
-    return join([header, *note, sections.key_numbers(run), *cards, sections.FOOTER])
+    return join([header, *note, sections.key_numbers(run), *cards])
 
 
 def how_drawn(run: Run) -> str:
@@ -162,19 +189,19 @@ def how_drawn(run: Run) -> str:
     return f"Pale: the lowest so far{' in its stage' * smoothed(run.stages)}. Work counts one rollout as 1."
 
 
-def motion_card(run: Run, recording: RecordedMotion, pictures: dict[str, Picture]) -> Html:
+def motion_card(run: Run, recording: RecordedMotion, pictures: Mapping[str, Drawn]) -> Html:
     """The motion; nothing where there is neither a result nor a motion."""
     if recording.trajectory is None and not run.readable:
         return Html("")
     return sections.motion(recording.trajectory, recording.scene, recording.guess, pictures, recording.faults)
 
 
-def only(pictures: dict[str, Picture], name: str) -> list[Picture]:
+def only(pictures: Mapping[str, Drawn], name: str) -> list[Drawn]:
     """The picture of that name, if it was made."""
     return [pictures[name]] if name in pictures else []
 
 
-def motion_cards(recording: RecordedMotion, pictures: dict[str, Picture]) -> list[Html]:
+def motion_cards(recording: RecordedMotion, pictures: Mapping[str, Drawn]) -> list[Html]:
     """Joints, gait, states, controls and contacts over time."""
     motion = recording.trajectory
     if motion is None:

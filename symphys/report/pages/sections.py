@@ -5,19 +5,18 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from symphys.findings import writing
 from symphys.findings.writing import show
 from symphys.report.figures import style
-from symphys.report.figures.style import Picture
 from symphys.report.figures.variables import component_names, knotted
 from symphys.report.pages import words
-from symphys.report.pages.markup import Html, banner, card, facts, figures, fold, join, pill, stats, table, tag
+from symphys.report.pages.markup import Drawn, Html, banner, card, facts, figures, fold, join, pill, stats, table, tag
 from symphys.report.robots.branches import is_large
-from symphys.report.scene.animation import animation
+from symphys.report.scene.animation import animation, light_animation
 from symphys.results.case_name import settings_words
 from symphys.results.result import CheckRecord, Result, VariableRecord
 from symphys.results.run import Run
@@ -26,6 +25,14 @@ from symphys.results.trace import OUTPUT
 from symphys.trajectory import Array, Trajectory
 
 FOOTER = tag("footer", "Made by symphys from the files of the run folder; make it again with “symphys report”.")
+LIGHT = join(
+    [
+        tag("p", "This browser cannot unpack the curves and the motion of this page; “symphys report” of the run "
+            "folder makes the page with figures.", class_="note unpacked", hidden=""),
+        tag("footer", "Made by symphys from the files of the run folder; a light page of a large batch. “symphys "
+            "report” of the run folder makes the full one, with its figures as SVG and CSV."),
+    ]
+)  # fmt: skip
 MOST_ROWS = 60
 LOG_TAIL = 20_000
 HOW_JUDGED = (
@@ -147,20 +154,22 @@ def motion(
     trajectory: Trajectory | None,
     scene: Scene,
     guess: Trajectory | None,
-    pictures: dict[str, Picture],
+    pictures: Mapping[str, Drawn],
     faults: Sequence[str],
 ) -> Html:
-    """The motion played and drawn, or why there is none."""
+    """The motion played and drawn, or why there is none; on a light page it is played only."""
     notes = tag("p", "Not read: " + "; ".join(faults) + ".", class_="note") if faults else Html("")
     if trajectory is None:
         return card("The motion", tag("p", "This run recorded no motion."), notes, anchor="motion")
+    if "motion" not in pictures:
+        return card("The motion", light_animation(trajectory, scene, guess), notes, anchor="motion")
     how = HOW_ROBOTS_DRAWN if is_large(trajectory, scene) else HOW_DRAWN
     drawn = figures([pictures["motion"]], f"{how} {HOW_JOINTS_DRAWN}" if scene.joints else how)
     strip = figures([pictures["strip"]], HOW_STRIP_DRAWN) if "strip" in pictures else Html("")
     return card("The motion", animation(trajectory, scene, guess), strip, drawn, notes, anchor="motion")
 
 
-def found(run: Run, pictures: dict[str, Picture]) -> Html:
+def found(run: Run, pictures: Mapping[str, Drawn]) -> Html:
     """Variables with one knot as a table, those with many as curves."""
     rows = [row for variable in run.variables if variable.value.shape[1] == 1 for row in variable_rows(variable)]
     more = tag("p", f"and {len(rows) - MOST_ROWS} more, in result.json", class_="note") if len(rows) > MOST_ROWS else ""

@@ -10,8 +10,7 @@ from symphys.findings.contacts import sliding
 from symphys.findings.examination import Examination
 from symphys.findings.levels import MARKS, Judged
 from symphys.findings.writing import show
-from symphys.report.figures.style import Picture
-from symphys.report.pages.markup import Html, Part, card, figures, pill, table, tag
+from symphys.report.pages.markup import Drawn, Html, Part, card, figures, pill, table, tag
 from symphys.results.run import Run
 
 NOT_EXAMINED = "This run was not examined; “symphys check --at” its folder examines how far to trust it."
@@ -30,7 +29,7 @@ HOW_BALANCED = (
 HOW_REFINED = "The same variables, simulated otherwise: the answers, and in percent how much the gradients change."
 
 
-def trusted(run: Run, pictures: Mapping[str, Picture]) -> Html:
+def trusted(run: Run, pictures: Mapping[str, Drawn]) -> Html:
     """Advice, findings, figures, and the refinements as numbers."""
     judged = run.judged
     lines = findings(run.examination, judged)
@@ -75,6 +74,6 @@ def refined(trust: Examination, judged: Judged) -> Html:
     )
 
 
-def drawn(pictures: Mapping[str, Picture], name: str, caption: Part) -> Html:
+def drawn(pictures: Mapping[str, Drawn], name: str, caption: Part) -> Html:
     """A figure with its caption, if it was made."""
     return figures([pictures[name]] if name in pictures else [], caption)

@@ -80,7 +80,7 @@ def draw_gait(trajectory: Trajectory, scene: Scene) -> DataFigure | None:
     found = stances(trajectory, scene)
     if not has_gait(found):
         return None
-    rows = sorted(sorted(found, key=changes, reverse=True)[:MOST_ROWS], key=lambda stance: stance.body)
+    rows = shown_stances(found)
     figure = DataFigure(figsize=(style.WIDTH, 0.75 + ROW * len(rows)), layout="constrained")
     axes = figure.subplots()
     colour = colours(trajectory, scene)
@@ -95,6 +95,11 @@ def draw_gait(trajectory: Trajectory, scene: Scene) -> DataFigure | None:
     axes.spines["left"].set_visible(False)
     style.set_linear(axes, "x", 10)
     return figure
+
+
+def shown_stances(found: list[Stance]) -> list[Stance]:
+    """The bodies that get a row: those that come down most often, in the file's order."""
+    return sorted(sorted(found, key=changes, reverse=True)[:MOST_ROWS], key=lambda stance: stance.body)
 
 
 def draw_row(axes: Axes, row: int, time: Array, stance: Stance, colour: str) -> None:

@@ -93,9 +93,7 @@ def draw_grid(grid: Grid, draw: Draw, trajectory: Trajectory, scene: Scene) -> D
 def draw_value(axes: Axes, time: Array, channel: Channel, colour: str) -> None:
     """The coordinate, what is beyond its limits, and a servo's target, dashed."""
     shown_values = channel.value if channel.target is None else np.concatenate([channel.value, channel.target])
-    low, high = axis_range(
-        shown_values, [channel.joint.lower, channel.joint.upper], LEAST_TURN if channel.turns else LEAST_SLIDE
-    )
+    low, high = axis_range(shown_values, [channel.joint.lower, channel.joint.upper], least_range(channel))
     for edge, beyond in ((channel.joint.lower, low), (channel.joint.upper, high)):
         if low <= edge <= high:
             axes.axhspan(min(edge, beyond), max(edge, beyond), color=BEYOND, linewidth=0, zorder=0.5)
@@ -147,6 +145,11 @@ def draw_torque(axes: Axes, time: Array, channel: Channel, colour: str) -> None:
     dress(axes, f"{channel.name} [{channel.torque_unit}]", low, high)
     if channel.share > 0:
         axes.set_title(percent(channel.share), loc="right", color=FULL)
+
+
+def least_range(channel: Channel) -> float:
+    """[rad] or [m]: what the axis of a coordinate shows at least."""
+    return LEAST_TURN if channel.turns else LEAST_SLIDE
 
 
 def axis_range(values: Array, edges: list[float], least: float) -> tuple[float, float]:

@@ -6,8 +6,9 @@ import json
 
 import numpy as np
 
+from symphys.report.charts.packed import pack_json
 from symphys.report.figures import style
-from symphys.report.pages.markup import Html, dot, join, tag
+from symphys.report.pages.markup import PACKED, Html, dot, embedded, join, tag
 from symphys.report.robots.branches import colours, keys, linked, traced
 from symphys.report.robots.joint_positions import SQUARE, axes_of, drawable
 from symphys.report.scene.views import SIDE_YZ, TOP, choose_views, reach, solids_of
@@ -17,6 +18,8 @@ from symphys.trajectory import Array, Trajectory
 
 NUMBERS = 60_000
 """How many numbers a page carries at most for one motion, about 400 kB."""
+LIGHT_NUMBERS = 10_000
+"""The same of a light page; the player goes evenly from one pose to the next."""
 MOST_FRAMES = 600
 GUESS_POINTS = 120
 SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
@@ -27,15 +30,27 @@ LEAST_PLAY = 3.0
 def animation(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = None, numbers: int = NUMBERS) -> Html:
     """A canvas with play, time and view controls, and its data; works without any network."""
     data = json.dumps(motion_data(trajectory, scene, guess, numbers), separators=(",", ":"), allow_nan=False)
-    inert = data.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
+    without = "The motion plays only with JavaScript; the figure below shows it without."
+    return player(trajectory, scene, without, embedded(data))
+
+
+def light_animation(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = None) -> Html:
+    """The same for a light page: fewer numbers, compressed."""
+    data = pack_json(motion_data(trajectory, scene, guess, LIGHT_NUMBERS))
+    held = tag("script", Html(data), type="application/json", class_=PACKED)
+    return player(trajectory, scene, "The motion plays only with JavaScript.", held)
+
+
+def player(trajectory: Trajectory, scene: Scene, without: str, data: Html) -> Html:
+    """The element; ``without``: what is said where no script runs."""
     legend = [join([dot(colour), style.short(name, 24)]) for name, colour in keys(trajectory, scene)]
     return tag(
         "div",
         tag("canvas", tabindex="0", role="img", aria_label="The motion, played; drag to turn"),
         tag("div", *(tag("span", part) for part in legend), class_="legend") if legend else "",
         controls(float(trajectory.time[-1] - trajectory.time[0]), follow_data(trajectory, scene) is not None),
-        tag("noscript", "The motion plays only with JavaScript; the figure below shows it without."),
-        tag("script", Html(inert), type="application/json"),
+        tag("noscript", without),
+        data,
         class_="animation",
     )
 

@@ -1,0 +1,132 @@
+"""All pages of a folder of runs: those of the runs, then that of the batch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from symphys import files
+from symphys.report.making.page import AUTO, PageFault, attempt, is_light
+from symphys.report.making.pool import make_run_pages
+from symphys.report.pages.batch import PAGE as BATCH_PAGE
+from symphys.report.pages.batch import write_batch_report
+from symphys.report.pages.run import PAGE
+from symphys.results.discovery import run_folders
+from symphys.results.file_names import RESULT
+from symphys.results.text_files import ReportError
+
+MOST_NAMED = 3
+
+Told = Callable[[int], None]
+"""Receives how many pages of runs are done; all of them: that of the batch begins."""
+
+
+@dataclass(frozen=True)
+class MadePages:
+    """What came of it.
+
+    Attributes:
+        page: that of the batch; of a single run folder its own. It is not new where ``faults`` names it.
+        runs: the pages of runs, in their order.
+        light: whether these pages are light.
+        faults: the pages that could not be made.
+    """
+
+    page: Path
+    runs: tuple[Path, ...]
+    light: bool
+    faults: tuple[PageFault, ...]
+
+
+def outdated(folder: Path) -> bool:
+    """Whether the page of a run folder is missing, or of another result, whose time it has; not without a result."""
+    source = files.modified(folder / RESULT)
+    return source is not None and files.modified(folder / PAGE) != source
+
+
+@dataclass(frozen=True)
+class WantedPages:
+    """The pages to make.
+
+    Attributes:
+        root: the folder of the batch.
+        runs: run folders at or below it.
+        batch: whether the page of the batch is made too.
+    """
+
+    root: Path
+    runs: tuple[Path, ...]
+    batch: bool = True
+
+
+def wanted_below(root: Path, only_new: bool = False) -> WantedPages:
+    """All pages at or below a folder; ``only_new``: of runs those that are ``outdated``. ReportError without a run."""
+    below = run_folders(root)
+    if not below:
+        raise ReportError(f"{root}: no run folder at or below it; `symphys solve --out` writes them")
+    runs = [folder for folder in below if outdated(folder)] if only_new else below
+    return WantedPages(root, tuple(runs), below != [root])
+
+
+def make_pages(wanted: WantedPages, kind: str = AUTO, jobs: int = 1, tell: Told = lambda _: None) -> MadePages:
+    """Make the pages of runs, then that of the batch, which links to them.
+
+    Args:
+        wanted: which.
+        kind: "full", "light", or "auto": light where more than ``MOST_FULL`` pages are made at once.
+        jobs: how many processes make them.
+        tell: receives how far it is.
+
+    Raises:
+        ReportError: there is no such kind. Pages that cannot be made are faults instead.
+    """
+    light = is_light(kind, len(wanted.runs))
+    faults: dict[Path, PageFault] = {}
+    over = 0
+
+    def done(folder: Path, fault: PageFault | None) -> None:
+        nonlocal over
+        over += 1
+        if fault is not None:
+            faults[folder] = fault
+        tell(over)
+
+    make_run_pages(wanted.runs, light, jobs, done)
+    made = tuple(folder / PAGE for folder in wanted.runs if folder not in faults)
+    found = [faults[folder] for folder in wanted.runs if folder in faults]
+    tell(len(wanted.runs))
+    if not wanted.batch:
+        return MadePages(wanted.root / PAGE, made, light, tuple(found))
+    if fault := attempt(wanted.root / BATCH_PAGE, lambda: write_batch_report(wanted.root)):
+        found.append(fault)
+    return MadePages(wanted.root / BATCH_PAGE, made, light, tuple(found))
+
+
+def report(folder: str | Path, pages: str = AUTO, jobs: int = 1) -> Path:
+    """Make the report of a run folder, or of all runs below a folder, again. Also called as ``symphys.report``.
+
+    Args:
+        folder: what ``solve`` or ``solve_all`` with a ``folder``, or ``symphys solve --out``, has written.
+        pages: of runs: "full" has its figures as files too; "light" draws its curves in the browser, and
+            takes a twentieth of the time and a tenth of the space; "auto" is light for more than 50 runs.
+        jobs: how many processes make the pages. A script that asks for several needs
+            ``if __name__ == "__main__":`` around its own work.
+
+    Returns:
+        The page of the batch, index.html, which links to those of the runs; of a run folder its own, report.html.
+
+    Raises:
+        ReportError: there is no such folder, it holds no run folder, or a page cannot be made; all others are then.
+
+    Example:
+        >>> import symphys
+        >>> solution = symphys.solve("ball_throw", "least_squares", backend="casadi", folder="reports")
+        >>> symphys.report("reports").name
+        'index.html'
+    """
+    made = make_pages(wanted_below(Path(folder)), pages, jobs)
+    if made.faults:
+        more = f"; and {len(made.faults) - MOST_NAMED} more" if len(made.faults) > MOST_NAMED else ""
+        raise ReportError("; ".join(map(str, made.faults[:MOST_NAMED])) + more)
+    return made.page

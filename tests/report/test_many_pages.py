@@ -1,0 +1,150 @@
+"""Many pages at once: one that fails keeps no other away, workers change no byte, an end leaves whole pages only."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import shutil
+import signal
+from pathlib import Path
+
+import pytest
+
+import symphys.report
+from symphys.report import WantedPages, make_pages, outdated, wanted_below
+from symphys.report.making import batch as making
+from symphys.report.making import page as single
+from symphys.report.making import pool
+from symphys.report.making.page import MOST_FULL, PageFault, is_light
+from symphys.results.text_files import ReportError
+
+PAGE = "report.html"
+
+
+@pytest.fixture
+def runs(made: Path, tmp_path: Path) -> list[Path]:
+    """Six run folders without a motion, which are quick to draw."""
+    folders = [tmp_path / "many" / "throw" / f"gradient-seed{seed}" for seed in range(6)]
+    for folder in folders:
+        shutil.copytree(
+            made / "ball_throw" / "gradient-seed0", folder, ignore=shutil.ignore_patterns("*.npz", "figures")
+        )
+    return folders
+
+
+def block(folder: Path) -> Path:
+    """Put a folder where the page has to go."""
+    (folder / PAGE / "inside").mkdir(parents=True)
+    return folder / PAGE
+
+
+def is_whole(page: Path) -> bool:
+    return page.read_text(encoding="utf-8").endswith("</html>\n")
+
+
+@pytest.fixture
+def two_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Start them however few pages there are."""
+    monkeypatch.setattr(pool, "WORTH", {False: 1, True: 1})
+
+
+def test_a_page_that_cannot_be_made_is_named_and_the_others_are_made(runs: list[Path]) -> None:
+    blocked = block(runs[2])
+    made = make_pages(wanted_below(runs[0].parents[1]), "light")
+    assert [str(fault.page) for fault in made.faults] == [str(blocked)]
+    assert str(blocked) in str(made.faults[0]) and "could not be made: " in str(made.faults[0])
+    assert list(made.runs) == [folder / PAGE for folder in runs if folder != runs[2]]
+    assert all(map(is_whole, [*made.runs, made.page]))
+    with pytest.raises(ReportError, match="gradient-seed2"):
+        symphys.report(runs[0].parents[1], pages="light")
+
+
+def test_any_error_is_a_fault_with_its_kind(runs: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    draw = single.write_light_report
+
+    def fails(folder: Path) -> Path:
+        if folder == runs[0]:
+            raise ZeroDivisionError("by nothing")
+        return draw(folder)
+
+    monkeypatch.setattr(single, "write_light_report", fails)
+    monkeypatch.setattr(making, "write_batch_report", lambda root: 1 / 0)
+    made = make_pages(wanted_below(runs[0].parents[1]), "light")
+    assert [fault.reason for fault in made.faults] == [
+        "ZeroDivisionError: by nothing",
+        "ZeroDivisionError: division by zero",
+    ]
+    assert [fault.page.name for fault in made.faults] == [PAGE, "index.html"]
+    assert len(made.runs) == 5
+
+
+@pytest.mark.usefixtures("two_workers")
+def test_workers_change_no_byte_and_name_what_fails(runs: list[Path]) -> None:
+    for folder in runs:
+        assert single.make_run_page(folder, light=True) is None
+    alone = {folder: (folder / PAGE).read_bytes() for folder in runs}
+    for folder in runs:
+        (folder / PAGE).unlink()
+    blocked = block(runs[3])
+    told: list[int] = []
+    made = make_pages(WantedPages(runs[0].parents[1], tuple(runs), batch=False), "light", 2, told.append)
+    assert [fault.page for fault in made.faults] == [blocked]
+    assert {page.parent: page.read_bytes() for page in made.runs} == {f: alone[f] for f in runs if f != runs[3]}
+    assert told[-1] == 6 and sorted(told) == told
+    assert not multiprocessing.active_children()
+
+
+@pytest.mark.usefixtures("two_workers")
+def test_a_worker_that_dies_fails_its_page_only(runs: list[Path]) -> None:
+    """Killed after the first page; who takes its place makes the rest."""
+    found: dict[Path, PageFault | None] = {}
+
+    def done(folder: Path, fault: PageFault | None) -> None:
+        if not found:
+            for child in multiprocessing.active_children():
+                assert child.pid is not None
+                os.kill(child.pid, signal.SIGKILL)
+        found[folder] = fault
+
+    pool.make_run_pages(runs, light=True, jobs=2, done=done)
+    assert set(found) == set(runs)
+    died = [folder for folder, fault in found.items() if fault is not None]
+    assert 1 <= len(died) <= 2
+    assert all("died" in found[folder].reason for folder in died)  # type: ignore[union-attr]
+    assert all(is_whole(folder / PAGE) for folder in runs if found[folder] is None)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.usefixtures("two_workers")
+def test_an_interruption_leaves_whole_pages_only(runs: list[Path], jobs: int) -> None:
+    def interrupt(folder: Path, fault: PageFault | None) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        pool.make_run_pages(runs, light=True, jobs=jobs, done=interrupt)
+    pages = [folder / PAGE for folder in runs if (folder / PAGE).exists()]
+    assert 1 <= len(pages) < len(runs)
+    assert all(map(is_whole, pages))
+    assert not [path for folder in runs for path in folder.iterdir() if path.name.startswith(".")]
+    assert not multiprocessing.active_children()
+
+
+def test_which_pages_are_light() -> None:
+    assert [is_light("auto", count) for count in (1, MOST_FULL, MOST_FULL + 1)] == [False, False, True]
+    assert is_light("light", 1) and not is_light("full", 10_000)
+    with pytest.raises(ReportError, match="auto, full, light"):
+        is_light("small", 1)
+
+
+def test_only_what_is_new(runs: list[Path], tmp_path: Path) -> None:
+    (tmp_path / "nothing").mkdir()
+    root = runs[0].parents[1]
+    make_pages(WantedPages(root, tuple(runs[:4]), batch=False), "light")
+    os.utime(runs[1] / "result.json", (2**31, 2**31))
+    (runs[5] / "result.json").unlink()
+    assert [folder for folder in runs if outdated(folder)] == [runs[1], runs[4]]
+    wanted = wanted_below(root, only_new=True)
+    assert wanted.runs == (runs[1], runs[4]) and wanted.batch
+    assert not wanted_below(runs[0], only_new=True).batch
+    with pytest.raises(ReportError, match="no run folder"):
+        wanted_below(tmp_path / "nothing")
