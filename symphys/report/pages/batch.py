@@ -86,7 +86,7 @@ def build_studies(found: Sequence[Study], root: Path) -> list[Html]:
     every = run_card(found, page_links(runs)) if long else Html("")
     if len(found) == 1:
         return [build_study(found[0], root, NUMBERS, names[0], curves, every)]
-    room = NUMBERS // len(found)
+    room = NUMBERS // max(len(found), 1)
     parts = [build_study(study, root, room, name, curves) for study, name in zip(found, names, strict=True)]
     return [tag("nav", *links, aria_label="Problems"), every, *parts]
 
