@@ -76,6 +76,7 @@ def run_batch(
             side_by_side(waiting, queue, processes, transcribe, ledger, halt, limits)
         else:
             Here(waiting, queue, transcribe, ledger, halt, limits).run(multi_start)
+        ledger.close()
     left = any(result is None or result.interrupted for result in ledger.results)
     return BatchResult(tuple(ledger.results), stop.requested, halt.spent and left)
 

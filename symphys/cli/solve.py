@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import sys
 from collections.abc import Callable, Mapping
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from symphys import threads
+from symphys import files, threads
 from symphys.cli.arguments import (
     backend_option,
     complete_problem,
@@ -127,6 +128,7 @@ def solve(
     for problem in problems:
         if note := many_pairs(problem.name, len(problem.world().pairs)):
             click.echo(note, err=True)
+    require_folder(out)
     made = partial(transcribe, backend=backend, threads=1 if jobs > 1 else None)
     limits = BatchLimits(how.retries, how.timeout, how.budget)
     with watch(len(asked), how.quiet, how.json) as observer:
@@ -136,6 +138,13 @@ def solve(
         return conclude_silently(batch, observer, write)
     parts = observer.notes.seconds if jobs == 1 and not multi_start else {}
     return conclude(asked, batch, out, began, parts, write)
+
+
+def require_folder(out: Path) -> None:
+    """Make the folder of a batch; FileError, before anything is solved, if it cannot be written."""
+    files.make_folder(out)
+    if not os.access(out, os.W_OK | os.X_OK):
+        raise files.FileError(f"cannot write into {out}: permission denied")
 
 
 def print_previews(jobs: list[Job], rerun: str) -> int:

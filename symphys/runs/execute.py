@@ -11,6 +11,7 @@ from symphys import files
 from symphys.errors import SymphysError, Unavailable
 from symphys.results.file_names import CHECKPOINT, LOG, RESULT
 from symphys.results.result import Result
+from symphys.results.table.journal import Journal
 from symphys.runs.claim import Claim, FolderBusy, claimed
 from symphys.runs.job import Job
 from symphys.runs.record import failure
@@ -164,6 +165,13 @@ def finish(job: Job, claim: Claim, result: Result) -> None:
     files.write_json(job.folder.path / RESULT, result.to_json())
     if not (result.interrupted or result.again):
         files.remove(job.folder.path / CHECKPOINT)
+    enter(job)
+
+
+def enter(job: Job) -> None:
+    """Keep the row of the run in the table of all runs, which can be made again from their folders."""
+    with contextlib.suppress(OSError, files.FileError):
+        Journal(job.folder.path.parents[1]).add(job.folder.path)
 
 
 def give_up(job: Job, message: str, again: bool) -> Result:
@@ -175,6 +183,7 @@ def give_up(job: Job, message: str, again: bool) -> Result:
             return found.result
         if found.stands in (Stands.NEW, Stands.CHANGED, Stands.DAMAGED):
             job.folder.begin(job.config, job.problem.text)
-        files.write_json(job.folder.path / RESULT, result.to_json())
         claim.check()
+        files.write_json(job.folder.path / RESULT, result.to_json())
+        enter(job)
     return result

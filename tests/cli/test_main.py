@@ -330,6 +330,7 @@ def test_the_help_names_every_backend(run: Run) -> None:
     assert "|".join(sorted(NAMES, key=["auto", "casadi", "c", "simd", "simd32", "cuda", "cuda32"].index)) in out
 
 
+@pytest.mark.usefixtures("whole_report")
 def test_no_report_leaves_pages_out_and_report_makes_them_later(run: Run, throw: Path) -> None:
     code, out, _ = run("solve", throw, "--solver", "least_squares", "--no-report", *QUICK)
     assert code == 0 and "no report; `symphys report reports` makes one" in out

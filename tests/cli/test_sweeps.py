@@ -17,18 +17,12 @@ from symphys.problem.sweeps.lazy import LazyProblem
 from symphys.results.result import CheckRecord
 from symphys.runs import Result, read_result
 
-QUICK = ("--backend", "casadi", "--unexamined", "--solver", "least_squares", "--out", "o")
+QUICK = ("--backend", "casadi", "--unexamined", "--solver", "least_squares", "--no-report", "--out", "o")
 TABLE = """
 [sweep]
 "ball.mass" = [1, 2]
 """
 Run = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture(autouse=True)
-def _without_the_page_of_the_batch(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Which takes longer than all runs of these tests."""
-    monkeypatch.setattr("symphys.report.write_batch_report", lambda out: out / "index.html")
 
 
 def cases() -> list[str]:
