@@ -10,6 +10,7 @@ import math
 import os
 import re
 import stat
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -47,17 +48,23 @@ def make_folder(path: Path) -> None:
 
 def write_bytes(path: Path, content: bytes) -> None:
     """Write to a temporary name in the same folder, then replace; FileError if that cannot be."""
-    make_folder(path.parent)
     own = f"{os.getpid()}-{os.urandom(3).hex()}"  # two machines may have processes of one number
     temporary = path.with_name(f".{path.name}.{own}")
+    whole = False
     try:
-        temporary.write_bytes(content)
+        try:
+            temporary.write_bytes(content)
+        except FileNotFoundError:
+            make_folder(path.parent)
+            temporary.write_bytes(content)
         temporary.replace(path)
+        whole = True
     except OSError as error:
         raise FileError(f"cannot write {path}: {reason(error)}") from error
     finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
+        if not whole:
+            with contextlib.suppress(OSError):
+                temporary.unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str) -> None:
@@ -66,16 +73,33 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_json(path: Path, value: object) -> None:
-    """Write strict JSON; numbers that are not finite become the strings "nan", "inf" and "-inf"."""
-    write_text(path, json.dumps(strict(value), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    """Write strict JSON; numbers that are not finite become the strings "nan", "inf" and "-inf".
+
+    An object has a line for each of its keys: all lines of nested values would take ten times as long to write.
+    """
+    plain = strict(value)
+    if not isinstance(plain, dict) or not plain:
+        write_text(path, as_json(plain) + "\n")
+        return
+    lines = ",\n".join(f" {as_json(key)}: {as_json(item)}" for key, item in plain.items())
+    write_text(path, f"{{\n{lines}\n}}\n")
+
+
+def as_json(value: object) -> str:
+    """A value of JSON's own types as text, in one line."""
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 
 def write_npz(path: Path, arrays: Mapping[str, Any]) -> None:
-    """Write named arrays, compressed."""
+    """Write named arrays, compressed; quickly, as recorded motions are the most of what is written."""
     import numpy as np  # late: the command line's help needs none
 
     buffer = io.BytesIO()
-    np.savez_compressed(buffer, **arrays)
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        for name, array in arrays.items():
+            member = io.BytesIO()
+            np.lib.format.write_array(member, np.asanyarray(array), allow_pickle=False)
+            archive.writestr(f"{name}.npy", member.getbuffer())
     write_bytes(path, buffer.getvalue())
 
 
