@@ -54,7 +54,7 @@ def write_bytes(path: Path, content: bytes) -> None:
     try:
         try:
             temporary.write_bytes(content)
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             make_folder(path.parent)
             temporary.write_bytes(content)
         temporary.replace(path)
