@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from symphys.codegen.backends import Backend, BackendSource, choose
 from symphys.problem import Problem, Variable, VariableSlot
 from symphys.shooting import Evaluator, Nlp, Values
+from symphys.transcription.formula_names import swept_parameters
 from symphys.transcription.functions import ExpressionFunctions
 from symphys.transcription.objective import terms
 from symphys.transcription.program import rollout_program
@@ -26,13 +27,9 @@ Array = NDArray[np.float64]
 
 
 def inputs_of(problem: Problem) -> tuple[Variable, ...]:
-    """A variable for each parameter in which the problems of its sweep differ, and that no variable of its own sets.
-
-    Anchors of joints are not among them: they decide where bodies start.
-    """
+    """A variable for each parameter in which the problems of its sweep differ, and that no variable of its own sets."""
     own = {slot.name for variable in problem.variables for slot in variable.slots}
-    names = sorted(name for name in problem.varied if name in problem.parameters and name not in own)
-    values = {name: problem.parameters[name] for name in names if not name.endswith(".anchor")}
+    values = {name: problem.parameters[name] for name in swept_parameters(problem) if name not in own}
     return tuple(
         hidden(f"{name} of the sweep", "parameter", VariableSlot(name, tuple(range(value.size))), value)
         for name, value in values.items()
