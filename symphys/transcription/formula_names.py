@@ -71,12 +71,21 @@ class Parameters:
 
 
 def varied_parameters(problem: Problem) -> Parameters:
-    """The parameters that some variable sets, in the order of first mention, and all numbers of controllers."""
-    names = tuple(dict.fromkeys(slot.name for v in problem.variables if v.kind == "parameter" for slot in v.slots))
+    """The parameters that some variable sets, in the order of first mention, and all numbers of controllers.
+
+    Of a problem of a sweep also those in which it differs from others, so that they share what is built.
+    """
+    own = dict.fromkeys(slot.name for v in problem.variables if v.kind == "parameter" for slot in v.slots)
+    names = (*own, *(name for name in swept_parameters(problem) if name not in own))
     values = {name: problem.parameters[name] for name in names} | problem.weights
     nominal = tuple(ca.DM(value) for value in values.values())
     symbols = tuple(ca.SX.sym(name, value.shape[0]) for name, value in zip(values, nominal, strict=True))
     return Parameters(tuple(values), symbols, nominal, len(names))
+
+
+def swept_parameters(problem: Problem) -> list[str]:
+    """The parameters in which the problems of its sweep differ, but for anchors, which decide where bodies start."""
+    return sorted(name for name in problem.varied & problem.parameters.keys() if not name.endswith(".anchor"))
 
 
 def input_names(problem: Problem) -> tuple[str, ...]:

@@ -124,9 +124,7 @@ def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:
     """The calls of one time step, from ``x`` and ``u`` to the ``x`` after."""
     rollout = samples.rollout
     columns = Columns(rollout.world)
-    recording = trace_step(
-        rollout.world, rollout.problem.simulation.scheme(), rollout.inputs, rollout.parameters.symbols, exact
-    )
+    recording = rollout.built(trace_step, rollout.problem.simulation.scheme(), exact)
     arguments = {"u": samples.u, "p": samples.p, "smoothing": samples.smoothing}
     after = samples.x.later() if rollout.termination is None else samples.layout.take(rollout.memory.size - 1)
     places: dict[TracedVector, Place] = {slot: _part(after, part) for slot, part in recording.results.items()}

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import casadi as ca
 import numpy as np
 
 from symphys.dynamics.functions import step_function
 from symphys.dynamics.horizon import roll_out
+from symphys.dynamics.kept import kept
 from symphys.expression import Formula
-from symphys.model.world import World
+from symphys.model.world import Scheme, World
 from symphys.problem import Problem
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.feedback.controllers import Control
@@ -26,6 +28,7 @@ from symphys.transcription.formula_names import (
 )
 from symphys.transcription.termination import termination_function
 
+T = TypeVar("T")
 Expr = Any
 """casadi MX"""
 
@@ -62,7 +65,12 @@ class Rollout:
     def step(self) -> ca.Function:
         """One step (x, u, p, smoothing) -> x_next; built when first asked for, since one expression takes its time."""
         scheme = self.problem.simulation.scheme()
-        return self.remembering(step_function(self.world, scheme, self.inputs, self.parameters.symbols))
+        return self.remembering(self.built(step_function, scheme))
+
+    def built(self, make: Callable[..., T], scheme: Scheme, *more: Hashable) -> T:
+        """What a function makes of the world; problems of a sweep share it, as far as their worlds are equal."""
+        arguments = (self.world, scheme, self.inputs, self.parameters.symbols)
+        return kept(make, *arguments, *more) if self.problem.varied else make(*arguments, *more)
 
     def remembering(self, step: ca.Function) -> ca.Function:
         """A function (x, u, p, smoothing) -> (x_next, ...) of the world's state, for states with memory."""

@@ -6,6 +6,7 @@ takes longer than many a solve. Programs of problems that differ in inputs alone
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import replace
 from typing import Any
 
@@ -16,23 +17,22 @@ from numpy.typing import NDArray
 from symphys.codegen.backends import Backend, BackendSource, choose
 from symphys.problem import Problem, Variable, VariableSlot
 from symphys.shooting import Evaluator, Nlp, Values
+from symphys.transcription.formula_names import swept_parameters
 from symphys.transcription.functions import ExpressionFunctions
-from symphys.transcription.objective import terms
+from symphys.transcription.objective import Terms, terms
 from symphys.transcription.program import rollout_program
 from symphys.transcription.randomization.numbers import hidden
-from symphys.transcription.rollout import symbolic_rollout
+from symphys.transcription.rollout import Rollout, symbolic_rollout
 
 Array = NDArray[np.float64]
+KEPT: dict[tuple[object, ...], Backend] = {}
+"""The backend of the last problem of a sweep, by all that it is made from."""
 
 
 def inputs_of(problem: Problem) -> tuple[Variable, ...]:
-    """A variable for each parameter in which the problems of its sweep differ, and that no variable of its own sets.
-
-    Anchors of joints are not among them: they decide where bodies start.
-    """
+    """A variable for each parameter in which the problems of its sweep differ, and that no variable of its own sets."""
     own = {slot.name for variable in problem.variables for slot in variable.slots}
-    names = sorted(name for name in problem.varied if name in problem.parameters and name not in own)
-    values = {name: problem.parameters[name] for name in names if not name.endswith(".anchor")}
+    values = {name: problem.parameters[name] for name in swept_parameters(problem) if name not in own}
     return tuple(
         hidden(f"{name} of the sweep", "parameter", VariableSlot(name, tuple(range(value.size))), value)
         for name, value in values.items()
@@ -53,10 +53,26 @@ def shared_backend(
         threads: likewise.
     """
     rollout = symbolic_rollout(replace(problem, variables=(*problem.variables, *inputs)))
-    functions = ExpressionFunctions(rollout, terms(rollout))
-    chosen = choose(backend, BackendSource(functions, lambda: rollout_program(rollout, exact), exact), threads)
+    asked = terms(rollout)
+    key = (whole(rollout, asked), exact, backend, threads)
+    if key in KEPT:
+        made = KEPT[key].description
+        here = replace(made, seconds=0.0, cached=None if made.cached is None else True)
+        chosen = replace(KEPT[key], description=here)
+    else:
+        source = BackendSource(ExpressionFunctions(rollout, asked), lambda: rollout_program(rollout, exact), exact)
+        KEPT.clear()
+        chosen = KEPT[key] = choose(backend, source, threads)
     numbers = np.concatenate([variable.guess for variable in inputs])
     return replace(chosen, evaluator=BoundEvaluator(chosen.evaluator, numbers), nlp=bound_nlp(chosen.nlp, nlp, numbers))
+
+
+def whole(rollout: Rollout, asked: Terms) -> str:
+    """All that a backend is made from, as a text: equal for problems that differ in inputs alone."""
+    parts = [getattr(asked, name) for name in ("costs", "objective", "penalties", "errors", "constraints", "outputs")]
+    parts += [asked.means, *([] if asked.residuals is None else [asked.residuals])]
+    text = ca.Function("whole", [rollout.z, rollout.smoothing], parts).serialize()
+    return hashlib.sha256(text.encode(errors="surrogateescape")).hexdigest()
 
 
 class BoundEvaluator:

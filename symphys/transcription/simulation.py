@@ -32,8 +32,7 @@ class Record:
 
 def recorder(rollout: Rollout) -> ca.Function:
     """(z, smoothing) -> (x, u, given, p, forces, gaps, residual, crowded, ambiguous, paradox) of the whole horizon."""
-    scheme = rollout.problem.simulation.scheme()
-    step = report_function(rollout.world, scheme, rollout.inputs, rollout.parameters.symbols)
+    step = rollout.built(report_function, rollout.problem.simulation.scheme())
     x, u, happened = rollout.rolled(rollout.remembering(step))
     return ca.Function("record", [rollout.z, rollout.smoothing], [x, u, rollout.given, rollout.p, *happened])
 

@@ -34,6 +34,8 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
         >>> made.judge(made.shooting.start(0)).solved, made.shooting.n
         (False, 6)
     """
+    if problem.varied and (problem.scenarios is not None or has_large_nets(problem)):
+        problem = replace(problem, varied=frozenset())  # their kernels are made in other ways
     if problem.scenarios is not None:
         require_small_nets(problem, "a problem with scenarios")
         plain = transcribe(replace(problem, scenarios=None), exact, "casadi", threads)

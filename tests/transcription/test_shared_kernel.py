@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from thrown import TABLES
 
+from symphys.dynamics.functions import step_function
 from symphys.problem import Problem, problem_of_tables
 from symphys.problem.sweeps.points import combined, swept
 from symphys.problem.sweeps.texts import read_axes
@@ -76,9 +77,34 @@ def test_functions_for_ipopt_are_those_of_the_point() -> None:
 
 def test_one_kernel_is_compiled_for_all_points() -> None:
     first, *others = made("simd")
-    assert all(each.backend.cached for each in others)
+    assert [(each.backend.cached, each.backend.seconds) for each in others] == [(True, 0.0)] * 2
+    kernels = {id(each.shooting.evaluator.evaluator) for each in made("simd")}  # type: ignore[attr-defined]
+    assert len(kernels) == 1
     program = first.shooting.evaluator.evaluator.kernel.program  # type: ignore[attr-defined]
     assert program.z.size == 6 + 6  # mass, friction, radius, gravity
+
+
+def test_points_that_differ_in_more_have_kernels_of_their_own() -> None:
+    """Here in a tolerance, which is a number of the program."""
+    found = points("ball.mass=0.5,0.7", "target.there.tolerance=0.01,0.02", tables={})
+    one, other = (transcribe(found[k], backend="simd", threads=1).shooting.evaluator for k in (0, 3))
+    Z = np.zeros((1, 6))
+    ratio = one.value(Z, 0.0).errors / other.value(Z, 0.0).errors
+    np.testing.assert_allclose(ratio, 2, rtol=1e-9)
+
+
+def test_steps_are_built_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    built: list[object] = []
+
+    def counted(world: object, *more: object) -> object:
+        built.append(world)
+        return step_function(world, *more)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("symphys.transcription.rollout.step_function", counted)
+    found = points("ball.mass=0.5:0.7:3", "simulation.dt=0.02,0.05", tables={})
+    motions = [transcribe(point, backend="casadi").simulate(np.zeros(6)) for point in found]
+    assert len(built) == 2  # one for each time step
+    assert {len(motion.time) for motion in motions} == {11, 26}
 
 
 def test_what_a_variable_sets_is_no_input() -> None:

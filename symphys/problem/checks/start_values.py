@@ -15,8 +15,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.dynamics.kept import structure
 from symphys.dynamics.observation import accelerometers, body_quantities, gap_function, joint_quantities, readings
-from symphys.dynamics.tracing.pytree import dismantle
 from symphys.model.state_layout import GIVEN, Layout, initial_state
 from symphys.model.world import World
 from symphys.problem.parametric.world import ParametricWorld
@@ -114,15 +114,12 @@ class StartValues:
 
     def _functions(self, world: World, symbols: list[Any]) -> StartFunctions:
         """Those of the structure of this world: it is equal to another, but for what the symbols stand for."""
-        leaves: list[Any] = []
-        shape = dismantle(world, leaves)
-        column = ca.vertcat(ca.SX(0, 1), *(ca.vec(ca.densify(leaf)) for leaf in leaves))
-        structure = (shape, ca.Function("world", [ca.vertcat(ca.SX(0, 1), *symbols)], [column]).serialize())
-        if structure not in self._kept:
+        key = structure(world, symbols)
+        if key not in self._kept:
             if len(self._kept) >= MOST_KEPT:
                 self._kept.clear()
-            self._kept[structure] = StartFunctions(world, symbols)
-        return self._kept[structure]
+            self._kept[key] = StartFunctions(world, symbols)
+        return self._kept[key]
 
 
 def parameter(value: Array) -> float | tuple[float, ...]:
