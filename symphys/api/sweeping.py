@@ -12,10 +12,11 @@ from pathlib import Path
 
 from symphys.api.solution import Solution
 from symphys.api.solving import kept
+from symphys.batches import BatchResult, run_batch
 from symphys.problem import Problem
 from symphys.problem.loading import Source, load
 from symphys.results.run import read_run
-from symphys.runs import BatchResult, Job, Result, make_jobs, run_batch
+from symphys.runs import Job, Result, make_jobs
 from symphys.solvers import TraceRow
 from symphys.transcription import transcribe
 

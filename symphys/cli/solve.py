@@ -24,12 +24,15 @@ from symphys.cli.arguments import (
     read_solvers,
     settings_option,
 )
+from symphys.cli.batch_options import BatchOptions, batch_options
 from symphys.cli.report import make_shown, pages_option
 from symphys.cli.wording import duration, many_pairs
 
 if TYPE_CHECKING:
+    from symphys.batches import BatchResult
+    from symphys.cli.watching.choice import Shown
     from symphys.report.making.batch import MadePages
-    from symphys.runs import BatchResult, Job
+    from symphys.runs import Job
 
 MOST_SEEDS = 10_000
 MOST_JOBS = 256
@@ -77,6 +80,7 @@ MOST_JOBS = 256
 @pages_option
 @backend_option
 @out_option
+@batch_options
 def solve(
     sources: tuple[str, ...],
     names: str | None,
@@ -89,6 +93,7 @@ def solve(
     pages: str,
     backend: str,
     out: Path,
+    how: BatchOptions,
 ) -> int:
     """Solve problems, and write a report.
 
@@ -97,8 +102,9 @@ def solve(
     """
     began = perf_counter()
     threads.limit()
-    from symphys.cli.progress import watch
-    from symphys.runs import make_jobs, run_batch
+    from symphys.batches import BatchLimits, run_batch
+    from symphys.cli.watching import watch
+    from symphys.runs import make_jobs
     from symphys.transcription import transcribe
 
     settings = read_settings(assignments)
@@ -106,15 +112,33 @@ def solve(
     problems = read_problems(sources, settings)
     command = shlex.join(["symphys", *sys.argv[1:]])
     asked = make_jobs(problems, solvers, range(seeds), settings, out, command, read_backend(backend), not unexamined)
+    if how.dry_run:
+        return print_previews(asked, how.rerun)
     for problem in problems:
         if note := many_pairs(problem.name, len(problem.world().pairs)):
             click.echo(note, err=True)
     made = partial(transcribe, backend=backend, threads=1 if jobs > 1 else None)
-    with watch(len(asked)) as observer:
-        batch = run_batch(asked, jobs, observer, made, multi_start)
+    limits = BatchLimits(how.retries, how.timeout, how.budget)
+    with watch(len(asked), how.quiet, how.json) as observer:
+        batch = run_batch(asked, jobs, observer, made, multi_start, limits, how.rerun)
+    silent = how.json or how.quiet
+    write = None if no_report or batch.interrupted else partial(write_reports, asked, out, pages, jobs, silent)
+    if silent:
+        return conclude_silently(batch, observer, write)
     parts = observer.notes.seconds if jobs == 1 and not multi_start else {}
-    write = None if no_report else partial(write_reports, asked, out, pages, jobs)
     return conclude(asked, batch, out, began, parts, write)
+
+
+def print_previews(jobs: list[Job], rerun: str) -> int:
+    """Say what would be done, and why, a run a line; the exit code."""
+    from symphys.batches import previews
+
+    todo = 0
+    for each in previews(jobs, rerun):
+        todo += each.todo
+        click.echo(f"{each.job.name}: {'to do' if each.todo else each.stands}: {each.why}")
+    click.echo(f"{todo} of {len(jobs)} runs are to do")
+    return 0
 
 
 def conclude(
@@ -131,19 +155,39 @@ def conclude(
     print_summary(jobs, batch)
     if batch.interrupted:
         click.echo(last_words(batch, out), err=True)
-        return 130
+        return exit_code(batch, None)
     made = write() if write else None
+    if batch.spent:
+        click.echo(last_words(batch, out), err=True)
     click.echo(time_line(perf_counter() - began, parts))
     click.echo(f"report: {made.page}" if made else f"no report; `symphys report {shlex.quote(str(out))}` makes one")
+    return exit_code(batch, made)
+
+
+def conclude_silently(batch: BatchResult, observer: Shown, write: Callable[[], MadePages] | None) -> int:
+    """Make the pages, and say no more than events; the exit code."""
+    from symphys.cli.watching.events import Events
+
+    code = exit_code(batch, write() if write else None)
+    if isinstance(observer, Events):
+        observer.finished(batch, code)
+    return code
+
+
+def exit_code(batch: BatchResult, made: MadePages | None) -> int:
+    """That of the command; ``made``: the pages, if any were asked for."""
+    if batch.interrupted:
+        return 130
     return 0 if batch.accepted and not (made and made.faults) else 1
 
 
 def last_words(batch: BatchResult, out: Path) -> str:
-    """What an interruption has left, and how to go on."""
+    """What an interruption, or the end of its time, has left of a batch, and how to go on."""
+    why = "interrupted" if batch.interrupted else "the time of the batch is used up"
     over = sum(result is not None and not result.interrupted for result in batch.results)
     halfway = sum(result is not None and result.interrupted for result in batch.results)
     return (
-        f"symphys: interrupted; {over} of {len(batch.results)} runs are done and {halfway} halfway, saved in {out}; "
+        f"symphys: {why}; {over} of {len(batch.results)} runs are done and {halfway} halfway, saved in {out}; "
         "the same command goes on from there"
     )
 
@@ -158,9 +202,9 @@ def time_line(total: float, parts: Mapping[str, float]) -> str:
     return f"time: {duration(total)} s in all; {', '.join(f'{word} {duration(part)}' for word, part in told.items())}"
 
 
-def write_reports(jobs: list[Job], out: Path, pages: str, processes: int) -> MadePages:
-    """Make the pages of the runs that are new, and that of the batch."""
+def write_reports(jobs: list[Job], out: Path, pages: str, processes: int, silent: bool) -> MadePages:
+    """Make the pages of the runs that are new, and that of the batch; ``silent``: say only which cannot be made."""
     from symphys.report import WantedPages, outdated
 
     new = dict.fromkeys(job.folder.path for job in jobs if outdated(job.folder.path))
-    return make_shown(WantedPages(out, tuple(new)), pages, processes)
+    return make_shown(WantedPages(out, tuple(new)), pages, processes, silent)

@@ -18,7 +18,8 @@ from symphys.findings.obstacles import MOST_BOUNDS, bound_words, holding
 from symphys.findings.verdict import BEST_FOUND, DOUBTED, NOT_SOLVED
 
 if TYPE_CHECKING:
-    from symphys.runs import BatchResult, Job, Result
+    from symphys.batches import BatchResult
+    from symphys.runs import Job, Result
 
 NARROWEST = 120
 """Columns of the table where the output is no terminal."""
