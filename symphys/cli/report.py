@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
@@ -63,13 +63,13 @@ def report(folder: Path, pages: str, only_new: bool, jobs: int | None) -> int:
     return 1 if made.faults else 0
 
 
-def make_shown(wanted: WantedPages, kind: str, jobs: int) -> MadePages:
-    """Make pages, say how far it is, and name those that could not be made."""
+def make_shown(wanted: WantedPages, kind: str, jobs: int, silent: bool = False) -> MadePages:
+    """Make pages, say how far it is unless ``silent``, and name those that could not be made."""
     from symphys.report import make_pages
 
     progress = PageProgress(len(wanted.runs))
     try:
-        with shown(progress):
+        with nullcontext() if silent else shown(progress):
             made = make_pages(wanted, kind, jobs, progress.tell)
     except KeyboardInterrupt:
         again = shlex.join(["symphys", "report", str(wanted.root), "--new"])

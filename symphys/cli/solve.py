@@ -133,8 +133,9 @@ def solve(
     limits = BatchLimits(how.retries, how.timeout, how.budget)
     with watch(len(asked), how.quiet, how.json) as observer:
         batch = run_batch(asked, jobs, observer, made, multi_start, limits, how.rerun)
-    write = None if no_report or batch.interrupted else partial(write_reports, asked, out, pages, jobs)
-    if how.json or how.quiet:
+    silent = how.json or how.quiet
+    write = None if no_report or batch.interrupted else partial(write_reports, asked, out, pages, jobs, silent)
+    if silent:
         return conclude_silently(batch, observer, write)
     parts = observer.notes.seconds if jobs == 1 and not multi_start else {}
     return conclude(asked, batch, out, began, parts, write)
@@ -183,7 +184,7 @@ def conclude(
 
 
 def conclude_silently(batch: BatchResult, observer: Shown, write: Callable[[], MadePages] | None) -> int:
-    """Write the reports, and say no more than events; the exit code."""
+    """Make the pages, and say no more than events; the exit code."""
     from symphys.cli.watching.events import Events
 
     code = exit_code(batch, write() if write else None)
@@ -220,9 +221,9 @@ def time_line(total: float, parts: Mapping[str, float]) -> str:
     return f"time: {duration(total)} s in all; {', '.join(f'{word} {duration(part)}' for word, part in told.items())}"
 
 
-def write_reports(jobs: list[Job], out: Path, pages: str, processes: int) -> MadePages:
-    """Make the pages of the runs that are new, and that of the batch."""
+def write_reports(jobs: list[Job], out: Path, pages: str, processes: int, silent: bool) -> MadePages:
+    """Make the pages of the runs that are new, and that of the batch; ``silent``: say only which cannot be made."""
     from symphys.report import WantedPages, outdated
 
     new = dict.fromkeys(job.folder.path for job in jobs if outdated(job.folder.path))
-    return make_shown(WantedPages(out, tuple(new)), pages, processes)
+    return make_shown(WantedPages(out, tuple(new)), pages, processes, silent)

@@ -134,13 +134,13 @@ def test_only_large_objects_are_left_out(tmp_path: Path) -> None:
     inner = {"a": {"b": [1, 2]}, "text": '\n "trust": {\n'}
     for value in ({"verdict": "x", "trust": inner, "z": inner}, {"z": {}, "verdict": "x", "trust": {}, "seed": 3}):
         files.write_json(tmp_path / "result.json", value)
-        content = read_brief_table(tmp_path / "result.json")
+        content = read_brief_table(str(tmp_path / "result.json"))
         kept = {key: entry for key, entry in value.items() if key not in ("z", "trust")}
         assert {key: content[key] for key in kept} == kept
     files.write_json(tmp_path / "result.json", {"verdict": "x", "trust": inner, "seed": 3})
-    assert "trust" not in read_brief_table(tmp_path / "result.json")
+    assert "trust" not in read_brief_table(str(tmp_path / "result.json"))
     (tmp_path / "result.json").write_text(json.dumps({"verdict": "x", "trust": inner}))
-    assert read_brief_table(tmp_path / "result.json")["trust"] == inner
+    assert read_brief_table(str(tmp_path / "result.json"))["trust"] == inner
     assert without_large(b'{\n "trust": {\n  "a": 1\n') == b'{\n "trust": {\n  "a": 1\n'
 
 

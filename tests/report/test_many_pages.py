@@ -6,6 +6,7 @@ import multiprocessing
 import os
 import shutil
 import signal
+from collections import deque
 from pathlib import Path
 
 import pytest
@@ -94,9 +95,8 @@ def test_workers_change_no_byte_and_name_what_fails(runs: list[Path]) -> None:
     assert not multiprocessing.active_children()
 
 
-@pytest.mark.usefixtures("two_workers")
 def test_a_worker_that_dies_fails_its_page_only(runs: list[Path]) -> None:
-    """Killed after the first page; who takes its place makes the rest."""
+    """Killed after its first page, it cannot make the second; who takes its place makes the rest."""
     found: dict[Path, PageFault | None] = {}
 
     def done(folder: Path, fault: PageFault | None) -> None:
@@ -106,22 +106,23 @@ def test_a_worker_that_dies_fails_its_page_only(runs: list[Path]) -> None:
                 os.kill(child.pid, signal.SIGKILL)
         found[folder] = fault
 
-    pool.make_run_pages(runs, light=True, jobs=2, done=done)
-    assert set(found) == set(runs)
-    died = [folder for folder, fault in found.items() if fault is not None]
-    assert 1 <= len(died) <= 2
-    assert all("died" in found[folder].reason for folder in died)  # type: ignore[union-attr]
-    assert all(is_whole(folder / PAGE) for folder in runs if found[folder] is None)
+    pool.PagePool(deque(runs), light=True, done=done).run(1)
+    assert list(found) == runs
+    faults = {folder: fault.reason for folder, fault in found.items() if fault is not None}
+    assert faults == {runs[1]: pool.DIED}
+    assert all(is_whole(folder / PAGE) for folder in runs if folder not in faults)
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
-@pytest.mark.usefixtures("two_workers")
-def test_an_interruption_leaves_whole_pages_only(runs: list[Path], jobs: int) -> None:
+@pytest.mark.parametrize("workers", [0, 1])
+def test_an_interruption_leaves_whole_pages_only(runs: list[Path], workers: int) -> None:
     def interrupt(folder: Path, fault: PageFault | None) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        pool.make_run_pages(runs, light=True, jobs=jobs, done=interrupt)
+        if workers:
+            pool.PagePool(deque(runs), light=True, done=interrupt).run(workers)
+        else:
+            pool.make_run_pages(runs, light=True, jobs=1, done=interrupt)
     pages = [folder / PAGE for folder in runs if (folder / PAGE).exists()]
     assert 1 <= len(pages) < len(runs)
     assert all(map(is_whole, pages))

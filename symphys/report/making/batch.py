@@ -79,8 +79,10 @@ def make_pages(wanted: WantedPages, kind: str = AUTO, jobs: int = 1, tell: Told 
         tell: receives how far it is.
 
     Raises:
-        ReportError: there is no such kind. Pages that cannot be made are faults instead.
+        ReportError: there is no such kind, or no such folder. Pages that cannot be made are faults instead.
     """
+    if not wanted.root.is_dir():
+        raise ReportError(f"{wanted.root}: there is no such folder")
     light = is_light(kind, len(wanted.runs))
     faults: dict[Path, PageFault] = {}
     over = 0

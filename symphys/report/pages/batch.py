@@ -34,7 +34,7 @@ CLOSEST = "run that came closest"
 ROWS_MARK = 'class="rows"'
 MOST_STUDIES = 20
 """Problems and settings that have a section each, at most; of more the page has tables only."""
-MOST_CURVES, LEAST_CURVES = 80, 5
+MOST_CURVES, LEAST_CURVES = 60, 5
 """Runs whose convergence a page draws at most about, and at least of each solver."""
 
 
@@ -78,9 +78,11 @@ def build_tables(found: Sequence[Study]) -> list[Html]:
 
 def build_studies(found: Sequence[Study], root: Path) -> list[Html]:
     """The problems one after the other; with links to each and headings where there are several."""
+    if not found:
+        return []
     names = anchors(found)
     links = [tag("a", linked(study), href=f"#{anchor}") for study, anchor in zip(found, names, strict=True)]
-    curves = max(MOST_CURVES // max(sum(len(study.entries) for study in found), 1), LEAST_CURVES)
+    curves = max(MOST_CURVES // sum(len(study.entries) for study in found), LEAST_CURVES)
     runs = [run for study in found for run in study.runs]
     long = any(len(entry.runs) > comparison.MOST_CHIPS for study in found for entry in study.entries)
     every = run_card(found, page_links(runs)) if long else Html("")

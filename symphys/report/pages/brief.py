@@ -6,14 +6,16 @@ left out is empty.
 
 from __future__ import annotations
 
+import errno
 import json
+import os
+import stat
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from symphys import json_values as values
-from symphys.files import check_regular
 from symphys.results.config import Config
 from symphys.results.file_names import CONFIG, RESULT, TRACE
 from symphys.results.result import BackendRecord, CheckRecord, StageRecord, everything_met
@@ -25,6 +27,8 @@ LARGE, END = (b'\n "z": {\n', b'\n "trust": {\n'), b"\n }"
 """Where the keys of result.json begin that take most of it, and that no table shows; and where their objects end."""
 CHECK = ("kind", "name", "error", "tolerance", "ratio", "met", "unit")
 MOST_KEPT = 1000
+MOST_AT_ONCE = 2**20
+READ = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 
 
 class BriefReader:
@@ -32,19 +36,19 @@ class BriefReader:
 
     def __init__(self, root: Path) -> None:
         """Nothing is read yet."""
-        self.root = root
+        self.root, self.prefix = root, f"{root}/"
         self.kept: dict[str, Any] = {}
 
     def __call__(self, folder: Path) -> Run:
         """The result and the settings of a run folder; what cannot be read is listed in ``faults``."""
         faults: list[str] = []
         try:
-            result = read_brief_table(folder / RESULT)
+            result = read_brief_table(f"{folder}/{RESULT}")
         except ReportError as error:
             result = {}
             faults.append(str(error))
         readable = is_result(result, faults)
-        config = read_config_table(folder / CONFIG, faults)
+        config = read_config_table(f"{folder}/{CONFIG}", faults)
         named = result if readable else config
         problem = values.name(named.get("problem")) or folder.resolve().parent.name
         about: dict[str, Any] = {
@@ -53,7 +57,7 @@ class BriefReader:
             "solver": values.name(named.get("solver")) or folder.resolve().name,
             "seed": values.whole(named.get("seed")),
             "folder": folder,
-            "place": folder.relative_to(self.root).as_posix(),
+            "place": self.place_of(folder),
             "settings": self.once("settings", config.get("settings"), read_settings),
             "faults": tuple(faults),
         }
@@ -63,6 +67,13 @@ class BriefReader:
             return self.older(result, about)
         found = self.numbers(result)
         return Run(**about, **found, readable=True, met=all(check.met for check in found["checks"]))
+
+    def place_of(self, folder: Path) -> str:
+        """The folder's path below the root, with forward slashes."""
+        text = str(folder)
+        if os.sep == "/" and text.startswith(self.prefix):
+            return text[len(self.prefix) :]
+        return folder.relative_to(self.root).as_posix()
 
     def numbers(self, result: Mapping[str, object]) -> dict[str, Any]:
         """The fields of a result that tables show."""
@@ -122,13 +133,13 @@ def read_settings(value: object) -> Mapping[str, Any]:
     return Config.from_json({"settings": value}).settings
 
 
-def read_config_table(path: Path, faults: list[str]) -> dict[str, Any]:
+def read_config_table(path: str, faults: list[str]) -> dict[str, Any]:
     """The object of config.json; empty, with a sentence in ``faults``, if there is none."""
     try:
-        content = json.loads(path.read_bytes())
+        content = json.loads(read_regular(path))
     except (OSError, ValueError, RecursionError):
         content = None
-    return content if isinstance(content, dict) else read_or_note(path, faults)
+    return content if isinstance(content, dict) else read_or_note(Path(path), faults)
 
 
 def read_versions(value: object) -> dict[str, str]:
@@ -136,19 +147,36 @@ def read_versions(value: object) -> dict[str, str]:
     return {name: values.name(version) for name, version in values.table(value).items()}
 
 
-def read_brief_table(path: Path) -> dict[str, object]:
+def read_brief_table(path: str) -> dict[str, object]:
     """The object of result.json without what is ``LARGE``; all of it where the text is not as this program writes it.
 
     Raises ReportError, see ``read_table``.
     """
     try:
-        check_regular(path)
-        content = json.loads(without_large(path.read_bytes()))
+        content = json.loads(without_large(read_regular(path)))
     except (OSError, ValueError, RecursionError):
-        return read_table(path)
+        return read_table(Path(path))
     if not isinstance(content, dict) or "verdict" not in content:  # older: the verdict follows from the examination
-        return read_table(path)
+        return read_table(Path(path))
     return content
+
+
+def read_regular(path: str) -> bytes:
+    """What a regular file holds; OSError for anything else, which is not waited for.
+
+    Paths and files of the standard library's own classes take as long as all the rest of reading a run.
+    """
+    number = os.open(path, READ)
+    try:
+        about = os.fstat(number)
+        if not stat.S_ISREG(about.st_mode):
+            raise OSError(errno.EINVAL, "a regular file is needed", path)
+        parts = [os.read(number, about.st_size + 1)]
+        while parts[-1]:
+            parts.append(os.read(number, MOST_AT_ONCE))
+        return b"".join(parts)
+    finally:
+        os.close(number)
 
 
 def without_large(text: bytes) -> bytes:
