@@ -21,7 +21,7 @@ from symphys.results.result import Result
 from symphys.results.table import Journal, read_rows
 from symphys.results.table import rows as table_rows
 from symphys.results.table.journal import Kept, entry, stamp_of
-from symphys.results.table.row import lightened, read_row
+from symphys.results.table.row import HEAVY, read_row
 
 
 def test_a_row_has_what_the_files_say(tmp_path: Path) -> None:
@@ -53,15 +53,20 @@ def test_a_row_has_what_the_files_say(tmp_path: Path) -> None:
     }
 
 
-def test_only_the_heavy_tables_are_cut_and_only_from_the_usual_layout() -> None:
+def test_only_the_heavy_tables_are_cut_and_only_from_the_usual_layouts(tmp_path: Path) -> None:
+    """A key a line, as files have it now, and lines for nested values too, as older ones."""
     whole = files.strict(recorded(advice='},\n "z": {\n').to_json())
-    text = json.dumps(whole, indent=1).encode()
-    cut = lightened(text)
-    assert json.loads(cut) == {**whole, "z": {}, "trust": {}} and len(cut) < len(text)
+    files.write_json(tmp_path / RESULT, whole)
+    for text in ((tmp_path / RESULT).read_bytes(), json.dumps(whole, indent=1).encode()):
+        cut = files.emptied(text, HEAVY)
+        assert json.loads(cut) == {**whole, "z": {}, "trust": {}} and len(cut) < len(text)
     for layout in (None, 0, 2):
-        assert lightened(json.dumps(whole, indent=layout).encode()) == json.dumps(whole, indent=layout).encode()
-    absent = json.dumps({**whole, "z": None, "trust": {}}, indent=1).encode()
-    assert lightened(absent) == absent
+        text = json.dumps(whole, indent=layout).encode()
+        assert files.emptied(text, HEAVY) == text
+    files.write_json(tmp_path / RESULT, {"z": None, "trust": {}})
+    absent = (tmp_path / RESULT).read_bytes()
+    assert files.emptied(absent, HEAVY) == absent
+    assert files.emptied(b'{\n "trust": {"a": 1', HEAVY) == b'{\n "trust": {"a": 1'
 
 
 def test_a_file_older_than_verdicts_is_ruled_on(tmp_path: Path) -> None:

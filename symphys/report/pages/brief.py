@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from symphys import json_values as values
+from symphys.files import emptied
 from symphys.results.config import Config
 from symphys.results.file_names import CONFIG, RESULT, TRACE
 from symphys.results.result import BackendRecord, CheckRecord, StageRecord, everything_met
@@ -23,7 +24,7 @@ from symphys.results.run import Run, is_result, read_or_note
 from symphys.results.text_files import ReportError, read_table
 from symphys.results.trace import read_trace
 
-LARGE, END = (b'\n "z": {\n', b'\n "trust": {\n'), b"\n }"
+LARGE = ("z", "trust")
 """Where the keys of result.json begin that take most of it, and that no table shows; and where their objects end."""
 CHECK = ("kind", "name", "error", "tolerance", "ratio", "met", "unit")
 MOST_KEPT = 1000
@@ -153,7 +154,7 @@ def read_brief_table(path: str) -> dict[str, object]:
     Raises ReportError, see ``read_table``.
     """
     try:
-        content = json.loads(without_large(read_regular(path)))
+        content = json.loads(emptied(read_regular(path), LARGE))
     except (OSError, ValueError, RecursionError):
         return read_table(Path(path))
     if not isinstance(content, dict) or "verdict" not in content:  # older: the verdict follows from the examination
@@ -177,16 +178,6 @@ def read_regular(path: str) -> bytes:
         return b"".join(parts)
     finally:
         os.close(number)
-
-
-def without_large(text: bytes) -> bytes:
-    """The text of an object, a key a line with one space before it, without the objects at keys that are ``LARGE``."""
-    for key in LARGE:
-        start = text.find(key)
-        end = text.find(END, start)
-        if 0 < start < end:
-            text = text[:start].removesuffix(b",") + text[end + len(END) :]
-    return text
 
 
 def with_trace(run: Run) -> Run:

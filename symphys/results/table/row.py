@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from symphys import json_values as values
-from symphys.files import check_regular, strict
+from symphys.files import check_regular, emptied, strict
 from symphys.findings.verdict import NOT_SOLVED
 from symphys.results.case_name import case_name
 from symphys.results.file_names import CONFIG, RESULT
@@ -175,7 +175,7 @@ def read_light(path: Path) -> dict[str, Any]:
     """
     try:
         check_regular(path)
-        found = json.loads(lightened(path.read_bytes()))
+        found = json.loads(emptied(path.read_bytes(), HEAVY))
     except FileNotFoundError:
         raise
     except OSError as error:
@@ -185,17 +185,3 @@ def read_light(path: Path) -> dict[str, Any]:
     if not isinstance(found, dict):
         raise ReportError(f"{path.name}: a JSON object is expected, this is a {type(found).__name__}")
     return found
-
-
-def lightened(text: bytes) -> bytes:
-    """The text of a JSON object with empty tables for those in HEAVY; another layout is left as it is.
-
-    Keys of the outermost object begin with one space on a line of their own, and its tables end so. No JSON text has
-    the end of a line within a word, so nothing else does.
-    """
-    for name in HEAVY:
-        start = text.find(b'\n "%s": {\n' % name.encode())
-        end = text.find(b"\n }", start)
-        if start >= 0 and end >= 0:
-            text = text[:start] + b'\n "%s": {' % name.encode() + text[end + 2 :]
-    return text
