@@ -16,7 +16,7 @@ from symphys.errors import SymphysError
 from symphys.solvers.core.interface import Solver
 from symphys.solvers.core.multi_start import solve_multi_start
 from symphys.solvers.core.options import recorded_options
-from symphys.solvers.core.outcome import Counts, Monitor, Outcome, StageResult, Status, TraceRow
+from symphys.solvers.core.outcome import Counts, Keep, Monitor, Outcome, StageResult, Status, TraceRow
 from symphys.solvers.methods.cma_es import CMA, CmaOptions
 from symphys.solvers.methods.evolution import EVOLUTION, EvolutionOptions
 from symphys.solvers.methods.gradient import GRADIENT, GradientOptions
@@ -31,6 +31,7 @@ __all__ = [
     "EvolutionOptions",
     "GradientOptions",
     "IpoptOptions",
+    "Keep",
     "LeastSquaresOptions",
     "Monitor",
     "Outcome",

@@ -18,7 +18,7 @@ from symphys.solvers.core.continuation import Rate, exact_best, stage_result
 from symphys.solvers.core.evaluator import CountingEvaluator, WorkCounter
 from symphys.solvers.core.interface import Iteration, IterationRecorder, Log, Method, Solver, StageContext, nothing
 from symphys.solvers.core.options import SolverOptions
-from symphys.solvers.core.outcome import Array, Counts, Monitor, Outcome, StageResult, Status, StopReason
+from symphys.solvers.core.outcome import Array, Counts, Keep, Monitor, Outcome, StageResult, Status, StopReason
 from symphys.solvers.core.point import Incumbent, Stop
 from symphys.solvers.core.trace import SolveTrace, counts_of
 
@@ -107,6 +107,7 @@ def make_solver(
         monitor: Monitor | None = None,
         checkpoint: dict[str, object] | None = None,
         log: Log | None = None,
+        keep: Keep | None = None,
     ) -> Outcome:
         """See ``interface.Solve``."""
         check(options)
@@ -119,7 +120,7 @@ def make_solver(
                 return StopReason(Status.NOT_APPLICABLE, refused)
             return stage(context, options, saved, recorder)
 
-        request = Request(name, problem, start, options, seed, monitor, checkpoint, log or silent, constraints)
+        request = Request(name, problem, start, options, seed, monitor, checkpoint, log or silent, constraints, keep)
         return Driver(request, run_stage, rate(options, seed)).run()
 
     return Solver(name, summary, Options, solve, prepare, threaded, scenarios)
@@ -131,7 +132,7 @@ class Request:
 
     Attributes:
         solver: its name.
-        problem, start, seed, monitor, checkpoint, log: of the call.
+        problem, start, seed, monitor, checkpoint, log, keep: of the call.
         options: of the call; of these the driver knows the limits.
         constraints: see ``make_solver``.
     """
@@ -145,6 +146,7 @@ class Request:
     checkpoint: dict[str, object] | None
     log: Log
     constraints: bool
+    keep: Keep | None = None
 
 
 class Driver:
@@ -172,8 +174,8 @@ class Driver:
         """Run every stage; whatever happens becomes a status with advice. SymphysError alone passes through."""
         try:
             reason, z = self._run_stages()
-        except KeyboardInterrupt:
-            reason = StopReason(Status.INTERRUPTED, INTERRUPTED)
+        except KeyboardInterrupt as stopped:
+            reason = StopReason(Status.INTERRUPTED, str(stopped) or INTERRUPTED)
             z = self._stages[-1].z if self._stages else self._start
         self._request.log(str(reason))
         if reason.status is Status.INTERRUPTED and self._checkpoint is not None:
@@ -192,9 +194,11 @@ class Driver:
         outputs = {**dict(zip(names, best.outputs.tolist(), strict=False)), **iteration.outputs}
         row = self._trace.append(counts, (*numbers, evaluator.smoothing), outputs)
         self._last = point.z
-        self._checkpoint = Checkpoint(
+        self._checkpoint = taken = Checkpoint(
             self._stages, iteration.state, best, point.z, counts, len(self._trace), row.seconds
         )
+        if self._request.keep:
+            self._request.keep(lambda: to_plain(self._request.solver, taken, self._trace.rows))
         if self._request.monitor:
             self._request.monitor(row)
 

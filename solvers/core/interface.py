@@ -9,7 +9,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from symphys.shooting import ShootingProblem
 from symphys.solvers.core.evaluator import CountingEvaluator
-from symphys.solvers.core.outcome import Array, Counts, Monitor, Outcome, StopReason
+from symphys.solvers.core.outcome import Array, Counts, Keep, Monitor, Outcome, StopReason
 from symphys.solvers.core.point import Point
 
 Log = Callable[[str], None]
@@ -116,6 +116,7 @@ class Solve(Protocol[O_contra]):
         monitor: takes each row of the trace; it may raise KeyboardInterrupt, which ends the solve so that it can go on.
         checkpoint: ``Outcome.checkpoint`` of an interrupted solve; from it the solve goes on.
         log: takes the solver's own text.
+        keep: is offered a checkpoint after each iteration, for what may end without an interruption.
 
     Raises SymphysError for options that cannot be, and for a checkpoint of another solver or problem;
     every other failure is a status.
@@ -130,6 +131,7 @@ class Solve(Protocol[O_contra]):
         monitor: Monitor | None = None,
         checkpoint: dict[str, object] | None = None,
         log: Log | None = None,
+        keep: Keep | None = None,
     ) -> Outcome:
         """Solve."""
         ...

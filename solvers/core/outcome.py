@@ -124,6 +124,8 @@ class StageResult:
 
 
 Monitor = Callable[[TraceRow], None]
+Keep = Callable[[Callable[[], dict[str, object]]], None]
+"""Is offered, after each iteration, what makes the checkpoint there; calls it when it wants to keep one."""
 
 
 @dataclass(frozen=True)

@@ -13,13 +13,14 @@ from typing import Any
 
 from symphys.api.solution import Solution
 from symphys.api.solving import kept
+from symphys.batches import BatchResult, run_batch
 from symphys.problem import Problem
 from symphys.problem.loading import Source, load
 from symphys.problem.problem import plain
 from symphys.problem.sweeps.points import combined, swept
 from symphys.problem.sweeps.table import read_sweep
 from symphys.results.run import read_run
-from symphys.runs import BatchResult, Job, Result, make_jobs, run_batch
+from symphys.runs import Job, Result, make_jobs
 from symphys.solvers import TraceRow
 from symphys.transcription import transcribe
 

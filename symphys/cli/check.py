@@ -38,7 +38,7 @@ def check(source: str, assignments: tuple[str, ...], folder: Path | None) -> int
     Exit code 1: the gradient disagrees with differences, or something is not finite.
     """
     from symphys.cli.examined import print_examined
-    from symphys.cli.progress import working
+    from symphys.cli.watching import working
     from symphys.problem import require_solvable
     from symphys.runs import check_tables
     from symphys.trajectory import NotFinite

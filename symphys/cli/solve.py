@@ -27,10 +27,13 @@ from symphys.cli.arguments import (
     settings_option,
     sweep_options,
 )
+from symphys.cli.batch_options import BatchOptions, batch_options
 from symphys.cli.wording import duration, many_pairs
 
 if TYPE_CHECKING:
-    from symphys.runs import BatchResult, Job
+    from symphys.batches import BatchResult
+    from symphys.cli.watching.choice import Shown
+    from symphys.runs import Job
 
 MOST_SEEDS = 10_000
 MOST_JOBS = 256
@@ -78,6 +81,7 @@ BATCH_PAGE = "page of all runs"
 )
 @backend_option
 @out_option
+@batch_options
 def solve(
     sources: tuple[str, ...],
     names: str | None,
@@ -90,6 +94,7 @@ def solve(
     unexamined: bool,
     backend: str,
     out: Path,
+    how: BatchOptions,
 ) -> int:
     """Solve problems, and write a report.
 
@@ -98,8 +103,9 @@ def solve(
     """
     began = perf_counter()
     threads.limit()
-    from symphys.cli.progress import watch, working
-    from symphys.runs import make_jobs, run_batch
+    from symphys.batches import BatchLimits, run_batch
+    from symphys.cli.watching import watch, working
+    from symphys.runs import make_jobs
     from symphys.transcription import transcribe
 
     solvers, backend = read_solvers(names), read_backend(backend)
@@ -110,36 +116,68 @@ def solve(
         for each in points_of(read_sweeps(problems, sweeps, samples), working)
         for job in make_jobs([each], solvers, range(seeds), dict(each.settings), out, command, backend, not unexamined)
     ]
+    if how.dry_run:
+        return print_previews(asked, how.rerun)
     for problem in problems:
         if note := many_pairs(problem.name, len(problem.world().pairs)):
             click.echo(note, err=True)
     made = partial(transcribe, backend=backend, threads=1 if jobs > 1 else None)
-    with watch(len(asked)) as observer:
-        batch = run_batch(asked, jobs, observer, made, multi_start)
+    limits = BatchLimits(how.retries, how.timeout, how.budget)
+    with watch(len(asked), how.quiet, how.json) as observer:
+        batch = run_batch(asked, jobs, observer, made, multi_start, limits, how.rerun)
+    code = 130 if batch.interrupted else 0 if batch.accepted else 1
+    if how.json or how.quiet:
+        return conclude_silently(asked, batch, out, observer, code)
     parts = observer.notes.seconds if jobs == 1 and not multi_start else {}
-    return conclude(asked, batch, out, began, parts)
+    conclude(asked, batch, out, began, parts)
+    return code
 
 
-def conclude(jobs: list[Job], batch: BatchResult, out: Path, began: float, parts: Mapping[str, float]) -> int:
-    """Show what came of it; the exit code."""
+def print_previews(jobs: list[Job], rerun: str) -> int:
+    """Say what would be done, and why, a run a line; the exit code."""
+    from symphys.batches import previews
+
+    todo = 0
+    for each in previews(jobs, rerun):
+        todo += each.todo
+        click.echo(f"{each.job.name}: {'to do' if each.todo else each.stands}: {each.why}")
+    click.echo(f"{todo} of {len(jobs)} runs are to do")
+    return 0
+
+
+def conclude(jobs: list[Job], batch: BatchResult, out: Path, began: float, parts: Mapping[str, float]) -> None:
+    """Show what came of it."""
     from symphys.cli.summary import print_summary
 
     print_summary(jobs, batch)
     if batch.interrupted:
         click.echo(last_words(batch, out), err=True)
-        return 130
+        return
     page = write_reports(jobs, out)
+    if batch.spent:
+        click.echo(last_words(batch, out), err=True)
     click.echo(time_line(perf_counter() - began, parts))
     click.echo(f"report: {page}")
-    return 0 if batch.accepted else 1
+
+
+def conclude_silently(jobs: list[Job], batch: BatchResult, out: Path, observer: Shown, code: int) -> int:
+    """Write the reports, and say no more than events; the exit code."""
+    from symphys.cli.watching.events import Events
+
+    if not batch.interrupted:
+        write_reports(jobs, out)
+    if isinstance(observer, Events):
+        observer.finished(batch, code)
+    return code
 
 
 def last_words(batch: BatchResult, out: Path) -> str:
-    """What an interruption has left, and how to go on."""
+    """What an interruption, or the end of its time, has left of a batch, and how to go on."""
+    why = "interrupted" if batch.interrupted else "the time of the batch is used up"
     over = sum(result is not None and not result.interrupted for result in batch.results)
     halfway = sum(result is not None and result.interrupted for result in batch.results)
     return (
-        f"symphys: interrupted; {over} of {len(batch.results)} runs are done and {halfway} halfway, saved in {out}; "
+        f"symphys: {why}; {over} of {len(batch.results)} runs are done and {halfway} halfway, saved in {out}; "
         "the same command goes on from there"
     )
 
@@ -156,7 +194,7 @@ def time_line(total: float, parts: Mapping[str, float]) -> str:
 
 def write_reports(jobs: list[Job], out: Path) -> Path:
     """Write the pages of the runs that are new, and that of the batch; where that lies."""
-    from symphys.cli.progress import working
+    from symphys.cli.watching import working
     from symphys.report import write_batch_report, write_run_report
     from symphys.report.pages.run import PAGE
     from symphys.runs import RESULT

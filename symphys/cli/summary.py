@@ -19,7 +19,8 @@ from symphys.findings.obstacles import MOST_BOUNDS, bound_words, holding
 from symphys.findings.verdict import BEST_FOUND, DOUBTED, NOT_SOLVED
 
 if TYPE_CHECKING:
-    from symphys.runs import BatchResult, Job, Result
+    from symphys.batches import BatchResult
+    from symphys.runs import Job, Result
 
 Groups = Mapping[tuple[str, str], list["Result"]]
 """Results by problem, with its settings, and solver."""

@@ -63,7 +63,7 @@ def time_words(seconds: float) -> str:
 def brief(job: Job, result: Result, skipped: bool) -> str:
     """One line on a run that is over."""
     if result.status == "failed" and skipped:
-        return f"failed before: {first_line(result.advice)} (to try again, remove {job.folder.path})"
+        return f"failed before: {first_line(result.advice)} (--rerun failed tries again)"
     if result.status == "failed":
         return f"failed: {first_line(result.advice)}"
     if skipped:

@@ -12,7 +12,6 @@ from typing import Any
 from symphys import files
 from symphys import json_values as values
 from symphys.json_values import Text
-from symphys.version import __version__
 
 
 @dataclass(frozen=True)
@@ -62,7 +61,7 @@ def make_config(
     backend: str,
 ) -> Config:
     """The configuration with its key; ``text`` is the problem's ``identity``."""
-    parts = [text, settings, solver, options, seed, backend, __version__]
+    parts = [text, settings, solver, options, seed, backend]
     canonical = json.dumps(files.strict(parts), sort_keys=True, allow_nan=False)
     key = hashlib.sha256(canonical.encode()).hexdigest()
     return Config(problem, solver, seed, settings, options, backend, key)

@@ -19,7 +19,7 @@ from symphys.json_values import Array, Text
 from symphys.results.trace import renamed
 
 FORMAT = 1
-ADDED_LATER = {"verdict", "doubts"}
+ADDED_LATER = {"verdict", "doubts", "again"}
 """Fields that older files do not have."""
 REACHED = frozenset(
     (
@@ -200,6 +200,7 @@ class Result:
         backend: what evaluated the functions.
         verdict: a word of ``symphys.findings.verdict``.
         doubts: why the motion is not to be relied on, one clause each.
+        again: whether what failed was the machine and not the run: the same command tries it again.
         absent: names of the fields above that the run did not reach; they are null in the file.
     """
 
@@ -229,6 +230,7 @@ class Result:
     backend: BackendRecord = field(default_factory=BackendRecord)
     verdict: str = NOT_SOLVED
     doubts: tuple[str, ...] = ()
+    again: bool = False
     absent: frozenset[str] = frozenset()
 
     def __eq__(self, other: object) -> bool:

@@ -3,7 +3,7 @@
 from symphys.results.file_names import RESULT, SCENE, TRAJECTORY
 from symphys.results.result import Result, read_result
 from symphys.results.scene_of_problem import make_scene
-from symphys.runs.batch import BatchResult, Observer, run_batch
+from symphys.runs.claim import FolderBusy
 from symphys.runs.execute import execute
 from symphys.runs.folder import RunFolder
 from symphys.runs.job import Job, check_tables, make_jobs
@@ -12,9 +12,8 @@ __all__ = [
     "RESULT",
     "SCENE",
     "TRAJECTORY",
-    "BatchResult",
+    "FolderBusy",
     "Job",
-    "Observer",
     "Result",
     "RunFolder",
     "check_tables",
@@ -22,5 +21,4 @@ __all__ = [
     "make_jobs",
     "make_scene",
     "read_result",
-    "run_batch",
 ]

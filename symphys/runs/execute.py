@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
+import contextlib
 import traceback
 from collections.abc import Callable
+from time import monotonic
 
 from symphys import files
 from symphys.errors import SymphysError
 from symphys.results.file_names import CHECKPOINT, LOG, RESULT
 from symphys.results.result import Result
-from symphys.runs.folder import FolderBusy
+from symphys.runs.claim import Claim, FolderBusy, claimed
 from symphys.runs.job import Job
 from symphys.runs.record import failure
 from symphys.runs.solving import silent, solve
+from symphys.runs.standing import MISSING, Standing, Stands, standing
 from symphys.runs.transcription_cache import Transcriptions
 from symphys.solvers import Monitor, Outcome
+
+KEPT = 10.0
+"""[s] between two checkpoints of a run that goes on, at least."""
+SHARE = 50
+"""A checkpoint takes at most one of so many seconds."""
+
+
+def unheard(resumed: bool) -> None:
+    """Tell nobody that a run begins."""
 
 
 def execute(
@@ -23,39 +35,68 @@ def execute(
     transcriptions: Transcriptions,
     solved: Outcome | None = None,
     tell: Callable[[str], None] = silent,
+    begin: Callable[[bool], None] = unheard,
 ) -> Result:
-    """Do the run, or go on with it, unless it is done; write its folder; return what it found.
+    """Do the run, or go on with it, unless it is over; write its folder; return what it found.
 
     ``monitor`` sees each iteration and may raise KeyboardInterrupt, which ends the run so that it can go on later.
     ``solved``: what its solver has found already, side by side with other seeds. ``tell``: see ``solving.solve``.
-    A run that fails is a result with the status "failed"; only a FileError, a folder that cannot be written, is raised.
+    ``begin``: is called with whether it goes on, once it is claimed; not for a run that was over.
+    A run that fails is a result with the status "failed", and so is one whose folder cannot be written.
+
+    Raises:
+        FolderBusy: another process is at this run, or has taken it over.
     """
+    found = standing(job)
+    if found.result and over(job, found):
+        return found.result
     try:
-        with job.folder.locked():
-            earlier = job.folder.earlier(job.config)
-            if earlier and not earlier.interrupted:
-                return earlier
-            return proceed(job, monitor, transcriptions, earlier, solved, tell)
-    except FolderBusy as error:
-        return failure(job, str(error))
+        with claimed(job.folder.path) as claim:
+            return with_claim(job, claim, monitor, transcriptions, solved, tell, begin)
+    except FolderBusy:
+        raise
+    except files.FileError as error:
+        return failure(job, str(error), again=True)
+
+
+def with_claim(
+    job: Job,
+    claim: Claim,
+    monitor: Monitor,
+    transcriptions: Transcriptions,
+    solved: Outcome | None = None,
+    tell: Callable[[str], None] = silent,
+    begin: Callable[[bool], None] = unheard,
+) -> Result:
+    """``execute`` for a run that this process has claimed; FileError for a folder that cannot be written."""
+    found = standing(job)
+    if found.result and over(job, found):
+        return found.result
+    begin(found.checkpoint is not None)
+    return proceed(job, claim, found, monitor, transcriptions, solved, tell)
+
+
+def over(job: Job, found: Standing) -> bool:
+    """Whether there is nothing to do, as the run is over and not to be made again."""
+    return found.stands not in MISSING and (not job.outdated or found.stamp != job.outdated)
 
 
 def proceed(
     job: Job,
+    claim: Claim,
+    found: Standing,
     monitor: Monitor,
     transcriptions: Transcriptions,
-    earlier: Result | None,
-    solved: Outcome | None = None,
-    tell: Callable[[str], None] = silent,
+    solved: Outcome | None,
+    tell: Callable[[str], None],
 ) -> Result:
-    """Solve and write down what came of it; ``earlier`` is the interrupted run to go on with."""
-    checkpoint = job.folder.checkpoint() if earlier else None
-    if not checkpoint:
-        checkpoint = earlier = None
+    """Solve and write down what came of it."""
+    if not found.checkpoint:
         job.folder.begin(job.config, job.problem.text)
     log = Log(job)
+    keeper = CheckpointKeeper(job, log)
     try:
-        result = solve(job, transcriptions(job), monitor, log, checkpoint, earlier, solved, tell)
+        result = solve(job, transcriptions(job), monitor, log, keeper, found, solved, tell)
     except files.FileError:
         raise
     except SymphysError as error:
@@ -64,8 +105,9 @@ def proceed(
         log(traceback.format_exc())
         result = failure(job, f"unexpected {type(error).__name__}: {error} (details in {job.folder.path / LOG})")
     finally:
-        log.write()
-    finish(job, result)
+        with contextlib.suppress(files.FileError):  # a full disk is reported by what comes after
+            log.write()
+    finish(job, claim, result)
     return result
 
 
@@ -75,7 +117,9 @@ class Log:
     def __init__(self, job: Job) -> None:
         """Start from what an interrupted run wrote."""
         self.path = job.folder.path / LOG
-        self.text = files.read_text(self.path) if self.path.exists() else ""
+        self.text = ""
+        with contextlib.suppress(files.FileError):
+            self.text = files.read_text(self.path)
 
     def __call__(self, line: str) -> None:
         """Add a line."""
@@ -86,15 +130,44 @@ class Log:
         files.write_text(self.path, self.text)
 
 
-def finish(job: Job, result: Result) -> None:
+class CheckpointKeeper:
+    """Writes a checkpoint now and then, so that a run whose process is killed goes on from there."""
+
+    def __init__(self, job: Job, log: Log) -> None:
+        """The first is due after KEPT."""
+        self.path, self.log = job.folder.path / CHECKPOINT, log
+        self.due = monotonic() + KEPT
+
+    def __call__(self, make: Callable[[], dict[str, object]]) -> None:
+        """Take an offered checkpoint, if one is due; a folder that cannot be written now may be so later."""
+        began = monotonic()
+        if began < self.due:
+            return
+        try:
+            files.write_json(self.path, make())
+            self.log.write()
+        except files.FileError as error:
+            self.log(f"no checkpoint: {error}")
+        self.due = monotonic() + max(KEPT, SHARE * (monotonic() - began))
+
+
+def finish(job: Job, claim: Claim, result: Result) -> None:
     """Write the result, last of all files, so that it exists only where the others are whole."""
+    claim.check()
     files.write_json(job.folder.path / RESULT, result.to_json())
     if not result.interrupted:
         files.remove(job.folder.path / CHECKPOINT)
 
 
-def give_up(job: Job, message: str) -> Result:
-    """Write that the run failed."""
-    result = failure(job, message)
-    finish(job, result)
+def give_up(job: Job, message: str, again: bool) -> Result:
+    """Write that the run failed, unless its folder says how it ended, or is another process's; see ``failure``."""
+    result = failure(job, message, again)
+    with contextlib.suppress(files.FileError), claimed(job.folder.path) as claim:
+        found = standing(job)
+        if found.result and over(job, found):
+            return found.result
+        if found.stands in (Stands.NEW, Stands.CHANGED, Stands.DAMAGED):
+            job.folder.begin(job.config, job.problem.text)
+        files.write_json(job.folder.path / RESULT, result.to_json())
+        claim.check()
     return result

@@ -1,28 +1,16 @@
-"""A run's folder: where its files are, whether the run is done, and its lock."""
+"""A run's folder: where its files are, and how they are begun."""
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
-import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from symphys import files
 from symphys.results.case_name import case_name
-from symphys.results.config import Config, read_config
+from symphys.results.config import Config
 from symphys.results.file_names import CHECKPOINT, CONFIG, GUESS, LOG, PROBLEM, RESULT, SCENE, TRACE, TRAJECTORY
-from symphys.results.result import Result, read_result
 from symphys.results.trace import trace_text
-
-try:
-    import fcntl
-except ImportError:  # not a POSIX system: concurrent commands are then kept apart by atomic writes alone
-    fcntl = None  # type: ignore[assignment]
-
-
-class FolderBusy(files.FileError):
-    """Another command is working in the folder."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,14 +27,6 @@ class RunFolder:
         if problem in {"", ".", ".."}:
             raise files.FileError(f"a problem called {problem!r} can have no folder: rename its file")
         return cls(out / case_name(problem, settings or {}) / f"{solver}-seed{seed}")
-
-    def earlier(self, config: Config) -> Result | None:
-        """The result of the very run that ``config`` asks for, interrupted or finished; None if there is none."""
-        try:
-            same = read_config(self.path / CONFIG).key == config.key
-            return read_result(self.path / RESULT) if same else None
-        except files.FileError:
-            return None
 
     def checkpoint(self) -> dict[str, object] | None:
         """Where an interrupted run stopped; None if that is not known."""
@@ -67,27 +47,3 @@ class RunFolder:
     def write_trace(self, rows: Iterable[Mapping[str, object]]) -> None:
         """Write one line per iteration under a header with the names of the columns; what a row lacks is nan."""
         files.write_text(self.path / TRACE, trace_text(rows))
-
-    @contextlib.contextmanager
-    def locked(self) -> Iterator[None]:
-        """Keep other commands out; FolderBusy if one is in. The lock ends with its process, however that ends."""
-        files.make_folder(self.path)
-        if fcntl is None:
-            yield
-            return
-        handle = os.open(self.path, os.O_RDONLY)
-        try:
-            take(handle, self.path)
-            yield
-        finally:
-            os.close(handle)
-
-
-def take(handle: int, path: Path) -> None:
-    """Lock an open folder; file systems without locks are let pass."""
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
-        raise FolderBusy(f"another symphys command is working in {path}; nothing was changed there") from error
-    except OSError:
-        return

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ class Job:
         folder: where the run is written.
         command: what was typed.
         examine: whether the solution is examined.
+        outdated: the stamp, see ``standing``, of a result that is to be made again although it is there.
     """
 
     problem: Problem
@@ -34,16 +35,27 @@ class Job:
     folder: RunFolder
     command: str
     examine: bool = True
+    outdated: str = ""
 
     @property
     def name(self) -> str:
         """For messages: ``ball_throw gradient seed 0``."""
-        return f"{self.config.problem} {self.config.solver} seed {self.config.seed}"
+        return f"{self.case} {self.config.solver} seed {self.config.seed}"
 
     @property
     def case(self) -> str:
         """The problem with its settings, as its folder is called: ``ball_throw@ground.friction=0.6``."""
         return case_name(self.config.problem, self.config.settings)
+
+    @property
+    def subject(self) -> Hashable:
+        """What is transcribed for it: jobs of one subject share their functions."""
+        return self.problem.file, self.problem.identity, repr(self.config.settings), self.smooth
+
+    @property
+    def size(self) -> int:
+        """How much work an evaluation is, roughly: time steps times quantities of the state."""
+        return self.problem.simulation.steps * max(len(self.problem.initial), 1)
 
     @property
     def smooth(self) -> bool:

@@ -91,9 +91,9 @@ def make_result(
     )
 
 
-def failure(job: Job, message: str) -> Result:
-    """The result of a run that could not be done."""
-    return Result(**provenance(job), solved=False, status="failed", advice=message, absent=REACHED)
+def failure(job: Job, message: str, again: bool = False) -> Result:
+    """The result of a run that could not be done; ``again``: the same command is to try it again."""
+    return Result(**provenance(job), solved=False, status="failed", advice=message, again=again, absent=REACHED)
 
 
 def judged(verdict: Assessment | None) -> Judged:

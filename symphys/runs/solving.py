@@ -16,8 +16,9 @@ from symphys.results.result import Result
 from symphys.results.scene_of_problem import make_scene
 from symphys.runs.job import Job
 from symphys.runs.record import Judgement, judged, make_result, trace_row, used
+from symphys.runs.standing import Standing
 from symphys.shooting import Array, ShootingProblem
-from symphys.solvers import Monitor, Outcome, Status, solver
+from symphys.solvers import Keep, Monitor, Outcome, Status, solver
 from symphys.transcription import Record, Transcription
 
 SMOOTHED = (
@@ -38,12 +39,12 @@ def solve(
     transcription: Transcription,
     monitor: Monitor,
     log: Callable[[str], None],
-    checkpoint: dict[str, object] | None,
-    earlier: Result | None,
+    keep: Keep,
+    found: Standing,
     solved: Outcome | None = None,
     tell: Callable[[str], None] = silent,
 ) -> Result:
-    """Solve from the seed's guess, or go on from ``checkpoint`` of the ``earlier`` result; write what was found.
+    """Solve from the seed's guess, or go on from the checkpoint that was ``found``; write what comes of it.
 
     ``solved``: what was found already, side by side with other seeds; its seconds are those of the group. ``tell``: is
     called with a few words before each part of judging what was found.
@@ -53,11 +54,11 @@ def solve(
     start = shooting.start(job.config.seed)
     files.write_npz(job.folder.path / GUESS, transcription.simulate(start).arrays())
     if solved is None:
-        outcome, spent = alone(job, shooting, start, monitor, log, checkpoint)
+        outcome, spent = alone(job, shooting, start, monitor, log, keep, found.checkpoint)
     else:
         log("solved side by side with other seeds: the seconds are those of all")
         outcome, spent = solved, solved.trace[-1].seconds if solved.trace else 0.0
-    spent += (earlier.seconds if earlier else {}).get("solve", 0.0)
+    spent += spent_before(found)
     judgement = judge(transcription, outcome, job.examine, tell)
     price = transcription.prices(used(outcome.counts))
     write(job, transcription, outcome, judgement, price)
@@ -71,16 +72,27 @@ def alone(
     start: Array,
     monitor: Monitor,
     log: Callable[[str], None],
-    checkpoint: dict[str, object] | None,
+    keep: Keep,
+    checkpoint: dict[str, Any] | None,
 ) -> tuple[Outcome, float]:
     """Solve; the outcome and the seconds that it took."""
     chosen = solver(job.config.solver)
     chosen.prepare()
     began = time.perf_counter()
     outcome = chosen.solve(
-        shooting, start, job.options, job.config.seed, monitor=monitor, checkpoint=checkpoint, log=log
+        shooting, start, job.options, job.config.seed, monitor=monitor, checkpoint=checkpoint, log=log, keep=keep
     )
     return outcome, time.perf_counter() - began
+
+
+def spent_before(found: Standing) -> float:
+    """[s] of solving before the checkpoint; of a process that was killed up to its last iteration there."""
+    if not found.checkpoint:
+        return 0.0
+    if found.result:
+        return found.result.seconds.get("solve", 0.0)
+    seconds = found.checkpoint.get("seconds", 0.0)
+    return float(seconds) if isinstance(seconds, int | float) else 0.0
 
 
 def judge(

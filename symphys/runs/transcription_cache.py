@@ -24,8 +24,7 @@ class TranscriptionCache:
 
     def __call__(self, job: Job) -> Transcription:
         """The job's problem as a shooting problem."""
-        subject = (job.problem.file, job.problem.identity, repr(job.config.settings), job.smooth)
-        if self.made is None or self.made[0] != subject:
+        if self.made is None or self.made[0] != job.subject:
             self.made = None
-            self.made = (subject, self.transcribe(job.problem, not job.smooth))
+            self.made = (job.subject, self.transcribe(job.problem, not job.smooth))
         return self.made[1]

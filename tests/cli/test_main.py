@@ -126,7 +126,8 @@ def test_other_settings_overwrite_nothing_in_either_order(
     assert "With ground.friction=0.3." in page and "With ground.friction=0.6." in page
     for settings in reversed(asked):
         err = run("solve", throw, "--solver", "least_squares", *settings, *QUICK)[2]
-        assert err.splitlines() == ["throw least_squares seed 0: done before (solved)"]
+        case = "@".join(["throw", *settings[1:]])
+        assert err.splitlines() == [f"{case} least_squares seed 0: done before (solved)"]
 
 
 def test_workers_solve_too(run: Run, throw: Path) -> None:

@@ -10,20 +10,15 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from symphys.cli import progress
-from symphys.cli.progress import (
-    Plain,
-    batch_words,
-    heartbeat,
-    percent,
-    step_words,
-    use_words,
-    watch,
-    working,
-)
+from symphys.batches import progress as batch_progress
+from symphys.batches.progress import BatchShare, StepProgress
+from symphys.cli.watching import heartbeat as heartbeats
+from symphys.cli.watching import plain as plain_lines
+from symphys.cli.watching import watch, working
+from symphys.cli.watching.heartbeat import heartbeat
+from symphys.cli.watching.plain import Plain
+from symphys.cli.watching.words import batch_words, percent, step_words, use_words
 from symphys.cli.wording import time_words
-from symphys.runs import progress as runs_progress
-from symphys.runs.progress import BatchShare, StepProgress
 from symphys.solvers import CmaOptions, TraceRow
 from symphys.solvers.core.budget import BudgetUse
 
@@ -54,7 +49,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     made = Clock()
-    for module in (progress, runs_progress):
+    for module in (plain_lines, batch_progress):
         monkeypatch.setattr(module, "monotonic", made)
     return made
 
@@ -166,7 +161,7 @@ def test_live_lines_are_wrapped_and_not_cut(monkeypatch: pytest.MonkeyPatch) -> 
     def console(**given: Any) -> Console:
         return Console(file=buffer, force_terminal=True, width=80, color_system=None)
 
-    monkeypatch.setattr(progress, "Console", console)
+    monkeypatch.setattr("symphys.cli.watching.choice.Console", console)
     outputs = {"height of the hand [m]": 1.25, "speed of the ball [m/s]": 12.5}
     with watch(1) as live:
         live.started(Job(), resumed=False)  # type: ignore[arg-type]
@@ -208,7 +203,7 @@ def test_a_heartbeat_ends_with_its_body() -> None:
 def test_work_without_a_terminal_says_now_and_then_where_it_is(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(progress, "EVERY", 0.01)
+    monkeypatch.setattr(heartbeats, "EVERY", 0.01)
     said = ""
     with working("check throw", {"one": 1.0, "two": 1.0}) as tell:
         tell("one")

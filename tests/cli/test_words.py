@@ -13,9 +13,11 @@ from rich.console import Console
 from rich.progress import Progress
 
 from symphys.cli.arguments import UsageFault, read_settings
-from symphys.cli.progress import Live, Notes, Plain, at
 from symphys.cli.solve import time_line
 from symphys.cli.summary import advice, fitting_table, missed, table
+from symphys.cli.watching.live import Live
+from symphys.cli.watching.plain import Notes, Plain
+from symphys.cli.watching.words import at
 from symphys.cli.wording import brief, duration, many_pairs, number, whole
 from symphys.problem.reading.value_texts import read_value
 from symphys.results.result import CheckRecord
@@ -85,7 +87,7 @@ def test_a_run_in_a_line() -> None:
     assert brief(job, result(), skipped=True) == "done before (solved)"
     failed = result(solved=False, status="failed", advice="broken\nin two")
     assert brief(job, failed, skipped=False) == "failed: broken"
-    assert brief(job, failed, skipped=True) == "failed before: broken (to try again, remove out/throw/cma-seed0)"
+    assert brief(job, failed, skipped=True) == "failed before: broken (--rerun failed tries again)"
 
 
 def test_seeds_share_a_row_of_medians() -> None:

@@ -53,15 +53,20 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "solvers": ("errors shooting", "casadi cma numpy scipy", "optimisation methods"),
     "findings": ("json_values", "numpy", "what the numbers of an examination mean"),
     "results": (
-        "errors files findings json_values model problem shooting trajectory version",
+        "errors files findings json_values model problem shooting trajectory",
         "casadi numpy scipy",
         "what a run folder holds",
     ),
     "runs": (
-        "codegen errors files findings problem results shooting solvers threads trajectory transcription verification "
-        "version",
+        "codegen errors files findings json_values problem results shooting solvers trajectory transcription "
+        "verification version",
         "numpy",
-        "solve, judge, examine, write",
+        "solve, judge, examine, write one run, and who may",
+    ),
+    "batches": (
+        "files results runs solvers threads verification",
+        "",
+        "many runs, in any number of processes and commands",
     ),
     "report": (
         "files findings results trajectory verbs",
@@ -70,8 +75,8 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     ),
     "doctor": ("codegen verbs", "casadi numpy", "what there is on this machine"),
     "api": (
-        "codegen errors files findings problem problems report results runs shooting solvers suggest trajectory "
-        "transcription verification",
+        "batches codegen errors files findings problem problems report results runs shooting solvers suggest "
+        "trajectory transcription verification",
         "matplotlib numpy",
         "what Python calls",
     ),
@@ -79,7 +84,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "jax": ("api errors transcription", "jax numpy", "rollouts and steps for JAX"),
     "env": ("api errors", "gymnasium numpy", "environments for Gymnasium"),
     "cli": (
-        "api codegen doctor errors export files findings problem problems report runs solvers suggest threads "
+        "api batches codegen doctor errors export files findings problem problems report runs solvers suggest threads "
         "trajectory transcription verification version",
         "click numpy rich",
         "the commands",

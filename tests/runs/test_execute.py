@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import os
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -15,6 +16,8 @@ import pytest
 from symphys import files, solvers
 from symphys.problem import load_problem
 from symphys.runs import Job, Result, execute, make_jobs
+from symphys.runs.claim import FolderBusy, claimed
+from symphys.runs.standing import standing
 from symphys.runs.transcription_cache import TranscriptionCache
 from symphys.solvers import Outcome, Status, TraceRow
 from symphys.transcription import transcribe
@@ -52,7 +55,7 @@ def test_a_run_leaves_every_file(make_job: MakeJob) -> None:
         "trace.csv",
         "log.txt",
     }
-    assert job.folder.earlier(job.config) == result
+    assert standing(job).result == result
     assert (job.folder.path / "problem.toml").read_text(encoding="utf-8") == job.problem.text
 
 
@@ -90,7 +93,7 @@ def test_what_is_met_by_a_motion_that_cannot_be_is_not_solved(problem_file: Path
         assert all(check.met for check in result.checks)
         assert (result.solved, result.accepted, result.verdict) == (False, False, "doubted")
         assert any("ball-ground" in doubt and "t = 0 s" in doubt for doubt in result.doubts), result.doubts
-        assert job.folder.earlier(job.config) == result
+        assert standing(job).result == result
 
 
 @pytest.mark.parametrize(
@@ -246,7 +249,7 @@ def test_an_expected_failure_is_a_result_with_the_message(make_job: MakeJob) -> 
     result = run(job)
     assert (result.status, result.solved, result.advice) == ("failed", False, "cannot do that")
     assert "Traceback" not in (job.folder.path / "log.txt").read_text(encoding="utf-8")
-    assert job.folder.earlier(job.config) == result
+    assert standing(job).result == result
 
 
 def test_an_unexpected_failure_puts_its_traceback_into_the_log_only(make_job: MakeJob) -> None:
@@ -272,11 +275,10 @@ def test_a_failure_leaves_nothing_of_an_earlier_success(make_job: MakeJob) -> No
 
 def test_a_folder_in_use_is_left_alone(make_job: MakeJob) -> None:
     job = make_job()
-    with job.folder.locked():
-        result = run(job)
-        assert list(job.folder.path.iterdir()) == []
-    assert result.status == "failed"
-    assert "another symphys command" in result.advice
+    with claimed(job.folder.path) as claim:
+        with pytest.raises(FolderBusy, match=f"process {os.getpid()} on .* is working in"):
+            run(job)
+        assert list(job.folder.path.iterdir()) == [claim.path]
     assert run(job).solved
 
 
@@ -290,7 +292,11 @@ def test_damaged_files_mean_a_fresh_start(make_job: MakeJob, name: str) -> None:
     assert seen == [0, 1, 2, 3]
 
 
-def test_a_folder_that_cannot_be_written_stops_the_command(make_job: MakeJob, tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_fails_its_run_and_nothing_else(make_job: MakeJob, tmp_path: Path) -> None:
+    """The run is not over: it is done as soon as the folder can be written."""
     (tmp_path / "out").write_text("in the way")
-    with pytest.raises(files.FileError, match="cannot make the folder"):
-        run(make_job())
+    result = run(make_job())
+    assert (result.status, result.again) == ("failed", True)
+    assert "cannot make the folder" in result.advice
+    (tmp_path / "out").unlink()
+    assert run(make_job()).solved

@@ -12,10 +12,11 @@ from typing import Any
 import pytest
 from repeats import first
 
+from symphys.batches import run_batch
 from symphys.problem import Problem, load_problem
 from symphys.problems import find
 from symphys.results.result import StageRecord
-from symphys.runs import Job, Result, execute, make_jobs, read_result, run_batch
+from symphys.runs import Job, Result, execute, make_jobs, read_result
 from symphys.runs.transcription_cache import TranscriptionCache
 from symphys.solvers import TraceRow
 from symphys.transcription import Transcription, transcribe

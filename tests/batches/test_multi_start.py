@@ -9,9 +9,10 @@ from typing import Any
 
 import pytest
 
+from symphys.batches import run_batch
+from symphys.batches.multi_start import groups
 from symphys.problem import load_problem
-from symphys.runs import Job, make_jobs, run_batch
-from symphys.runs.multi_start import groups
+from symphys.runs import Job, make_jobs
 from symphys.solvers import TraceRow
 from symphys.transcription import transcribe
 
@@ -67,6 +68,6 @@ def test_one_that_fails_spoils_no_other(
     def broken(*_: Any) -> Any:
         raise RuntimeError("out of order")
 
-    monkeypatch.setattr("symphys.runs.multi_start.solve_multi_start", broken)
+    monkeypatch.setattr("symphys.batches.multi_start.solve_multi_start", broken)
     batch = run_batch(jobs_of(problem_file, tmp_path), 1, recorder, transcribe, multi_start=True)
     assert batch.accepted

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from time import monotonic
 
+from symphys.results.result import Result
 from symphys.runs.job import Job
 from symphys.solvers import TraceRow
 from symphys.solvers.core.budget import BudgetUse
@@ -48,7 +49,9 @@ class BatchShare:
 
     def __init__(self, runs: int) -> None:
         """None has begun."""
-        self.runs, self.over, self.timed = runs, 0, 0
+        self.runs, self.over, self.timed, self.failed = runs, 0, 0, 0
+        self.problems: set[str] = set()
+        self.best: tuple[float, str] | None = None
         self.began = monotonic()
         self.running: dict[str, BudgetUse] = {}
         self.judged: dict[str, StepProgress] = {}
@@ -73,6 +76,13 @@ class BatchShare:
         steps = self.judged.setdefault(job.name, StepProgress(PARTS))
         steps.tell(what)
         return steps
+
+    def found(self, job: Job, result: Result) -> None:
+        """What a run has come to."""
+        self.failed += result.status == "failed"
+        self.problems.add(result.problem)
+        if result.accepted and (self.best is None or result.objective < self.best[0]):
+            self.best = (result.objective, job.name)
 
     def ended(self, job: Job, skipped: bool) -> None:
         """A run is over; what was done before takes no time."""

@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from symphys.batches import run_batch
 from symphys.problem import Problem, load_problem
-from symphys.runs import Job, make_jobs, run_batch
+from symphys.runs import Job, make_jobs
 from symphys.runs.solving import JUDGING
 from symphys.solvers import SOLVERS, TraceRow
 from symphys.transcription import transcribe

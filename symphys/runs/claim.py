@@ -1,0 +1,296 @@
+"""The right to work in a run folder: claimed by a file, so that any number of commands on any machines share a batch.
+
+A claim is a file ``.claim-N`` in the run folder. It is linked into place whole, or not at all. Its process touches it
+every BEAT seconds. One that belongs to a process of this machine is over when the process is. One of another machine is
+over when it was not touched for LEASE seconds by the clock of whoever waits, so that clocks need not agree. What is
+over is taken up under the next number, which again only one can get. Nothing here needs locks of the file system.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+import socket
+import threading
+import time
+import uuid
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
+
+from symphys import files
+from symphys import json_values as values
+
+BEAT = 10.0
+"""[s] between two touches of a claim."""
+LEASE = 120.0
+"""[s] without a touch after which a claim of another machine is over; longer than any call that stops all threads."""
+NAME = re.compile(r"\.claim-(\d+)")
+
+
+class FolderBusy(files.FileError):
+    """Another process is working in the folder."""
+
+
+@dataclass(frozen=True)
+class Owner:
+    """Who holds a claim.
+
+    Attributes:
+        host: the machine's name, for people.
+        machine: what tells it from others: boot, and the space that process numbers are in.
+        process: its number.
+        begun: when the process began, as the system counts; empty where that is not known.
+        token: different for each claim.
+    """
+
+    host: str = ""
+    machine: str = ""
+    process: int = 0
+    begun: str = ""
+    token: str = ""
+
+    def __str__(self) -> str:
+        """For messages."""
+        return f"process {self.process} on {self.host}" if self.host else "another process"
+
+    @property
+    def here(self) -> bool:
+        """Whether it is a process of this machine."""
+        return bool(self.machine) and self.machine == machine()
+
+    @property
+    def alive(self) -> bool:
+        """Whether the process, of this machine, still runs."""
+        try:
+            os.kill(self.process, 0)
+        except ProcessLookupError:
+            return False
+        except OSError:  # of another user
+            return True
+        return beginning(self.process) == self.begun
+
+
+@cache
+def machine() -> str:
+    """What tells this machine, since it was started, from all others; empty where processes cannot be asked after."""
+    try:
+        boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="utf-8").strip()
+        return f"{boot} {Path('/proc/self/ns/pid').readlink()}"
+    except OSError:
+        return f"{uuid.getnode()}" if os.name == "posix" else ""
+
+
+def beginning(process: int) -> str:
+    """When a process of this machine began, in ticks since its boot; empty where that is not known, or it is over."""
+    try:
+        fields = Path(f"/proc/{process}/stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
+    except OSError:
+        return ""
+    return "over" if fields[0] in "ZX" else fields[19]
+
+
+def myself() -> Owner:
+    """This process, for a new claim."""
+    process = os.getpid()
+    return Owner(socket.gethostname(), machine(), process, beginning(process), uuid.uuid4().hex)
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim that this process holds.
+
+    Attributes:
+        folder: the run folder.
+        number: of the claim; the highest in the folder is the one that counts.
+        owner: this process.
+    """
+
+    folder: Path
+    number: int
+    owner: Owner
+
+    @property
+    def path(self) -> Path:
+        """Its file."""
+        return path_of(self.folder, self.number)
+
+    @property
+    def held(self) -> bool:
+        """Whether it still counts: nobody has taken the run over since, as after a sleep that was longer than LEASE."""
+        newest = numbers(self.folder)
+        return newest[-1:] == [self.number] and read_owner(self.path).token == self.owner.token
+
+    def check(self) -> None:
+        """Raise FolderBusy if the run was taken over."""
+        if not self.held:
+            raise FolderBusy(f"{self.folder} was taken over by another command while this one stood still")
+
+    def release(self) -> None:
+        """Let others in: this claim, and those that it took over, go."""
+        for number in reversed([each for each in numbers(self.folder) if each <= self.number]):
+            with contextlib.suppress(OSError):
+                path_of(self.folder, number).unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def claimed(folder: Path) -> Iterator[Claim]:
+    """Hold the folder; it is made if there is none.
+
+    Raises:
+        FolderBusy: another process is at work there, or may be.
+        FileError: the folder cannot be written.
+    """
+    claim = take(folder)
+    HEART.add(claim)
+    try:
+        yield claim
+    finally:
+        HEART.drop(claim)
+        claim.release()
+
+
+def take(folder: Path) -> Claim:
+    """Claim a folder; see ``claimed``."""
+    files.make_folder(folder)
+    while True:
+        earlier = numbers(folder)
+        before = earlier[-1] if earlier else None
+        over = read_owner(path_of(folder, before)) if before is not None else None
+        if before is not None and over is not None and not is_over(path_of(folder, before), over):
+            raise FolderBusy(f"{over} is working in {folder}; nothing was changed there")
+        claim = Claim(folder, 0 if before is None else before + 1, myself())
+        if not create(claim):
+            continue
+        if before is None or path_of(folder, before).exists():
+            return claim
+        claim.release()  # the one to be taken over was taken, done and released meanwhile
+
+
+def create(claim: Claim) -> bool:
+    """Put the file of a claim in its place; False if there is one."""
+    content = json.dumps(asdict(claim.owner)).encode()
+    temporary = claim.folder / f".claiming-{claim.owner.token}"
+    try:
+        temporary.write_bytes(content)
+        return linked(temporary, claim.path) or placed(claim.path, content)
+    except FileExistsError:
+        return False
+    except OSError as error:
+        raise files.FileError(f"cannot write {claim.path}: {files.reason(error)}") from error
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def linked(source: Path, path: Path) -> bool:
+    """Give a file another name; False on a file system without links. FileExistsError if the name is taken."""
+    try:
+        os.link(source, path)
+    except FileExistsError:
+        raise
+    except OSError:
+        return False
+    return True
+
+
+def placed(path: Path, content: bytes) -> bool:
+    """Write a file that is not there yet, where for an instant others see it empty; FileExistsError if it is there."""
+    with path.open("xb") as file:
+        try:
+            file.write(content)
+            file.flush()
+        except OSError:
+            path.unlink()
+            raise
+    return True
+
+
+def path_of(folder: Path, number: int) -> Path:
+    """The file of a claim."""
+    return folder / f".claim-{number}"
+
+
+def numbers(folder: Path) -> list[int]:
+    """The claims in a folder, ascending."""
+    try:
+        found = [NAME.fullmatch(path.name) for path in folder.iterdir()]
+    except OSError:
+        return []
+    return sorted(int(each[1]) for each in found if each)
+
+
+def owner(folder: Path) -> Owner | None:
+    """Who is at work in a folder, as far as its files say; None: nobody."""
+    held = numbers(folder)
+    found = read_owner(path_of(folder, held[-1])) if held else None
+    return None if found is None or (found.here and not found.alive) else found
+
+
+def read_owner(path: Path) -> Owner:
+    """The owner in the file of a claim; one without a name if it cannot be read."""
+    try:
+        return values.record(Owner, files.read_json(path), values.verbatim)
+    except files.FileError:
+        return Owner()
+
+
+seen: dict[tuple[Path, str], tuple[int, float]] = {}
+"""Of claims that this process waits for: when the file was last touched, and since when [s] that has been so here."""
+
+
+def is_over(path: Path, found: Owner) -> bool:
+    """Whether nobody stands behind a claim any more."""
+    if found.here:
+        return not found.alive
+    try:
+        touched = path.stat().st_mtime_ns
+    except OSError:
+        return True
+    known, now = seen.get((path, found.token)), time.monotonic()
+    if known is None or known[0] != touched:
+        seen[path, found.token] = (touched, now)
+        return False
+    return now - known[1] > LEASE
+
+
+class Heart:
+    """Touches the claims of this process, in a thread of its own."""
+
+    def __init__(self) -> None:
+        """No claim is held."""
+        self.claims: set[Claim] = set()
+        self.lock = threading.Lock()
+        self.thread: threading.Thread | None = None
+        self.process = 0
+
+    def add(self, claim: Claim) -> None:
+        """Keep a claim alive."""
+        with self.lock:
+            self.claims.add(claim)
+            if self.thread is None or self.process != os.getpid():
+                self.process = os.getpid()
+                self.thread = threading.Thread(target=self.run, name="symphys-claims", daemon=True)
+                self.thread.start()
+
+    def drop(self, claim: Claim) -> None:
+        """Let it rest."""
+        with self.lock:
+            self.claims.discard(claim)
+
+    def run(self) -> None:
+        """Touch all claims, for ever."""
+        while True:
+            time.sleep(BEAT)
+            with self.lock:
+                held = list(self.claims)
+            for claim in held:
+                with contextlib.suppress(OSError):
+                    os.utime(claim.path)
+
+
+HEART = Heart()
+"""Of this process."""
