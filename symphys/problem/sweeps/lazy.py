@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from symphys.problem.model import Simulation
+from symphys.problem.model import Array, Simulation
 from symphys.problem.problem import Problem
 from symphys.problem.reader import ProblemReader
 
@@ -27,6 +27,7 @@ KEPT = (
     "settings",
     "functions",
     "simulation",
+    "initial",
     "scenarios",
     "solvers",
     "solver_tables",
@@ -55,6 +56,7 @@ class Family:
         self._reader: ProblemReader | None = None
         self._last: tuple[str, Problem] | None = None
         self._simulation: Simulation | None = None
+        self._initial: dict[str, Array] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         """What travels to other processes: nothing that can be made there."""
@@ -88,11 +90,18 @@ class Family:
             if name not in self.varied and not np.array_equal(value, self.first.get(name, value)):
                 self.varied.add(name)
 
-    def simulation(self, whole: Problem) -> Simulation:
-        """That of a problem; one for all neighbours that have it equal."""
+    def shared(self, whole: Problem) -> dict[str, Any]:
+        """Simulation and initial state of a problem; one object for all neighbours that have them equal."""
         if self._simulation != whole.simulation:
             self._simulation = whole.simulation
-        return self._simulation
+        if stacked(self._initial) != stacked(whole.initial):
+            self._initial = whole.initial
+        return {"simulation": self._simulation, "initial": self._initial}
+
+
+def stacked(values: Mapping[str, Array]) -> bytes:
+    """All numbers of these arrays."""
+    return b"".join(value.tobytes() for value in values.values())
 
 
 @lru_cache(maxsize=2)
@@ -116,9 +125,8 @@ class LazyProblem(Problem):
         """Keep the facts of a problem that was read."""
         family.note(whole)
         vars(self).update({key: getattr(whole, key) for key in KEPT})
-        weights = b"".join(value.tobytes() for value in whole.weights.values())
-        digest = hashlib.sha256(weights).hexdigest() if whole.controllers else ""
-        vars(self).update(simulation=family.simulation(whole), _family=family, _digest=digest)
+        digest = hashlib.sha256(stacked(whole.weights)).hexdigest() if whole.controllers else ""
+        vars(self).update(family.shared(whole), _family=family, _digest=digest)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Travels to other processes as what is kept."""
