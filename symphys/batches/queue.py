@@ -15,8 +15,9 @@ LOOK = 1.0
 class Queue:
     """Runs that wait, by what they are of, and runs that other commands have claimed.
 
-    Whoever has built a problem gets more of its runs; who has not, those of a problem that nobody builds. So a problem
-    is built and compiled by one while the others do something else, as long as there is something else.
+    Whoever has built a problem file gets more of its runs, points of a sweep too; who has not, those of a file that
+    nobody is at. So a problem is built and compiled by one while the others do something else, as long as there is
+    something else.
     """
 
     def __init__(self, jobs: Mapping[int, Job]) -> None:
@@ -24,7 +25,7 @@ class Queue:
         self.jobs = jobs
         self.waiting: dict[Hashable, deque[int]] = {}
         self.claimed: dict[int, float] = {}
-        self.subjects = {index: hash(job.subject) for index, job in jobs.items()}
+        self.subjects = {index: hash((job.problem.file, job.problem.text)) for index, job in jobs.items()}
         self.at_work: Counter[Hashable] = Counter()
         for index in jobs:
             self.put(index)
