@@ -1,9 +1,10 @@
 """The right to work in a run folder: claimed by a file, so that any number of commands on any machines share a batch.
 
-A claim is a file ``.claim-N`` in the run folder. It is linked into place whole, or not at all. Its process touches it
-every BEAT seconds. One that belongs to a process of this machine is over when the process is. One of another machine is
-over when it was not touched for LEASE seconds by the clock of whoever waits, so that clocks need not agree. What is
-over is taken up under the next number, which again only one can get. Nothing here needs locks of the file system.
+A claim is a symbolic link ``.claim-N`` in the run folder, whose target is a text that says who holds it; so it is there
+whole, or not at all. Its process touches it every BEAT seconds. One that belongs to a process of this machine is over
+when the process is. One of another machine is over when it was not touched for LEASE seconds by the clock of whoever
+waits, so that clocks need not agree. What is over is taken up under the next number, which again only one can get.
+Nothing here needs locks of the file system.
 """
 
 from __future__ import annotations
@@ -95,8 +96,13 @@ def beginning(process: int) -> str:
 
 def myself() -> Owner:
     """This process, for a new claim."""
-    process = os.getpid()
-    return Owner(socket.gethostname(), machine(), process, beginning(process), uuid.uuid4().hex)
+    return Owner(*this_process(os.getpid()), uuid.uuid4().hex)
+
+
+@cache
+def this_process(number: int) -> tuple[str, str, int, str]:
+    """What does not change in the life of a process: host, machine, number, beginning."""
+    return socket.gethostname(), machine(), number, beginning(number)
 
 
 @dataclass(frozen=True)
@@ -165,43 +171,41 @@ def take(folder: Path) -> Claim:
         claim = Claim(folder, 0 if before is None else before + 1, myself())
         if not create(claim):
             continue
-        if before is None or path_of(folder, before).exists():
+        if before is None or os.path.lexists(path_of(folder, before)):
             return claim
         claim.release()  # the one to be taken over was taken, done and released meanwhile
 
 
 def create(claim: Claim) -> bool:
-    """Put the file of a claim in its place; False if there is one."""
-    content = json.dumps(asdict(claim.owner)).encode()
-    temporary = claim.folder / f".claiming-{claim.owner.token}"
+    """Put a claim in its place; False if there is one."""
+    content = json.dumps(asdict(claim.owner))
     try:
-        temporary.write_bytes(content)
-        return linked(temporary, claim.path) or placed(claim.path, content)
+        return linked(content, claim.path) or placed(content, claim.path)
     except FileExistsError:
         return False
     except OSError as error:
         raise files.FileError(f"cannot write {claim.path}: {files.reason(error)}") from error
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
 
 
-def linked(source: Path, path: Path) -> bool:
-    """Give a file another name; False on a file system without links. FileExistsError if the name is taken."""
+def linked(content: str, path: Path) -> bool:
+    """Make a symbolic link with the text for its target, which nobody follows: it is there whole, in one operation.
+
+    False on systems without such links; FileExistsError if the name is taken.
+    """
     try:
-        os.link(source, path)
+        path.symlink_to(content)
     except FileExistsError:
         raise
-    except OSError:
+    except (OSError, NotImplementedError):
         return False
     return True
 
 
-def placed(path: Path, content: bytes) -> bool:
+def placed(content: str, path: Path) -> bool:
     """Write a file that is not there yet, where for an instant others see it empty; FileExistsError if it is there."""
     with path.open("xb") as file:
         try:
-            file.write(content)
+            file.write(content.encode())
             file.flush()
         except OSError:
             path.unlink()
@@ -231,10 +235,11 @@ def owner(folder: Path) -> Owner | None:
 
 
 def read_owner(path: Path) -> Owner:
-    """The owner in the file of a claim; one without a name if it cannot be read."""
+    """The owner that a claim names; one without a name if it cannot be read."""
     try:
-        return values.record(Owner, files.read_json(path), values.verbatim)
-    except files.FileError:
+        text = str(path.readlink()) if path.is_symlink() else files.read_text(path)
+        return values.record(Owner, json.loads(text), values.verbatim)
+    except (OSError, ValueError, RecursionError, files.FileError):
         return Owner()
 
 
@@ -247,7 +252,7 @@ def is_over(path: Path, found: Owner) -> bool:
     if found.here:
         return not found.alive
     try:
-        touched = path.stat().st_mtime_ns
+        touched = path.lstat().st_mtime_ns
     except OSError:
         return True
     known, now = seen.get((path, found.token)), time.monotonic()
@@ -289,7 +294,7 @@ class Heart:
                 held = list(self.claims)
             for claim in held:
                 with contextlib.suppress(OSError):
-                    os.utime(claim.path)
+                    os.utime(claim.path, follow_symlinks=os.utime not in os.supports_follow_symlinks)
 
 
 HEART = Heart()

@@ -49,7 +49,7 @@ class RunFolder:
 
     def clear(self) -> None:
         """Take away what killed processes left under temporary names; whoever calls has claimed the folder."""
-        begun = (*(f".{name}." for name in (PROBLEM, *WRITTEN)), ".claiming-")
+        begun = tuple(f".{name}." for name in (PROBLEM, *WRITTEN))
         for path in self.path.iterdir():
             if path.name.startswith(begun):
                 files.remove(path)

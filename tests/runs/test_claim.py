@@ -39,7 +39,7 @@ def process() -> Iterator[subprocess.Popen[bytes]]:
 def leave(folder: Path, held: Owner, number: int = 0) -> Path:
     """Write a claim of another process."""
     folder.mkdir(parents=True, exist_ok=True)
-    path_of(folder, number).write_text(json.dumps(asdict(held)), encoding="utf-8")
+    path_of(folder, number).symlink_to(json.dumps(asdict(held)))
     return path_of(folder, number)
 
 
@@ -109,7 +109,7 @@ def test_a_claim_of_another_machine_is_over_once_nobody_touches_it_whatever_its_
     path = leave(folder, ELSEWHERE)
     stamp = time.time() + day
     for beat in range(3):
-        os.utime(path, (stamp + beat, stamp + beat))
+        os.utime(path, (stamp + beat, stamp + beat), follow_symlinks=False)
         with pytest.raises(FolderBusy, match="process 4711 on far"):
             take(folder)
         now[0] += claims.LEASE - 1
@@ -143,11 +143,11 @@ def test_a_held_claim_is_touched(folder: Path, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(claims, "BEAT", 0.01)
     monkeypatch.setattr(claims, "HEART", claims.Heart())
     with claimed(folder) as claim:
-        os.utime(claim.path, (1, 1))
+        os.utime(claim.path, (1, 1), follow_symlinks=False)
         end = time.monotonic() + 5
-        while claim.path.stat().st_mtime == 1 and time.monotonic() < end:
+        while claim.path.lstat().st_mtime == 1 and time.monotonic() < end:
             time.sleep(0.01)
-        assert claim.path.stat().st_mtime > 1
+        assert claim.path.lstat().st_mtime > 1
 
 
 HOLD = """
@@ -203,11 +203,11 @@ def test_of_many_who_take_over_one_succeeds(folder: Path) -> None:
             path_of(folder, number).unlink()
 
 
-def test_where_files_cannot_be_linked_claims_work_too(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_there_are_no_links_claims_work_too(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object) -> None:
         raise PermissionError("no links here")
 
-    monkeypatch.setattr(os, "link", refuse)
+    monkeypatch.setattr(Path, "symlink_to", refuse)
     with claimed(folder) as claim:
         assert claim.held
         with pytest.raises(FolderBusy):
@@ -215,9 +215,12 @@ def test_where_files_cannot_be_linked_claims_work_too(folder: Path, monkeypatch:
 
 
 def test_a_folder_that_cannot_be_written_is_named(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(*_: object) -> int:
+    claims.myself()
+
+    def full(*_: object, **__: object) -> int:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Path, "write_bytes", full)
+    monkeypatch.setattr(Path, "symlink_to", full)
+    monkeypatch.setattr(Path, "open", full)
     with pytest.raises(FileError, match=r"cannot write .*run/\.claim-0: no space left on device"):
         take(folder)
