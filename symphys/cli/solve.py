@@ -59,7 +59,7 @@ BATCH_PAGE = "page of all runs"
     type=click.IntRange(1, MOST_JOBS),
     default=1,
     show_default=True,
-    help="How many runs go on at once.",
+    help="How many runs go on at once; with --on, how many drivers.",
 )
 @click.option(
     "--multi-start",
@@ -97,7 +97,7 @@ def solve(
     """
     began = perf_counter()
     threads.limit()
-    from symphys.batches import BatchLimits, run_batch
+    from symphys.batches import BatchLimits, run_batch, run_on
     from symphys.cli.watching import watch
     from symphys.runs import make_jobs
     from symphys.transcription import transcribe
@@ -112,14 +112,17 @@ def solve(
     for problem in problems:
         if note := many_pairs(problem.name, len(problem.world().pairs)):
             click.echo(note, err=True)
-    made = partial(transcribe, backend=backend, threads=1 if jobs > 1 else None)
+    made = partial(transcribe, backend=backend, threads=1 if jobs > 1 or how.on else None)
     limits = BatchLimits(how.retries, how.timeout, how.budget)
     with watch(len(asked), how.quiet, how.json) as observer:
-        batch = run_batch(asked, jobs, observer, made, multi_start, limits, how.rerun)
+        if how.on:
+            batch = run_on(how.on, how.scheduler, asked, jobs, observer, made, out, limits, how.rerun)
+        else:
+            batch = run_batch(asked, jobs, observer, made, multi_start, limits, how.rerun)
     code = 130 if batch.interrupted else 0 if batch.accepted else 1
     if how.json or how.quiet:
         return conclude_silently(asked, batch, out, observer, code)
-    parts = observer.notes.seconds if jobs == 1 and not multi_start else {}
+    parts = observer.notes.seconds if jobs == 1 and not (multi_start or how.on) else {}
     conclude(asked, batch, out, began, parts)
     return code
 
