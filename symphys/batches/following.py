@@ -5,6 +5,7 @@ What comes of a run is read from its folder. News come from the board, see ``sym
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -80,18 +81,15 @@ def follow(
 ) -> None:
     """Open the engine, let it do what waits, and put all away that was needed for that."""
     sent = tuple(replace(job, folder=RunFolder(job.folder.path.absolute())) for _, job in waiting)
-    board = Board.hang(out)
-    try:
+    with contextlib.ExitStack() as stack:
         engine = open_engine(name, scheduler, min(drivers, len(sent)), out)
-        try:
-            task = DriverTask(board, sent, transcribe, replace(limits, budget=float("inf")))
-            follower = Follower(task, engine, drivers, [index for index, _ in waiting], ledger, halt)
-            follower.run()
-            follower.part()
-        finally:
-            engine.close()
-    finally:
-        board.take_down()
+        stack.callback(engine.close)
+        board = Board.hang(out)
+        stack.callback(board.take_down)
+        task = DriverTask(board, sent, transcribe, replace(limits, budget=float("inf")))
+        follower = Follower(task, engine, drivers, [index for index, _ in waiting], ledger, halt)
+        follower.run()
+        follower.part()
 
 
 @dataclass
@@ -105,7 +103,7 @@ class Follower:
         indices: (runs that were sent) of each in the ledger.
         left: those that were sent and are not over.
         at_work: those of them that were begun.
-        owners: tokens of the claims that were seen on each.
+        tried_by: the drivers that have begun each.
         rounds: how often drivers were started again since a run was over.
         turn: drivers that were started.
     """
@@ -118,7 +116,7 @@ class Follower:
     halt: Halt
     left: set[int] = field(default_factory=set)
     at_work: set[int] = field(default_factory=set)
-    owners: dict[int, set[str]] = field(default_factory=dict)
+    tried_by: dict[int, set[str]] = field(default_factory=dict)
     rounds: int = -1
     turn: int = 0
 
@@ -159,6 +157,7 @@ class Follower:
                 self.end(news.index, outcome(self.task.jobs[news.index]))
             else:
                 self.at_work.add(news.index)
+                self.tried_by.setdefault(news.index, set()).add(news.by)
                 self.ledger.started(self.indices[news.index], news.what == RESUMED)
 
     def end(self, index: int, result: Result) -> None:
@@ -169,28 +168,29 @@ class Follower:
         self.ledger.ended(self.indices[index], result)
 
     def bury(self) -> None:
-        """Give up runs whose process has died once more than they may be tried again."""
-        for index in list(self.at_work):
-            folder = self.task.jobs[index].folder.path
-            held = numbers(folder)
-            if not held:
-                continue
-            path = path_of(folder, held[-1])
-            owner = read_owner(path)
-            known = self.owners.setdefault(index, set())
-            known.add(owner.token)
-            if len(known) > max(self.task.limits.retries, 1) and is_over(path, owner):
-                self.give_up(index, f"{owner} died, as did others at this run before: see {folder / 'log.txt'}")
+        """Give up runs of which one driver more has died than they may be tried again."""
+        most = max(self.task.limits.retries, 1)
+        for index in [index for index in self.at_work if len(self.tried_by[index]) > most]:
+            if died := self.deserted(index):
+                self.give_up(index, f"{died} died, as did others at this run before: see log.txt there")
+
+    def deserted(self, index: int) -> str:
+        """Whose claim it is that is left on a run at which nobody works any more; empty if there is none."""
+        folder = self.task.jobs[index].folder.path
+        held = numbers(folder)
+        if not held:
+            return ""
+        path = path_of(folder, held[-1])
+        owner = read_owner(path)
+        return str(owner) if is_over(path, owner) else ""
 
     def give_up(self, index: int, message: str) -> None:
         """Write that a run failed, so that no driver takes it up, unless one has already."""
-        board, job = self.task.board, self.task.jobs[index]
-        board.tell(OVER, index)
-        held = numbers(job.folder.path)
-        if held and not is_over(path := path_of(job.folder.path, held[-1]), read_owner(path)):
-            board.take_back(index)
-            return
-        self.end(index, give_up(job, message, again=True))
+        self.task.board.tell(OVER, index)
+        if self.deserted(index):
+            self.end(index, give_up(self.task.jobs[index], message, again=True))
+        else:
+            self.task.board.take_back(index)
 
     def keep_up(self, alive: int) -> bool:
         """Start drivers in the place of those that ended while runs are left; False if there is none any more."""

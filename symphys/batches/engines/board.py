@@ -25,11 +25,13 @@ class BoardNews:
     Attributes:
         what: BEGUN, RESUMED or OVER of a run, or a NOTE.
         index: of the run; -1 for a note.
+        by: which driver began it.
         text: of a note.
     """
 
     what: str
     index: int = -1
+    by: str = ""
     text: str = ""
 
 
@@ -52,10 +54,10 @@ class Board:
         files.make_folder(path)
         return cls(path)
 
-    def tell(self, what: str, index: int) -> None:
-        """Leave news of a run; where that cannot be written, its folder will have to do."""
+    def tell(self, what: str, index: int, by: str = "") -> None:
+        """Leave news of a run; where that cannot be written, its folder will have to do. ``by``: a driver's token."""
         with contextlib.suppress(OSError):
-            (self.path / f"{what}.{index}").touch()
+            (self.path / ".".join(filter(None, (what, f"{index}", by)))).touch()
 
     def note(self, text: str) -> None:
         """Leave a note."""
@@ -79,10 +81,10 @@ class Board:
         except OSError:
             return []
         self.seen.update(names)
-        split = sorted(name.split(".") for name in names if name.count(".") == 1)
-        found = [BoardNews(NOTE, text=self.read(f"{NOTE}.{rest}")) for what, rest in split if what == NOTE]
+        split = [(*name.split("."), "")[:3] for name in sorted(names) if "." in name]
+        found = [BoardNews(NOTE, text=self.read(f"{NOTE}.{rest}")) for what, rest, _ in split if what == NOTE]
         for kind in (BEGUN, RESUMED, OVER):
-            found += [BoardNews(kind, int(rest)) for what, rest in split if what == kind and rest.isdecimal()]
+            found += [BoardNews(kind, int(rest), by) for what, rest, by in split if what == kind and rest.isdecimal()]
         return found
 
     def stop(self, reason: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import dask
@@ -14,7 +15,7 @@ from symphys.batches.engines.interface import EngineError
 from symphys.runs.stopping import ignoring_interrupts
 
 PATIENCE = 15
-"""[s] until a scheduler that does not answer is given up."""
+"""[s] until a scheduler that does not answer is given up, and until a driver for which no worker is idle is queued."""
 CONFIG = {
     "distributed.admin.large-graph-warning-threshold": "1 TiB",  # all jobs of a batch go to each driver, once
     "distributed.scheduler.allowed-failures": 0,  # a driver whose worker dies is started again from here
@@ -33,7 +34,8 @@ class DaskEngine:
 
     def __init__(self, scheduler: str, count: int) -> None:
         """Connect, and start workers if there is no scheduler; EngineError if it does not answer."""
-        self.futures: list[Any] = []
+        self.waiting: list[tuple[float, DriverTask]] = []
+        self.futures: dict[Any, str] = {}
         self.heard: list[str] = []
         with contextlib.ExitStack() as stack:
             stack.enter_context(dask.config.set(CONFIG))
@@ -48,15 +50,36 @@ class DaskEngine:
             self.stack = stack.pop_all()
 
     def start(self, task: DriverTask) -> None:
-        """Submit one more."""
-        self.futures.append(self.client.submit(drive, task, pure=False))
+        """Submit one more, as soon as a worker is idle: dask itself would put it behind another driver."""
+        self.waiting.append((monotonic(), task))
+        self.place()
+
+    def place(self) -> None:
+        """Give what waits to idle workers; where there are none for long, let dask find or start some."""
+        if not self.waiting:
+            return
+        taken = set(self.futures.values())
+        idle = [address for address, keys in self.client.processing().items() if not keys and address not in taken]
+        left = []
+        for since, task in self.waiting:
+            if idle:
+                address = idle.pop()
+                where = {"workers": [address], "allow_other_workers": True}
+                self.futures[self.client.submit(drive, task, pure=False, **where)] = address
+            elif monotonic() - since > PATIENCE:
+                self.futures[self.client.submit(drive, task, pure=False)] = ""
+            else:
+                left.append((since, task))
+        self.waiting = left
 
     def alive(self) -> int:
         """Tasks that wait for a worker or work."""
         over = [future for future in self.futures if future.status != "pending"]
         self.heard += [told(future) for future in over if future.status != "finished"]
-        self.futures = [future for future in self.futures if future not in over]
-        return len(self.futures)
+        for future in over:
+            del self.futures[future]
+        self.place()
+        return len(self.futures) + len(self.waiting)
 
     def faults(self) -> list[str]:
         """What ended tasks."""
@@ -65,7 +88,7 @@ class DaskEngine:
 
     def close(self) -> None:
         """Forget the tasks, and end the cluster if it is ours."""
-        self.client.cancel(self.futures)
+        self.client.cancel(list(self.futures))
         self.stack.close()
 
 

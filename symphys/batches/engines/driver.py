@@ -8,6 +8,7 @@ from __future__ import annotations
 import multiprocessing
 import socket
 import threading
+import uuid
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
 from time import monotonic
@@ -121,14 +122,15 @@ class BoardHalt(Halt):
 
 @dataclass
 class BoardLedger(Ledger):
-    """Leaves on the board what begins and what is over."""
+    """Leaves on the board what begins and what is over; ``token``: of this driver."""
 
     board: Board = field(kw_only=True)
+    token: str = field(default_factory=lambda: uuid.uuid4().hex)
 
     def started(self, index: int, resumed: bool) -> None:
         """A run begins, or goes on."""
         self.begun.add(index)
-        self.board.tell(RESUMED if resumed else BEGUN, index)
+        self.board.tell(RESUMED if resumed else BEGUN, index, self.token)
 
     def ended(self, index: int, result: Result) -> None:
         """It is over, here or as it was before."""

@@ -84,8 +84,7 @@ class SlurmEngine:
     def alive(self) -> int:
         """Jobs that wait or run."""
         over = [job for job in self.jobs if job.done()]
-        errors = [job.exception() for job in over]
-        self.heard += [last_line(error) for error in errors if error is not None]
+        self.heard += filter(None, map(ended, over))
         self.jobs = [job for job in self.jobs if job not in over]
         return len(self.jobs)
 
@@ -98,6 +97,14 @@ class SlurmEngine:
         """Cancel what is left."""
         for job in self.jobs:
             job.cancel(check=False)
+
+
+def ended(job: Any) -> str:
+    """What ended a job, in a line; empty if it ended by itself."""
+    if not job.paths.result_pickle.exists():  # submitit would wait for it
+        return f"the job {job.job_id} was ended ({job.state}); see {job.paths.stderr}"
+    error = job.exception()
+    return "" if error is None else last_line(error)
 
 
 def last_line(error: BaseException) -> str:
