@@ -12,12 +12,14 @@ from pathlib import Path
 
 from symphys.api.solution import Solution
 from symphys.api.solving import kept
-from symphys.batches import BatchResult, run_batch
+from symphys.batches import ENGINES, BatchResult, run_batch, run_on
+from symphys.errors import SymphysError
 from symphys.problem import Problem
 from symphys.problem.loading import Source, load
 from symphys.results.run import read_run
 from symphys.runs import Job, Result, make_jobs
 from symphys.solvers import TraceRow
+from symphys.suggest import hint
 from symphys.transcription import transcribe
 
 BatchProgress = Callable[[str, TraceRow], None]
@@ -35,6 +37,8 @@ def solve_all(
     multi_start: bool = False,
     backend: str = "auto",
     progress: BatchProgress | None = None,
+    on: str | None = None,
+    scheduler: str | None = None,
 ) -> list[Solution]:
     """Solve problems with solvers from seeds. No run's failure stops the others.
 
@@ -49,7 +53,10 @@ def solve_all(
         examine: whether to examine how far solutions can be trusted.
         multi_start: whether to solve the seeds of a problem side by side, their evaluations in batches.
         backend: as in ``solve``.
-        progress: sees each iteration.
+        progress: sees each iteration; none of those that are done elsewhere.
+        on: ``"dask"`` or ``"slurm"``: let as many drivers as ``jobs`` says do the runs elsewhere; needs a ``folder``
+            that all machines see by one path.
+        scheduler: as ``symphys solve --scheduler``; None: dask workers here, Slurm with its defaults.
 
     Returns:
         Problems times solvers times seeds, in this order; of a run that failed ``run.status`` is "failed", and
@@ -57,6 +64,7 @@ def solve_all(
 
     Raises:
         ProblemError: a problem, or an option of a solver, cannot be used; before anything is solved.
+        SymphysError: ``on`` cannot be used here, or not with the other arguments.
         KeyboardInterrupt: after Ctrl-C; with a ``folder``, the same call goes on from there.
 
     Example:
@@ -67,6 +75,7 @@ def solve_all(
         >>> [(solution.run.problem, solution.solved) for solution in found]
         [('ball_throw', True), ('ball_throw-2', True)]
     """
+    check_engine(on, scheduler, folder, multi_start)
     asked = list(numbered(map(load, problems)))
     counted = range(seeds) if isinstance(seeds, int) else tuple(seeds)
     with kept(folder) as out:
@@ -75,12 +84,28 @@ def solve_all(
             for each in asked
             for job in make_jobs([each], solvers, counted, dict(each.settings), out, "", backend, examine)
         ]
-        made = partial(transcribe, backend=backend, threads=1 if jobs > 1 else None)
-        batch = run_batch(todo, jobs, ProgressObserver(progress), made, multi_start)
+        made = partial(transcribe, backend=backend, threads=1 if jobs > 1 or on else None)
+        observer = ProgressObserver(progress)
+        if on:
+            batch = run_on(on, scheduler or "", todo, jobs, observer, made, out)
+        else:
+            batch = run_batch(todo, jobs, observer, made, multi_start)
         solutions = list(solutions_of(todo, batch))
     if folder is None:
         drop_with(solutions, out)
     return solutions
+
+
+def check_engine(on: str | None, scheduler: str | None, folder: str | Path | None, multi_start: bool) -> None:
+    """SymphysError for arguments that do not go together."""
+    if scheduler and not on:
+        raise SymphysError(f"scheduler={scheduler!r} needs on: {' or '.join(map(repr, ENGINES))}")
+    if on and on not in ENGINES:
+        raise SymphysError(f"on={on!r}: {hint(on, ENGINES)}")
+    if on and folder is None:
+        raise SymphysError(f"on={on!r} needs a folder that all machines see, such as folder='results'")
+    if on and multi_start:
+        raise SymphysError(f"multi_start solves seeds side by side in one process: leave it or on={on!r} out")
 
 
 def numbered(problems: Iterable[Problem]) -> Iterator[Problem]:

@@ -87,9 +87,7 @@ def batch_options(command: Callable[..., Any]) -> Callable[..., Any]:
         times = read_time("--timeout", timeout), read_time("--budget", budget)
         on, scheduler = rest.pop("on") or "", rest.pop("scheduler") or ""
         check_engine(on, scheduler, rest.get("multi_start", False))
-        how = BatchOptions(
-            **switches, timeout=times[0], budget=times[1], rerun=rerun or "", on=on, scheduler=scheduler
-        )
+        how = BatchOptions(**switches, timeout=times[0], budget=times[1], rerun=rerun or "", on=on, scheduler=scheduler)
         return command(how=how, **rest)
 
     for option in reversed(OPTIONS):

@@ -144,7 +144,7 @@ def conclude(jobs: list[Job], batch: BatchResult, out: Path, began: float, parts
     from symphys.cli.summary import print_summary
 
     print_summary(jobs, batch)
-    if batch.interrupted:
+    if batch.interrupted or not any(batch.results):
         click.echo(last_words(batch, out), err=True)
         return
     page = write_reports(jobs, out)
@@ -158,7 +158,7 @@ def conclude_silently(jobs: list[Job], batch: BatchResult, out: Path, observer: 
     """Write the reports, and say no more than events; the exit code."""
     from symphys.cli.watching.events import Events
 
-    if not batch.interrupted:
+    if not batch.interrupted and any(batch.results):
         write_reports(jobs, out)
     if isinstance(observer, Events):
         observer.finished(batch, code)
@@ -167,7 +167,7 @@ def conclude_silently(jobs: list[Job], batch: BatchResult, out: Path, observer: 
 
 def last_words(batch: BatchResult, out: Path) -> str:
     """What an interruption, or the end of its time, has left of a batch, and how to go on."""
-    why = "interrupted" if batch.interrupted else "the time of the batch is used up"
+    why = "interrupted" if batch.interrupted else "the time of the batch is used up" if batch.spent else "nothing ran"
     over = sum(result is not None and not result.interrupted for result in batch.results)
     halfway = sum(result is not None and result.interrupted for result in batch.results)
     return (
