@@ -8,11 +8,12 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 
 from symphys.api.solution import Solution
 from symphys.api.solving import kept
-from symphys.batches import ENGINES, BatchResult, run_batch, run_on
+from symphys.batches import ENGINES, BatchResult, Observer, run_batch, run_on
 from symphys.errors import SymphysError
 from symphys.problem import Problem
 from symphys.problem.loading import Source, load
@@ -54,8 +55,7 @@ def solve_all(
         multi_start: whether to solve the seeds of a problem side by side, their evaluations in batches.
         backend: as in ``solve``.
         progress: sees each iteration; none of those that are done elsewhere.
-        on: ``"dask"`` or ``"slurm"``: let as many drivers as ``jobs`` says do the runs elsewhere; needs a ``folder``
-            that all machines see by one path.
+        on: ``"dask"`` or ``"slurm"``: ``jobs`` drivers do the runs elsewhere; needs a ``folder`` that all machines see.
         scheduler: as ``symphys solve --scheduler``; None: dask workers here, Slurm with its defaults.
 
     Returns:
@@ -79,21 +79,30 @@ def solve_all(
     asked = list(numbered(map(load, problems)))
     counted = range(seeds) if isinstance(seeds, int) else tuple(seeds)
     with kept(folder) as out:
-        todo = [
-            job
-            for each in asked
-            for job in make_jobs([each], solvers, counted, dict(each.settings), out, "", backend, examine)
-        ]
-        made = partial(transcribe, backend=backend, threads=1 if jobs > 1 or on else None)
-        observer = ProgressObserver(progress)
-        if on:
-            batch = run_on(on, scheduler or "", todo, jobs, observer, made, out)
-        else:
-            batch = run_batch(todo, jobs, observer, made, multi_start)
+        made = [make_jobs([each], solvers, counted, dict(each.settings), out, "", backend, examine) for each in asked]
+        todo = list(chain.from_iterable(made))
+        elsewhere = (on, scheduler or "", out) if on else None
+        batch = do(todo, jobs, ProgressObserver(progress), backend, multi_start, elsewhere)
         solutions = list(solutions_of(todo, batch))
     if folder is None:
         drop_with(solutions, out)
     return solutions
+
+
+def do(
+    todo: Sequence[Job],
+    processes: int,
+    observer: Observer,
+    backend: str,
+    multi_start: bool,
+    elsewhere: tuple[str, str, Path] | None,
+) -> BatchResult:
+    """Do all, here or ``elsewhere``: by an engine, with its scheduler, in a folder."""
+    made = partial(transcribe, backend=backend, threads=1 if processes > 1 or elsewhere else None)
+    if elsewhere is None:
+        return run_batch(todo, processes, observer, made, multi_start)
+    on, scheduler, out = elsewhere
+    return run_on(on, scheduler, todo, processes, observer, made, out)
 
 
 def check_engine(on: str | None, scheduler: str | None, folder: str | Path | None, multi_start: bool) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -97,7 +98,11 @@ def local(count: int) -> Any:
     """Workers of this machine, with one thread each; one that dies is started again."""
     with ignoring_interrupts():
         cluster = LocalCluster(
-            n_workers=count, threads_per_worker=1, processes=True, dashboard_address=None, memory_limit=0
+            n_workers=count,
+            threads_per_worker=1,
+            dashboard_address=None,
+            memory_limit=0,
+            silence_logs=logging.CRITICAL,  # of a worker that dies the command says what is to be said
         )
     with cluster:
         yield cluster
