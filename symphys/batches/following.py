@@ -106,6 +106,7 @@ class Follower:
         tried_by: the drivers that have begun each.
         rounds: how often drivers were started again since a run was over.
         turn: drivers that were started.
+        told: what has ended drivers; each is said once.
     """
 
     task: DriverTask
@@ -119,6 +120,7 @@ class Follower:
     tried_by: dict[int, set[str]] = field(default_factory=dict)
     rounds: int = -1
     turn: int = 0
+    told: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         """Nothing has begun."""
@@ -194,8 +196,10 @@ class Follower:
 
     def keep_up(self, alive: int) -> bool:
         """Start drivers in the place of those that ended while runs are left; False if there is none any more."""
-        for fault in dict.fromkeys(self.engine.faults()):
-            self.ledger.note(f"a driver ended: {fault}")
+        for fault in self.engine.faults():
+            if fault not in self.told:
+                self.told.add(fault)
+                self.ledger.note(f"a driver ended: {fault}")
         missing = min(self.drivers, len(self.left)) - alive
         if missing <= 0:
             return True

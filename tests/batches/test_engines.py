@@ -141,6 +141,32 @@ def test_a_machine_without_slurm_says_so(monkeypatch: pytest.MonkeyPatch, tmp_pa
         open_engine("slurm", "", 1, tmp_path)
 
 
+def test_slurm_is_asked_for_what_was_said(monkeypatch: pytest.MonkeyPatch, make: Any, tmp_path: Path) -> None:
+    """A stand-in for Slurm keeps the script of the job, and what is cancelled at the end."""
+    pytest.importorskip("submitit")
+    from symphys.batches.engines import EngineError, open_engine
+    from symphys.batches.engines.board import Board
+    from symphys.batches.engines.driver import DriverTask
+
+    tools = {"sbatch": 'cp "$1" ../asked; echo Submitted batch job 7', "scancel": 'echo "$@" > CANCELLED', "srun": ""}
+    for name, does in tools.items():
+        does = does.replace("../asked", f"{tmp_path}/asked").replace("CANCELLED", f"{tmp_path}/cancelled")
+        (tmp_path / name).write_text(f"#!/bin/sh\n{does}\n", "utf-8")
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("PATH", os.pathsep.join((str(tmp_path), os.environ["PATH"])))
+    engine = open_engine("slurm", "partition=short,mem_gb=4,timeout_min=90", 1, tmp_path / "out")
+    task = DriverTask(Board.hang(tmp_path / "out"), tuple(make("one")), transcribe, BatchLimits())
+    engine.start(task)
+    script = (tmp_path / "asked").read_text("utf-8")
+    wanted = ("--partition=short", "--mem=4GB", "--time=90", "--job-name=symphys", "--cpus-per-task=1")
+    assert [each for each in wanted if each not in script] == []
+    engine.close()
+    assert "7" in (tmp_path / "cancelled").read_text("utf-8")
+    (tmp_path / "sbatch").write_text("#!/bin/sh\necho 'invalid partition' >&2; exit 1\n", "utf-8")
+    with pytest.raises(EngineError, match=r"Slurm does not take the job: .*invalid partition"):
+        engine.start(task)
+
+
 def test_a_scheduler_that_does_not_answer_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     pytest.importorskip("distributed")
     from symphys.batches.engines import EngineError, dask, open_engine

@@ -37,9 +37,10 @@ DEFAULTS = {"timeout_min": 60, "cpus_per_task": 1}
 def opened(scheduler: str, count: int, out: Path) -> SlurmEngine:
     """An engine for what is asked for: ``partition=short,timeout_min=60,mem_gb=4``, or ``local``."""
     here, asked = read_asked(scheduler)
-    if not here and shutil.which("sbatch") is None:
+    missing = next((name for name in ("sbatch", "srun") if shutil.which(name) is None), "")
+    if missing and not here:
         raise EngineError(
-            "there is no sbatch on this machine: call symphys where Slurm takes jobs, or give --scheduler local"
+            f"there is no {missing} on this machine: call symphys where Slurm takes jobs, or give --scheduler local"
         )
     executor = submitit.AutoExecutor(folder=str(out / FOLDER), cluster=LOCAL if here else "slurm")
     named = {name if name in SHARED else f"slurm_{name}": value for name, value in asked.items()}
