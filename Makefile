@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 QUICK := $(addprefix tests/,house model expression findings problem solvers dynamics)
 
-.PHONY: help demo demo-walk test test-quick test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-table1 bench-gpu bench-walk bench-lessons bench-pipelines bench-runs gallery clean
+.PHONY: help demo demo-walk test test-quick test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-table1 bench-gpu bench-walk bench-lessons stress bench-pipelines bench-runs gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
@@ -80,6 +80,13 @@ bench-lessons: $(VENV)/.benching  ## solvers on one walk against time, what doma
 	$(BIN)/python benchmarks/race.py quadruped_walk_net build
 	$(BIN)/python benchmarks/robustness.py build
 	$(BIN)/python benchmarks/lessons.py
+
+stress: $(VENV)/.developing  ## kill a batch a hundred times, do 10,000 runs, make 2,000 pages (twenty minutes)
+	$(BIN)/python benchmarks/killing.py --runs 400 --kills 100 --drivers 3
+	$(BIN)/python benchmarks/overhead.py --runs 10000
+	SYMPHYS_FSYNC=1 $(BIN)/python benchmarks/overhead.py --runs 2000
+	$(BIN)/python benchmarks/report_pages.py 2000 2
+	$(BIN)/python benchmarks/report_pages.py 10000 2
 
 bench-pipelines: $(VENV)/.pipelining  ## steps for environments and nets against their kernel
 	$(BIN)/python benchmarks/step_rates.py

@@ -13,7 +13,8 @@ from typing import Any
 
 from symphys.api.solution import Solution
 from symphys.api.solving import kept
-from symphys.batches import BatchResult, run_batch
+from symphys.batches import ENGINES, BatchResult, Observer, run_batch, run_on
+from symphys.errors import SymphysError
 from symphys.problem import Problem
 from symphys.problem.loading import Source, load
 from symphys.problem.problem import plain
@@ -22,6 +23,7 @@ from symphys.problem.sweeps.table import read_sweep
 from symphys.results.run import read_run
 from symphys.runs import Job, Result, make_jobs
 from symphys.solvers import TraceRow
+from symphys.suggest import hint
 from symphys.transcription import transcribe
 
 BatchProgress = Callable[[str, TraceRow], None]
@@ -40,6 +42,8 @@ def solve_all(
     backend: str = "auto",
     progress: BatchProgress | None = None,
     sweep: Mapping[str, Any] | None = None,
+    on: str | None = None,
+    scheduler: str | None = None,
 ) -> list[Solution]:
     """Solve problems with solvers from seeds. No run's failure stops the others.
 
@@ -53,7 +57,9 @@ def solve_all(
         examine: whether to examine how far solutions can be trusted.
         multi_start: whether to solve the seeds of a problem side by side, their evaluations in batches.
         backend: as in ``solve``.
-        progress: sees each iteration.
+        progress: sees each iteration; none of those that are done elsewhere.
+        on: ``"dask"`` or ``"slurm"``: ``jobs`` drivers do the runs elsewhere; needs a ``folder`` that all machines see.
+        scheduler: as ``symphys solve --scheduler``; None: dask workers here, Slurm with its defaults.
         sweep: a table like [sweep] in a problem file, in its place; None: the file's; ``{}``: nothing is swept.
 
     Returns:
@@ -62,6 +68,7 @@ def solve_all(
 
     Raises:
         ProblemError: a problem, a point, or an option of a solver, cannot be used; before anything is solved.
+        SymphysError: ``on`` cannot be used here, or not with the other arguments.
         KeyboardInterrupt: after Ctrl-C; with a ``folder``, the same call goes on from there.
 
     Example:
@@ -71,6 +78,7 @@ def solve_all(
         >>> [(solution.problem.settings["ball.mass"], solution.solved) for solution in found]
         [(1, True), (2, True)]
     """
+    check_engine(on, scheduler, folder, multi_start)
     asked = list(numbered(map(load, problems)))
     counted = range(seeds) if isinstance(seeds, int) else tuple(seeds)
     with kept(folder) as out:
@@ -80,8 +88,8 @@ def solve_all(
             for each in points_of(problem, sweep)
             for job in make_jobs([each], solvers, counted, dict(each.settings), out, "", backend, examine)
         ]
-        made = partial(transcribe, backend=backend, threads=1 if jobs > 1 else None)
-        batch = run_batch(todo, jobs, ProgressObserver(progress), made, multi_start)
+        elsewhere = (on, scheduler or "", out) if on else None
+        batch = do(todo, jobs, ProgressObserver(progress), backend, multi_start, elsewhere)
         solutions = list(solutions_of(todo, batch))
     if folder is None:
         drop_with(solutions, out)
@@ -94,6 +102,34 @@ def points_of(problem: Problem, table: Mapping[str, Any] | None) -> Iterable[Pro
     if table is not None:
         own = read_sweep(plain(table), "solve_all") if table else None
     return [problem] if own is None else swept(problem, combined(own, problem))
+
+
+def do(
+    todo: Sequence[Job],
+    processes: int,
+    observer: Observer,
+    backend: str,
+    multi_start: bool,
+    elsewhere: tuple[str, str, Path] | None,
+) -> BatchResult:
+    """Do all, here or ``elsewhere``: by an engine, with its scheduler, in a folder."""
+    made = partial(transcribe, backend=backend, threads=1 if processes > 1 or elsewhere else None)
+    if elsewhere is None:
+        return run_batch(todo, processes, observer, made, multi_start)
+    on, scheduler, out = elsewhere
+    return run_on(on, scheduler, todo, processes, observer, made, out)
+
+
+def check_engine(on: str | None, scheduler: str | None, folder: str | Path | None, multi_start: bool) -> None:
+    """SymphysError for arguments that do not go together."""
+    if scheduler and not on:
+        raise SymphysError(f"scheduler={scheduler!r} needs on: {' or '.join(map(repr, ENGINES))}")
+    if on and on not in ENGINES:
+        raise SymphysError(f"on={on!r}: {hint(on, ENGINES)}")
+    if on and folder is None:
+        raise SymphysError(f"on={on!r} needs a folder that all machines see, such as folder='results'")
+    if on and multi_start:
+        raise SymphysError(f"multi_start solves seeds side by side in one process: leave it or on={on!r} out")
 
 
 def numbered(problems: Iterable[Problem]) -> Iterator[Problem]:

@@ -29,6 +29,8 @@ class BatchOptions:
         dry_run: whether only to say what would be done.
         json: whether to write events on stdout.
         quiet: whether to show failures only.
+        on: the engine that starts drivers elsewhere; empty for runs in this process and its workers.
+        scheduler: where the engine finds machines, or what it asks for; empty for its default.
     """
 
     retries: int
@@ -38,6 +40,8 @@ class BatchOptions:
     dry_run: bool
     json: bool
     quiet: bool
+    on: str = ""
+    scheduler: str = ""
 
 
 OPTIONS = (
@@ -59,6 +63,18 @@ OPTIONS = (
     click.option("--dry-run", is_flag=True, help="Say what would be done, and why, and do nothing."),
     click.option("--json", is_flag=True, help="Write what happens to stdout, a JSON object a line."),
     click.option("--quiet", is_flag=True, help="Show nothing but failures."),
+    click.option(
+        "--on",
+        type=click.Choice(("dask", "slurm")),
+        default=None,
+        help="Let as many drivers as --jobs says do the runs: on dask workers, or as jobs of Slurm.",
+    ),
+    click.option(
+        "--scheduler",
+        metavar="TEXT",
+        help="dask: the address of a cluster, tcp://host:8786, instead of workers here. slurm: what to ask for, "
+        "partition=short,timeout_min=60,mem_gb=4, or local.",
+    ),
 )
 
 
@@ -69,12 +85,22 @@ def batch_options(command: Callable[..., Any]) -> Callable[..., Any]:
     def taking(*, timeout: str | None, budget: str | None, rerun: str | None, **rest: Any) -> Any:
         switches: dict[str, Any] = {name: rest.pop(name) for name in ("retries", "dry_run", "json", "quiet")}
         times = read_time("--timeout", timeout), read_time("--budget", budget)
-        how = BatchOptions(**switches, timeout=times[0], budget=times[1], rerun=rerun or "")
+        on, scheduler = rest.pop("on") or "", rest.pop("scheduler") or ""
+        check_engine(on, scheduler, rest.get("multi_start", False))
+        how = BatchOptions(**switches, timeout=times[0], budget=times[1], rerun=rerun or "", on=on, scheduler=scheduler)
         return command(how=how, **rest)
 
     for option in reversed(OPTIONS):
         taking = option(taking)
     return taking
+
+
+def check_engine(on: str, scheduler: str, multi_start: bool) -> None:
+    """UsageFault for options that do not go together."""
+    if scheduler and not on:
+        raise UsageFault(f"--scheduler {scheduler!r} needs --on dask or --on slurm")
+    if on and multi_start:
+        raise UsageFault(f"--multi-start solves seeds side by side in one process: leave it or --on {on} out")
 
 
 def read_time(option: str, text: str | None) -> float:

@@ -66,7 +66,7 @@ INTERRUPTED = 130
     type=click.IntRange(1, MOST_JOBS),
     default=1,
     show_default=True,
-    help="How many runs go on at once.",
+    help="How many runs go on at once; with --on, how many drivers.",
 )
 @click.option(
     "--multi-start",
@@ -110,7 +110,7 @@ def solve(
     """
     began = perf_counter()
     threads.limit()
-    from symphys.batches import BatchLimits, run_batch
+    from symphys.batches import BatchLimits, run_batch, run_on
     from symphys.cli.watching import watch, working
     from symphys.runs import make_jobs
     from symphys.transcription import transcribe
@@ -129,15 +129,18 @@ def solve(
         if note := many_pairs(problem.name, len(problem.world().pairs)):
             click.echo(note, err=True)
     require_folder(out)
-    made = partial(transcribe, backend=backend, threads=1 if jobs > 1 else None)
+    made = partial(transcribe, backend=backend, threads=1 if jobs > 1 or how.on else None)
     limits = BatchLimits(how.retries, how.timeout, how.budget)
     with watch(len(asked), how.quiet, how.json) as observer:
-        batch = run_batch(asked, jobs, observer, made, multi_start, limits, how.rerun)
-    silent = how.json or how.quiet
-    write = None if no_report or batch.interrupted else partial(write_reports, asked, out, pages, jobs, silent)
+        if how.on:
+            batch = run_on(how.on, how.scheduler, asked, jobs, observer, made, out, limits, how.rerun)
+        else:
+            batch = run_batch(asked, jobs, observer, made, multi_start, limits, how.rerun)
+    silent, over = how.json or how.quiet, batch.interrupted or not any(batch.results)
+    write = None if no_report or over else partial(write_reports, asked, out, pages, jobs, silent)
     if silent:
         return conclude_silently(batch, observer, write)
-    parts = observer.notes.seconds if jobs == 1 and not multi_start else {}
+    parts = observer.notes.seconds if jobs == 1 and not (multi_start or how.on) else {}
     return conclude(asked, batch, out, began, parts, write)
 
 
@@ -172,9 +175,9 @@ def conclude(
     from symphys.cli.summary import print_summary
 
     print_summary(jobs, batch)
-    if batch.interrupted:
+    if batch.interrupted or not any(batch.results):
         click.echo(last_words(batch, out), err=True)
-        return INTERRUPTED
+        return exit_code(batch, None)
     made = write() if write else None
     if batch.spent:
         click.echo(last_words(batch, out), err=True)
@@ -202,7 +205,7 @@ def exit_code(batch: BatchResult, made: MadePages | None) -> int:
 
 def last_words(batch: BatchResult, out: Path) -> str:
     """What an interruption, or the end of its time, has left of a batch, and how to go on."""
-    why = "interrupted" if batch.interrupted else "the time of the batch is used up"
+    why = "interrupted" if batch.interrupted else "the time of the batch is used up" if batch.spent else "nothing ran"
     over = sum(result is not None and not result.interrupted for result in batch.results)
     halfway = sum(result is not None and result.interrupted for result in batch.results)
     return (

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from thread_engine import Threads
 
 import symphys
 import symphys.report
@@ -119,6 +120,25 @@ def test_an_interrupted_batch_goes_on(problem: symphys.Problem, tmp_path: Path) 
     with pytest.raises(KeyboardInterrupt, match="1 of 2 runs are done"):
         symphys.solve_all([problem], progress=press, **asked)
     assert [each.solved for each in symphys.solve_all([problem], **asked)] == [True, True]
+
+
+def test_a_batch_is_done_by_an_engine(
+    problem: symphys.Problem, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As it is here; arguments that do not go together are named."""
+    monkeypatch.setattr("symphys.batches.following.open_engine", lambda *_: Threads())
+    asked: dict[str, Any] = {"solvers": ["least_squares"], "backend": "casadi"}
+    (here,) = symphys.solve_all([problem], **asked)
+    (there,) = symphys.solve_all([problem], on="dask", folder=tmp_path, **asked)
+    assert np.array_equal(here.value["throw"], there.value["throw"])
+    for given, said in (
+        ({"on": "dask"}, "needs a folder"),
+        ({"on": "dusk", "folder": tmp_path}, 'did you mean "dask"'),
+        ({"scheduler": "local"}, "needs on"),
+        ({"on": "slurm", "folder": tmp_path, "multi_start": True}, "side by side in one process"),
+    ):
+        with pytest.raises(symphys.SymphysError, match=said):
+            symphys.solve_all([problem], **given)
 
 
 def test_show_draws_what_it_is_given(problem: symphys.Problem, tmp_path: Path) -> None:

@@ -65,8 +65,8 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "solve, judge, examine, write one run, and who may",
     ),
     "batches": (
-        "files results runs solvers threads verification",
-        "",
+        "errors files results runs solvers suggest threads verification",
+        "dask distributed submitit",
         "many runs, in any number of processes and commands",
     ),
     "report": (
