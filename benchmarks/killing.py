@@ -172,7 +172,7 @@ def main(given: list[str] | None = None) -> int:
         problem.write_text(PROBLEM.replace("EVALUATIONS", str(asked.evaluations)), encoding="utf-8")
         seeds = asked.runs // len(SOLVERS)
         arguments = [str(problem), "--solver", ",".join(SOLVERS), "--seeds", str(seeds), "--jobs", str(asked.jobs)]
-        arguments += ["--unexamined", "--backend", "simd"]
+        arguments += ["--unexamined", "--no-report", "--backend", "simd"]
         began = time.monotonic()
         subprocess.run(
             [sys.executable, "-m", "symphys", "solve", *arguments, "--quiet", "--out", str(folder / "calm")],

@@ -30,6 +30,10 @@ LONE_SURROGATE = re.compile("[\ud800-\udfff]")
 """What stands in a text for bytes of a file name that are no UTF-8."""
 
 
+FSYNC = "SYMPHYS_FSYNC"
+"""The variable of the environment that, set, makes each file wait for the disk: what is done survives a power cut."""
+
+
 class FileError(SymphysError):
     """A file or folder that cannot be read or written; names it and says why."""
 
@@ -47,43 +51,56 @@ def make_folder(path: Path) -> None:
         raise FileError(f"cannot make the folder {path}: {reason(error)}") from error
 
 
-def write_bytes(path: Path, content: bytes) -> None:
-    """Write to a temporary name in the same folder, then replace; FileError if that cannot be."""
-    own = f"{os.getpid()}-{os.urandom(3).hex()}"  # two machines may have processes of one number
-    temporary = path.with_name(f".{path.name}.{own}")
-    whole = False
+def write_bytes(path: Path, content: bytes, at_once: bool = True) -> None:
+    """Write to a temporary name in the same folder, then replace; FileError if that cannot be.
+
+    ``at_once`` False: write in its place, for what counts for nothing before another file is written at once. On a disk
+    that takes half the time.
+    """
+    own = f".{path.name}.{os.getpid()}-{os.urandom(3).hex()}"  # two machines may have processes of one number
+    written, whole = path.with_name(own) if at_once else path, False
     try:
         try:
-            temporary.write_bytes(content)
+            write_through(written, content)
         except (FileNotFoundError, NotADirectoryError):
             make_folder(path.parent)
-            temporary.write_bytes(content)
-        temporary.replace(path)
+            write_through(written, content)
+        if at_once:
+            written.replace(path)
         whole = True
     except OSError as error:
         raise FileError(f"cannot write {path}: {reason(error)}") from error
     finally:
         if not whole:
             with contextlib.suppress(OSError):
-                temporary.unlink(missing_ok=True)
+                written.unlink(missing_ok=True)
 
 
-def write_text(path: Path, text: str) -> None:
+def write_through(path: Path, content: bytes) -> None:
+    """Write a file, and wait until it is on the disk if ``SYMPHYS_FSYNC`` is set; OSError if that cannot be."""
+    with path.open("wb") as file:
+        file.write(content)
+        if os.environ.get(FSYNC):
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def write_text(path: Path, text: str, at_once: bool = True) -> None:
     """Write UTF-8 text with the line ends as they are; parts of file names that are no UTF-8 are replaced."""
-    write_bytes(path, printable(text).encode())
+    write_bytes(path, printable(text).encode(), at_once)
 
 
-def write_json(path: Path, value: object) -> None:
+def write_json(path: Path, value: object, at_once: bool = True) -> None:
     """Write strict JSON; numbers that are not finite become the strings "nan", "inf" and "-inf".
 
     An object has a line for each of its keys: all lines of nested values would take ten times as long to write.
     """
     plain = strict(value)
     if not isinstance(plain, dict) or not plain:
-        write_text(path, as_json(plain) + "\n")
+        write_text(path, as_json(plain) + "\n", at_once)
         return
     lines = ",\n".join(f" {as_json(key)}: {as_json(item)}" for key, item in plain.items())
-    write_text(path, f"{{\n{lines}\n}}\n")
+    write_text(path, f"{{\n{lines}\n}}\n", at_once)
 
 
 def emptied(text: bytes, keys: Iterable[str]) -> bytes:
@@ -107,7 +124,7 @@ def as_json(value: object) -> str:
     return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 
-def write_npz(path: Path, arrays: Mapping[str, Any]) -> None:
+def write_npz(path: Path, arrays: Mapping[str, Any], at_once: bool = True) -> None:
     """Write named arrays of numbers and texts, compressed; quickly, as they are most of what a run writes."""
     import numpy as np  # late: the command line's help needs none
 
@@ -116,7 +133,7 @@ def write_npz(path: Path, arrays: Mapping[str, Any]) -> None:
         for name, value in arrays.items():
             array = np.asarray(value, order="C")
             archive.writestr(f"{name}.npy", npy_header(array.dtype.str, array.shape) + array.tobytes())
-    write_bytes(path, buffer.getvalue())
+    write_bytes(path, buffer.getvalue(), at_once)
 
 
 @lru_cache(maxsize=4096)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 import weakref
 from collections import Counter
@@ -13,7 +14,7 @@ from typing import Any
 
 from symphys.api.solution import Solution
 from symphys.api.solving import kept
-from symphys.batches import ENGINES, BatchResult, Observer, run_batch, run_on
+from symphys.batches import ENGINES, BatchLimits, BatchResult, run_batch, run_on
 from symphys.errors import SymphysError
 from symphys.problem import Problem
 from symphys.problem.loading import Source, load
@@ -22,6 +23,7 @@ from symphys.problem.sweeps.points import combined, swept
 from symphys.problem.sweeps.table import read_sweep
 from symphys.results.run import read_run
 from symphys.runs import Job, Result, make_jobs
+from symphys.runs.standing import RERUN
 from symphys.solvers import TraceRow
 from symphys.suggest import hint
 from symphys.transcription import transcribe
@@ -44,6 +46,10 @@ def solve_all(
     sweep: Mapping[str, Any] | None = None,
     on: str | None = None,
     scheduler: str | None = None,
+    retries: int = 0,
+    timeout: float | None = None,
+    budget: float | None = None,
+    rerun: str | None = None,
 ) -> list[Solution]:
     """Solve problems with solvers from seeds. No run's failure stops the others.
 
@@ -60,6 +66,10 @@ def solve_all(
         progress: sees each iteration; none of those that are done elsewhere.
         on: ``"dask"`` or ``"slurm"``: ``jobs`` drivers do the runs elsewhere; needs a ``folder`` that all machines see.
         scheduler: as ``symphys solve --scheduler``; None: dask workers here, Slurm with its defaults.
+        retries: how often a run that fails is tried again.
+        timeout: [s] of a run; with a ``folder``, the same call goes on with what it stops.
+        budget: [s] of all; likewise.
+        rerun: what is done again although it is over: ``"failed"``, ``"changed"`` (by another version), ``"all"``.
         sweep: a table like [sweep] in a problem file, in its place; None: the file's; ``{}``: nothing is swept.
 
     Returns:
@@ -79,6 +89,7 @@ def solve_all(
         [(1, True), (2, True)]
     """
     check_engine(on, scheduler, folder, multi_start)
+    limits = limits_of(retries, timeout, budget, rerun)
     asked = list(numbered(map(load, problems)))
     counted = range(seeds) if isinstance(seeds, int) else tuple(seeds)
     with kept(folder) as out:
@@ -88,8 +99,12 @@ def solve_all(
             for each in points_of(problem, sweep)
             for job in make_jobs([each], solvers, counted, dict(each.settings), out, "", backend, examine)
         ]
-        elsewhere = (on, scheduler or "", out) if on else None
-        batch = do(todo, jobs, ProgressObserver(progress), backend, multi_start, elsewhere)
+        made = partial(transcribe, backend=backend, threads=1 if jobs > 1 or on else None)
+        observer = ProgressObserver(progress)
+        if on:
+            batch = run_on(on, scheduler or "", todo, jobs, observer, made, out, limits, rerun or "")
+        else:
+            batch = run_batch(todo, jobs, observer, made, multi_start, limits, rerun or "")
         solutions = list(solutions_of(todo, batch))
     if folder is None:
         drop_with(solutions, out)
@@ -104,20 +119,13 @@ def points_of(problem: Problem, table: Mapping[str, Any] | None) -> Iterable[Pro
     return [problem] if own is None else swept(problem, combined(own, problem))
 
 
-def do(
-    todo: Sequence[Job],
-    processes: int,
-    observer: Observer,
-    backend: str,
-    multi_start: bool,
-    elsewhere: tuple[str, str, Path] | None,
-) -> BatchResult:
-    """Do all, here or ``elsewhere``: by an engine, with its scheduler, in a folder."""
-    made = partial(transcribe, backend=backend, threads=1 if processes > 1 or elsewhere else None)
-    if elsewhere is None:
-        return run_batch(todo, processes, observer, made, multi_start)
-    on, scheduler, out = elsewhere
-    return run_on(on, scheduler, todo, processes, observer, made, out)
+def limits_of(retries: int, timeout: float | None, budget: float | None, rerun: str | None) -> BatchLimits:
+    """The bounds of a batch; SymphysError for what cannot be."""
+    if rerun is not None and rerun not in RERUN:
+        raise SymphysError(f"rerun={rerun!r}: {hint(rerun, RERUN)}")
+    if retries < 0 or min(math.inf if each is None else each for each in (timeout, budget)) <= 0:
+        raise SymphysError("retries must be 0 or more, timeout and budget seconds above 0")
+    return BatchLimits(retries, *(math.inf if each is None else each for each in (timeout, budget)))
 
 
 def check_engine(on: str | None, scheduler: str | None, folder: str | Path | None, multi_start: bool) -> None:

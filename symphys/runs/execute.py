@@ -132,7 +132,7 @@ class Log:
 
     def write(self) -> None:
         """Write the file."""
-        files.write_text(self.path, self.text)
+        files.write_text(self.path, self.text, at_once=False)
 
 
 class CheckpointKeeper:

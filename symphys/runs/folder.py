@@ -44,8 +44,8 @@ class RunFolder:
         files.make_folder(self.path)
         for name in WRITTEN:
             files.remove(self.path / name)
-        files.write_text(self.path / PROBLEM, problem_text)
-        files.write_json(self.path / CONFIG, config.to_json())
+        files.write_text(self.path / PROBLEM, problem_text, at_once=False)
+        files.write_json(self.path / CONFIG, config.to_json(), at_once=False)
 
     def clear(self) -> None:
         """Take away what killed processes left under temporary names; whoever calls has claimed the folder."""
@@ -54,6 +54,6 @@ class RunFolder:
             if path.name.startswith(begun):
                 files.remove(path)
 
-    def write_trace(self, rows: Iterable[Mapping[str, object]]) -> None:
+    def write_trace(self, rows: Iterable[Mapping[str, object]], at_once: bool = True) -> None:
         """Write one line per iteration under a header with the names of the columns; what a row lacks is nan."""
-        files.write_text(self.path / TRACE, trace_text(rows))
+        files.write_text(self.path / TRACE, trace_text(rows), at_once)

@@ -52,7 +52,8 @@ def solve(
     shooting = transcription.shooting
     log(f"evaluated by {transcription.backend}")
     start = shooting.start(job.config.seed)
-    files.write_npz(job.folder.path / GUESS, transcription.simulate(start).arrays())
+    at_once = found.result is not None  # else nothing counts before the result is written
+    files.write_npz(job.folder.path / GUESS, transcription.simulate(start).arrays(), at_once)
     if solved is None:
         outcome, spent = alone(job, shooting, start, monitor, log, keep, found.checkpoint)
     else:
@@ -61,7 +62,7 @@ def solve(
     spent += spent_before(found)
     judgement = judge(transcription, outcome, job.examine, tell)
     price = transcription.prices(used(outcome.counts))
-    write(job, transcription, outcome, judgement, price)
+    write(job, transcription, outcome, judgement, price, at_once)
     seconds = {"build": transcription.build_seconds, "compile": transcription.backend.seconds, "solve": spent}
     return make_result(job, transcription, outcome, judgement, price, seconds)
 
@@ -125,13 +126,19 @@ def measured(transcription: Transcription, taken: Record, examine: bool, tell: C
 
 
 def write(
-    job: Job, transcription: Transcription, outcome: Outcome, judgement: Judgement, price: Mapping[str, float]
+    job: Job,
+    transcription: Transcription,
+    outcome: Outcome,
+    judgement: Judgement,
+    price: Mapping[str, float],
+    at_once: bool,
 ) -> None:
     """Write trace, motion and checkpoint."""
-    job.folder.write_trace([trace_row(row, price) for row in outcome.trace])
+    job.folder.write_trace([trace_row(row, price) for row in outcome.trace], at_once)
     if judgement.trajectory is not None:
-        files.write_npz(job.folder.path / TRAJECTORY, judgement.trajectory.arrays())
+        files.write_npz(job.folder.path / TRAJECTORY, judgement.trajectory.arrays(), at_once)
         z = transcription.shooting.by_block(outcome.z)
-        files.write_json(job.folder.path / SCENE, make_scene(job.problem, z, judgement.trajectory).to_json())
+        scene = make_scene(job.problem, z, judgement.trajectory)
+        files.write_json(job.folder.path / SCENE, scene.to_json(), at_once)
     if outcome.status is Status.INTERRUPTED:
         files.write_json(job.folder.path / CHECKPOINT, outcome.checkpoint)

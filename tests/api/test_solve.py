@@ -12,6 +12,7 @@ import pytest
 from thrown import TABLES
 
 import symphys
+from symphys.errors import SymphysError
 
 
 def test_the_solution_is_that_of_the_variables(problem: symphys.Problem, solution: symphys.Solution) -> None:
@@ -102,3 +103,14 @@ def test_a_run_that_fails_raises(problem: symphys.Problem, monkeypatch: pytest.M
 def test_read_names_what_is_no_run(tmp_path: Path) -> None:
     with pytest.raises(symphys.SymphysError, match=r"no run folder"):
         symphys.read(tmp_path)
+
+
+def test_a_batch_has_limits_and_does_again_what_is_asked_for(tmp_path: Path) -> None:
+    for given in ({"rerun": "faild"}, {"retries": -1}, {"timeout": 0.0}, {"budget": -1.0}):
+        with pytest.raises(SymphysError, match=r"failed|retries must be"):
+            symphys.solve_all(["ball_throw"], ["least_squares"], folder=tmp_path, **given)  # type: ignore[arg-type]
+    written = []
+    for rerun in (None, None, "all"):
+        symphys.solve_all(["ball_throw"], ["least_squares"], backend="casadi", folder=tmp_path, rerun=rerun)
+        written.append((tmp_path / "ball_throw/least_squares-seed0/result.json").stat().st_mtime_ns)
+    assert written[0] == written[1] != written[2]
