@@ -78,10 +78,9 @@ def write_bytes(path: Path, content: bytes, at_once: bool = True) -> None:
 
 def write_through(path: Path, content: bytes) -> None:
     """Write a file, and wait until it is on the disk if ``SYMPHYS_FSYNC`` is set; OSError if that cannot be."""
-    with path.open("wb") as file:
-        file.write(content)
-        if os.environ.get(FSYNC):
-            file.flush()
+    path.write_bytes(content)
+    if os.environ.get(FSYNC):
+        with path.open("rb+") as file:
             os.fsync(file.fileno())
 
 
