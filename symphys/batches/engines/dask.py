@@ -21,6 +21,7 @@ CONFIG = {
     "distributed.admin.large-graph-warning-threshold": "1 TiB",  # all jobs of a batch go to each driver, once
     "distributed.scheduler.allowed-failures": 0,  # a driver whose worker dies is started again from here
     "distributed.scheduler.worker-ttl": None,  # casadi holds the interpreter for minutes while it builds
+    "distributed.worker.profile.enabled": False,  # nobody looks at the profile of a driver
     "distributed.worker.daemon": False,  # runs with a timeout have processes of their own
 }
 
