@@ -58,8 +58,7 @@ def solve_all(
         solvers: their names; None: for each problem those that it names, else those that fit it.
         seeds: how many, from 0 on, or which; 0 starts from the guess.
         jobs: how many runs go on at once, in processes; a script then needs ``if __name__ == "__main__":``.
-        folder: where run folders are kept, as by ``symphys solve --out``: what is done already is not done again, what
-            was interrupted goes on, and ``symphys.report(folder)`` compares all. None: nothing is kept.
+        folder: of run folders, as by ``symphys solve --out``; what is done is not done again. None: nothing is kept.
         examine: whether to examine how far solutions can be trusted.
         multi_start: whether to solve the seeds of a problem side by side, their evaluations in batches.
         backend: as in ``solve``.
@@ -73,12 +72,10 @@ def solve_all(
         sweep: a table like [sweep] in a problem file, in its place; None: the file's; ``{}``: nothing is swept.
 
     Returns:
-        Problems times points of the sweep times solvers times seeds, in this order; of a run that failed
-        ``run.status`` is "failed", and ``advice`` says why.
+        Problems times points times solvers times seeds, in this order; ``run.status`` may be "failed".
 
     Raises:
-        ProblemError: a problem, a point, or an option of a solver, cannot be used; before anything is solved.
-        SymphysError: ``on`` cannot be used here, or not with the other arguments.
+        SymphysError: a problem, a point or an argument cannot be used; before anything is solved.
         KeyboardInterrupt: after Ctrl-C; with a ``folder``, the same call goes on from there.
 
     Example:
@@ -100,11 +97,11 @@ def solve_all(
             for job in make_jobs([each], solvers, counted, dict(each.settings), out, "", backend, examine)
         ]
         made = partial(transcribe, backend=backend, threads=1 if jobs > 1 or on else None)
-        observer = ProgressObserver(progress)
+        way = (jobs, ProgressObserver(progress), made)
         if on:
-            batch = run_on(on, scheduler or "", todo, jobs, observer, made, out, limits, rerun or "")
+            batch = run_on(on, scheduler or "", todo, *way, out, limits, rerun or "")
         else:
-            batch = run_batch(todo, jobs, observer, made, multi_start, limits, rerun or "")
+            batch = run_batch(todo, *way, multi_start, limits, rerun or "")
         solutions = list(solutions_of(todo, batch))
     if folder is None:
         drop_with(solutions, out)
