@@ -9,8 +9,9 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 from symphys.api.solution import Solution
 from symphys.api.solving import kept
@@ -24,12 +25,29 @@ from symphys.problem.sweeps.table import read_sweep
 from symphys.results.run import read_run
 from symphys.runs import Job, Result, make_jobs
 from symphys.runs.standing import RERUN
+from symphys.runs.transcription_cache import Transcribe
 from symphys.solvers import TraceRow
 from symphys.suggest import hint
 from symphys.transcription import transcribe
 
 BatchProgress = Callable[[str, TraceRow], None]
 """Sees which run it is, ``"ball_throw gradient seed 0"``, and its iteration."""
+
+
+class How(TypedDict, total=False):
+    """How a batch is done.
+
+    Attributes:
+        retries: how often a run that fails is tried again; 0 if not given.
+        timeout: [s] of a run; with a folder, the same call goes on with what it stops.
+        budget: [s] of all; likewise.
+        rerun: what is done again although it is over: "failed", "changed" (by another version of symphys) or "all".
+    """
+
+    retries: int
+    timeout: float | None
+    budget: float | None
+    rerun: str | None
 
 
 def solve_all(
@@ -46,10 +64,7 @@ def solve_all(
     sweep: Mapping[str, Any] | None = None,
     on: str | None = None,
     scheduler: str | None = None,
-    retries: int = 0,
-    timeout: float | None = None,
-    budget: float | None = None,
-    rerun: str | None = None,
+    **how: Unpack[How],
 ) -> list[Solution]:
     """Solve problems with solvers from seeds. No run's failure stops the others.
 
@@ -65,11 +80,8 @@ def solve_all(
         progress: sees each iteration; none of those that are done elsewhere.
         on: ``"dask"`` or ``"slurm"``: ``jobs`` drivers do the runs elsewhere; needs a ``folder`` that all machines see.
         scheduler: as ``symphys solve --scheduler``; None: dask workers here, Slurm with its defaults.
-        retries: how often a run that fails is tried again.
-        timeout: [s] of a run; with a ``folder``, the same call goes on with what it stops.
-        budget: [s] of all; likewise.
-        rerun: what is done again although it is over: ``"failed"``, ``"changed"`` (by another version), ``"all"``.
         sweep: a table like [sweep] in a problem file, in its place; None: the file's; ``{}``: nothing is swept.
+        how: ``retries``, ``timeout``, ``budget`` and ``rerun``, see ``How``.
 
     Returns:
         Problems times points times solvers times seeds, in this order; ``run.status`` may be "failed".
@@ -86,25 +98,32 @@ def solve_all(
         [(1, True), (2, True)]
     """
     check_engine(on, scheduler, folder, multi_start)
-    limits = limits_of(retries, timeout, budget, rerun)
-    asked = list(numbered(map(load, problems)))
-    counted = range(seeds) if isinstance(seeds, int) else tuple(seeds)
+    limits, rerun = limits_of(how), how.get("rerun") or ""
+    asked, counted = list(numbered(map(load, problems))), range(seeds) if isinstance(seeds, int) else tuple(seeds)
     with kept(folder) as out:
         todo = [
             job
-            for problem in asked
-            for each in points_of(problem, sweep)
+            for each in chain.from_iterable(points_of(problem, sweep) for problem in asked)
             for job in make_jobs([each], solvers, counted, dict(each.settings), out, "", backend, examine)
         ]
-        made = partial(transcribe, backend=backend, threads=1 if jobs > 1 or on else None)
-        way = (jobs, ProgressObserver(progress), made)
+        way = (jobs, ProgressObserver(progress), transcriber(backend, jobs > 1 or on is not None))
         if on:
-            batch = run_on(on, scheduler or "", todo, *way, out, limits, rerun or "")
+            batch = run_on(on, scheduler or "", todo, *way, out, limits, rerun)
         else:
-            batch = run_batch(todo, *way, multi_start, limits, rerun or "")
-        solutions = list(solutions_of(todo, batch))
-    if folder is None:
-        drop_with(solutions, out)
+            batch = run_batch(todo, *way, multi_start, limits, rerun)
+        return solutions_kept(todo, batch, None if folder else out)
+
+
+def transcriber(backend: str, shared: bool) -> Transcribe:
+    """What transcribes problems; ``shared``: the processors are for several runs at once."""
+    return partial(transcribe, backend=backend, threads=1 if shared else None)
+
+
+def solutions_kept(todo: Sequence[Job], batch: BatchResult, temporary: Path | None) -> list[Solution]:
+    """The solutions in the order of the jobs; a temporary folder goes with the last of them."""
+    solutions = list(solutions_of(todo, batch))
+    if temporary is not None:
+        drop_with(solutions, temporary)
     return solutions
 
 
@@ -116,13 +135,15 @@ def points_of(problem: Problem, table: Mapping[str, Any] | None) -> Iterable[Pro
     return [problem] if own is None else swept(problem, combined(own, problem))
 
 
-def limits_of(retries: int, timeout: float | None, budget: float | None, rerun: str | None) -> BatchLimits:
+def limits_of(how: How) -> BatchLimits:
     """The bounds of a batch; SymphysError for what cannot be."""
+    rerun, retries = how.get("rerun"), how.get("retries", 0)
+    times = [how.get("timeout"), how.get("budget")]
     if rerun is not None and rerun not in RERUN:
         raise SymphysError(f"rerun={rerun!r}: {hint(rerun, RERUN)}")
-    if retries < 0 or min(math.inf if each is None else each for each in (timeout, budget)) <= 0:
+    if retries < 0 or any(each is not None and not each > 0 for each in times):
         raise SymphysError("retries must be 0 or more, timeout and budget seconds above 0")
-    return BatchLimits(retries, *(math.inf if each is None else each for each in (timeout, budget)))
+    return BatchLimits(retries, *(math.inf if each is None else each for each in times))
 
 
 def check_engine(on: str | None, scheduler: str | None, folder: str | Path | None, multi_start: bool) -> None:
