@@ -92,8 +92,7 @@ def solve_all(
 
     Example:
         >>> import symphys
-        >>> masses = {"ball.mass": [1, 2]}
-        >>> found = symphys.solve_all(["ball_throw"], ["least_squares"], backend="casadi", sweep=masses)
+        >>> found = symphys.solve_all(["ball_throw"], ["least_squares"], sweep={"ball.mass": [1, 2]})
         >>> [(solution.problem.settings["ball.mass"], solution.solved) for solution in found]
         [(1, True), (2, True)]
     """
@@ -101,11 +100,9 @@ def solve_all(
     limits, rerun = limits_of(how), how.get("rerun") or ""
     asked, counted = list(numbered(map(load, problems))), range(seeds) if isinstance(seeds, int) else tuple(seeds)
     with kept(folder) as out:
-        todo = [
-            job
-            for each in chain.from_iterable(points_of(problem, sweep) for problem in asked)
-            for job in make_jobs([each], solvers, counted, dict(each.settings), out, "", backend, examine)
-        ]
+        points = chain.from_iterable(points_of(problem, sweep) for problem in asked)
+        made = (make_jobs([each], solvers, counted, dict(each.settings), out, "", backend, examine) for each in points)
+        todo = list(chain.from_iterable(made))
         way = (jobs, ProgressObserver(progress), transcriber(backend, jobs > 1 or on is not None))
         if on:
             batch = run_on(on, scheduler or "", todo, *way, out, limits, rerun)
