@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from symphys import json_values as values
 from symphys.findings import writing
 from symphys.findings.writing import show
 from symphys.report.figures import style
@@ -260,17 +261,33 @@ def time_split(run: Run) -> Html:
 def provenance(run: Run) -> Html:
     """When, with what and by which command."""
     versions = ", ".join(f"{name} {version}" for name, version in run.versions.items() if name != "platform")
+    memory = values.number(run.provenance.get("peak_memory"))
     return facts(
         [
             ("Command", tag("code", run.command) if run.command else ""),
             ("When", run.when),
-            ("Machine", run.versions.get("platform", "")),
+            ("Machine", machine(run)),
+            ("Commit", commit(run)),
+            ("Peak memory", f"{memory / 2**30:.2f} GiB" if np.isfinite(memory) else ""),
             ("Versions", versions),
             ("Evaluated by", str(run.backend)),
+            ("Compiler flags", values.name(run.provenance.get("flags"))),
             ("Ended as", words.status(run.status)),
             ("Iterations", words.count(run.iterations) if math.isfinite(run.iterations) else ""),
         ]
     )
+
+
+def machine(run: Run) -> str:
+    """Host, processor and platform, as far as they are known."""
+    named = [values.name(run.provenance.get(key)) for key in ("host", "processor", "python_platform")]
+    return ", ".join(filter(None, named)) or run.versions.get("platform", "")
+
+
+def commit(run: Run) -> str:
+    """Of the working folder, and whether there were changes."""
+    known = values.name(run.provenance.get("commit"))
+    return f"{known}, with changes" if known and run.provenance.get("dirty") is True else known
 
 
 def source(title: str, text: str) -> Html:
