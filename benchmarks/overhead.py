@@ -120,7 +120,7 @@ def main(given: list[str] | None = None) -> int:
         before = bare(jobs[: asked.sample], transcription)
         memory, clock = Memory(), Clock()
         batch = run_batch(jobs, 1, memory, lambda problem, exact: transcription)
-        whole = clock.times
+        whole, flat = clock.times, list(memory.seen)
         after = bare(jobs[: asked.sample], transcription)
         clock = Clock()
         run_batch(jobs, 1, memory, made)
@@ -134,8 +134,8 @@ def main(given: list[str] | None = None) -> int:
             f"{word}: a run takes {1e3 * each:.1f} ms in a batch and {1e3 * share:.1f} ms without "
             f"({1e3 * first:.1f} before it, {1e3 * second:.1f} after): the batch adds {1e3 * (each - share):.1f} ms"
         )
-    tenth = max(len(memory.seen) // 10, 1)
-    print(f"memory: {memory.seen[tenth]:.0f} MB after a tenth of the runs, {memory.seen[-1]:.0f} MB at the end")
+    tenth = flat[max(len(flat) // 10, 1)]
+    print(f"memory: {tenth:.0f} MB after a tenth of the runs, {flat[-1]:.0f} MB when the last ends")
     print(f"the same command again: {again[0]:.1f} s; the table of {len(rows)} runs: {listed[0]:.1f} s")
     return 0
 

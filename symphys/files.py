@@ -30,6 +30,8 @@ LONE_SURROGATE = re.compile("[\ud800-\udfff]")
 """What stands in a text for bytes of a file name that are no UTF-8."""
 
 
+SMALL = 1024
+"""[bytes] Arrays that are no larger are not compressed: it takes longer than it spares."""
 FSYNC = "SYMPHYS_FSYNC"
 """The variable of the environment that, set, makes each file wait for the disk: what is done survives a power cut."""
 
@@ -128,10 +130,13 @@ def write_npz(path: Path, arrays: Mapping[str, Any], at_once: bool = True) -> No
     import numpy as np  # late: the command line's help needs none
 
     buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+    with zipfile.ZipFile(buffer, "w") as archive:
         for name, value in arrays.items():
             array = np.asarray(value, order="C")
-            archive.writestr(f"{name}.npy", npy_header(array.dtype.str, array.shape) + array.tobytes())
+            content = npy_header(array.dtype.str, array.shape) + array.tobytes()
+            member = zipfile.ZipInfo(f"{name}.npy")  # without the time of day: equal arrays make equal files
+            member.compress_type = zipfile.ZIP_DEFLATED if len(content) > SMALL else zipfile.ZIP_STORED
+            archive.writestr(member, content, compresslevel=1)
     write_bytes(path, buffer.getvalue(), at_once)
 
 

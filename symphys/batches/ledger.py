@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from time import monotonic
 from typing import Any, Protocol, runtime_checkable
 
 from symphys import files
@@ -13,10 +12,6 @@ from symphys.results.result import Result
 from symphys.results.table import write_table
 from symphys.runs.job import Job
 from symphys.solvers import TraceRow
-
-EVERY = 30.0
-"""[s] between two tables of all runs, at least."""
-SHARE = 50
 
 
 class Observer(Protocol):
@@ -48,27 +43,6 @@ class NotedObserver(Protocol):
         """Something that people should know."""
 
 
-class TableKeeper:
-    """Writes the table of all runs now and then; it takes no more than one of SHARE seconds."""
-
-    def __init__(self) -> None:
-        """It is due after EVERY."""
-        self.due = monotonic() + EVERY
-
-    def look(self, jobs: Sequence[Job]) -> None:
-        """Write it, if it is due."""
-        if monotonic() >= self.due:
-            self.write(jobs)
-
-    def write(self, jobs: Sequence[Job]) -> None:
-        """Write it; where that cannot be, the folders have everything all the same."""
-        began = monotonic()
-        for out in {job.folder.path.parents[1] for job in jobs}:
-            with contextlib.suppress(OSError, files.FileError):
-                write_table(out)
-        self.due = monotonic() + max(EVERY, SHARE * (monotonic() - began))
-
-
 @dataclass
 class Ledger:
     """Keeps the results by the index of their job, and passes on what happens.
@@ -76,14 +50,12 @@ class Ledger:
     Attributes:
         jobs: all that were asked for.
         results: one for each job, without what only its folder need hold; None until it is over.
-        table: keeps the table of all runs.
         begun: indices of the jobs that were begun here.
     """
 
     jobs: Sequence[Job]
     observer: Observer
     results: list[Result | None] = field(default_factory=list)
-    table: TableKeeper = field(default_factory=lambda: TableKeeper())
     begun: set[int] = field(default_factory=set)
 
     def __post_init__(self) -> None:
@@ -114,12 +86,12 @@ class Ledger:
         elsewhere = index not in self.begun and not result.again
         self.results[index] = slim(result)
         self.observer.ended(self.jobs[index], result, skipped=elsewhere)
-        self.table.look(self.jobs)
 
     def close(self) -> None:
-        """Write the table of all runs, if there is anything new in it."""
-        if self.begun:
-            self.table.write(self.jobs)
+        """Write the table of all runs, if there is anything new; where that cannot be, the folders have it all."""
+        for out in {self.jobs[index].folder.path.parents[1] for index in self.begun}:
+            with contextlib.suppress(OSError, files.FileError):
+                write_table(out)
 
     def note(self, text: str) -> None:
         """Report what happens to the batch."""

@@ -162,16 +162,16 @@ def finish(job: Job, claim: Claim, result: Result) -> None:
     The checkpoint stays where the same command goes on from there.
     """
     claim.check()
-    files.write_json(job.folder.path / RESULT, result.to_json())
+    write_result(job, result)
     if not (result.interrupted or result.again):
         files.remove(job.folder.path / CHECKPOINT)
-    enter(job)
 
 
-def enter(job: Job) -> None:
-    """Keep the row of the run in the table of all runs, which can be made again from their folders."""
-    with contextlib.suppress(OSError, files.FileError):
-        Journal(job.folder.path.parents[1]).add(job.folder.path)
+def write_result(job: Job, result: Result) -> None:
+    """Write result.json, and keep the row of the run in the table of all runs."""
+    found = files.strict(result.to_json())
+    files.write_json(job.folder.path / RESULT, found)
+    Journal(job.folder.path.parents[1]).add(job.folder.path, (files.strict(job.config.to_json()), found))
 
 
 def give_up(job: Job, message: str, again: bool) -> Result:
@@ -184,6 +184,5 @@ def give_up(job: Job, message: str, again: bool) -> Result:
         if found.stands in (Stands.NEW, Stands.CHANGED, Stands.DAMAGED):
             job.folder.begin(job.config, job.problem.text)
         claim.check()
-        files.write_json(job.folder.path / RESULT, result.to_json())
-        enter(job)
+        write_result(job, result)
     return result

@@ -50,19 +50,23 @@ class Journal:
         """The file."""
         return self.out / NAME
 
-    def add(self, folder: Path) -> None:
+    def add(self, folder: Path, written: tuple[dict[str, Any], dict[str, Any]] | None = None) -> None:
         """Keep the row of a run that has ended, once its result.json is written.
 
+        ``written``: what config.json and result.json hold, if that is at hand; they are read otherwise.
         Never fails, and does nothing where nothing can be written: whoever needs the row reads it from the folder.
         """
-        from symphys.results.table.row import read_row  # late: whoever finds rows in a journal needs none of that
+        from symphys.results.table.row import (  # late: whoever finds rows in a journal needs none of that
+            read_row,
+            row_of,
+        )
 
         try:
             stamp = stamp_of((folder / RESULT).stat())
             place = folder.absolute().relative_to(self.out.absolute()).as_posix()
         except (OSError, ValueError):
             return
-        row = read_row(folder)
+        row = row_of(folder, *written) if written else read_row(folder)
         if "fault" not in row:
             self.append({place: Kept(stamp, row)})
 

@@ -37,6 +37,12 @@ def read_row(folder: Path) -> Row:
     return {column: value for column, value in whole_row(folder).items() if value is not None and value != ""}
 
 
+def row_of(folder: Path, config: dict[str, Any], result: dict[str, Any]) -> Row:
+    """``read_row`` of a run whose config.json and result.json hold this."""
+    row = make_row(folder, config, result, [])
+    return {column: value for column, value in row.items() if value is not None and value != ""}
+
+
 def whole_row(folder: Path) -> Row:
     """The row with None and empty texts for what is not known."""
     faults: list[str] = []
