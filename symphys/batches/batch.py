@@ -136,6 +136,7 @@ class Here:
         while len(self.queue) and not self.halt():
             index = self.queue.take(last)
             if index is None:
+                self.ledger.wait_for(self.queue.claimed)
                 time.sleep(TICK)
                 continue
             try:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, runtime_checkable
 
 from symphys import files
 from symphys.results.result import Result
 from symphys.results.table import write_table
+from symphys.runs.claim import owner
 from symphys.runs.job import Job
 from symphys.solvers import TraceRow
 
@@ -51,12 +52,14 @@ class Ledger:
         jobs: all that were asked for.
         results: one for each job, without what only its folder need hold; None until it is over.
         begun: indices of the jobs that were begun here.
+        waited: whether it was said that only runs of other commands are left.
     """
 
     jobs: Sequence[Job]
     observer: Observer
     results: list[Result | None] = field(default_factory=list)
     begun: set[int] = field(default_factory=set)
+    waited: bool = False
 
     def __post_init__(self) -> None:
         """No job is done."""
@@ -92,6 +95,16 @@ class Ledger:
         for out in {self.jobs[index].folder.path.parents[1] for index in self.begun}:
             with contextlib.suppress(OSError, files.FileError):
                 write_table(out)
+
+    def wait_for(self, indices: Collection[int]) -> None:
+        """Say, once, that the runs that are left are those that other commands are at."""
+        if self.waited or not indices:
+            return
+        self.waited = True
+        first = self.jobs[min(indices)]
+        who = owner(first.folder.path) or "another command"
+        runs = f"{len(indices)} runs, at which other commands are" if len(indices) > 1 else "a run of another command"
+        self.note(f"waiting for {runs}: {first.name} ({who})")
 
     def note(self, text: str) -> None:
         """Report what happens to the batch."""

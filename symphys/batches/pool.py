@@ -114,6 +114,8 @@ class Pool:
                 continue
             index = self.queue.take(seat.last)
             if index is None:
+                if not self.working:
+                    self.ledger.wait_for(self.queue.claimed)
                 return
             seat.index, seat.asked, seat.until = index, False, math.inf
             send(seat, (self.jobs[index],))

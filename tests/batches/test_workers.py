@@ -7,6 +7,7 @@ import pickle
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -20,6 +21,9 @@ from symphys.batches import pool as pools
 from symphys.problem import load_problem
 from symphys.results.result import read_result
 from symphys.runs import Job, make_jobs
+from symphys.runs.claim import claimed
+from symphys.runs.execute import with_claim
+from symphys.runs.transcription_cache import TranscriptionCache
 from symphys.transcription import transcribe
 
 HURT = """
@@ -188,3 +192,29 @@ def test_a_killed_run_goes_on_from_its_checkpoint(make: Any, recorder: Any) -> N
     first, second = (read_result(each.folder.path / "result.json") for each in (whole, job))
     assert (first.z, first.counts, first.iterations) == (second.z, second.counts, second.iterations)
     assert not [path.name for path in job.folder.path.iterdir() if path.name.startswith(".")]
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_runs_that_another_command_is_at_are_waited_for_and_taken_from_there(
+    make: Any, recorder: Any, processes: int
+) -> None:
+    """It is said whom the command waits for; what it did not compute it has all the same."""
+    jobs = make("ours", "theirs")
+    other = type(recorder)()
+
+    def work() -> None:
+        with claimed(jobs[1].folder.path) as claim:
+            held.set()
+            waited.wait(30)
+            with_claim(jobs[1], claim, lambda row: None, TranscriptionCache(transcribe))
+
+    held, waited = threading.Event(), threading.Event()
+    thread = threading.Thread(target=work)
+    thread.start()
+    held.wait(30)
+    recorder.note = lambda text: (other.notes.append(text), waited.set())
+    batch = run_batch(jobs, processes, recorder, transcribe)
+    thread.join()
+    assert batch.accepted
+    assert other.notes[0].startswith("waiting for a run of another command: theirs least_squares seed 0 (process ")
+    assert ("started", jobs[0].name) in recorder.events and ("skipped", jobs[1].name) in recorder.events
