@@ -12,12 +12,12 @@ from pathlib import Path
 from symphys.api.solution import Solution
 from symphys.api.transcriptions import transcribed
 from symphys.errors import SymphysError
+from symphys.interrupts import Interrupts
 from symphys.problem import Problem
 from symphys.problem.loading import Source, load
 from symphys.results.run import read_run
 from symphys.runs import Job, Result, execute, make_jobs
 from symphys.runs.job import fitting
-from symphys.runs.stopping import Interrupts
 from symphys.solvers import TraceRow
 
 Progress = Callable[[TraceRow], None]

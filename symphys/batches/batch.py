@@ -19,6 +19,7 @@ from symphys.batches.multi_start import groups, solve_group
 from symphys.batches.pool import NoWorkers, Pool
 from symphys.batches.queue import Queue
 from symphys.batches.worker import TICK
+from symphys.interrupts import Interrupts
 from symphys.results.file_names import RESULT
 from symphys.results.result import Result
 from symphys.runs.claim import FolderBusy, claimed
@@ -26,7 +27,6 @@ from symphys.runs.execute import execute, with_claim
 from symphys.runs.job import Job
 from symphys.runs.record import failure
 from symphys.runs.standing import RERUN, stamped, standing
-from symphys.runs.stopping import Interrupts
 from symphys.runs.transcription_cache import Transcribe, TranscriptionCache
 from symphys.solvers import Monitor, TraceRow
 

@@ -18,6 +18,7 @@ from symphys.batches.engines.board import NOTE, OVER, RESUMED, Board
 from symphys.batches.engines.driver import DriverTask
 from symphys.batches.ledger import Ledger, Observer
 from symphys.batches.limits import UNLIMITED, BatchLimits, Halt
+from symphys.interrupts import Interrupts
 from symphys.results.file_names import RESULT
 from symphys.results.result import Result, read_result
 from symphys.runs.claim import is_over, numbers, path_of, read_owner
@@ -26,7 +27,6 @@ from symphys.runs.folder import RunFolder
 from symphys.runs.job import Job
 from symphys.runs.record import failure
 from symphys.runs.standing import Stands, standing
-from symphys.runs.stopping import Interrupts
 from symphys.runs.transcription_cache import Transcribe
 
 TICK = 0.25

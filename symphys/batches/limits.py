@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from time import monotonic
 
-from symphys.runs.stopping import Stop
+from symphys.interrupts import Stop
 
 
 @dataclass(frozen=True)

@@ -21,12 +21,12 @@ from symphys.batches.ledger import Ledger
 from symphys.batches.limits import BatchLimits, Halt, timed_out
 from symphys.batches.queue import Queue
 from symphys.batches.worker import TICK, Begun, Ended, News, Order, Ready, Stopping, serve
+from symphys.interrupts import ignoring_interrupts
 from symphys.results.file_names import RESULT
 from symphys.results.result import Result
 from symphys.runs.execute import give_up
 from symphys.runs.job import Job
 from symphys.runs.standing import stamped
-from symphys.runs.stopping import ignoring_interrupts
 from symphys.runs.transcription_cache import Transcribe
 from symphys.solvers import TraceRow
 

@@ -19,6 +19,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "errors": ("", "", "errors that a user may meet"),
     "suggest": ("", "", "hints for error messages"),
     "verbs": ("", "", "rooms that can be called"),
+    "interrupts": ("", "", "Ctrl-C"),
     "threads": ("", "", "one thread for linear algebra"),
     "provenance": ("version", "", "where a run comes from: versions, machine, process, commit"),
     "files": ("errors", "numpy", "files appear at once and whole, or not at all"),
@@ -65,19 +66,19 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "solve, judge, examine, write one run, and who may",
     ),
     "batches": (
-        "errors files results runs solvers suggest threads verification",
+        "errors files interrupts results runs solvers suggest threads verification",
         "dask distributed submitit",
         "many runs, in any number of processes and commands",
     ),
     "report": (
-        "files findings json_values results trajectory verbs",
+        "files findings interrupts json_values results trajectory verbs",
         "matplotlib numpy",
         "pages and figures, made from run folders alone",
     ),
     "doctor": ("codegen verbs", "casadi numpy", "what there is on this machine"),
     "api": (
-        "batches codegen errors files findings problem problems report results runs shooting solvers suggest "
-        "trajectory transcription verification",
+        "batches codegen errors files findings interrupts problem problems report results runs shooting "
+        "solvers suggest trajectory transcription verification",
         "matplotlib numpy",
         "what Python calls",
     ),

@@ -13,7 +13,7 @@ from distributed import Client, LocalCluster
 
 from symphys.batches.engines.driver import DriverTask, drive
 from symphys.batches.engines.interface import EngineError
-from symphys.runs.stopping import ignoring_interrupts
+from symphys.interrupts import ignoring_interrupts
 
 PATIENCE = 15
 """[s] until a scheduler that does not answer is given up, and until a driver for which no worker is idle is queued."""

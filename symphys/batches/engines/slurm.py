@@ -11,7 +11,7 @@ import submitit
 
 from symphys.batches.engines.driver import DriverTask, drive
 from symphys.batches.engines.interface import EngineError
-from symphys.runs.stopping import ignoring_interrupts
+from symphys.interrupts import ignoring_interrupts
 from symphys.suggest import hint
 
 FOLDER = ".slurm"

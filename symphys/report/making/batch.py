@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from symphys import files
+from symphys.interrupts import Interrupts
 from symphys.report.making.page import AUTO, PageFault, attempt, is_light
 from symphys.report.making.pool import make_run_pages
 from symphys.report.pages.batch import PAGE as BATCH_PAGE
@@ -100,8 +101,11 @@ def make_pages(wanted: WantedPages, kind: str = AUTO, jobs: int = 1, tell: Told 
     tell(len(wanted.runs))
     if not wanted.batch:
         return MadePages(wanted.root / PAGE, made, light, tuple(found))
-    if fault := attempt(wanted.root / BATCH_PAGE, lambda: write_batch_report(wanted.root)):
-        found.append(fault)
+    with Interrupts().listening() as interrupted:
+        if fault := attempt(wanted.root / BATCH_PAGE, lambda: write_batch_report(wanted.root)):
+            found.append(fault)
+    if interrupted():
+        raise KeyboardInterrupt
     return MadePages(wanted.root / BATCH_PAGE, made, light, tuple(found))
 
 

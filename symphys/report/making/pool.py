@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
-import threading
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
+from symphys.interrupts import Interrupts, ignoring_interrupts
 from symphys.report.making.page import PageFault, make_run_page
 from symphys.report.pages.run import PAGE
 
@@ -35,9 +35,12 @@ def make_run_pages(folders: Sequence[Path], light: bool, jobs: int, done: Done) 
     left = deque(folders)
     if count > 1:
         PagePool(left, light, done).run(count)
-    while left:
-        done(left[0], make_run_page(left[0], light))
-        left.popleft()
+    with Interrupts().listening() as interrupted:  # a KeyboardInterrupt in the middle of a figure may be lost there
+        while left:
+            done(left[0], make_run_page(left[0], light))
+            left.popleft()
+            if interrupted():
+                raise KeyboardInterrupt
 
 
 @dataclass
@@ -66,7 +69,7 @@ class PagePool:
         """Make all pages; some are left over only where no process can be started."""
         workers: list[PageWorker] = []
         try:
-            with unheard():
+            with ignoring_interrupts():
                 workers += [start(self.light) for _ in range(count)]
             while workers:
                 ready = wait([worker.pipe for worker in workers])
@@ -85,7 +88,7 @@ class PagePool:
             if worker.folder is not None:
                 self.done(worker.folder, PageFault(worker.folder / PAGE, DIED))
                 if self.left:
-                    with unheard():
+                    with ignoring_interrupts():
                         workers.append(start(self.light))
             return
         if worker.folder is not None:
@@ -111,7 +114,7 @@ def start(light: bool) -> PageWorker:
 
 def end(workers: Sequence[PageWorker]) -> None:
     """Let workers end after their pages, and wait for that."""
-    with unheard():
+    with ignoring_interrupts():
         for worker in workers:
             worker.stop()
         for worker in workers:
@@ -120,19 +123,6 @@ def end(workers: Sequence[PageWorker]) -> None:
                 worker.process.terminate()
                 worker.process.join()
             worker.pipe.close()
-
-
-@contextmanager
-def unheard() -> Iterator[None]:
-    """Ctrl-C waits until the block is over, and processes that are started in it never see it."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def work(pipe: Connection, light: bool) -> None:
