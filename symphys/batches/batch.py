@@ -184,7 +184,7 @@ class Here:
         with contextlib.ExitStack() as stack:
             claims = {}
             for index in group:
-                with contextlib.suppress(FolderBusy):
+                with contextlib.suppress(files.FileError):  # busy, or it cannot be written: done alone, it says so
                     claims[index] = stack.enter_context(claimed(self.jobs[index].folder.path))
                     self.ledger.started(index, False)
             solved = solve_group({index: self.jobs[index] for index in claims}, self.transcriptions, self.watch)
