@@ -46,6 +46,7 @@ class Owner:
         process: its number.
         begun: when the process began, as the system counts; empty where that is not known.
         token: different for each claim.
+        after: the token of the claim that it took over; empty for one that was the first.
     """
 
     host: str = ""
@@ -53,6 +54,7 @@ class Owner:
     process: int = 0
     begun: str = ""
     token: str = ""
+    after: str = ""
 
     def __str__(self) -> str:
         """For messages."""
@@ -94,9 +96,9 @@ def beginning(process: int) -> str:
     return "over" if fields[0] in "ZX" else fields[19]
 
 
-def myself() -> Owner:
-    """This process, for a new claim."""
-    return Owner(*this_process(os.getpid()), uuid.uuid4().hex)
+def myself(after: str = "") -> Owner:
+    """This process, for a new claim; ``after``: see ``Owner``."""
+    return Owner(*this_process(os.getpid()), uuid.uuid4().hex, after)
 
 
 @cache
@@ -127,8 +129,8 @@ class Claim:
     @property
     def held(self) -> bool:
         """Whether it still counts: nobody has taken the run over since, as after a sleep that was longer than LEASE."""
-        newest = numbers(self.folder)
-        return newest[-1:] == [self.number] and read_owner(self.path).token == self.owner.token
+        later = [read_owner(path_of(self.folder, number)) for number in numbers(self.folder) if number > self.number]
+        return read_owner(self.path).token == self.owner.token and all(o.after != self.owner.token for o in later)
 
     def check(self) -> None:
         """Raise FolderBusy if the run was taken over."""
@@ -136,10 +138,9 @@ class Claim:
             raise FolderBusy(f"{self.folder} was taken over by another command while this one stood still")
 
     def release(self) -> None:
-        """Let others in: this claim, and those that it took over, go."""
-        for number in reversed([each for each in numbers(self.folder) if each <= self.number]):
-            with contextlib.suppress(OSError):
-                path_of(self.folder, number).unlink(missing_ok=True)
+        """Let others in."""
+        with contextlib.suppress(OSError):
+            self.path.unlink(missing_ok=True)
 
 
 @contextlib.contextmanager
@@ -164,16 +165,37 @@ def take(folder: Path) -> Claim:
     files.make_folder(folder)
     while True:
         earlier = numbers(folder)
-        before = earlier[-1] if earlier else None
-        over = read_owner(path_of(folder, before)) if before is not None else None
-        if before is not None and over is not None and not is_over(path_of(folder, before), over):
-            raise FolderBusy(f"{over} is working in {folder}; nothing was changed there")
-        claim = Claim(folder, 0 if before is None else before + 1, myself())
-        if not create(claim):
+        if not earlier:
+            claim = Claim(folder, 0, myself())
+            if create(claim) and settled(claim):
+                return claim
             continue
-        if before is None or os.path.lexists(path_of(folder, before)):
+        before = path_of(folder, earlier[-1])
+        found = read_owner(before)
+        if not os.path.lexists(before):  # released meanwhile
+            continue
+        if not is_over(before, found):
+            raise FolderBusy(f"{found} is working in {folder}; nothing was changed there")
+        claim = Claim(folder, earlier[-1] + 1, myself(after=found.token))
+        if create(claim) and settled(claim, earlier[-1]):
             return claim
-        claim.release()  # the one to be taken over was taken, done and released meanwhile
+
+
+def settled(claim: Claim, before: int | None = None) -> bool:
+    """Whether a new claim stands; one that does not is withdrawn.
+
+    It does not where it was made by an older view of the folder: where there is a higher one, or where the one that it
+    was to take over is another by now. ``before``: its number; it goes once it is taken over.
+    """
+    stands = numbers(claim.folder)[-1:] == [claim.number]
+    if stands and before is not None:
+        path = path_of(claim.folder, before)
+        stands = os.path.lexists(path) and read_owner(path).token == claim.owner.after
+        if stands:
+            path.unlink(missing_ok=True)
+    if not stands:
+        claim.release()
+    return stands
 
 
 def create(claim: Claim) -> bool:

@@ -48,7 +48,7 @@ def test_an_interrupted_export_can_be_done_again(tmp_path: Path, monkeypatch: py
     write_folders({tmp_path: CONTENT})
     write = files.write_bytes
 
-    def stop_at_b(path: Path, content: bytes) -> None:
+    def stop_at_b(path: Path, content: bytes, at_once: bool = True) -> None:
         if path.name == "b.c":
             raise KeyboardInterrupt
         write(path, content)

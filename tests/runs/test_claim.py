@@ -132,11 +132,14 @@ def test_a_claim_without_an_owner_is_waited_for(folder: Path, monkeypatch: pytes
 def test_what_was_taken_over_is_not_held_any_more(folder: Path) -> None:
     """As by a process that slept longer than its lease: it must not write its result."""
     with claimed(folder) as slept:
-        leave(folder, ELSEWHERE, slept.number + 1)
+        leave(folder, replace(ELSEWHERE, after="another claim"), slept.number + 1)
+        assert slept.held, "a claim that is about to be withdrawn takes nothing over"
+        path_of(folder, 1).unlink()
+        leave(folder, replace(ELSEWHERE, after=slept.owner.token), slept.number + 1)
         assert not slept.held
         with pytest.raises(FolderBusy, match="taken over"):
             slept.check()
-    assert read_owner(path_of(folder, 1)) == ELSEWHERE
+    assert read_owner(path_of(folder, 1)).token == ELSEWHERE.token
 
 
 def test_a_held_claim_is_touched(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -156,7 +159,7 @@ from pathlib import Path
 from symphys.runs.claim import FolderBusy, claimed
 folder, seen = Path(sys.argv[1]), {"in": 0, "busy": 0, "both": 0}
 mark = folder.with_name("inside")
-while seen["in"] < 15:
+while seen["in"] < 25:
     try:
         with claimed(folder):
             with mark.open("xb"):
@@ -176,7 +179,7 @@ def test_of_many_processes_one_is_in_at_a_time(folder: Path) -> None:
     command = [sys.executable, "-c", HOLD, str(folder)]
     started = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(3)]
     found = [json.loads(each.communicate(timeout=60)[0]) for each in started]
-    assert [each["in"] for each in found] == [15] * 3
+    assert [each["in"] for each in found] == [25] * 3
     assert sum(each["both"] for each in found) == 0
 
 
@@ -201,6 +204,20 @@ def test_of_many_who_take_over_one_succeeds(folder: Path) -> None:
         assert sum(won) == 1, turn
         for number in numbers(folder):
             path_of(folder, number).unlink()
+
+
+def test_a_claim_that_was_made_by_an_older_view_is_withdrawn(folder: Path) -> None:
+    """Somebody saw a dead claim 0; before he made claim 1, all of it was over, and another has claim 0 now."""
+    leave(folder, ELSEWHERE)
+    late = claims.Claim(folder, 1, claims.myself(after="a dead claim"))
+    assert claims.create(late) and not claims.settled(late, 0)
+    assert numbers(folder) == [0]
+    late = claims.Claim(folder, 1, claims.myself(after=ELSEWHERE.token))
+    assert claims.create(late) and claims.settled(late, 0)
+    assert numbers(folder) == [1]
+    later = claims.Claim(folder, 0, claims.myself())
+    assert claims.create(later) and not claims.settled(later)
+    assert numbers(folder) == [1]
 
 
 def test_where_there_are_no_links_claims_work_too(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
