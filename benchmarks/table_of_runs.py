@@ -26,7 +26,7 @@ RUNS, SEEDS = 10_000, 100
 COMMAND = """
 import sys
 from symphys.cli import main
-from symphys.provenance import peak_memory
+from symphys.runs.provenance import peak_memory
 main(sys.argv[1:])
 print(peak_memory(), file=sys.stderr)
 """

@@ -195,7 +195,7 @@ class Result:
         stages: those of smoothing that were begun, in their order; the solution is the point of the last, unless that
             of another or the guess is better exactly.
         versions: of everything that took part.
-        provenance: the machine, the process and the working copy, with the keys of ``symphys.provenance.provenance``,
+        provenance: the machine, the process and the working copy, with the keys of ``symphys.runs.provenance``,
             and "flags", those of the compiler, where something was compiled.
         when: UTC time of the end, ISO 8601.
         command: what was typed.

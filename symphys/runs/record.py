@@ -13,8 +13,6 @@ from symphys import files
 from symphys.codegen.backends import Description
 from symphys.findings.levels import Judged
 from symphys.findings.verdict import rule
-from symphys.provenance import provenance as origin
-from symphys.provenance import versions
 from symphys.results.result import (
     REACHED,
     BackendRecord,
@@ -26,6 +24,8 @@ from symphys.results.result import (
 )
 from symphys.results.trace import OUTPUT
 from symphys.runs.job import Job
+from symphys.runs.provenance import provenance as origin
+from symphys.runs.provenance import versions
 from symphys.shooting import Array
 from symphys.solvers import Counts, Outcome, StageResult, TraceRow
 from symphys.trajectory import Trajectory

@@ -21,7 +21,6 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "verbs": ("", "", "rooms that can be called"),
     "interrupts": ("", "", "Ctrl-C"),
     "threads": ("", "", "one thread for linear algebra"),
-    "provenance": ("version", "", "where a run comes from: versions, machine, process, commit"),
     "files": ("errors", "numpy", "files appear at once and whole, or not at all"),
     "json_values": ("", "numpy", "tolerant readings of JSON"),
     "trajectory": ("errors suggest", "numpy", "a simulated motion as arrays"),
@@ -60,8 +59,8 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "what a run folder holds",
     ),
     "runs": (
-        "codegen errors files findings json_values problem provenance results shooting solvers trajectory "
-        "transcription verification version",
+        "codegen errors files findings json_values problem results shooting solvers trajectory transcription "
+        "verification version",
         "numpy",
         "solve, judge, examine, write one run, and who may",
     ),

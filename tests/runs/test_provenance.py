@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from symphys import files, provenance
+from symphys import files
 from symphys.results.file_names import RESULT
 from symphys.results.result import read_result
-from symphys.runs import Job, execute
+from symphys.runs import Job, execute, provenance
 from symphys.runs.record import failure
 from symphys.runs.transcription_cache import TranscriptionCache
 from symphys.transcription import transcribe

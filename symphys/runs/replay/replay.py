@@ -18,13 +18,13 @@ from symphys import json_values as values
 from symphys.errors import SymphysError
 from symphys.files import FileError
 from symphys.problem import Problem, load_problem
-from symphys.provenance import machine, versions
 from symphys.results.archives import read_archive
 from symphys.results.config import Config
 from symphys.results.file_names import CONFIG, PROBLEM, RESULT, TRAJECTORY
 from symphys.results.result import Result
 from symphys.results.text_files import ReportError, read_table
 from symphys.results.trajectories import make_trajectory
+from symphys.runs.provenance import machine, versions
 from symphys.runs.replay.comparison import QuantityDifference, compare_motions, compare_numbers
 from symphys.trajectory import NotFinite, Trajectory
 from symphys.transcription import Assessment, Transcription, transcribe
