@@ -78,22 +78,35 @@ class Worker:
                 job,
                 self.watch,
                 self.transcriptions,
-                tell=self.parent.send,
-                begin=lambda resumed: self.parent.send(Begun(resumed)),
+                tell=self.tell,
+                begin=lambda resumed: self.tell(Begun(resumed)),
             )
         except FolderBusy:
             return None
 
     def watch(self, row: TraceRow) -> None:
         """Report to the parent now and then; stop the solver when asked to."""
-        while self.parent.poll():
-            order = self.parent.recv()
+        while (order := self.hear()) is not None:
             if isinstance(order, Stopping):
                 raise KeyboardInterrupt(order.reason)
         now = time.monotonic()
         if now - self.reported > TICK:
             self.reported = now
-            self.parent.send(row)
+            self.tell(row)
+
+    def hear(self) -> Order | None:
+        """What the parent has sent; None if there is nothing. Without a parent the process ends, its run unwritten."""
+        try:
+            return self.parent.recv() if self.parent.poll() else None
+        except (EOFError, OSError):
+            os._exit(1)
+
+    def tell(self, news: News) -> None:
+        """Send news; likewise."""
+        try:
+            self.parent.send(news)
+        except OSError:
+            os._exit(1)
 
 
 def serve(parent: Connection[News, Order], transcribe: Transcribe) -> None:

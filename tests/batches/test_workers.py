@@ -194,6 +194,26 @@ def test_a_killed_run_goes_on_from_its_checkpoint(make: Any, recorder: Any) -> N
     assert not [path.name for path in job.folder.path.iterdir() if path.name.startswith(".")]
 
 
+ORPHAN = """
+import multiprocessing, pickle, sys
+from symphys.batches.worker import Worker
+from symphys.runs.transcription_cache import TranscriptionCache
+from symphys.transcription import transcribe
+
+ours, theirs = multiprocessing.Pipe()
+ours.close()
+Worker(theirs, TranscriptionCache(transcribe)).work(pickle.loads(sys.stdin.buffer.read()))
+"""
+
+
+def test_a_worker_whose_parent_has_gone_ends_and_calls_its_run_no_failure(make: Any) -> None:
+    """The broken pipe is seen in the middle of the solver; the run is to be done by the next command."""
+    (job,) = make("orphan")
+    ended = subprocess.run([sys.executable, "-c", ORPHAN], input=pickle.dumps(job), capture_output=True, check=False)
+    assert (ended.returncode, ended.stderr) == (1, b"")
+    assert not (job.folder.path / "result.json").exists()
+
+
 @pytest.mark.parametrize("processes", [1, 2])
 def test_runs_that_another_command_is_at_are_waited_for_and_taken_from_there(
     make: Any, recorder: Any, processes: int
