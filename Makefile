@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 QUICK := $(addprefix tests/,house model expression findings problem solvers dynamics)
 
-.PHONY: help demo demo-walk test test-quick test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-table1 bench-gpu bench-walk bench-lessons stress bench-pipelines bench-runs gallery clean
+.PHONY: help demo demo-walk test test-quick test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-table1 bench-gpu bench-walk bench-lessons stress bench-pipelines bench-runs bench-gaits bench-imports gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
@@ -93,6 +93,16 @@ bench-pipelines: $(VENV)/.pipelining  ## steps for environments and nets against
 
 bench-runs: $(VENV)/.developing  ## the table of ten thousand runs
 	$(BIN)/python benchmarks/table_of_runs.py
+
+bench-gaits: $(VENV)/.benching  ## gaits of Gymnasium's models, rated as Gymnasium does, here and in MuJoCo
+	$(BIN)/python -m pip install --quiet --editable '.[models]'
+	$(BIN)/python benchmarks/imported_gaits.py build/gaits
+	$(BIN)/python benchmarks/shac_ant.py
+
+bench-imports: $(VENV)/.benching  ## 56 robots of gymnasium, dm_control and example-robot-data after import, against MuJoCo (two hours)
+	$(BIN)/python -m pip install --quiet --editable '.[models]'
+	$(BIN)/python benchmarks/imported_robots.py build/imported
+	$(BIN)/python benchmarks/imported_statics.py
 
 bench-table1: $(VENV)/.benching  ## the timing table of Degrave et al. (1 and 128 robots, small and large net), cost against weights
 	$(BIN)/python benchmarks/table1.py

@@ -78,6 +78,13 @@ class Runs:
         """(batch, steps, nstate) the states after each step."""
         return np.array(rollout.rollout(self.model, self.data, np.ascontiguousarray(states), nstep=steps)[0])
 
+    def last(self, states: Array, steps: int, most: int = 5000) -> Array:
+        """(batch, nstate) the states after all steps, without those between in memory."""
+        while steps:
+            some = min(steps, most)
+            states, steps = self.after(states, some)[:, -1], steps - some
+        return states
+
     def along(self, states: Array, interval: int, count: int) -> Array:
         """(count, batch, nstate) after every ``interval`` steps; one rollout, so that warm starts go on."""
         return np.moveaxis(self.after(states, interval * count)[:, interval - 1 :: interval], 0, 1)

@@ -19,6 +19,7 @@ from symphys.version import __version__
 if TYPE_CHECKING:
     from symphys.api.checking import Checked, check
     from symphys.api.compiled import CompiledRollout, compile
+    from symphys.api.robots.robot import Robot, load_robot
     from symphys.api.showing import show
     from symphys.api.simulation import simulate
     from symphys.api.solution import Solution, read
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from symphys.model.body import Body
     from symphys.model.heightfield import Heightfield
     from symphys.model.joints import (
+        AffineMotor,
         BallJoint,
         FixedJoint,
         Hinge,
@@ -44,7 +46,7 @@ if TYPE_CHECKING:
         UniversalJoint,
         VelocityMotor,
     )
-    from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain
+    from symphys.model.shapes import Box, Capsule, Convex, Cylinder, Ellipsoid, Fixture, Plane, Sphere, Terrain
     from symphys.model.state_layout import Layout, initial_state
     from symphys.model.world import Law, Scheme, World, make_world
     from symphys.problem import Problem, load_problem
@@ -57,6 +59,7 @@ if TYPE_CHECKING:
     from symphys.transcription.transcribe import transcribe
 
 __all__ = [
+    "AffineMotor",
     "BallJoint",
     "Body",
     "Box",
@@ -64,6 +67,9 @@ __all__ = [
     "Checked",
     "CompiledRollout",
     "CompiledStep",
+    "Convex",
+    "Cylinder",
+    "Ellipsoid",
     "FixedJoint",
     "Fixture",
     "Heightfield",
@@ -73,6 +79,7 @@ __all__ = [
     "Plane",
     "Problem",
     "ProblemError",
+    "Robot",
     "Scheme",
     "Servo",
     "ShootingProblem",
@@ -98,6 +105,7 @@ __all__ = [
     "initial_state",
     "load",
     "load_problem",
+    "load_robot",
     "make_world",
     "new",
     "read",
@@ -119,6 +127,7 @@ _HOMES = {
     "api.sweeping": ("solve_all",),
     "api.tools": ("cache", "new", "schema"),
     "api.compiled": ("CompiledRollout", "compile"),
+    "api.robots.robot": ("Robot", "load_robot"),
     "problem.loading": ("load",),
     "api.simulation": ("simulate",),
     "api.solution": ("Solution", "read"),
@@ -132,7 +141,7 @@ _HOMES = {
     "dynamics.functions": ("step_function",),
     "trajectory": ("Trajectory",),
     "transcription": ("Transcription", "transcribe"),
-    "model.shapes": ("Box", "Capsule", "Fixture", "Plane", "Sphere", "Terrain"),
+    "model.shapes": ("Box", "Capsule", "Convex", "Cylinder", "Ellipsoid", "Fixture", "Plane", "Sphere", "Terrain"),
     "model.body": ("Body",),
     "model.heightfield": ("Heightfield",),
     "model.joints": (
@@ -145,6 +154,7 @@ _HOMES = {
         "Spring",
         "TorqueMotor",
         "VelocityMotor",
+        "AffineMotor",
     ),
     "model.world": ("Law", "Scheme", "World", "make_world"),
 }

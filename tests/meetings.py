@@ -16,13 +16,15 @@ from symphys.dynamics.collision import collide
 from symphys.dynamics.collision.contact_geometry import Displacement
 from symphys.dynamics.collision.predicted_path import PredictedPath, at_rest
 from symphys.maths import rotation
-from symphys.model.shapes import Box, Capsule, Sphere, Surface
+from symphys.model.shapes import Box, Capsule, Convex, Cylinder, Ellipsoid, Sphere, Surface
 
 Array = NDArray[np.float64]
-WIDTHS = {"sphere": 1, "capsule": 2, "box": 3}
+WIDTHS = {"sphere": 1, "capsule": 2, "box": 3, "cylinder": 2, "ellipsoid": 3, "convex": 0}
 """How many numbers the size of a shape has."""
 PLACE, MOTION = 7, 19
 """Numbers of a place on a body (centre, orientation) and of a body's motion over the step."""
+HULL = tuple(map(tuple, np.random.default_rng(5).normal(size=(24, 3)) * [0.3, 0.2, 0.25]))
+"""Points of ``convex``, which has no sizes."""
 STILL = np.array([0, 0, 0, 1, 0, 0, 0] + [0] * 12, float)
 
 
@@ -34,6 +36,12 @@ def shape(kind: str, size: Any, place: Any) -> Any:
         return Sphere(numbers[0], centre)
     if kind == "capsule":
         return Capsule(numbers[0], numbers[1], centre, orientation)
+    if kind == "cylinder":
+        return Cylinder(numbers[0], numbers[1], centre, orientation)
+    if kind == "ellipsoid":
+        return Ellipsoid(tuple(numbers), centre, orientation)
+    if kind == "convex":
+        return Convex(HULL, centre, orientation)
     return Box(tuple(numbers), centre, orientation)
 
 

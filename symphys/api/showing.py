@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from symphys import problems
 from symphys.api.transcriptions import transcribed
 from symphys.api.values import vector
-from symphys.problem import Problem, robot_alone
+from symphys.problem import Problem, is_robot, robot_alone
 from symphys.problem.loading import Source, load
 from symphys.results.scene_of_problem import make_scene
 
@@ -30,7 +30,8 @@ def show(
     """Draw the motion of a problem from the side and from above: of its guess, or of other values of its variables.
 
     Args:
-        problem: what ``load`` takes, or a shipped robot by itself: ``"robots/arm.toml"``.
+        problem: what ``load`` takes, or a robot by itself: a shipped one, ``"robots/arm.toml"``, or a file that
+            problems may include. It falls to the ground, and motors that aim at an angle or a position hold the start.
         values: of variables by name.
         page: HTML file to write as well; it plays the motion, and draws states, joints and contacts.
         variables: the same as ``values``, for names that are words.
@@ -64,9 +65,13 @@ def show(
 
 
 def shown(source: Source) -> Problem:
-    """A problem, or a shipped robot alone."""
-    if isinstance(source, str) and not Path(source).exists() and source not in problems.catalogue():
-        path = problems.shipped(source)
-        if problems.is_part(path):
+    """A problem, or a robot alone."""
+    if isinstance(source, str | Path):
+        path = Path(source)
+        if path.is_file() and is_robot(path):
             return robot_alone(path)
+        if isinstance(source, str) and not path.exists() and source not in problems.catalogue():
+            part = problems.shipped(source)
+            if problems.is_part(part):
+                return robot_alone(part)
     return load(source)

@@ -20,6 +20,7 @@ from symphys.cli.finding.diff import diff
 from symphys.cli.finding.ls import ls
 from symphys.cli.finding.replay import replay
 from symphys.cli.report import report
+from symphys.cli.robots.importing import import_robot
 from symphys.cli.schema import schema
 from symphys.cli.shipped import listing, new
 from symphys.cli.show import show
@@ -51,7 +52,24 @@ def app() -> None:
     """Trajectory optimisation through contact: a problem file in, a solution and a report out."""
 
 
-for command in (new, solve, report, show, check, ls, best, diff, replay, export, listing, schema, doctor, cache):
+COMMANDS = (
+    new,
+    solve,
+    report,
+    show,
+    check,
+    ls,
+    best,
+    diff,
+    replay,
+    import_robot,
+    export,
+    listing,
+    schema,
+    doctor,
+    cache,
+)
+for command in COMMANDS:
     app.add_command(command)
 
 

@@ -18,16 +18,30 @@ FOLDER = click.Path(path_type=Path, file_okay=False)
 @click.option(
     "--mjcf", type=FOLDER, metavar="DIR", help="Folder for a model file of MuJoCo: bodies, joints, the start."
 )
+@click.option("--approximate", is_flag=True, help="Leave out of that model what MuJoCo has no counterpart for.")
 @settings_option
-def export(source: str, c: Path | None, casadi: Path | None, mjcf: Path | None, assignments: tuple[str, ...]) -> None:
+def export(
+    source: str,
+    c: Path | None,
+    casadi: Path | None,
+    mjcf: Path | None,
+    approximate: bool,
+    assignments: tuple[str, ...],
+) -> None:
     """Write a problem as plain C sources, as casadi functions, or as a model for MuJoCo, that need no symphys.
 
-    Files that symphys did not write, or that were changed since, are not overwritten.
+    Files that symphys did not write, or that were changed since, are not overwritten. What a model for MuJoCo
+    approximates or leaves out stands in its first lines, and is printed.
     """
-    if c is None and casadi is None and mjcf is None:
+    given = {"c": c, "casadi": casadi, "mjcf": mjcf}
+    asked = {kind: folder for kind, folder in given.items() if folder is not None}
+    if not asked:
         raise UsageFault("export: say what to write, --c DIR, --casadi DIR or --mjcf DIR")
-    from symphys.export.writing import export as write
+    from symphys.export.writing import write
 
     (problem,) = read_problems([source], read_settings(assignments))
-    for path in write(problem, c=c, casadi=casadi, mjcf=mjcf):
+    made = write(problem, asked, approximate)
+    for departure in made.departures:
+        click.echo(departure, err=True)
+    for path in made.paths:
         click.echo(path)

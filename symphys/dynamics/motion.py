@@ -64,6 +64,8 @@ class PredictedMotion(PredictedPath):
         inverse_rate: its time derivative; None if isotropic.
         inertia_mid: (3, 3) inertia at t_k + dt/2, world frame [kg m^2].
         jacobian: if the body is part of a tree of joints.
+        massless: whether it is a frame between joints. It has the numbers of a body of mass 1 and moment 1 about all
+            axes here, without weight, so that its momenta are its velocities; trees do not count them.
     """
 
     mass: Expr
@@ -77,6 +79,12 @@ class PredictedMotion(PredictedPath):
     inverse_rate: Expr | None
     inertia_mid: Expr
     jacobian: BodyJacobian | None = None
+    massless: bool = False
+
+    @property
+    def counted_mass(self) -> Expr:
+        """As its tree counts it [kg]."""
+        return ca.SX(0) if self.massless else self.mass
 
     def predicted_path(self) -> PredictedPath:
         """The motion without its inertia."""

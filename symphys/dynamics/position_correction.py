@@ -8,7 +8,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.articulated.configuration_update import JointCorrection, update_configuration
+from symphys.dynamics.articulated.configuration_update import JointCorrection, RotorCorrection, update_configuration
 from symphys.dynamics.articulated.forward_kinematics import FinalPose
 from symphys.dynamics.collision.contact_geometry import UNMOVED, Contact, Displacement
 from symphys.dynamics.contact.body_term import BodyTerm
@@ -84,11 +84,13 @@ class Corrected:
         shifts: displacements of bodies that are not part of a tree.
         arrived: of each body of a tree where it comes to.
         made: of each body of a tree what joints did to its displacement. Velocities are not touched.
+        turned: of each tree, by its root, what joints did to the displacements of its rotors.
     """
 
     shifts: Mapping[int, Displacement]
     arrived: Mapping[int, FinalPose]
     made: Mapping[int, JointCorrection]
+    turned: Mapping[int, RotorCorrection]
 
 
 def close_gaps(
@@ -125,15 +127,17 @@ def _closed(
 ) -> Corrected:
     shifts = {i: each for i, each in enumerate(along) if isinstance(each, Displacement)}
     arrived, made, joints = dict[int, FinalPose](), dict[int, JointCorrection](), context.world.joints
+    turned = dict[int, RotorCorrection]()
     for tree, coordinates in zip(kinematic_trees(joints), trees.coordinates, strict=True):
         ended = along[tree.root]
         assert isinstance(ended, GeneralizedVelocities)
         own = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
         motions = [trees.motions[i] for i in tree.bodies]
-        places, gained = update_configuration(tree, own, coordinates, motions, ended, by_loops[tree.root])
+        corrected = update_configuration(tree, own, coordinates, motions, ended, by_loops[tree.root])
+        places, gained, turned[tree.root] = corrected
         arrived |= zip(tree.bodies, places, strict=True)
         made |= zip(tree.bodies, gained, strict=True)
-    return Corrected(shifts, arrived, made)
+    return Corrected(shifts, arrived, made, turned)
 
 
 Pushed = tuple[tuple[TreeDisplacement, ...], tuple[Expr, ...]]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import groupby
 from typing import Any, TypeVar
 
@@ -69,8 +70,9 @@ def predicted_motions(context: StepContext, x: State, duration: Expr) -> list[Pr
         motions = tuple(found[i] for i in tree.bodies)
         wrenches = tuple(_wrench(motion) for motion in motions)
         for i, change in zip(tree.bodies, accelerations(tree, own, motions, wrenches), strict=True):
-            tensor = world_inertia(found[i].inertia, found[i].rotation)
-            found[i] = _as_held(found[i], tensor, change, gravity)
+            motion, weight = found[i], ca.SX.zeros(3) if found[i].massless else gravity
+            tensor = world_inertia(motion.inertia, motion.rotation)
+            found[i] = replace(_as_held(motion, tensor, change, weight), massless=motion.massless)
     return found
 
 
@@ -97,8 +99,11 @@ def _motions(context: StepContext, x: State, duration: Expr, freed: int, share: 
         part = {name: x[f"{body.name}.{name}"] for name, _ in BODY_FIELDS}
         given = (context.input(f"{body.name}.{name}") for name in ("force", "torque"))
         push = tuple(zero if each is None else each for each in given)
-        inertial, times = (body.mass, body.inertia), (freed, lag, share, duration)
-        motions.append(_motion(inertial, part, push, context.settings.gravity, times, index in jointed))
+        massless, times = body.massless, (freed, lag, share, duration)
+        inertial = (ca.SX(1), ca.SX(1)) if massless else (body.mass, body.inertia)
+        gravity = zero if massless else context.settings.gravity
+        motion = _motion(inertial, part, push, gravity, times, index in jointed)
+        motions.append(replace(motion, massless=True) if massless else motion)
     return motions
 
 

@@ -24,7 +24,14 @@ from symphys.dynamics.joints.assembly import (
     warm_started,
 )
 from symphys.dynamics.joints.loop_closure import TreeDisplacement
-from symphys.dynamics.joints.warm_start import add_joint_forces, keep_momentum, lasting_forces, project_velocities
+from symphys.dynamics.joints.warm_start import (
+    Rotors,
+    add_joint_forces,
+    keep_momentum,
+    keep_rotors,
+    lasting_forces,
+    project_velocities,
+)
 from symphys.dynamics.motion import PredictedMotion, angular_velocity, apply, isotropic
 from symphys.dynamics.pgs import apply_start, iterate
 from symphys.dynamics.position_correction import Corrected, close_gaps, displacements
@@ -39,6 +46,7 @@ Expr = Any
 
 
 NONE = ca.SX(0)
+ZERO_MOMENTUM = Momentum(ca.SX.zeros(3), ca.SX.zeros(3))
 
 
 @dataclass(frozen=True)
@@ -110,13 +118,14 @@ def advance(
 
     # 8. what is stored: persistent forces (20), velocities (21)
     values: State = {"lag": half}
-    reactions = _store_forces(context, constraints, impulses, kick, values)
+    reactions, rotors = _store_forces(context, constraints, impulses, kick, values), Rotors()
     if world.joints:
         struck, forces = lasting_forces(context, constraints, joints, by_joints, x, kick)
         add_joint_forces(context, forces, poses, reactions)
         momenta = keep_momentum(context, momenta, closed.made, struck, duration)
+        rotors = keep_rotors(context, trees.coordinates, solved.momenta, closed.turned, struck, duration)
         values |= forces if scheme.warm_start else {name: ca.SX.zeros(*force.shape) for name, force in forces.items()}
-    values |= _moving_bodies(context, motions, momenta, reactions, poses)
+    values |= _moving_bodies(context, motions, momenta, reactions, poses, rotors)
     changes = tuple(zip(solved.impulses, solved.last, strict=True))
     return Substep(values, tuple(constraints), tuple(contacts), impulses, changes)
 
@@ -150,12 +159,14 @@ def _moving_bodies(
     momenta: Momenta,
     reactions: Sequence[tuple[Expr, Expr]],
     poses: Sequence[tuple[Expr, Expr]],
+    rotors: Rotors,
 ) -> State:
-    """The fields of all bodies at the end of the substep."""
+    """The fields of all bodies at the end of the substep; of a frame only what acts on it counts."""
     values = State()
-    ended = [_end_momentum(*parts) for parts in zip(motions, momenta, reactions, strict=True)]
+    counted = [ZERO_MOMENTUM if motion.massless else each for motion, each in zip(motions, momenta, strict=True)]
+    ended = [_end_momentum(*parts) for parts in zip(motions, counted, reactions, strict=True)]
     apart = [_velocities(*parts) for parts in zip(motions, ended, poses, strict=True)]
-    moving = project_velocities(context, ended, poses, apart)
+    moving = project_velocities(context, ended, poses, apart, rotors)
     for body, pose, velocities, reaction in zip(context.world.bodies, poses, moving, reactions, strict=True):
         stored = (*pose, *velocities, *reaction)
         values |= {f"{body.name}.{field}": value for (field, _), value in zip(BODY_FIELDS, stored, strict=True)}

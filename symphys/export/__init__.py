@@ -2,11 +2,24 @@
 
 from symphys.export.casadi_files import casadi_files
 from symphys.export.folder import ExportError, write_folders
-from symphys.export.mjcf import mjcf, mjcf_files
+from symphys.export.mjcf import MjcfModel, mjcf, mjcf_files, mjcf_model, problem_model
+from symphys.export.mjcf_departures import Departure
 from symphys.export.sources import c_files
 from symphys.export.writing import export
 from symphys.verbs import make_callable
 
-__all__ = ["ExportError", "c_files", "casadi_files", "export", "mjcf", "mjcf_files", "write_folders"]
+__all__ = [
+    "Departure",
+    "ExportError",
+    "MjcfModel",
+    "c_files",
+    "casadi_files",
+    "export",
+    "mjcf",
+    "mjcf_files",
+    "mjcf_model",
+    "problem_model",
+    "write_folders",
+]
 
 make_callable(__name__, export)

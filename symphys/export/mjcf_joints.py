@@ -1,72 +1,21 @@
-"""Joints of trees as MJCF joints of the child, motors as actuators, and the start as numbers of a keyframe."""
+"""Joints of trees as MJCF joints of the child, and the start as numbers of a keyframe."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
 from xml.etree.ElementTree import Element
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.dynamics.joints.joint_frames import joint_frames_at
-from symphys.dynamics.observation.joint_coordinates import Reading, readings
+from symphys.export.mjcf_bodies import NestedBody, StartState, plain, tidy
 from symphys.export.mjcf_surfaces import text
-from symphys.maths import rotation
-from symphys.model.joints import Joint, Link, Motor, Servo, TorqueMotor
-from symphys.model.state_layout import Layout, initial_state
-from symphys.model.world import World
+from symphys.model.joints import Joint, Link
+from symphys.model.scalar import is_zero
 
 Array = NDArray[np.float64]
-GIVING_WAY = 0.01
-"""Of a motor's largest velocity: how far off it MuJoCo's gives all of its torque."""
 UNBOUNDED = 1e10
 """[rad], [m] where one of two limits is missing."""
-
-
-@dataclass(frozen=True)
-class StartState:
-    """A world at the start.
-
-    Attributes:
-        world: plain numbers only.
-        initial: what of the bodies' state is not zero, by name; see ``state.initial_state``.
-    """
-
-    world: World
-    initial: Mapping[str, Any]
-
-    @cached_property
-    def x(self) -> ca.DM:
-        """The state."""
-        return ca.DM(initial_state(self.world, self.initial))
-
-    def of(self, body: int, field: str) -> Array:
-        """(k,): a field of a body, world frame."""
-        return np.array(self.x[Layout(self.world)[f"{self.world.bodies[body].name}.{field}"]]).ravel()
-
-    def axes(self, body: int | None) -> Array:
-        """(3, 3): from the body's frame to the world's."""
-        return np.eye(3) if body is None else np.array(rotation.matrix(ca.DM(self.of(body, "orientation"))))
-
-    @cached_property
-    def readings(self) -> dict[str, Reading]:
-        """Of every joint."""
-        return readings(self.world, ca.SX(self.x))
-
-    def directions(self, joint: Joint) -> list[Array]:
-        """(3,) of each coordinate: about which, or along which, the first side moves, world frame."""
-        poses = tuple((ca.SX(self.of(i, "position")), ca.SX(self.of(i, "orientation"))) for i in joint.bodies)
-        placed = joint_frames_at(joint, poses).placed(ca.SX(0))
-        return [plain(coordinate.axis(placed)) for coordinate in joint.kind.coordinates]
-
-
-def plain(expression: Any) -> Array:
-    """(k,): the numbers of an expression without symbols."""
-    return np.array(ca.evalf(expression)).ravel()
 
 
 @dataclass(frozen=True)
@@ -78,78 +27,71 @@ class Freedom:
     qvel: Array
 
 
-def freedoms(start: StartState, link: Link) -> list[Freedom]:
-    """What a body may do against its parent, in MuJoCo's order: what is next to the parent comes first."""
-    turned = start.axes(link.body).T
+def freedoms(start: StartState, reference: StartState, nested: NestedBody) -> list[Freedom]:
+    """What a body may do against its parent, in MuJoCo's order: what is next to the parent comes first.
+
+    Args:
+        start: what the keyframe says.
+        reference: where the model's bodies lie in its file.
+        nested: of the body.
+    """
+    return [freedom for link in nested.links for freedom in link_freedoms(start, reference, link, nested.body)]
+
+
+def link_freedoms(start: StartState, reference: StartState, link: Link, body: int) -> list[Freedom]:
+    """What one joint on the way to a body leaves free, in the frame of that body as the file has it."""
     if link.joint is None:
-        pose = np.concatenate([start.of(link.body, "position"), start.of(link.body, "orientation")])
-        spin = turned @ start.of(link.body, "angular_velocity")
-        qvel = np.concatenate([start.of(link.body, "velocity"), spin])
-        return [Freedom(Element("freejoint", name=start.world.bodies[link.body].name), pose, qvel)]
-    joint = start.world.joints[link.joint]
+        pose = np.concatenate([start.of(body, "position"), start.of(body, "orientation")])
+        spin = start.axes(body).T @ start.of(body, "angular_velocity")
+        qvel = np.concatenate([start.of(body, "velocity"), spin])
+        return [Freedom(Element("freejoint", name=start.world.bodies[body].name), pose, qvel)]
+    joint, place = start.world.joints[link.joint], text(anchor(reference, link, body))
     if joint.kind.name == "ball":
         spin = start.of(link.body, "angular_velocity")
         spin = spin if link.parent is None else spin - start.of(link.parent, "angular_velocity")
-        element = Element("joint", name=joint.name, type="ball", pos=place(joint, link))
-        return [Freedom(element, np.array([1.0, 0, 0, 0]), turned @ spin)]
-    found = [coordinate(start, joint, k, link, turned) for k in range(len(joint.kind.coordinates))]
+        turned = start.axes(link.body) @ reference.axes(link.body).T @ reference.axes(body)
+        element = Element("joint", {"name": joint.name, "type": "ball", "pos": place, **acting(joint)})
+        return [Freedom(element, np.array([1.0, 0, 0, 0]), turned.T @ spin)]
+    found = []
+    turned = link.sign * reference.axes(body).T
+    directions, values, now = reference.directions(joint), reference.values(joint), start.values(joint)
+    rates = plain(start.readings[joint.name].rate)
+    for k, direction in enumerate(directions):
+        turns = joint.kind.coordinates[k].turns
+        attributes = {"name": names(joint)[k], "type": "hinge" if turns else "slide", "pos": place}
+        attributes["axis"] = text(tidy(turned @ direction))
+        if values[k]:
+            attributes["ref"] = text(values[[k]])
+        found.append(Freedom(Element("joint", attributes | acting(joint)), now[[k]], rates[[k]]))
     return found[:: link.sign]
 
 
-def coordinate(start: StartState, joint: Joint, k: int, link: Link, turned: Array) -> Freedom:
-    """One coordinate of a joint; where the child is its second side, it moves against the axis."""
-    reading = start.readings[joint.name]
-    value, rate = plain(reading.value)[[k]], plain(reading.rate)[[k]]
-    axis = link.sign * turned @ start.directions(joint)[k]
-    attributes = {
-        "name": names(joint)[k],
-        "type": "hinge" if joint.kind.coordinates[k].turns else "slide",
-        "pos": place(joint, link),
-        "axis": text(axis),
-        "ref": text(value),
-    }
-    return Freedom(Element("joint", attributes | acting(joint)), value, rate)
+def anchor(reference: StartState, link: Link, body: int) -> Array:
+    """(3,) [m]: the point of a link's joint on its child, in the frame of a body."""
+    joint = reference.world.joints[link.joint or 0]
+    point = np.array(joint.frames[0 if link.sign > 0 else 1].point, float)
+    if link.body == body:
+        return point
+    place = reference.of(link.body, "position") + reference.axes(link.body) @ point
+    return tidy(reference.axes(body).T @ (place - reference.of(body, "position")))
 
 
 def acting(joint: Joint) -> dict[str, str]:
-    """Limits and spring along a coordinate."""
+    """Limits, spring, armature and dry friction along each coordinate, or each rotation of a ball joint."""
     found, limits, spring = {}, joint.limits, joint.spring
     if limits.lower is not None or limits.upper is not None:
         ends = (limits.lower, -UNBOUNDED), (limits.upper, UNBOUNDED)
         found["range"] = text(other if end is None else end for end, other in ends)
-    if spring is not None:
-        found |= {"stiffness": text([spring.stiffness]), "damping": text([spring.damping])}
+    if spring is not None and joint.kind.coordinates:
+        found["stiffness"] = text([spring.stiffness])
         found["springref"] = text([spring.rest])
-    return found
-
-
-def place(joint: Joint, link: Link) -> str:
-    """The point of the joint's frame on the child, in the child's frame."""
-    return text(joint.frames[0 if link.sign > 0 else 1].point)
+    if spring is not None:
+        found["damping"] = text([spring.damping])
+    dry = {"armature": joint.armature, "frictionloss": joint.friction}
+    return found | {key: text([value]) for key, value in dry.items() if not is_zero(value)}
 
 
 def names(joint: Joint) -> list[str]:
     """Of the coordinates."""
     coordinates = joint.kind.coordinates
     return [joint.name] if len(coordinates) == 1 else [f"{joint.name}.{c.name}" for c in coordinates]
-
-
-def actuators(joint: Joint) -> list[Element]:
-    """The motor along every coordinate; its command is MuJoCo's ctrl."""
-    if joint.motor is None:
-        return []
-    kind, attributes = actuator(joint.motor)
-    return [Element(kind, {"name": name, "joint": name, **attributes}) for name in names(joint)]
-
-
-def actuator(motor: Motor) -> tuple[str, dict[str, str]]:
-    """The element that is nearest to a motor, and its attributes."""
-    bound = text((-motor.torque, motor.torque))
-    if isinstance(motor, TorqueMotor):
-        return "motor", {"ctrlrange": bound}
-    steepness = motor.torque / (GIVING_WAY * motor.velocity)
-    attributes = {"kv": text([steepness]), "forcerange": bound}
-    if isinstance(motor, Servo):
-        held = {} if motor.range is None else {"ctrlrange": text((-motor.range, motor.range))}
-        return "position", {"kp": text([steepness * motor.gain]), **attributes, **held}
-    return "velocity", {**attributes, "ctrlrange": text((-motor.velocity, motor.velocity))}

@@ -7,10 +7,12 @@ from typing import Any
 from xml.etree.ElementTree import Element
 
 from symphys.model.scalar import is_zero
-from symphys.model.shapes import Plane, Shape, Terrain, surface
+from symphys.model.shapes import Convex, Plane, Shape, Terrain, surface
 from symphys.model.world import Law, Side, World, side_name
 
 MJCF_PLACEMENT = {"centre": "pos", "orientation": "quat"}
+APART = {"contype": "1", "conaffinity": "0"}
+"""Of a geom that touches another in an explicit pair only: affinity with none. Readers see that it is no picture."""
 
 
 def text(numbers: Iterable[Any]) -> str:
@@ -19,18 +21,23 @@ def text(numbers: Iterable[Any]) -> str:
 
 
 def geoms(world: World, body: int | None) -> list[Element]:
-    """The surfaces of a body, placed in its frame; of what stands still for None. They touch as ``pairs`` says only."""
+    """The surfaces of a body, placed in its frame; of what stands still for None. They touch as ``pairs`` says only.
+
+    Terrain, which needs a grid, comes from ``mjcf_terrain``.
+    """
     count = len(world.statics if body is None else world.bodies[body].shapes)
-    return [geom(world, Side(body, k)) for k in range(count)]
+    made = (geom(world, Side(body, k)) for k in range(count))
+    return [each for each in made if each is not None]
 
 
-def geom(world: World, side: Side) -> Element:
-    """One surface."""
+def geom(world: World, side: Side) -> Element | None:
+    """One surface; None for terrain."""
     shape = surface(world.statics[side.shape]) if side.body is None else world.bodies[side.body].shapes[side.shape]
-    assert not isinstance(shape, Terrain)
+    if isinstance(shape, Terrain):
+        return None
     name = side_name(world.bodies, world.statics, side)
-    placed = half_space(shape) if isinstance(shape, Plane) else solid(shape)
-    return Element("geom", {"name": name, **placed, "contype": "0", "conaffinity": "0"})
+    placed = half_space(shape) if isinstance(shape, Plane) else solid(shape, name)
+    return Element("geom", {"name": name, **placed, **APART})
 
 
 def half_space(plane: Plane) -> dict[str, str]:
@@ -39,10 +46,25 @@ def half_space(plane: Plane) -> dict[str, str]:
     return {"type": "plane", "size": "0 0 1", "pos": text(point), "zaxis": text(plane.normal)}
 
 
-def solid(shape: Shape) -> dict[str, str]:
-    """Kind, sizes and place."""
+def solid(shape: Shape, name: str) -> dict[str, str]:
+    """Kind, sizes and place; the hull of points is a mesh of the geom's name."""
     placed = {MJCF_PLACEMENT[key]: text(numbers) for key, numbers in shape.placement.items()}
+    if isinstance(shape, Convex):
+        return {"type": "mesh", "mesh": name, **placed}
     return {"type": shape.kind, "size": text(shape.mjcf_size), **placed}
+
+
+def meshes(world: World) -> list[Element]:
+    """The points of every hull, by the name of its geom: MuJoCo makes the hull of a mesh by itself."""
+    sides = [Side(i, k) for i, body in enumerate(world.bodies) for k in range(len(body.shapes))]
+    sides += [Side(None, k) for k in range(len(world.statics))]
+    found = []
+    for side in sides:
+        shape = world.surface(side)
+        if isinstance(shape, Convex):
+            name, vertices = side_name(world.bodies, world.statics, side), [x for point in shape.points for x in point]
+            found.append(Element("mesh", name=name, inertia="convex", vertex=text(vertices)))
+    return found
 
 
 def pairs(world: World) -> Element:

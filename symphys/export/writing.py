@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from symphys.export.casadi_files import casadi_files
 from symphys.export.folder import ExportError, write_folders
-from symphys.export.mjcf import mjcf_files
+from symphys.export.mjcf import problem_model
+from symphys.export.mjcf_departures import Departure
 from symphys.export.sources import c_files
 from symphys.problem import Problem, require_solvable
 from symphys.problem.loading import Source, load
@@ -22,6 +24,7 @@ def export(
     c: str | Path | None = None,
     casadi: str | Path | None = None,
     mjcf: str | Path | None = None,
+    approximate: bool = False,
 ) -> list[Path]:
     """Write a problem as files that need no symphys. Also called as ``symphys.export``.
 
@@ -30,6 +33,8 @@ def export(
         c: folder for C sources: step, rollout and gradient.
         casadi: folder for functions that plain casadi loads.
         mjcf: folder for a model file of MuJoCo: bodies, joints, the start.
+        approximate: leave out of that model what MuJoCo has no counterpart for, instead of refusing it; the file begins
+            with what was left out.
 
     Returns:
         The files.
@@ -48,14 +53,37 @@ def export(
     }
     if not asked:
         raise ExportError("export: say what to write and where, as c='folder', casadi='folder' or mjcf='folder'")
+    return list(write(load(problem), asked, approximate).paths)
+
+
+@dataclass(frozen=True)
+class ExportedFiles:
+    """What was written.
+
+    Attributes:
+        paths: of the files.
+        departures: in what the model of MuJoCo differs from the problem's world.
+    """
+
+    paths: tuple[Path, ...]
+    departures: tuple[Departure, ...]
+
+
+def write(problem: Problem, asked: Mapping[str, Path], approximate: bool = False) -> ExportedFiles:
+    """Write the files of each kind, "c", "casadi" or "mjcf", into its folder; see ``export``."""
     folders: dict[Path, dict[str, bytes]] = {}
-    for kind, contents in contents_of(load(problem), list(asked)):
+    for kind, contents in contents_of(problem, list(asked)):
         folders[asked[kind]] = folders.get(asked[kind], {}) | contents
-    return write_folders(folders)
+    departures: tuple[Departure, ...] = ()
+    if "mjcf" in asked:
+        model = problem_model(problem, approximate)
+        departures, folder = model.departures, asked["mjcf"]
+        folders[folder] = folders.get(folder, {}) | {f"{problem.name}.xml": model.text.encode()}
+    return ExportedFiles(tuple(write_folders(folders)), departures)
 
 
 def contents_of(problem: Problem, kinds: list[str]) -> Iterator[tuple[str, dict[str, bytes]]]:
-    """The files of each kind, "c", "casadi" or "mjcf"; a model asks for nothing to be solved."""
+    """The files of each kind, "c" or "casadi"; a model asks for nothing to be solved."""
     if "c" in kinds or "casadi" in kinds:
         require_solvable(problem)
         require_small_nets(problem, "export")
@@ -64,5 +92,3 @@ def contents_of(problem: Problem, kinds: list[str]) -> Iterator[tuple[str, dict[
         yield "c", c_files(transcription, __version__)
     if "casadi" in kinds:
         yield "casadi", casadi_files(transcription, __version__)
-    if "mjcf" in kinds:
-        yield "mjcf", mjcf_files(problem)

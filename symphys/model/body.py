@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from symphys.errors import SymphysError
 from symphys.model.orientation import unit_quaternion
-from symphys.model.scalar import Scalar
-from symphys.model.shapes import SOLID_SPHERE, UPRIGHT, Box, Capsule, Shape, Sphere
+from symphys.model.scalar import Scalar, is_zero
+from symphys.model.shapes import SOLID_SPHERE, UPRIGHT, Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
 from symphys.model.shapes.inertia import centring, inertia_of, off_centre, specific
 from symphys.suggest import hint, quote
 
@@ -44,7 +44,7 @@ class Body:
 
     Attributes:
         name: how states, inputs and parameters refer to it.
-        mass: [kg].
+        mass: [kg]; 0 is a frame between two joints, without inertia and shapes.
         inertia: about the centre of mass [kg m^2]: a scalar (the same about every axis),
             (3,) principal moments along the body's axes, or a symmetric (3, 3) tensor, body frame.
         shapes: the parts of its surface.
@@ -70,6 +70,16 @@ class Body:
         """Check the start."""
         if self.start:
             object.__setattr__(self, "start", _checked_start(self.name, self.start))
+
+    @classmethod
+    def frame(cls, name: str, **start: Unpack[BodyStart]) -> Body:
+        """A body without mass between two joints, so that two bodies may have several joints between them."""
+        return cls(name, 0.0, 0.0, (), dict(start))
+
+    @property
+    def massless(self) -> bool:
+        """Whether it is a frame between two joints; a matter of structure, so never a symbol's value."""
+        return is_zero(self.mass)
 
     @classmethod
     def ball(
@@ -125,6 +135,33 @@ class Body:
     ) -> Body:
         """A uniform capsule along its z axis; ``length``: of the straight part [m]. See ``ball``."""
         return cls._of(name, (_solid(name, Capsule, radius=radius, length=length),), mass, density, start)
+
+    @classmethod
+    def cylinder(
+        cls,
+        name: str,
+        radius: Scalar,
+        length: Scalar,
+        mass: Scalar = None,
+        *,
+        density: Scalar = None,
+        **start: Unpack[BodyStart],
+    ) -> Body:
+        """A uniform cylinder along its z axis; ``length``: from end to end [m]. See ``ball``."""
+        return cls._of(name, (_solid(name, Cylinder, radius=radius, length=length),), mass, density, start)
+
+    @classmethod
+    def ellipsoid(
+        cls,
+        name: str,
+        radii: Sequence[Scalar],
+        mass: Scalar = None,
+        *,
+        density: Scalar = None,
+        **start: Unpack[BodyStart],
+    ) -> Body:
+        """A uniform ellipsoid; ``radii``: half axes along x, y and z [m]. See ``ball``."""
+        return cls._of(name, (_solid(name, Ellipsoid, radii=radii),), mass, density, start)
 
     @classmethod
     def compound(

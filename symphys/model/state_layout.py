@@ -4,7 +4,7 @@ For each body: position (3) [m], orientation (4) [-] quaternion w x y z, velocit
 [rad/s] at t_k, world frame, and the force (3) [N] and torque (3) [N m] with which constraints act on it persistently.
 For each pair: force (3) [N] on its first body, and torque (3) [N m] if its law resists spinning. For each joint: if
 it closes a loop or is soft lock, the forces and torques of what it locks; and a number per coordinate for its motor,
-lower and upper limit and spring. Last ``lag`` [s].
+lower and upper limit, spring and dry friction. For each coupling what it gives. Last ``lag`` [s].
 
 The velocities are the true ones at t_k: 0 at rest. The step needs them without the persistent forces of the last
 half step: v - lag force / m. ``lag`` is 0 at the start and dt/2 after the first step, so that no step is special.
@@ -28,6 +28,8 @@ BODY_FIELDS = (
     ("reaction_force", 3),
     ("reaction_torque", 3),
 )
+COUPLED = "lock"
+"""What a coupling gives along the coordinate that follows."""
 INPUT_FIELDS = ("force", "torque")
 GIVEN = ("position", "orientation", "velocity", "angular_velocity")
 """The fields of a body that an initial state may give."""
@@ -53,6 +55,8 @@ class Layout:
                 self._add(f"{joint.name}.lock", joint.locked)
             for part in joint.acting:
                 self._add(f"{joint.name}.{part}", len(joint.kind.coordinates))
+        for coupling in world.couplings:
+            self._add(f"{coupling.name}.{COUPLED}", 1)
         self._add("lag", 1)
 
     def _add(self, name: str, length: int) -> None:

@@ -17,9 +17,11 @@ from symphys.errors import SymphysError
 from symphys.model.body import Body
 from symphys.model.jointed import jointed
 from symphys.model.joints import Joint
+from symphys.model.joints.coupling import JointCoupling
 from symphys.model.joints.specs import JointSpec
 from symphys.model.scalar import Scalar, is_zero
 from symphys.model.shapes import Static, Surface, contact_points, surface
+from symphys.model.site import Site
 from symphys.suggest import hint, quote
 
 Vector = Sequence[Any]
@@ -101,6 +103,8 @@ class World:
         pairs: every point of contact that is looked at, those of two surfaces one after the other; ``all_pairs``.
         gravity: (3,) [m/s^2].
         joints: what holds bodies together.
+        couplings: coordinates that follow others.
+        sites: named points.
     """
 
     bodies: tuple[Body, ...]
@@ -108,6 +112,8 @@ class World:
     pairs: tuple[Pair, ...] = ()
     gravity: tuple[Scalar, ...] = GRAVITY
     joints: tuple[Joint, ...] = ()
+    couplings: tuple[JointCoupling, ...] = ()
+    sites: tuple[Site, ...] = ()
 
     def body_index(self, name: str) -> int:
         """The index of the body called ``name``; KeyError if there is none."""

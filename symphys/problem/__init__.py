@@ -19,8 +19,9 @@ from symphys.problem.model import (
     VariableSlot,
 )
 from symphys.problem.parametric.reposition import reposition
-from symphys.problem.problem import Problem, load_problem, problem_of_tables, robot_alone
+from symphys.problem.problem import Problem, load_problem, problem_of_tables
 from symphys.problem.reading.solver_options import require_solvers, validate_options
+from symphys.problem.robot_alone import is_robot, robot_alone
 from symphys.problem.schema.json_schema import json_schema
 from symphys.problem.schema.reference import reference_page
 
@@ -42,6 +43,7 @@ __all__ = [
     "Termination",
     "Variable",
     "VariableSlot",
+    "is_robot",
     "json_schema",
     "load_problem",
     "problem_of_tables",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,11 @@ from numpy.typing import NDArray
 
 from symphys.errors import SymphysError
 from symphys.model.jointed import REST
-from symphys.model.joints import Joint, Motor, Servo, VelocityMotor
+from symphys.model.joints import AffineMotor, Joint, Motor, Servo, VelocityMotor
 from symphys.model.joints.frames import MEET
 from symphys.model.joints.placing import PlacedJoint
 from symphys.model.joints.start import State, moved_to_zero, placed_frames, spanning_tree, unmoved
+from symphys.model.scalar import is_zero
 from symphys.model.world import World
 from symphys.problem.plain import floats, numbers
 
@@ -125,6 +127,7 @@ def joint_table(world: World, joint: Joint, named: PlacedJoint, axes: Array) -> 
         table["motor"] = motor_table(joint.motor)
     if joint.spring is not None:
         table["spring"] = numbers(joint.spring)
+    table |= {key: floats(value) for key in ("armature", "friction") if not is_zero(value := getattr(joint, key))}
     limits = (joint.limits.lower, joint.limits.upper)
     if limits != (None, None):
         table["limits"] = ends(limits)
@@ -138,5 +141,8 @@ def ends(limits: Sequence[Any]) -> list[float]:
 
 def motor_table(motor: Motor) -> dict[str, Any]:
     """A motor by its kind."""
+    if isinstance(motor, AffineMotor):
+        given = {field.name: getattr(motor, field.name) for field in fields(motor)}
+        return {"affine": {key: floats(value) for key, value in given.items() if value is not None}}
     kind = "servo" if isinstance(motor, Servo) else "velocity" if isinstance(motor, VelocityMotor) else "torque"
     return {kind: numbers(motor)}

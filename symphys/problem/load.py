@@ -30,6 +30,7 @@ from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.reading.messages import report
 from symphys.problem.schema import Document
 from symphys.problem.sweeps.sweep import Sweep
+from symphys.problem.tables.attached import check_couplings, read_couplings, read_sites
 from symphys.problem.tables.bodies import read_body, read_state
 from symphys.problem.tables.contact import (
     check_collides_with,
@@ -49,7 +50,7 @@ from symphys.problem.tables.variables import read_variables
 from symphys.problem.units import formula_units
 
 MEMBERS = ("body", "plane", "block", "terrain")
-SHARED_NAMES = (*MEMBERS, "joint", "sensor", "controller", "variable")
+SHARED_NAMES = (*MEMBERS, "joint", "coupling", "site", "sensor", "controller", "variable")
 OWN_NAMES = ("cost", "target", "constraint", "output", "scenario")
 
 
@@ -109,6 +110,7 @@ def build(
     faults.stop_if_any()
     nominal = parametric.world({})
     check_laws(parametric, nominal, faults)
+    check_couplings(nominal, faults)
     known = quantities(initial, parametric.parameters(), input_sizes(nominal))
     sensors, controllers = read_control(document, parametric, known, functions, starts, faults)
     known |= weight_quantities(controllers)
@@ -200,11 +202,16 @@ def read_world(document: Document, faults: Faults) -> tuple[ParametricWorld, dic
     initial: dict[str, Array] = {}
     for index, table in enumerate(document.body):
         initial |= read_state(table, index, faults)
-    joints = read_joints(document.joint, [body.name for body in bodies], initial, faults)
+    bare = [table.name for table in document.body if table.shape is None and table.inertia is None]
+    massless = [body.name for body in bodies if not body.mass and body.name in bare]
+    joints = read_joints(document.joint, [body.name for body in bodies], initial, faults, massless)
     if not faults.issues:
         initial = forward_kinematics(joints, initial, faults)
     x, y, z = document.world.gravity
-    parametric = ParametricWorld(bodies, statics, pairs, read_contact(document.contact), (x, y, z), joints)
+    sites = read_sites(document.site, [body.name for body in bodies], faults)
+    couplings = read_couplings(document.coupling, joints, faults)
+    law = read_contact(document.contact)
+    parametric = ParametricWorld(bodies, statics, pairs, law, (x, y, z), joints, couplings, sites)
     check_pair_limit(CollisionFilter(parametric.parts, (*pairs, *parametric.jointed)), faults)
     return parametric, initial
 

@@ -153,13 +153,16 @@ def load_problem(
 
 
 def problem_of_tables(
-    tables: Mapping[str, Any], name: str = "problem", functions: Mapping[str, ca.Function] = NOTHING
+    tables: Mapping[str, Any],
+    name: str = "problem",
+    functions: Mapping[str, ca.Function] = NOTHING,
+    settings: Mapping[str, object] = NOTHING,
 ) -> Problem:
     """A problem from the tables of a problem file as dicts and lists: ``{"simulation": {"duration": 2, ...}, ...}``.
 
     Numpy's arrays and numbers may stand for lists and numbers. Raises ProblemError like ``load_problem``.
     """
-    return _made(Path(f"{name}.toml"), tomli_w.dumps(plain(tables)), NOTHING, functions)
+    return _made(Path(f"{name}.toml"), tomli_w.dumps(plain(tables)), settings, functions)
 
 
 def listed(entries: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
@@ -167,19 +170,6 @@ def listed(entries: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
     return [
         {"name": name, **(entry if isinstance(entry, Mapping) else {key: entry})} for name, entry in entries.items()
     ]
-
-
-def robot_alone(path: Path, settings: Mapping[str, object] = NOTHING) -> Problem:
-    """A shipped robot, for a second, on the ground unless a joint holds it to the world; its motors are at rest."""
-    robot = parse_toml(path, read_source(path))
-    held = any("world" in joint.get("between", ()) for joint in robot.get("joint", ()))
-    tables = {
-        "title": robot.get("title", path.stem),
-        "simulation": {"duration": 1.0, "dt": 0.01},
-        "include": [{"file": f"{path.parent.name}/{path.name}"}],
-        **({} if held else {"ground": {}}),
-    }
-    return problem_of_tables(tables, path.stem).set(settings)
 
 
 def plain(value: Any) -> Any:

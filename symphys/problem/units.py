@@ -32,12 +32,12 @@ UNITS = {
 TURNING = {
     **dict.fromkeys(("motor", "lower", "upper", "spring", "torque"), "N m"),
     **{"lock": "N, then N m", "gain": "1/s", "angle": "rad", "rate": "rad/s", "velocity": "rad/s", "rest": "rad"},
-    **{"stiffness": "N m/rad", "damping": "N m s/rad"},
+    **{"stiffness": "N m/rad", "damping": "N m s/rad", "armature": "kg m^2", "friction": "N m"},
 }
 SLIDING = {
     **dict.fromkeys(("motor", "lower", "upper", "spring", "torque"), "N"),
     **{"lock": "N, then N m", "gain": "1/s", "position": "m", "rate": "m/s", "velocity": "m/s", "rest": "m"},
-    **{"stiffness": "N/m", "damping": "N s/m"},
+    **{"stiffness": "N/m", "damping": "N s/m", "armature": "kg", "friction": "N"},
 }
 """Of what belongs to joints, likewise."""
 

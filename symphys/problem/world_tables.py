@@ -47,8 +47,31 @@ def world_tables(world: World, start: Start) -> dict[str, Any]:
         "body": [body_table(body, start) for body in world.bodies],
         "joint": joints,
         **static_tables(world.statics),
+        **attached_tables(world),
     }
     return {key: table for key, table in tables.items() if table}
+
+
+def attached_tables(world: World) -> dict[str, Any]:
+    """Couplings and sites, by the kind of their tables."""
+    couplings = [
+        {
+            "name": each.name,
+            "joints": [world.joints[k].name for k in (each.first, each.second) if k is not None],
+            "polynomial": floats(each.polynomial),
+        }
+        for each in world.couplings
+    ]
+    sites = [
+        {
+            "name": site.name,
+            "body": "world" if site.body is None else world.bodies[site.body].name,
+            "position": floats(site.position),
+            "orientation": floats(site.orientation),
+        }
+        for site in world.sites
+    ]
+    return {"coupling": couplings, "site": sites}
 
 
 def body_table(body: Body, start: Start) -> dict[str, Any]:
@@ -56,6 +79,8 @@ def body_table(body: Body, start: Start) -> dict[str, Any]:
     state = {key: floats(start[f"{body.name}.{key}"]) for key in GIVEN if f"{body.name}.{key}" in start}
     parts, mass = [part_table(shape) for shape in body.shapes], floats(body.mass)
     table: dict[str, Any] = {"name": body.name, "mass": mass, **state}
+    if body.massless:
+        return table
     if parts:
         shape = body.shapes[0]
         alone = len(parts) == 1 and parts[0] == {**size_table(shape), "centre": [0, 0, 0], "orientation": [1, 0, 0, 0]}

@@ -5,7 +5,7 @@ What cannot be read, or is too large to draw, is left out of the picture.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,7 @@ class Solid:
         centre: (3,) [m], in the body's frame; in the world for what stands still.
         orientation: (4,) unit quaternion w x y z.
         kind: of the shape, as problem files call it.
-        sizes: of the shape, by the names of problem files: a number or (3,) [m].
+        sizes: of the shape, by the names of problem files: a number, (3,) or points (n, 3) [m].
     """
 
     radius: float = 0.0
@@ -89,14 +89,24 @@ class Solid:
         if kind not in SHAPES:
             return None
         keys = {key.name: key.count for key in SHAPES[kind].size_keys}
-        sizes = {
-            name: values.number(entry.get(name)) if count == 1 else values.vector(entry.get(name))
-            for name, count in keys.items()
-        }
-        whole = np.concatenate([np.atleast_1d(size) for size in sizes.values()])
-        if not (small([*whole, *centre]) and (whole > 0).all()):
+        sizes = {name: SIZES[count](entry.get(name)) for name, count in keys.items()}
+        whole = np.concatenate([np.ravel(size) for size in sizes.values()])
+        lengths = [size for name, size in sizes.items() if keys[name]]
+        if not (whole.size and small([*whole, *centre]) and all(np.all(length > 0) for length in lengths)):
+            return None
+        if not lengths and SHAPES[kind].from_sizes(sizes, (0.0, 0.0, 0.0), UPRIGHT).flatness:
             return None
         return cls.of(kind, sizes, centre, _orientation(entry.get("orientation")))
+
+
+def _points(value: object) -> Array:
+    """(n, 3): the points of a list of lists; nan for numbers that are missing."""
+    rows = [values.vector(row, np.nan) for row in value] if isinstance(value, list) else []
+    return np.array(rows, float).reshape(-1, 3)
+
+
+SIZES: dict[int, Callable[[object], Any]] = {0: _points, 1: values.number, 3: values.vector}
+"""How a size is read, by its ``SizeKey.count``."""
 
 
 def _orientation(value: object) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -10,16 +11,22 @@ import casadi as ca
 import numpy as np
 
 from symphys.model.body import Body
-from symphys.model.joints import Joint, Motor, Servo, TorqueMotor, VelocityMotor
+from symphys.model.joints import AffineMotor, Joint, Motor, Servo, TorqueMotor, VelocityMotor
 from symphys.model.shapes import Fixture, Plane, Scalar, Shape, Terrain
 from symphys.model.world import World
 from symphys.problem import Problem
+from symphys.problem.plain import floats
 from symphys.results.scene import Scene, SceneBody, SceneFixture, ScenePlane, SceneTerrain, Solid
 from symphys.results.scene_joints import SceneCoordinate, SceneJoint, SceneJointFrame, SceneMotor
 from symphys.shooting import Array
 from symphys.trajectory import Trajectory
 
-MOTORS: dict[type[Motor], str] = {Servo: "servo", VelocityMotor: "velocity", TorqueMotor: "torque"}
+MOTORS: dict[type[Motor], str] = {
+    Servo: "servo",
+    VelocityMotor: "velocity",
+    TorqueMotor: "torque",
+    AffineMotor: "affine",
+}
 """As problem files call them."""
 
 
@@ -68,7 +75,7 @@ def parameters(problem: Problem, z: Mapping[str, Array]) -> dict[str, Any]:
 
 def make_solid(shape: Shape) -> Solid:
     """A shape with numbers, no symbols."""
-    sizes = {key: plain(size) if isinstance(size, tuple) else float(size) for key, size in shape.sizes.items()}
+    sizes = {key: np.array(floats(size), float)[()] for key, size in shape.sizes.items()}
     return Solid.of(shape.kind, sizes, plain(shape.centre), plain(shape.orientation))
 
 
@@ -94,7 +101,10 @@ def bound(value: Scalar | None, missing: float) -> float:
 
 def make_motor(motor: Motor) -> SceneMotor:
     """A motor with those of its bounds that there are, and a servo's gain."""
-    return SceneMotor(MOTORS[type(motor)], {key: float(v) for key, v in asdict(motor).items() if v is not None})
+    numbers = {key: float(v) for key, v in asdict(motor).items() if v is not None and not isinstance(v, tuple)}
+    if isinstance(motor, AffineMotor) and math.isfinite(motor.torque):
+        numbers["torque"] = motor.torque
+    return SceneMotor(MOTORS[type(motor)], numbers)
 
 
 def plain(vector: Any) -> Array:

@@ -17,6 +17,8 @@ from symphys.dynamics.observation import (
     body_quantity_names,
     joint_quantities,
     joint_quantity_names,
+    site_quantities,
+    site_quantity_names,
 )
 from symphys.expression import Formula
 from symphys.model.state_layout import GIVEN, Layout, input_columns, input_sizes, inputs_size
@@ -147,6 +149,8 @@ def namespace(
         names.update(joint_quantities(world, at.x))
     if not wanted.isdisjoint(body_quantity_names(world)):
         names.update(body_quantities(world, at.x))
+    if not wanted.isdisjoint(site_quantity_names(world)):
+        names.update(site_quantities(world, at.x))
     names.update(accelerometers(world, at.x, memory.velocities(at.x), problem.simulation.dt))
     return names
 
@@ -154,7 +158,8 @@ def namespace(
 def moving_names(world: World) -> frozenset[str]:
     """The names that change within a step."""
     states = {f"{body.name}.{field}" for body in world.bodies for field in (*GIVEN, "accelerometer")}
-    return frozenset({"time", ALIVE, *states, *joint_quantity_names(world), *body_quantity_names(world)})
+    felt = (*joint_quantity_names(world), *body_quantity_names(world), *site_quantity_names(world))
+    return frozenset({"time", ALIVE, *states, *felt})
 
 
 def spans(variables: Sequence[Variable]) -> list[tuple[int, int]]:

@@ -18,7 +18,7 @@ from symphys.trajectory import Trajectory
 from symphys.transcription import Record, Rollout, plain
 from symphys.verification.bodies import bodies, parameters
 from symphys.verification.contacts import acting, touching
-from symphys.verification.joints import floating, joint_work, uncounted
+from symphys.verification.joints import floating, joint_work, rotor_energy, uncounted
 from symphys.verification.sensitivity_growth import samples
 
 Array = NDArray[np.float64]
@@ -120,6 +120,7 @@ def _energies(rollout: Rollout, record: Record) -> tuple[Array, Array, Array]:
         turned = rotation.between(at["orientation"], after[layout[f"{body.name}.orientation"]])
         for field, way in (("force", moved), ("torque", turned)):
             work += ca.dot(given.get(f"{body.name}.{field}", ca.SX.zeros(3)), way)
+    kinetic += rotor_energy(world, x)
     states, arrays = ca.Function("energies", [x, p], [kinetic, potential]), record.arrays
     x_k = plain(rollout, arrays.x)
     both = states.map(len(x_k))(x_k.T, np.tile(arrays.p[:, None], len(arrays.x)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Bodies:
-    """Numbers of the bodies: ``mass`` (B,) [kg], ``size`` (B,) [m] radius of gyration, ``gravity`` (3,) [m/s^2]."""
+    """``mass`` (B,) [kg], ``size`` (B,) [m] radius of gyration, of a frame the largest, ``gravity`` (3,) [m/s^2]."""
 
     mass: Array
     size: Array
@@ -29,9 +29,12 @@ def bodies(rollout: Rollout, record: Record) -> Bodies:
     world = rollout.world
     mass = ca.vertcat(*(ca.SX(body.mass) for body in world.bodies))
     inertia = ca.vertcat(*(ca.trace(inertia_matrix(body.inertia)) / 3 for body in world.bodies))
-    results = [mass, ca.sqrt(inertia / mass), ca.vertcat(*(ca.SX(g) for g in world.gravity))]
+    size = ca.vertcat(*(ca.SX(0) if b.massless else ca.sqrt(inertia[k] / mass[k]) for k, b in enumerate(world.bodies)))
+    results = [mass, size, ca.vertcat(*(ca.SX(g) for g in world.gravity))]
     numbers = ca.Function("bodies", [parameters(rollout)], results)(record.arrays.p)
-    return Bodies(*(np.array(part).ravel() for part in numbers))
+    found = Bodies(*(np.array(part).ravel() for part in numbers))
+    frames = np.array([body.massless for body in world.bodies], bool)
+    return replace(found, size=np.where(frames, found.size.max(), found.size))
 
 
 def parameters(rollout: Rollout) -> Any:

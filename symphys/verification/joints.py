@@ -10,21 +10,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.dynamics.joints.warm_start import components
-from symphys.model.joints import Joint, TorqueMotor
+from symphys.dynamics.observation import readings
+from symphys.model.joints import AffineMotor, Joint, Motor, TorqueMotor
+from symphys.model.scalar import is_zero
 from symphys.model.state_layout import Layout
+from symphys.model.world import World
 from symphys.transcription import Record, Rollout
 from symphys.verification.bodies import parameters
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-WORKING = ("motor", "spring")
+WORKING = ("motor", "spring", "friction")
 AT_LIMIT = 1e-6
 """How near to a limit a coordinate counts as there [rad] or [m]; what it moves in a step comes on top."""
 
 
 def joint_work(rollout: Rollout, record: Record) -> tuple[Array, Array]:
-    """(N,) [J]: the work of motors and springs in each step, and the sum of its sizes, joint by joint.
+    """(N,) [J]: the work of motors, springs and dry friction in each step, and the sum of its sizes, joint by joint.
 
     Leapfrog: velocities at the ends of a step hold the persistent forces half a stretch ahead. Of a step that is cut
     only the last force is known: torque motors act with it all along, others are taken to get there in even steps. Of
@@ -35,13 +38,31 @@ def joint_work(rollout: Rollout, record: Record) -> tuple[Array, Array]:
     for joint, _, rate in coordinates(rollout, record):
         for part in (part for part in WORKING if part in joint.acting):
             force = x[:, layout[f"{joint.name}.{part}"]]
-            is_torque = part == "motor" and isinstance(joint.motor, TorqueMotor)
+            is_torque = part == "motor" and given_torque(joint.motor)
             ahead = lag[:-1] + (rollout.dt if is_torque else rollout.dt / 2 + lag[1:])
             impulse = rollout.dt * force[:-1] + ahead * (force[1:] - force[:-1])
             work = impulse * (rate[:-1] + rate[1:]) / 2
             total += work.sum(axis=1)
             gross += 0 if is_torque else np.abs(work).sum(axis=1)
     return total, gross
+
+
+def given_torque(motor: Motor | None) -> bool:
+    """Whether a motor gives what its command says, whatever its joint does."""
+    return isinstance(motor, TorqueMotor) or (isinstance(motor, AffineMotor) and motor.passive)
+
+
+def rotor_energy(world: World, x: Any) -> Any:
+    """The kinetic energy of the rotors in a state (casadi SX) [J]."""
+    total, layout = ca.SX(0), Layout(world)
+    found = readings(world, x) if any(not is_zero(joint.armature) for joint in world.joints) else {}
+    for joint in world.joints if found else ():
+        rate = found[joint.name].rate
+        if not joint.kind.coordinates and joint.kind.name == "ball":
+            spins = [x[layout[f"{world.bodies[k].name}.angular_velocity"]] for k in joint.bodies]
+            rate = spins[0] if len(spins) == 1 else spins[0] - spins[1]
+        total += joint.armature / 2 * ca.sumsqr(rate)
+    return total
 
 
 def uncounted(rollout: Rollout, record: Record) -> Mask:

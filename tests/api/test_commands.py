@@ -18,7 +18,14 @@ from symphys.cli.app import app
 from symphys.cli.examined import Examined
 from symphys.report import write_run_report
 
-ROOM_OF_COMMAND = {"list": "problems", "ls": "results", "best": "results", "diff": "results", "replay": "Solution"}
+ROOM_OF_COMMAND = {
+    "list": "problems",
+    "ls": "results",
+    "best": "results",
+    "diff": "results",
+    "replay": "Solution",
+    "import": "load_robot",
+}
 
 
 def test_every_command_has_its_name_here() -> None:

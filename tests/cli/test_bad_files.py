@@ -47,9 +47,13 @@ BRACKETS = 1_000_000
 CHANGES: list[tuple[str, str, str]] = [
     ("mass = 1.0", "mass = 1.0\ncolour = 3", "colour: unknown key"),
     ("[[target]]", "[[tarket]]", 'did you mean "target"'),
-    ("{ sphere = { radius = 0.1 } }", "{ cube = { side = 1.0 } }", "valid: sphere, box, capsule, spheres, parts"),
+    (
+        "{ sphere = { radius = 0.1 } }",
+        "{ cube = { side = 1.0 } }",
+        "valid: sphere, box, capsule, cylinder, ellipsoid, convex, spheres, parts",
+    ),
     ("[0, 0, 1]", "[0, 1]", "a list of 3 numbers"),
-    ("mass = 1.0", "mass = -1.0", "greater than 0"),
+    ("mass = 1.0", "mass = -1.0", "at least 0"),
     ("mass = 1.0", "mass = nan", "a finite number"),
     ("mass = 1.0", f"mass = {'9' * 4000}", "that large"),
     ("mass = 1.0", f"mass = {'9' * 5000}", "5000 digits"),
@@ -159,7 +163,7 @@ def test_what_is_no_problem_file_is_one_line(
     ("setting", "words"),
     [
         ("body.bal.mass=1", 'did you mean "ball"'),
-        ("body.ball.mass=-1", "greater than 0"),
+        ("body.ball.mass=-1", "at least 0"),
         ("body.ball.mass=nan", "a finite number"),
         ("body.ball.mass.x=1", 'has no "x"'),
         ("body.5.mass=1", 'there is no "5"'),

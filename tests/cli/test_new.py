@@ -52,3 +52,20 @@ def test_the_text_of_what_is_shipped(run: Run) -> None:
 def test_a_robot_alone(run: Run, robot: str) -> None:
     code, out, _ = run("show", robot, "--set", "simulation.duration=0.1")
     assert code == 0 and Path(out.strip()).is_file()
+
+
+def test_a_robot_of_mujoco_is_shown_with_what_was_lost(run: Run) -> None:
+    pytest.importorskip("mujoco")
+    joint = '<joint name="hip" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -0.2" size="0.02"/>'
+    body = f'<body name="arm" pos="0 0 1">{joint}</body><light pos="0 0 3"/>'
+    Path("arm.xml").write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>", encoding="utf-8")
+    code, out, err = run("show", "arm.xml", "--set", "simulation.duration=0.1", "--no-self-collision")
+    assert code == 0 and Path(out.strip()).is_file()
+    assert "left out; symphys import arm.xml names them" in err
+    code, _, err = run("show", "arm.xml", "--keyframe", "home")
+    assert code == 2 and "home" in err and "arm.xml" in err
+
+
+def test_choices_for_robots_are_none_of_problems(run: Run) -> None:
+    code, _, err = run("show", "ball_throw", "--base", "free")
+    assert code == 2 and "base: for robots alone" in err

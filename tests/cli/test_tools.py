@@ -169,6 +169,10 @@ def test_export_writes_a_model_of_a_problem_without_variables(run: Run, throw: P
     assert (code, out) == (2, "")
     assert "throw: MJCF cannot say this: ball-ground: restitution" in err
     assert not Path("there").exists()
+    code, out, err = run("export", throw, "--mjcf", "there", "--set", "ground.restitution=0.5", "--approximate")
+    assert (code, out) == (0, "there/throw.xml\n")
+    assert "left out: ball-ground: restitution" in err
+    assert "<!-- left out: ball-ground: restitution" in Path("there/throw.xml").read_text("utf-8")
 
 
 def test_a_problem_without_variables_cannot_be_exported(run: Run, throw: Path) -> None:

@@ -26,12 +26,17 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "trajectory": ("errors suggest", "numpy", "a simulated motion as arrays"),
     "shooting": ("", "numpy", "the shooting problem: all that a solver sees"),
     "maths": ("", "casadi", "rotations and smoothed primitives"),
-    "model": ("errors maths suggest", "casadi numpy", "what a world is, as data"),
+    "model": ("errors maths suggest", "casadi numpy scipy", "what a world is, as data"),
     "dynamics": ("maths model", "casadi numpy", "one time step"),
     "expression": ("errors maths suggest", "casadi", "the formula language"),
     "problems": ("errors suggest", "", "shipped problem files"),
+    "importing": (
+        "errors files maths model suggest",
+        "casadi matplotlib mujoco numpy scipy",
+        "other programs' models of robots as tables",
+    ),
     "problem": (
-        "dynamics errors expression files maths model problems suggest",
+        "dynamics errors expression files importing maths model problems suggest",
         "casadi numpy pydantic pydantic_core scipy tomli_w",
         "problem file to problem; of the dynamics only what is observed",
     ),
@@ -76,8 +81,8 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     ),
     "doctor": ("codegen verbs", "casadi numpy", "what there is on this machine"),
     "api": (
-        "batches codegen errors files findings interrupts problem problems report results runs shooting "
-        "solvers suggest trajectory transcription verification",
+        "batches codegen errors files findings importing interrupts problem problems report results runs "
+        "shooting solvers suggest trajectory transcription verification",
         "matplotlib numpy",
         "what Python calls",
     ),

@@ -17,7 +17,7 @@ TEXTS = {".py", ".c", ".h", ".toml", ".cfg", ".md", ".css", ".js", ".html", ".js
 SKIPPED = {".git", ".venv", "build", "dist", "reports", "__pycache__"}
 LONGEST_FILE = 400
 LONGEST_FUNCTION = 60
-MOST_NAMES = 55
+MOST_NAMES = 62
 MACHINE_PATH = re.compile(r"(?<![\w.<$/])/(?:home|root|work|tmp|Users|mnt)/\w")
 
 

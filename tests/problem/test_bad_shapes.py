@@ -29,6 +29,10 @@ def terrain(keys: str) -> str:
 ROW = "[" + ", ".join(["0"] * 40) + "]"
 OFF = "{ parts = [{ box = { size = [1, 1, 1] }, centre = [1, 0, 0] }, { sphere = { radius = 0.1 } }] }"
 TWO = '{ parts = [{ box = { size = [1, 1, 1] } }, { capsule = { radius = 1, length = "1" } }] }'
+ONE_OF = "give one of sphere, box, capsule, cylinder, ellipsoid and convex"
+FLAT = "{ convex = { points = [[0, 0, 1], [1, 0, 1], [0, 1, 1], [1, 1, 1]] } }"
+OFF_ORIGIN = "{ convex = { points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]] } }"
+NO_NUMBER = "{ convex = { points = [[0, 0, 1], [1, 0, 1], [0, 1, 1], [1, nan, 2]] } }"
 
 CASES = [
     (body("{ box = { size = [1, 0, 1] } }"), f"{BODY}.shape.box.size", "greater than 0; one is 0"),
@@ -54,8 +58,17 @@ CASES = [
         f"{BODY}.shape",
         "has sphere and box; give only one",
     ),
+    (body("{ cylinder = { radius = 1, length = 0 } }"), f"{BODY}.shape.cylinder.length", "greater than 0"),
+    (body("{ cylinder = { radius = 1, length = 1e-7 } }"), f"{BODY}.shape.cylinder", "make the length 2e-06 m or more"),
+    (body("{ ellipsoid = { radii = [1, 1] } }"), f"{BODY}.shape.ellipsoid.radii", "a list of 3 numbers"),
+    (body("{ ellipsoid = { radii = [1, 1e-8, 1] } }"), f"{BODY}.shape.ellipsoid.radii", "make it 1e-06 m or more"),
+    (body("{ convex = { points = 3 } }"), f"{BODY}.shape.convex.points", "a list of points"),
+    (body("{ convex = { points = [[0, 0, 0]] } }"), f"{BODY}.shape.convex.points", "has 1 points; give 4 to 2000"),
+    (body(FLAT), f"{BODY}.shape.convex.points", "in a plane"),
+    (body(OFF_ORIGIN), f"{BODY}.shape.convex", "these points is 0.433 m .* every point, or give inertia"),
+    (body(NO_NUMBER), f"{BODY}.shape.convex.points", "point 3 must be three finite numbers"),
     (body("{ parts = [] }"), f"{BODY}.shape.parts", "1 or more"),
-    (body("{ parts = [{}] }"), f"{BODY}.shape.parts[0]", "give one of sphere, box and capsule"),
+    (body("{ parts = [{}] }"), f"{BODY}.shape.parts[0]", ONE_OF),
     (
         body("{ parts = [{ sphere = { radius = 1 }, box = { size = [1, 1, 1] } }] }"),
         f"{BODY}.shape.parts[0]",
@@ -117,7 +130,7 @@ CASES = [
     ),
     # blocks
     (block("friction = 1"), 'block "ramp".shape', "required"),
-    (block("shape = {}"), 'block "ramp".shape', "give one of sphere, box and capsule"),
+    (block("shape = {}"), 'block "ramp".shape', ONE_OF),
     (block("shape = { box = { size = [1, 1, 0] } }"), 'block "ramp".shape.box.size', "greater than 0"),
     (block("shape = { box = { size = [1, 1, 1e-9] } }"), 'block "ramp".shape.box.size', "of the largest"),
     (block("shape = { parts = [] }"), 'block "ramp".shape.parts', "valid: sphere, box, capsule"),

@@ -68,7 +68,7 @@ CASES = [
     ("duration = 1.0", "duration = 1e7", "simulation.dt", r"1e\+09 steps are too many, .* dt = 10 or more"),
     ("duration = 1.0\ndt = 0.01", "duration = 1e300\ndt = 1e-300", "simulation.dt", "inf steps are too many"),
     # bodies
-    (MASS, "mass = -1", 'body "ball".mass', "greater than 0, not -1"),
+    (MASS, "mass = -1", 'body "ball".mass', "at least 0, not -1"),
     (MASS, "mass = 0", 'body "ball".mass', "greater than 0, not 0"),
     (MASS, "mass = 5e-324", 'body "ball".mass', r"must be from 1e-100 to 1e\+100 kg, not 4.94066e-324"),
     (MASS, "mass = 1e-310", 'body "ball".mass', r"must be from 1e-100 to 1e\+100 kg, not 1e-310"),

@@ -15,7 +15,7 @@ Refused = Callable[..., list[str]]
 
 SECOND = '[[include]]\nfile = "parts/robot.toml"\n'
 FAULTS = [
-    (("mass = 2", "mass = -2"), ("", ""), r'parts/robot.toml: body "torso".mass: must be greater than 0'),
+    (("mass = 2", "mass = -2"), ("", ""), r'parts/robot.toml: body "torso".mass: must be at least 0'),
     (("mass = 2", "mas = 2"), ("", ""), r'parts/robot.toml: body "torso".mas: unknown key; did you mean "mass"'),
     (("mass = 2", ""), ("", ""), r'parts/robot.toml: body "torso".mass: give either mass'),
     (('name = "shin"', ""), ("", ""), r"parts/robot.toml: body\[1\].name: this key is required"),

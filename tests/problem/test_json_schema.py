@@ -6,6 +6,7 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
+from symphys.model.shapes import SHAPES
 from symphys.problem import json_schema
 from symphys.problem.schema import Document
 
@@ -32,14 +33,16 @@ def test_every_table_and_key_is_there() -> None:
     body = definition(schema, schema["properties"]["body"]["items"])
     assert {"name", "shape", "mass", "friction", "collides_with"} <= set(body["properties"])
     assert body["required"] == ["name"]
-    assert body["properties"]["mass"]["exclusiveMinimum"] == 0
+    assert body["properties"]["density"]["exclusiveMinimum"] == 0
     assert body["properties"]["position"]["minItems"] == 3
 
 
 def test_shapes_are_there() -> None:
     schema = json_schema()
     shape = definition(schema, definition(schema, schema["properties"]["body"]["items"])["properties"]["shape"])
-    assert set(shape["properties"]) == {"sphere", "box", "capsule", "spheres", "parts"}
+    assert set(shape["properties"]) == {*SHAPES, "spheres", "parts"}
+    points = definition(schema, shape["properties"]["convex"])["properties"]["points"]
+    assert (points["minItems"], points["maxItems"], points["items"]["minItems"]) == (4, 2000, 3)
     size = definition(schema, shape["properties"]["box"])["properties"]["size"]
     assert (size["minItems"], size["maxItems"], size["items"]["exclusiveMinimum"]) == (3, 3, 0)
     block = definition(schema, schema["properties"]["block"]["items"])
@@ -93,7 +96,7 @@ def test_without_solvers_any_option_passes() -> None:
 def test_a_problem_may_include_its_bodies() -> None:
     schema = json_schema()
     include = definition(schema, schema["properties"]["include"]["items"])
-    assert set(include["properties"]) == {"file", "position", "yaw_deg", "prefix"}
+    assert set(include["properties"]) == {"file", "position", "yaw_deg", "prefix", "keyframe", "self_collision", "base"}
     assert include["required"] == ["file"]
     assert all("description" in key for key in include["properties"].values())
     joint = definition(schema, schema["properties"]["joint"]["items"])

@@ -12,7 +12,18 @@ import pytest
 
 from symphys.errors import ProblemError
 from symphys.model import shapes
-from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain, contact_points
+from symphys.model.shapes import (
+    Box,
+    Capsule,
+    Convex,
+    Cylinder,
+    Ellipsoid,
+    Fixture,
+    Plane,
+    Sphere,
+    Terrain,
+    contact_points,
+)
 from symphys.model.world import Law
 from symphys.problem import Problem
 from symphys.problem.checks.pair_limit import MOST_POINTS
@@ -147,7 +158,7 @@ def test_classes_meet_as_their_members_do(seed: int) -> None:
 
 
 def test_every_kind_of_surface_is_counted() -> None:
-    assert set(KINDS) == {Sphere, Capsule, Box, Plane, Terrain}
+    assert set(KINDS) == {Sphere, Capsule, Box, Cylinder, Ellipsoid, Convex, Plane, Terrain}
     assert {kind for both in shapes.POINTS for kind in both} == set(KINDS)
 
 

@@ -56,7 +56,8 @@ def test_every_table_and_key_is_on_the_page(schema: dict[str, Any]) -> None:
 
 def test_a_row_says_type_unit_default_and_meaning() -> None:
     page = reference_page(OPTIONS)
-    assert "| `mass` | number > 0 [kg] |  | Of the whole body; needed unless density is given. |" in page
+    meaning = "Of the whole body; needed unless density is given; 0: a frame between two joints."
+    assert f"| `mass` | number >= 0 [kg] |  | {meaning} |" in page
     assert "| `duration` | number > 0 [s] | needed | How long to simulate; a whole number of time steps. |" in page
     assert "| `position` | `[x, y, z]` [m] | `[0, 0, 0]` | Of the centre of mass. |" in page
     assert '| `at` | `"end"`, `"always"` or number >= 0 [s] | `"end"` |' in page

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from symphys.maths import rotation
-from symphys.model.shapes import Box, Capsule, Shape, Sphere
+from symphys.model.shapes import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
 from symphys.model.shapes.inertia import specific
 from symphys.problem import Problem
 
@@ -89,6 +89,33 @@ def test_a_capsule(load: Load) -> None:
     assert body.shapes == (CAPSULE,)
     assert body.mass == pytest.approx(100 * np.pi * 0.01 * (0.5 + 4 / 3 * 0.1))
     np.testing.assert_allclose(body.inertia, body.mass * np.array(CAPSULE.moments))
+
+
+def test_a_cylinder_and_an_ellipsoid(load: Load) -> None:
+    body = load(text=thing("{ cylinder = { radius = 0.1, length = 0.5 } }", "density = 100")).world().bodies[0]
+    assert body.shapes == (Cylinder(0.1, 0.25),)
+    assert body.mass == pytest.approx(100 * np.pi * 0.01 * 0.5)
+    np.testing.assert_allclose(body.inertia, body.mass * np.array([0.01 / 4 + 0.25 / 12] * 2 + [0.005]))
+    problem = load(text=thing("{ ellipsoid = { radii = [0.1, 0.2, 0.3] } }"))
+    assert problem.world().bodies[0].shapes == (Ellipsoid((0.1, 0.2, 0.3)),)
+    assert problem.parameters["thing.radii"].tolist() == [0.1, 0.2, 0.3]
+    np.testing.assert_allclose(problem.world().bodies[0].inertia, 3 / 5 * np.array([0.13, 0.1, 0.05]))
+
+
+def test_a_hull(load: Load) -> None:
+    """The corners of a box in any order, and a point inside: mass and inertia of that box; no parameter."""
+    rows = [list(corner) for corner in BOX.rounded_hull.corners[::-1]] + [[0.01, 0.02, 0.0]]
+    problem = load(text=thing(f"{{ convex = {{ points = {rows} }} }}", "density = 10"))
+    body = problem.world().bodies[0]
+    assert body.mass == pytest.approx(10 * BOX.volume)
+    np.testing.assert_allclose(
+        np.diag(np.array(body.inertia)) if np.ndim(body.inertia) == 2 else body.inertia,
+        body.mass * np.array(BOX.moments),
+        rtol=1e-12,
+    )
+    assert "thing.points" not in problem.parameters
+    again = load(text=thing(f"{{ parts = [{{ convex = {{ points = {rows} }}, centre = [0, 0, 0] }}] }}", "mass = 2"))
+    assert again.world().bodies[0].shapes == body.shapes
 
 
 def test_a_compound_of_all(load: Load) -> None:

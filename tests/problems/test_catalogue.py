@@ -14,6 +14,7 @@ from symphys.errors import SymphysError
 from symphys.problem import load_problem
 
 SHIPPED = [
+    "ant_walk",
     "arm_reach",
     "ball_throw",
     "bank_shot",
@@ -23,7 +24,9 @@ SHIPPED = [
     "gait_robot_build",
     "gait_robot_fast",
     "gait_robot_trot",
+    "half_cheetah_run",
     "hopper_jump",
+    "hopper_run",
     "juggle",
     "knock",
     "parcel",
@@ -35,6 +38,7 @@ SHIPPED = [
     "sled",
     "stairs",
     "two_balls",
+    "walker2d_walk",
 ]
 
 

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 from yard import write_yard
 
-from symphys.results.scene import Scene, read_scene
+from symphys.model.shapes import Convex, Cylinder, Ellipsoid, Shape
+from symphys.results.scene import Scene, Solid, read_scene
+from symphys.results.scene_of_problem import make_solid
 
 
 def test_scene_is_read(tmp_path: Path) -> None:
@@ -27,6 +29,18 @@ def test_scene_is_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    "shape",
+    [Cylinder(0.1, 0.2), Ellipsoid((0.1, 0.2, 0.3)), Convex(((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, -1)), (1, 2, 3))],
+)
+def test_solids_are_read_as_they_are_written(shape: Shape) -> None:
+    solid = make_solid(shape)
+    read = Solid.from_json(json.loads(json.dumps(solid.to_json())))
+    assert read is not None
+    assert (read.kind, read.corners.tolist()) == (shape.kind, [list(each) for each in shape.rounded_hull.corners])
+    assert read.to_json() == solid.to_json()
+
+
+@pytest.mark.parametrize(
     "broken",
     [
         {"kind": "box", "size": [1, 0, 1]},
@@ -35,6 +49,12 @@ def test_scene_is_read(tmp_path: Path) -> None:
         {"kind": "capsule", "radius": 1, "length": "inf"},
         {"kind": "capsule", "radius": -1, "length": 1},
         {"kind": "torus", "radius": 1},
+        {"kind": "cylinder", "radius": 1, "length": -1},
+        {"kind": "ellipsoid", "radii": [1, 0, 1]},
+        {"kind": "convex", "points": []},
+        {"kind": "convex", "points": 3},
+        {"kind": "convex", "points": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]},
+        {"kind": "convex", "points": [[0, 0, 0], [1, 0], [0, 1, 0], [1, 1, 1]]},
         {"kind": "sphere"},
         {"kind": "sphere", "radius": 1, "centre": [0, "inf", 0]},
         {},

@@ -70,11 +70,15 @@ def branches_of(kinematic_tree: KinematicTree) -> tuple[Branch, ...]:
 
 @dataclass(frozen=True)
 class Tree:
-    """A kinematic tree at an instant, or between two, with the motion subspaces (6, count) of its links."""
+    """A kinematic tree at an instant, or between two, with the motion subspaces (6, count) of its links.
+
+    ``armature``: of each link what is added to its coordinates' diagonal of the mass matrix; None where nothing is.
+    """
 
     kinematic_tree: KinematicTree
     seen: Columns
     given: Columns | None = None
+    armature: tuple[Expr | None, ...] = ()
 
     @property
     def branches(self) -> tuple[Branch, ...]:
@@ -124,19 +128,34 @@ def axes_at(
 def tree_matrix(tree: Tree, inertias: Sequence[SpatialInertia]) -> TreeMatrix:
     """Of a tree, its bodies' inertias given."""
     parts = tuple(
-        schur_complement.branch_matrix(branch.above, branch.of(inertias), tree.axes(branch)) for branch in tree.branches
+        schur_complement.branch_matrix(branch.above, branch.of(inertias), tree.axes(branch), branch.of(tree.armature))
+        for branch in tree.branches
     )
     root = tree.seen[0], None if tree.given is None else tree.given[0]
-    return TreeMatrix(parts, schur_complement.root_matrix(inertias[0], root, tuple(part.at_root for part in parts)))
+    reached = tuple(part.at_root for part in parts)
+    return TreeMatrix(parts, schur_complement.root_matrix(inertias[0], root, reached, tree.armature[0]))
 
 
-def solve(tree: Tree, matrix: TreeMatrix, momenta: Sequence[SpatialVector]) -> TreeRates:
-    """The rates that momenta, or forces, of all bodies stand for."""
+def solve(
+    tree: Tree, matrix: TreeMatrix, momenta: Sequence[SpatialVector], rates: Sequence[Expr | None] = ()
+) -> TreeRates:
+    """The rates that momenta, or forces, of all bodies stand for; ``rates`` (count,) are those of rotors."""
     given, found = tree.impulses, []
+    rotors = tuple(
+        None if rate is None else _rotor_momentum(armature, rate)
+        for armature, rate in zip(tree.armature, rates or (None,) * len(given), strict=True)
+    )
     for branch, part in zip(tree.branches, matrix.branches, strict=True):
-        found.append(schur_complement.branch_load(branch.above, part, branch.of(given), given[0], branch.of(momenta)))
-    r = schur_complement.root_rates(matrix.root, given[0], momenta[0], tuple(push for _, push in found))
+        own = branch.of(given), given[0], branch.of(momenta), branch.of(rotors)
+        found.append(schur_complement.branch_load(branch.above, part, *own))
+    reached = tuple(push for _, push in found)
+    r = schur_complement.root_rates(matrix.root, given[0], momenta[0], reached, rotors[0])
     return TreeRates(r, tuple(z for z, _ in found))
+
+
+@traced
+def _rotor_momentum(armature: Expr, rate: Expr) -> Expr:
+    return armature * rate
 
 
 @dataclass(frozen=True)

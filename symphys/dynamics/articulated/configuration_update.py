@@ -19,6 +19,7 @@ from symphys.dynamics.articulated.branches import TreeRates, solve, tree_motion
 from symphys.dynamics.articulated.forward_kinematics import FinalPose, final_poses, joint_starts
 from symphys.dynamics.articulated.generalized_coordinates import GeneralizedCoordinates, apart
 from symphys.dynamics.articulated.impulse_response import BodyPlace, numbering
+from symphys.dynamics.articulated.rotors import Rates, chosen
 from symphys.dynamics.articulated.schur_complement import SpatialVector
 from symphys.dynamics.motion import PredictedMotion
 from symphys.dynamics.tracing.decorator import traced
@@ -28,6 +29,7 @@ from symphys.model.joints import KinematicTree
 
 Expr = Any
 """casadi SX"""
+
 
 CORRECTIONS = 2
 """Each leaves an error smaller by the angle of a step."""
@@ -59,6 +61,23 @@ class Deviation:
     screw: SpatialVector
 
 
+STILL = Deviation(Momentum(ca.SX.zeros(3), ca.SX.zeros(3)), SpatialVector(ca.SX(6, 1)))
+"""Of a frame."""
+
+
+@dataclass(frozen=True)
+class RotorCorrection:
+    """What joints did to the displacements of rotors: of each link (count,) [rad] or [m], None where there is none.
+
+    Attributes:
+        by_tree: the joints of the tree.
+        by_loops: joints that close loops, if there are any.
+    """
+
+    by_tree: Rates
+    by_loops: Rates | None = None
+
+
 @dataclass(frozen=True)
 class TargetPose:
     """The pose along the displacement: (3,) centre of mass, (3,) rotation vector, (4,) its inverse rotation."""
@@ -75,8 +94,8 @@ def update_configuration(
     motions: Sequence[PredictedMotion],
     along: GeneralizedVelocities,
     by_loops: GeneralizedVelocities | None,
-) -> tuple[tuple[FinalPose, ...], tuple[JointCorrection, ...]]:
-    """Where the bodies of a tree come to, and what joints did to their displacements.
+) -> tuple[tuple[FinalPose, ...], tuple[JointCorrection, ...], RotorCorrection]:
+    """Where the bodies of a tree come to, and what joints did to their displacements and to those of rotors.
 
     ``along``: displacements along the tree's numbers; ``by_loops``: what of them joints that close loops did.
     """
@@ -85,21 +104,32 @@ def update_configuration(
     numbers = apart(numbering(tree), along.numbers)
     moved = tree_motion(tree, matrix, numbers)
     aims = [_aim(*each) for each in zip(moved.screws, coordinates.bodies, places, strict=True)]
-    bodies = [(motion.mass, motion.position - places[0]) for motion in motions]
+    bodies = [(motion.counted_mass, motion.position - places[0]) for motion in motions]
+    frames = [motion.massless for motion in motions]
+    wanted = turned = chosen(tree, moved.rates)
     for k in range(CORRECTIONS + 1):
         arrived = final_poses(kinematic_tree, joints, starts, places, moved.rates)
         beside = tuple(
-            _beside(*body, placed, aim, at)
-            for body, placed, aim, at in zip(bodies, coordinates.bodies, aims, arrived, strict=True)
+            STILL if frame else _beside(*body, placed, aim, at)
+            for frame, body, placed, aim, at in zip(frames, bodies, coordinates.bodies, aims, arrived, strict=True)
         )
+        turned = _differences(chosen(tree, moved.rates), wanted)
         if k < CORRECTIONS:
-            numbers = _less(numbers, solve(tree, matrix, [each.screw for each in beside]))
+            numbers = _less(numbers, solve(tree, matrix, [each.screw for each in beside], turned))
             moved = tree_motion(tree, matrix, numbers)
-    arrived, beside = _kept(coordinates, joints[0] is None, bodies, arrived, beside)
+    arrived, beside = _kept(coordinates, joints[0] is None, bodies, arrived, beside, turned[0])
     if by_loops is None:
-        return arrived, tuple(JointCorrection(each.made) for each in beside)
-    loops = tree_motion(tree, matrix, apart(numbering(tree), by_loops.numbers)).screws
-    return arrived, tuple(_made(*each) for each in zip(beside, coordinates.bodies, loops, strict=True))
+        return arrived, tuple(JointCorrection(each.made) for each in beside), RotorCorrection(turned)
+    loops = tree_motion(tree, matrix, apart(numbering(tree), by_loops.numbers))
+    made = tuple(
+        JointCorrection(each.made, STILL.made) if frame else _made(each, placed, screw)
+        for frame, each, placed, screw in zip(frames, beside, coordinates.bodies, loops.screws, strict=True)
+    )
+    return arrived, made, RotorCorrection(turned, chosen(tree, loops.rates))
+
+
+def _differences(after: Rates, before: Rates) -> Rates:
+    return tuple(None if a is None or b is None else a - b for a, b in zip(after, before, strict=True))
 
 
 @traced
@@ -113,6 +143,7 @@ def _kept(
     bodies: Sequence[tuple[Expr, Expr]],
     arrived: Sequence[FinalPose],
     beside: Sequence[Deviation],
+    rotor: Expr | None,
 ) -> tuple[tuple[FinalPose, ...], tuple[Deviation, ...]]:
     """The same without any momentum along the root's coordinates, so that what is conserved is so to rounding.
 
@@ -122,9 +153,13 @@ def _kept(
     total, mass = _total(tuple(each.screw for each in beside), tuple(mass for mass, _ in bodies))
     if floats:
         moved = [_shifted(*each, total, mass) for each in zip(bodies, arrived, beside, strict=True)]
+        # what has no mass moves along, and has no momentum
+        moved = [(pose, STILL if was is STILL else more) for (pose, more), was in zip(moved, beside, strict=True)]
         arrived, beside = (tuple(each) for each in zip(*moved, strict=True))
         total = _total(tuple(each.screw for each in beside), ())[0]
-    root = _without(beside[0], coordinates.tree.impulses[0], total, bodies[0][0], floats)
+    rotor = None if rotor is None else coordinates.tree.armature[0] * rotor
+    mass_of_root = ca.SX(1) if beside[0] is STILL else bodies[0][0]
+    root = _without(beside[0], coordinates.tree.impulses[0], total, mass_of_root, floats, rotor)
     return tuple(arrived), (root, *beside[1:])
 
 
@@ -144,11 +179,13 @@ def _shifted(
 
 
 @traced
-def _without(beside: Deviation, axes: Expr, total: SpatialVector, mass: Expr, floats: bool) -> Deviation:
+def _without(
+    beside: Deviation, axes: Expr, total: SpatialVector, mass: Expr, floats: bool, rotor: Expr | None
+) -> Deviation:
     """What is conserved about axes that turn and along those that slide, at right angles to each other."""
     if floats:
         return replace(beside, made=replace(beside.made, angular=beside.made.angular - total.parts[:3]))
-    made, along = beside.made, ca.mtimes(axes.T, total.parts)
+    made, along = beside.made, ca.mtimes(axes.T, total.parts) + (0 if rotor is None else rotor)
     for k in range(axes.size2()):
         if axes[:3, k].nnz():
             made = replace(made, angular=made.angular - axes[:3, k] * along[k])

@@ -13,6 +13,7 @@ import casadi as ca
 
 from symphys.dynamics.articulated import spatial
 from symphys.dynamics.articulated.branches import Tree, TreeMotion, axes_at, solve, tree_matrix, tree_motion
+from symphys.dynamics.articulated.rotors import armatures, joint_rates
 from symphys.dynamics.articulated.schur_complement import SpatialInertia, SpatialVector, mirrored
 from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.motion import PredictedMotion, in_world, inertia_matrix
@@ -20,12 +21,15 @@ from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import Momentum
 from symphys.maths import rotation
 from symphys.model.joints import Joint, KinematicTree, Link
+from symphys.model.scalar import is_zero
 
 Expr = Any
 """casadi SX"""
 Wrench = tuple[Expr, Expr]
 """Force [N] and torque [N m] about the centre of mass; also linear and angular acceleration."""
 NOW = ca.SX(0)
+NOTHING = ca.SX(3, 3)
+"""The inertia of a frame."""
 _rotation = traced(rotation.matrix)
 
 
@@ -37,12 +41,13 @@ def accelerations(
 ) -> tuple[Wrench, ...]:
     """Of the bodies of a tree, from their poses and velocities and all forces but the joints'."""
     origin = motions[0].position
-    tree = Tree(kinematic_tree, axes_at(kinematic_tree, joints, [m.predicted_path() for m in motions], NOW, origin))
-    tensors = [world_inertia(m.inertia, m.rotation) for m in motions]
-    bodies = [(m.mass, tensor, m.position, origin) for m, tensor in zip(motions, tensors, strict=True)]
+    axes = axes_at(kinematic_tree, joints, [m.predicted_path() for m in motions], NOW, origin)
+    tree = Tree(kinematic_tree, axes, armature=armatures(kinematic_tree, joints))
+    tensors = [NOTHING if m.massless else world_inertia(m.inertia, m.rotation) for m in motions]
+    bodies = [(m.counted_mass, tensor, m.position, origin) for m, tensor in zip(motions, tensors, strict=True)]
     matrix = tree_matrix(tree, [_inertia(*body) for body in bodies])
     momenta = [_momentum(*body, m.velocity, m.angular_velocity) for body, m in zip(bodies, motions, strict=True)]
-    now = tree_motion(tree, matrix, solve(tree, matrix, momenta))
+    now = tree_motion(tree, matrix, solve(tree, matrix, momenta, joint_rates(tree, joints, motions)))
     biases = _biases(tree, joints, now)
     lacking = [
         _lacking(*body, screw, bias, wrench)
@@ -61,18 +66,25 @@ def consistent(
     inertials: Sequence[tuple[Expr, Expr]],
     poses: Sequence[tuple[Expr, Expr]],
     momenta: Sequence[Momentum],
+    rates: Sequence[Expr | None],
 ) -> tuple[Wrench, ...]:
-    """Velocity and angular velocity of each body: those that fit the joints and have the momenta along free motions."""
+    """Velocity and angular velocity of each body: those that fit the joints and have the momenta along free motions.
+
+    ``inertials``: mass and inertia of each body, 0 of a frame. ``rates``: of the joints with armature, whose rotors
+    have momenta too.
+    """
     zero, origin = ca.SX.zeros(3), poses[0][0]
     turned = [_rotation(q) for _, q in poses]
     body_paths = [PredictedPath(p, r, zero, zero, zero, zero, NOW) for (p, _), r in zip(poses, turned, strict=True)]
-    tree = Tree(kinematic_tree, axes_at(kinematic_tree, joints, body_paths, NOW, origin))
+    axes = axes_at(kinematic_tree, joints, body_paths, NOW, origin)
+    tree = Tree(kinematic_tree, axes, armature=armatures(kinematic_tree, joints))
     parts = list(zip(inertials, poses, turned, momenta, strict=True))
     tensors = (world_inertia(inertia, r) for (_, inertia), _, r, _ in parts)
     inertias = [_inertia(mass, t, p, origin) for ((mass, _), (p, _), *_), t in zip(parts, tensors, strict=True)]
-    counted = [_counted(mass, p, origin, momentum) for (mass, _), (p, _), _, momentum in parts]
+    # what acts on a frame counts, though its mass does not
+    counted = [_counted(ca.SX(1) if is_zero(mass) else mass, p, origin, m) for (mass, _), (p, _), _, m in parts]
     matrix = tree_matrix(tree, inertias)
-    moved = tree_motion(tree, matrix, solve(tree, matrix, counted)).screws
+    moved = tree_motion(tree, matrix, solve(tree, matrix, counted, rates)).screws
     return tuple(_at_place(screw, p, origin) for screw, (p, _) in zip(moved, poses, strict=True))
 
 

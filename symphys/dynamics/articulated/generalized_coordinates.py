@@ -26,6 +26,7 @@ from symphys.dynamics.articulated.impulse_response import (
     numbering,
     spread,
 )
+from symphys.dynamics.articulated.rotors import Rates, armatures, chosen, joint_rates
 from symphys.dynamics.articulated.schur_complement import SpatialInertia, SpatialVector
 from symphys.dynamics.motion import BodyJacobian, PredictedMotion, apply
 from symphys.dynamics.tracing.decorator import traced
@@ -66,6 +67,7 @@ def generalized_coordinates(
     motions: Sequence[PredictedMotion],
     free: Sequence[Momentum],
     middle: Expr,
+    acting: Sequence[bool],
 ) -> GeneralizedCoordinates:
     """The coordinates of a tree.
 
@@ -76,32 +78,34 @@ def generalized_coordinates(
         motions: what the bodies do.
         free: their momenta without any impulse of the substep.
         middle: the time of the velocities [s].
+        acting: whether anything acts along the coordinates of the link.
     """
     origin = motions[0].position
     body_paths = [motion.predicted_path() for motion in motions]
     seen, given = (axes_at(kinematic_tree, joints, body_paths, t, origin) for t in (middle, ca.SX(0)))
-    tree = Tree(kinematic_tree, seen, given)
+    tree = Tree(kinematic_tree, seen, given, armatures(kinematic_tree, joints))
     parts = [_counted(motion, momentum, origin, middle) for motion, momentum in zip(motions, free, strict=True)]
     bodies, inertias, momenta = zip(*parts, strict=True)
     matrix = tree_matrix(tree, inertias)
-    rates = _joined(numbering(tree), solve(tree, matrix, momenta))
+    rates = _joined(numbering(tree), solve(tree, matrix, momenta, joint_rates(tree, joints, motions)))
     places = [
         (motion.position - origin, body) if on else None
         for motion, body, on in zip(motions, bodies, reached, strict=True)
     ]
     jacobians = body_jacobians(tree, matrix, places)
-    responses = coordinate_responses(tree, matrix, [acts(joint) for joint in joints])
+    responses = coordinate_responses(tree, matrix, acting)
     return GeneralizedCoordinates(GeneralizedVelocities(rates), jacobians, responses, tree, matrix, bodies)
-
-
-def acts(joint: Any) -> bool:
-    """Whether anything acts along a joint's coordinates."""
-    return joint is not None and bool(joint.acting)
 
 
 def body_momenta(coordinates: GeneralizedCoordinates, rates: Any) -> tuple[Momentum, ...]:
     """Of the bodies of a tree, from its generalized velocities."""
     return tuple(_momentum(*each) for each in zip(_moving(coordinates, rates), coordinates.bodies, strict=True))
+
+
+def rotor_rates(coordinates: GeneralizedCoordinates, rates: Any) -> Rates:
+    """Of the links with rotors, from the tree's generalized velocities."""
+    numbers = apart(numbering(coordinates.tree), rates.numbers)
+    return chosen(coordinates.tree, tree_motion(coordinates.tree, coordinates.matrix, numbers).rates)
 
 
 def _moving(coordinates: GeneralizedCoordinates, rates: Any) -> tuple[SpatialVector, ...]:
@@ -118,8 +122,15 @@ def _momentum(screw: SpatialVector, body: BodyPlace) -> Momentum:
 def _counted(
     motion: PredictedMotion, free: Momentum, origin: Expr, middle: Expr
 ) -> tuple[BodyPlace, SpatialInertia, SpatialVector]:
-    """A body at mid-step, its inertia from velocities at mid-step to momenta at the start, and its free momentum."""
+    """A body at mid-step, its inertia from velocities at mid-step to momenta at the start, and its free momentum.
+
+    Of a frame only what acts on it counts.
+    """
     counted, place, inertia = motion.position - origin, motion.centre().at(middle) - origin, motion.inertia_at(middle)
+    if motion.massless:
+        acted = free.velocity - motion.velocity, free.angular - motion.angular_velocity
+        given = SpatialVector(spatial.about_origin(counted, *acted))
+        return BodyPlace(place, inertia), SpatialInertia(ca.SX(6, 6)), given
     momentum = spatial.about_origin(counted, motion.mass * free.velocity, free.angular)
     return (
         BodyPlace(place, inertia),

@@ -90,8 +90,10 @@ def paths(above: Parents, axes: Columns) -> list[list[int]]:
 
 
 @traced
-def branch_matrix(above: Parents, inertias: Sequence[SpatialInertia], axes: MotionSubspaces) -> BranchMatrix:
-    """Of a branch, its bodies' inertias given."""
+def branch_matrix(
+    above: Parents, inertias: Sequence[SpatialInertia], axes: MotionSubspaces, armature: tuple[Expr | None, ...]
+) -> BranchMatrix:
+    """Of a branch, its bodies' inertias given, and of its links what is added to their coordinates' diagonal."""
     symmetric, (given, root_given) = axes.given is None, axes.impulses
     total, base = summed_up(above, [inertia.matrix for inertia in inertias])
     seen_of: Expr = ca.horzcat(*axes.seen)
@@ -99,7 +101,7 @@ def branch_matrix(above: Parents, inertias: Sequence[SpatialInertia], axes: Moti
     n, m = seen_of.size2(), axes.root_seen.size2()
     rows: list[Sparse] = [{} for _ in range(n)]
     pushes, pulls = ca.SX(m, n), ca.SX(n, m)
-    for path, columns, inertia in zip(paths(above, axes.seen), axes.seen, total, strict=True):
+    for path, columns, inertia, added in zip(paths(above, axes.seen), axes.seen, total, armature, strict=True):
         for k in path[len(path) - columns.size2() :]:
             momentum, reaction = ca.mtimes(inertia, seen_of[:, k]), ca.mtimes(inertia.T, given_of[:, k])
             pushes[:, k] = ca.mtimes(root_given.T, momentum)
@@ -107,6 +109,7 @@ def branch_matrix(above: Parents, inertias: Sequence[SpatialInertia], axes: Moti
             for i in [i for i in path if i <= k]:
                 rows[i][k] = ca.dot(momentum, given_of[:, i])
                 rows[k][i] = rows[i][k] if symmetric or i == k else ca.dot(reaction, seen_of[:, i])
+            rows[k][k] = rows[k][k] if added is None else rows[k][k] + added
     block = factorise(rows, symmetric)
     follows = ca.SX(n, m)
     for j in range(m):
@@ -117,25 +120,36 @@ def branch_matrix(above: Parents, inertias: Sequence[SpatialInertia], axes: Moti
 
 
 @traced
-def root_matrix(inertia: SpatialInertia, axes: tuple[Expr, Expr | None], branches: tuple[Expr, ...]) -> Factorisation:
-    """S, from the root's inertia, its motion subspaces for velocities and impulses, and the branches' shares."""
+def root_matrix(
+    inertia: SpatialInertia, axes: tuple[Expr, Expr | None], branches: tuple[Expr, ...], armature: Expr | None
+) -> Factorisation:
+    """S, from the root's inertia, its motion subspaces for velocities and impulses, and the branches' shares.
+
+    ``armature`` is added to the diagonal.
+    """
     seen, given = axes
     whole = ca.mtimes((seen if given is None else given).T, ca.mtimes(inertia.matrix, seen))
     for each in branches:
         whole += each
     m = seen.size2()
+    whole = whole if armature is None else whole + armature * ca.SX.eye(m)
     return factorise([{j: whole[i, j] for j in range(m)} for i in range(m)], given is None)
 
 
 @traced
 def branch_load(
-    above: Parents, matrix: BranchMatrix, given: Columns, root: Expr, momenta: Sequence[SpatialVector]
+    above: Parents,
+    matrix: BranchMatrix,
+    given: Columns,
+    root: Expr,
+    momenta: Sequence[SpatialVector],
+    rotors: tuple[Expr | None, ...],
 ) -> tuple[Expr, Expr]:
-    """(z (n,), what reaches the root (m,)) of momenta, or forces, of a branch's bodies."""
+    """(z (n,), what reaches the root (m,)) of momenta, or forces, of a branch's bodies and (count,) of its rotors."""
     total, base = summed_up(above, [momentum.parts for momentum in momenta])
     right, start = dict[int, Expr](), 0
-    for columns, screw in zip(given, total, strict=True):
-        along = ca.mtimes(columns.T, screw)
+    for columns, screw, rotor in zip(given, total, rotors, strict=True):
+        along = ca.mtimes(columns.T, screw) + (0 if rotor is None else rotor)
         right |= {start + k: along[k] for k in range(columns.size2())}
         start += columns.size2()
     z = dense(matrix.block.solve(right), start)
@@ -143,9 +157,11 @@ def branch_load(
 
 
 @traced
-def root_rates(matrix: Factorisation, given: Expr, momentum: SpatialVector, branches: tuple[Expr, ...]) -> Expr:
-    """r (m,): of the root's own momentum and what branches pass on."""
-    right = ca.mtimes(given.T, momentum.parts)
+def root_rates(
+    matrix: Factorisation, given: Expr, momentum: SpatialVector, branches: tuple[Expr, ...], rotor: Expr | None
+) -> Expr:
+    """r (m,): of the root's own momentum, that of its rotor and what branches pass on."""
+    right = ca.mtimes(given.T, momentum.parts) + (0 if rotor is None else rotor)
     for each in branches:
         right += each
     return solved(matrix, right)

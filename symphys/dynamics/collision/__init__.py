@@ -6,11 +6,17 @@ from collections.abc import Callable
 from typing import Any
 
 from symphys.dynamics.collision.contact_geometry import Contact, flipped
+from symphys.dynamics.collision.fields.convex import sphere_convex
+from symphys.dynamics.collision.fields.cylinder import capsule_cylinder, sphere_cylinder
+from symphys.dynamics.collision.fields.ellipsoid import capsule_ellipsoid, sphere_ellipsoid
 from symphys.dynamics.collision.pairs.box_box import box_box
 from symphys.dynamics.collision.pairs.box_plane import box_plane
 from symphys.dynamics.collision.pairs.capsule_box import capsule_box
 from symphys.dynamics.collision.pairs.capsule_capsule import capsule_capsule
 from symphys.dynamics.collision.pairs.capsule_plane import capsule_plane
+from symphys.dynamics.collision.pairs.convex_ground import convex_plane, convex_terrain
+from symphys.dynamics.collision.pairs.cylinder_ground import cylinder_plane, cylinder_terrain
+from symphys.dynamics.collision.pairs.ellipsoid_ground import ellipsoid_plane, ellipsoid_terrain
 from symphys.dynamics.collision.pairs.sphere_box import sphere_box
 from symphys.dynamics.collision.pairs.sphere_capsule import sphere_capsule
 from symphys.dynamics.collision.pairs.sphere_plane import sphere_plane
@@ -18,7 +24,7 @@ from symphys.dynamics.collision.pairs.sphere_sphere import sphere_sphere
 from symphys.dynamics.collision.pairs.terrain import box_terrain, capsule_terrain, sphere_terrain
 from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.tracing.decorator import traced
-from symphys.model.shapes import Box, Capsule, Plane, Sphere, Surface, Terrain
+from symphys.model.shapes import Box, Capsule, Convex, Cylinder, Ellipsoid, Plane, Sphere, Surface, Terrain
 
 __all__ = ["Contact", "collide"]
 
@@ -31,12 +37,23 @@ RULES: dict[tuple[type, type], Rule] = {
     (Sphere, Terrain): sphere_terrain,
     (Capsule, Terrain): capsule_terrain,
     (Box, Terrain): box_terrain,
+    (Cylinder, Plane): cylinder_plane,
+    (Ellipsoid, Plane): ellipsoid_plane,
+    (Convex, Plane): convex_plane,
+    (Cylinder, Terrain): cylinder_terrain,
+    (Ellipsoid, Terrain): ellipsoid_terrain,
+    (Convex, Terrain): convex_terrain,
     (Sphere, Sphere): sphere_sphere,
     (Sphere, Capsule): sphere_capsule,
     (Sphere, Box): sphere_box,
     (Capsule, Capsule): capsule_capsule,
     (Capsule, Box): capsule_box,
     (Box, Box): box_box,
+    (Sphere, Cylinder): sphere_cylinder,
+    (Sphere, Ellipsoid): sphere_ellipsoid,
+    (Sphere, Convex): sphere_convex,
+    (Capsule, Cylinder): capsule_cylinder,
+    (Capsule, Ellipsoid): capsule_ellipsoid,
 }
 """Which rule covers which surfaces; ``shapes.POINTS`` says how many points each returns."""
 

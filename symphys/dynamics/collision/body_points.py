@@ -10,7 +10,7 @@ import casadi as ca
 from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.maths import rotation
 from symphys.model.scalar import is_zero
-from symphys.model.shapes import UPRIGHT, Box, Capsule, Shape
+from symphys.model.shapes import UPRIGHT, Box, Capsule, SolidShape
 
 Expr = Any
 """casadi SX or a float"""
@@ -29,7 +29,7 @@ def corners(box: Box) -> list[Offset]:
     return [placed(box, (a * x, b * y, c * z)) for a, b, c in product(SIGNS, repeat=3)]
 
 
-def placed(shape: Capsule | Box, point: Offset) -> Offset:
+def placed(shape: SolidShape, point: Offset) -> Offset:
     """A point given in the shape's own frame, body frame."""
     turned = turned_by(shape.orientation, point)
     return (turned[0] + shape.centre[0], turned[1] + shape.centre[1], turned[2] + shape.centre[2])
@@ -43,7 +43,7 @@ def turned_by(orientation: tuple[Any, ...], vector: Offset) -> Offset:
     return (x, y, z)
 
 
-def axes(body_path: PredictedPath, shape: Shape) -> tuple[Parabola, Parabola, Parabola]:
+def axes(body_path: PredictedPath, shape: SolidShape) -> tuple[Parabola, Parabola, Parabola]:
     """The paths of a shape's own axes, world frame."""
     units = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     x, y, z = (body_path.arm(turned_by(shape.orientation, unit)) for unit in units)

@@ -11,7 +11,7 @@ from symphys.dynamics.collision.body_points import axes
 from symphys.dynamics.collision.contact_geometry import Contact, Displacement, Expr, Frame
 from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.dynamics.collision.time_of_impact import contact_along
-from symphys.model.shapes import Box, Capsule
+from symphys.model.shapes import SolidShape
 
 NEWTON_STEPS = 5
 """Towards the instant of touch: with 3 a tenth of what flies through a thin wall in one step is not seen to hit it."""
@@ -79,7 +79,7 @@ class InField:
 
 
 def ball_in_field(
-    path: Parabola, arm: Parabola, radius: Expr, shape: Capsule | Box, field: Field, b: PredictedPath
+    path: Parabola, arm: Parabola, radius: Expr, shape: SolidShape, field: Field, b: PredictedPath
 ) -> Contact:
     """The contact of a ball with a shape on b; ``path`` and ``arm`` of the ball's centre."""
     centre = b.path(shape.centre)

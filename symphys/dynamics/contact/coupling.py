@@ -78,7 +78,8 @@ def _ratio(body: Body, shape: int, friction: Any) -> float:
     if surface.central:
         return 0.0
     sizes = (
-        ca.vertcat(*size) if isinstance(size, tuple) else size for size in (*surface.sizes.values(), surface.centre)
+        ca.vertcat(*size) if isinstance(size, tuple) else size
+        for size in (*surface.parameters.values(), surface.centre)
     )
     numbers = [*map(ca.SX, (friction, body.mass, *sizes)), ca.SX(inertia_matrix(body.inertia))]
     if not all(number.is_constant() for number in numbers):

@@ -16,6 +16,7 @@ from typing import Any
 
 import casadi as ca
 
+from symphys.dynamics.articulated.generalized_coordinates import rotor_rates
 from symphys.dynamics.contact.constraint import ContactConstraint
 from symphys.dynamics.context import StepContext
 from symphys.dynamics.joints.assembly import KinematicTrees, momenta_of
@@ -60,7 +61,11 @@ def rebound(
     sums: tuple[Expr, Expr, Expr] = (ca.SX(0), ca.SX(0), ca.SX(0))
     bodies = (momenta_of(context, trees, solution.momenta) for solution in (start, plastic, newton))
     for motion, *momenta in zip(motions, *bodies, strict=True):
-        sums = _energies(motion, momenta, sums)
+        sums = sums if motion.massless else _energies(motion, momenta, sums)
+    for tree, root in zip(trees.coordinates, trees.roots, strict=True):
+        rates = (rotor_rates(tree, solution.momenta[root]) for solution in (start, plastic, newton))
+        for armature, *turning in zip(tree.tree.armature, *rates, strict=True):
+            sums = sums if armature is None else _rotor_energies(armature, turning, sums)
     share = _largest_share(sums)
     return Iterate(
         tuple(_between_states(share, a, b) for a, b in zip(plastic.momenta, newton.momenta, strict=True)),
@@ -92,6 +97,15 @@ def _energies(
     a, b, c = sums
     change = product(plastic, plastic) - product(before, before)
     return a + product(way, way), b + 2 * product(way, plastic), c + change
+
+
+@traced
+def _rotor_energies(armature: Expr, rates: list[Expr], sums: tuple[Expr, Expr, Expr]) -> tuple[Expr, Expr, Expr]:
+    """The same of the rotors of a joint."""
+    before, plastic, newton = rates
+    (a, b, c), way, half = sums, newton - plastic, armature / 2
+    change = ca.dot(plastic, plastic) - ca.dot(before, before)
+    return a + half * ca.dot(way, way), b + 2 * half * ca.dot(way, plastic), c + half * change
 
 
 @traced

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,8 +17,10 @@ from symphys.dynamics.context import State, StepContext
 from symphys.dynamics.joints.coordinate_constraint import CoordinateConstraint
 from symphys.dynamics.joints.joint_constraints import (
     CONSTRAINTS,
+    CoordinateTerms,
     SubstepTimes,
     coordinate_terms,
+    coupling_constraint,
     lock_at_impact,
     lock_constraint,
 )
@@ -28,7 +30,8 @@ from symphys.dynamics.joints.locked_directions import LockConstraint
 from symphys.dynamics.motion import PredictedMotion
 from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import AllVelocities, Momenta, PlacedConstraint, Velocities
-from symphys.model.joints import carriers, kinematic_trees, tree_joints
+from symphys.model.joints import Joint, JointCoupling, carriers, kinematic_trees, tree_joints
+from symphys.model.state_layout import COUPLED
 from symphys.model.world import World
 
 Expr = Any
@@ -45,12 +48,14 @@ class KinematicTrees:
         motions: of all bodies, those of trees with how they are held.
         states: what the sweeps start from, without any impulse of the substep.
         carriers: for each body where the sweeps keep what they know of it.
+        roots: the body at which each tree's velocities are kept.
     """
 
     coordinates: tuple[GeneralizedCoordinates, ...]
     motions: tuple[PredictedMotion, ...]
     states: AllVelocities
     carriers: tuple[int, ...]
+    roots: tuple[int, ...] = ()
 
     def placed(self, bodies: tuple[int, ...], constraint: Any) -> PlacedConstraint:
         """A constraint on these bodies."""
@@ -68,16 +73,24 @@ def prepare_trees(
     joints, moving = context.world.joints, list(motions)
     states: list[Velocities] = list(free)
     found, touched = list[GeneralizedCoordinates](), _touched(context.world)
+    coupled = {k for each in context.world.couplings for k in (each.first, each.second) if k is not None}
     for tree in kinematic_trees(joints):
         own = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
         reached = tuple(body in touched for body in tree.bodies)
         parts = tuple(motions[i] for i in tree.bodies), tuple(free[i] for i in tree.bodies)
-        coordinates = generalized_coordinates(tree, own, reached, *parts, middle)
+        acting = tuple(link.joint in coupled or _acts(joint) for link, joint in zip(tree.links, own, strict=True))
+        coordinates = generalized_coordinates(tree, own, reached, *parts, middle, acting)
         found.append(coordinates)
         for body, jacobian in zip(tree.bodies, coordinates.jacobians, strict=True):
             moving[body], states[body] = replace(motions[body], jacobian=jacobian), None
         states[tree.root] = coordinates.free
-    return KinematicTrees(tuple(found), tuple(moving), tuple(states), carriers(len(motions), joints))
+    roots = tuple(tree.root for tree in kinematic_trees(joints))
+    return KinematicTrees(tuple(found), tuple(moving), tuple(states), carriers(len(motions), joints), roots)
+
+
+def _acts(joint: Joint | None) -> bool:
+    """Whether anything acts along a joint's coordinates."""
+    return joint is not None and bool(joint.acting)
 
 
 def _touched(world: World) -> set[int]:
@@ -136,7 +149,34 @@ def joint_constraints(
                 constraint = trees.placed(joint.bodies, CONSTRAINTS[part](settings, joint, at, command, substep))
                 projected.append(JointConstraint(constraint, f"{joint.name}.{part}", k))
                 fitted += [constraint] if part in LIMITS else []
+    for coupling in context.world.couplings:
+        constraint = _coupled(context, trees, paths, duration, coupling, places)
+        projected.append(JointConstraint(constraint, f"{coupling.name}.{COUPLED}", 0))
+        fitted.append(constraint)
     return projected, fitted
+
+
+def _coupled(
+    context: StepContext,
+    trees: KinematicTrees,
+    paths: Sequence[PredictedMotion],
+    duration: Expr,
+    coupling: JointCoupling,
+    places: Mapping[int, tuple[int, Expr]],
+) -> PlacedConstraint:
+    """The constraint of a coupling."""
+    terms = list[CoordinateTerms | None]()
+    for index in (coupling.first, coupling.second):
+        if index is None:
+            terms.append(None)
+            continue
+        joint = context.world.joints[index]
+        moving, bare = (tuple(motions[i] for i in joint.bodies) for motions in (trees.motions, paths))
+        states = tuple(trees.states[trees.carriers[i]] for i in joint.bodies)
+        terms.append(coordinate_terms(joint_frames(joint, bare), 0, moving, states, duration, places[index]))
+    assert terms[0] is not None
+    bodies = context.world.joints[coupling.first].bodies
+    return trees.placed(bodies, coupling_constraint(coupling, terms[0], terms[1], duration))
 
 
 def _places(world: World, trees: KinematicTrees) -> dict[int, tuple[int, Expr]]:

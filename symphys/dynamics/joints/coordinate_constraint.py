@@ -41,7 +41,7 @@ class CoordinateConstraint:
         width: of the smoothed bounds [N m s].
         same: whether both bodies are of one tree of joints.
         of_tree: where the coordinate is one of a tree's.
-        left: how far a limit is away at the start [rad], [m]; None for what is none.
+        left: how far a limit is away at the start, or a coupling is off [rad], [m]; None for what is neither.
         inverse_mobility: effective mass.
         landing: 1 for a limit that is struck: its impulse is an impact, not a force.
     """
@@ -62,7 +62,12 @@ class CoordinateConstraint:
     landing: Expr
 
     def fitting(self, moved: Expr) -> Expr:
-        """(1,): the impulse times a time that takes a limit back to where it is kept; see ``LockConstraint``."""
+        """(1,): the impulse times a time that takes a limit back to where it is kept, a coupling to where it holds.
+
+        See ``LockConstraint``.
+        """
+        if self.low is None and self.high is None:
+            return -self.inverse_mobility * (self.left + moved)
         sign = 1 if self.low is not None else -1
         beyond = self.left + sign * moved
         return -sign * self.inverse_mobility * ca.fmin(beyond, 0)

@@ -9,6 +9,7 @@ sweeps start from, which is unstable as soon as these do not converge by half in
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import inf, isfinite
 from typing import Any
 
 import casadi as ca
@@ -22,8 +23,8 @@ from symphys.dynamics.joints.joint_impulse import Directions, mobility, speeds
 from symphys.dynamics.joints.locked_directions import LockConstraint, inverse
 from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import Momentum
-from symphys.maths.smoothing import clip
-from symphys.model.joints import Joint, Servo, TorqueMotor, VelocityMotor
+from symphys.maths.smoothing import at_least, at_most, clip
+from symphys.model.joints import AffineMotor, Joint, JointCoupling, Servo, Spring, TorqueMotor, VelocityMotor
 
 Expr = Any
 """casadi SX"""
@@ -176,6 +177,8 @@ def motor_constraint(
 ) -> CoordinateConstraint:
     """A motor; the bounds of its torque are rounded off over what the smoothing makes of an effective mass."""
     motor, width = joint.motor, settings.smoothing / at.mobility
+    if isinstance(motor, AffineMotor):
+        return _affine(settings, motor, at, command, substep)
     if isinstance(motor, TorqueMotor):
         torque = clip(command, -motor.torque, motor.torque, settings.smoothing)
         return _constraint(at, by_law(-torque * substep.kick, ca.SX(0), at.mobility), None, None, width)
@@ -184,6 +187,29 @@ def motor_constraint(
     target = clip(wanted, -motor.velocity, motor.velocity, settings.smoothing)
     most = motor.torque * substep.kick
     return _constraint(at, towards(target, at.mobility), -most, most, width)
+
+
+def _affine(
+    settings: StepSettings, motor: AffineMotor, at: CoordinateTerms, command: Expr, substep: SubstepTimes
+) -> CoordinateConstraint:
+    """A torque that is affine in command, coordinate and rate; what depends on these acts as a spring and damper do."""
+    gear, kick = motor.gear, substep.kick
+    for end, held in zip(motor.command_range or (), (at_least, at_most), strict=False):
+        command = held(command, end, settings.smoothing) if isfinite(end) else command
+    pull, slope = _spring(settings, at, substep, Spring(gear**2 * motor.kp, gear**2 * motor.kv))
+    law = by_law(pull - kick * gear * (motor.gain * command + motor.offset), slope, at.mobility)
+    low, high = (None if end is None else kick * end for end in _force_ends(motor))
+    return _constraint(at, law, low, high, settings.smoothing / at.mobility)
+
+
+def _force_ends(motor: AffineMotor) -> tuple[Expr | None, Expr | None]:
+    """The least and the largest force behind the gear; None where there is none."""
+    low, high = motor.force_range or (-inf, inf)
+    if isfinite(low) and isfinite(high):
+        return ca.fmin(motor.gear * low, motor.gear * high), ca.fmax(motor.gear * low, motor.gear * high)
+    turned = isinstance(motor.gear, int | float) and motor.gear < 0
+    ends = (high, low) if turned else (low, high)
+    return tuple(motor.gear * end if isfinite(end) else None for end in ends)  # type: ignore[return-value]
 
 
 def servo_velocity(servo: Servo, command: Expr, value: Expr, smoothing: Expr) -> Expr:
@@ -230,22 +256,66 @@ def _strikes(settings: StepSettings, at: CoordinateTerms, closing: Expr) -> Expr
 def spring_constraint(
     settings: StepSettings, joint: Joint, at: CoordinateTerms, command: Expr, substep: SubstepTimes
 ) -> CoordinateConstraint:
-    """A spring and damper.
+    """A spring and damper."""
+    assert joint.spring is not None
+    pull, half = _spring(settings, at, substep, joint.spring)
+    return _constraint(at, by_law(pull, half, at.mobility), None, None, ca.SX(0))
+
+
+@traced
+def friction_constraint(
+    settings: StepSettings, joint: Joint, at: CoordinateTerms, command: Expr, substep: SubstepTimes
+) -> CoordinateConstraint:
+    """Dry friction: it stops the coordinate with at most so much."""
+    most = joint.friction * substep.kick
+    return _constraint(at, towards(ca.SX(0), at.mobility), -most, most, settings.smoothing / at.mobility)
+
+
+@traced
+def coupling_constraint(
+    coupling: JointCoupling, follows: CoordinateTerms, leads: CoordinateTerms | None, duration: Expr
+) -> CoordinateConstraint:
+    """A coordinate that follows another of its tree: no velocity apart, and the position pass takes back what is left.
+
+    Its rate is seen with the slope at the middle of the substep, and its impulse acts with that at the start.
+    """
+    first = follows.of_tree
+    assert first is not None
+    if leads is None:
+        jacobian, response = first.jacobian, first.response
+        error = follows.value - coupling.polynomial[0]
+    else:
+        second, slope = leads.of_tree, coupling.slope(leads.value + duration / 2 * leads.rate_now)
+        assert second is not None
+        jacobian = first.jacobian - slope * second.jacobian
+        response = first.response - coupling.slope(leads.value) * second.response
+        error = follows.value - coupling.value(leads.value)
+    both = TreeCoordinate(jacobian, response)
+    at = replace(follows, mobility=ca.mtimes(jacobian, response), of_tree=both)
+    return _constraint(at, towards(ca.SX(0), at.mobility), None, None, ca.SX(0), error)
+
+
+def _spring(settings: StepSettings, at: CoordinateTerms, substep: SubstepTimes, spring: Spring) -> tuple[Expr, Expr]:
+    """(a, b) of the impulse -(a + b rate) of a spring and damper.
 
     The spring acts with k / (1 + (w dt)^2 / 3), w^2 = k / m: of second order, keeps energy and is stable at any k. The
     damper acts on the mean of the rates before and after: with all that acted in the step before, else what falls on it
     from then to now would count twice, an error of first order.
     """
-    spring, dt = joint.spring, settings.scheme.dt
-    assert spring is not None
+    dt = settings.scheme.dt
     stiffness = spring.stiffness / (1 + spring.stiffness * at.mobility * dt * dt / 3)
     half = substep.kick * spring.damping / 2
     before = at.rate_now + (at.rate_due - at.rate_now) * (1 - 2 * substep.kick / substep.duration)
-    pull = substep.kick * stiffness * (at.value - spring.rest) + half * before
-    return _constraint(at, by_law(pull, half, at.mobility), None, None, ca.SX(0))
+    return substep.kick * stiffness * (at.value - spring.rest) + half * before, half
 
 
-CONSTRAINTS = {"motor": motor_constraint, "lower": lower_limit, "upper": upper_limit, "spring": spring_constraint}
+CONSTRAINTS = {
+    "motor": motor_constraint,
+    "lower": lower_limit,
+    "upper": upper_limit,
+    "spring": spring_constraint,
+    "friction": friction_constraint,
+}
 """By what acts along a coordinate."""
 
 

@@ -7,8 +7,10 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.articulated.configuration_update import JointCorrection
+from symphys.dynamics.articulated.configuration_update import JointCorrection, RotorCorrection
 from symphys.dynamics.articulated.forward_dynamics import consistent
+from symphys.dynamics.articulated.generalized_coordinates import GeneralizedCoordinates, rotor_rates
+from symphys.dynamics.articulated.rotors import Rates
 from symphys.dynamics.contact.constraint import ContactConstraint
 from symphys.dynamics.context import State, StepContext
 from symphys.dynamics.joints.assembly import LIMITS, JointConstraint, own
@@ -17,8 +19,9 @@ from symphys.dynamics.joints.joint_frames import free, joint_frames_at, locked
 from symphys.dynamics.joints.joint_impulse import JointImpulse
 from symphys.dynamics.joints.locked_directions import LockConstraint, in_world
 from symphys.dynamics.tracing.decorator import traced
-from symphys.dynamics.unknowns import Momenta, Momentum, PlacedConstraint
-from symphys.model.joints import Joint, kinematic_trees, tree_joints
+from symphys.dynamics.unknowns import AllVelocities, Momenta, Momentum, PlacedConstraint
+from symphys.model.joints import Joint, JointCoupling, kinematic_trees, tree_joints
+from symphys.model.state_layout import COUPLED
 from symphys.model.world import World
 
 Expr = Any
@@ -27,6 +30,8 @@ Struck = Mapping[frozenset[int], Expr]
 """Of bodies that hang together: 1 if one of their contacts is an impact."""
 Total = list[tuple[Expr, Expr]]
 """Force and torque on each body."""
+Rotors = dict[int, Rates]
+"""Of each tree, by its root, the rates of its rotors."""
 Poses = Sequence[tuple[Expr, Expr]]
 """Positions and orientations."""
 
@@ -140,6 +145,25 @@ def add_joint_forces(context: StepContext, forces: State, poses: Poses, total: T
         for body, wrench in zip(joint.bodies, found, strict=True):
             total[body] = _added(total[body], wrench)
 
+    for coupling in context.world.couplings:
+        _add_coupling(context, coupling, forces[f"{coupling.name}.{COUPLED}"], poses, total)
+
+
+def _add_coupling(context: StepContext, coupling: JointCoupling, force: Expr, poses: Poses, total: Total) -> None:
+    """Adds what a coupling does: its force along the coordinate that follows, and against it along the other."""
+    joints = [context.world.joints[k] for k in (coupling.first, coupling.second) if k is not None]
+    held = [tuple(poses[i] for i in joint.bodies) for joint in joints]
+    along = [force] if len(joints) == 1 else [force, _against(coupling, joints[1], held[1], force)]
+    for joint, sides, numbers in zip(joints, held, along, strict=True):
+        for body, wrench in zip(joint.bodies, _on_bodies(joint, sides, (("motor", numbers),)), strict=True):
+            total[body] = _added(total[body], wrench)
+
+
+@traced
+def _against(coupling: JointCoupling, joint: Joint, poses: tuple[tuple[Expr, Expr], ...], force: Expr) -> Expr:
+    value = joint.kind.coordinates[0].value(joint_frames_at(joint, poses).placed(ca.SX(0)))
+    return -coupling.slope(value) * force
+
 
 @traced
 def _on_bodies(
@@ -191,8 +215,40 @@ def _kept_up(momentum: Momentum, made: JointCorrection, impact: Expr, duration: 
     return Momentum(momentum.velocity + share * velocity, momentum.angular + share * angular)
 
 
+def keep_rotors(
+    context: StepContext,
+    coordinates: Sequence[GeneralizedCoordinates],
+    solved: AllVelocities,
+    turned: Mapping[int, RotorCorrection],
+    struck: Struck,
+    duration: Expr,
+) -> Rotors:
+    """The rates of rotors, with those that the displacements by joints stand for; see ``keep_momentum``."""
+    dt, found = context.settings.scheme.dt, Rotors()
+    for tree, each in zip(kinematic_trees(context.world.joints), coordinates, strict=True):
+        root, more = tree.root, turned[tree.root]
+        rates = rotor_rates(each, solved[root])
+        loops = more.by_loops or (None,) * len(rates)
+        impact = of_body(struck, root)
+        found[root] = tuple(
+            None if rate is None else _turned(rate, by_tree, by_loops, impact, duration, dt)
+            for rate, by_tree, by_loops in zip(rates, more.by_tree, loops, strict=True)
+        )
+    return found
+
+
+@traced
+def _turned(rate: Expr, by_tree: Expr, by_loops: Expr | None, impact: Expr, duration: Expr, dt: float) -> Expr:
+    made = by_tree if by_loops is None else by_tree + ca.if_else(impact, 0, by_loops)
+    return rate + duration / dt**2 * made
+
+
 def project_velocities(
-    context: StepContext, momenta: Sequence[Momentum], poses: Poses, velocities: Sequence[tuple[Expr, Expr]]
+    context: StepContext,
+    momenta: Sequence[Momentum],
+    poses: Poses,
+    velocities: Sequence[tuple[Expr, Expr]],
+    rotors: Rotors,
 ) -> list[tuple[Expr, Expr]]:
     """Velocities and angular velocities; those of trees as they fit their joints at these poses.
 
@@ -201,6 +257,7 @@ def project_velocities(
         momenta: of the bodies.
         poses: of the bodies.
         velocities: of bodies that are not part of a tree.
+        rotors: the rates of those of trees.
     """
     found, joints = list(velocities), context.world.joints
     for tree in kinematic_trees(joints):
@@ -208,6 +265,6 @@ def project_velocities(
         bodies = [context.world.bodies[i] for i in tree.bodies]
         inertials = tuple((body.mass, body.inertia) for body in bodies)
         parts = tuple(poses[i] for i in tree.bodies), tuple(momenta[i] for i in tree.bodies)
-        for i, fits in zip(tree.bodies, consistent(tree, along, inertials, *parts), strict=True):
+        for i, fits in zip(tree.bodies, consistent(tree, along, inertials, *parts, rotors[tree.root]), strict=True):
             found[i] = fits
     return found

@@ -13,6 +13,7 @@ from symphys.dynamics.observation.joint_coordinates import (
     readings,
 )
 from symphys.dynamics.observation.queries import gap_function, slip_function
+from symphys.dynamics.observation.sites import site_quantities, site_quantity_names
 
 __all__ = [
     "accelerometer_bodies",
@@ -24,5 +25,7 @@ __all__ = [
     "joint_quantity_names",
     "reading_function",
     "readings",
+    "site_quantities",
+    "site_quantity_names",
     "slip_function",
 ]

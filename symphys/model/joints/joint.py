@@ -8,9 +8,9 @@ from typing import Any
 
 from symphys.model.joints.kind import Kind
 from symphys.model.joints.motor import Motor
-from symphys.model.shapes import Scalar
+from symphys.model.scalar import Scalar, is_zero
 
-PARTS = ("motor", "lower", "upper", "spring")
+PARTS = ("motor", "lower", "upper", "spring", "friction")
 Vector = Sequence[Any]
 """three of them"""
 
@@ -55,6 +55,8 @@ class Joint:
         first, second: indices of bodies; second None: the world. Coordinates are those of the first against the second.
         frames: of the first and of the second.
         motor, limits, spring: along every coordinate.
+        armature: inertia of what turns with each coordinate, seen through its gear [kg m^2] or [kg].
+        friction: dry friction along every coordinate [N m] or [N].
         frequency, damping: [Hz] and damping ratio of a joint that is soft (Catto, GDC 2011); 0 is a rigid one.
     """
 
@@ -68,6 +70,8 @@ class Joint:
     spring: Spring | None = None
     frequency: Scalar = 0.0
     damping: Scalar = 1.0
+    armature: Scalar = 0.0
+    friction: Scalar = 0.0
 
     @property
     def bodies(self) -> tuple[int, ...]:
@@ -86,10 +90,11 @@ class Joint:
 
     @property
     def acting(self) -> tuple[str, ...]:
-        """Which of motor, lower, upper and spring act along its coordinates."""
+        """Which of motor, lower, upper, spring and friction act along its coordinates."""
         if not self.kind.coordinates:
             return ()
-        present = (self.motor, self.limits.lower, self.limits.upper, self.spring)
+        dry = None if is_zero(self.friction) else self.friction
+        present = (self.motor, self.limits.lower, self.limits.upper, self.spring, dry)
         return tuple(part for part, what in zip(PARTS, present, strict=True) if what is not None)
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,7 +88,8 @@ def _joint(spec: JointSpec, placed: PlacedJoint, places: Mapping[str, int]) -> J
     soft = {"frequency": spec.frequency, "damping": spec.damping}
     if not isinstance(spec, MovingJoint):
         return Joint(spec.name, spec.kind, *sides, placed.frames, **soft)
-    return Joint(spec.name, spec.kind, *sides, placed.frames, spec.motor, spec.bounds, spec.spring, **soft)
+    found = Joint(spec.name, spec.kind, *sides, placed.frames, spec.motor, spec.bounds, spec.spring, **soft)
+    return replace(found, armature=spec.armature, friction=spec.friction)
 
 
 def _check_between(spec: JointSpec, names: Sequence[str]) -> None:

@@ -85,6 +85,8 @@ class MovingJoint(JointSpec):
         motor: drives every coordinate.
         limits: (lower, upper) of every coordinate [rad] or [m]; None, -inf and inf are none.
         spring: along every coordinate.
+        armature: inertia of what turns with each coordinate, seen through its gear [kg m^2] or [kg].
+        friction: dry friction along every coordinate [N m] or [N].
         start: the coordinate at the start [rad] or [m], or a sequence of all; None: 0. ``make_world`` carries the
             second body, and all that hangs on it, there; if the world holds these, the first, the other way.
     """
@@ -92,14 +94,20 @@ class MovingJoint(JointSpec):
     motor: Motor | None = field(default=None, kw_only=True)
     limits: tuple[float | None, float | None] | None = field(default=None, kw_only=True)
     spring: Spring | None = field(default=None, kw_only=True)
+    armature: Scalar = field(default=0.0, kw_only=True)
+    friction: Scalar = field(default=0.0, kw_only=True)
     start: float | Sequence[float] | None = field(default=None, kw_only=True)
 
     def check_acting(self) -> None:
         """ValueError for a motor or a spring that is none."""
         if not (self.motor is None or isinstance(self.motor, Motor)):
-            raise ValueError(f"motor must be a Servo, a VelocityMotor or a TorqueMotor, not {self.motor!r}")
+            kinds = "a Servo, a VelocityMotor, a TorqueMotor or an AffineMotor"
+            raise ValueError(f"motor must be {kinds}, not {self.motor!r}")
         if not (self.spring is None or isinstance(self.spring, Spring)):
             raise ValueError(f"spring must be a Spring, not {self.spring!r}")
+        for key, value in (("armature", self.armature), ("friction", self.friction)):
+            if isinstance(value, int | float) and not 0 <= value < inf:
+                raise ValueError(f"{key} must not be negative, but it is {value}")
 
     @property
     def bounds(self) -> Limits:

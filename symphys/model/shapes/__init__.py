@@ -14,6 +14,10 @@ from typing import Any, ClassVar
 from symphys.model.scalar import Scalar
 from symphys.model.shapes.box import Box
 from symphys.model.shapes.capsule import Capsule
+from symphys.model.shapes.convex import SLOTS, Convex
+from symphys.model.shapes.cylinder import Cylinder
+from symphys.model.shapes.ellipsoid import Ellipsoid
+from symphys.model.shapes.hull import Hull
 from symphys.model.shapes.plane import Plane
 from symphys.model.shapes.shape import UPRIGHT, RoundedHull, SizeKey, SolidShape
 from symphys.model.shapes.sphere import SOLID_SPHERE, Sphere
@@ -22,12 +26,17 @@ from symphys.model.shapes.terrain import Terrain
 __all__ = [
     "POINTS",
     "SHAPES",
+    "SLOTS",
     "SOLID_SPHERE",
     "SURFACES",
     "UPRIGHT",
     "Box",
     "Capsule",
+    "Convex",
+    "Cylinder",
+    "Ellipsoid",
     "Fixture",
+    "Hull",
     "Plane",
     "RoundedHull",
     "Scalar",
@@ -43,7 +52,7 @@ __all__ = [
     "surface",
 ]
 
-Shape = Sphere | Box | Capsule
+Shape = Sphere | Box | Capsule | Cylinder | Ellipsoid | Convex
 
 
 @dataclass(frozen=True)
@@ -78,7 +87,7 @@ class Fixture:
 Static = Plane | Fixture | Terrain
 Surface = Shape | Plane | Terrain
 
-SHAPES: dict[str, type[Shape]] = {shape.kind: shape for shape in (Sphere, Box, Capsule)}
+SHAPES: dict[str, type[Shape]] = {shape.kind: shape for shape in (Sphere, Box, Capsule, Cylinder, Ellipsoid, Convex)}
 """By kind, in the order of messages."""
 SURFACES: dict[str, type[Surface]] = {**SHAPES, Plane.kind: Plane, Terrain.kind: Terrain}
 """All that bodies have or touch, by kind."""

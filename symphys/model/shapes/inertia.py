@@ -35,7 +35,7 @@ def shares(shapes: Sequence[SolidShape]) -> list[Scalar]:
 
 def centre_of_mass(shapes: Sequence[SolidShape]) -> Array:
     """(3,): of solid shapes of equal density [m], body frame; parts that overlap count twice."""
-    return np.asarray(np.array(shares(shapes)) @ np.array([shape.centre for shape in shapes], float))
+    return np.asarray(np.array(shares(shapes)) @ np.array([middle(shape) for shape in shapes], float))
 
 
 def off_centre(shapes: Sequence[SolidShape]) -> bool:
@@ -48,9 +48,11 @@ def centring(shapes: Sequence[SolidShape], called: str) -> str:
     """The message for shapes that are ``off_centre``; ``called``: what they are."""
     centre = centre_of_mass(shapes)
     off, listed = float(np.linalg.norm(centre)), ", ".join(f"{c:.6g}" for c in centre)
+    placed = "point" if called == "convex" else "centre"
+    called = "points" if called == "convex" else called
     return (
         f"the centre of mass of these {called} is {off:.4g} m from the body's origin, at [{listed}]; "
-        "subtract that from every centre"
+        f"subtract that from every {placed}"
     )
 
 
@@ -58,13 +60,32 @@ def specific(shapes: Sequence[SolidShape]) -> Tensor:
     """Inertia per mass [m^2] of solid shapes of equal density about the body's origin; sizes may be symbols."""
     total: Tensor = [[0.0] * 3 for _ in range(3)]
     for share, shape in zip(shares(shapes), shapes, strict=True):
-        own, c, turned = shape.moments, shape.centre, axes(shape)
+        own, c, turned = tensor_of(shape), middle(shape), axes(shape)
         arm = sum(x * x for x in c)
         for i in range(3):
             for j in range(3):
-                spun = sum(turned[i][k] * turned[j][k] * own[k] for k in range(3) if turned[i][k] * turned[j][k])
+                spun = sum(turned[i][k] * turned[j][m] * x for (k, m), x in own.items() if turned[i][k] * turned[j][m])
                 total[i][j] = total[i][j] + share * (spun + (arm if i == j else 0.0) - c[i] * c[j])
     return total
+
+
+def tensor_of(shape: SolidShape) -> dict[tuple[int, int], Scalar]:
+    """The entries of a shape's own inertia by mass that are not zero, along its own axes, by row and column [m^2]."""
+    own = {(k, k): moment for k, moment in enumerate(shape.moments)}
+    for (i, j), product in zip(((1, 2), (0, 2), (0, 1)), shape.products, strict=True):
+        if not is_zero(product):
+            own[i, j] = own[j, i] = product
+    return own
+
+
+def middle(shape: SolidShape) -> tuple[Scalar, ...]:
+    """(3,): a shape's centre of mass [m], body frame."""
+    if all(is_zero(c) for c in shape.centroid):
+        return shape.centre
+    turned = axes(shape)
+    return tuple(
+        shape.centre[i] + sum(turned[i][k] * shape.centroid[k] for k in range(3) if turned[i][k]) for i in range(3)
+    )
 
 
 def axes(shape: SolidShape) -> list[list[float]]:

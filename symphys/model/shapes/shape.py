@@ -26,7 +26,7 @@ class SizeKey:
     Attributes:
         name: the key.
         description: for the JSON schema.
-        count: 1 for a number, 3 for a list.
+        count: 1 for a number, 3 for a list, 0 for a list of points (n, 3), of either sign.
         reason: why it must not be 0, for messages; empty: that goes without saying.
     """
 
@@ -83,7 +83,7 @@ class SolidShape(ABC):
     @property
     @abstractmethod
     def sizes(self) -> dict[str, Any]:
-        """By the names of ``size_keys`` [m]: a number, or a tuple of three."""
+        """By the names of ``size_keys`` [m]: a number, a tuple of three, or a tuple of points."""
 
     @property
     @abstractmethod
@@ -93,7 +93,7 @@ class SolidShape(ABC):
     @property
     @abstractmethod
     def moments(self) -> tuple[Scalar, Scalar, Scalar]:
-        """Principal moments of inertia about its own centre, along its own axes, by mass [m^2]."""
+        """Moments of inertia about its own centre of mass, along its own axes, by mass [m^2]."""
 
     @property
     @abstractmethod
@@ -109,6 +109,21 @@ class SolidShape(ABC):
     @abstractmethod
     def mjcf_size(self) -> tuple[Scalar, ...]:
         """``size`` of a MuJoCo geom whose type is ``kind``."""
+
+    @property
+    def products(self) -> tuple[Scalar, Scalar, Scalar]:
+        """Entries yz, xz and xy of its tensor of inertia, beside ``moments`` [m^2]: 0 along principal axes."""
+        return 0.0, 0.0, 0.0
+
+    @property
+    def centroid(self) -> tuple[Scalar, ...]:
+        """(3,): its centre of mass from ``centre``, along its own axes [m]."""
+        return (0.0, 0.0, 0.0)
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The ``sizes`` that variables may set."""
+        return self.sizes
 
     @property
     def flatness(self) -> str:

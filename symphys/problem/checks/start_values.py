@@ -16,7 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.dynamics.kept import structure
-from symphys.dynamics.observation import accelerometers, body_quantities, gap_function, joint_quantities, readings
+from symphys.dynamics.observation import (
+    accelerometers,
+    body_quantities,
+    gap_function,
+    joint_quantities,
+    readings,
+    site_quantities,
+)
 from symphys.model.state_layout import GIVEN, Layout, initial_state
 from symphys.model.world import World
 from symphys.problem.parametric.world import ParametricWorld
@@ -46,7 +53,7 @@ class StartFunctions:
         layout = Layout(self.world)
         still = {body.name: self.x[layout[f"{body.name}.velocity"]] for body in self.world.bodies}
         found = joint_quantities(self.world, self.x) | body_quantities(self.world, self.x)
-        found |= accelerometers(self.world, self.x, still, 1.0)
+        found |= accelerometers(self.world, self.x, still, 1.0) | site_quantities(self.world, self.x)
         return list(found), self._function("quantities", list(found.values()))
 
     @cached_property

@@ -26,6 +26,12 @@ OF_THE_PROBLEM = ("simulation", "termination", "fall", "objective", "solver", "s
 FURTHER = ("include", "included")
 OWN = ("title", "description")
 """What an included file says about itself alone."""
+MODELS = (".xml", ".mjcf", ".urdf")
+"""Ends of the names of other programs' models."""
+PACKAGE = "package://"
+"""Before the path of a file in an installed package."""
+OF_MODELS = {"keyframe", "self_collision", "base"}
+"""Keys about them."""
 LISTS = [name for name, field in Document.model_fields.items() if get_origin(field.annotation) is list]
 Model = TypeVar("Model", bound=SchemaTable)
 
@@ -51,7 +57,8 @@ def with_included(path: Path, text: str, data: dict[str, Any]) -> MergedFiles:
     sources = []
     for index, table in enumerate(tables):
         file, content = find(path, index, table, kept, faults)
-        texts[table.file] = content
+        if texts.setdefault(table.file, content) != content:
+            faults.stop(("include", index), f"includes {quote(table.file)} otherwise than before; import it to a file")
         sources.append(source(file, content, table, faults))
     check_twice(sources, faults)
     faults.stop_if_any()
@@ -84,7 +91,7 @@ def find(path: Path, index: int, table: IncludeTable, kept: Mapping[str, str], f
         if table.file not in kept:
             faults.stop(place, f"{quote(table.file)} is not among the files kept in [[included]]: {hint('', kept)}")
         return table.file, kept[table.file]
-    file = path.parent / table.file
+    file = in_package(index, table, faults) if table.file.startswith(PACKAGE) else path.parent / table.file
     if not exists(file):
         shipped = parts()
         if table.file not in shipped:
@@ -93,7 +100,35 @@ def find(path: Path, index: int, table: IncludeTable, kept: Mapping[str, str], f
         file = shipped[table.file]
     if exists(path) and file.samefile(path):
         faults.stop(place, "the file includes itself")
+    if file.suffix.lower() in MODELS:
+        return str(file), text_of_model(file, index, table, faults)
+    for key in sorted(OF_MODELS & table.model_fields_set):
+        faults.add((*place[:2], key), f"is for models of other programs, {', '.join(MODELS)}, and this file is none")
     return str(file), read_source(file)
+
+
+def in_package(index: int, table: IncludeTable, faults: Faults) -> Path:
+    """A file of an installed package."""
+    from symphys.importing.packages import model_file
+    from symphys.importing.problem import ImportProblem
+
+    try:
+        return model_file(table.file)
+    except ImportProblem as error:
+        faults.stop(("include", index, "file"), str(error))
+
+
+def text_of_model(file: Path, index: int, table: IncludeTable, faults: Faults) -> str:
+    """The tables of another program's model of a robot, as text."""
+    from symphys.importing.options import ImportOptions
+    from symphys.importing.problem import ImportProblem
+    from symphys.importing.robot import read_robot
+    from symphys.importing.writing import robot_text
+
+    try:
+        return robot_text(read_robot(file, ImportOptions(table.keyframe, table.self_collision, table.base)))
+    except ImportProblem as error:
+        faults.stop(("include", index, "file"), str(error))
 
 
 def exists(file: Path) -> bool:

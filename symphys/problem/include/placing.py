@@ -15,7 +15,7 @@ from symphys.problem.include.merge import MergedFiles
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema import Document, SchemaTable
 from symphys.problem.schema.include import IncludeTable
-from symphys.problem.schema.joints import JointTable
+from symphys.problem.schema.joints import JointTable, SiteTable
 from symphys.problem.schema.physics import BlockTable, BodyTable, PlaneTable, TerrainTable
 from symphys.problem.tables.shapes import read_orientation
 
@@ -114,6 +114,13 @@ class Placement:
             update["universal"] = table.universal.model_copy(update={"axes": axes})
         return table.model_copy(update=update)
 
+    def site(self, place: Place, table: SiteTable) -> SchemaTable:
+        """A site of the world; one of a body moves with that."""
+        if table.body != WORLD:
+            return table
+        orientation = self.orientation(place, table.orientation)
+        return table.model_copy(update={"position": self.point(table.position), "orientation": orientation})
+
     def terrain(self, place: Place, table: TerrainTable) -> SchemaTable:
         """Terrain stays."""
         text = "terrain cannot be moved; include this file without position and yaw_deg, or take the terrain out of it"
@@ -124,6 +131,7 @@ class Placement:
 MOVES: dict[str, Callable[[Placement, Place, Any], SchemaTable]] = {
     "body": Placement.body,
     "joint": Placement.joint,
+    "site": Placement.site,
     "plane": Placement.plane,
     "block": Placement.block,
     "terrain": Placement.terrain,

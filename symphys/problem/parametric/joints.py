@@ -10,6 +10,8 @@ from symphys.model.joints import Joint, JointFrame, Kind, Limits, Motor, Spring
 from symphys.problem.parametric.parts import Numbers, PairRule, Value
 
 Part = TypeVar("Part", bound=Motor | Spring)
+OWN = ("armature", "friction")
+"""Numbers of the joint itself, parameters where they are not 0."""
 
 
 @dataclass(frozen=True)
@@ -22,6 +24,7 @@ class ParametricJoint:
         first, second: names of the body whose coordinates count and of what they are measured against; None: the world.
         frames: of the first and of the second.
         motor, limits, spring: along every coordinate.
+        armature, friction: see ``Joint``.
         frequency: [Hz] of a joint that gives way; 0: rigid.
         damping: its damping ratio.
         collide: whether the two bodies may touch each other.
@@ -40,6 +43,8 @@ class ParametricJoint:
     damping: float = 1.0
     collide: bool = False
     start: tuple[float, ...] = ()
+    armature: float = 0.0
+    friction: float = 0.0
 
     @property
     def apart(self) -> PairRule | None:
@@ -54,9 +59,10 @@ class ParametricJoint:
         return f"{self.name}.anchor"
 
     def parameters(self) -> dict[str, Numbers]:
-        """Parameter names and values: those of motor and spring, and the anchor."""
+        """Parameter names and values: those of motor and spring, armature and friction if not 0, and the anchor."""
         parts = [part for part in (self.motor, self.spring) if part is not None]
         found = {f"{self.name}.{key}": getattr(part, key) for part in parts for key in given(part)}
+        found |= {f"{self.name}.{key}": getattr(self, key) for key in OWN if getattr(self, key)}
         return found | {self.anchor: self.frames[1].point}
 
     def valued(self, places: Mapping[str, int], value: Value) -> Joint:
@@ -72,6 +78,7 @@ class ParametricJoint:
             spring=None if self.spring is None else self._valued(self.spring, value),
             frequency=self.frequency,
             damping=self.damping,
+            **{key: value(f"{self.name}.{key}") for key in OWN if getattr(self, key)},
         )
 
     def _valued(self, part: Part, value: Value) -> Part:
@@ -80,5 +87,6 @@ class ParametricJoint:
 
 
 def given(part: Motor | Spring) -> list[str]:
-    """The numbers that there are."""
-    return [field.name for field in fields(part) if getattr(part, field.name) is not None]
+    """The numbers that there are; ranges are none."""
+    values = {field.name: getattr(part, field.name) for field in fields(part)}
+    return [key for key, value in values.items() if value is not None and not isinstance(value, tuple)]

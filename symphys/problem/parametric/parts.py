@@ -66,17 +66,19 @@ class ParametricBody:
 
     def parameters(self) -> dict[str, Numbers]:
         """Parameter names and values."""
-        own: dict[str, Numbers] = {"mass": self.mass}
+        own: dict[str, Numbers] = {"mass": self.mass} if self.mass else {}
         if len(self.shapes) == 1:
-            own |= self.shapes[0].sizes
+            own |= self.shapes[0].parameters
         return {f"{self.name}.{key}": numbers for key, numbers in (own | stated(self.states)).items()}
 
     def valued(self, overrides: Mapping[str, Any], value: Value) -> Body:
         """The body with its parameters' values; a mass given by density follows the size unless overridden."""
+        if not self.mass:
+            return Body.frame(self.name)
         mass = value(f"{self.name}.mass")
         if len(self.shapes) != 1:
             return Body(self.name, mass, self._inertia(mass, self._specific), self.shapes)
-        own = {key: f"{self.name}.{key}" for key in self.shapes[0].sizes}
+        own = {key: f"{self.name}.{key}" for key in self.shapes[0].parameters}
         shape = self.shapes[0].resized({key: value(name) for key, name in own.items()})
         varied = any(name in overrides for name in own.values())
         if self.density is not None and varied and f"{self.name}.mass" not in overrides:
@@ -91,6 +93,16 @@ class ParametricBody:
 
     def _inertia(self, mass: Scalar, tensor: Tensor) -> Any:
         return inertia_of(tensor, mass) if self.inertia is None else self.inertia
+
+
+@dataclass(frozen=True)
+class ParametricSite:
+    """A site by the name of its body; None: the world. See ``Site``."""
+
+    name: str
+    body: str | None
+    position: tuple[float, float, float]
+    orientation: tuple[float, ...]
 
 
 @dataclass(frozen=True)

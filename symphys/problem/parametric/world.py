@@ -16,7 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.model.body import Body
+from symphys.model.joints.coupling import CouplingSpec, placed_couplings
 from symphys.model.shapes import Scalar, Static
+from symphys.model.site import Site
 from symphys.model.world import Law, Pair, Side, World, points_of
 from symphys.problem.parametric.collision_filter import CollisionFilter
 from symphys.problem.parametric.joints import ParametricJoint
@@ -26,6 +28,7 @@ from symphys.problem.parametric.parts import (
     VARIABLE,
     PairRule,
     ParametricBody,
+    ParametricSite,
     ParametricStatic,
     Part,
     Value,
@@ -43,6 +46,7 @@ class ParametricWorld:
         contact: the law where nothing else is stated.
         gravity: (3,) [m/s^2].
         joints: in the file's order.
+        couplings, sites: likewise.
     """
 
     bodies: tuple[ParametricBody, ...]
@@ -51,6 +55,8 @@ class ParametricWorld:
     contact: Law
     gravity: tuple[float, float, float]
     joints: tuple[ParametricJoint, ...] = ()
+    couplings: tuple[CouplingSpec, ...] = ()
+    sites: tuple[ParametricSite, ...] = ()
 
     def parameters(self) -> dict[str, Array]:
         """Every parameter with its value: (1,), or (3,) for gravity, the size of a box and the place of a block."""
@@ -77,7 +83,18 @@ class ParametricWorld:
         statics = tuple(static.valued(value) for static in self.statics)
         places = {body.name: index for index, body in enumerate(bodies)}
         joints = tuple(joint.valued(places, value) for joint in self.joints)
-        return World(bodies, statics, self._pairs(bodies, statics, value), value("gravity"), joints)
+        return World(
+            bodies,
+            statics,
+            self._pairs(bodies, statics, value),
+            value("gravity"),
+            joints,
+            placed_couplings(self.couplings, joints),
+            tuple(
+                Site(site.name, None if site.body is None else places[site.body], site.position, site.orientation)
+                for site in self.sites
+            ),
+        )
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:

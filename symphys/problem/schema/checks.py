@@ -19,6 +19,8 @@ IDENTIFIER = "[A-Za-z][A-Za-z0-9_]*"
 MAX_IDENTIFIER = 64
 MAX_LABEL = 100
 STAGES = "[0.1, 0.01, 0]"
+LEAST_POINTS, MOST_POINTS = 4, 2000
+"""Points whose hull is a shape."""
 LEAST_SIDE = 2
 MOST_HEIGHTS = 1024
 """Each height of a terrain is in every contact with it, in every step."""
@@ -152,6 +154,20 @@ def grid(value: object) -> list[list[float]]:
         for item in row:
             if not is_number(item):
                 raise fault(f"must hold finite numbers; one in row {k} is {shown(item)}")
+    return [[float(item) for item in row] for row in rows]
+
+
+def points(value: object) -> list[list[float]]:
+    """Points [x, y, z], some and not too many."""
+    rows: list[Any] = value if isinstance(value, list) else []
+    if not rows or not all(isinstance(row, list) for row in rows):
+        raise fault("must be a list of points, each a list [x, y, z] [m]")
+    if not LEAST_POINTS <= len(rows) <= MOST_POINTS:
+        wanted = f"give {LEAST_POINTS} to {MOST_POINTS}"
+        raise fault(f"has {len(rows)} points; {wanted}, of which only those on the hull count")
+    for k, row in enumerate(rows):
+        if len(row) != 3 or not all(is_number(item) for item in row):
+            raise fault(f"point {k} must be three finite numbers [x, y, z], not {shown(row)}")
     return [[float(item) for item in row] for row in rows]
 
 

@@ -8,7 +8,7 @@ from pydantic import ConfigDict, Field
 
 from symphys.problem.schema.control import ControllerTable, SensorTable
 from symphys.problem.schema.include import MOST_INCLUDES, IncludedTable, IncludeTable
-from symphys.problem.schema.joints import JointTable
+from symphys.problem.schema.joints import CouplingTable, JointTable, SiteTable
 from symphys.problem.schema.objectives import (
     ConstraintTable,
     CostTable,
@@ -56,6 +56,8 @@ class Document(SchemaTable):
     contact: ContactTable = ContactTable()
     pair: list[PairTable] = Field(default=[])
     joint: list[JointTable] = Field(default=[])
+    coupling: list[CouplingTable] = Field(default=[])
+    site: list[SiteTable] = Field(default=[])
     sensor: list[SensorTable] = Field(default=[])
     controller: list[ControllerTable] = Field(default=[])
     variable: list[VariableTable] = Field(default=[])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field, PlainValidator, WithJsonSchema
 
@@ -25,7 +25,8 @@ class IncludeTable(SchemaTable):
 
     file: str = Field(
         min_length=1,
-        description='"robots/table_robot.toml": relative to the folder of this file, else a shipped robot of that path',
+        description='"robots/table_robot.toml": relative to the folder of this file, else a shipped robot of that path;'
+        " a model of MuJoCo (.xml) or a URDF (.urdf) becomes tables, see docs/robots.md",
     )
     position: Vector = Field(
         default=[0.0, 0.0, 0.0],
@@ -35,6 +36,16 @@ class IncludeTable(SchemaTable):
     yaw_deg: Finite = Field(default=0.0, description="turns them about the z axis of the world, with their velocities")
     prefix: Prefix = Field(
         default="", description='put before all names of that file, where they are used too: "left_" makes left_torso'
+    )
+    keyframe: str | None = Field(
+        default=None, description="of an .xml: its keyframe at which the robot begins; otherwise at its reference pose"
+    )
+    self_collision: bool = Field(
+        default=True, description="of an .xml or .urdf: whether bodies of the robot may touch each other"
+    )
+    base: Literal["auto", "free", "fixed"] = Field(
+        default="auto",
+        description='of a .urdf: whether its root link floats; "auto": see docs/robots.md',
     )
 
 

@@ -6,12 +6,14 @@ from typing import Annotated
 
 from pydantic import Field
 
+from symphys.problem.schema.shapes import UPRIGHT
 from symphys.problem.schema.types import (
     Coordinates,
     Ends,
     Finite,
     Identifier,
     NonNegative,
+    Orientation,
     Positive,
     SchemaTable,
     Vector,
@@ -63,12 +65,31 @@ class TorqueTable(SchemaTable):
     torque: Positive = Field(description="the most that it gives [N m], or [N] where the joint slides")
 
 
+class AffineTable(SchemaTable):
+    """A motor whose torque is affine in its command and in the joint's coordinate and rate.
+
+    It is gear clip(gain clip(command, command_range) + offset - kp gear q - kv gear v, force_range); q and v are the
+    joint's coordinate and its rate. MuJoCo's motor, position, velocity and general actuators are such.
+    """
+
+    gain: Finite = Field(default=1.0, description="force by command, before the gear")
+    offset: Finite = Field(default=0.0, description="force at command 0, before the gear [N m], or [N]")
+    kp: Finite = Field(default=0.0, description="by the position behind the gear [N m/rad], or [N/m]")
+    kv: Finite = Field(default=0.0, description="by the velocity behind the gear [N m s/rad], or [N s/m]")
+    gear: Finite = Field(default=1.0, description="ratio of the gear; a negative one turns the direction around")
+    command_range: Ends | None = Field(default=None, description="least and largest command; default: any")
+    force_range: Ends | None = Field(
+        default=None, description="least and largest force before the gear [N m], or [N]; default: any"
+    )
+
+
 class MotorTable(SchemaTable):
-    """One of three kinds of motors."""
+    """One of four kinds of motors."""
 
     servo: ServoTable | None = Field(default=None, description="{ gain = 20, torque = 30, velocity = 8 }")
     velocity: VelocityTable | None = Field(default=None, description="{ torque = 30, velocity = 8 }")
     torque: TorqueTable | None = Field(default=None, description="{ torque = 30 }")
+    affine: AffineTable | None = Field(default=None, description="{ gear = 150, command_range = [-1, 1] }")
 
 
 class SpringTable(SchemaTable):
@@ -77,6 +98,31 @@ class SpringTable(SchemaTable):
     stiffness: NonNegative = Field(default=0.0, description="torque per angle [N m/rad], or force per length [N/m]")
     damping: NonNegative = Field(default=0.0, description="torque per rate [N m s/rad], or force per velocity [N s/m]")
     rest: Finite = Field(default=0.0, description="where it gives nothing [rad], or [m]")
+
+
+class CouplingTable(SchemaTable):
+    """A coordinate that follows another: a gear, a parallel gripper, a joint that mimics another."""
+
+    name: Identifier = Field(description="how states refer to it")
+    joints: Annotated[list[str], Field(min_length=1, max_length=2)] = Field(
+        description="the joint that follows and the one that it follows, each with one coordinate and in one tree; one "
+        "alone is held where the polynomial says"
+    )
+    polynomial: Annotated[list[Finite], Field(min_length=1, max_length=5)] = Field(
+        default=[0.0, 1.0],
+        description="[c0, c1, c2, c3, c4]: the first coordinate is c0 + c1 q + c2 q^2 + ... of the second's q",
+    )
+
+
+class SiteTable(SchemaTable):
+    """A named point with axes on a body: formulas name its position, orientation and velocity."""
+
+    name: Identifier = Field(description="how formulas refer to it: name.position, name.orientation, name.velocity")
+    body: str = Field(description='the body that carries it, or "world"')
+    position: Vector = Field(
+        default=[0.0, 0.0, 0.0], description="from the centre of mass, in the body's frame [m]; world coordinates there"
+    )
+    orientation: Orientation = Field(default=[1.0, 0.0, 0.0, 0.0], description=UPRIGHT)
 
 
 class JointTable(SchemaTable):
@@ -116,6 +162,11 @@ class JointTable(SchemaTable):
     )
     start_deg: Coordinates | None = Field(default=None, description="the same in degrees, where the joint turns")
     spring: SpringTable | None = Field(default=None, description="{ stiffness = 5, damping = 0.1, rest = 0 }")
+    armature: NonNegative = Field(
+        default=0.0,
+        description="inertia that turns with each coordinate, as a rotor does, seen through its gear [kg m^2], or [kg]",
+    )
+    friction: NonNegative = Field(default=0.0, description="dry friction along every coordinate [N m], or [N]")
     frequency: NonNegative = Field(default=0.0, description="of a joint that gives way [Hz]; 0: rigid")
     damping: NonNegative | None = Field(default=None, description="damping ratio of a joint that gives way; default 1")
     collide: bool = Field(default=False, description="whether the two bodies may touch each other")

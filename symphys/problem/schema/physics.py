@@ -114,7 +114,10 @@ class BodyTable(MemberTable):
 
     name: Identifier = Field(description="how formulas refer to it")
     shape: ShapeTable | None = Field(default=None, description="its surface; without one it touches nothing")
-    mass: Positive | None = Field(default=None, description="of the whole body [kg]; needed unless density is given")
+    mass: NonNegative | None = Field(
+        default=None,
+        description="of the whole body [kg]; needed unless density is given; 0: a frame between two joints",
+    )
     density: Positive | None = Field(default=None, description="[kg/m^3], instead of mass, for solid shapes")
     inertia: Inertia | None = Field(
         default=None,

@@ -9,7 +9,7 @@ from pydantic import Field, PlainValidator, WithJsonSchema, create_model
 from symphys.model.shapes import SHAPES, SizeKey, Sphere
 from symphys.problem.reading.value_texts import listed
 from symphys.problem.schema import checks
-from symphys.problem.schema.types import Orientation, Positive, SchemaTable, Size, Vector
+from symphys.problem.schema.types import Orientation, Points, Positive, SchemaTable, Size, Vector
 
 MOST_PARTS = 1000
 EXAMPLES = listed([f"{{ {kind} = {shape.example} }}" for kind, shape in SHAPES.items()], "or")
@@ -19,8 +19,8 @@ UPRIGHT = "quaternion [w, x, y, z], or { roll_deg, pitch_deg, yaw_deg }"
 
 def value_of(key: SizeKey) -> Any:
     """The kind of value of a size."""
-    if key.count == 3:
-        return Size
+    if key.count != 1:
+        return Size if key.count == 3 else Points
     if not key.reason:
         return Positive
     return Annotated[

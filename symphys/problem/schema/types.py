@@ -82,6 +82,18 @@ Grid = Annotated[
         }
     ),
 ]
+Points = Annotated[
+    list[list[float]],
+    PlainValidator(checks.points),
+    WithJsonSchema(
+        {
+            "type": "array",
+            "items": vector_schema(3),
+            "minItems": checks.LEAST_POINTS,
+            "maxItems": checks.MOST_POINTS,
+        }
+    ),
+]
 Quaternion = Annotated[list[float], PlainValidator(checks.vector(4)), WithJsonSchema(vector_schema(4))]
 Numbers = Annotated[NestedList, PlainValidator(checks.nested(bound=False)), WithJsonSchema(numbers_schema())]
 Bounds = Annotated[NestedList, PlainValidator(checks.nested(bound=True)), WithJsonSchema(numbers_schema())]

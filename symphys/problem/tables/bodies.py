@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 def read_body(index: int, table: BodyTable, faults: Faults) -> ParametricBody:
     """One body; notes a mass or inertia that is missing, doubled or impossible."""
     place = ("body", index)
+    if table.mass == 0:
+        return read_frame(place, table, faults)
     before = len(faults.issues)
     shapes = read_shape(place, table.shape, faults)
     single = table.shape.sphere if table.shape else None
@@ -45,6 +47,14 @@ def read_body(index: int, table: BodyTable, faults: Faults) -> ParametricBody:
     return body
 
 
+def read_frame(place: tuple[str, int], table: BodyTable, faults: Faults) -> ParametricBody:
+    """A body without mass: a frame between two joints; notes what only bodies with mass have."""
+    given = [key for key in ("shape", "inertia", "density") if getattr(table, key) is not None]
+    if given:
+        faults.add((*place, "mass"), "must be greater than 0, not 0")
+    return ParametricBody(table.name, 0.0, None, (), False, 0.0, states(table), touching(table), table.group)
+
+
 def read_density(place: tuple[str, int], table: BodyTable, hollow: bool, faults: Faults) -> float | None:
     """The density, where the mass is given by it."""
     if (table.mass is None) == (table.density is None):
@@ -65,7 +75,7 @@ def check_inertia(place: tuple[str, int], table: BodyTable, shapes: Sequence[Sha
     elif table.shape is None:
         faults.add((*place, "inertia"), "this key is required for a body without a shape")
     elif shapes and off_centre(shapes):
-        key = "spheres" if table.shape.spheres else "parts"
+        key = next(key for key in ("spheres", "parts", "convex") if getattr(table.shape, key))
         faults.add((*place, "shape", key), f"{centring(shapes, key)}, or give inertia")
 
 

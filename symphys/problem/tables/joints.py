@@ -8,7 +8,7 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.model.joints import KINDS, Kind, Limits, Motor, Servo, Spring, TorqueMotor, VelocityMotor
+from symphys.model.joints import KINDS, AffineMotor, Kind, Limits, Motor, Servo, Spring, TorqueMotor, VelocityMotor
 from symphys.model.joints.frames import WORLD
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.reading.faults import Faults, Place
@@ -27,7 +27,11 @@ EXAMPLES = {
 
 
 def read_joints(
-    tables: Sequence[JointTable], bodies: Sequence[str], initial: Mapping[str, Array], faults: Faults
+    tables: Sequence[JointTable],
+    bodies: Sequence[str],
+    initial: Mapping[str, Array],
+    faults: Faults,
+    massless: Sequence[str] = (),
 ) -> tuple[ParametricJoint, ...]:
     """The [[joint]] tables; notes what is impossible, and loops in which nothing can move.
 
@@ -36,10 +40,21 @@ def read_joints(
         bodies: the names of the bodies.
         initial: their state at the start; see ``Problem.initial``.
         faults: gets what is wrong.
+        massless: those of the bodies that have no mass.
     """
     found = [JointReader(index, table, bodies, initial, faults).read() for index, table in enumerate(tables)]
     check_loops(found, faults)
+    check_frames(found, massless, faults)
     return tuple(joint for joint in found if joint)
+
+
+def check_frames(joints: Sequence[ParametricJoint | None], massless: Sequence[str], faults: Faults) -> None:
+    """A body without mass must be between rigid joints: what hangs on it gives it inertia."""
+    for name in massless:
+        held = [joint for joint in joints if joint and name in (joint.first, joint.second)]
+        if len(held) < 2 or any(joint.frequency for joint in held):
+            text = f"{name} has mass 0, so it must be between two rigid joints, which hold it to bodies with mass"
+            faults.add(("joint",), text)
 
 
 def check_loops(joints: Sequence[ParametricJoint | None], faults: Faults) -> None:
@@ -104,6 +119,8 @@ class JointReader:
             damping=1.0 if table.damping is None else table.damping,
             collide=table.collide,
             start=self.start(kind, limits),
+            armature=table.armature,
+            friction=table.friction,
         )
 
     def check_between(self) -> None:
@@ -135,8 +152,8 @@ class JointReader:
         """What acts along coordinates needs some."""
         if kind.coordinates:
             return
-        for key in ("motor", "limits", "limits_deg", "start", "start_deg", "spring"):
-            if getattr(self.table, key) is not None:
+        for key in ("motor", "limits", "limits_deg", "start", "start_deg", "spring", "friction"):
+            if getattr(self.table, key):
                 which = f"a {kind.name} joint has no coordinate along which it could act"
                 self.add(key, f"{which}; leave it out, or take a hinge, a slider or a universal joint")
 
@@ -153,14 +170,17 @@ class JointReader:
         if len(given) != 1:
             start = f"has {' and '.join(given)}; give only" if given else "give"
             text = "servo = { gain = 20, torque = 30, velocity = 8 }, velocity = { torque = 30, velocity = 8 }, "
-            self.add("motor", f"{start} one of {text}torque = {{ torque = 30 }}")
+            self.add("motor", f"{start} one of {text}torque = {{ torque = 30 }}, affine = {{ gear = 150 }}")
             return None
         if table.servo is not None:
             return Servo(table.servo.gain, table.servo.torque, table.servo.velocity, table.servo.range)
         if table.velocity is not None:
             return VelocityMotor(table.velocity.torque, table.velocity.velocity)
-        assert table.torque is not None
-        return TorqueMotor(table.torque.torque)
+        if table.torque is not None:
+            return TorqueMotor(table.torque.torque)
+        assert table.affine is not None
+        ranges = {key: ends_of(getattr(table.affine, key)) for key in ("command_range", "force_range")}
+        return AffineMotor(**{**dict(table.affine), **ranges})
 
     def limits(self, kind: Kind) -> Limits:
         """In rad or m."""
@@ -200,6 +220,11 @@ class JointReader:
             ):
                 self.add(key, f"{written:g} is beyond the limits of this joint")
         return values
+
+
+def ends_of(ends: Sequence[float] | None) -> tuple[float, float] | None:
+    """A range; None where there is none."""
+    return None if ends is None else (float(ends[0]), float(ends[1]))
 
 
 def read_spring(table: SpringTable | None) -> Spring | None:

@@ -114,7 +114,8 @@ def use_row(channel: Channel) -> list[Part]:
 def motor_words(motor: SceneMotor, channel: Channel) -> str:
     """Its kind and bounds."""
     speed = f", {show(motor.velocity)} {channel.unit}/s" if math.isfinite(motor.velocity) else ""
-    return f"{motor.kind}, {show(motor.torque)} {channel.torque_unit}{speed}"
+    most = f", {show(motor.torque)} {channel.torque_unit}" if math.isfinite(motor.torque) else ""
+    return f"{motor.kind}{most}{speed}"
 
 
 def share_words(channel: Channel) -> Html:

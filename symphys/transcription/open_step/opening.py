@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from symphys.errors import Issue, ProblemError, SymphysError
 from symphys.model.controllers import Net
-from symphys.model.joints import Joint, Servo, TorqueMotor
+from symphys.model.joints import AffineMotor, Joint, Servo, TorqueMotor
 from symphys.model.state_layout import input_columns, input_sizes, inputs_size
 from symphys.model.world import World
 from symphys.problem import Controller, Problem, Variable
@@ -166,6 +166,8 @@ def reach(joint: Joint, k: int) -> tuple[float, float]:
         lower, upper = joint.limits.lower, joint.limits.upper
         return -widest if lower is None else float(lower), widest if upper is None else float(upper)
     assert motor is not None, "a joint without a motor has no commands"
+    if isinstance(motor, AffineMotor):
+        return motor.command_range or (-np.inf, np.inf)
     most = float(motor.torque if isinstance(motor, TorqueMotor) else motor.velocity)
     return -most, most
 

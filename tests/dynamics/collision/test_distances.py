@@ -12,7 +12,7 @@ from meetings import PLACE, STILL, Array, Thing, met, moved_to, random_thing, ru
 from scipy.optimize import minimize
 
 from symphys.dynamics.collision.pairs.box_box import RIM
-from symphys.model.shapes import POINTS, Plane, Terrain
+from symphys.model.shapes import POINTS, SHAPES, Plane, Terrain
 
 KINDS = ("sphere", "capsule", "box")
 PAIRS = [(a, b) for a in KINDS for b in KINDS]
@@ -184,7 +184,7 @@ def test_terrain(name: str, kind: str) -> None:
 
 
 def test_every_rule_gives_the_points_that_it_announces() -> None:
-    names = {"Sphere": "sphere", "Capsule": "capsule", "Box": "box"}
+    names = {kind.__name__: name for name, kind in SHAPES.items()}
     surfaces = {"Plane": Plane.ground(), "Terrain": Terrain("t", lambda x, y: ca.SX(0))}
     for (first, second), count in POINTS.items():
         a, b = names[first.__name__], names.get(second.__name__, "")

@@ -1,0 +1,1 @@
+"""Commands on robots of other programs."""

@@ -1,0 +1,92 @@
+"""``symphys import``: another program's model of a robot as a file for ``[[include]]``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from symphys.api.robots.robot import Robot
+
+STYLES = {"taken": "green", "approximated": "yellow", "left out": "red", "recovered": "cyan"}
+"""Of findings on a terminal."""
+
+
+@click.command("import")
+@click.argument("model", metavar="MODEL", type=str)
+@click.option(
+    "--out", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help="Where to write the robot."
+)
+@click.option("--keyframe", metavar="NAME", help="The model's keyframe at which it begins; else its reference pose.")
+@click.option("--no-self-collision", is_flag=True, help="Bodies of the robot pass through each other.")
+@click.option(
+    "--base",
+    type=click.Choice(["auto", "free", "fixed"]),
+    default="auto",
+    show_default=True,
+    help="Of a URDF: whether its root link floats.",
+)
+@click.option(
+    "--assets",
+    type=click.Path(path_type=Path, file_okay=False),
+    multiple=True,
+    metavar="DIR",
+    help="A folder besides the model's own from which meshes and included files may be read. Repeatable.",
+)
+@click.option(
+    "--meshes",
+    type=click.Choice(["hull", "fit"]),
+    default="hull",
+    show_default=True,
+    help="Convex hulls, exact on planes and terrain; or spheres, boxes or capsules near them, which touch other bodies "
+    "too: some ten seconds a mesh.",
+)
+def import_robot(
+    model: str,
+    out: Path | None,
+    keyframe: str | None,
+    no_self_collision: bool,
+    base: str,
+    assets: tuple[Path, ...],
+    meshes: str,
+) -> None:
+    """Read a robot from an MJCF or URDF file, say what becomes of each of its parts, and write it as TOML.
+
+    MuJoCo does the reading, which `pip install 'symphys[robots]'` brings. The file that is written is for [[include]].
+    """
+    from symphys.api.robots.robot import load_robot
+
+    robot = load_robot(
+        model,
+        keyframe=keyframe,
+        self_collision=not no_self_collision,
+        base="free" if base == "free" else "fixed" if base == "fixed" else "auto",
+        assets=assets,
+        meshes="fit" if meshes == "fit" else "hull",
+    )
+    tell(robot)
+    if out is not None:
+        robot.save(out)
+        click.echo(f'{out}: to be included in a problem, by [[include]] with file = "{out.name}"')
+
+
+def tell(robot: Robot) -> None:
+    """Print what became of the parts of a robot: as a table on a terminal, else line by line."""
+    import sys
+
+    if not sys.stdout.isatty():
+        click.echo(str(robot))
+        return
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(title=str(robot).partition("\n")[0], title_justify="left", expand=False)
+    for heading in ("", "part", "what was done", "how far off"):
+        table.add_column(heading, overflow="fold")
+    for finding in robot.findings:
+        cells = (finding.what, finding.how, finding.amount)
+        table.add_row(Text(finding.kind, STYLES[finding.kind]), *(Text(cell) for cell in cells))
+    Console().print(table)

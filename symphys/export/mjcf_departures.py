@@ -1,0 +1,128 @@
+"""In what a model for MuJoCo departs from the world that it was written from: what is approximated or left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from symphys.export.folder import ExportError
+from symphys.export.mjcf_bodies import APART, StartState, loose_frames, nesting_joints
+from symphys.export.mjcf_equality import expressible_loop
+from symphys.export.mjcf_terrain import deviation, window
+from symphys.model.heightfield import Heightfield
+from symphys.model.joints import Servo, VelocityMotor
+from symphys.model.scalar import is_zero
+from symphys.model.shapes import Terrain
+
+LISTED = 5
+"""Names in a message."""
+Kind = Literal["approximated", "left out", "refused"]
+
+
+@dataclass(frozen=True)
+class Departure:
+    """Something that MJCF has no exact counterpart for.
+
+    Attributes:
+        kind: ``approximated`` by what is nearest; ``left out``, which is refused unless it is asked for; ``refused``.
+        what: names of joints, contacts, surfaces or sensors.
+        how: what was written instead, or what can be done.
+    """
+
+    kind: Kind
+    what: tuple[str, ...]
+    how: str
+
+    def __str__(self) -> str:
+        """In a line."""
+        return f"{self.kind}: {listed(self.what)}: {self.how}"
+
+
+def listed(names: Sequence[str]) -> str:
+    """The first few of them."""
+    more = len(names) - LISTED
+    return ", ".join(names[:LISTED]) + (f" and {more} more" if more > 0 else "")
+
+
+def require_expressible(departures: Iterable[Departure], name: str, approximate: bool) -> None:
+    """ExportError with all that has no counterpart, and what can be done."""
+    refused = [each for each in departures if each.kind == "refused" or (each.kind == "left out" and not approximate)]
+    lines = [f"{name}: MJCF cannot say this: {listed(each.what)}: {each.how}" for each in refused]
+    if any(each.kind == "left out" for each in refused):
+        lines.append("with --approximate, or approximate=True, the model is written without it")
+    if lines:
+        raise ExportError("\n".join(lines))
+
+
+def departures(start: StartState) -> list[Departure]:
+    """All of a world at its start, those with most consequence first; sensors are not among them."""
+    found = [*joint_departures(start), *contact_departures(start), *terrain_departures(start), *soft_departures(start)]
+    order = ("refused", "left out", "approximated")
+    return sorted((each for each in found if each.what), key=lambda each: order.index(each.kind))
+
+
+def joint_departures(start: StartState) -> Iterator[Departure]:
+    """Of joints and motors."""
+    world, trees = start.world, nesting_joints(start.world)
+    apart = [world.joints[k].name for k in sorted(trees) if start.gap(world.joints[k]) > APART]
+    text = "a joint that does not fit its bodies at the start; move them until its frames meet"
+    yield Departure("refused", tuple(apart), text)
+    frames = tuple(world.bodies[k].name for k in loose_frames(world))
+    yield Departure("refused", frames, "a frame without mass that is not between two joints of one chain")
+    others = [joint for k, joint in enumerate(world.joints) if k not in trees]
+    soft = [joint.name for joint in others if joint.soft and not expressible_loop(world, joint)]
+    text = "a joint that gives way, by another law than MuJoCo's; leave out its frequency"
+    yield Departure("left out", tuple(soft), text)
+    loops = [joint.name for joint in others if not joint.soft and not expressible_loop(world, joint)]
+    text = "a joint that closes a loop, which only ball, hinge and fixed joints between bodies with mass do there"
+    yield Departure("left out", tuple(loops), text)
+    driven = [joint.name for joint in world.joints if isinstance(joint.motor, Servo | VelocityMotor)]
+    text = "a motor that reaches its velocity within a step, as an actuator with a stiff gain: it sags under load"
+    yield Departure("approximated", tuple(driven), text)
+
+
+def contact_departures(start: StartState) -> Iterator[Departure]:
+    """Of the laws of contacts."""
+    contacts = {pair.name.partition(":")[0]: pair.law for pair in start.world.pairs}
+    bouncing = [name for name, law in contacts.items() if not law.soft and not is_zero(law.restitution)]
+    text = "restitution, which MuJoCo does not have; give the surfaces restitution 0"
+    yield Departure("left out", tuple(bouncing), text)
+    soft = [name for name, law in contacts.items() if law.soft]
+    text = "contact that gives way, by another law than MuJoCo's; leave out its frequency"
+    yield Departure("left out", tuple(soft), text)
+
+
+def terrain_departures(start: StartState) -> Iterator[Departure]:
+    """Of terrain: MuJoCo's height fields are triangles, and end."""
+    for static in start.world.statics:
+        if isinstance(static, Terrain):
+            grid = window(start, static)
+            off = f"triangles on the grid, off by at most {1000 * deviation(static, grid):.3g} mm"
+            if isinstance(static.height, Heightfield):
+                yield Departure("approximated", (static.name,), f"terrain as {off}; it ends at the edge of the grid")
+            else:
+                x, y = (
+                    (at, at + step * (n - 1)) for at, step, n in zip(grid.origin, grid.spacing, grid.count, strict=True)
+                )
+                area = f"x from {x[0]:g} to {x[1]:g} m, y from {y[0]:g} to {y[1]:g} m"
+                yield Departure("left out", (static.name,), f"terrain beyond {area}; there as {off}; take a grid")
+
+
+def soft_departures(start: StartState) -> Iterator[Departure]:
+    """What is rigid here and a spring with a damper there, acting over several steps; with default softness."""
+    world, trees = start.world, nesting_joints(start.world)
+    if world.pairs:
+        yield Departure("approximated", ("contacts",), "rigid here; springs and dampers there, of default softness")
+    limited = [joint.name for joint in world.joints if {"lower", "upper"} & set(joint.acting)]
+    yield Departure("approximated", tuple(limited), "limits that are rigid here and soft there")
+    rubbing = [joint.name for joint in world.joints if "friction" in joint.acting]
+    yield Departure("approximated", tuple(rubbing), "dry friction that holds still here and creeps there")
+    closing = [joint for k, joint in enumerate(world.joints) if k not in trees and expressible_loop(world, joint)]
+    loops = tuple(joint.name for joint in closing if not joint.soft)
+    yield Departure("approximated", loops, "a rigid joint that closes a loop, as an equality constraint that gives way")
+    soft = tuple(joint.name for joint in closing if joint.soft)
+    text = "a joint that gives way, as an equality constraint of the same frequency and damping ratio"
+    yield Departure("approximated", soft, text)
+    coupled = tuple(coupling.name for coupling in world.couplings)
+    yield Departure("approximated", coupled, "a coupling that is exact here and gives way there")

@@ -1,0 +1,81 @@
+"""Joints that close loops, joints that give way, and couplings, as MJCF equality constraints."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import pi
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from numpy.polynomial import Polynomial
+
+from symphys.export.mjcf_bodies import StartState, nesting_joints
+from symphys.export.mjcf_surfaces import text
+from symphys.maths import rotation
+from symphys.model.joints import Joint
+from symphys.model.joints.coupling import JointCoupling
+from symphys.model.world import World
+
+ARM = 0.05
+"""[m] from the point of a hinge to each of the two points on its axis that are held together."""
+IMPEDANCE = 1e-4
+"""The least that MuJoCo takes: the constraint is a spring and damper beside all other forces, not instead of them."""
+
+
+def expressible_loop(world: World, joint: Joint) -> bool:
+    """Whether an equality constraint holds what a joint outside of the trees holds."""
+    kinds = ("ball", "fixed") if joint.soft else ("ball", "fixed", "hinge")
+    return joint.kind.name in kinds and not any(world.bodies[k].massless for k in joint.bodies)
+
+
+def equalities(reference: StartState) -> Iterator[Element]:
+    """Of every joint that no tree holds and that has a counterpart, and of every coupling."""
+    world = reference.world
+    trees = nesting_joints(world)
+    for k, joint in enumerate(world.joints):
+        if k not in trees and expressible_loop(world, joint):
+            yield from loop(world, joint)
+    for coupling in world.couplings:
+        yield coupled(reference, coupling)
+
+
+def loop(world: World, joint: Joint) -> Iterator[Element]:
+    """A joint whose frames meet as the file has the bodies, which is where MuJoCo reads the pose that it holds.
+
+    The anchor of points that stay together is on ``body1``, that of a weld on ``body2``, which may be the world.
+    """
+    bodies = [world.bodies[k].name for k in reversed(joint.bodies)]
+    named = {f"body{k + 1}": name for k, name in enumerate(bodies)} | softness(joint)
+    on_first, on_second = joint.frames if joint.second is None else reversed(joint.frames)
+    if joint.kind.name == "fixed":
+        yield Element("weld", {"name": joint.name, **named, "anchor": text(on_second.point)})
+        return
+    point = np.array(on_first.point, float)
+    if joint.kind.name == "ball":
+        yield Element("connect", {"name": joint.name, **named, "anchor": text(point)})
+        return
+    axis = np.array(rotation.matrix(np.array(on_first.orientation, float)))[:, 0]
+    for name, way in ((joint.name, 1), (f"{joint.name}_axis", -1)):
+        yield Element("connect", {"name": name, **named, "anchor": text(point + way * ARM * axis)})
+
+
+def softness(joint: Joint) -> dict[str, str]:
+    """Of a joint that gives way: stiffness and damping by mass, which is MuJoCo's direct form."""
+    if not joint.soft:
+        return {}
+    rate = 2 * pi * joint.frequency
+    stiffness, damping = rate * rate, 2 * max(joint.damping, 1e-9) * rate
+    return {"solref": text((-stiffness, -damping)), "solimp": text((IMPEDANCE, IMPEDANCE, 1.0, 0.5, 1.0))}
+
+
+def coupled(reference: StartState, coupling: JointCoupling) -> Element:
+    """A coupling; MuJoCo counts coordinates from where they are in the file, and the polynomial with them."""
+    joints = [reference.world.joints[k] for k in (coupling.first, coupling.second) if k is not None]
+    shifts = [float(reference.values(joint)[0]) for joint in joints]
+    polynomial = Polynomial([float(c) for c in coupling.polynomial])
+    polynomial = polynomial(Polynomial([shifts[1], 1.0])) if len(shifts) > 1 else Polynomial([polynomial(0.0)])
+    numbers = np.zeros(5)
+    numbers[: len(polynomial.coef)] = polynomial.coef
+    numbers[0] -= shifts[0]
+    attributes = {f"joint{k + 1}": joint.name for k, joint in enumerate(joints)}
+    return Element("joint", {"name": coupling.name, **attributes, "polycoef": text(numbers)})

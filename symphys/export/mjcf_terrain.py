@@ -1,0 +1,112 @@
+"""Terrain as MJCF height fields: heights on a grid, triangles between them, and how far off these are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.export.mjcf_bodies import StartState
+from symphys.model.heightfield import Heightfield, weights
+from symphys.model.shapes import Terrain
+
+Array = NDArray[np.float64]
+AROUND = 10.0
+"""[m] on every side of the bodies at the start, where terrain without a grid is sampled."""
+STEP = 0.2
+"""[m] between its samples."""
+FINER = 4
+"""Parts of a spacing at which a surface is compared with its triangles."""
+THICKNESS = 1.0
+"""[m] of what is solid below the lowest height."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Where heights are read.
+
+    Attributes:
+        origin: (2,) x and y of the first height [m].
+        spacing: (2,) [m].
+        count: (2,) of heights along x and along y.
+    """
+
+    origin: tuple[float, float]
+    spacing: tuple[float, float]
+    count: tuple[int, int]
+
+
+def window(start: StartState, terrain: Terrain) -> Grid:
+    """The grid of a height field; of other terrain one around the bodies at the start."""
+    height = terrain.height
+    if isinstance(height, Heightfield):
+        return Grid(height.origin, height.spacing, (len(height.heights[0]), len(height.heights)))
+    places = np.array([start.of(k, "position")[:2] for k in range(len(start.world.bodies))])
+    low, high = np.floor(places.min(0) - AROUND), np.ceil(places.max(0) + AROUND)
+    columns, rows = np.rint((high - low) / STEP).astype(int) + 1
+    return Grid((float(low[0]), float(low[1])), (STEP, STEP), (int(columns), int(rows)))
+
+
+def sampled(terrain: Terrain, grid: Grid, finer: int = 1) -> Array:
+    """(rows, columns) [m]: heights on a grid, rows along y; with ``finer`` parts in each spacing."""
+    columns, rows = (finer * (n - 1) + 1 for n in grid.count)
+    height = terrain.height
+    if isinstance(height, Heightfield):
+        across, along = (
+            np.array(ca.horzcat(*weights(ca.DM(np.arange(n) / finer), size)))
+            for n, size in zip((columns, rows), reversed(height.coefficients.shape), strict=True)
+        )
+        return np.asarray(along @ height.coefficients @ across.T)
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    function = ca.Function("height", [x, y], [ca.densify(ca.SX(height(x, y)))])
+    xs, ys = (
+        origin + step * np.arange(n) / finer
+        for origin, step, n in zip(grid.origin, grid.spacing, (columns, rows), strict=True)
+    )
+    places = [each.reshape(1, -1) for each in np.meshgrid(xs, ys)]
+    return np.array(function(*map(ca.DM, places))).reshape(rows, columns)
+
+
+def deviation(terrain: Terrain, grid: Grid) -> float:
+    """[m]: the farthest that a surface is from the triangles on its grid, whichever way the squares are cut."""
+    fine = sampled(terrain, grid, FINER)
+    corners = fine[::FINER, ::FINER]
+    z00, z10, z01, z11 = corners[:-1, :-1], corners[:-1, 1:], corners[1:, :-1], corners[1:, 1:]
+    most = 0.0
+    for row in range(FINER + 1):
+        for column in range(FINER + 1):
+            u, v = column / FINER, row / FINER
+            there = fine[row : fine.shape[0] - FINER + row : FINER, column : fine.shape[1] - FINER + column : FINER]
+            near, far = z00 + u * (z10 - z00) + v * (z01 - z00), z11 + (1 - u) * (z01 - z11) + (1 - v) * (z10 - z11)
+            rising = z00 + (u * (z10 - z00) + v * (z11 - z10) if u >= v else v * (z01 - z00) + u * (z11 - z01))
+            falling = near if u + v <= 1 else far
+            most = max(most, float(np.abs(there - rising).max()), float(np.abs(there - falling).max()))
+    return most
+
+
+def height_field(start: StartState, terrain: Terrain) -> Element:
+    """The asset: heights between 0 and 1, and what they are multiplied with."""
+    grid = window(start, terrain)
+    heights = sampled(terrain, grid)
+    low, high = float(heights.min()), float(heights.max())
+    scaled = (heights - low) / (high - low) if high > low else np.zeros_like(heights)
+    half = [step * (n - 1) / 2 for step, n in zip(grid.spacing, grid.count, strict=True)]
+    size = [*half, high - low if high > low else 1.0, THICKNESS]
+    return Element(
+        "hfield",
+        name=terrain.name,
+        nrow=str(grid.count[1]),
+        ncol=str(grid.count[0]),
+        size=" ".join(map(repr, size)),
+        elevation=" ".join(repr(float(each)) for each in scaled[::-1].ravel()),
+    )
+
+
+def middle(start: StartState, terrain: Terrain) -> tuple[float, float, float]:
+    """(3,) [m]: where the height field stands, whose lowest point has height 0."""
+    grid = window(start, terrain)
+    x, y = (o + step * (n - 1) / 2 for o, step, n in zip(grid.origin, grid.spacing, grid.count, strict=True))
+    return x, y, float(sampled(terrain, grid).min())

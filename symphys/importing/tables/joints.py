@@ -1,0 +1,143 @@
+"""Joints of a model as [[joint]] tables, with frames between several joints of one body."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from symphys.importing.tables.links import frame_table
+from symphys.importing.tables.pose import range_of
+from symphys.importing.tables.reading import BALL, FREE, HINGE, SLIDE, ModelReading, WeldedLink, numbers
+
+KINDS = {BALL: "ball", SLIDE: "slide", HINGE: "hinge"}
+
+
+def read_joints(reading: ModelReading) -> tuple[dict[int, list[dict[str, Any]]], list[dict[str, Any]]]:
+    """(frames before each link, by its top body; [[joint]] tables)."""
+    frames, joints = dict[int, list[dict[str, Any]]](), list[dict[str, Any]]()
+    for top, link in reading.links.items():
+        if top == link.top:
+            frames[top], more = chain(reading, link)
+            joints += more
+    return frames, joints
+
+
+def chain(reading: ModelReading, link: WeldedLink) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """The frames and joints from the parent of a link to it."""
+    model, indices = reading.model, list(reading.joints_of(link.top))
+    free = [j for j in indices if model.jnt_type[j] == FREE]
+    for joint in free:
+        reading.joint_names[joint] = link.name
+        floating(reading, joint, link)
+    indices = [j for j in indices if j not in free]
+    if not indices:
+        return [], []
+    parent = reading.links.get(int(model.body_parentid[link.top]))
+    before = "world" if parent is None else parent.name
+    frames, joints = list[dict[str, Any]](), list[dict[str, Any]]()
+    for joint in indices:
+        name = reading.names.give("joint", reading.name("joint", joint), f"{link.name}_joint")
+        reading.joint_names[joint] = name
+        last = joint == indices[-1]
+        after = link.name if last else reading.names.give("frame", f"{link.name}_{name}")
+        if not last:
+            frames.append(frame_table(after, np.array(reading.data.xanchor[joint])))
+        joints.append(joint_table(reading, joint, name, (before, after)))
+        before = after
+    if parent is not None and len(indices) > 1:
+        reading.apart.append((parent.name, link.name))
+    return frames, joints
+
+
+def floating(reading: ModelReading, joint: int, link: WeldedLink) -> None:
+    """What MuJoCo lets act on a free joint and a floating body here has not."""
+    model, dof = reading.model, int(reading.model.jnt_dofadr[joint])
+    acting = {
+        "armature": model.dof_armature[dof : dof + 6],
+        "damping": model.dof_damping[dof : dof + 6],
+        "friction": model.dof_frictionloss[dof : dof + 6],
+        "stiffness": np.array([model.jnt_stiffness[joint]]),
+    }
+    for key, values in acting.items():
+        if np.any(np.asarray(values)):
+            text = "a body that floats has none"
+            reading.note("left out", f"{key} of the free {reading.called('joint', joint)}", text, f"{np.max(values):g}")
+
+
+def joint_table(reading: ModelReading, joint: int, name: str, between: tuple[str, str]) -> dict[str, Any]:
+    """One joint."""
+    model, kind = reading.model, int(reading.model.jnt_type[joint])
+    table: dict[str, Any] = {"name": name, "between": list(between)}
+    axis = numbers(np.array(reading.data.xaxis[joint]))
+    if kind == BALL:
+        table["ball"] = {}
+    else:
+        table["hinge" if kind == HINGE else "slider"] = {"axis": axis}
+    table["point"] = numbers(np.array(reading.data.xanchor[joint]))
+    dof = int(model.jnt_dofadr[joint])
+    armature, friction = float(model.dof_armature[dof]), float(model.dof_frictionloss[dof])
+    if armature:
+        table["armature"] = numbers(armature)
+    if kind == BALL:
+        ball(reading, joint, dof)
+        return table
+    if friction and not reading.off("FRICTIONLOSS"):
+        table["friction"] = numbers(friction)
+    spring = spring_of(reading, joint, dof)
+    if spring:
+        table["spring"] = spring
+    limits = limits_of(reading, joint)
+    if limits:
+        table["limits"] = limits
+    return table
+
+
+def ball(reading: ModelReading, joint: int, dof: int) -> None:
+    """What acts in a ball joint of MuJoCo and not in one here."""
+    model = reading.model
+    acting = {
+        "damping": float(model.dof_damping[dof]),
+        "friction": float(model.dof_frictionloss[dof]),
+        "stiffness": float(model.jnt_stiffness[joint]),
+        "limit": float(model.jnt_limited[joint]),
+    }
+    for key, value in acting.items():
+        if value:
+            text = "a ball joint has no coordinates along which it could act"
+            reading.note("left out", f"{key} of {reading.called('joint', joint)}", text, f"{value:g}")
+
+
+def spring_of(reading: ModelReading, joint: int, dof: int) -> dict[str, float]:
+    """Stiffness and damping; the rest is where the spring gives nothing, from the reference pose."""
+    model = reading.model
+    stiffness = 0.0 if reading.off("SPRING") else float(model.jnt_stiffness[joint])
+    damping = 0.0 if reading.off("DAMPER") else float(model.dof_damping[dof])
+    beyond = ("jnt_stiffnesspoly", joint, "stiffness"), ("dof_dampingpoly", dof, "damping")
+    for key, at, what in beyond:
+        if np.any(getattr(model, key, np.zeros(max(joint, dof) + 1))[at]):
+            text = "terms beyond the linear one have no counterpart"
+            reading.note("left out", f"nonlinear {what} of {reading.called('joint', joint)}", text)
+    found: dict[str, float] = {}
+    if stiffness:
+        found["stiffness"] = numbers(stiffness)
+        rest = float(model.qpos_spring[model.jnt_qposadr[joint]]) - reading.reference(joint)
+        if abs(rest) > 1e-15:
+            found["rest"] = numbers(rest)
+    if damping:
+        found["damping"] = numbers(damping)
+    return found
+
+
+def limits_of(reading: ModelReading, joint: int) -> list[float] | None:
+    """The range from the reference pose; an angle of half a turn and more is no bound here."""
+    model = reading.model
+    low, high = range_of(reading, joint)
+    if model.jnt_limited[joint] and not reading.off("LIMIT"):
+        ends = [float(end) - reading.reference(joint) for end in model.jnt_range[joint]]
+        wide = [f"{end:.4g}" for end, held in zip(ends, (low, high), strict=True) if not isfinite(held)]
+        if wide:
+            text = "angles lie between -pi and pi here, so such an end of its range holds nothing"
+            reading.note("left out", f"limit of {reading.called('joint', joint)}", text, f"{' and '.join(wide)} rad")
+    return numbers([low, high]) if isfinite(low) or isfinite(high) else None

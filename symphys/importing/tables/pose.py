@@ -1,0 +1,157 @@
+"""The reference pose of a model, and the start of a robot: coordinates of a keyframe, within limits, on the ground."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Any
+
+import numpy as np
+
+from symphys.importing.problem import ImportProblem
+from symphys.importing.tables.reading import BALL, FREE, HINGE, SLIDE, ModelReading, numbers
+from symphys.suggest import hint
+
+PLANE = 0
+"""MuJoCo's type of a geom that is a plane."""
+LIFTS = 3
+"""How often a robot is lifted out of the ground; the first is enough unless contacts were too many to list."""
+SUNK = 1e-4
+"""[m]: overlap with the ground that stays."""
+
+
+def keyframe(library: Any, model: Any, name: str | None, file: str) -> int | None:
+    """The index of a keyframe by its name, or by its number; ImportProblem if there is none."""
+    if name is None:
+        return None
+    names = [library.mj_id2name(model, library.mjtObj.mjOBJ_KEY, k) or str(k) for k in range(model.nkey)]
+    if name not in names:
+        raise ImportProblem(file, f"there is no keyframe {name!r}; {hint(name, names)}", "keyframe")
+    return names.index(name)
+
+
+def reference_pose(library: Any, model: Any, key: int | None) -> Any:
+    """MjData where coordinates of hinges and sliders are 0 here; what floats, and balls, as the keyframe has it."""
+    data = library.MjData(model)
+    data.qpos[:] = model.qpos0
+    if key is not None:
+        for joint in range(model.njnt):
+            start = int(model.jnt_qposadr[joint])
+            size = {FREE: 7, BALL: 4}.get(int(model.jnt_type[joint]), 0)
+            data.qpos[start : start + size] = model.key_qpos[key][start : start + size]
+    place(library, model, data)
+    return data
+
+
+def place(library: Any, model: Any, data: Any) -> None:
+    """Puts bodies where the coordinates say."""
+    library.mj_kinematics(model, data)
+    library.mj_comPos(model, data)
+
+
+def range_of(reading: ModelReading, joint: int) -> tuple[float, float]:
+    """The range of a hinge or slider from the reference pose; infinite where nothing holds it.
+
+    An angle lies between -pi and pi here, so an end of half a turn and more holds nothing.
+    """
+    model = reading.model
+    if not model.jnt_limited[joint] or reading.off("LIMIT"):
+        return -np.inf, np.inf
+    low, high = (float(end) - reading.reference(joint) for end in model.jnt_range[joint])
+    if model.jnt_type[joint] != HINGE:
+        return low, high
+    if low >= pi or high <= -pi:
+        return -np.inf, np.inf
+    return (low if low > -pi else -np.inf), (high if high < pi else np.inf)
+
+
+def starts(reading: ModelReading) -> dict[int, float]:
+    """Where hinges and sliders begin, from the reference pose: at the keyframe's coordinates, within their ranges."""
+    model, found = reading.model, dict[int, float]()
+    for joint in range(model.njnt):
+        if model.jnt_type[joint] not in (HINGE, SLIDE):
+            continue
+        low, high = range_of(reading, joint)
+        found[joint] = min(max(wanted(reading, joint), low), high)
+    return found
+
+
+def at_start(reading: ModelReading) -> Any:
+    """MjData at the start, with the contacts that there are."""
+    library, model = reading.library, reading.model
+    data = library.MjData(model)
+    data.qpos[:] = reading.data.qpos
+    for joint, value in starts(reading).items():
+        data.qpos[int(model.jnt_qposadr[joint])] += value
+    place(library, model, data)
+    library.mj_collision(model, data)
+    return data
+
+
+def lift(reading: ModelReading) -> None:
+    """Robots that float and begin below the ground are lifted onto it."""
+    model, lifted = reading.model, dict[int, float]()
+    for _ in range(LIFTS):
+        data, depths = at_start(reading), dict[int, float]()
+        for contact in data.contact:
+            joint = sunk(reading, data, contact)
+            if joint is not None:
+                depths[joint] = max(depths.get(joint, 0.0), -float(contact.dist))
+        if not depths:
+            break
+        for joint, depth in depths.items():
+            reading.data.qpos[int(model.jnt_qposadr[joint]) + 2] += depth
+            lifted[joint] = lifted.get(joint, 0.0) + depth
+        place(reading.library, model, reading.data)
+    for joint, depth in lifted.items():
+        name = reading.name("body", int(model.jnt_bodyid[joint])) or str(joint)
+        text = "the model begins below the ground; it is lifted onto it"
+        reading.note("approximated", f"start of {name}", text, f"{1e3 * depth:.3g} mm")
+
+
+def sunk(reading: ModelReading, data: Any, contact: Any) -> int | None:
+    """The free joint that holds what has sunk into a level plane; None for other contacts."""
+    model = reading.model
+    for one, other in ((contact.geom1, contact.geom2), (contact.geom2, contact.geom1)):
+        level = min(one, other) >= 0 and model.geom_type[one] == PLANE and data.geom_xmat[one][8] > 1 - 1e-9
+        if level and contact.dist < -SUNK:
+            root = int(model.body_rootid[model.geom_bodyid[other]])
+            joint = int(model.body_jntadr[root])
+            return joint if joint >= 0 and model.jnt_type[joint] == FREE else None
+    return None
+
+
+def begin(reading: ModelReading, joints: list[dict[str, Any]]) -> None:
+    """Puts the start into the tables of joints, and says what of keyframes is not there."""
+    model, by_name = reading.model, {table["name"]: table for table in joints}
+    moved, furthest = [], 0.0
+    for joint, value in starts(reading).items():
+        table = by_name.get(reading.joint_names.get(joint, ""))
+        if table is None:
+            continue
+        start = numbers(value)
+        if start:
+            table["start"] = start
+        off = abs(value - wanted(reading, joint))
+        if off > 1e-9:
+            moved.append(f"{table['name']} at {start:.4g}")
+            furthest = max(furthest, off)
+    if moved:
+        text = "the model begins beyond their limits, so they begin at these: " + ", ".join(moved)
+        reading.note("approximated", f"start of {len(moved)} joints", text, f"up to {furthest:.3g} rad or m")
+    if reading.key is None and model.nkey:
+        names = ", ".join(reading.name("key", k) or str(k) for k in range(model.nkey))
+        text = "it begins at the model's reference pose; the option keyframe chooses one of them"
+        reading.note("left out", f"keyframes {names}", text)
+    if reading.key is not None and np.any(model.key_qvel[reading.key]):
+        what = f"velocities of keyframe {reading.name('key', reading.key) or reading.key}"
+        reading.note("left out", what, "it begins at rest", f"{np.abs(model.key_qvel[reading.key]).max():g}")
+
+
+def wanted(reading: ModelReading, joint: int) -> float:
+    """Where the model itself begins, from the reference pose; an angle between -pi and pi."""
+    if reading.key is None:
+        return 0.0
+    at = int(reading.model.jnt_qposadr[joint])
+    value = float(reading.model.key_qpos[reading.key][at]) - reading.reference(joint)
+    turns = reading.model.jnt_type[joint] == HINGE and abs(value) > pi
+    return float(np.remainder(value + pi, 2 * pi) - pi) if turns else value

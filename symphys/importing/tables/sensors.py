@@ -1,0 +1,202 @@
+"""Sensors of a model whose reading a formula can say, as [[sensor]] tables."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from symphys.importing.tables.reading import HINGE, SLIDE, Array, ModelReading, WeldedLink, is_upright, numbers
+
+MEET = 1e-6
+"""[m]: an accelerometer that is farther from the centre of mass is approximated."""
+MOST_BODIES = 100
+"""Of a centre of mass that a formula says."""
+JOINTS = ("JOINTPOS", "JOINTVEL", "JOINTACTFRC")
+AXES = {"FRAMEXAXIS": "[1, 0, 0]", "FRAMEYAXIS": "[0, 1, 0]", "FRAMEZAXIS": "[0, 0, 1]"}
+
+
+def read_sensors(reading: ModelReading) -> list[dict[str, Any]]:
+    """Sensors whose reading a formula can say; the others are noted, and delays and noise are not there."""
+    tables, lost = list[dict[str, Any]](), Counter[str]()
+    for sensor in range(reading.model.nsensor):
+        kind = reading.library.mjtSensor(int(reading.model.sensor_type[sensor])).name.removeprefix("mjSENS_")
+        reads = formula(reading, sensor, kind)
+        if reads is None:
+            lost[kind.lower()] += 1
+            continue
+        name = reading.names.give("sensor", reading.name("sensor", sensor), "sensor")
+        tables.append({"name": name, "reads": reads})
+    if lost:
+        which = ", ".join(f"{count} {kind}" for kind, count in sorted(lost.items()))
+        reading.note("left out", f"sensors: {which}", "no formula says what they read")
+    return tables
+
+
+def formula(reading: ModelReading, sensor: int, kind: str) -> str | None:
+    """What a sensor reads; None where there is no word for it."""
+    model, index = reading.model, int(reading.model.sensor_objid[sensor])
+    if kind == "CLOCK":
+        return "time"
+    if kind in JOINTS:
+        return of_joint(reading, index, kind)
+    if kind in ("ACTUATORPOS", "ACTUATORVEL", "ACTUATORFRC"):
+        return of_actuator(reading, index, kind)
+    if kind in ("SUBTREECOM", "SUBTREELINVEL"):
+        return of_subtree(reading, index, "position" if kind == "SUBTREECOM" else "velocity")
+    if kind == "TOUCH":
+        return of_touch(reading, index)
+    if kind in INERTIAL:
+        return INERTIAL[kind](reading, frame_of(reading, int(reading.library.mjtObj.mjOBJ_SITE), index), index)
+    if kind.startswith("FRAME") and int(model.sensor_refid[sensor]) < 0:
+        frame = frame_of(reading, int(model.sensor_objtype[sensor]), index)
+        return None if frame is None else frame.reads(kind)
+    return None
+
+
+def of_joint(reading: ModelReading, joint: int, kind: str) -> str | None:
+    """Coordinate, rate or force of a hinge or slider."""
+    model, name = reading.model, reading.joint_names.get(joint)
+    if name is None or model.jnt_type[joint] not in (HINGE, SLIDE):
+        return None
+    if kind == "JOINTVEL":
+        return f"{name}.rate"
+    if kind == "JOINTACTFRC":
+        return f"{name}.torque" if name in reading.driven else None
+    value = f"{name}.{'angle' if model.jnt_type[joint] == HINGE else 'position'}"
+    reference = numbers(reading.reference(joint))
+    return f"{value} + {reference}" if reference else value
+
+
+def of_actuator(reading: ModelReading, actuator: int, kind: str) -> str | None:
+    """Length, velocity or force of an actuator, on its side of the gear."""
+    model, types = reading.model, reading.library.mjtTrn
+    joint, gear = int(model.actuator_trnid[actuator][0]), numbers(float(model.actuator_gear[actuator][0]))
+    if int(model.actuator_trntype[actuator]) not in (int(types.mjTRN_JOINT), int(types.mjTRN_JOINTINPARENT)):
+        return None
+    if kind == "ACTUATORFRC":
+        name = reading.joint_names.get(joint, "")
+        return f"{name}.torque / {gear}" if name in reading.driven and gear else None
+    inside = of_joint(reading, joint, "JOINTPOS" if kind == "ACTUATORPOS" else "JOINTVEL")
+    return None if inside is None else f"{gear} * ({inside})"
+
+
+def of_subtree(reading: ModelReading, body: int, field: str) -> str | None:
+    """Centre of mass of a body and all that hangs on it, or its velocity."""
+    model = reading.model
+    inside = {body}
+    for other in range(body + 1, model.nbody):
+        inside |= {other} if int(model.body_parentid[other]) in inside else set()
+    links = {reading.links[each].top: reading.links[each] for each in inside if each in reading.links}
+    whole = all(set(link.members) <= inside for link in links.values())
+    heavy = [link for link in links.values() if link.mass]
+    still = any(model.body_mass[each] and each not in reading.links for each in inside)
+    if not whole or still or not 0 < len(heavy) <= MOST_BODIES:
+        return None
+    parts = " + ".join(f"{numbers(link.mass)} * {link.name}.{field}" for link in heavy)
+    return f"({parts}) / {numbers(sum(link.mass for link in heavy))}"
+
+
+def of_touch(reading: ModelReading, site: int) -> str | None:
+    """The force on the body of a site."""
+    link = reading.links.get(int(reading.model.site_bodyid[site]))
+    if link is None or not link.mass:
+        return None
+    text = "all that presses on its body, in any direction"
+    reading.note("approximated", f"touch at {reading.called('site', site)}", text)
+    return f"norm({link.name}.contact_force)"
+
+
+@dataclass(frozen=True)
+class SensorFrame:
+    """A frame on a link.
+
+    Attributes:
+        link: with mass.
+        offset: (3,) from its centre of mass, in its axes [m].
+        orientation: (4,) in its axes.
+    """
+
+    link: WeldedLink
+    offset: Array
+    orientation: list[float]
+
+    @property
+    def arm(self) -> str:
+        """From the centre of mass to the frame, world axes; empty where both are one."""
+        offset = numbers(self.offset)
+        return f"rotate({self.link.name}.orientation, {offset})" if any(offset) else ""
+
+    def reads(self, kind: str) -> str | None:
+        """What a frame sensor reads, world axes."""
+        name = self.link.name
+        if kind == "FRAMEPOS":
+            return f"{name}.position + {self.arm}" if self.arm else f"{name}.position"
+        if kind == "FRAMELINVEL":
+            return f"{name}.velocity + cross({name}.angular_velocity, {self.arm})" if self.arm else f"{name}.velocity"
+        if kind == "FRAMEANGVEL":
+            return f"{name}.angular_velocity"
+        if kind == "FRAMEQUAT" and is_upright(self.orientation):
+            return f"{name}.orientation"
+        if kind in AXES:
+            return f"rotate({name}.orientation, rotate({self.orientation}, {AXES[kind]}))"
+        return None
+
+    def own_axes(self, vector: str) -> str:
+        """A vector in the body's axes, in those of the frame."""
+        w, x, y, z = self.orientation
+        return vector if is_upright(self.orientation) else f"rotate({[w, -x, -y, -z]}, {vector})"
+
+
+def frame_of(reading: ModelReading, kind: int, index: int) -> SensorFrame | None:
+    """The frame of a site, geom or body (of a body its inertia's); None for one that stands still."""
+    model, data, objects = reading.model, reading.data, reading.library.mjtObj
+    body, place, axes = index, data.xpos, data.xmat
+    if kind == int(objects.mjOBJ_SITE):
+        body, place, axes = int(model.site_bodyid[index]), data.site_xpos, data.site_xmat
+    elif kind == int(objects.mjOBJ_GEOM):
+        body, place, axes = int(model.geom_bodyid[index]), data.geom_xpos, data.geom_xmat
+    elif kind == int(objects.mjOBJ_BODY):
+        place, axes = data.xipos, data.ximat
+    elif kind != int(objects.mjOBJ_XBODY):
+        return None
+    link = reading.links.get(body)
+    if link is None or not link.mass:
+        return None
+    turned = link.turned(np.array(axes[index]).reshape(3, 3))
+    return SensorFrame(link, link.to_body(np.array(place[index])), turned)
+
+
+def gyro(reading: ModelReading, frame: SensorFrame | None, site: int) -> str | None:
+    """The angular velocity in the axes of a site."""
+    return None if frame is None else frame.own_axes(f"{frame.link.name}.gyro")
+
+
+def accelerometer(reading: ModelReading, frame: SensorFrame | None, site: int) -> str | None:
+    """The acceleration of the centre of mass, in the axes of a site."""
+    if frame is None:
+        return None
+    arm = float(np.linalg.norm(frame.offset))
+    if arm > MEET:
+        text = "it is at the centre of mass of its body here"
+        reading.note("approximated", f"accelerometer at {reading.called('site', site)}", text, f"{1000 * arm:.3g} mm")
+    return frame.own_axes(f"{frame.link.name}.accelerometer")
+
+
+def velocimeter(reading: ModelReading, frame: SensorFrame | None, site: int) -> str | None:
+    """The velocity of a site in its own axes."""
+    if frame is None:
+        return None
+    name, world = frame.link.name, frame.reads("FRAMELINVEL")
+    q = f"{name}.orientation"
+    return frame.own_axes(f"rotate([{q}[0], -{q}[1], -{q}[2], -{q}[3]], {world})")
+
+
+INERTIAL: dict[str, Callable[[ModelReading, SensorFrame | None, int], str | None]] = {
+    "GYRO": gyro,
+    "ACCELEROMETER": accelerometer,
+    "VELOCIMETER": velocimeter,
+}

@@ -1,0 +1,60 @@
+"""Models of gymnasium after import: MuJoCo's masses, mass matrices and free motion; rest and slopes by statics."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+mujoco = pytest.importorskip("mujoco")
+
+from imported_model import Imported, begin, grounded, imported  # noqa: E402
+from imported_statics import held, rest, slopes  # noqa: E402
+from repeats import first  # noqa: E402
+from robot_matching import Match, matched  # noqa: E402
+from robot_models import gymnasium_model  # noqa: E402
+from robot_motion import agreement_after  # noqa: E402
+
+pytestmark = pytest.mark.skipif(not gymnasium_model("ant").path.is_file(), reason="gymnasium is not installed")
+MODELS = ("half_cheetah", "ant", "hopper", "walker2d_v5", "humanoid", "reacher")
+ROUNDING = 1e-10
+
+
+@cache
+def robot(name: str) -> tuple[Imported, Match]:
+    found = imported(gymnasium_model(name), self_collision=False)
+    return found, matched(found.problem.world(), found.placed, gymnasium_model(name).reference())
+
+
+@first("name", MODELS)
+def test_masses_and_mass_matrix_at_random_poses(name: str) -> None:
+    match, rng = robot(name)[1], np.random.default_rng(0)
+    for _ in range(1 if match.model.nv > 20 else 3):
+        qpos, _ = match.random(rng)
+        mass, centre, mass_there, centre_there = match.centres(qpos)
+        assert mass == pytest.approx(mass_there, rel=ROUNDING)
+        assert np.abs(centre - centre_there).max() < ROUNDING
+        matrix = match.mass_matrix_there(qpos)
+        assert np.abs(match.mass_matrix(qpos) - matrix).max() < ROUNDING * np.abs(matrix).max()
+
+
+@first("name", ["half_cheetah", "ant", "inverted_double_pendulum"])
+def test_free_motion_is_of_second_order(name: str) -> None:
+    found = agreement_after(robot(name)[1], 0.2, batch=1)
+    assert found.steps[-1] == 0.001
+    assert found.errors[-1] < 1e-5
+    assert found.order == pytest.approx(2, abs=0.1)
+
+
+@pytest.mark.thorough
+def test_ant_stands_by_statics() -> None:
+    imported_ant, match = robot("ant")
+    found, x = rest(match, begin(match, imported_ant), grounded(gymnasium_model("ant"), imported_ant), seconds=1.0)
+    assert abs(found.support) < 1e-6
+    assert found.speed < 1e-6
+    # MuJoCo's contacts act from the margins of the geoms on, 2 cm above the ground
+    assert found.height - found.sunk_there == pytest.approx(found.height_there, abs=2e-3)
+    below, above = slopes(held(match.world), x, (0.95, 1.05))
+    assert abs(below.acceleration) < 0.1 * above.expected
+    assert above.acceleration == pytest.approx(above.expected, rel=0.01)
