@@ -29,7 +29,7 @@ from symphys.model.world import Scheme, World
 Array = NDArray[np.float64]
 G = 9.81
 DT = 0.004
-SETTLED = 3.0
+SETTLED = 8.0
 """[s] until it rests at the latest."""
 SLID = 1.0
 """[s] on a slope."""

@@ -38,17 +38,19 @@ def show(
 ) -> None:
     """Simulate the guess of a problem, or a robot by itself, and draw the motion.
 
-    A robot is a shipped one, or a file that problems may include. It falls to the ground, and motors that aim at an
-    angle or a position hold the start.
+    A robot is a shipped one, or a file that problems may include, also one of an installed package
+    (package://NAME/PATH). It falls to the ground, and motors that aim at an angle or a position hold the start.
     """
     from symphys import problems
+    from symphys.importing.packages import model_file
     from symphys.problem import is_robot, robot_alone
     from symphys.report import write_motion
     from symphys.runs import SCENE, TRAJECTORY, make_scene
     from symphys.transcription import transcribe
 
-    here = Path(source).is_file()
-    path = Path(source) if here else problems.shipped(source)
+    named = model_file(source)
+    here = named.is_file()
+    path = named if here else problems.shipped(source)
     if text:
         click.echo(path.read_text(encoding="utf-8"), nl=False)
         return

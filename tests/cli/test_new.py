@@ -66,6 +66,21 @@ def test_a_robot_of_mujoco_is_shown_with_what_was_lost(run: Run) -> None:
     assert code == 2 and "home" in err and "arm.xml" in err
 
 
+def test_a_robot_of_an_installed_package_is_shown(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("mujoco")
+    package = tmp_path / "site" / "toy_robots"
+    package.mkdir(parents=True)
+    (package / "__init__.py").touch()
+    joint = '<joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -0.2" size="0.02"/>'
+    body = f'<body name="arm" pos="0 0 1">{joint}</body>'
+    (package / "arm.xml").write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>", encoding="utf-8")
+    monkeypatch.syspath_prepend(package.parent)
+    code, out, _ = run("show", "package://toy_robots/arm.xml", "--set", "simulation.duration=0.1")
+    assert code == 0 and Path(out.strip()).is_file()
+    code, _, err = run("show", "package://toy_robots/leg.xml")
+    assert code == 2 and "no such file" in err
+
+
 def test_choices_for_robots_are_none_of_problems(run: Run) -> None:
     code, _, err = run("show", "ball_throw", "--base", "free")
     assert code == 2 and "base: for robots alone" in err

@@ -90,8 +90,8 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "jax": ("api errors transcription", "jax numpy", "rollouts and steps for JAX"),
     "env": ("api errors", "gymnasium numpy", "environments for Gymnasium"),
     "cli": (
-        "api batches codegen doctor errors export files findings problem problems report results runs solvers "
-        "suggest threads trajectory transcription verification version",
+        "api batches codegen doctor errors export files findings importing problem problems report results runs "
+        "solvers suggest threads trajectory transcription verification version",
         "click numpy rich",
         "the commands",
     ),
