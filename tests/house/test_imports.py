@@ -24,7 +24,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "files": ("errors", "numpy", "files appear at once and whole, or not at all"),
     "json_values": ("", "numpy", "tolerant readings of JSON"),
     "trajectory": ("errors suggest", "numpy", "a simulated motion as arrays"),
-    "shooting": ("", "numpy", "the shooting problem: all that a solver sees"),
+    "shooting": ("", "numpy", "what solvers see: the shooting problem, whole or step by step"),
     "maths": ("", "casadi", "rotations and smoothed primitives"),
     "model": ("errors maths suggest", "casadi numpy scipy", "what a world is, as data"),
     "dynamics": ("maths model", "casadi numpy", "one time step"),

@@ -1,0 +1,32 @@
+"""What solvers see of a problem: as one function of z, or step by step."""
+
+from symphys.shooting.shooting_problem import (
+    Array,
+    Evaluator,
+    Function,
+    Nlp,
+    ScenarioEvaluator,
+    ScenarioSamples,
+    ShootingProblem,
+    Values,
+    VariableBlock,
+    WithoutResiduals,
+)
+from symphys.shooting.staged_problem import Expansion, Linearized, StagedMotion, StagedProblem
+
+__all__ = [
+    "Array",
+    "Evaluator",
+    "Expansion",
+    "Function",
+    "Linearized",
+    "Nlp",
+    "ScenarioEvaluator",
+    "ScenarioSamples",
+    "ShootingProblem",
+    "StagedMotion",
+    "StagedProblem",
+    "Values",
+    "VariableBlock",
+    "WithoutResiduals",
+]

@@ -1,0 +1,143 @@
+"""A problem step by step: what methods see that use the structure of time.
+
+States live on a manifold (orientations are quaternions, joints bind bodies), so a state ``x`` (nx,) is never added to:
+small changes of it are ``n`` numbers in the robot's own coordinates, its tangent, and ``retract`` and ``difference``
+lead there and back. The tangent holds all that a step carries on: places, velocities, and the forces from which the
+next step's sweeps begin. So a linearisation is that of the real step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Sparse = Any
+"""scipy.sparse.csr_array"""
+
+
+@dataclass(frozen=True)
+class StagedMotion:
+    """A rollout, state by state.
+
+    Attributes:
+        z: (len(z),) decision vector.
+        x: (N + 1, nx) states.
+        u: (N, m) inputs of all steps, as the variables give them.
+        smoothing: at which it was simulated.
+    """
+
+    z: Array
+    x: Array
+    u: Array
+    smoothing: float
+
+
+@dataclass(frozen=True)
+class Linearized:
+    """Slopes of all steps about a motion, in tangents of its states.
+
+    Attributes:
+        a: (N, n, n) the next state by the state.
+        b: (N, n, m) the next state by the inputs.
+        c: (N, n, s) the next state by the static entries of z, without what these do to the first state.
+        start: (n, s) the first state by the static entries of z.
+    """
+
+    a: Array
+    b: Array
+    c: Array
+    start: Array
+
+
+@dataclass(frozen=True)
+class Expansion:
+    """The augmented objective about a motion, to second order: of state k and inputs k, and of the static entries.
+
+    Second derivatives are those of Gauss and Newton for squares, and made positive semidefinite for other costs.
+
+    Attributes:
+        value: the augmented objective.
+        x, xx: (N + 1, n) and (N + 1, n, n).
+        u, uu, ux: (N, m), (N, m, m) and (N, m, n).
+        s, ss: (s,) and (s, s).
+        sx, su: (N + 1, s, n) and (N, s, m).
+    """
+
+    value: float
+    x: Array
+    xx: Array
+    u: Array
+    uu: Array
+    ux: Array
+    s: Array
+    ss: Array
+    sx: Array
+    su: Array
+
+
+class StagedProblem(Protocol):
+    """A problem whose horizon is a chain of N equal steps.
+
+    Attributes:
+        steps: N.
+        state_size, tangent_size, input_size: nx, n and m.
+        statics: (s,) the entries of z that are no knots of a control: initial states, parameters.
+        weights: (N * m, len(z)) such that u = weights @ z, step after step; 0 for static entries.
+        lower, upper: (c,) bounds of the limits: the problem's constraints, in their order.
+        squares: whether every cost is a sum of squares.
+    """
+
+    steps: int
+    state_size: int
+    tangent_size: int
+    input_size: int
+    statics: Indices
+    weights: Sparse
+    lower: Array
+    upper: Array
+    squares: bool
+
+    def start(self, Z: Array) -> Array:
+        """(B, len(z)) -> (B, nx): first states."""
+        ...
+
+    def step(self, k: int, X: Array, U: Array, Z: Array, smoothing: float) -> Array:
+        """(B, nx), (B, m), (B, len(z)) -> (B, nx): states after step k."""
+        ...
+
+    def roll_out(self, z: Array, smoothing: float) -> StagedMotion:
+        """The motion of (len(z),)."""
+        ...
+
+    def linearize(self, motion: StagedMotion) -> Linearized:
+        """Slopes of all steps."""
+        ...
+
+    def retract(self, X: Array, D: Array) -> Array:
+        """(B, nx), (B, n) -> (B, nx): the states that are so far from others; places, velocities, forces."""
+        ...
+
+    def difference(self, X: Array, Y: Array) -> Array:
+        """(B, nx), (B, nx) -> (B, n): the inverse: D with retract(X, D) = Y."""
+        ...
+
+    def measure(self, Z: Array, X: Array, U: Array) -> tuple[Array, Array]:
+        """(B, len(z)), (B, N + 1, nx), (B, N, m) -> objectives (B,) and limits (B, c)."""
+        ...
+
+    def expand(self, motion: StagedMotion, multipliers: Array, penalties: Array) -> Expansion:
+        """The objective and, for each limit g within [lower, upper], its augmented Lagrangian.
+
+        That is penalty / 2 times the squared distance of g + multiplier / penalty from the bounds; ``multipliers`` and
+        ``penalties`` are (c,), and a penalty of 0 leaves a limit out.
+        """
+        ...
+
+    def limit_slopes(self, motion: StagedMotion) -> tuple[Array, Sparse, Sparse, Sparse]:
+        """Limits (c,), and their slopes by all states (c, (N + 1) * n), inputs (c, N * m) and static entries (c, s)."""
+        ...
