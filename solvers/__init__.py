@@ -20,6 +20,7 @@ from symphys.solvers.core.outcome import Counts, Keep, Monitor, Outcome, StageRe
 from symphys.solvers.methods.cma_es import CMA, CmaOptions
 from symphys.solvers.methods.evolution import EVOLUTION, EvolutionOptions
 from symphys.solvers.methods.gradient import GRADIENT, GradientOptions
+from symphys.solvers.methods.ilqr import ILQR, IlqrOptions
 from symphys.solvers.methods.ipopt import IPOPT, IpoptOptions
 from symphys.solvers.methods.least_squares import LEAST_SQUARES, LeastSquaresOptions
 from symphys.solvers.methods.stochastic import STOCHASTIC, StochasticOptions
@@ -30,6 +31,7 @@ __all__ = [
     "Counts",
     "EvolutionOptions",
     "GradientOptions",
+    "IlqrOptions",
     "IpoptOptions",
     "Keep",
     "LeastSquaresOptions",
@@ -46,7 +48,7 @@ __all__ = [
 ]
 
 SOLVERS: dict[str, Solver[Any]] = {
-    each.name: each for each in (GRADIENT, LEAST_SQUARES, IPOPT, CMA, STOCHASTIC, EVOLUTION)
+    each.name: each for each in (GRADIENT, LEAST_SQUARES, IPOPT, ILQR, CMA, STOCHASTIC, EVOLUTION)
 }
 solve_together = solve_multi_start
 """Deprecated: the old name of ``solve_multi_start``."""

@@ -64,6 +64,7 @@ class Expansion:
         value: the augmented objective.
         x, xx: (N + 1, n) and (N + 1, n, n).
         u, uu, ux: (N, m), (N, m, m) and (N, m, n).
+        uy: (N, m, n) by inputs k and by the state after them, k + 1.
         s, ss: (s,) and (s, s).
         sx, su: (N + 1, s, n) and (N, s, m).
     """
@@ -74,6 +75,7 @@ class Expansion:
     u: Array
     uu: Array
     ux: Array
+    uy: Array
     s: Array
     ss: Array
     sx: Array
@@ -89,6 +91,7 @@ class StagedProblem(Protocol):
         statics: (s,) the entries of z that are no knots of a control: initial states, parameters.
         weights: (N * m, len(z)) such that u = weights @ z, step after step; 0 for static entries.
         lower, upper: (c,) bounds of the limits: the problem's constraints, in their order.
+        penalties: (c,) the weights of their squared violations in the merit.
         squares: whether every cost is a sum of squares.
     """
 
@@ -100,6 +103,7 @@ class StagedProblem(Protocol):
     weights: Sparse
     lower: Array
     upper: Array
+    penalties: Array
     squares: bool
 
     def start(self, Z: Array) -> Array:

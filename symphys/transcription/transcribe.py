@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from time import perf_counter
 
 from symphys.codegen.backends import BEST, BackendSource, choose
@@ -16,6 +17,7 @@ from symphys.transcription.program import rollout_program
 from symphys.transcription.randomization import with_scenarios
 from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.shared_kernel import inputs_of, shared_backend
+from symphys.transcription.staged.staged_problem import RolloutStages
 from symphys.transcription.transcription import Transcription
 
 
@@ -65,5 +67,6 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
         smoothing=problem.simulation.smoothing,
         stop_when_met=problem.stop_when_met,
         output_names=tuple(output.label for output in problem.outputs),
+        staged=cache(lambda: RolloutStages(rollout, backend, threads)),
     )
     return Transcription(problem, rollout, asked, functions, shooting, chosen.description, built)

@@ -1,0 +1,257 @@
+"""Control-limited DDP with Gauss-Newton Hessians: Newton steps along the structure of time, with feedback."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from symphys.shooting import ShootingProblem, StagedMotion, StagedProblem
+from symphys.solvers.core.checkpoint import revive
+from symphys.solvers.core.convergence import Progress, converged, not_finite, stationary
+from symphys.solvers.core.driver import iterating, make_solver
+from symphys.solvers.core.evaluator import CountingEvaluator
+from symphys.solvers.core.interface import Iteration, Method, StageContext
+from symphys.solvers.core.options import SolverOptions, at_least, require
+from symphys.solvers.core.outcome import Array, Counts, Status, StopReason
+from symphys.solvers.core.point import Point
+from symphys.solvers.ddp.backward_pass import Bounds, Policy, backward_pass
+from symphys.solvers.ddp.forward_pass import Motions, forward_pass
+from symphys.solvers.ddp.knots import KnotStep, knot_steps
+
+LENGTHS = 0.5 ** np.arange(8.0)
+"""Step lengths that are tried side by side."""
+WORTH = 1e-4
+"""A step must reach this share of the expected fall."""
+STIFFEST, SOFTEST = 1e12, 1e-12
+"""Of the damping."""
+LESS_VIOLATED = 0.25
+"""If the violation has not fallen to this share of itself, the penalty grows."""
+NO_STEPS = "ilqr needs a problem that can be seen step by step: take gradient, ipopt or cma"
+STALLED = "no step lowers the objective: a kink (smoothing above 0 rounds it), or good enough"
+SLOW = "the objective hardly falls any more: a kink (smoothing above 0 rounds it), or good enough"
+BUDGET = "the iterations are used up: raise `iterations`"
+
+
+@dataclass(frozen=True)
+class IlqrOptions(SolverOptions):
+    """Options of iLQR.
+
+    Attributes:
+        iterations: linearisations at most, in each stage of smoothing.
+        damping: first lambda, as a share of the mean curvature of the first step's knots.
+        tolerance: converged where the expected fall is below tolerance * (1 + |objective|).
+        patience: stalled where the objective has not fallen by 1e-5 of itself in so many iterations; 0 goes on.
+        penalty: first penalty of the constraints, as a factor on their own.
+        growth: factor on the penalty where constraints do not come nearer.
+    """
+
+    iterations: int = 300
+    damping: float = 1e-4
+    tolerance: float = 1e-9
+    patience: int = 20
+    penalty: float = 1.0
+    growth: float = 10.0
+
+    def __post_init__(self) -> None:
+        """ValueError that names the option and what would be valid."""
+        super().__post_init__()
+        at_least(0, iterations=self.iterations, tolerance=self.tolerance, patience=self.patience)
+        require(0 < self.damping < math.inf, "damping", "above 0")
+        require(0 < self.penalty < math.inf, "penalty", "above 0")
+        require(1 < self.growth < math.inf, "growth", "above 1")
+
+
+@dataclass(frozen=True)
+class IlqrState:
+    """Between two iterations.
+
+    Attributes:
+        iteration: of this stage.
+        z: (len(z),).
+        value: of the augmented objective there.
+        damping, growth: lambda, and the factor on it after a step that is refused.
+        multipliers, penalties: (c,) of the limits.
+        violated: the largest violation when the multipliers were set.
+        settled: whether the last step of these multipliers found nothing to gain.
+        progress: of the objective.
+    """
+
+    iteration: int
+    z: Array
+    value: float
+    damping: float
+    growth: float
+    multipliers: Array
+    penalties: Array
+    violated: float
+    settled: bool
+    progress: Progress
+
+
+class Ilqr(Method[IlqrState]):
+    """The method, see ``interface.Method``. Nothing is drawn: the seed acts through the start alone."""
+
+    def __init__(self, context: StageContext, options: IlqrOptions) -> None:
+        """For one stage."""
+        self.evaluator: CountingEvaluator = context.evaluator
+        self.start, self.options = context.start, options
+
+    @cached_property
+    def staged(self) -> StagedProblem:
+        """The problem, step by step."""
+        make = self.evaluator.problem.staged
+        assert make is not None, "refusal() has looked"
+        return make()
+
+    @cached_property
+    def knots(self) -> list[KnotStep]:
+        """Of the steps."""
+        return knot_steps(self.staged)
+
+    def init(self) -> Iteration[IlqrState] | StopReason:
+        """Roll the guess out."""
+        point = self.evaluator.value(self.start)
+        if not point.finite:
+            return not_finite(point)
+        limits = len(self.staged.lower)
+        penalties = 2 * self.options.penalty * self.staged.penalties
+        state = IlqrState(
+            0, point.z, math.nan, self.options.damping, 2.0, np.zeros(limits), penalties, math.inf, False,
+            Progress(point.merit),
+        )  # fmt: skip
+        value = float(self._values(state, self._single(point.z))[0])
+        return self._iteration(point, replace(state, value=value), math.nan, math.nan)
+
+    def step(self, state: IlqrState) -> Iteration[IlqrState] | StopReason:
+        """Linearise, then make the best of the steps that the policy suggests; lambda grows until there is one."""
+        motion = self._motion(state.z)
+        slopes = self.staged.linearize(motion)
+        costs = self.staged.expand(motion, state.multipliers, state.penalties)
+        self.evaluator.counter.add(Counts(jacobians=1))
+        damping, growth = state.damping, state.growth
+        while damping <= STIFFEST:
+            policy = backward_pass(slopes, costs, self.knots, self.staged.statics, self._room(state.z), damping)
+            if policy is not None:
+                if -policy.first <= self.options.tolerance * (1 + abs(state.value)):
+                    return self._settle(state, policy)
+                taken = self._search(state, motion, policy)
+                if taken is not None:
+                    z, value, length = taken
+                    softer = damping / growth if length > 0.3 else damping
+                    after = replace(state, z=z, value=value, damping=max(SOFTEST, softer), growth=2.0)
+                    return self._advance(state, after, policy)
+            damping, growth = damping * growth, 2 * growth
+        return StopReason(Status.STALLED, STALLED)
+
+    def terminate(self, state: IlqrState) -> StopReason | None:
+        """Whether nothing is to be gained, the budget used up, or the descent gets nowhere."""
+        if state.settled:
+            point = self.evaluator.value(state.z)
+            return (
+                converged(self.evaluator)
+                if len(self.staged.lower)
+                else stationary(self.evaluator, state.z, point.merit)
+            )
+        if state.iteration >= self.options.iterations:
+            return StopReason(Status.BUDGET, BUDGET)
+        return StopReason(Status.STALLED, SLOW) if state.progress.quiet >= (self.options.patience or math.inf) else None
+
+    def resume(self, saved: dict[str, Any]) -> IlqrState:
+        """See ``Method``."""
+        return revive(IlqrState, saved, Progress)
+
+    def _advance(self, before: IlqrState, after: IlqrState, policy: Policy) -> Iteration[IlqrState] | StopReason:
+        """The state after a step, with its point."""
+        point = self.evaluator.value(after.z)
+        if not point.finite:
+            return not_finite(point)
+        state = replace(after, iteration=before.iteration + 1, progress=before.progress.after(after.value))
+        norm = self.evaluator.stationarity(before.z, policy.gradient)
+        return self._iteration(point, state, norm, float(np.linalg.norm(after.z - before.z)))
+
+    def _settle(self, state: IlqrState, policy: Policy) -> Iteration[IlqrState] | StopReason:
+        """Nothing to gain with these multipliers: set them anew, or end."""
+        point = self.evaluator.value(state.z)
+        norm = self.evaluator.stationarity(state.z, policy.gradient)
+        after = replace(state, iteration=state.iteration + 1, settled=True)
+        if not len(self.staged.lower):
+            return self._iteration(point, after, norm, 0.0)
+        limits = self._limits(self._single(state.z))[0]
+        violation = self._beyond(limits, np.zeros_like(limits), np.ones_like(limits))
+        largest = float(np.abs(violation).max())
+        worst = self.evaluator.problem.violation(point.errors)
+        if worst == 0.0 and largest >= LESS_VIOLATED * state.violated:
+            return self._iteration(point, after, norm, 0.0)
+        multipliers = state.penalties * self._beyond(limits, state.multipliers, state.penalties)
+        grown = state.penalties * (self.options.growth if largest > LESS_VIOLATED * state.violated else 1.0)
+        after = replace(after, multipliers=multipliers, penalties=grown, violated=largest, settled=False)
+        value = float(self._values(after, self._single(state.z))[0])
+        after = replace(after, value=value, progress=Progress(value))
+        return self._iteration(point, after, norm, 0.0)
+
+    def _search(self, state: IlqrState, motion: StagedMotion, policy: Policy) -> tuple[Array, float, float] | None:
+        """The lowest of the motions of all step lengths: z, value and length; None where none is low enough."""
+        bounds = self.evaluator.lower, self.evaluator.upper
+        motions = forward_pass(self.staged, motion, policy, self.knots, LENGTHS, bounds)
+        self.evaluator.counter.add(Counts(rollouts=len(LENGTHS)))
+        values = self._values(state, motions)
+        values[~np.isfinite(values)] = math.inf
+        best = int(values.argmin())
+        expected = -(LENGTHS * policy.first + LENGTHS**2 * policy.second)[best]
+        if state.value - values[best] < WORTH * max(expected, 0.0) or values[best] >= state.value:
+            return None
+        self._kept = motions.motion(best, motion.smoothing)
+        return motions.z[best].copy(), float(values[best]), float(LENGTHS[best])
+
+    def _motion(self, z: Array) -> StagedMotion:
+        """The motion of z; that of the last step is known."""
+        if self._kept is None or not np.array_equal(self._kept.z, z):
+            self._kept = self.staged.roll_out(z, self.evaluator.smoothing)
+        return self._kept
+
+    _kept: StagedMotion | None = None
+
+    def _single(self, z: Array) -> Motions:
+        motion = self._motion(z)
+        return Motions(z[None], motion.x[None], motion.u[None])
+
+    def _limits(self, motions: Motions) -> Array:
+        """(B, c)."""
+        return self.staged.measure(*motions)[1]
+
+    def _values(self, state: IlqrState, motions: Motions) -> Array:
+        """(B,) the augmented objective."""
+        objective, limits = self.staged.measure(*motions)
+        beyond = self._beyond(limits, state.multipliers, state.penalties)
+        return np.asarray(objective + np.sum(state.penalties * beyond**2, axis=1) / 2)
+
+    def _beyond(self, limits: Array, multipliers: Array, penalties: Array) -> Array:
+        """How far limits, shifted by their multipliers, lie outside of their bounds."""
+        moved = limits + multipliers / penalties
+        return np.asarray(moved - np.clip(moved, self.staged.lower, self.staged.upper))
+
+    def _room(self, z: Array) -> Bounds:
+        evaluator = self.evaluator
+        return Bounds(evaluator.lower - z, evaluator.upper - z, evaluator.scale)
+
+    def _iteration(self, point: Point, state: IlqrState, norm: float, step: float) -> Iteration[IlqrState]:
+        return Iteration(state, point, norm, step)
+
+
+def refusal(problem: ShootingProblem) -> str:
+    """Why the solver is not for a problem."""
+    return NO_STEPS if problem.staged is None else ""
+
+
+ILQR = make_solver(
+    "ilqr",
+    "differential dynamic programming within bounds, for controls over time",
+    IlqrOptions,
+    iterating(Ilqr),
+    refusal=refusal,
+    constraints=True,
+)
