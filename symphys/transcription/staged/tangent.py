@@ -1,0 +1,255 @@
+"""The tangent of a state: the numbers by which states can differ, places and velocities first, forces last.
+
+Of each kinematic tree its coordinates and then their rates (``tree_chart``); of each other body its position, a rotation
+vector (world frame), velocity and angular velocity; then what carries on as it is: forces of pairs, joints and
+couplings, the torque (3) with which contacts act on each body that has pairs, ``lag`` if impacts cut steps, and what
+sensors remember. All reactions of bodies follow from these. A step leaves its trees' joints closed to rounding, so that
+nothing of its state is lost; what an initial state is off them is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from symphys.dynamics.context import make_context
+from symphys.dynamics.joints.warm_start import add_joint_forces
+from symphys.dynamics.prediction import bodies_of
+from symphys.dynamics.step import splits_of
+from symphys.maths import rotation
+from symphys.model.joints import kinematic_trees
+from symphys.model.state_layout import BODY_FIELDS, Layout
+from symphys.transcription.rollout import Rollout
+from symphys.transcription.staged.tree_chart import Moving, Pose, TreeChart
+
+Array = NDArray[np.float64]
+Expr = Any
+"""casadi SX"""
+Parts = Mapping[str, Expr]
+"""Of a state, by the names of ``Layout``."""
+POSES, VELOCITIES, REACTIONS = BODY_FIELDS[:2], BODY_FIELDS[2:4], BODY_FIELDS[4:]
+
+
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """The tangent of a rollout's states.
+
+    States are (nx,), with what sensors remember at their end; tangents are (n,). ``p`` (np,) are the rollout's
+    parameters: they matter where a variable moves a joint.
+    """
+
+    rollout: Rollout
+
+    @cached_property
+    def size(self) -> int:
+        """N."""
+        return len(self.names)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """What each number is: ``torso.position[0]``, ``knee.coordinate[0]``, ``knee.rate[0]``, ``foot.force[2]``."""
+        found = []
+        for (index, chart), kinds in ((each, kinds) for each in self._charts for kinds in ("coordinate", "rate")):
+            fields = ("position", "turn") if kinds == "coordinate" else ("velocity", "angular_velocity")
+            for link in chart.tree.links if chart else ():
+                if link.joint is None:
+                    body = self.rollout.world.bodies[link.body].name
+                    found += [f"{body}.{field}[{k}]" for field in fields for k in range(3)]
+                else:
+                    joint = self.rollout.world.joints[link.joint].name
+                    found += [f"{joint}.{kinds}[{k}]" for k in range(link.count)]
+            if chart is None:
+                body = self.rollout.world.bodies[index].name
+                found += [f"{body}.{field}[{k}]" for field in fields for k in range(3)]
+        return (*found, *(f"{name}[{k}]" for name, size in self._carried for k in range(size)))
+
+    @cached_property
+    def retraction(self) -> ca.Function:
+        """(x, d, p) -> the state that is so far from x."""
+        x, d, p = ca.SX.sym("x", self._layout_size), ca.SX.sym("d", self.size), self._p
+        return ca.Function("retract", [x, d, p], [ca.densify(ca.cse(self._retracted(x, d)))])
+
+    @cached_property
+    def distance(self) -> ca.Function:
+        """(x, y, p) -> d with retract(x, d) = y."""
+        x, y, p = ca.SX.sym("x", self._layout_size), ca.SX.sym("y", self._layout_size), self._p
+        return ca.Function("difference", [x, y, p], [ca.densify(ca.cse(self._difference(x, y)))])
+
+    @cached_property
+    def basis(self) -> ca.Function:
+        """(x, p) -> (nx, n) how retract(x, d) changes with d, at d = 0."""
+        x, d, p = ca.SX.sym("x", self._layout_size), ca.SX.sym("d", self.size), self._p
+        slope = ca.substitute(ca.jacobian(self.retraction(x, d, p), d), d, ca.SX.zeros(self.size))
+        return ca.Function("basis", [x, p], [ca.cse(slope)])
+
+    @cached_property
+    def projection(self) -> ca.Function:
+        """(x, p) -> (n, nx) how difference(x, y) changes with y, at y = x."""
+        x, y, p = ca.SX.sym("x", self._layout_size), ca.SX.sym("y", self._layout_size), self._p
+        slope = ca.substitute(ca.jacobian(self.distance(x, y, p), y), y, x)
+        return ca.Function("projection", [x, p], [ca.cse(slope)])
+
+    def retract(self, X: ArrayLike, D: ArrayLike, p: ArrayLike | None = None) -> Array:
+        """(B, nx), (B, n) -> (B, nx): the states that are so far from others; ``p``: of all, None: as the guess has it."""
+        return self._batch(self.retraction, (X, D), p)
+
+    def difference(self, X: ArrayLike, Y: ArrayLike, p: ArrayLike | None = None) -> Array:
+        """(B, nx), (B, nx) -> (B, n): D with retract(X, D) = Y."""
+        return self._batch(self.distance, (X, Y), p)
+
+    def _batch(self, function: ca.Function, rows: tuple[ArrayLike, ArrayLike], p: ArrayLike | None) -> Array:
+        first, second = (np.asarray(each, float) for each in rows)
+        given = np.array(ca.vertcat(ca.DM(0, 1), *self.rollout.parameters.nominal)).ravel() if p is None else p
+        if not len(first):
+            return np.zeros((0, function.size1_out(0)))
+        mapped = function.map(len(first))
+        return np.ascontiguousarray(np.array(mapped(first.T, second.T, ca.repmat(ca.DM(given), 1, len(first)))).T)
+
+    @property
+    def _p(self) -> Expr:
+        return ca.vertcat(ca.SX(0, 1), *self.rollout.parameters.symbols)
+
+    @property
+    def _layout_size(self) -> int:
+        """Nx."""
+        return self.rollout.memory.size
+
+    @cached_property
+    def _layout(self) -> Layout:
+        return Layout(self.rollout.world)
+
+    @cached_property
+    def _charts(self) -> tuple[tuple[int, TreeChart | None], ...]:
+        """Of each tree, then of each body that is in none, with its index or that of the root."""
+        world = self.rollout.world
+        trees = kinematic_trees(world.joints)
+        held = {body for tree in trees for body in tree.bodies}
+        free = ((i, None) for i in range(len(world.bodies)) if i not in held)
+        return (*((tree.root, TreeChart(tree, world.joints)) for tree in trees), *free)
+
+    @cached_property
+    def _raw(self) -> tuple[tuple[str, int], ...]:
+        """Parts of the world's state that carry on as they are, and how many numbers each has."""
+        world, scheme = self.rollout.world, self.rollout.problem.simulation.scheme()
+        of_bodies = {f"{body.name}.{field}" for body in world.bodies for field, _ in BODY_FIELDS}
+        names = [name for name in self._layout.names() if name not in of_bodies and name != "lag"]
+        if splits_of(world, scheme):
+            names.append("lag")
+        parts = [(name, self._layout[name]) for name in names]
+        return tuple((name, part.stop - part.start) for name, part in parts)
+
+    @cached_property
+    def _touching(self) -> tuple[str, ...]:
+        """Names of the bodies on which contacts act."""
+        world = self.rollout.world
+        indices = {i for pair in world.pairs for i in bodies_of(pair)}
+        return tuple(body.name for i, body in enumerate(world.bodies) if i in indices)
+
+    @cached_property
+    def _carried(self) -> tuple[tuple[str, int], ...]:
+        """All numbers after coordinates and rates, by name."""
+        torques = tuple((f"{name}.reaction_torque", 3) for name in self._touching)
+        memory = self._layout_size - self._layout.size
+        return (*self._raw, *torques, *((("memory", memory),) if memory else ()))
+
+    def _retracted(self, x: Expr, d: Expr) -> Expr:
+        old, cursor = self._parts(x), _Cursor(d)
+        new = dict(old)
+        for index, chart in self._charts:
+            bodies = (index,) if chart is None else chart.tree.bodies
+            poses, moving = ({i: self._pair(old, i, fields) for i in bodies} for fields in (POSES, VELOCITIES))
+            if chart is None:
+                (p, q), (v, w) = poses[index], moving[index]
+                shift, turn, speed, spin = (cursor.take(3) for _ in range(4))
+                moved = {index: (p + shift, rotation.multiply(rotation.exponential(turn), q))}
+                after = {index: (v + speed, w + spin)}
+            else:
+                moved = chart.moved(poses, cursor.take(chart.tree.size))
+                after = _carried_on(chart, poses, moving, moved, cursor.take(chart.tree.size))
+            for i in bodies:
+                self._put(new, i, POSES, moved[i])
+                self._put(new, i, VELOCITIES, after[i])
+        for name, size in self._raw:
+            new[name] = old[name] + cursor.take(size)
+        torques = {name: cursor.take(3) for name in self._touching}
+        for body, before, after in zip(self.rollout.world.bodies, self._given(old), self._given(new), strict=True):
+            for (field, _), a, b in zip(REACTIONS, before, after, strict=True):
+                new[f"{body.name}.{field}"] = old[f"{body.name}.{field}"] + (b - a)
+        for name, torque in torques.items():
+            new[f"{name}.reaction_torque"] += torque
+        return ca.vertcat(self._layout.pack(new), x[self._layout.size :] + d[cursor.at :])
+
+    def _difference(self, x: Expr, y: Expr) -> Expr:
+        old, new = self._parts(x), self._parts(y)
+        found: list[Expr] = []
+        for index, chart in self._charts:
+            bodies = (index,) if chart is None else chart.tree.bodies
+            places = [{i: self._pair(state, i, POSES) for i in bodies} for state in (old, new)]
+            moving = [{i: self._pair(state, i, VELOCITIES) for i in bodies} for state in (old, new)]
+            if chart is None:
+                (p, q), (r, s) = places[0][index], places[1][index]
+                found += [r - p, rotation.between(q, s)]
+                found += [b - a for a, b in zip(moving[0][index], moving[1][index], strict=True)]
+            else:
+                rates = [chart.rates(*each) for each in zip(places, moving, strict=True)]
+                found += [chart.apart(*places), rates[1] - rates[0]]
+        found += [new[name] - old[name] for name, _ in self._raw]
+        given = dict(zip((b.name for b in self.rollout.world.bodies), zip(self._given(old), self._given(new)), strict=True))
+        for name in self._touching:
+            field = f"{name}.reaction_torque"
+            found.append(new[field] - old[field] - (given[name][1][1] - given[name][0][1]))
+        return ca.vertcat(ca.SX(0, 1), *found, y[self._layout.size :] - x[self._layout.size :])
+
+    def _given(self, state: Parts) -> list[tuple[Expr, Expr]]:
+        """Force and torque on each body as far as other parts of the state tell them: joints', and forces of pairs."""
+        world = self.rollout.world
+        total = [(ca.SX.zeros(3), ca.SX.zeros(3)) for _ in world.bodies]
+        for pair in world.pairs:
+            sides = [(side.body, sign) for side, sign in ((pair.first, 1), (pair.second, -1)) if side.body is not None]
+            for body, sign in sides:
+                total[body] = total[body][0] + sign * state[f"{pair.name}.force"], total[body][1]
+        poses = [self._pair(state, i, POSES) for i in range(len(world.bodies))]
+        context = make_context(world, self.rollout.problem.simulation.scheme(), (), ca.SX(0, 1), ca.SX(0))
+        add_joint_forces(context, dict(state), poses, total)
+        return total
+
+    def _parts(self, x: Expr) -> dict[str, Expr]:
+        return {name: x[self._layout[name]] for name in self._layout.names()}
+
+    def _pair(self, state: Parts, index: int, fields: tuple[tuple[str, int], ...]) -> Pose | Moving:
+        name = self.rollout.world.bodies[index].name
+        return state[f"{name}.{fields[0][0]}"], state[f"{name}.{fields[1][0]}"]
+
+    def _put(self, state: dict[str, Expr], index: int, fields: tuple[tuple[str, int], ...], both: Pose | Moving) -> None:
+        name = self.rollout.world.bodies[index].name
+        for (field, _), value in zip(fields, both, strict=True):
+            state[f"{name}.{field}"] = value
+
+
+class _Cursor:
+    """Takes parts of a column one after the other."""
+
+    def __init__(self, column: Expr) -> None:
+        self.column, self.at = column, 0
+
+    def take(self, count: int) -> Expr:
+        """The next ``count`` numbers."""
+        self.at += count
+        return self.column[self.at - count : self.at]
+
+
+def _carried_on(
+    chart: TreeChart, poses: Mapping[int, Pose], moving: Mapping[int, Moving], moved: Mapping[int, Pose], more: Expr
+) -> dict[int, Moving]:
+    """Velocities at the new poses, of rates that changed by ``more``; what velocities are off the joints stays."""
+    rates = chart.rates(poses, moving)
+    fit, after = chart.velocities(poses, rates), chart.velocities(moved, rates + more)
+    return {
+        i: (after[i][0] + (moving[i][0] - fit[i][0]), after[i][1] + (moving[i][1] - fit[i][1])) for i in after
+    }

@@ -1,0 +1,133 @@
+"""A kinematic tree about a state, in its own coordinates: poses and velocities of its bodies, and back.
+
+Coordinates are increments: of a root that floats its position (3) [m] and a rotation vector (3) [rad], world frame; of
+each joint what it leaves free, [rad] or [m]. A ball joint turns about the axes of its second frame. Rates are those of
+the same: of a root velocity [m/s] and angular velocity [rad/s], world frame. What a state is off its joints is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from symphys.dynamics.articulated import spatial
+from symphys.dynamics.articulated.forward_kinematics import HERE, JointStart, final_poses
+from symphys.dynamics.joints.joint_frames import JointFrames, joint_frames_at
+from symphys.maths import rotation
+from symphys.model.joints import Joint, KinematicTree, Link
+
+Expr = Any
+"""casadi SX"""
+Pose = tuple[Expr, Expr]
+"""Position (3,) and orientation (4,)."""
+Moving = tuple[Expr, Expr]
+"""Velocity and angular velocity (3,) each."""
+NOW = ca.SX(0)
+
+
+@dataclass(frozen=True)
+class TreeChart:
+    """A tree whose coordinates are asked for; bodies are keys of all mappings."""
+
+    tree: KinematicTree
+    joints: Sequence[Joint]
+
+    def moved(self, poses: Mapping[int, Pose], along: Expr) -> dict[int, Pose]:
+        """The poses after coordinates went on by ``along`` (size,)."""
+        own = tuple(None if link.joint is None else self.joints[link.joint] for link in self.tree.links)
+        starts = [None if joint is None else self._start(link, joint, poses) for link, joint in self._links()]
+        places = [poses[link.body][0] for link in self.tree.links]
+        parts = [along[list(link.coordinates)] for link in self.tree.links]
+        arrived = final_poses(self.tree, own, starts, places, parts)
+        return {
+            link.body: (each.position, rotation.multiply(each.turn, poses[link.body][1]))
+            for link, each in zip(self.tree.links, arrived, strict=True)
+        }
+
+    def apart(self, before: Mapping[int, Pose], after: Mapping[int, Pose]) -> Expr:
+        """(size,) coordinates that lead from one to the other; turns of joints within half a turn."""
+        found = []
+        for link, joint in self._links():
+            if joint is None:
+                (p, q), (r, s) = before[link.body], after[link.body]
+                found += [r - p, rotation.between(q, s)]
+            elif joint.kind.coordinates:
+                old, new = (self._frames(joint, poses).placed(NOW) for poses in (before, after))
+                for each in joint.kind.coordinates:
+                    step = each.value(new) - each.value(old)
+                    found.append(ca.atan2(ca.sin(step), ca.cos(step)) if each.turns else step)
+            elif link.count:
+                placed = self._frames(joint, before).placed(NOW)
+                found.append(ca.mtimes(placed.b[:, : link.count].T, self._turned(link, before, after)))
+        return ca.vertcat(ca.SX(0, 1), *found)
+
+    def rates(self, poses: Mapping[int, Pose], moving: Mapping[int, Moving]) -> Expr:
+        """(size,) of bodies at these poses with these velocities."""
+        found = []
+        for link, joint in self._links():
+            if joint is None:
+                found += [*moving[link.body]]
+                continue
+            frames = self._frames(joint, poses)
+            placed, arms = frames.placed(NOW), frames.lever_arms(NOW)
+            linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
+            for sign, arm, body in zip((1, -1), arms, joint.bodies, strict=False):
+                velocity, spin = moving[body]
+                linear += sign * (velocity + ca.cross(spin, arm))
+                angular += sign * spin
+            for slide, turn in spatial.free_motions_of(joint, placed):
+                found.append(ca.dot(slide, linear) + ca.dot(turn, angular))
+        return ca.vertcat(ca.SX(0, 1), *found)
+
+    def velocities(self, poses: Mapping[int, Pose], rates: Expr) -> dict[int, Moving]:
+        """Of the bodies at these poses, from the rates (size,)."""
+        found: dict[int, Moving] = {}
+        for link, joint in self._links():
+            own = rates[list(link.coordinates)]
+            if joint is None:
+                found[link.body] = own[:3], own[3:]
+                continue
+            frames = self._frames(joint, poses)
+            arms = frames.lever_arms(NOW)
+            above, mine = (arms[1], arms[0]) if link.sign > 0 else arms
+            velocity, spin = (ca.SX.zeros(3), ca.SX.zeros(3)) if link.parent is None else found[link.parent]
+            linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
+            for k, (slide, turn) in enumerate(spatial.free_motions_of(joint, frames.placed(NOW))):
+                linear, angular = linear + own[k] * slide, angular + own[k] * turn
+            after = spin + link.sign * angular
+            at = velocity + ca.cross(spin, above) + link.sign * linear
+            found[link.body] = at - ca.cross(after, mine), after
+        return found
+
+    def _links(self) -> Iterator[tuple[Link, Joint | None]]:
+        for link in self.tree.links:
+            yield link, None if link.joint is None else self.joints[link.joint]
+
+    def _frames(self, joint: Joint, poses: Mapping[int, Pose]) -> JointFrames:
+        return joint_frames_at(joint, tuple(poses[i] for i in joint.bodies))
+
+    def _start(self, link: Link, joint: Joint, poses: Mapping[int, Pose]) -> JointStart:
+        """The joint as it is: what it is off is part of how its sides are apart."""
+        frames = self._frames(joint, poses)
+        placed, arms = frames.placed(NOW), tuple(arm.at(NOW) for arm in frames.arms)
+        turning = [c.turns for c in joint.kind.coordinates] or [True] * link.count
+        free = spatial.free_motions_of(joint, placed)
+        axes = [turn if turns else slide for turns, (slide, turn) in zip(turning, free, strict=True)]
+        ordered = (arms[1], arms[0]) if link.sign > 0 else (arms[0], arms[1])
+        return JointStart(ordered, placed.apart, ca.horzcat(ca.SX(3, 0), *axes), HERE.turn)
+
+    def _turned(self, link: Link, before: Mapping[int, Pose], after: Mapping[int, Pose]) -> Expr:
+        """(3,) rotation vector of a ball joint's first side against its second; see ``final_poses``."""
+        own = rotation.multiply(after[link.body][1], inverse(before[link.body][1]))
+        if link.parent is not None:
+            parent = rotation.multiply(after[link.parent][1], inverse(before[link.parent][1]))
+            own = rotation.multiply(inverse(parent), own)
+        return link.sign * rotation.logarithm(own)
+
+
+def inverse(q: Expr) -> Expr:
+    """(4,) of a unit quaternion."""
+    return ca.vertcat(q[0], -q[1:4])
