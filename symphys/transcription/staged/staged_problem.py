@@ -80,7 +80,7 @@ class RolloutStages:
         p = self.parameters(motion.z[None])[0]
         a, b, by_p = self._step.slopes(motion.x[:-1], motion.u, p, motion.smoothing)
         by_x0, of_p = self._start_slopes(motion.z)
-        start = np.array(self.tangent.projection(motion.x[0])) @ by_x0
+        start = np.array(self.tangent.projection(motion.x[0], p)) @ by_x0
         return Linearized(a, b, by_p @ of_p, start)
 
     def retract(self, X: Array, D: Array) -> Array:
@@ -151,10 +151,11 @@ class RolloutStages:
         """(T, q, n): the term's columns of the state by the tangent, at its ticks."""
         columns = tuple(term.columns.tolist())
         if columns not in self._bases:
-            x = ca.SX.sym("x", self.state_size)
-            rows = ca.densify(self.tangent.basis(x)[list(columns), :])
-            self._bases[columns] = ca.Function("rows", [x], [ca.cse(rows)])
-        found = self._bases[columns].map(len(term.states))(motion.x[term.states].T)
+            x, p = ca.SX.sym("x", self.state_size), ca.SX.sym("p", int(self.rollout.p.shape[0]))
+            rows = ca.densify(self.tangent.basis(x, p)[list(columns), :])
+            self._bases[columns] = ca.Function("rows", [x, p], [ca.cse(rows)])
+        ticks, p = len(term.states), self.parameters(motion.z[None])[0]
+        found = self._bases[columns].map(ticks)(motion.x[term.states].T, np.tile(p[:, None], ticks))
         array = np.array(found, float).reshape(len(columns), len(term.states), self.tangent_size)
         return np.ascontiguousarray(array.transpose(1, 0, 2))
 
