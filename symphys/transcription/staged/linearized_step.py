@@ -1,0 +1,138 @@
+"""How a step changes with its state, inputs and parameters: exact slopes, in tangents, of all steps of a motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from symphys.codegen import Kernel, KernelUnavailable, ProgramError, processors
+from symphys.codegen.backends import BEST, PRECISIONS, build_kernel
+from symphys.transcription.rollout import Rollout
+from symphys.transcription.staged.step_program import StepArguments, step_functions, step_program
+from symphys.transcription.staged.tangent import Tangent
+
+Array = NDArray[np.float64]
+Slopes = tuple[Array, Array, Array]
+"""(N, n, n), (N, n, m) and (N, n, np): the next state's tangent by the state's, by inputs and by parameters."""
+MOST_ROWS = 4096
+"""Of one batch of seeds: what is asked for at once stays in memory."""
+
+
+@dataclass(eq=False)
+class LinearizedStep:
+    """One step of a rollout, its controllers in it, for batches of states: values, and slopes in tangents.
+
+    Attributes:
+        rollout, tangent: whose step it is, and in what its slopes are.
+        backend: the name of a backend that is a kernel; other names mean casadi's virtual machine.
+        threads: that share a batch; None: one for each processor.
+        exact: whether it is for smoothing 0 only.
+        description: what evaluates, in words.
+    """
+
+    rollout: Rollout
+    tangent: Tangent
+    backend: str = BEST
+    threads: int | None = None
+    exact: bool = False
+    description: str = field(default="", init=False)
+
+    def __post_init__(self) -> None:
+        """Build what evaluates."""
+        self.arguments = StepArguments(self.rollout, self.tangent)
+        self._step, self._off = self._built()
+
+    def step(self, k: int | NDArray[np.int64], X: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float) -> Array:
+        """(B, nx), (B, m), (B, np) or (np,) -> (B, nx): states after step ``k``, or after steps k (B,)."""
+        varying, given = self._rows(k, X, X, U, P, smoothing)
+        return self._step.values(varying, given)
+
+    def slopes(self, X: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float, after: ArrayLike | None = None) -> Slopes:
+        """Slopes of the steps 0, 1, .. from the states X (N, nx) with inputs U (N, m) and parameters P (np,).
+
+        ``after``: (N, nx) the states that they lead to, where these are known. Numbers that are not finite are
+        returned as they are.
+        """
+        states = np.asarray(X, float)
+        k = np.arange(len(states))
+        if after is None:
+            after = self.step(k, states, U, P, smoothing)
+        varying, given = self._rows(k, states, after, U, P, smoothing)
+        _, n, m, np_ = self.arguments.sizes
+        found = self._off.jacobians(varying, given, n)
+        a, b, varied = np.split(found, [n, n + m], axis=2)
+        if not varied.shape[2]:
+            return a, b, np.broadcast_to(0.0, (len(states), n, np_))
+        c = np.zeros((len(states), n, np_))
+        c[:, :, self.arguments.varied] = varied
+        return a, b, c
+
+    def _rows(self, k: Any, X: ArrayLike, after: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float) -> Any:
+        x, aim, u, p = (np.atleast_2d(np.asarray(each, float)) for each in (X, after, U, P))
+        count, (_, n, m, np_) = len(x), self.arguments.sizes
+        p = np.broadcast_to(p, (count, np_))
+        time = np.broadcast_to(np.asarray(k, float) * self.rollout.dt, (count,))[:, None]
+        if self.exact and smoothing:
+            raise ValueError(f"this step is for smoothing 0 only, not for {smoothing:g}")
+        varying = np.concatenate([np.zeros((count, n)), u.reshape(count, m), p[:, self.arguments.varied]], axis=1)
+        fixed = p[:, self.arguments.fixed]
+        return varying, np.concatenate([x, aim, time, fixed, np.full((count, 1), smoothing)], axis=1)
+
+    def _built(self) -> tuple[Any, Any]:
+        note = ""
+        if self.backend in PRECISIONS:
+            count = processors() if self.threads is None else self.threads
+            try:
+                step, off = (step_program(self.arguments, self.exact, tangent) for tangent in (False, True))
+                made = build_kernel(self.backend, step, [], count), build_kernel(self.backend, off, ["off"], count)
+                report = made[1].report
+                self.description = f"{report.precision} precision, lanes {report.lanes}, threads {made[1].threads}"
+                return tuple(_ByKernel(kernel) for kernel in made)
+            except (KernelUnavailable, ProgramError) as error:
+                note = f"; {error}"
+        self.description = f"casadi's virtual machine{note}"
+        return tuple(_ByCasadi(function) for function in step_functions(self.arguments))
+
+
+class _ByKernel:
+    """A lane for each state, or for each row of a Jacobian."""
+
+    def __init__(self, kernel: Kernel) -> None:
+        self.kernel = kernel
+
+    def values(self, varying: Array, given: Array) -> Array:
+        return np.array(self.kernel.forward(varying, given)["after"])
+
+    def jacobians(self, varying: Array, given: Array, n: int) -> Array:
+        found = np.empty((len(varying), n, varying.shape[1]))
+        share = max(1, MOST_ROWS // max(n, 1))
+        for first in range(0, len(varying), share):
+            some = slice(first, first + share)
+            rows = [np.repeat(each[some], n, axis=0) for each in (varying, given)]
+            seeds = np.tile(np.eye(n), (len(varying[some]), 1))
+            found[some] = self.kernel.gradient(rows[0], seeds, rows[1])[1].reshape(-1, n, varying.shape[1])
+        return found
+
+
+class _ByCasadi:
+    """One state after the other, on casadi's virtual machine: for machines without a compiler."""
+
+    def __init__(self, function: ca.Function) -> None:
+        self.function = function
+        self._jacobian: ca.Function | None = None
+
+    def values(self, varying: Array, given: Array) -> Array:
+        rows = [np.array(self.function(*row)).ravel() for row in zip(varying, given, strict=True)]
+        return np.array(rows).reshape(len(varying), self.function.size1_out(0))
+
+    def jacobians(self, varying: Array, given: Array, n: int) -> Array:
+        if self._jacobian is None:
+            symbols = [ca.MX.sym("varying", varying.shape[1]), ca.MX.sym("given", given.shape[1])]
+            slope = ca.jacobian(self.function(*symbols), symbols[0])
+            self._jacobian = ca.Function("slopes", symbols, [slope])
+        rows = [np.array(ca.DM(self._jacobian(*row))) for row in zip(varying, given, strict=True)]
+        return np.array(rows).reshape(-1, n, varying.shape[1])
