@@ -67,6 +67,6 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
         smoothing=problem.simulation.smoothing,
         stop_when_met=problem.stop_when_met,
         output_names=tuple(output.label for output in problem.outputs),
-        staged=cache(lambda: RolloutStages(rollout, backend, threads)),
+        staged=cache(lambda: RolloutStages(rollout, backend, threads, exact or not any(problem.simulation.smoothing))),
     )
     return Transcription(problem, rollout, asked, functions, shooting, chosen.description, built)

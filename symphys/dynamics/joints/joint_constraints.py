@@ -150,7 +150,7 @@ def coordinate_terms(
         tuple(replace(term, jacobian=None) for term in frames.terms(motions, start, start)), given, before
     )
     rate_due = speeds(tuple(replace(term, jacobian=None) for term in terms), seen, due)
-    value = coordinate.value(now)
+    value = frames.joint.value(k, now)
     if isinstance(place, bool):
         rate, k_of = speeds(terms, seen, momenta), mobility(terms, seen, place)
         return CoordinateTerms(terms, seen, given, value, rate, rate_now, rate_due, k_of, place, None)

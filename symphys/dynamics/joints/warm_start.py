@@ -161,7 +161,7 @@ def _add_coupling(context: StepContext, coupling: JointCoupling, force: Expr, po
 
 @traced
 def _against(coupling: JointCoupling, joint: Joint, poses: tuple[tuple[Expr, Expr], ...], force: Expr) -> Expr:
-    value = joint.kind.coordinates[0].value(joint_frames_at(joint, poses).placed(ca.SX(0)))
+    value = joint.value(0, joint_frames_at(joint, poses).placed(ca.SX(0)))
     return -coupling.slope(value) * force
 
 

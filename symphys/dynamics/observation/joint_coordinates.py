@@ -83,7 +83,7 @@ def _reading(world: World, layout: Layout, joint: Joint, x: Expr) -> Reading:
     rates = [_rate(frames, coordinate, motions) for coordinate in coordinates]
     torque = x[layout[f"{joint.name}.motor"]] if joint.driven else ca.SX.zeros(len(coordinates))
     return Reading(
-        value=ca.vertcat(ca.SX(0, 1), *(coordinate.value(placed) for coordinate in coordinates)),
+        value=ca.vertcat(ca.SX(0, 1), *(joint.value(k, placed) for k in range(len(coordinates)))),
         rate=ca.vertcat(ca.SX(0, 1), *rates),
         torque=torque,
         separation=ca.norm_2(errors(joint, placed)[:held]),

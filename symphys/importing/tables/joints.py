@@ -131,13 +131,13 @@ def spring_of(reading: ModelReading, joint: int, dof: int) -> dict[str, float]:
 
 
 def limits_of(reading: ModelReading, joint: int) -> list[float] | None:
-    """The range from the reference pose; an angle of half a turn and more is no bound here."""
+    """The range from the reference pose; one of a whole turn is no bound here."""
     model = reading.model
     low, high = range_of(reading, joint)
     if model.jnt_limited[joint] and not reading.off("LIMIT"):
         ends = [float(end) - reading.reference(joint) for end in model.jnt_range[joint]]
-        wide = [f"{end:.4g}" for end, held in zip(ends, (low, high), strict=True) if not isfinite(held)]
-        if wide:
-            text = "angles lie between -pi and pi here, so such an end of its range holds nothing"
-            reading.note("left out", f"limit of {reading.called('joint', joint)}", text, f"{' and '.join(wide)} rad")
+        if not isfinite(low):
+            text = "angles are told within one turn here, so its range holds nothing"
+            wide = " to ".join(f"{end:.4g}" for end in ends)
+            reading.note("left out", f"limit of {reading.called('joint', joint)}", text, f"{wide} rad")
     return numbers([low, high]) if isfinite(low) or isfinite(high) else None

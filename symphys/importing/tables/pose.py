@@ -9,6 +9,7 @@ import numpy as np
 
 from symphys.importing.problem import ImportProblem
 from symphys.importing.tables.reading import BALL, FREE, HINGE, SLIDE, ModelReading, numbers
+from symphys.model.joints.turn import natural_centre
 from symphys.suggest import hint
 
 PLANE = 0
@@ -17,6 +18,8 @@ LIFTS = 3
 """How often a robot is lifted out of the ground; the first is enough unless contacts were too many to list."""
 SUNK = 1e-4
 """[m]: overlap with the ground that stays."""
+WIDEST = 2 * pi - 0.2
+"""[rad]: a wider range would leave no room for what passes its ends."""
 
 
 def keyframe(library: Any, model: Any, name: str | None, file: str) -> int | None:
@@ -51,7 +54,7 @@ def place(library: Any, model: Any, data: Any) -> None:
 def range_of(reading: ModelReading, joint: int) -> tuple[float, float]:
     """The range of a hinge or slider from the reference pose; infinite where nothing holds it.
 
-    An angle lies between -pi and pi here, so an end of half a turn and more holds nothing.
+    An angle is told within one turn here, so a wider range holds nothing.
     """
     model = reading.model
     if not model.jnt_limited[joint] or reading.off("LIMIT"):
@@ -59,9 +62,7 @@ def range_of(reading: ModelReading, joint: int) -> tuple[float, float]:
     low, high = (float(end) - reading.reference(joint) for end in model.jnt_range[joint])
     if model.jnt_type[joint] != HINGE:
         return low, high
-    if low >= pi or high <= -pi:
-        return -np.inf, np.inf
-    return (low if low > -pi else -np.inf), (high if high < pi else np.inf)
+    return (low, high) if high - low < WIDEST else (-np.inf, np.inf)
 
 
 def starts(reading: ModelReading) -> dict[int, float]:
@@ -148,10 +149,12 @@ def begin(reading: ModelReading, joints: list[dict[str, Any]]) -> None:
 
 
 def wanted(reading: ModelReading, joint: int) -> float:
-    """Where the model itself begins, from the reference pose; an angle between -pi and pi."""
+    """Where the model itself begins, from the reference pose; an angle within the turn that is told."""
     if reading.key is None:
         return 0.0
     at = int(reading.model.jnt_qposadr[joint])
     value = float(reading.model.key_qpos[reading.key][at]) - reading.reference(joint)
-    turns = reading.model.jnt_type[joint] == HINGE and abs(value) > pi
-    return float(np.remainder(value + pi, 2 * pi) - pi) if turns else value
+    if reading.model.jnt_type[joint] != HINGE:
+        return value
+    low = natural_centre(*range_of(reading, joint)) - pi
+    return value if low <= value <= low + 2 * pi else float(np.remainder(value - low, 2 * pi) + low)

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from symphys.model.joints.kind import Kind
+from symphys.model.joints.kind import Kind, PlacedFrames
 from symphys.model.joints.motor import Motor
+from symphys.model.joints.turn import told
 from symphys.model.scalar import Scalar, is_zero
 
 PARTS = ("motor", "lower", "upper", "spring", "friction")
@@ -57,6 +58,7 @@ class Joint:
         motor, limits, spring: along every coordinate.
         armature: inertia of what turns with each coordinate, seen through its gear [kg m^2] or [kg].
         friction: dry friction along every coordinate [N m] or [N].
+        centre: angles are told from half a turn below it to half a turn above it [rad].
         frequency, damping: [Hz] and damping ratio of a joint that is soft (Catto, GDC 2011); 0 is a rigid one.
     """
 
@@ -72,6 +74,13 @@ class Joint:
     damping: Scalar = 1.0
     armature: Scalar = 0.0
     friction: Scalar = 0.0
+    centre: float = 0.0
+
+    def value(self, k: int, placed: PlacedFrames) -> Any:
+        """Its coordinate k [rad] or [m], of frames in the world."""
+        coordinate = self.kind.coordinates[k]
+        value = coordinate.value(placed)
+        return told(value, self.centre) if coordinate.turns else value
 
     @property
     def bodies(self) -> tuple[int, ...]:

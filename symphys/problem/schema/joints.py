@@ -161,6 +161,11 @@ class JointTable(SchemaTable):
         "that hangs on it, is carried there from where it lies in the file",
     )
     start_deg: Coordinates | None = Field(default=None, description="the same in degrees, where the joint turns")
+    centre: float | None = Field(
+        default=None,
+        description="angles are told from half a turn below it to half a turn above it [rad]; default: the middle of "
+        "limits that come near to half a turn, else 0",
+    )
     spring: SpringTable | None = Field(default=None, description="{ stiffness = 5, damping = 0.1, rest = 0 }")
     armature: NonNegative = Field(
         default=0.0,

@@ -51,7 +51,9 @@ class LinearizedStep:
         varying, given = self._rows(k, X, X, U, P, smoothing)
         return self._step.values(varying, given)
 
-    def slopes(self, X: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float, after: ArrayLike | None = None) -> Slopes:
+    def slopes(
+        self, X: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float, after: ArrayLike | None = None
+    ) -> Slopes:
         """Slopes of the steps 0, 1, .. from the states X (N, nx) with inputs U (N, m) and parameters P (np,).
 
         ``after``: (N, nx) the states that they lead to, where these are known. Numbers that are not finite are

@@ -25,14 +25,24 @@ Indices = NDArray[np.int64]
 class RolloutStages:
     """The steps of a rollout, compiled; see ``symphys.shooting.StagedProblem`` for what is public."""
 
-    def __init__(self, rollout: Rollout, backend: str = BEST, threads: int | None = None) -> None:
-        """SymphysError for formulas that look at more than one state."""
+    def __init__(self, rollout: Rollout, backend: str = BEST, threads: int | None = None, exact: bool = False) -> None:
+        """Compile the step.
+
+        Args:
+            rollout: of a problem.
+            backend: what evaluates the step.
+            threads: that share a batch; None: one for each processor.
+            exact: whether it is for smoothing 0 only.
+
+        Raises:
+            SymphysError: for formulas that look at more than one state.
+        """
         problem = rollout.problem
         self.rollout, self.steps = rollout, rollout.steps
         self.statics = static_entries(problem)
         self.terms = stage_terms(rollout, self.statics)
         self.tangent = Tangent(rollout)
-        self._step = LinearizedStep(rollout, self.tangent, backend, threads)
+        self._step = LinearizedStep(rollout, self.tangent, backend, threads, exact)
         self.state_size, self.tangent_size = int(rollout.x0.shape[0]), self.tangent.size
         self.input_size = int(rollout.given.shape[0])
         self.squares = all(term.kind != "cost" for term in self.terms)
@@ -56,7 +66,13 @@ class RolloutStages:
 
     def parameters(self, Z: Array) -> Array:
         """(B, np)."""
-        return np.array([np.array(self._start(z)[1]).ravel() for z in Z])
+        key = Z[:, self.statics].tobytes()
+        if self._known is None or self._known[0] != key:
+            self._known = key, np.array([np.array(self._start(z)[1]).ravel() for z in Z])
+        return self._known[1]
+
+    _known: tuple[bytes, Array] | None = None
+    """The parameters that were asked for last."""
 
     def step(self, k: int, X: Array, U: Array, Z: Array, smoothing: float) -> Array:
         """(B, nx) after step k."""
@@ -78,7 +94,7 @@ class RolloutStages:
     def linearize(self, motion: StagedMotion) -> Linearized:
         """Slopes of all steps."""
         p = self.parameters(motion.z[None])[0]
-        a, b, by_p = self._step.slopes(motion.x[:-1], motion.u, p, motion.smoothing)
+        a, b, by_p = self._step.slopes(motion.x[:-1], motion.u, p, motion.smoothing, motion.x[1:])
         by_x0, of_p = self._start_slopes(motion.z)
         start = np.array(self.tangent.projection(motion.x[0], p)) @ by_x0
         return Linearized(a, b, by_p @ of_p, start)
