@@ -116,13 +116,21 @@ def compile_formula(
     memory: SensorMemory,
     formula: Formula,
 ) -> ca.Function:
-    """A formula as a casadi function of (x, u, p, time, z); x with its memory."""
+    """A formula as a casadi function of (x, u, p, time, z); x with its memory.
+
+    What a formula takes of a whole motion is one more argument at the end: its parts, one after the other.
+    """
     at = instant(world, inputs, parameters, memory, sum(v.guess.size for v in problem.variables))
     names = namespace(problem, world, inputs, parameters, memory, at, formula.names)
     for variable, (start, stop) in zip(problem.variables, spans(problem.variables), strict=True):
         names[variable.name] = at.z[start:stop]
+    arguments, parts = at.arguments(), []
+    for part in formula.parts:
+        size = compile_formula(problem, world, inputs, parameters, memory, part.formula).size1_out(0)
+        names[part.name] = ca.SX.sym("part", size)
+        parts.append(names[part.name])
     value = formula.evaluate({name: names[name] for name in formula.names})
-    return ca.Function("formula", at.arguments(), [ca.SX(value)])
+    return ca.Function("formula", [*arguments, *([ca.vertcat(*parts)] if parts else [])], [ca.SX(value)])
 
 
 def namespace(
