@@ -73,9 +73,10 @@ class Parameters:
 
 
 def varied_parameters(problem: Problem) -> Parameters:
-    """The parameters that some variable sets, in the order of first mention, and all numbers of controllers.
+    """The parameters that some variable sets, in the order of first mention, and all numbers of feedback.
 
-    Of a problem of a sweep also those in which it differs from others, so that they share what is built.
+    Feedback is controllers and force laws. Of a problem of a sweep also those in which it differs from others, so that
+    they share what is built.
     """
     own = dict.fromkeys(slot.name for v in problem.variables if v.kind == "parameter" for slot in v.slots)
     names = (*own, *(name for name in swept_parameters(problem) if name not in own))
@@ -91,10 +92,10 @@ def swept_parameters(problem: Problem) -> list[str]:
 
 
 def input_names(problem: Problem) -> tuple[str, ...]:
-    """The forces, torques and commands that some variable sets or some controller drives, in that order."""
+    """The forces, torques and commands that variables set, controllers drive or force laws act on, in that order."""
     set_ = [slot.name for v in problem.variables if v.kind == "control" for slot in v.slots]
     driven = [name for controller in problem.controllers for name, _ in controller.drives]
-    return tuple(dict.fromkeys([*set_, *driven]))
+    return tuple(dict.fromkeys([*set_, *driven, *(law.on for law in problem.forces)]))
 
 
 def instant(world: World, inputs: Sequence[str], parameters: Parameters, memory: SensorMemory, n: int) -> Instant:

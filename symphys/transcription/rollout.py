@@ -100,8 +100,8 @@ class Rollout:
 
     @cached_property
     def feedback(self) -> ca.Function | None:
-        """(x, u, p, time) -> the inputs of the step from x; None without controllers."""
-        return self.control.function() if self.problem.controllers else None
+        """(x, u, p, time) -> the inputs of the step from x; None without controllers and force laws."""
+        return self.control.function() if self.problem.controllers or self.problem.forces else None
 
     @cached_property
     def closed(self) -> ca.Function:
