@@ -7,14 +7,15 @@ A formula is a number or a column vector. It is made of
 - components ``ball.position[2]``, ``ball.position[-1]`` and ranges ``ball.position[0:2]``, from 0 as in Python
 - vectors ``[1, 2, 3]``; a list joins what it holds: ``[ball.position[0:2], 0.5]`` has three components
 - calls of the functions in ``FUNCTIONS``
+- of a whole motion: ``start.NAME``, ``end.NAME``, ``integral(...)``, ``average(...)``
 
 There are no comparisons, keywords, strings, attributes of values or anything else.
 """
 
 from symphys.expression.errors import FormulaError
-from symphys.expression.formula import Formula
+from symphys.expression.formula import Formula, MotionPart
 from symphys.expression.functions import FUNCTIONS
 from symphys.expression.names import CONSTANTS
 from symphys.expression.parse import parse
 
-__all__ = ["CONSTANTS", "FUNCTIONS", "Formula", "FormulaError", "parse"]
+__all__ = ["CONSTANTS", "FUNCTIONS", "Formula", "FormulaError", "MotionPart", "parse"]

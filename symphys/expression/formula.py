@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import casadi as ca
 
@@ -18,12 +18,21 @@ class Formula:
 
     Attributes:
         text: as written.
-        names: every name that it needs, such as ``ball.velocity`` or ``time``.
+        names: every name that it needs, such as ``ball.velocity`` or ``time``; those of its parts as they are written,
+            such as ``end.knee.angle``.
+        parts: what it takes of a whole motion; none: it is a formula of an instant.
     """
 
     text: str
     names: frozenset[str]
     root: Node = field(repr=False, compare=False)
+    parts: tuple[MotionPart, ...] = field(default=(), repr=False, compare=False)
+
+    @property
+    def needed(self) -> frozenset[str]:
+        """Every name of a quantity that it needs, those in its parts too."""
+        own = self.names - {part.name for part in self.parts}
+        return own.union(*(part.formula.names for part in self.parts))
 
     def evaluate(self, namespace: Mapping[str, Any]) -> Expr:
         """The value as a dense casadi column (n,) of SX, MX or DM; (1,) for a number.
@@ -32,3 +41,18 @@ class Formula:
         FormulaError for an unknown name or shapes that do not fit.
         """
         return ca.densify(evaluate(self.root, namespace))
+
+
+@dataclass(frozen=True)
+class MotionPart:
+    """A number or vector that a formula takes of a whole motion.
+
+    Attributes:
+        name: how the formula refers to it: ``end.knee.angle``, ``integral(sumsqr(ball.force))``.
+        kind: a formula's value at the start or at the end, or its integral or average over time.
+        formula: of an instant.
+    """
+
+    name: str
+    kind: Literal["start", "end", "integral", "average"]
+    formula: Formula

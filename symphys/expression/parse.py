@@ -13,9 +13,9 @@ import casadi as ca
 
 from symphys.expression import columns
 from symphys.expression.errors import FormulaError
-from symphys.expression.formula import Formula
+from symphys.expression.formula import Formula, MotionPart
 from symphys.expression.functions import FUNCTIONS, elementwise
-from symphys.expression.names import CONSTANTS
+from symphys.expression.names import CONSTANTS, INSTANTS, OF_INSTANTS, OVER_TIME
 from symphys.expression.source import flatten, read
 from symphys.expression.tree import Constant, Node, Reference, apply
 from symphys.suggest import hint, quote
@@ -33,24 +33,31 @@ ALLOWED = (
 )
 
 
+ONE_INSTANT = "costs, targets, constraints and outputs are of whole motions; this formula is of one instant"
+
+
 @lru_cache(maxsize=1024)
-def parse(text: str) -> Formula:
-    """Read a formula; FormulaError names the piece at fault, what is allowed and the nearest valid names."""
-    builder = Builder(flatten(text))
-    root = builder.build(read(builder.line))
-    return Formula(text, frozenset(builder.names), root)
+def parse(text: str, whole: bool = False) -> Formula:
+    """Read a formula; FormulaError names the piece at fault, what is allowed and the nearest valid names.
+
+    ``whole``: whether it may take parts of a whole motion: ``start.NAME``, ``end.NAME``, ``integral(...)``.
+    """
+    builder = Builder(flatten(text), whole)
+    return builder.formula(text, read(builder.line))
 
 
-copyreg.pickle(Formula, lambda formula: (parse, (formula.text,)))  # a formula travels to other processes as its text
+# a formula travels to other processes as its text
+copyreg.pickle(Formula, lambda formula: (parse, (formula.text, bool(formula.parts))))
 
 
 class Builder:
     """Turns syntax into nodes and collects the names on the way."""
 
-    def __init__(self, line: str) -> None:
-        """Keep the line, from which errors quote."""
-        self.line = line
+    def __init__(self, line: str, whole: bool = False) -> None:
+        """Keep the line, from which errors quote, and whether parts of a whole motion are allowed."""
+        self.line, self.whole, self.instant = line, whole, ONE_INSTANT
         self.names: set[str] = set()
+        self.parts: dict[str, MotionPart] = {}
         self._rules: dict[type[ast.expr], Callable[..., Node]] = {
             ast.Constant: self._number,
             ast.Name: self._name,
@@ -61,6 +68,11 @@ class Builder:
             ast.List: self._list,
             ast.Call: self._call,
         }
+
+    def formula(self, text: str, syntax: ast.expr) -> Formula:
+        """The formula of a piece of syntax."""
+        root = self.build(syntax)
+        return Formula(text, frozenset(self.names), root, tuple(self.parts.values()))
 
     def build(self, syntax: ast.expr) -> Node:
         """The node of a piece of syntax."""
@@ -96,13 +108,38 @@ class Builder:
             return Constant(ca.DM(CONSTANTS[syntax.id]))
         if syntax.id in FUNCTIONS:
             raise FormulaError(f"{quote(syntax.id)} is a function; write {FUNCTIONS[syntax.id].signature}")
+        if syntax.id in OVER_TIME:
+            raise FormulaError(f"{quote(syntax.id)} is of a whole motion; write {OVER_TIME[syntax.id]}")
         return self._reference(syntax.id)
 
     def _dotted(self, syntax: ast.Attribute) -> Node:
+        words = self._piece(syntax).replace(" ", "").split(".")
+        plain = isinstance(syntax.value, ast.Name) or (
+            isinstance(syntax.value, ast.Attribute) and isinstance(syntax.value.value, ast.Name)
+        )
+        if plain and words[0] in INSTANTS and (len(words) == 3 or words[1] in OF_INSTANTS):
+            name = ".".join(words[1:])
+            return self._part(syntax, words[0], ".".join(words), Formula(name, frozenset({name}), Reference(name)))
         if not isinstance(syntax.value, ast.Name):
-            advice = "a name has at most one dot; components are [0], [1], ..."
+            advice = "a name has at most one dot; components are [0], [1], ...; only start. and end. add one"
             raise FormulaError(f"{quote(self._piece(syntax))} is not allowed; {advice}")
         return self._reference(f"{syntax.value.id}.{syntax.attr}")
+
+    def _part(self, syntax: ast.expr, kind: str, name: str, formula: Formula) -> Node:
+        """Something of the whole motion, by a name of its own."""
+        if not self.whole:
+            raise FormulaError(f"{quote(self._piece(syntax))} is of a whole motion; {self.instant}")
+        self.parts[name] = MotionPart(name, kind, formula)  # type: ignore[arg-type]
+        return self._reference(name)
+
+    def _over_time(self, syntax: ast.Call, kind: str) -> Node:
+        """The integral or average of a formula, which is of one instant."""
+        if len(syntax.args) != 1 or syntax.keywords:
+            raise FormulaError(f"{quote(self._piece(syntax))}: one formula is wanted; {OVER_TIME[kind]}")
+        inner = Builder(self.line)
+        inner.instant = f"what has an {kind} is of one instant"
+        formula = inner.formula(self._piece(syntax.args[0]), syntax.args[0])
+        return self._part(syntax, kind, self._piece(syntax), formula)
 
     def _reference(self, name: str) -> Node:
         self.names.add(name)
@@ -150,11 +187,12 @@ class Builder:
         piece = self._piece(syntax)
         if not isinstance(syntax.func, ast.Name):
             raise FormulaError(f"{quote(piece)} is not allowed; only functions by plain name are called")
+        if syntax.func.id in OVER_TIME:
+            return self._over_time(syntax, syntax.func.id)
         function = FUNCTIONS.get(syntax.func.id)
         if function is None:
-            raise FormulaError(
-                f"unknown function {quote(syntax.func.id)} in {quote(piece)}; {hint(syntax.func.id, FUNCTIONS)}"
-            )
+            known = hint(syntax.func.id, [*FUNCTIONS, *OVER_TIME])
+            raise FormulaError(f"unknown function {quote(syntax.func.id)} in {quote(piece)}; {known}")
         if syntax.keywords or any(isinstance(argument, ast.Starred) for argument in syntax.args):
             raise FormulaError(f"{quote(piece)}: arguments are plain values; write {function.signature}")
         count = len(syntax.args)

@@ -47,8 +47,22 @@ def unit_of(formula: Formula, units: Mapping[str, str]) -> str:
         units: of the names, such as ``{"ball.velocity": "m/s"}``; a pure number has "", and a name that is absent is
             one whose unit is not known.
     """
-    found = infer(formula.root, units)
+    found = infer(formula.root, {**units, **part_units(formula, units)})
     return "" if found is None or found == NUMBER else written(found)
+
+
+def part_units(formula: Formula, units: Mapping[str, str]) -> dict[str, str]:
+    """The units of what a formula takes of a whole motion, where they are known."""
+    known = {}
+    for part in formula.parts:
+        powers = infer(part.formula.root, units)
+        if powers is None or (powers == NUMBER and part.kind == "integral"):
+            continue
+        powers = combined(powers, {"s": 1}) if part.kind == "integral" else powers
+        text = "" if powers == NUMBER else written(powers)
+        if text or not powers:
+            known[part.name] = text
+    return known
 
 
 def infer(node: Node, units: Mapping[str, str]) -> Found:

@@ -1,6 +1,6 @@
 """Problem files: reading, validation, and the model that everything after works with."""
 
-from symphys.problem.feedback import Controller, Sensor
+from symphys.problem.feedback import Controller, ForceLaw, Sensor
 from symphys.problem.load import require_solvable
 from symphys.problem.model import (
     ALIVE,
@@ -31,6 +31,7 @@ __all__ = [
     "Controller",
     "Cost",
     "Discretisation",
+    "ForceLaw",
     "Output",
     "Problem",
     "ProblemData",

@@ -1,4 +1,4 @@
-"""Sensors and controllers of a problem after validation."""
+"""Sensors, controllers and force laws of a problem after validation."""
 
 from __future__ import annotations
 
@@ -51,4 +51,33 @@ class Controller:
     @property
     def weights(self) -> dict[str, Array]:
         """The numbers by the names that variables use: ``brain.weights``."""
+        return {f"{self.name}.{key}": value for key, value in self.numbers.items()}
+
+
+@dataclass(frozen=True)
+class ForceLaw:
+    """What adds to an input in every step, by a formula of the state.
+
+    Attributes:
+        name: as in the file.
+        on: the input: ``ball.force`` [N], ``ball.torque`` [N m], both world frame, or ``knee.command``.
+        components: of the input.
+        formula: of as many numbers.
+        numbers: of the formula, as the file has them.
+    """
+
+    name: str
+    on: str
+    components: tuple[int, ...]
+    formula: Formula
+    numbers: dict[str, Array] = field(repr=False)
+
+    @property
+    def commands(self) -> bool:
+        """Whether it commands a motor, which gives its impulse at the start of a step; other forces act over it."""
+        return self.on.endswith(".command")
+
+    @property
+    def weights(self) -> dict[str, Array]:
+        """The numbers by the names that variables and formulas use: ``drag.c``."""
         return {f"{self.name}.{key}": value for key, value in self.numbers.items()}

@@ -40,6 +40,7 @@ from symphys.problem.tables.contact import (
     read_pairs,
 )
 from symphys.problem.tables.controllers import read_controllers, read_sensors
+from symphys.problem.tables.forces import force_quantities, read_forces
 from symphys.problem.tables.joints import read_joints
 from symphys.problem.tables.objectives import Objectives, read_objectives
 from symphys.problem.tables.scenarios import read_scenarios
@@ -50,7 +51,7 @@ from symphys.problem.tables.variables import read_variables
 from symphys.problem.units import formula_units
 
 MEMBERS = ("body", "plane", "block", "terrain")
-SHARED_NAMES = (*MEMBERS, "joint", "coupling", "site", "sensor", "controller", "variable")
+SHARED_NAMES = (*MEMBERS, "joint", "coupling", "site", "sensor", "controller", "force", "variable")
 OWN_NAMES = ("cost", "target", "constraint", "output", "scenario")
 
 
@@ -113,7 +114,7 @@ def build(
     check_couplings(nominal, faults)
     known = quantities(initial, parametric.parameters(), input_sizes(nominal))
     sensors, controllers = read_control(document, parametric, known, functions, starts, faults)
-    known |= weight_quantities(controllers)
+    known |= weight_quantities(controllers) | force_quantities(document.force)
     variables = read_variables(document.variable, known, simulation, faults)
     check_rollout(nominal, simulation, variables, faults)
     check_varied(parametric, nominal, variables, faults)
@@ -124,9 +125,9 @@ def build(
     start = starts.of(parametric, values)
     check_overlap(parametric, start, faults)
     check_joints(parametric, start, faults)
-    termination, objectives = read_termination_and_objectives(
-        document, simulation, nominal, formula_names(values, start, variables), variables, faults
-    )
+    named = formula_names(values, start, variables)
+    forces = read_forces(document.force, known, named, variables, faults)
+    termination, objectives = read_termination_and_objectives(document, simulation, nominal, named, variables, faults)
     return ProblemData(
         name=printable(path.stem),
         title=document.title or printable(path.stem),
@@ -144,6 +145,7 @@ def build(
         solver_tables=document.solver,
         sensors=sensors,
         controllers=controllers,
+        forces=forces,
         solvers=None if document.solvers is None else tuple(dict.fromkeys(document.solvers)),
         termination=termination,
         scenarios=scenarios or None,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from symphys.expression import Formula
 from symphys.model.world import Scheme, World
-from symphys.problem.feedback import Controller, Sensor
+from symphys.problem.feedback import Controller, ForceLaw, Sensor
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.sweeps.sweep import Sweep
@@ -282,6 +282,7 @@ class ProblemData:
         solvers: the names of those that the problem is for, as the file has them; None for all.
         solver_tables: the raw [solver.NAME] tables by NAME.
         sensors, controllers: in the file's order.
+        forces: laws of the state, in the file's order.
         termination: where a motion is over before its time; None: nowhere.
         scenarios: what differs from sample to sample; None: nothing.
         outputs: numbers that are reported, in the file's order.
@@ -306,6 +307,7 @@ class ProblemData:
     solver_tables: dict[str, dict[str, object]]
     sensors: tuple[Sensor, ...] = ()
     controllers: tuple[Controller, ...] = ()
+    forces: tuple[ForceLaw, ...] = ()
     solvers: tuple[str, ...] | None = None
     termination: Termination | None = None
     scenarios: Scenarios | None = None
@@ -314,8 +316,9 @@ class ProblemData:
 
     @property
     def weights(self) -> dict[str, Array]:
-        """The numbers of all controllers as the file has them, by names such as ``brain.weights``."""
-        return {name: value for controller in self.controllers for name, value in controller.weights.items()}
+        """The numbers of all controllers and force laws as the file has them, by names such as ``brain.weights``."""
+        own = [*(controller.weights for controller in self.controllers), *(law.weights for law in self.forces)]
+        return {name: value for weights in own for name, value in weights.items()}
 
     @property
     def identity(self) -> str:

@@ -39,10 +39,14 @@ class SlotError(ValueError):
 
 @dataclass(frozen=True)
 class Quantity:
-    """Something that a variable can set: (components,) as the file has it."""
+    """Something that a variable can set: (components,) as the file has it.
+
+    ``own_scale``: whether it typically changes by its own size, as parameters do.
+    """
 
     kind: Kind
     nominal: Array
+    own_scale: bool = False
 
 
 def quantities(
@@ -51,7 +55,7 @@ def quantities(
     """Every quantity of a world by name: states at the start, inputs with their sizes, then parameters."""
     found = {name: Quantity("initial", value) for name, value in initial.items()}
     found |= {name: Quantity("control", np.zeros(size)) for name, size in inputs.items()}
-    return found | {name: Quantity("parameter", value) for name, value in parameters.items()}
+    return found | {name: Quantity("parameter", value, own_scale=True) for name, value in parameters.items()}
 
 
 def weight_quantities(controllers: Iterable[Controller]) -> dict[str, Quantity]:

@@ -73,9 +73,10 @@ class Parameters:
 
 
 def varied_parameters(problem: Problem) -> Parameters:
-    """The parameters that some variable sets, in the order of first mention, and all numbers of controllers.
+    """The parameters that some variable sets, in the order of first mention, and all numbers of feedback.
 
-    Of a problem of a sweep also those in which it differs from others, so that they share what is built.
+    Feedback is controllers and force laws. Of a problem of a sweep also those in which it differs from others, so that
+    they share what is built.
     """
     own = dict.fromkeys(slot.name for v in problem.variables if v.kind == "parameter" for slot in v.slots)
     names = (*own, *(name for name in swept_parameters(problem) if name not in own))
@@ -91,10 +92,10 @@ def swept_parameters(problem: Problem) -> list[str]:
 
 
 def input_names(problem: Problem) -> tuple[str, ...]:
-    """The forces, torques and commands that some variable sets or some controller drives, in that order."""
+    """The forces, torques and commands that variables set, controllers drive or force laws act on, in that order."""
     set_ = [slot.name for v in problem.variables if v.kind == "control" for slot in v.slots]
     driven = [name for controller in problem.controllers for name, _ in controller.drives]
-    return tuple(dict.fromkeys([*set_, *driven]))
+    return tuple(dict.fromkeys([*set_, *driven, *(law.on for law in problem.forces)]))
 
 
 def instant(world: World, inputs: Sequence[str], parameters: Parameters, memory: SensorMemory, n: int) -> Instant:
@@ -116,13 +117,21 @@ def compile_formula(
     memory: SensorMemory,
     formula: Formula,
 ) -> ca.Function:
-    """A formula as a casadi function of (x, u, p, time, z); x with its memory."""
+    """A formula as a casadi function of (x, u, p, time, z); x with its memory.
+
+    What a formula takes of a whole motion is one more argument at the end: its parts, one after the other.
+    """
     at = instant(world, inputs, parameters, memory, sum(v.guess.size for v in problem.variables))
     names = namespace(problem, world, inputs, parameters, memory, at, formula.names)
     for variable, (start, stop) in zip(problem.variables, spans(problem.variables), strict=True):
         names[variable.name] = at.z[start:stop]
+    arguments, parts = at.arguments(), []
+    for part in formula.parts:
+        size = compile_formula(problem, world, inputs, parameters, memory, part.formula).size1_out(0)
+        names[part.name] = ca.SX.sym("part", size)
+        parts.append(names[part.name])
     value = formula.evaluate({name: names[name] for name in formula.names})
-    return ca.Function("formula", at.arguments(), [ca.SX(value)])
+    return ca.Function("formula", [*arguments, *([ca.vertcat(*parts)] if parts else [])], [ca.SX(value)])
 
 
 def namespace(

@@ -17,6 +17,7 @@ from symphys.model.state_layout import Layout as Columns
 from symphys.problem import ALIVE
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.feedback.controller_calls import Places, control_calls
+from symphys.transcription.formulas.motion_parts import part_arguments
 from symphys.transcription.gradient_probe import combined
 from symphys.transcription.objective import Terms, terms
 from symphys.transcription.rollout import Rollout
@@ -56,7 +57,8 @@ class ProgramSamples:
         k = self.steps if isinstance(when, str) else round(when / self.dt)
         x, u = self.x.later(k).still(), self.u.later(min(k, self.steps - 1)).still()
         p, z = self.symbol(self.p), self.symbol(self.z)
-        return self.rollout.compiled(formula)(self.symbol(x), self.symbol(u), p, k * self.dt, z)
+        parts = part_arguments(self, formula)
+        return self.rollout.compiled(formula)(self.symbol(x), self.symbol(u), p, k * self.dt, z, *parts)
 
     def after_steps(self, formula: Formula) -> Expr:
         """(m, N): see ``Rollout.after_steps``."""

@@ -26,6 +26,7 @@ from symphys.transcription.formula_names import (
     moving_names,
     varied_parameters,
 )
+from symphys.transcription.formulas.motion_parts import part_arguments
 from symphys.transcription.termination import termination_function
 
 T = TypeVar("T")
@@ -99,8 +100,8 @@ class Rollout:
 
     @cached_property
     def feedback(self) -> ca.Function | None:
-        """(x, u, p, time) -> the inputs of the step from x; None without controllers."""
-        return self.control.function() if self.problem.controllers else None
+        """(x, u, p, time) -> the inputs of the step from x; None without controllers and force laws."""
+        return self.control.function() if self.problem.controllers or self.problem.forces else None
 
     @cached_property
     def closed(self) -> ca.Function:
@@ -154,7 +155,7 @@ class Rollout:
         return self.problem.simulation.dt
 
     def compiled(self, formula: Formula) -> ca.Function:
-        """The formula as a casadi function of (x, u, p, time, z)."""
+        """The formula as a casadi function of (x, u, p, time, z), and of its parts; see ``part_arguments``."""
         return compile_formula(self.problem, self.world, self.inputs, self.parameters, self.memory, formula)
 
     def tick(self, when: str | float) -> int:
@@ -165,7 +166,8 @@ class Rollout:
         """(m,): the formula's value at the end or at the step nearest to a time; inputs are those of that step."""
         k = self.tick(when)
         u = self.u[:, min(k, self.steps - 1)]
-        return self.compiled(formula)(self.x[:, k], u, self.p, k * self.dt, self.z)
+        parts = part_arguments(self, formula)
+        return self.compiled(formula)(self.x[:, k], u, self.p, k * self.dt, self.z, *parts)
 
     def after_steps(self, formula: Formula) -> Expr:
         """(m, N): its value at the end of every step, with that step's inputs."""

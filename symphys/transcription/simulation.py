@@ -15,7 +15,8 @@ from symphys.dynamics.observation import reading_function
 from symphys.model.joints import Joint
 from symphys.model.state_layout import GIVEN, Layout, input_columns
 from symphys.trajectory import NotFinite, Trajectory
-from symphys.transcription.nan_tracing.steps import RolloutArrays, first_non_finite
+from symphys.transcription.formulas.recorded_parts import RolloutArrays
+from symphys.transcription.nan_tracing.steps import first_non_finite
 from symphys.transcription.rollout import Rollout
 
 Array = NDArray[np.float64]
@@ -41,7 +42,8 @@ def simulate(rollout: Rollout, record: Callable[..., Any], z: Array, smoothing: 
     """The rollout of z; NotFinite, which says where and why, if it has none."""
     x, u, given, p, *happened = (np.array(part).T for part in record(z, smoothing))
     z = np.asarray(z, float)
-    arrays = RolloutArrays(z, smoothing, x, u, given, p.ravel())
+    time = np.arange(rollout.steps + 1, dtype=np.float64) * rollout.dt
+    arrays = RolloutArrays(z, smoothing, x, u, given, p.ravel(), time)
     motion = _trajectory(rollout, x, u, p.ravel(), *happened)
     try:
         return Record(z, arrays, motion.require_finite())

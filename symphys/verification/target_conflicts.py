@@ -14,6 +14,7 @@ from symphys.problem import Target
 from symphys.shooting import ShootingProblem
 from symphys.trajectory import NotFinite
 from symphys.transcription import Record, Rollout, Transcription
+from symphys.transcription.formulas.recorded_parts import part_numbers
 from symphys.verification.held_bounds import lies_at
 from symphys.verification.sensitivity_growth import DIRECTIONS
 
@@ -86,13 +87,17 @@ def target_samples(rollout: Rollout, record: Record, functions: Sequence[ca.Func
     for target, function in zip(rollout.problem.targets, functions, strict=True):
         k = rollout.tick(target.at)
         u = arrays.u[min(k, rollout.steps - 1)]
-        arguments = (arrays.x[k], u, arrays.p, np.array([k * rollout.dt]), arrays.z)
+        parts = part_numbers(rollout, arrays, target.formula)
+        arguments = (arrays.x[k], u, arrays.p, arrays.time[k : k + 1], arrays.z, *parts)
         found.append(TargetSample(target, function, k, arguments, np.array(function(*arguments)).ravel()))
     return found
 
 
 def target_slopes(transcription: Transcription, record: Record, samples: list[TargetSample]) -> Array | None:
-    """(T, n): of weight * |value|^2 by z; None where a formula depends on inputs, or for problems with large nets."""
+    """(T, n): of weight * |value|^2 by z.
+
+    None where a formula depends on inputs or on a whole motion, or for problems with large nets.
+    """
     rows: list[Array] = []
     for first in range(0, len(samples), DIRECTIONS):
         some, states = samples[first : first + DIRECTIONS], dict[int, Array]()
@@ -112,7 +117,9 @@ def target_slopes(transcription: Transcription, record: Record, samples: list[Ta
 
 
 def _by_arguments(sample: TargetSample) -> tuple[Array, Array, Array] | None:
-    """Derivatives of weight * |value|^2 by x, p and z; None where inputs have a part in it."""
+    """Derivatives of weight * |value|^2 by x, p and z; None where inputs or whole motions have a part in it."""
+    if sample.target.formula.parts:
+        return None
     inputs = sample.function.sx_in()
     (value,) = sample.function.call(inputs)
     if inputs[1].shape[0] and ca.depends_on(value, inputs[1]):

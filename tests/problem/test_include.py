@@ -127,6 +127,11 @@ def test_terrain_stays_where_it_is(load_both: Load) -> None:
     assert [part.name for part in problem.parametric.statics] == ["floor", "post", "hills"]
 
 
+def test_prefixes_reach_names_of_the_start_and_the_end() -> None:
+    data = {"body": [{"name": "leg"}], "cost": [{"name": "x", "value": "end.leg.position[0] - start.leg.x + my.leg.x"}]}
+    assert prefixed(data, "l_")["cost"][0]["value"] == "end.l_leg.position[0] - start.l_leg.x + my.leg.x"
+
+
 def test_prefixes_reach_tables_of_any_kind() -> None:
     """Names and groups of the file where texts mention them, and no others: keys after a dot, functions, labels."""
     data = {

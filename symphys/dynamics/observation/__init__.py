@@ -6,6 +6,7 @@ from symphys.dynamics.observation.body_sensors import (
     body_quantities,
     body_quantity_names,
 )
+from symphys.dynamics.observation.half_step import half_step_function
 from symphys.dynamics.observation.joint_coordinates import (
     joint_quantities,
     joint_quantity_names,
@@ -21,6 +22,7 @@ __all__ = [
     "body_quantities",
     "body_quantity_names",
     "gap_function",
+    "half_step_function",
     "joint_quantities",
     "joint_quantity_names",
     "reading_function",

@@ -11,12 +11,19 @@ LABELLED = ("cost", "target", "constraint", "scenario")
 OTHER_TEXTS = ("at", "interpolation", "height", "activation", "output", "weights")
 """Keys whose texts name nothing of the file."""
 
+BEFORE = r"(?:(?<![\w.])|(?<=\bstart\.)|(?<=\bend\.))"
+"""Before a mention of a name: nothing of a longer one, but ``end.`` in ``end.knee.angle``."""
+
 
 def prefixed(data: Mapping[str, Any], prefix: str) -> dict[str, Any]:
     """The tables of a file with ``prefix`` before every name and group, and wherever a text mentions one."""
     lists = {key: value for key, value in data.items() if isinstance(value, list)}
     names = sorted(own_names(lists), key=len, reverse=True)
-    mention = re.compile(rf"(?<![\w.])(?:{'|'.join(map(re.escape, names))})(?!\w)") if names else None
+    mention = (
+        re.compile(rf"(?:(?<![\w.])|(?<=\bstart\.)|(?<=\bend\.))(?:{'|'.join(map(re.escape, names))})(?!\w)")
+        if names
+        else None
+    )
 
     def renamed(value: Any) -> Any:
         if isinstance(value, str):

@@ -1,4 +1,4 @@
-"""Tables of sensors and controllers: what is sensed, and how motors and forces follow from it."""
+"""Tables of sensors, controllers and force laws: what is sensed, and how motors and forces follow from the state."""
 
 from __future__ import annotations
 
@@ -80,3 +80,17 @@ class ControllerTable(SchemaTable):
     periodic: PeriodicTable | None = Field(default=None, description="{ frequency = 1.5 }")
     net: NetTable | None = Field(default=None, description="{ hidden = [32, 32] }")
     function: FunctionTable | None = Field(default=None, description="{ weights = [0, 0] }, and a function from Python")
+
+
+class ForceTable(SchemaTable):
+    """A force that follows from the state by a formula: a spring, drag, wind, Magnus' force."""
+
+    name: Identifier = Field(description='formulas name its numbers: "drag.c"')
+    on: str = Field(description='what it is added to: "ball.force", "ball.torque", "knee.command", "ball.force[0:2]"')
+    value: str = Field(
+        description='formula in N or N m, world frame: "-drag.c * norm(ball.velocity) * ball.velocity"; it is '
+        "evaluated in the middle of each step, that of a command at its start"
+    )
+    numbers: dict[Identifier, Numbers] = Field(
+        default={}, description="numbers of the formula, which variables may set: { c = 0.02 } is drag.c"
+    )

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import ConfigDict, Field
 
-from symphys.problem.schema.control import ControllerTable, SensorTable
+from symphys.problem.schema.control import ControllerTable, ForceTable, SensorTable
 from symphys.problem.schema.include import MOST_INCLUDES, IncludedTable, IncludeTable
 from symphys.problem.schema.joints import CouplingTable, JointTable, SiteTable
 from symphys.problem.schema.objectives import (
@@ -60,6 +60,7 @@ class Document(SchemaTable):
     site: list[SiteTable] = Field(default=[])
     sensor: list[SensorTable] = Field(default=[])
     controller: list[ControllerTable] = Field(default=[])
+    force: list[ForceTable] = Field(default=[])
     variable: list[VariableTable] = Field(default=[])
     cost: list[CostTable] = Field(default=[])
     target: list[TargetTable] = Field(default=[])

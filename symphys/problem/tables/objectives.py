@@ -67,11 +67,17 @@ class ObjectiveReader:
     def formula(self, place: Place, text: str, at: str | float) -> tuple[Formula, int] | None:
         """The formula and the length of its value; notes why there is none."""
         try:
-            formula = parse(text)
-            value = formula.evaluate(self.sample)
+            formula = parse(text, whole=True)
+            parts = {part.name: part.formula.evaluate(self.sample) for part in formula.parts}
+            value = formula.evaluate({**self.sample, **parts})
         except FormulaError as error:
             self.faults.add(place, str(error))
             return None
+        if formula.parts:
+            if at == "always":
+                text = f"has {formula.parts[0].name}, which is of the whole motion, so it has no value for each instant"
+                self.faults.add((*place[:-1], "at"), f'{text}; take "end", the default')
+            return formula, int(value.shape[0])
         if at in ("always", 0) and not ca.DM(value).is_regular():
             self.faults.add(place, "is not a finite number at the start of the guess")
         return formula, int(value.shape[0])

@@ -107,9 +107,9 @@ class VariableReader:
     def usual_scale(self, slots: Sequence[VariableSlot], kind: Kind) -> Array | float:
         """Parameters vary by their own size, numbers of controllers by WEIGHTS, everything else by 1."""
         value = self.nominal(slots)
-        if kind == "weight":
-            return WEIGHTS
-        if kind != "parameter" or value is None:
+        if not all(self.known[slot.name].own_scale for slot in slots):
+            return WEIGHTS if kind == "weight" else 1.0
+        if value is None:
             return 1.0
         return np.where(value == 0, 1.0, np.abs(value))
 

@@ -1,4 +1,4 @@
-"""Sensors and controllers as calls of a program: a call for each sensor, and for each row of a net."""
+"""Sensors, controllers and force laws as calls of a program: a call for each sensor, and for each row of a net."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Places(Protocol):
 
 
 def control_calls(rollout: Rollout, places: Places) -> list[FunctionCall]:
-    """The calls that come before those of a step: from ``x`` and ``given`` to ``u``; none without controllers."""
+    """The calls that come before those of a step: from ``x`` and ``given`` to ``u``; none without feedback."""
     if rollout.feedback is None:
         return []
     return ControllerCalls(rollout, places).calls
@@ -45,9 +45,14 @@ class ControllerCalls:
         """Write all of them."""
         self.rollout, self.places = rollout, places
         self.calls: list[FunctionCall] = []
-        sensed = {name: self.sense(name) for name in self.used()}
-        outputs = [self.outputs(c, [sensed[name] for name in c.senses]) for c in rollout.problem.controllers]
-        self.add_up(outputs)
+        laws, given = rollout.control.laws, places.given
+        if rollout.problem.controllers:
+            sensed = {name: self.sense(name) for name in self.used()}
+            outputs = [self.outputs(c, [sensed[name] for name in c.senses]) for c in rollout.problem.controllers]
+            given = places.u if laws is None else places.layout.take(places.u.size)
+            self.add_up(outputs, given)
+        if laws is not None:
+            self.calls.append(FunctionCall(laws, (places.x, given, places.p, places.time), (places.u,)))
 
     def used(self) -> list[str]:
         """The sensors that some controller uses."""
@@ -115,7 +120,7 @@ class ControllerCalls:
         places = [place for inputs, held in products for place in (*inputs, held)]
         return row_function(layer.activation, sizes, len(biases)), (*places, *biases)
 
-    def add_up(self, outputs: Sequence[Sequence[Place]]) -> None:
+    def add_up(self, outputs: Sequence[Sequence[Place]], result: Place) -> None:
         """The inputs: what variables give and what all controllers add."""
         controllers = self.rollout.problem.controllers
         given = ca.SX.sym("given", self.places.u.size)
@@ -130,7 +135,7 @@ class ControllerCalls:
                 total[columns[name].start + component] += scale * value
         function = ca.Function("inputs", [given, *symbols], [ca.densify(total)])
         flat = [place for parts in outputs for place in parts]
-        self.calls.append(FunctionCall(function, (self.places.given, *flat), (self.places.u,)))
+        self.calls.append(FunctionCall(function, (self.places.given, *flat), (result,)))
 
 
 def part(place: Place, columns: slice) -> Place:

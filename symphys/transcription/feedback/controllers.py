@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -10,6 +11,7 @@ import casadi as ca
 from symphys.model.state_layout import input_columns, input_sizes, inputs_size
 from symphys.model.world import World
 from symphys.problem import Controller, Problem, Sensor
+from symphys.transcription.feedback.force_laws import force_function
 from symphys.transcription.feedback.sensor_memory import SensorMemory
 from symphys.transcription.formula_names import Parameters, instant, namespace
 
@@ -50,7 +52,7 @@ class Control:
         )
 
     def function(self) -> ca.Function:
-        """(x, u, p, time) -> the inputs: u, which variables give, and what all controllers add."""
+        """(x, u, p, time) -> the inputs: u, which variables give, and what all controllers and force laws add."""
         at = instant(self.world, self.inputs, self.parameters, self.memory, 0)
         read = {s.name: self.sensor(s)(at.x, at.p, at.time) for s in self.problem.sensors}
         u = at.u
@@ -58,4 +60,13 @@ class Control:
             sensed = ca.vertcat(ca.SX(0, 1), *(read[name] for name in controller.senses))
             outputs = controller.law.act(sensed, at.time, self.numbers(controller, at.p))
             u = u + ca.mtimes(self.place(controller), outputs)
+        if self.laws is not None:
+            u = self.laws(at.x, u, at.p, at.time)
         return ca.Function("control", [at.x, at.u, at.p, at.time], [ca.densify(u)])
+
+    @cached_property
+    def laws(self) -> ca.Function | None:
+        """See ``force_function``; None without force laws."""
+        if not self.problem.forces:
+            return None
+        return force_function(self.problem, self.world, self.inputs, self.parameters, self.memory)

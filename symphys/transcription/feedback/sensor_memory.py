@@ -82,7 +82,7 @@ def memory_of(problem: Problem, world: World) -> SensorMemory:
         *problem.constraints,
         *problem.outputs,
     ]
-    asked = frozenset[str]().union(*(each.formula.names for each in objectives))
+    asked = frozenset[str]().union(*(each.formula.needed for each in objectives))
     inputs = tuple(name for name in input_sizes(world) if name in sensed)
     margin = problem.termination.margin.names if problem.termination else frozenset[str]()
     bodies = accelerometer_bodies(world, sensed | asked | margin)

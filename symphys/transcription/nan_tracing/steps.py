@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.expression import Formula
 from symphys.model.state_layout import Layout, input_columns
 from symphys.problem import Constraint, Cost, Output, Target
+from symphys.transcription.formulas.recorded_parts import (
+    RolloutArrays,
+    formula_arguments,
+    instants,
+    part_numbers,
+)
 from symphys.transcription.nan_tracing.operations import NonFiniteOperation, non_finite_operation
 from symphys.transcription.rollout import Rollout
 
@@ -19,40 +25,6 @@ Columns = Sequence[str]
 """A name for each element of a vector."""
 
 MOST_NAMES = 4
-
-
-@dataclass(frozen=True)
-class RolloutArrays:
-    """All that a rollout went through.
-
-    Attributes:
-        z: (n,) decision vector.
-        smoothing: [m/s].
-        x: (N + 1, nx) states, with all memory.
-        u: (N, nu) inputs.
-        given: (N, nu) inputs as variables give them, to which controllers add.
-        p: (np,) parameters.
-    """
-
-    z: Array
-    smoothing: float
-    x: Array
-    u: Array
-    given: Array
-    p: Array
-
-    def step_arguments(self, k: int) -> list[Array]:
-        """Of the step function at step k."""
-        return [self.x[k], self.u[k], self.p, np.array([self.smoothing])]
-
-    def control_arguments(self, k: int, dt: float) -> list[Array]:
-        """Of the controllers at step k."""
-        return [self.x[k], self.given[k], self.p, np.array([k * dt])]
-
-    def closed_arguments(self, k: int, rollout: Rollout) -> list[Array]:
-        """Of the step with its controllers."""
-        time = [] if rollout.feedback is None else [k * rollout.dt]
-        return [self.x[k], np.array([*self.given[k], *time]), self.p, np.array([self.smoothing])]
 
 
 def first_non_finite(rollout: Rollout, arrays: RolloutArrays) -> str:
@@ -82,31 +54,34 @@ def _in_steps(rollout: Rollout, arrays: RolloutArrays) -> str:
     k = int(np.argmax(bad))
     if rollout.feedback is not None and not np.isfinite(arrays.u[k]).all():
         known = [*_argument_names(rollout), ("time",)]
-        found = non_finite_operation(rollout.feedback, arrays.control_arguments(k, rollout.dt))
-        return f"it begins in what controllers give at t = {k * rollout.dt:g} s{_cause(found, known, known[1:2])}"
+        found = non_finite_operation(rollout.feedback, arrays.control_arguments(k))
+        where = f"in what controllers and force laws give at t = {arrays.time[k]:g} s"
+        return f"it begins {where}{_cause(found, known, known[1:2])}"
     found = non_finite_operation(rollout.step, arrays.step_arguments(k))
     names = _argument_names(rollout)
-    return f"it begins in the step from t = {k * rollout.dt:g} s{_cause(found, names, names[:1])}"
+    return f"it begins in the step from t = {arrays.time[k]:g} s{_cause(found, names, names[:1])}"
 
 
 def _in_formulas(rollout: Rollout, arrays: RolloutArrays) -> str:
     names = _argument_names(rollout)
-    for kind, asked, k, row in _instants(rollout):
-        found = non_finite_operation(rollout.compiled(asked.formula), _formula_arguments(rollout, arrays, k, row))
+    for kind, asked, formula, k, row in _instants(rollout):
+        found = non_finite_operation(rollout.compiled(formula), _formula_arguments(rollout, arrays, formula, k, row))
         if found is not None:
-            return f"{kind} {asked.name!r} is not finite at t = {k * rollout.dt:g} s{_cause(found, names)}"
+            return f"{kind} {asked.name!r} is not finite at t = {arrays.time[k]:g} s{_cause(found, names)}"
     return ""
 
 
-def _derivative_clause(rollout: Rollout, arrays: RolloutArrays, kind: str, asked: Asked, k: int, row: int) -> str:
-    formula = rollout.compiled(asked.formula)
-    arguments = _formula_arguments(rollout, arrays, k, row)
-    seeds = [np.zeros(formula.numel_out(0)), np.ones(formula.numel_out(0))]
-    found = non_finite_operation(formula.reverse(1), [*arguments, *seeds])
+def _derivative_clause(
+    rollout: Rollout, arrays: RolloutArrays, kind: str, asked: Asked, formula: Formula, k: int, row: int
+) -> str:
+    compiled = rollout.compiled(formula)
+    arguments = _formula_arguments(rollout, arrays, formula, k, row)
+    seeds = [np.zeros(compiled.numel_out(0)), np.ones(compiled.numel_out(0))]
+    found = non_finite_operation(compiled.reverse(1), [*arguments, *seeds])
     if found is None:
         return ""
     names = _argument_names(rollout)
-    return f"the derivative of {kind} {asked.name!r} is not finite at t = {k * rollout.dt:g} s{_cause(found, names)}"
+    return f"the derivative of {kind} {asked.name!r} is not finite at t = {arrays.time[k]:g} s{_cause(found, names)}"
 
 
 def _in_steps_back(rollout: Rollout, arrays: RolloutArrays) -> str:
@@ -120,7 +95,7 @@ def _in_steps_back(rollout: Rollout, arrays: RolloutArrays) -> str:
         adjoint = np.array(backward(*arguments)[0]).ravel()
         if not np.isfinite(adjoint).all():
             names, found = _argument_names(rollout), non_finite_operation(backward, arguments)
-            when = f"t = {k * rollout.dt:g} s to {(k + 1) * rollout.dt:g} s"
+            when = f"t = {arrays.time[k]:g} s to {arrays.time[k + 1]:g} s"
             return f"the derivative of the step from {when} is not finite{_cause(found, names, names)}"
     return ""
 
@@ -136,8 +111,8 @@ def _cause(found: NonFiniteOperation | None, names: Sequence[Columns], results: 
     return f": {found.operation}{made}{leads}" if found.operation else f"{made}{leads}"
 
 
-def _instants(rollout: Rollout) -> Iterator[tuple[str, Asked, int, int]]:
-    """(kind, objective, number of the state, number of the inputs) of every evaluation of a formula."""
+def _instants(rollout: Rollout) -> Iterator[tuple[str, Asked, Formula, int, int]]:
+    """(kind, objective, formula, number of the state, number of the inputs) of every evaluation of a formula."""
     problem, steps = rollout.problem, rollout.steps
     groups = (
         ("cost", problem.costs),
@@ -146,18 +121,21 @@ def _instants(rollout: Rollout) -> Iterator[tuple[str, Asked, int, int]]:
         ("output", problem.outputs),
     )
     for kind, asked in ((kind, asked) for kind, group in groups for asked in group):
+        formula = asked.formula
+        for part in formula.parts:
+            yield from ((kind, asked, part.formula, k, row) for k, row in instants(rollout, part))
         if asked.at != "always":
             k = rollout.tick(asked.at)
-            yield kind, asked, k, min(k, steps - 1)
+            yield kind, asked, formula, k, min(k, steps - 1)
             continue
         if kind == "cost":
-            yield from ((kind, asked, k, k) for k in range(steps))
-        if kind == "constraint" or rollout.moves(asked.formula):
-            yield from ((kind, asked, k, k - 1) for k in range(1, steps + 1))
+            yield from ((kind, asked, formula, k, k) for k in range(steps))
+        if kind == "constraint" or rollout.moves(formula):
+            yield from ((kind, asked, formula, k, k - 1) for k in range(1, steps + 1))
 
 
-def _formula_arguments(rollout: Rollout, arrays: RolloutArrays, k: int, row: int) -> list[Array]:
-    return [arrays.x[k], arrays.u[row], arrays.p, np.array([k * rollout.dt]), arrays.z]
+def _formula_arguments(rollout: Rollout, arrays: RolloutArrays, formula: Formula, k: int, row: int) -> list[Array]:
+    return [*formula_arguments(arrays, k, row), *part_numbers(rollout, arrays, formula)]
 
 
 def _argument_names(rollout: Rollout) -> tuple[Columns, Columns, Columns]:

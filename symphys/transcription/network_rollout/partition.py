@@ -142,7 +142,7 @@ def refuse_formulas(problem: Problem, names: Sequence[str]) -> None:
         Issue(f'{kind} "{each.name}"', f"looks at {name}, the weights of a net that is too large for formulas")
         for kind, each in _formulas(problem)
         for name in names
-        if name in each.formula.names
+        if name in each.formula.needed
     ]
     if issues:
         raise ProblemError(problem.file, issues)

@@ -18,6 +18,7 @@ from symphys.codegen import FunctionCall, MemoryLayout, Place, Program
 from symphys.expression import Formula
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.feedback.controller_calls import control_calls
+from symphys.transcription.formulas.motion_parts import part_arguments
 from symphys.transcription.gradient_probe import combined
 from symphys.transcription.objective import terms
 from symphys.transcription.program import dense, step_calls
@@ -48,7 +49,7 @@ class FormulaSamples:
         if key not in self.moments:
             self.moments[key] = ca.MX.sym("x", sizes[0]), ca.MX.sym("u", sizes[1])
         x, u = self.moments[key]
-        return self.rollout.compiled(formula)(x, u, self.p, k * self.dt, self.z)
+        return self.rollout.compiled(formula)(x, u, self.p, k * self.dt, self.z, *part_arguments(self, formula))
 
     def after_steps(self, formula: Formula) -> Expr:
         """See ``Sampled``."""

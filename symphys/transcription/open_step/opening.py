@@ -91,6 +91,7 @@ def opened(problem: Problem, controllers: Sequence[str] | None = None, sensors: 
     if not actions:
         text = "nothing can act: it has no controller, no motor, and no variable that sets an input over time"
         raise SymphysError(f"{problem.name}: {text}")
+    refuse_motion_parts(problem)
     refuse_formulas(problem, {**dict.fromkeys(names, "nothing else"), **{v.name: slots(v) for v in dropped}})
     rest = replace(
         problem,
@@ -177,6 +178,18 @@ def slots(variable: Variable) -> str:
     return " or ".join(slot.name for slot in variable.slots)
 
 
+def refuse_motion_parts(problem: Problem) -> None:
+    """ProblemError if a cost or target takes something of a whole motion, which a single step does not have."""
+    issues = [
+        Issue(f'{kind} "{each.name}"', f"{each.formula.parts[0].name} is of a whole motion, and this is a single step")
+        for kind, every in (("cost", problem.costs), ("target", problem.targets))
+        for each in every
+        if each.formula.parts
+    ]
+    if issues:
+        raise ProblemError(problem.file, issues)
+
+
 def refuse_formulas(problem: Problem, taken: Mapping[str, str]) -> None:
     """ProblemError if a cost or target looks at what is taken off, by name; the values say what to look at instead."""
     issues = [
@@ -184,7 +197,7 @@ def refuse_formulas(problem: Problem, taken: Mapping[str, str]) -> None:
         for kind, every in (("cost", problem.costs), ("target", problem.targets))
         for each in every
         for name, instead in taken.items()
-        if name in each.formula.names
+        if name in each.formula.needed
     ]
     if issues:
         raise ProblemError(problem.file, issues)

@@ -1,0 +1,56 @@
+"""The state half a time step ahead, as far as it is known before the step: for forces that depend on the state."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import casadi as ca
+
+from symphys.dynamics.arguments import arguments_of, context_of, inline, parts_of
+from symphys.dynamics.prediction import predicted_motions
+from symphys.dynamics.tracing.decorator import traced, tracing
+from symphys.maths import rotation
+from symphys.model.state_layout import Layout
+from symphys.model.world import Scheme, World
+
+Expr = Any
+"""casadi SX, MX or DM"""
+
+
+def half_step_function(
+    world: World, scheme: Scheme | None = None, inputs: Sequence[str] = (), parameters: Sequence[Any] = ()
+) -> ca.Function:
+    """The state at t_k + dt/2, to first order in dt: (x, u, p) -> (nx,).
+
+    Places drift with the velocities at t_k: a force of these places alone makes the step position Verlet (drift, kick,
+    drift), which is symplectic. Velocities change with the accelerations under gravity, the inputs and the persistent
+    forces of the last step, as joints let them. Everything else is as at t_k.
+    """
+    arguments = arguments_of(world, inputs, parameters)
+    tracer, layout = inline(world, arguments, reduces=False), Layout(world)
+    with tracing(tracer):
+        context = context_of(world, scheme, inputs, arguments)
+        x, dt = parts_of(layout, arguments[0]), ca.SX(context.settings.scheme.dt)
+        values = dict(x)
+        for body, motion in zip(world.bodies, predicted_motions(context, x, dt), strict=True):
+            place = _drifted(motion.position, motion.orientation, motion.velocity, motion.angular_velocity, dt / 2)
+            changes = (motion.acceleration, motion.angular_acceleration)
+            moving = _accelerated(motion.velocity, motion.angular_velocity, *changes, dt / 2)
+            for name, value in zip(FIELDS, (*place, *moving), strict=True):
+                values[f"{body.name}.{name}"] = value
+    packed = layout.pack({name: tracer.value(part) for name, part in values.items()})
+    return ca.Function("half_step", arguments[:3], [ca.densify(packed)], ["x", "u", "p"], ["x_half"])
+
+
+FIELDS = ("position", "orientation", "velocity", "angular_velocity")
+
+
+@traced
+def _drifted(position: Expr, orientation: Expr, velocity: Expr, spin: Expr, half: Expr) -> tuple[Expr, Expr]:
+    return position + half * velocity, rotation.turn(orientation, half * spin)
+
+
+@traced
+def _accelerated(velocity: Expr, spin: Expr, change: Expr, turning: Expr, half: Expr) -> tuple[Expr, Expr]:
+    return velocity + half * change, spin + half * turning

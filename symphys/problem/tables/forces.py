@@ -1,0 +1,89 @@
+"""The [[force]] tables: forces, torques and commands that follow from the state by a formula."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from symphys.expression import FormulaError, parse
+from symphys.problem.feedback import ForceLaw
+from symphys.problem.model import Variable
+from symphys.problem.quantities import Quantity, SlotError, read_slot
+from symphys.problem.reading.faults import Faults
+from symphys.problem.schema.control import ForceTable
+from symphys.suggest import quote
+
+NOT_AHEAD = "accelerometer"
+"""What is not known half a step ahead."""
+VARYING = ("parameter", "weight")
+"""Kinds of variables that have one value over the whole motion, which a law may name."""
+
+
+def force_quantities(tables: Sequence[ForceTable]) -> dict[str, Quantity]:
+    """The numbers of all force laws by the names that variables and formulas use, such as ``drag.c``."""
+    return {
+        f"{table.name}.{key}": Quantity("weight", np.ravel(np.array(value, float)), own_scale=True)
+        for table in tables
+        for key, value in table.numbers.items()
+    }
+
+
+def read_forces(
+    tables: Sequence[ForceTable],
+    known: Mapping[str, Quantity],
+    sample: Mapping[str, Any],
+    variables: Sequence[Variable],
+    faults: Faults,
+) -> tuple[ForceLaw, ...]:
+    """Every law that is clear.
+
+    Args:
+        tables: as they are in the file.
+        known: every quantity; those of kind "control" can be added to.
+        sample: a value for each name in formulas, as the guess has it.
+        variables: of the problem.
+        faults: gets what is wrong.
+    """
+    found = [_read(index, table, known, sample, variables, faults) for index, table in enumerate(tables)]
+    return tuple(law for law in found if law is not None)
+
+
+def _read(
+    index: int,
+    table: ForceTable,
+    known: Mapping[str, Quantity],
+    sample: Mapping[str, Any],
+    variables: Sequence[Variable],
+    faults: Faults,
+) -> ForceLaw | None:
+    place = ("force", index)
+    inputs = {name: quantity for name, quantity in known.items() if quantity.kind == "control"}
+    try:
+        slot = read_slot(table.on, inputs)
+    except SlotError as error:
+        faults.add((*place, "on"), f"{error}; forces act on bodies and motors: ball.force, ball.torque, knee.command")
+        return None
+    try:
+        formula = parse(table.value)
+        value = ca.DM(formula.evaluate(sample))
+    except FormulaError as error:
+        faults.add((*place, "value"), str(error))
+        return None
+    kinds = {variable.name: variable.kind for variable in variables}
+    for name in sorted(formula.names):
+        if kinds.get(name, VARYING[0]) not in VARYING:
+            instead = " or ".join(slot.name for v in variables if v.name == name for slot in v.slots)
+            faults.add((*place, "value"), f"the variable {quote(name)} sets {instead}; name that instead")
+        if name.endswith(f".{NOT_AHEAD}"):
+            faults.add((*place, "value"), f"{quote(name)} is not known while the force is; take velocities")
+    size = int(value.shape[0])
+    if size != len(slot.components):
+        parts = f"has {len(slot.components)} component{'s' * (len(slot.components) > 1)}"
+        faults.add((*place, "value"), f"has {size} component{'s' * (size > 1)}, but {table.on} {parts}")
+    elif not value.is_regular():
+        faults.add((*place, "value"), "is not a finite number at the start of the guess")
+    numbers = {key: known[f"{table.name}.{key}"].nominal for key in table.numbers}
+    return ForceLaw(table.name, slot.name, slot.components, formula, numbers)

@@ -1,0 +1,69 @@
+"""Forces that follow from the state: what they add to the inputs of a step.
+
+Inputs are constant over a step. A force of the state at t_k would therefore be of first order. The laws are evaluated
+at t_k + dt/2 instead, see ``half_step_function``, which makes them of second order. Velocities there need
+accelerations, which depend on the laws. For them the laws are evaluated at t_k first. Motors give their impulse at the
+start of a step, so that laws of commands are of second order if they are evaluated there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import casadi as ca
+
+from symphys.dynamics.observation import half_step_function
+from symphys.model.state_layout import Layout, input_columns
+from symphys.model.world import World
+from symphys.problem import ForceLaw, Problem
+from symphys.transcription.feedback.sensor_memory import SensorMemory
+from symphys.transcription.formula_names import Instant, Parameters, instant, namespace
+
+Expr = Any
+"""casadi SX"""
+
+
+def force_function(
+    problem: Problem, world: World, inputs: Sequence[str], parameters: Parameters, memory: SensorMemory
+) -> ca.Function:
+    """(x, u, p, time) -> the inputs: u, and what all laws of the state add; x with its memory."""
+    at = instant(world, inputs, parameters, memory, 0)
+    scheme = problem.simulation.scheme()
+    ahead = half_step_function(world, scheme, inputs, parameters.symbols)
+    plain = Layout(world).size
+
+    def added(laws: Sequence[ForceLaw], x: Expr, time: Expr) -> Expr:
+        return _added(problem, world, inputs, parameters, memory, laws, Instant(x, at.u, at.p, time, at.z))
+
+    forces = [law for law in problem.forces if not law.commands]
+    total = at.u + added([law for law in problem.forces if law.commands], at.x, at.time)
+    if forces:
+        first = total + added(forces, at.x, at.time)
+        half = ca.vertcat(ahead(at.x[:plain], first, at.p), at.x[plain:])
+        total = total + added(forces, half, at.time + scheme.dt / 2)
+    return ca.Function("forces", [at.x, at.u, at.p, at.time], [ca.densify(total)])
+
+
+def _added(
+    problem: Problem,
+    world: World,
+    inputs: Sequence[str],
+    parameters: Parameters,
+    memory: SensorMemory,
+    laws: Sequence[ForceLaw],
+    at: Instant,
+) -> Expr:
+    """(nu,): what laws give at an instant."""
+    total, columns = ca.SX.zeros(at.u.shape[0]), input_columns(world, inputs)
+    wanted = frozenset[str]().union(*(law.formula.names for law in laws))
+    names = namespace(problem, world, inputs, parameters, memory, at, wanted)
+    for variable in problem.variables:
+        if variable.name in wanted:
+            slot = variable.slots[0]
+            names[variable.name] = ca.vertcat(*(names[slot.name][k] for k in slot.components))
+    for law in laws:
+        value = law.formula.evaluate({name: names[name] for name in law.formula.names})
+        for k, component in enumerate(law.components):
+            total[columns[law.on].start + component] += value[k]
+    return total

@@ -1,0 +1,1 @@
+"""What formulas take of whole motions."""

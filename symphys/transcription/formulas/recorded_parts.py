@@ -1,0 +1,78 @@
+"""A rollout that was simulated, as arrays, and what formulas take of it as a whole motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.expression import Formula, MotionPart
+from symphys.transcription.rollout import Rollout
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RolloutArrays:
+    """All that a rollout went through.
+
+    Attributes:
+        z: (n,) decision vector.
+        smoothing: [m/s].
+        x: (N + 1, nx) states, with all memory.
+        u: (N, nu) inputs.
+        given: (N, nu) inputs as variables give them, to which controllers add.
+        p: (np,) parameters.
+        time: (N + 1,) [s].
+    """
+
+    z: Array
+    smoothing: float
+    x: Array
+    u: Array
+    given: Array
+    p: Array
+    time: Array
+
+    def step_arguments(self, k: int) -> list[Array]:
+        """Of the step function at step k."""
+        return [self.x[k], self.u[k], self.p, np.array([self.smoothing])]
+
+    def control_arguments(self, k: int) -> list[Array]:
+        """Of the controllers at step k."""
+        return [self.x[k], self.given[k], self.p, self.time[k : k + 1]]
+
+    def closed_arguments(self, k: int, rollout: Rollout) -> list[Array]:
+        """Of the step with its controllers."""
+        time = [] if rollout.feedback is None else [self.time[k]]
+        return [self.x[k], np.array([*self.given[k], *time]), self.p, np.array([self.smoothing])]
+
+
+def part_numbers(rollout: Rollout, arrays: RolloutArrays, formula: Formula) -> list[Array]:
+    """The same as ``part_arguments``, in numbers, of a rollout that was simulated."""
+    if not formula.parts:
+        return []
+    return [np.concatenate([_numbers(rollout, arrays, part) for part in formula.parts])]
+
+
+def _numbers(rollout: Rollout, arrays: RolloutArrays, part: MotionPart) -> Array:
+    """(m,)."""
+    compiled = rollout.compiled(part.formula)
+    found = [np.array(compiled(*formula_arguments(arrays, k, row))).ravel() for k, row in instants(rollout, part)]
+    total = np.mean(found, axis=0)
+    return np.asarray(total * arrays.time[-1] if part.kind == "integral" else total)
+
+
+def instants(rollout: Rollout, part: MotionPart) -> list[tuple[int, int]]:
+    """The numbers of the states and of the inputs at which the formula of a part is evaluated."""
+    steps = rollout.steps
+    if part.kind in ("start", "end"):
+        return [(0, 0)] if part.kind == "start" else [(steps, steps - 1)]
+    after = [(k + 1, k) for k in range(steps)] if rollout.moves(part.formula) else []
+    return [(k, k) for k in range(steps)] + after
+
+
+def formula_arguments(arrays: RolloutArrays, k: int, row: int) -> list[Array]:
+    """Of a compiled formula without parts, at state k with inputs ``row``."""
+    return [arrays.x[k], arrays.u[row], arrays.p, arrays.time[k : k + 1], arrays.z]

@@ -1,0 +1,157 @@
+"""Force laws: of second order against closed forms, with exact slopes, by every backend; what cannot be is said."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from symphys.codegen import compile_program, interpret
+from symphys.errors import ProblemError
+from symphys.problem import Problem, problem_of_tables
+from symphys.trajectory import Trajectory
+from symphys.transcription import rollout_program, transcribe
+
+MASS, G = 0.5, 9.81
+BALL = {"name": "ball", "mass": MASS, "shape": {"sphere": {"radius": 0.1}}}
+HINGE = {"name": "hinge", "between": ["world", "ball"], "hinge": {"axis": [0, 1, 0]}, "point": [0, 0, 0], "start": 0.5}
+SPRING = {"name": "spring", "on": "ball.force", "value": "-spring.k * ball.position", "numbers": {"k": 20}}
+DRAG = {"name": "drag", "on": "ball.force", "value": "-drag.c * norm(ball.velocity) * ball.velocity"}
+MAGNUS = {"name": "lift", "on": "ball.force", "value": "lift.c * cross(ball.angular_velocity, ball.velocity)"}
+
+
+def problem(forces: list[Any], dt: float, duration: float = 2.0, down: float = 0.0, **tables: Any) -> Problem:
+    return problem_of_tables(
+        {
+            "simulation": {"duration": duration, "dt": dt},
+            "world": {"gravity": [0, 0, -down]},
+            "body": [{**BALL, **tables.pop("start", {})}],
+            "force": forces,
+            "variable": [{"name": "throw", "sets": "ball.velocity"}],
+            "cost": [{"name": "place", "value": "sumsqr(ball.position - [1, 2, 3])"}],
+            **tables,
+        }
+    )
+
+
+def motion(forces: list[Any], dt: float, **more: Any) -> Trajectory:
+    made = transcribe(problem(forces, dt, **more), backend="casadi")
+    return made.simulate(made.shooting.start(0))
+
+
+def test_a_spring_swings_with_its_period_and_keeps_its_energy() -> None:
+    errors = []
+    for dt in (0.02, 0.01):
+        found = motion([SPRING], dt, duration=4.0, start={"position": [1, 0, 0]})
+        x, v = found.position[:, 0, 0], found.velocity[:, 0, 0]
+        errors.append(np.abs(x - np.cos(np.sqrt(20 / MASS) * found.time)).max())
+        energy = MASS * v**2 / 2 + 10 * x**2
+        assert energy == pytest.approx(10, rel=12 * dt**2)  # it swings about its value and does not drift
+    assert errors[1] < 5e-3
+    assert errors[0] / errors[1] == pytest.approx(4, rel=0.02)
+
+
+def test_a_ball_that_falls_through_air_follows_tanh() -> None:
+    errors = []
+    for dt in (0.02, 0.01):
+        found = motion([{**DRAG, "numbers": {"c": 0.05}}], dt, duration=4.0, down=G)
+        last = np.sqrt(MASS * G / 0.05)
+        expected = -last * np.tanh(G * found.time / last)
+        errors.append(np.abs(found.velocity[:, 0, 2] - expected).max())
+    assert errors[1] < 1e-4
+    assert errors[0] / errors[1] == pytest.approx(4, rel=0.05)
+
+
+def test_magnus_force_bends_the_path_as_scipy_integrates_it() -> None:
+    forces = [{**DRAG, "numbers": {"c": 0.005}}, {**MAGNUS, "numbers": {"c": 0.002}}]
+    spin = np.array([0, 10.0, 60.0])
+    start = {"velocity": [20, 0, 5], "angular_velocity": spin.tolist()}
+
+    def slope(_: float, y: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        v = y[3:]
+        force = -0.005 * np.linalg.norm(v) * v + 0.002 * np.cross(spin, v)
+        return np.concatenate([v, [0, 0, -G] + force / MASS])
+
+    exact = solve_ivp(slope, (0, 1), [0, 0, 0, 20, 0, 5], rtol=1e-11, atol=1e-11).y[:, -1]
+    found = motion(forces, 0.001, duration=1.0, down=G, start=start)
+    assert found.position[-1, 0] == pytest.approx(exact[:3], abs=1e-6)
+    assert found.velocity[-1, 0] == pytest.approx(exact[3:], abs=1e-6)
+
+
+@pytest.mark.parametrize("on", ["hinge.command", "ball.torque[1]"])
+def test_laws_on_motors_and_on_bodies_of_joints_are_of_second_order(on: str) -> None:
+    law = {"name": "law", "on": on, "value": "-0.08 * hinge.angle - 0.004 * hinge.rate"}
+    inertia = 0.4 * MASS * 0.01
+    decay, errors = 0.004 / (2 * inertia), []
+    rate = np.sqrt(0.08 / inertia - decay**2)
+    for dt in (0.01, 0.005):
+        joint = [{**HINGE, "motor": {"torque": {"torque": 1000}}}]
+        found = motion([law], dt, joint=joint)
+        t = found.time
+        expected = 0.5 * np.exp(-decay * t) * (np.cos(rate * t) + decay / rate * np.sin(rate * t))
+        errors.append(np.abs(found.joint_value[:, 0, 0] - expected).max())
+    assert errors[1] < 1e-4
+    assert errors[0] / errors[1] == pytest.approx(4, rel=0.05)
+
+
+def test_slopes_are_those_of_differences_and_the_kernel_agrees() -> None:
+    forces = [{**DRAG, "numbers": {"c": 0.05}}, {**MAGNUS, "numbers": {"c": 0.02}}, SPRING]
+    forces.append(
+        {
+            "name": "gust",
+            "on": "ball.force[0]",
+            "value": "strength * sin(5 * time) + gust.more",
+            "numbers": {"more": 0.1},
+        }
+    )
+    variables = [
+        {"name": "throw", "sets": "ball.velocity", "guess": [3, 1, 2]},
+        {"name": "strength", "sets": "drag.c"},
+        {"name": "lift_of_air", "sets": "lift.c"},
+        {"name": "push", "sets": "ball.force[1]", "knots": 3, "guess": [0.1, 0.2, 0.3]},
+    ]
+    start = {"angular_velocity": [1, 2, 8]}
+    made = transcribe(problem(forces, 0.01, 0.5, G, variable=variables, start=start), backend="casadi")
+    z, h = made.shooting.start(1), 1e-6
+    merit, *_, slope, _ = (np.array(part).ravel() for part in made.functions.gradient(z, 0.0))
+    value = made.functions.value
+    differences = [(float(value(z + e, 0.0)[0]) - float(value(z - e, 0.0)[0])) / (2 * h) for e in h * np.eye(z.size)]
+    assert np.all(slope != 0)
+    assert slope == pytest.approx(differences, rel=1e-6, abs=1e-7)
+    program = rollout_program(made.rollout)
+    assert interpret(program, z, [0.0])["merit"] == pytest.approx(merit, rel=1e-12)
+    outputs, gradient = compile_program(program, seeded=("merit",), threads=1).gradient(z, [1.0], [0.0])
+    assert outputs["merit"][0] == pytest.approx(merit, rel=1e-12)
+    assert gradient[0] == pytest.approx(slope, rel=1e-9)
+
+
+def test_laws_add_to_controllers_and_to_each_other() -> None:
+    push = {"name": "push", "on": "ball.force", "value": "[ball.mass, 0, 0]"}
+    controller = [{"name": "steady", "drives": "ball.force[1]", "senses": ["clock"], "linear": {"offsets": [1.0]}}]
+    clock = [{"name": "clock", "reads": "time"}]
+    made = transcribe(problem([push, {**push, "name": "again"}], 0.01, controller=controller, sensor=clock))
+    found = made.simulate(made.shooting.start(0))
+    assert found.force[:, 0] == pytest.approx(np.tile([2 * MASS, 1, 0], (200, 1)), rel=1e-12)
+    value = made.shooting.evaluator.value(made.shooting.start(0)[None], 0.0)
+    assert value.objective[0] == pytest.approx(np.sum((found.position[-1, 0] - [1, 2, 3]) ** 2), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("law", "message"),
+    [
+        ({"on": "ball.velocity"}, r'"drag".on: there is no quantity "ball.velocity".*forces act on bodies and motors'),
+        ({"on": "ball.force[0]"}, r'"drag".value: has 3 components, but ball.force\[0\] has 1 component'),
+        ({"value": "ball.velocty"}, r'"drag".value: unknown name "ball.velocty"; did you mean "ball.velocity"'),
+        ({"value": "end.ball.velocity"}, r"is of a whole motion; costs"),
+        ({"value": "throw"}, r'the variable "throw" sets ball.velocity; name that instead'),
+        ({"value": "ball.accelerometer"}, r"is not known while the force is"),
+        ({"value": "ball.velocity / ball.velocity[0]"}, r"is not a finite number at the start of the guess"),
+        ({"numbers": {"c": "fast"}}, r'"drag".numbers.c'),
+        ({"name": "ball"}, r'"ball" is already the name of another'),
+    ],
+)
+def test_what_cannot_be_names_table_and_key(law: dict[str, Any], message: str) -> None:
+    with pytest.raises(ProblemError, match=message):
+        problem([{**DRAG, "numbers": {"c": 0.1}, **law}], 0.01)

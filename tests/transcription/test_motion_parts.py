@@ -1,0 +1,135 @@
+"""Formulas of whole motions: start, end and integrals are those of the rollout, with exact slopes, by every backend."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from symphys.codegen import compile_program, interpret
+from symphys.errors import ProblemError, SymphysError
+from symphys.problem import Problem, load_problem
+from symphys.transcription import Transcription, rollout_program, transcribe
+from symphys.transcription.nan_tracing.steps import first_non_finite
+from symphys.transcription.open_step import compile_open_step
+
+BALL = """
+[simulation]
+duration = 0.6
+dt = 0.01
+[[body]]
+name = "ball"
+shape = { sphere = { radius = 0.1 } }
+mass = 0.5
+position = [0, 0, 1]
+[ground]
+restitution = 0.5
+[[variable]]
+name = "throw"
+sets = "ball.velocity"
+guess = [1, 0.5, 0.2]
+[[variable]]
+name = "push"
+sets = "ball.force[0]"
+knots = 5
+guess = [1, -2, 3, 1, 0.5]
+[[cost]]
+name = "whole"
+value = "integral(sumsqr(ball.velocity) + ball.force[0]**2)"
+[[cost]]
+name = "running"
+at = "always"
+value = "sumsqr(ball.velocity) + ball.force[0]**2"
+[[cost]]
+name = "of transport"
+value = "integral(abs(ball.force[0] * ball.velocity[0])) / norm(end.ball.position - start.ball.position)"
+[[target]]
+name = "periodic"
+value = "end.ball.velocity[0:2] - start.ball.velocity[0:2]"
+tolerance = 0.01
+[[target]]
+name = "half way"
+at = 0.3
+value = "ball.position - start.ball.position"
+tolerance = 0.01
+[[constraint]]
+name = "on average"
+value = "average(ball.position[2])"
+lower = 0.7
+[[output]]
+name = "duration"
+value = "end.time - start.time"
+"""
+
+
+def load(tmp_path: Path, text: str) -> Problem:
+    path = tmp_path / "ball.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_problem(path)
+
+
+NOT_FINITE = BALL.replace("sumsqr(ball.velocity) +", "sqrt(ball.position[2] - 0.5) +", 1)
+
+
+@pytest.fixture
+def ball(tmp_path: Path) -> Transcription:
+    return transcribe(load(tmp_path, BALL), backend="casadi")
+
+
+def test_an_integral_is_the_running_cost_and_start_and_end_are_those_of_the_motion(ball: Transcription) -> None:
+    z = ball.shooting.start(1)
+    judged, motion = ball.judge(z), ball.simulate(z)
+    assert judged.costs["whole"] == pytest.approx(judged.costs["running"], rel=1e-14)
+    assert judged.outputs["duration"] == pytest.approx(0.6, rel=1e-15)
+    periodic, half, _ = judged.checks
+    velocity, position = motion.velocity[:, 0], motion.position[:, 0]
+    assert periodic.error == pytest.approx(np.linalg.norm((velocity[-1] - velocity[0])[:2]), rel=1e-12)
+    assert half.error == pytest.approx(np.linalg.norm(position[30] - position[0]), rel=1e-12)
+    power = np.abs(motion.force[:, 0, 0] * velocity[:-1, 0]) + np.abs(motion.force[:, 0, 0] * velocity[1:, 0])
+    work = 0.01 * power.sum() / 2
+    assert judged.costs["of transport"] == pytest.approx(work / np.linalg.norm(position[-1] - position[0]), rel=1e-12)
+
+
+def test_slopes_are_those_of_differences_and_the_kernel_agrees(ball: Transcription) -> None:
+    z, h = ball.shooting.start(1), 1e-6
+    merit, _, errors, slope, _ = (np.array(part).ravel() for part in ball.functions.gradient(z, 0.0))
+    differences = [
+        (float(ball.functions.value(z + e, 0.0)[0]) - float(ball.functions.value(z - e, 0.0)[0])) / (2 * h)
+        for e in h * np.eye(z.size)
+    ]
+    assert slope == pytest.approx(differences, rel=1e-6, abs=1e-6)
+    program = rollout_program(ball.rollout)
+    assert interpret(program, z, [0.0])["errors"] == pytest.approx(errors, rel=1e-12)
+    outputs, gradient = compile_program(program, seeded=("merit",), threads=1).gradient(z, [1.0], [0.0])
+    assert outputs["merit"][0] == pytest.approx(merit, rel=1e-12)
+    assert gradient[0] == pytest.approx(slope, rel=1e-9)
+
+
+def test_where_a_part_is_not_finite_is_said(tmp_path: Path) -> None:
+    made = transcribe(load(tmp_path, NOT_FINITE), backend="casadi")
+    found = first_non_finite(made.rollout, made.record(made.shooting.start(0)).arrays)
+    assert found.startswith("cost 'whole' is not finite at t = 0.3")
+
+
+def test_a_single_step_has_no_whole_motion(tmp_path: Path) -> None:
+    with pytest.raises(SymphysError, match=r"integral.* is of a whole motion, and this is a single step"):
+        compile_open_step(load(tmp_path, BALL), backend="casadi")
+
+
+@pytest.mark.parametrize(
+    ("found", "given", "message"),
+    [
+        (
+            'at = "always"\nvalue = "',
+            'at = "always"\nvalue = "end.time + ',
+            r'"running".at: has end.time, .* take "end"',
+        ),
+        ("end.ball.velocity", "end.bal.velocity", r'unknown name "bal.velocity"'),
+        ("average(ball.position[2])", "average(ball.position[3])", r"no component 3"),
+        ("average(ball.position[2])", "average(end.time)", r"what has an average is of one instant"),
+    ],
+)
+def test_what_cannot_be_names_table_and_key(tmp_path: Path, found: str, given: str, message: str) -> None:
+    with pytest.raises(ProblemError, match=message):
+        load(tmp_path, BALL.replace(found, given, 1))
