@@ -200,7 +200,9 @@ class Tangent:
                 rates = [chart.rates(*each) for each in zip(places, moving, strict=True)]
                 found += [chart.apart(*places), rates[1] - rates[0]]
         found += [new[name] - old[name] for name, _ in self._raw]
-        given = dict(zip((b.name for b in self.rollout.world.bodies), zip(self._given(old), self._given(new)), strict=True))
+        given = dict(
+            zip((b.name for b in self.rollout.world.bodies), zip(self._given(old), self._given(new)), strict=True)
+        )
         for name in self._touching:
             field = f"{name}.reaction_torque"
             found.append(new[field] - old[field] - (given[name][1][1] - given[name][0][1]))
@@ -226,7 +228,9 @@ class Tangent:
         name = self.rollout.world.bodies[index].name
         return state[f"{name}.{fields[0][0]}"], state[f"{name}.{fields[1][0]}"]
 
-    def _put(self, state: dict[str, Expr], index: int, fields: tuple[tuple[str, int], ...], both: Pose | Moving) -> None:
+    def _put(
+        self, state: dict[str, Expr], index: int, fields: tuple[tuple[str, int], ...], both: Pose | Moving
+    ) -> None:
         name = self.rollout.world.bodies[index].name
         for (field, _), value in zip(fields, both, strict=True):
             state[f"{name}.{field}"] = value
@@ -250,6 +254,4 @@ def _carried_on(
     """Velocities at the new poses, of rates that changed by ``more``; what velocities are off the joints stays."""
     rates = chart.rates(poses, moving)
     fit, after = chart.velocities(poses, rates), chart.velocities(moved, rates + more)
-    return {
-        i: (after[i][0] + (moving[i][0] - fit[i][0]), after[i][1] + (moving[i][1] - fit[i][1])) for i in after
-    }
+    return {i: (after[i][0] + (moving[i][0] - fit[i][0]), after[i][1] + (moving[i][1] - fit[i][1])) for i in after}
