@@ -24,6 +24,10 @@ from symphys.codegen.program.program import FunctionCall, Place, Program
 
 Flags = NDArray[np.bool_]
 Words = NDArray[np.int64]
+TABLED = 1.5
+"""Operations of products with slopes on the tape that take as long as one of other adjoints, which store more."""
+LARGEST = 4000
+"""Slopes of a call beyond which they are not put on the tape."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +67,13 @@ class _Pull:
     @property
     def work(self) -> int:
         """Operations of a block."""
-        graph = self.taped.adjoint if self.taped else self.graph
-        return sum(graph.nodes[x].op not in ("input", "const") for x in graph.needed())
+        return operations(self.graph, self.taped)
+
+
+def operations(graph: Graph, taped: Taped | None) -> int:
+    """Of an adjoint, for a block of rows."""
+    found = taped.adjoint if taped else graph
+    return sum(found.nodes[x].op not in ("input", "const") for x in found.needed())
 
 
 def slope_plan(program: Program, output: str, lanes: int) -> SlopePlan:
@@ -85,7 +94,7 @@ def slope_plan(program: Program, output: str, lanes: int) -> SlopePlan:
     places = AdjointPlaces(program, target, backward)
     entries = [_entry(pull, places, functions) for pull in backward]
     blocks = []
-    for rows, taken in row_blocks(program, target, backward, lanes):
+    for rows, taken in row_blocks(program, target, backward, lanes, functions):
         blocks.append((rows, [entries[i] for i in np.flatnonzero(taken)]))
     seeds = [places.static[target.offset + row] for row in range(target.size)]
     result = places.static[program.z.offset] if program.z.size else 0
@@ -101,8 +110,15 @@ def _pull(reach: CallActivity, activity: Activity, functions: DistinctFunctions,
     inputs, outputs = activity.marks(reach.inputs), activity.marks(reach.outputs)
     if not any(inputs) or not any(outputs):
         return None
-    graph = functions.adjoint(reach.call.function, inputs, outputs)
-    taped = functions.taped(functions.forward(reach.call.function), graph)
+    function = reach.call.function
+    forward = functions.forward(function)
+    graph = functions.adjoint(function, inputs, outputs)
+    taped = functions.taped(forward, graph)
+    table = functions.adjoint(function, inputs, outputs, tabled=True)
+    if table is not graph:
+        other = functions.taped(forward, table)
+        if operations(table, other) < TABLED * operations(graph, taped):
+            graph, taped = table, other
     return _Pull(reach, graph, inputs, outputs, taped, Place(end, taped.size if taped else 0))
 
 
@@ -175,40 +191,53 @@ class AdjointPlaces:
 
 
 def row_blocks(
-    program: Program, target: Place, backward: Sequence[_Pull], lanes: int
+    program: Program, target: Place, backward: Sequence[_Pull], lanes: int, functions: DistinctFunctions
 ) -> list[tuple[list[int], Flags]]:
-    """Rows in blocks, and which of the adjoints each block takes: each row beside those that add least to its block."""
-    taken = np.array([_taken(program, target.offset + row, backward) for row in range(target.size)])
+    """Rows in blocks, and which of the adjoints each block takes: each row beside those with which it shares most."""
+    taken = _taken(program, target, backward, functions)
     work = np.array([pull.work for pull in backward], float)
     left, blocks = list(range(target.size)), []
     while left:
-        loads = taken[left] @ work
-        rows = [left.pop(int(np.argmax(loads)))]
+        rows = [left.pop(int(np.argmax(taken[left] @ work)))]
         union = taken[rows[0]].copy()
         while left and len(rows) < lanes:
-            more = (taken[left] & ~union) @ work
-            best = int(np.lexsort((-(taken[left] @ work), more))[0])
-            rows.append(left.pop(best))
+            rows.append(left.pop(int(np.argmax(taken[left] @ np.where(union, work, -work)))))
             union |= taken[rows[-1]]
         blocks.append((rows, union))
     return blocks
 
 
-def _taken(program: Program, word: int, backward: Sequence[_Pull]) -> Flags:
-    """Which adjoints a seed on this word reaches."""
-    useful, found = np.zeros(program.size, bool), np.zeros(len(backward), bool)
-    useful[word] = True
+def _taken(program: Program, target: Place, backward: Sequence[_Pull], functions: DistinctFunctions) -> Flags:
+    """(rows, adjoints): which adjoints a seed on each word of the output reaches."""
+    useful = np.zeros((target.size, program.size), np.float32)
+    useful[:, target.offset : target.offset + target.size] = np.eye(target.size)
+    found, known = np.zeros((target.size, len(backward)), bool), dict[int, NDArray[np.float32]]()
     for i, pull in enumerate(backward):
         reach = pull.reach
-        wanted = np.zeros(len(reach.inputs), bool)
-        for words, matters, on in zip(reach.outputs, reach.dependence, pull.outputs, strict=True):
-            if on:
-                wanted |= matters[useful[words[0]]].any(axis=0)
-        wanted &= np.array(pull.inputs)
-        found[i] = wanted.any()
-        for k in np.flatnonzero(wanted):
-            useful[reach.inputs[k][0]] = True
+        outputs = np.concatenate([words[0] for words in reach.outputs])
+        inputs = np.concatenate([words[0] for words in reach.inputs])
+        graph = functions.forward(reach.call.function)
+        if id(graph) not in known:
+            known[id(graph)] = _sparsity(graph)
+        on = np.concatenate([np.full(len(words[0]), mark) for words, mark in zip(reach.outputs, pull.outputs, strict=True)])
+        seeded = useful[:, outputs] * on
+        found[:, i] = seeded.any(axis=1)
+        useful[:, inputs] = np.maximum(useful[:, inputs], np.minimum(seeded @ known[id(graph)], 1))
     return found
+
+
+def _sparsity(graph: Graph) -> NDArray[np.float32]:
+    """(words of all results, words of all arguments): 1 where one depends on the other."""
+    starts = np.cumsum([0, *graph.sizes]).tolist()
+    bits: list[int] = []
+    for node in graph.nodes:
+        own = 1 << (starts[node.at[0]] + node.at[1]) if node.op == "input" else 0
+        for x in node.operands:
+            own |= bits[x]
+        bits.append(own)
+    rows = [bits[x].to_bytes(starts[-1] // 8 + 1, "little") for result in graph.results for x in result]
+    flags = np.frombuffer(b"".join(rows), np.uint8).reshape(len(rows), -1)
+    return np.unpackbits(flags, axis=1, count=starts[-1], bitorder="little").astype(np.float32)
 
 
 def _marked(places: Sequence[Place], marks: Mask) -> list[Place]:
