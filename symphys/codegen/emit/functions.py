@@ -48,12 +48,12 @@ class DistinctFunctions:
             self._forward[identity] = graph_of(function)
         return self._forward[identity]
 
-    def adjoint(self, function: Function, inputs: Mask, outputs: Mask) -> Graph:
-        """The adjoint graph for these arguments and results."""
+    def adjoint(self, function: Function, inputs: Mask, outputs: Mask, tabled: bool = False) -> Graph:
+        """The adjoint graph for these arguments and results; ``tabled``: as ``adjoint_graph`` has it."""
         forward = self.forward(function)
-        key = (self._identity(forward), inputs, outputs)
+        key = (self._identity(forward), inputs, outputs, tabled)
         if key not in self._adjoints:
-            self._adjoints[key] = adjoint_graph(function, forward, inputs, outputs)
+            self._adjoints[key] = adjoint_graph(function, forward, inputs, outputs, tabled)
         return self._adjoints[key]
 
     def taped(self, forward: Graph, adjoint: Graph) -> Taped | None:

@@ -22,12 +22,14 @@ class Form:
         adds: results are added to what is there.
         backward: results go to the adjoint memory.
         clears: the adjoint arguments are zeroed when they have been read.
+        shared: what it reads of the memory is one number for all lanes.
     """
 
     primal: int
     adds: bool
     backward: bool = False
     clears: bool = False
+    shared: bool = False
 
 
 def write(name: str, graph: Graph, form: Form, dialect: Dialect = VECTORS) -> str:
@@ -37,7 +39,7 @@ def write(name: str, graph: Graph, form: Form, dialect: Dialect = VECTORS) -> st
     parameters = ", ".join(f"{kind}{pointer}" for kind, pointer, _ in pointers) + ", V *restrict w"
     text = []
     for i, piece in enumerate(pieces):
-        lines = piece.statements(graph, form.adds)
+        lines = piece.statements(graph, form)
         if piece is pieces[-1] and form.clears:
             lines += [
                 f"for (int j = 0; j < {graph.sizes[a]}; j++) {dialect.word.format(f'i{a}', 'j')} = S(0.0);"
@@ -64,24 +66,24 @@ class _Piece:
     dialect: Dialect
     targets: dict[int, list[str]] = field(default_factory=dict)
 
-    def statements(self, graph: Graph, adds: bool) -> list[str]:
+    def statements(self, graph: Graph, form: Form) -> list[str]:
         """Its C statements."""
         names: dict[int, str] = {}
         lines: list[str] = []
         for x in self.nodes:
             node = graph.nodes[x]
-            operands = [self._use(graph, y, names, lines) for y in node.operands]
+            operands = [self._use(graph, y, names, lines, form) for y in node.operands]
             lines.append(f"const {_type(node.op)} v{x} = {self.dialect.forms[node.op].format(*operands)};")
             names[x] = f"v{x}"
             if x in self.slots:
                 lines.append(f"w[{self.slots[x]}] = (V)v{x};")
-            lines += self._stores(graph, x, names[x], adds)
+            lines += self._stores(graph, x, names[x], form.adds)
         for x in set(self.targets) - set(self.nodes):
-            value = self._use(graph, x, names, lines)
-            lines += self._stores(graph, x, value, adds)
+            value = self._use(graph, x, names, lines, form)
+            lines += self._stores(graph, x, value, form.adds)
         return lines
 
-    def _use(self, graph: Graph, x: int, names: dict[int, str], lines: list[str]) -> str:
+    def _use(self, graph: Graph, x: int, names: dict[int, str], lines: list[str], form: Form) -> str:
         """How a value is called here; what comes from elsewhere is loaded first."""
         node = graph.nodes[x]
         if node.op == "const":
@@ -90,7 +92,8 @@ class _Piece:
             given = node.op == "input"
             source = self.dialect.word.format(f"i{node.at[0]}", node.at[1]) if given else f"w[{self.slots[x]}]"
             names[x] = f"v{x}"
-            lines.append(f"const {_type(node.op)} v{x} = ({_type(node.op)}){source};")
+            value = f"ALL({source})" if given and form.shared and node.at[0] < form.primal else source
+            lines.append(f"const {_type(node.op)} v{x} = ({_type(node.op)}){value};")
         return names[x]
 
     def _stores(self, graph: Graph, x: int, value: str, adds: bool) -> Iterator[str]:
@@ -123,7 +126,8 @@ def _type(op: str) -> str:
 
 def _pointers(graph: Graph, form: Form, dialect: Dialect) -> list[tuple[str, str, str]]:
     """(type, name, memory) of every argument and result; adjoints of arguments may coincide, all others may not."""
-    primal = [(dialect.reads, f"i{i}", "m") for i in range(form.primal)]
+    kind, memory = ("const R *", "(const R *)m") if form.shared else (dialect.reads, "m")
+    primal = [(kind, f"i{i}", memory) for i in range(form.primal)]
     seeds = [(dialect.writes, f"i{i}", "b") for i in range(form.primal, len(graph.sizes))]
     kind, memory = (dialect.shares, "b") if form.backward else (dialect.writes, "m")
     return [*primal, *seeds, *((kind, f"o{i}", memory) for i in range(len(graph.results)))]

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from symphys.codegen import Kernel, KernelUnavailable, ProgramError, processors
 from symphys.codegen.backends import BEST, PRECISIONS, build_kernel
+from symphys.codegen.slopes import SlopeKernel, compile_slopes
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.step_program import StepArguments, step_functions, step_program
 from symphys.transcription.staged.tangent import Tangent
@@ -31,6 +32,7 @@ class LinearizedStep:
         backend: the name of a backend that is a kernel; other names mean casadi's virtual machine.
         threads: that share a batch; None: one for each processor.
         exact: whether it is for smoothing 0 only.
+        parameters: whether there are slopes by p; without, those are 0.
         description: what evaluates, in words.
     """
 
@@ -39,11 +41,12 @@ class LinearizedStep:
     backend: str = BEST
     threads: int | None = None
     exact: bool = False
+    parameters: bool = True
     description: str = field(default="", init=False)
 
     def __post_init__(self) -> None:
         """Build what evaluates."""
-        self.arguments = StepArguments(self.rollout, self.tangent)
+        self.arguments = StepArguments(self.rollout, self.tangent, self.parameters)
         self._step, self._off = self._built()
 
     def step(self, k: int | NDArray[np.int64], X: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float) -> Array:
@@ -81,8 +84,7 @@ class LinearizedStep:
         if self.exact and smoothing:
             raise ValueError(f"this step is for smoothing 0 only, not for {smoothing:g}")
         varying = np.concatenate([np.zeros((count, n)), u.reshape(count, m), p[:, self.arguments.varied]], axis=1)
-        fixed = p[:, self.arguments.fixed]
-        return varying, np.concatenate([x, aim, time, fixed, np.full((count, 1), smoothing)], axis=1)
+        return varying, np.concatenate([x, aim, time, p, np.full((count, 1), smoothing)], axis=1)
 
     def _built(self) -> tuple[Any, Any]:
         note = ""
@@ -90,10 +92,10 @@ class LinearizedStep:
             count = processors() if self.threads is None else self.threads
             try:
                 step, off = (step_program(self.arguments, self.exact, tangent) for tangent in (False, True))
-                made = build_kernel(self.backend, step, [], count), build_kernel(self.backend, off, ["off"], count)
-                report = made[1].report
-                self.description = f"{report.precision} precision, lanes {report.lanes}, threads {made[1].threads}"
-                return tuple(_ByKernel(kernel) for kernel in made)
+                kernel, slopes = build_kernel(self.backend, step, [], count), compile_slopes(off, "off", threads=count)
+                report = slopes.report
+                self.description = f"{report.precision} precision, lanes {report.lanes}, threads {slopes.threads}"
+                return _ByKernel(kernel), _BySlopes(slopes)
             except (KernelUnavailable, ProgramError) as error:
                 note = f"; {error}"
         self.description = f"casadi's virtual machine{note}"
@@ -118,6 +120,16 @@ class _ByKernel:
             seeds = np.tile(np.eye(n), (len(varying[some]), 1))
             found[some] = self.kernel.gradient(rows[0], seeds, rows[1])[1].reshape(-1, n, varying.shape[1])
         return found
+
+
+class _BySlopes:
+    """Lanes hold states, then rows of one Jacobian."""
+
+    def __init__(self, kernel: SlopeKernel) -> None:
+        self.kernel = kernel
+
+    def jacobians(self, varying: Array, given: Array, n: int) -> Array:
+        return self.kernel.jacobians(varying, given)
 
 
 class _ByCasadi:

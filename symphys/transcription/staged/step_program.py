@@ -11,11 +11,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.codegen import FunctionCall, MemoryLayout, Program
+from symphys.codegen import FunctionCall, MemoryLayout, Place, Program
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.feedback.controller_calls import control_calls
 from symphys.transcription.program import step_calls
-from symphys.transcription.rollout import Rollout
+from symphys.transcription.rollout import Rollout, call
 from symphys.transcription.staged.tangent import Tangent
 
 Indices = NDArray[np.int64]
@@ -27,11 +27,16 @@ Expr = Any
 class StepArguments:
     """The arguments of one step, and which of them it is differentiated by.
 
-    What varies is (d, u, p as far as z sets it), what is given (x, the state after, time, p else).
+    What varies is (d, u, p as far as z sets it), what is given (x, the state after, time, p).
+
+    Attributes:
+        rollout, tangent: of the step.
+        parameters: whether it is differentiated by p.
     """
 
     rollout: Rollout
     tangent: Tangent
+    parameters: bool = True
 
     @cached_property
     def sizes(self) -> tuple[int, int, int, int]:
@@ -41,16 +46,13 @@ class StepArguments:
 
     @cached_property
     def varied(self) -> Indices:
-        """The entries of p that z sets."""
+        """The entries of p by which it is differentiated: those that z sets."""
+        if not self.parameters:
+            return np.zeros(0, np.int64)
         rollout = self.rollout
         p = start_of(rollout.problem, rollout.world, rollout.inputs, rollout.parameters, rollout.z).p
         rows = ca.Function("p", [rollout.z], [p]).jac_sparsity(0, 0).row()
         return np.unique(np.array(rows, np.int64))
-
-    @cached_property
-    def fixed(self) -> Indices:
-        """The other entries of p."""
-        return np.setdiff1d(np.arange(self.sizes[3]), self.varied)
 
     @property
     def varying(self) -> list[int]:
@@ -61,15 +63,16 @@ class StepArguments:
     @property
     def given(self) -> list[int]:
         """Sizes of what is given."""
-        nx = self.sizes[0]
-        return [nx, nx, 1, len(self.fixed)]
+        nx, _, _, np_ = self.sizes
+        return [nx, nx, 1, np_]
 
-    def together(self, varied: Expr, fixed: Expr) -> Expr:
-        """P of its parts."""
-        if not self.sizes[3]:
-            return type(fixed)(0, 1)
-        order = np.argsort(np.concatenate([self.varied, self.fixed]))
-        return ca.vertcat(varied, fixed)[order.tolist()]
+    def replaced(self, p: Expr, varied: Expr) -> Expr:
+        """P with the entries that vary."""
+        if not len(self.varied):
+            return p
+        fixed = np.setdiff1d(np.arange(self.sizes[3]), self.varied)
+        order = np.argsort(np.concatenate([self.varied, fixed]))
+        return ca.vertcat(varied, p[fixed.tolist()])[order.tolist()]
 
 
 class StepPlaces:
@@ -89,16 +92,16 @@ class StepPlaces:
 def step_program(arguments: StepArguments, exact: bool, tangent: bool) -> Program:
     """The program of one step, whose output is ``after``; with ``tangent`` also ``off``.
 
-    Its vector is what varies and its parameters what is given, and the smoothing. ``off`` is (n,) how far the state
-    after the step from retract(x, d) is from the one that is given. Without ``tangent`` d is left out of the step.
+    Its vector is what varies and its parameters what is given, and the smoothing. d is 0 there, and the step begins at x
+    to the last bit: only the slopes by d are those of retract. ``off`` (n,) has the slopes of how far the state after
+    the step is from the one that is given. Without ``tangent`` d is left out of the step.
     """
     places = StepPlaces(arguments)
     body = [*control_calls(arguments.rollout, places), *step_calls(places, exact)]
-    after, outputs, epilogue = places.x.later().still(), {}, ()
+    after, outputs, epilogue = places.x.later().still(), dict[str, Place](), tuple[FunctionCall, ...]()
     if tangent:
-        off = places.layout.take(arguments.tangent.size)
-        outputs["off"] = off
-        epilogue = (FunctionCall(_off(arguments), (places.given_row, places.p, after), (off,)),)
+        outputs["off"] = places.layout.take(arguments.tangent.size)
+        epilogue = (FunctionCall(_off(arguments), (places.given_row, after), (outputs["off"],)),)
     written = (places.x.still(), places.given, places.p, places.time.still(), places.smoothing)
     return Program(
         size=places.layout.size,
@@ -116,31 +119,29 @@ def _begun(arguments: StepArguments, tangent: bool) -> ca.Function:
     """(varying, given) -> state, inputs, parameters, time and smoothing of the step."""
     varying, given = ca.SX.sym("varying", sum(arguments.varying)), ca.SX.sym("given", sum(arguments.given) + 1)
     d, u, varied = parts(varying, arguments.varying)
-    x, _, time, fixed, smoothing = parts(given, [*arguments.given, 1])
-    p = arguments.together(varied, fixed)
-    start = arguments.tangent.retraction(x, d, p) if tangent else x
-    return ca.Function("begun", [varying, given], [ca.densify(each) for each in (start, u, p, time, smoothing)])
+    x, _, time, p, smoothing = parts(given, [*arguments.given, 1])
+    start = x + ca.mtimes(arguments.tangent.basis(x, p), d) if tangent else x
+    results = (start, u, arguments.replaced(p, varied), time, smoothing)
+    return ca.Function("begun", [varying, given], [ca.densify(each) for each in results])
 
 
 def _off(arguments: StepArguments) -> ca.Function:
-    """(given, p, after) -> how far ``after`` is from the state that is given."""
-    given, p = ca.SX.sym("given", sum(arguments.given) + 1), ca.SX.sym("p", arguments.sizes[3])
-    after = ca.SX.sym("after", arguments.sizes[0])
-    aim = parts(given, [*arguments.given, 1])[1]
-    return ca.Function("off", [given, p, after], [arguments.tangent.distance(aim, after, p)])
+    """(given, after) -> how far ``after`` is from the state that is given."""
+    given, after = ca.SX.sym("given", sum(arguments.given) + 1), ca.SX.sym("after", arguments.sizes[0])
+    _, aim, _, p, _ = parts(given, [*arguments.given, 1])
+    return ca.Function("off", [given, after], [ca.mtimes(arguments.tangent.projection(aim, p), after - aim)])
 
 
 def step_functions(arguments: StepArguments) -> tuple[ca.Function, ca.Function]:
     """(varying, given with smoothing) -> after, and off: on casadi's virtual machine."""
     varying, given = ca.MX.sym("varying", sum(arguments.varying)), ca.MX.sym("given", sum(arguments.given) + 1)
     d, u, varied = parts(varying, arguments.varying)
-    x, aim, time, fixed, smoothing = parts(given, [*arguments.given, 1])
-    p, closed = arguments.together(varied, fixed), arguments.rollout.closed
+    x, aim, time, p, smoothing = parts(given, [*arguments.given, 1])
+    closed, tangent = arguments.rollout.closed, arguments.tangent
     put = u if arguments.rollout.feedback is None else ca.vertcat(u, time)
-    first = closed(x, put, p, smoothing)
-    moved = closed(arguments.tangent.retraction(x, d, p), put, p, smoothing)
-    first, moved = (each[0] if isinstance(each, tuple) else each for each in (first, moved))
-    off = arguments.tangent.distance(aim, moved, p)
+    starts = x, x + ca.mtimes(tangent.basis(x, p), d)
+    first, moved = (call(closed, start, put, arguments.replaced(p, varied), smoothing)[0] for start in starts)
+    off = ca.mtimes(tangent.projection(aim, p), moved - aim)
     return ca.Function("step", [varying, given], [first]), ca.Function("off", [varying, given], [off])
 
 

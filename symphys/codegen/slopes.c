@@ -1,0 +1,57 @@
+/* Jacobians: values of LANES points at once, then blocks of LANES rows of each point by adjoints. */
+#include <string.h>
+
+typedef struct { word count; const word *entries, *rows; } block; /* rows: LANES numbers, -1 for none */
+typedef struct {
+  word size, tape, adjoints, height, width, result; /* result: where the adjoint of z begins */
+  word z, z_size, parameters, parameters_size;
+  const word *seeds;
+  word calls;
+  const word *entries;
+  word blocks;
+  const block *rows;
+} slopes;
+typedef struct { word points; const double *z, *parameters; word shared; double *jacobian; } points;
+
+static void run(const word *t, word count, V *m, V *b) {
+  for (word c = 0; c < count; c++, t += t[1]) FUNCTIONS[t[0]](m, b, t + 2, 0);
+}
+
+/* Lanes beyond the last point repeat it, so that they compute nothing unusual. */
+static void gather(V *to, word size, const double *from, word stride, word first, word count) {
+  for (word l = 0; l < LANES; l++) {
+    const double *row = from + stride * (first + (l < count ? l : count - 1));
+    for (word j = 0; j < size; j++) LANE(to[j], l) = (R)row[j];
+  }
+}
+
+/* Memory: size + tape vectors of values; as many numbers of one point; adjoints. */
+API void jacobians(const slopes *p, const points *x, V *m) {
+  const word kept = p->size + p->tape;
+  R *s = (R *)(m + kept);
+  V *b = m + kept + (kept + LANES - 1) / LANES;
+  memset(m, 0, sizeof(V) * p->size);
+  memset(b, 0, sizeof(V) * p->adjoints);
+  for (word first = 0; first < x->points; first += LANES) {
+    const word count = x->points - first < LANES ? x->points - first : LANES;
+    gather(m + p->z, p->z_size, x->z, p->z_size, first, count);
+    gather(m + p->parameters, p->parameters_size, x->parameters, x->shared ? 0 : p->parameters_size, first, count);
+    run(p->entries, p->calls, m, 0);
+    for (word l = 0; l < count; l++) {
+      double *to = x->jacobian + (first + l) * p->height * p->width;
+      for (word j = 0; j < kept; j++) s[j] = LANE(m[j], l);
+      for (word i = 0; i < p->blocks; i++) {
+        const block *rows = p->rows + i;
+        for (word r = 0; r < LANES; r++)
+          if (rows->rows[r] >= 0) LANE(b[p->seeds[rows->rows[r]]], r) = (R)1;
+        run(rows->entries, rows->count, (V *)s, b);
+        for (word j = 0; j < p->width; j++) {
+          const V found = b[p->result + j];
+          for (word r = 0; r < LANES; r++)
+            if (rows->rows[r] >= 0) to[rows->rows[r] * p->width + j] = (double)LANE(found, r);
+        }
+        memset(b + p->result, 0, sizeof(V) * p->width);
+      }
+    }
+  }
+}

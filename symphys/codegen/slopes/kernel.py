@@ -1,0 +1,176 @@
+"""A compiled Jacobian: batches of points over threads."""
+
+from __future__ import annotations
+
+import ctypes
+import time
+from functools import partial
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from symphys.codegen.emit.source import FILES, SourceFile, resource, spread
+from symphys.codegen.emit.writer import write
+from symphys.codegen.errors import KernelUnavailable, ProgramError
+from symphys.codegen.program.program import Program
+from symphys.codegen.runtime.thread_pool import MemoryPool
+from symphys.codegen.slopes.plan import SlopePlan, slope_plan
+from symphys.codegen.toolchain.build import shared_library
+from symphys.codegen.toolchain.cache import Cache, default_cache
+from symphys.codegen.toolchain.compiler import processors
+from symphys.codegen.toolchain.processor import processor
+from symphys.codegen.toolchain.report import BuildReport
+
+Array = NDArray[np.float64]
+WORD = ctypes.c_int64
+POINTER = ctypes.c_void_p
+SHARED = "#define ALL(x) ((R)(x) - (V){0})\n"
+"""A number of the memory in all lanes: unlike the S of a constant it needs no sum."""
+PARTS = 4
+"""Of a batch for each thread; see ``RolloutBatch``."""
+
+
+class _Block(ctypes.Structure):
+    _fields_ = (("count", WORD), ("entries", POINTER), ("rows", POINTER))
+
+
+class _Slopes(ctypes.Structure):
+    _fields_ = (
+        *((name, WORD) for name in ("size", "tape", "adjoints", "height", "width", "result")),
+        *((name, WORD) for name in ("z", "z_size", "parameters", "parameters_size")),
+        ("seeds", POINTER),
+        ("calls", WORD),
+        ("entries", POINTER),
+        ("blocks", WORD),
+        ("rows", POINTER),
+    )
+
+
+class _Points(ctypes.Structure):
+    _fields_ = (("points", WORD), ("z", POINTER), ("parameters", POINTER), ("shared", WORD), ("jacobian", POINTER))
+
+
+class SlopeKernel:
+    """The Jacobian of one output of a program by its z. A point's numbers do not depend on the other points."""
+
+    def __init__(
+        self, program: Program, output: str, planned: SlopePlan, library: Any, report: BuildReport, threads: int | None
+    ) -> None:
+        """Use ``compile_slopes``."""
+        self.program, self.output, self.report = program, output, report
+        self.threads = processors() if threads is None else threads
+        self._evaluate = library.jacobians
+        self._evaluate.argtypes, self._evaluate.restype = (POINTER, POINTER, POINTER), None
+        self._kept: list[Any] = []
+        self._data = self._slopes(planned, report.lanes)
+        kept = program.size + planned.tape
+        self._pool = MemoryPool(kept + -(-kept // report.lanes) + planned.adjoints, report.lanes, np.float64)
+
+    def jacobians(self, Z: ArrayLike, parameters: ArrayLike) -> Array:
+        """(B, n) and (B, p), or (p,) for all points -> (B, outputs, n)."""
+        z, given = (np.ascontiguousarray(each, float) for each in (Z, parameters))
+        self._check("Z", z, (2,), self.program.z.size)
+        self._check("parameters", given, (1, 2), self.program.parameters.size)
+        if given.ndim == 2 and len(given) != len(z):
+            raise ProgramError(f"the batch sizes {len(z)} of Z and {len(given)} of parameters differ")
+        found = np.empty((len(z), self._data.height, self._data.width))
+        lanes = self.report.lanes
+        blocks = -(-len(z) // lanes)
+        parts = 1 if self.threads == 1 else min(blocks, PARTS * self.threads)
+        ends = [min(lanes * (blocks * i // parts), len(z)) for i in range(parts + 1)] if parts else []
+        tasks = [partial(self._run, z, given, found, a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+        self._pool.run(tasks, self.threads)
+        return found
+
+    def _run(self, z: Array, given: Array, found: Array, first: int, last: int, memory: Any) -> None:
+        shared = given.ndim == 1
+        row = given if shared else given[first:]
+        addresses = z[first:].ctypes.data, row.ctypes.data, int(shared), found[first:].ctypes.data
+        batch = _Points(last - first, *addresses)
+        self._evaluate(ctypes.byref(self._data), ctypes.byref(batch), memory.ctypes.data)
+
+    def _check(self, name: str, values: Array, dimensions: tuple[int, ...], size: int) -> None:
+        if values.ndim not in dimensions or values.shape[-1] != size:
+            raise ProgramError(f"{name} has the shape {values.shape}; wanted is (batch, {size})")
+
+    def _slopes(self, planned: SlopePlan, lanes: int) -> _Slopes:
+        blocks = (_Block * max(len(planned.blocks), 1))()
+        for block, (rows, entries) in zip(blocks, planned.blocks, strict=False):
+            numbers = [*rows, *[-1] * (lanes - len(rows))]
+            block.count, block.entries, block.rows = len(entries), self._flat(entries), self._words(numbers)
+        self._kept.append(blocks)
+        program = self.program
+        z, parameters, height = program.z, program.parameters, program.outputs[self.output].size
+        return _Slopes(
+            *(program.size, planned.tape, planned.adjoints, height, z.size, planned.result),
+            *(z.offset, z.size, parameters.offset, parameters.size),
+            self._words(planned.seeds),
+            len(planned.forward),
+            self._flat(planned.forward),
+            len(planned.blocks),
+            ctypes.addressof(blocks),
+        )
+
+    def _flat(self, entries: list[list[int]]) -> int:
+        return self._words([x for row in entries for x in row])
+
+    def _words(self, values: list[int]) -> int:
+        words = np.array(values or [0], np.int64)
+        self._kept.append(words)
+        return int(words.ctypes.data)
+
+
+def compile_slopes(
+    program: Program, output: str, cache: Cache | None = None, threads: int | None = None
+) -> SlopeKernel:
+    """Build the Jacobian of an output of a program by z, in double precision, or take it from the cache.
+
+    Args:
+        program: of one step.
+        output: which of its outputs.
+        cache: where kernels are kept; None: the user's.
+        threads: how many blocks of points are computed at once; None: one for each processor.
+
+    Raises:
+        KernelUnavailable: with one line that says why; the caller falls back.
+    """
+    started = time.perf_counter()
+    lanes: int | Literal["auto"] = processor().lanes(False)
+    planned = slope_plan(program, output, lanes)
+    if program.zeroed or program.constants:
+        raise ProgramError("slopes are of programs without constants")
+    with shared_library(_sources(planned, lanes), cache or default_cache()) as built:
+        try:
+            library = ctypes.CDLL(str(built.path))
+        except OSError as error:
+            raise KernelUnavailable(f"the compiled kernel cannot be loaded: {error}") from error
+    report = BuildReport(
+        compiler=built.compiler.version,
+        flags=built.flags,
+        lanes=lanes,
+        precision="double",
+        functions=len(planned.functions),
+        operations=sum(len(graph.nodes) for graph, _ in planned.functions),
+        bytes_per_lane=8 * (program.size + planned.tape + planned.adjoints),
+        cached=built.cached,
+        seconds=time.perf_counter() - started,
+        note=built.note,
+    )
+    return SlopeKernel(program, output, planned, library, report, threads)
+
+
+def _sources(planned: SlopePlan, lanes: int) -> list[SourceFile]:
+    """The C files; adjoints are fused, values are not, so that they are casadi's to the bit."""
+    head = f"#define LANES {lanes}\n#define SINGLE 0\n{resource('vector.h')}{SHARED}"
+    texts = [write(f"f{number}", graph, form) for number, (graph, form) in enumerate(planned.functions)]
+    found = []
+    for backward in (False, True):
+        mine = [i for i, (_, form) in enumerate(planned.functions) if form.backward == backward]
+        work = [len(planned.functions[i][0].nodes) for i in mine]
+        for group in spread([texts[i] for i in mine], work, FILES):
+            found.append(SourceFile("\n".join([head, *group]), fused=backward))
+    names = [f"f{number}" for number in range(len(texts))]
+    declared = "".join(f"void {name}(V *m, V *b, const word *t, word k);\n" for name in names)
+    listed = f"static void (*const FUNCTIONS[])(V *, V *, const word *, word) = {{{', '.join(names) or '0'}}};\n"
+    return [*found, SourceFile(head + declared + listed + resource("slopes.c"))]
