@@ -176,17 +176,22 @@ def require_local(problem: Problem, name: str, formula: Formula) -> None:
     """Refuse formulas that look at all of a motion at once.
 
     Raises:
-        SymphysError: the formula names a variable that acts over time, or an input that a controller drives.
+        SymphysError: the formula takes parts of the whole motion, or names a variable that acts over time, or an input
+            that a controller or a force law drives.
     """
+    if formula.parts:
+        text = f"takes {', '.join(part.name for part in formula.parts)} of the whole motion"
+        raise SymphysError(f"{name}: {text}: no solver that goes step by step can take that")
     for variable in problem.variables:
         if variable.kind == "control" and variable.name in formula.names:
             inputs = ", ".join(dict.fromkeys(slot.name for slot in variable.slots))
             text = f"looks at the variable {quote(variable.name)}, which acts over time; name what it sets, {inputs}"
             raise SymphysError(f"{name}: {text}, or take a solver that sees the motion as a whole")
-    driven = {driven for controller in problem.controllers for driven, _ in controller.drives}
+    driven = {law.on for law in problem.forces}
+    driven |= {driven for controller in problem.controllers for driven, _ in controller.drives}
     found = sorted(driven & formula.names)
     if found:
-        text = f"looks at {', '.join(found)}, which a controller drives"
+        text = f"looks at {', '.join(found)}, which a controller or a force law drives"
         raise SymphysError(f"{name}: {text}: no solver that goes step by step can take that")
 
 

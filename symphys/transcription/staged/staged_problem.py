@@ -95,9 +95,37 @@ class RolloutStages:
         """Slopes of all steps."""
         p = self.parameters(motion.z[None])[0]
         a, b, by_p = self._step.slopes(motion.x[:-1], motion.u, p, motion.smoothing, motion.x[1:])
-        by_x0, of_p = self._start_slopes(motion.z)
-        start = np.array(self.tangent.projection(motion.x[0], p)) @ by_x0
-        return Linearized(a, b, by_p @ of_p, start)
+        _, of_p = self._start_slopes(motion.z)
+        start, off = self._start_tangents(motion)
+        c = by_p @ of_p
+        if off.any():
+            c[0] += np.array(self.tangent.projection(motion.x[1], p)) @ self._pushed(motion, p, off)
+        return Linearized(a, b, c, start)
+
+    def _start_tangents(self, motion: StagedMotion) -> tuple[Array, Array]:
+        """(n, s) and (nx, s): the first state by the static entries, in its tangent, and what lies off that.
+
+        A variable may set the velocity of one body of a tree: the first step brings the others to it.
+        """
+        by_x0, _ = self._start_slopes(motion.z)
+        place = motion.x[0], self.parameters(motion.z[None])[0]
+        start = np.array(self.tangent.projection(*place)) @ by_x0
+        off = by_x0 - np.array(self.tangent.basis(*place)) @ start
+        return start, np.where(np.abs(off) > OFF, off, 0.0)
+
+    def _pushed(self, motion: StagedMotion, p: Array, off: Array) -> Array:
+        """(nx, s): what the first step makes of these changes of the first state."""
+        step, count = self.rollout.closed, off.shape[1]
+        if self._forward is None:
+            self._forward = step.forward(count)
+        given = motion.u[0] if self.rollout.feedback is None else np.append(motion.u[0], 0.0)
+        arguments = motion.x[0], given, p, motion.smoothing
+        results = [np.zeros(step.size_out(i)) for i in range(step.n_out())]
+        still = [np.zeros((step.size1_in(i), count)) for i in range(1, step.n_in())]
+        found = self._forward(*arguments, *results, off, *still)
+        return np.array(found[0] if isinstance(found, list | tuple) else found)
+
+    _forward: ca.Function | None = None
 
     def retract(self, X: Array, D: Array) -> Array:
         """(B, nx)."""
@@ -157,9 +185,12 @@ class RolloutStages:
         """Every term with its slopes, and those by the tangents of its states (T, r, n)."""
         p = self.parameters(motion.z[None])[0]
         _, of_p = self._start_slopes(motion.z)
+        _, off = self._start_tangents(motion)
         found = []
         for term in self.terms:
             slopes = term.slopes(motion.x, motion.u, p, motion.z, of_p)
+            if off.any():
+                slopes.s[term.states == 0] += slopes.x[term.states == 0] @ off[term.columns]
             found.append((term, slopes, slopes.x @ self._rows(motion, term)))
         return found
 
@@ -195,6 +226,10 @@ class RolloutStages:
         z, statics = ca.SX.sym("z", int(self.rollout.z.shape[0])), self.statics.tolist()
         parts = [ca.densify(ca.jacobian(part, z)[:, statics]) for part in self._start(z)]
         return ca.Function("start_slopes", [z], parts)
+
+
+OFF = 1e-13
+"""Slopes of the first state that are nearer to its tangent lie in it."""
 
 
 def _limit(limit: Constraint, term: StageTerm) -> tuple[Array, Array, Array]:

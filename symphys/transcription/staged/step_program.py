@@ -72,7 +72,8 @@ class StepArguments:
             return p
         fixed = np.setdiff1d(np.arange(self.sizes[3]), self.varied)
         order = np.argsort(np.concatenate([self.varied, fixed]))
-        return ca.vertcat(varied, p[fixed.tolist()])[order.tolist()]
+        kept = ca.reshape(p[fixed.tolist()], len(fixed), 1)  # of no index casadi makes a row
+        return ca.vertcat(varied, kept)[order.tolist()]
 
 
 class StepPlaces:
