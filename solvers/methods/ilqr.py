@@ -254,4 +254,5 @@ ILQR = make_solver(
     iterating(Ilqr),
     refusal=refusal,
     constraints=True,
+    over_time=True,
 )

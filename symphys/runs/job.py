@@ -95,8 +95,10 @@ def make_jobs(
 
 
 def fitting(problem: Problem) -> list[str]:
-    """The solvers that are for such problems: with scenarios, or without."""
-    return [name for name, each in SOLVERS.items() if each.scenarios in (None, problem.scenarios is not None)]
+    """The solvers that are for such problems: with scenarios or without, with controls over time or without."""
+    over_time = any(variable.kind == "control" for variable in problem.variables)
+    fit = (None, problem.scenarios is not None)
+    return [name for name, each in SOLVERS.items() if each.scenarios in fit and over_time >= each.over_time]
 
 
 def solver_options(problem: Problem, name: str) -> Any:
