@@ -22,6 +22,7 @@ from symphys.solvers.methods.evolution import EVOLUTION, EvolutionOptions
 from symphys.solvers.methods.gradient import GRADIENT, GradientOptions
 from symphys.solvers.methods.ipopt import IPOPT, IpoptOptions
 from symphys.solvers.methods.least_squares import LEAST_SQUARES, LeastSquaresOptions
+from symphys.solvers.methods.multiple_shooting import MULTIPLE_SHOOTING, MultipleShootingOptions
 from symphys.solvers.methods.stochastic import STOCHASTIC, StochasticOptions
 
 __all__ = [
@@ -34,6 +35,7 @@ __all__ = [
     "Keep",
     "LeastSquaresOptions",
     "Monitor",
+    "MultipleShootingOptions",
     "Outcome",
     "Solver",
     "StageResult",
@@ -46,7 +48,7 @@ __all__ = [
 ]
 
 SOLVERS: dict[str, Solver[Any]] = {
-    each.name: each for each in (GRADIENT, LEAST_SQUARES, IPOPT, CMA, STOCHASTIC, EVOLUTION)
+    each.name: each for each in (GRADIENT, LEAST_SQUARES, IPOPT, MULTIPLE_SHOOTING, CMA, STOCHASTIC, EVOLUTION)
 }
 solve_together = solve_multi_start
 """Deprecated: the old name of ``solve_multi_start``."""

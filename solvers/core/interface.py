@@ -155,6 +155,7 @@ class Solver(Generic[O_inv]):
             works without, and a second call costs nothing.
         threaded: whether several solves may run in threads side by side, see ``multi_start``.
         scenarios: whether it is for problems with scenarios, and for no others; None: for all.
+        by_name: whether it solves only where it is named; the others solve wherever no solver is.
     """
 
     name: str
@@ -164,3 +165,4 @@ class Solver(Generic[O_inv]):
     prepare: Callable[[], None] = nothing
     threaded: bool = False
     scenarios: bool | None = False
+    by_name: bool = False

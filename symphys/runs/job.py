@@ -95,8 +95,9 @@ def make_jobs(
 
 
 def fitting(problem: Problem) -> list[str]:
-    """The solvers that are for such problems: with scenarios, or without."""
-    return [name for name, each in SOLVERS.items() if each.scenarios in (None, problem.scenarios is not None)]
+    """The solvers that are for such problems, with scenarios or without, and need not be named."""
+    scenarios = (None, problem.scenarios is not None)
+    return [name for name, each in SOLVERS.items() if each.scenarios in scenarios and not each.by_name]
 
 
 def solver_options(problem: Problem, name: str) -> Any:

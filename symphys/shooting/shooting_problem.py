@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from symphys.shooting.staged_problem import StagedProblem
 
 Array = NDArray[np.float64]
 Function = Any
@@ -195,6 +197,7 @@ class ShootingProblem:
         stop_when_met: stop at the first point whose errors are all <= 1, instead of at a stationary point.
         output_names: of the reported quantities.
         scenario: evaluates points in samples of the problem's scenarios; None: it has none.
+        staged: returns the same problem step by step, built when it is first asked for and kept; None: it has no steps.
     """
 
     name: str
@@ -210,6 +213,7 @@ class ShootingProblem:
     stop_when_met: bool = True
     output_names: tuple[str, ...] = ()
     scenario: ScenarioEvaluator | None = None
+    staged: Callable[[], StagedProblem] | None = None
 
     @property
     def n(self) -> int:

@@ -23,7 +23,15 @@ every_solver = pytest.mark.parametrize("name", list(SOLVERS))
 
 
 def test_names() -> None:
-    assert list(SOLVERS) == ["gradient", "least_squares", "ipopt", "cma", "stochastic", "evolution"]
+    assert list(SOLVERS) == [
+        "gradient",
+        "least_squares",
+        "ipopt",
+        "multiple_shooting",
+        "cma",
+        "stochastic",
+        "evolution",
+    ]
     for name in SOLVERS:
         assert solver(name).name == name
     with pytest.raises(
