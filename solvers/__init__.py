@@ -23,6 +23,7 @@ from symphys.solvers.methods.gradient import GRADIENT, GradientOptions
 from symphys.solvers.methods.ilqr import ILQR, IlqrOptions
 from symphys.solvers.methods.ipopt import IPOPT, IpoptOptions
 from symphys.solvers.methods.least_squares import LEAST_SQUARES, LeastSquaresOptions
+from symphys.solvers.methods.multiple_shooting import MULTIPLE_SHOOTING, MultipleShootingOptions
 from symphys.solvers.methods.stochastic import STOCHASTIC, StochasticOptions
 
 __all__ = [
@@ -36,6 +37,7 @@ __all__ = [
     "Keep",
     "LeastSquaresOptions",
     "Monitor",
+    "MultipleShootingOptions",
     "Outcome",
     "Solver",
     "StageResult",
@@ -48,7 +50,7 @@ __all__ = [
 ]
 
 SOLVERS: dict[str, Solver[Any]] = {
-    each.name: each for each in (GRADIENT, LEAST_SQUARES, IPOPT, ILQR, CMA, STOCHASTIC, EVOLUTION)
+    each.name: each for each in (GRADIENT, LEAST_SQUARES, IPOPT, ILQR, MULTIPLE_SHOOTING, CMA, STOCHASTIC, EVOLUTION)
 }
 solve_together = solve_multi_start
 """Deprecated: the old name of ``solve_multi_start``."""

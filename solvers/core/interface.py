@@ -155,7 +155,7 @@ class Solver(Generic[O_inv]):
             works without, and a second call costs nothing.
         threaded: whether several solves may run in threads side by side, see ``multi_start``.
         scenarios: whether it is for problems with scenarios, and for no others; None: for all.
-        over_time: whether it is for problems whose variables act over time.
+        by_name: whether it solves only where it is named; the others solve wherever no solver is.
     """
 
     name: str
@@ -165,4 +165,4 @@ class Solver(Generic[O_inv]):
     prepare: Callable[[], None] = nothing
     threaded: bool = False
     scenarios: bool | None = False
-    over_time: bool = False
+    by_name: bool = False

@@ -254,5 +254,5 @@ ILQR = make_solver(
     iterating(Ilqr),
     refusal=refusal,
     constraints=True,
-    over_time=True,
+    by_name=True,
 )

@@ -95,10 +95,9 @@ def make_jobs(
 
 
 def fitting(problem: Problem) -> list[str]:
-    """The solvers that are for such problems: with scenarios or without, with controls over time or without."""
-    over_time = any(variable.kind == "control" for variable in problem.variables)
-    fit = (None, problem.scenarios is not None)
-    return [name for name, each in SOLVERS.items() if each.scenarios in fit and over_time >= each.over_time]
+    """The solvers that are for such problems, with scenarios or without, and need not be named."""
+    scenarios = (None, problem.scenarios is not None)
+    return [name for name, each in SOLVERS.items() if each.scenarios in scenarios and not each.by_name]
 
 
 def solver_options(problem: Problem, name: str) -> Any:

@@ -41,6 +41,9 @@ class StagedMotion:
 class Linearized:
     """Slopes of all steps about a motion, in tangents of its states.
 
+    A motion may have gaps: state k + 1 is not what step k leads to. The slopes are then by the tangent of state k, and
+    of the tangent of what step k leads to from there.
+
     Attributes:
         a: (N, n, n) the next state by the state.
         b: (N, n, m) the next state by the inputs.

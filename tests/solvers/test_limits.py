@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from staged_toys import boxed, pendulum
 from toys import PLAIN, counted, rosenbrock, solve, stop_at, through_json, toy, values
 from windy import BEST, windy
 
@@ -22,11 +23,15 @@ from symphys.solvers.core.outcome import StopReason
 
 AT_ONCE = {"max_seconds": 1e-9}
 every_solver = pytest.mark.parametrize("name", list(SOLVERS))
-descents = pytest.mark.parametrize("name", [name for name in SOLVERS if name not in PLAIN])
+ALONE = [*PLAIN, "multiple_shooting"]
+"""Without samples."""
+descents = pytest.mark.parametrize("name", [name for name in SOLVERS if name not in ALONE])
 
 
 def problem_of(name: str, **more: Any) -> ShootingProblem:
     """One that takes the solver more than a few iterations."""
+    if name == "multiple_shooting":
+        return replace(boxed(pendulum(), 8.0), **more)
     return rosenbrock(**more) if name in PLAIN else replace(windy(), **more)
 
 
@@ -54,7 +59,7 @@ def test_the_time_is_up_after_the_first_row(name: str) -> None:
 def test_the_iteration_that_reaches_it_is_the_last(name: str) -> None:
     """And the best point so far is the result."""
     problem = problem_of(name)
-    more = {} if name in PLAIN else {"validation": 0, "rate": 0.05}
+    more = {} if name in ALONE else {"validation": 0, "rate": 0.05}
     found = solve(name, problem, options={"max_seconds": 4.5, **more})
     assert [row.seconds for row in found.trace] == [1, 2, 3, 4, 5]
     assert spent(found)
@@ -90,13 +95,13 @@ def test_it_ends_the_solve_in_whatever_stage(name: str) -> None:
 def test_what_goes_on_counts_the_time_before(name: str) -> None:
     """At once over where that is used up already; else as without a break."""
     problem, count = counted(problem_of(name))
-    quick = {} if name in PLAIN else {"validation": 0}
+    quick = {} if name in ALONE else {"validation": 0}
     part = solve(name, problem, options=quick, monitor=stop_at(3))
     assert part.status is Status.INTERRUPTED and part.trace[-1].seconds == 4
     checkpoint, before = through_json(part.checkpoint), dict(count.count)
     over = solve(name, problem, options=quick | {"max_seconds": 3.5}, checkpoint=checkpoint)
     assert spent(over) and len(over.trace) == 4
-    assert name not in PLAIN or dict(count.count) == before
+    assert name not in ALONE or dict(count.count) == before
     longer = solve(name, problem, options=quick | {"max_seconds": 6.5}, checkpoint=checkpoint)
     assert spent(longer)
     assert [row.seconds for row in longer.trace] == [1, 2, 3, 4, 5, 6, 7]

@@ -23,7 +23,16 @@ every_solver = pytest.mark.parametrize("name", list(SOLVERS))
 
 
 def test_names() -> None:
-    assert list(SOLVERS) == ["gradient", "least_squares", "ipopt", "ilqr", "cma", "stochastic", "evolution"]
+    assert list(SOLVERS) == [
+        "gradient",
+        "least_squares",
+        "ipopt",
+        "ilqr",
+        "multiple_shooting",
+        "cma",
+        "stochastic",
+        "evolution",
+    ]
     for name in SOLVERS:
         assert solver(name).name == name
     with pytest.raises(

@@ -1,0 +1,330 @@
+"""Direct multiple shooting (Bock and Plitt 1984): the states at nodes are variables too, and defects are constraints.
+
+Every interval between two nodes is simulated by itself, so what is unstable over the whole horizon grows over one
+interval only, and a guess of the states counts as much as one of the controls. The nodes are tangents at reference
+states; where a tangent turns far, the solve goes on from the same point with references at its nodes.
+
+Iterates have gaps: their motion is none. What is compared and kept is the exact rollout of their z, one for each, as
+for IPOPT. The solution is z; its nodes are what its rollout passes through, up to the largest defect, which every row
+of the trace has.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import casadi as ca
+import numpy as np
+
+from symphys.errors import SymphysError
+from symphys.shooting import ShootingProblem, StagedProblem
+from symphys.solvers.core.checkpoint import damaged, revive
+from symphys.solvers.core.convergence import converged, not_finite
+from symphys.solvers.core.driver import make_solver
+from symphys.solvers.core.evaluator import CountingEvaluator
+from symphys.solvers.core.interface import Iteration, IterationRecorder, StageContext
+from symphys.solvers.core.options import SolverOptions, at_least, refuse, require
+from symphys.solvers.core.outcome import Array, Status, StopReason
+from symphys.solvers.methods.ipopt import ENDS, GOOD, worse
+from symphys.solvers.methods.ipopt_options import RESERVED
+from symphys.solvers.methods.ipopt_options import refusal as refused_by_ipopt
+from symphys.solvers.multiple_shooting.backends import (
+    ITERATIONS_USED,
+    NO_STEP,
+    LibraryRequest,
+    solve_by_fatrop,
+    solve_by_ipopt,
+)
+from symphys.solvers.multiple_shooting.chart import interpolated
+from symphys.solvers.multiple_shooting.grid import make_grid
+from symphys.solvers.multiple_shooting.layout import shared, staged
+from symphys.solvers.multiple_shooting.nlp import MultipleShootingNlp
+from symphys.solvers.multiple_shooting.shots import IntervalSteps, ShootingPlan
+
+DEFECT = "largest defect"
+NO_STEPS = (
+    "this problem cannot be taken step by step, which multiple shooting needs: take ipopt, gradient, or least_squares "
+    "where costs are squares"
+)
+APART = (
+    "the rollout of the solution is worse than that of an iterate before it, which is kept: the motion is so unstable "
+    "that what is left of the defects grows along it (a lower `tolerance`, or a feedback controller)"
+)
+STUCK = (
+    "FATROP found no step that leads on: take hessian = 'exact', which it needs more than IPOPT, or backend = 'ipopt'"
+)
+TURN = 0.5
+"""A node whose tangent's slope is so far from the unit matrix has turned by about a radian: it gets a new reference."""
+
+
+@dataclass(frozen=True)
+class MultipleShootingOptions(SolverOptions):
+    """Options of multiple shooting.
+
+    Attributes:
+        iterations: at most, in each stage of smoothing.
+        tolerance: on the scaled optimality error of IPOPT or FATROP; defects are at most so large.
+        steps_between_nodes: a node every so many steps; 0: so many that there are at most 40 intervals.
+        backend: "ipopt" or "fatrop", which factorises stage after stage.
+        hessian: "gauss-newton" leaves the curvature of the steps out; "exact" has it, by differences of slopes;
+            "limited-memory" is IPOPT's own approximation.
+        nodes: states between which the guess of the nodes is a straight line, at equal times from the first state to
+            the last: two, or those of another run on any grid. Empty: the rollout of the guess.
+        options: those of IPOPT, such as {mu_strategy = "adaptive"}, or of FATROP, passed on as they are.
+    """
+
+    iterations: int = 200
+    tolerance: float = 1e-6
+    steps_between_nodes: int = 0
+    backend: Literal["ipopt", "fatrop"] = "ipopt"
+    hessian: Literal["gauss-newton", "exact", "limited-memory"] = "gauss-newton"
+    nodes: tuple[tuple[float, ...], ...] = ()
+    options: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """ValueError that names the option and what would be valid."""
+        super().__post_init__()
+        at_least(0, iterations=self.iterations, steps_between_nodes=self.steps_between_nodes)
+        require(0 < self.tolerance < math.inf, "tolerance", "above 0")
+        require(self.backend in ("ipopt", "fatrop"), "backend", "ipopt or fatrop")
+        known = ("gauss-newton", "exact", "limited-memory")
+        require(self.hessian in known, "hessian", "gauss-newton, exact or limited-memory")
+        taken = self.backend == "ipopt" or self.hessian != "limited-memory"
+        require(taken, "hessian", "gauss-newton or exact with backend = fatrop")
+        require(len(self.nodes) != 1, "nodes", "two states or more, or none")
+
+
+@dataclass(frozen=True)
+class MultipleShootingState:
+    """An iterate.
+
+    Attributes:
+        iteration: of this stage.
+        z: (n,).
+        nodes: (M, nx) states at nodes 1 to M.
+        bound_duals, row_duals: multipliers where IPOPT reports them, for tangents at these nodes; else empty.
+        barrier: mu there.
+    """
+
+    iteration: int
+    z: Array
+    nodes: Array
+    bound_duals: Array
+    row_duals: Array
+    barrier: float
+
+
+def stage(
+    context: StageContext,
+    options: MultipleShootingOptions,
+    saved: dict[str, object] | None,
+    recorder: IterationRecorder,
+) -> StopReason:
+    """Calls of IPOPT or FATROP, each with references at the nodes of the one before."""
+    evaluator = context.evaluator
+    assert evaluator.problem.staged is not None, "refused otherwise"
+    problem = evaluator.problem.staged()
+    state = revive(MultipleShootingState, saved) if saved else guess(problem, context, options)
+    programs = Programs(problem, evaluator, options, state.z)
+    if state.nodes.shape != (programs.grid.intervals, problem.state_size):
+        raise damaged(ValueError("other nodes"))
+    if not saved:
+        point = evaluator.value(state.z)
+        if not point.finite and not options.nodes:
+            return not_finite(point)
+        recorder.commit(Iteration(state, point))
+    while True:
+        spent = recorder.spent()
+        if spent is not None:
+            return spent
+        if state.iteration >= options.iterations:
+            return StopReason(*ENDS[ITERATIONS_USED])
+        nlp = programs.at(state.nodes)
+        watch, first = ShootingWatch(evaluator, recorder, nlp, state), recorder.rows
+        ending, w = run(nlp, evaluator, options, state, watch, context)
+        recorder.distribute(nlp.work, first)
+        if watch.error:
+            raise watch.error
+        if watch.spent is not None:
+            return watch.spent
+        state = watch.state
+        if not watch.turned:
+            return reason(context, nlp, ending, w)
+        context.log("nodes have turned far: new references")
+
+
+def guess(problem: StagedProblem, context: StageContext, options: MultipleShootingOptions) -> MultipleShootingState:
+    """The start: nodes from the rollout of z, or between named states in the first stage of smoothing."""
+    evaluator, z = context.evaluator, context.start
+    starts = make_grid(problem, options.steps_between_nodes).starts[1:]
+    if options.nodes and evaluator.smoothing == evaluator.problem.smoothing[0]:
+        given = [len(each) for each in options.nodes]
+        if set(given) != {problem.state_size}:
+            where = f"a state of this problem has {problem.state_size} numbers, not {', '.join(map(str, set(given)))}"
+            raise SymphysError(f"solver.multiple_shooting.nodes: {where}")
+        nodes = interpolated(problem, np.array(options.nodes, float), starts / problem.steps)
+    else:
+        nodes = problem.roll_out(z, evaluator.smoothing).x[starts]
+    return MultipleShootingState(0, z, nodes, np.zeros(0), np.zeros(0), math.nan)
+
+
+class Programs:
+    """Makes the program of a stage of smoothing at any references; grid and layout are always the same."""
+
+    def __init__(
+        self, problem: StagedProblem, evaluator: CountingEvaluator, options: MultipleShootingOptions, z: Array
+    ) -> None:
+        """Find which stages the limits depend on, at the rollout of z."""
+        self.problem, self.evaluator, self.options = problem, evaluator, options
+        motion = problem.roll_out(z, evaluator.smoothing)
+        self.steps, self.grid = IntervalSteps(problem, motion), make_grid(problem, options.steps_between_nodes)
+        stages: list[set[int]] = [set() for _ in problem.lower]
+        if stages:
+            _, by_state, by_input, _ = problem.limit_slopes(motion)
+            owner = self.grid.stage_of_state
+            for slopes, size in ((by_state, problem.tangent_size), (by_input, problem.input_size)):
+                rows, columns = slopes.tocoo().coords
+                for row, of in zip(rows.tolist(), owner[columns // size].tolist(), strict=True):
+                    stages[row].add(of)
+        found = [sorted(each) or [0] for each in stages]
+        count = self.grid.intervals + 1
+        self.limit_rows = [np.array([r for r, of in enumerate(found) if j in of], np.int64) for j in range(count)]
+        variables = evaluator.problem.n
+        fatrop = options.backend == "fatrop"
+        self.layout = staged(self.grid, variables, found) if fatrop else shared(self.grid, variables, len(stages))
+
+    def at(self, reference: Array) -> MultipleShootingNlp:
+        """The program with tangents at these states (M, nx)."""
+        plan = ShootingPlan(self.problem, self.grid, self.steps, reference, self.evaluator.smoothing)
+        exact = self.options.hessian == "exact"
+        return MultipleShootingNlp(plan, self.layout, self.limit_rows, self.evaluator.scale, exact)
+
+
+def run(
+    nlp: MultipleShootingNlp,
+    evaluator: CountingEvaluator,
+    options: MultipleShootingOptions,
+    state: MultipleShootingState,
+    watch: ShootingWatch,
+    context: StageContext,
+) -> tuple[str, Array]:
+    """One call of the library: how it ended in IPOPT's words, and its last w (size,)."""
+    acting = np.zeros(len(state.z), bool)
+    for entries in (*nlp.plan.grid.knots, nlp.plan.grid.statics):
+        acting[entries] = True
+    lower, upper = (np.where(acting, bound, state.z) for bound in (evaluator.lower, evaluator.upper))
+    request = LibraryRequest(
+        nlp,
+        nlp.pack(state.z, np.zeros((nlp.plan.grid.intervals, nlp.plan.grid.tangent_size))),
+        *nlp.bounds(lower, upper),
+        state.bound_duals,
+        state.row_duals,
+        state.barrier,
+        options.iterations - state.iteration,
+        options.tolerance,
+        options.hessian == "limited-memory",
+        options.options,
+        context.log,
+    )
+    return (solve_by_fatrop if options.backend == "fatrop" else solve_by_ipopt)(request, watch)
+
+
+class ShootingWatch:
+    """Records every iterate: one rollout, a row of the trace; ends the call at limits, on Ctrl-C, at large turns."""
+
+    def __init__(
+        self,
+        evaluator: CountingEvaluator,
+        recorder: IterationRecorder,
+        nlp: MultipleShootingNlp,
+        state: MultipleShootingState,
+    ) -> None:
+        """``state``: of the start, which has its row already."""
+        self.evaluator, self.recorder, self.nlp, self.state = evaluator, recorder, nlp, state
+        self.error: BaseException | None = None
+        self.spent: StopReason | None = None
+        self.turned = False
+
+    @property
+    def ended(self) -> bool:
+        """See ``IterateWatch``."""
+        return self.error is not None or self.spent is not None or self.turned
+
+    def iterate(self, w: Array, bound_duals: Array, row_duals: Array) -> bool:
+        """See ``IterateWatch``."""
+        nlp, before = self.nlp, self.state
+        z, shots = self.evaluator.clip(nlp.unpack(w)[0]), nlp.shots(w)
+        turns = shots.turns
+        duals = row_duals.copy()
+        if duals.size:
+            rows = nlp.layout.defects
+            duals[rows] = np.linalg.solve(turns.transpose(0, 2, 1), duals[rows][:, :, None])[:, :, 0]
+        mu = barrier(nlp, self.evaluator, w, bound_duals, row_duals)
+        self.state = MultipleShootingState(before.iteration + 1, z, shots.nodes, bound_duals, duals, mu)
+        defect = float(np.abs(shots.defects).max())
+        step = float(np.linalg.norm(z - before.z))
+        self.recorder.commit(Iteration(self.state, self.evaluator.value(z), step=step, outputs={DEFECT: defect}))
+        self.spent = self.recorder.spent()
+        self.turned = bool(np.abs(turns - np.eye(turns.shape[1])).max() > TURN)
+        return self.ended
+
+
+def barrier(
+    nlp: MultipleShootingNlp, evaluator: CountingEvaluator, w: Array, bound_duals: Array, row_duals: Array
+) -> float:
+    """The mean product of multipliers and distances from their bounds, within what IPOPT may start from."""
+    products = []
+    bounds = (nlp.bounds(evaluator.lower, evaluator.upper), nlp.row_bounds())
+    for at, duals, (low, high) in zip((w, nlp.constraints(w)), (bound_duals, row_duals), bounds, strict=True):
+        bounded = (low < high) & (np.isfinite(low) | np.isfinite(high))
+        if duals.size and bounded.any():
+            distance = np.minimum((at - low)[bounded], (high - at)[bounded])
+            products.append(np.abs(duals[bounded]) * distance.clip(min=0))
+    return float(np.clip(np.mean(np.concatenate(products)), 1e-9, 0.1)) if products else 1e-2
+
+
+def reason(context: StageContext, nlp: MultipleShootingNlp, ending: str, w: Array) -> StopReason:
+    """Why a library ended; a solution whose rollout is worse than that of an iterate before it is none."""
+    evaluator, grid = context.evaluator, nlp.plan.grid
+    if np.isfinite(w).all():
+        defect = np.abs(nlp.shots(w).defects).max()
+        context.log(
+            f"{grid.intervals} intervals of {int(np.diff(grid.starts).max())} steps, defects up to {defect:.2e}"
+        )
+    if ending in GOOD:
+        solution = evaluator.value(evaluator.clip(nlp.unpack(w)[0]))
+        best = evaluator.incumbent.best or solution
+        return StopReason(Status.STALLED, APART) if worse(solution, best) else converged(evaluator)
+    if ending == NO_STEP:
+        return StopReason(Status.STALLED, STUCK)
+    return StopReason(*ENDS.get(ending, (Status.FAILED, f"IPOPT ended with {ending.replace('_', ' ').lower()}")))
+
+
+def refusal(problem: ShootingProblem) -> str:
+    """Why the solver is not for a problem."""
+    return NO_STEPS if problem.staged is None else ""
+
+
+def check(options: MultipleShootingOptions) -> None:
+    """SymphysError for an option that the library does not take, or a library that is not there."""
+    if not ca.has_nlpsol(options.backend):
+        raise SymphysError(f"solver.multiple_shooting.backend: this casadi has no {options.backend}")
+    if options.backend == "ipopt":
+        for name, value in options.options.items():
+            why = RESERVED.get(name) or refused_by_ipopt(name, value)
+            if why:
+                raise refuse("multiple_shooting", name, f"IPOPT does not take {value!r}: {why}")
+
+
+MULTIPLE_SHOOTING = make_solver(
+    "multiple_shooting",
+    "states at nodes as variables, defects as constraints, by IPOPT or FATROP",
+    MultipleShootingOptions,
+    stage,
+    check=check,
+    refusal=refusal,
+    constraints=True,
+    by_name=True,
+)

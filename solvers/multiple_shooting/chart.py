@@ -1,0 +1,65 @@
+"""Charts of the node states: each node is a reference state and a tangent at it, and slopes pass through the chart.
+
+A problem gives slopes in the tangent of the state itself. A node that is ``retract(reference, d)`` with d other than 0
+needs the slope of that tangent by d; a defect that is measured at the reference of the next node needs the slope of
+``difference(reference, state)`` by the tangent of the state. Both are the unit matrix but for rotations. They are
+differences of fourth order, whose error is that of rounding: retract and difference are smooth and cheap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.shooting import StagedProblem
+
+Array = NDArray[np.float64]
+STEP = 1e-3
+"""Of the differences, in tangents: radians, metres. Their error is below 1e-12 for rotations of some radians."""
+STENCIL = ((1, 8 / 12), (-1, -8 / 12), (2, -1 / 12), (-2, 1 / 12))
+"""(offset, weight) of the fourth-order difference."""
+
+
+def slopes(moved: Callable[[Array], Array], count: int, size: int) -> Array:
+    """(count, size, size): slope of ``moved`` by offsets at 0, where it takes (rows, count, size) to the same."""
+    offsets = STEP * np.eye(size)[:, None, :] * np.ones((1, count, 1))
+    total = np.zeros((size, count, size))
+    for factor, weight in STENCIL:
+        total += weight / STEP * moved(factor * offsets)
+    return np.ascontiguousarray(total.transpose(1, 2, 0))
+
+
+def pulled(problem: StagedProblem, reference: Array, nodes: Array, tangents: Array) -> Array:
+    """(M, n, n): the node in its own tangent by the tangent d at its reference; reference, nodes (M, nx), d (M, n)."""
+    count, size = tangents.shape
+    if not np.any(tangents):
+        return np.broadcast_to(np.eye(size), (count, size, size)).copy()
+
+    def moved(offsets: Array) -> Array:
+        rows = len(offsets)
+        there = problem.retract(np.tile(reference, (rows, 1)), (tangents + offsets).reshape(-1, size))
+        return problem.difference(np.tile(nodes, (rows, 1)), there).reshape(rows, count, size)
+
+    return slopes(moved, count, size)
+
+
+def transported(problem: StagedProblem, reference: Array, states: Array) -> Array:
+    """(M, n, n): ``difference(reference, state)`` by the state in its own tangent; both (M, nx)."""
+    count, size = len(reference), problem.tangent_size
+
+    def moved(offsets: Array) -> Array:
+        rows = len(offsets)
+        there = problem.retract(np.tile(states, (rows, 1)), offsets.reshape(-1, size))
+        return problem.difference(np.tile(reference, (rows, 1)), there).reshape(rows, count, size)
+
+    return slopes(moved, count, size)
+
+
+def interpolated(problem: StagedProblem, states: Array, fractions: Array) -> Array:
+    """(B, nx): states at fractions (B,) of the way, 0 to 1, along straight lines in tangents; states (rows, nx)."""
+    position = np.clip(fractions, 0, 1) * (len(states) - 1)
+    before = np.minimum(position.astype(int), len(states) - 2)
+    ahead = problem.difference(states[before], states[before + 1])
+    return problem.retract(states[before], (position - before)[:, None] * ahead)

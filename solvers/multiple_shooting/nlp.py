@@ -1,0 +1,230 @@
+"""The nonlinear program of multiple shooting: w, its bounds, objective, constraints, and their sparse derivatives.
+
+w holds z / scale and the tangents of the nodes, in the order of a ``NlpLayout``. Derivatives are dense blocks, a stage
+each, that are scattered into fixed sparsity patterns, column by column as casadi has them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.solvers.core.outcome import Counts
+from symphys.solvers.multiple_shooting.layout import NlpLayout
+from symphys.solvers.multiple_shooting.shots import ShootingPlan, Shots
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+STEP = 1e-6
+"""Of the differences for an exact Hessian, in local vectors."""
+
+
+@dataclass(frozen=True)
+class ScatterPattern:
+    """A sparsity pattern and where the entries of the blocks go; several may go to one place, and add up.
+
+    Attributes:
+        sparsity: casadi's.
+        place: (entries,) the place of each entry among the nonzeros.
+    """
+
+    sparsity: ca.Sparsity
+    place: Indices
+
+    def nonzeros(self, entries: Array) -> Array:
+        """Entries added up."""
+        return np.bincount(self.place, weights=entries, minlength=self.sparsity.nnz()).astype(float)
+
+
+def pattern(shape: tuple[int, int], rows: Indices, columns: Indices) -> ScatterPattern:
+    """The pattern of entries at (rows, columns)."""
+    keys, place = np.unique(columns * shape[0] + rows, return_inverse=True)
+    starts = np.searchsorted(keys, shape[0] * np.arange(shape[1] + 1))
+    return ScatterPattern(ca.Sparsity(*shape, starts.tolist(), (keys % max(shape[0], 1)).tolist()), place)
+
+
+class MultipleShootingNlp:
+    """The program in w; the last evaluation is kept, since solvers ask for its parts one after the other."""
+
+    def __init__(
+        self, plan: ShootingPlan, layout: NlpLayout, limit_rows: list[Indices], scale: Array, exact: bool
+    ) -> None:
+        """Make the patterns.
+
+        Args:
+            plan: what is evaluated.
+            layout: where everything is.
+            limit_rows: the limits that depend on each stage.
+            scale: (len(z),).
+            exact: whether the Hessian has the curvature of the steps, by differences of slopes.
+        """
+        self.plan, self.layout, self.limit_rows, self.scale, self.exact = plan, layout, limit_rows, scale, exact
+        grid = plan.grid
+        self.local_scale = [np.ones(grid.local_size(stage)) for stage in range(grid.intervals + 1)]
+        for stage, local in enumerate(self.local_scale):
+            if stage < grid.intervals:
+                local[grid.knot_part(stage)] = scale[grid.knots[stage]]
+            local[grid.static_part(stage)] = scale[grid.statics]
+        self.jacobian_pattern = self._jacobian_pattern()
+        pairs = [np.meshgrid(local, local, indexing="ij") for local in layout.local]
+        rows, columns = (np.concatenate([pair[side].ravel() for pair in pairs]) for side in (0, 1))
+        self.hessian_pattern = pattern((layout.size, layout.size), rows, columns)
+        self.upper = rows <= columns
+        self.upper_pattern = pattern((layout.size, layout.size), rows[self.upper], columns[self.upper])
+        self.work = Counts()
+        self._key = b""
+        self._shots: Shots | None = None
+        self._kept: dict[str, Array] = {}
+
+    def pack(self, z: Array, d: Array) -> Array:
+        """(size,) w of z and the tangents d (M, n), copies included."""
+        w = np.zeros(self.layout.size)
+        w[self.layout.home], w[self.layout.nodes] = z / self.scale, d
+        for _, copy, origin in self.layout.copies.tolist():
+            w[copy] = w[origin]
+        return w
+
+    def unpack(self, w: Array) -> tuple[Array, Array]:
+        """Z and d (M, n)."""
+        return w[self.layout.home] * self.scale, w[self.layout.nodes]
+
+    def bounds(self, lower: Array, upper: Array) -> tuple[Array, Array]:
+        """(size,) each, of w from those of z; copies and tangents have none."""
+        low, high = np.full(self.layout.size, -np.inf), np.full(self.layout.size, np.inf)
+        low[self.layout.home], high[self.layout.home] = lower / self.scale, upper / self.scale
+        return low, high
+
+    def row_bounds(self) -> tuple[Array, Array]:
+        """(rows,) each: 0 but for the limits."""
+        low, high = np.zeros(self.layout.rows), np.zeros(self.layout.rows)
+        low[self.layout.limits], high[self.layout.limits] = self.plan.problem.lower, self.plan.problem.upper
+        return low, high
+
+    def shots(self, w: Array) -> Shots:
+        """The evaluation at w."""
+        key = w.tobytes()
+        if self._shots is None or key != self._key:
+            z, d = self.unpack(w)
+            problem = self.plan.problem
+            u = np.asarray(problem.weights @ z).reshape(problem.steps, problem.input_size)
+            self._shots, self._key, self._kept = Shots(self.plan, z, u, d), key, {}
+            self.work += Counts(rollouts=1)
+        return self._shots
+
+    def objective(self, w: Array) -> float:
+        """At w."""
+        return self.shots(w).measured[0]
+
+    def constraints(self, w: Array) -> Array:
+        """(rows,) at w."""
+        shots, rows = self.shots(w), np.zeros(self.layout.rows)
+        rows[self.layout.defects] = shots.defects
+        rows[self.layout.limits] = shots.measured[1]
+        row, copy, origin = self.layout.copies.T
+        rows[row] = w[copy] - w[origin]
+        return rows
+
+    def gradient(self, w: Array) -> Array:
+        """(size,) of the objective."""
+        shots = self._sloped(w)
+        if "gradient" not in self._kept:
+            self._kept["gradient"] = self._gathered(shots.gradients)
+        return self._kept["gradient"]
+
+    def jacobian(self, w: Array) -> Array:
+        """Nonzeros of the constraints' slopes in the order of the pattern."""
+        shots, n = self._sloped(w), self.plan.grid.tangent_size
+        if "jacobian" in self._kept:
+            return self._kept["jacobian"]
+        entries = [np.ones(n * self.plan.grid.intervals)]
+        entries += [-(s.reached * scale).ravel() for s, scale in zip(shots.slopes, self.local_scale, strict=True)]
+        blocks = zip(shots.limit_slopes(self.limit_rows), self.local_scale, strict=True)
+        entries += [(block * scale).ravel() for block, scale in blocks]
+        copies = np.ones(len(self.layout.copies))
+        self._kept["jacobian"] = self.jacobian_pattern.nonzeros(np.concatenate([*entries, copies, -copies]))
+        return self._kept["jacobian"]
+
+    def hessian(self, w: Array, factor: float, multipliers: Array, upper: bool) -> Array:
+        """Nonzeros of the Hessian of factor * objective + multipliers . constraints, or of its upper half."""
+        if self.exact:
+            blocks = self._differences(w, factor, multipliers)
+        else:
+            blocks = [factor * block for block in self._sloped(w).gauss_newton()]
+        scaled = [block * np.outer(s, s) for block, s in zip(blocks, self.local_scale, strict=True)]
+        entries = np.concatenate([block.ravel() for block in scaled])
+        return self.upper_pattern.nonzeros(entries[self.upper]) if upper else self.hessian_pattern.nonzeros(entries)
+
+    def _sloped(self, w: Array) -> Shots:
+        shots = self.shots(w)
+        if "slopes" not in shots.__dict__:
+            self.work += Counts(jacobians=1)
+        return shots
+
+    def _gathered(self, local: list[Array]) -> Array:
+        """(size,) the sum of local gradients."""
+        scaled = [gradient * scale for gradient, scale in zip(local, self.local_scale, strict=True)]
+        indices = np.concatenate(self.layout.local)
+        return np.bincount(indices, weights=np.concatenate(scaled), minlength=self.layout.size).astype(float)
+
+    def _jacobian_pattern(self) -> ScatterPattern:
+        layout = self.layout
+        rows, columns = [layout.defects.ravel()], [layout.nodes.ravel()]
+        blocks = [*zip(layout.defects, layout.local[:-1], strict=True)]
+        blocks += [(layout.limits[here], local) for here, local in zip(self.limit_rows, layout.local, strict=True)]
+        for block_rows, local in blocks:
+            rows.append(np.repeat(block_rows, len(local)))
+            columns.append(np.tile(local, len(block_rows)))
+        row, copy, origin = layout.copies.T
+        rows += [row, row]
+        columns += [copy, origin]
+        return pattern((layout.rows, layout.size), np.concatenate(rows), np.concatenate(columns))
+
+    def _differences(self, w: Array, factor: float, multipliers: Array) -> list[Array]:
+        """Blocks of the exact Hessian: all stages move at once along one entry of their local vectors.
+
+        Local gradients depend on the own local vector alone, so each move gives a column of every block.
+        """
+        grid, base = self.plan.grid, self._sloped(w)
+        before = self._lagrangian(base, factor, multipliers)
+        blocks = [np.zeros((len(each), len(each))) for each in before]
+        statics, knots = len(grid.statics), max(len(each) for each in grid.knots)
+        for column in range(grid.tangent_size):
+            d = base.d.copy()
+            d[:, column] += STEP
+            after = self._lagrangian(self._moved(base.motion.z, base.motion.u, d), factor, multipliers)
+            for stage in range(1, grid.intervals + 1):
+                blocks[stage][:, column] = (after[stage] - before[stage]) / STEP
+        for column in range(knots):
+            u, moving = base.motion.u.copy(), [stage for stage, own in enumerate(grid.knots) if column < len(own)]
+            steps = {stage: STEP * self.scale[grid.knots[stage][column]] for stage in moving}
+            for stage, step in steps.items():
+                u[list(grid.steps(stage))] += step * grid.shares[stage][:, :, column]
+            after = self._lagrangian(self._moved(base.motion.z, u, base.d), factor, multipliers)
+            for stage, step in steps.items():
+                blocks[stage][:, grid.node_size(stage) + column] = (after[stage] - before[stage]) / step
+        for column in range(statics):
+            z = base.motion.z.copy()
+            step = STEP * self.scale[grid.statics[column]]
+            z[grid.statics[column]] += step
+            after = self._lagrangian(self._moved(z, base.motion.u, base.d), factor, multipliers)
+            for stage, block in enumerate(blocks):
+                block[:, grid.static_part(stage).start + column] = (after[stage] - before[stage]) / step
+        return [(block + block.T) / 2 for block in blocks]
+
+    def _moved(self, z: Array, u: Array, d: Array) -> Shots:
+        self.work += Counts(rollouts=1, jacobians=1)
+        return Shots(self.plan, z, u, d)
+
+    def _lagrangian(self, shots: Shots, factor: float, multipliers: Array) -> list[Array]:
+        """Local gradients of factor * objective + multipliers . constraints, the tangents' own part left out."""
+        lagrangians = [factor * gradient for gradient in shots.gradients]
+        if len(self.layout.limits):
+            blocks = shots.limit_slopes(self.limit_rows)
+            for gradient, block, here in zip(lagrangians, blocks, self.limit_rows, strict=True):
+                gradient += multipliers[self.layout.limits[here]] @ block
+        for gradient, slopes, rows in zip(lagrangians, shots.slopes, self.layout.defects, strict=False):
+            gradient -= multipliers[rows] @ slopes.reached
+        return lagrangians
