@@ -81,7 +81,9 @@ def slope_plan(program: Program, output: str, lanes: int) -> SlopePlan:
     if program.steps != 1 or any(call.accumulate for call in program.calls):
         raise ProgramError("slopes are of programs of one step, whose calls add to nothing")
     functions, target = DistinctFunctions(), program.outputs[output]
-    phases = [[_reach(call, functions) for call in calls] for calls in (program.prologue, program.body, program.epilogue)]
+    phases = [
+        [_reach(call, functions) for call in calls] for calls in (program.prologue, program.body, program.epilogue)
+    ]
     activity = Activity(program, phases, [target])
     reaches = [reach for phase in phases for reach in phase]
     pulls, end = list[_Pull | None](), program.size
@@ -219,7 +221,9 @@ def _taken(program: Program, target: Place, backward: Sequence[_Pull], functions
         graph = functions.forward(reach.call.function)
         if id(graph) not in known:
             known[id(graph)] = _sparsity(graph)
-        on = np.concatenate([np.full(len(words[0]), mark) for words, mark in zip(reach.outputs, pull.outputs, strict=True)])
+        on = np.concatenate(
+            [np.full(len(words[0]), mark) for words, mark in zip(reach.outputs, pull.outputs, strict=True)]
+        )
         seeded = useful[:, outputs] * on
         found[:, i] = seeded.any(axis=1)
         useful[:, inputs] = np.maximum(useful[:, inputs], np.minimum(seeded @ known[id(graph)], 1))
