@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symphys.api.transcriptions import recorded, transcribed
+from symphys.api.transcriptions import linearized, recorded, transcribed
 from symphys.api.values import by_name, vector
 from symphys.errors import SymphysError
 from symphys.problem import Problem
 from symphys.problem.loading import Source, load
-from symphys.shooting import Evaluator, Values
+from symphys.shooting import Evaluator, Linearized, Values
 from symphys.trajectory import Trajectory
 from symphys.transcription import Transcription
 from symphys.transcription.recorded_rollout import RecordedRollout
@@ -101,6 +101,27 @@ class CompiledRollout:
             (4, 500, 3)
         """
         return recorded(self.problem, quantities, self.smoothing, *self._settings)
+
+    def linearize(self, z: ArrayLike) -> Linearized:
+        """How each step of the motion of one z (n,) changes with its state, its inputs and the static entries of z.
+
+        Changes of states are tangents: coordinates and rates of robots, and the forces that steps begin from, so that
+        products of ``a`` are exact. Static entries of z are those of variables that are no controls, in their
+        order. ``c`` of the first step has also what these do to the first state beside its tangent.
+
+        Returns:
+            ``a`` (N, t, t), ``b`` (N, t, m) and ``c`` (N, t, s): the next state by the state, the inputs and the static
+            entries; and ``start`` (t, s): the first state by the static entries.
+
+        Example:
+            >>> import symphys
+            >>> rollout = symphys.compile("ball_throw")
+            >>> slopes = rollout.linearize(rollout.z())
+            >>> slopes.a.shape, slopes.b.shape, slopes.c.shape, slopes.start.shape
+            ((500, 18, 18), (500, 18, 0), (500, 18, 6), (18, 6))
+        """
+        made = linearized(self.problem, self.smoothing == 0, *self._settings)
+        return made.linearize(made.motion(np.asarray(z, float), self.smoothing))
 
     def trajectory(self, z: ArrayLike) -> Trajectory:
         """The motion of one z (n,); NotFinite if there is none."""

@@ -8,6 +8,7 @@ from symphys.problem import Problem
 from symphys.transcription import Transcription, transcribe
 from symphys.transcription.open_step import CompiledStep, compile_open_step
 from symphys.transcription.recorded_rollout import RecordedRollout, record_rollout
+from symphys.transcription.staged.linearization import Linearization
 
 KEPT = 8
 """How many are kept: the kernels of one problem may take hundreds of megabytes."""
@@ -17,6 +18,12 @@ KEPT = 8
 def transcribed(problem: Problem, exact: bool, backend: str, threads: int | None = None) -> Transcription:
     """See ``transcribe``; the same object for the same problem."""
     return transcribe(problem, exact, backend, threads)
+
+
+@lru_cache(maxsize=KEPT)
+def linearized(problem: Problem, exact: bool, backend: str, threads: int | None = None) -> Linearization:
+    """See ``Linearization``; the same object for the same problem."""
+    return Linearization(transcribed(problem, exact, backend, threads).rollout, backend, threads, exact)
 
 
 @lru_cache(maxsize=KEPT)

@@ -11,7 +11,7 @@ typedef struct {
   word blocks;
   const block *rows;
 } slopes;
-typedef struct { word points; const double *z, *parameters; word shared; double *jacobian; } points;
+typedef struct { word points; const double *z, *parameters; word shared, columns; double *jacobian; } points;
 
 static void run(const word *t, word count, V *m, V *b) {
   for (word c = 0; c < count; c++, t += t[1]) FUNCTIONS[t[0]](m, b, t + 2, 0);
@@ -38,17 +38,17 @@ API void jacobians(const slopes *p, const points *x, V *m) {
     gather(m + p->parameters, p->parameters_size, x->parameters, x->shared ? 0 : p->parameters_size, first, count);
     run(p->entries, p->calls, m, 0);
     for (word l = 0; l < count; l++) {
-      double *to = x->jacobian + (first + l) * p->height * p->width;
+      double *to = x->jacobian + (first + l) * p->height * x->columns;
       for (word j = 0; j < kept; j++) s[j] = LANE(m[j], l);
       for (word i = 0; i < p->blocks; i++) {
         const block *rows = p->rows + i;
         for (word r = 0; r < LANES; r++)
           if (rows->rows[r] >= 0) LANE(b[p->seeds[rows->rows[r]]], r) = (R)1;
         run(rows->entries, rows->count, (V *)s, b);
-        for (word j = 0; j < p->width; j++) {
+        for (word j = 0; j < x->columns; j++) {
           const V found = b[p->result + j];
           for (word r = 0; r < LANES; r++)
-            if (rows->rows[r] >= 0) to[rows->rows[r] * p->width + j] = (double)LANE(found, r);
+            if (rows->rows[r] >= 0) to[rows->rows[r] * x->columns + j] = (double)LANE(found, r);
         }
         memset(b + p->result, 0, sizeof(V) * p->width);
       }

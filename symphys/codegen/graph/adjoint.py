@@ -15,8 +15,8 @@ Mask = tuple[bool, ...]
 def adjoint_graph(function: Function, forward: Graph, inputs: Mask, outputs: Mask, tabled: bool = False) -> Graph:
     """Graph with the arguments, then the adjoints of the marked results; it gives one result a marked argument.
 
-    ``forward`` is the function's own graph. ``tabled``: all slopes are computed, then multiplied with the adjoints: more
-    to compute, but of it only the products depend on the adjoints.
+    ``forward`` is the function's own graph. ``tabled``: all slopes are computed, then multiplied with the adjoints:
+    more to compute, but of it only the products depend on the adjoints.
     """
     arguments = [ca.SX.sym("x", function.numel_in(i)) for i in range(function.n_in())]
     results = function.call(arguments, True, False)
@@ -24,10 +24,7 @@ def adjoint_graph(function: Function, forward: Graph, inputs: Mask, outputs: Mas
     wanted = [x for x, on in zip(arguments, inputs, strict=True) if on]
     values = ca.vertcat(*(r for r, on in zip(results, outputs, strict=True) if on))
     by, seed = ca.vertcat(*wanted), ca.vertcat(*seeds)
-    if tabled:
-        adjoint = ca.mtimes(ca.cse(ca.jacobian(values, by)).T, seed)
-    else:
-        adjoint = ca.jtimes(values, by, seed, True)
+    adjoint = ca.mtimes(ca.cse(ca.jacobian(values, by)).T, seed) if tabled else ca.jtimes(values, by, seed, True)
     ends = [0]
     for x in wanted:
         ends.append(ends[-1] + x.numel())

@@ -5,7 +5,8 @@ from __future__ import annotations
 import ctypes
 import time
 from functools import partial
-from typing import Any, Literal
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -48,7 +49,12 @@ class _Slopes(ctypes.Structure):
 
 
 class _Points(ctypes.Structure):
-    _fields_ = (("points", WORD), ("z", POINTER), ("parameters", POINTER), ("shared", WORD), ("jacobian", POINTER))
+    _fields_ = (
+        ("points", WORD),
+        *((name, POINTER) for name in ("z", "parameters")),
+        *((name, WORD) for name in ("shared", "columns")),
+        ("jacobian", POINTER),
+    )
 
 
 class SlopeKernel:
@@ -67,26 +73,26 @@ class SlopeKernel:
         kept = program.size + planned.tape
         self._pool = MemoryPool(kept + -(-kept // report.lanes) + planned.adjoints, report.lanes, np.float64)
 
-    def jacobians(self, Z: ArrayLike, parameters: ArrayLike) -> Array:
-        """(B, n) and (B, p), or (p,) for all points -> (B, outputs, n)."""
+    def jacobians(self, Z: ArrayLike, parameters: ArrayLike, columns: int | None = None) -> Array:
+        """(B, n) and (B, p), or (p,) for all points -> (B, outputs, columns): by the first of z; None: by all."""
         z, given = (np.ascontiguousarray(each, float) for each in (Z, parameters))
         self._check("Z", z, (2,), self.program.z.size)
         self._check("parameters", given, (1, 2), self.program.parameters.size)
         if given.ndim == 2 and len(given) != len(z):
             raise ProgramError(f"the batch sizes {len(z)} of Z and {len(given)} of parameters differ")
-        found = np.empty((len(z), self._data.height, self._data.width))
+        found = np.empty((len(z), self._data.height, self._data.width if columns is None else columns))
         lanes = self.report.lanes
         blocks = -(-len(z) // lanes)
         parts = 1 if self.threads == 1 else min(blocks, PARTS * self.threads)
         ends = [min(lanes * (blocks * i // parts), len(z)) for i in range(parts + 1)] if parts else []
-        tasks = [partial(self._run, z, given, found, a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+        tasks = [partial(self._run, z, given, found, a, b) for a, b in pairwise(ends)]
         self._pool.run(tasks, self.threads)
         return found
 
     def _run(self, z: Array, given: Array, found: Array, first: int, last: int, memory: Any) -> None:
         shared = given.ndim == 1
         row = given if shared else given[first:]
-        addresses = z[first:].ctypes.data, row.ctypes.data, int(shared), found[first:].ctypes.data
+        addresses = z[first:].ctypes.data, row.ctypes.data, int(shared), found.shape[2], found[first:].ctypes.data
         batch = _Points(last - first, *addresses)
         self._evaluate(ctypes.byref(self._data), ctypes.byref(batch), memory.ctypes.data)
 
@@ -136,7 +142,7 @@ def compile_slopes(
         KernelUnavailable: with one line that says why; the caller falls back.
     """
     started = time.perf_counter()
-    lanes: int | Literal["auto"] = processor().lanes(False)
+    lanes = processor().lanes(False)
     planned = slope_plan(program, output, lanes)
     if program.zeroed or program.constants:
         raise ProgramError("slopes are of programs without constants")

@@ -19,8 +19,6 @@ from symphys.transcription.staged.tangent import Tangent
 Array = NDArray[np.float64]
 Slopes = tuple[Array, Array, Array]
 """(N, n, n), (N, n, m) and (N, n, np): the next state's tangent by the state's, by inputs and by parameters."""
-MOST_ROWS = 4096
-"""Of one batch of seeds: what is asked for at once stays in memory."""
 
 
 @dataclass(eq=False)
@@ -68,13 +66,18 @@ class LinearizedStep:
             after = self.step(k, states, U, P, smoothing)
         varying, given = self._rows(k, states, after, U, P, smoothing)
         _, n, m, np_ = self.arguments.sizes
-        found = self._off.jacobians(varying, given, n)
-        a, b, varied = np.split(found, [n, n + m], axis=2)
+        a, b, varied = np.split(self._off.jacobians(varying, given, n + m + len(self.arguments.varied)), [n, n + m], 2)
         if not varied.shape[2]:
             return a, b, np.broadcast_to(0.0, (len(states), n, np_))
         c = np.zeros((len(states), n, np_))
         c[:, :, self.arguments.varied] = varied
         return a, b, c
+
+    def beside(self, x: ArrayLike, u: ArrayLike, p: ArrayLike, smoothing: float) -> Array:
+        """(n, nx): the slope of step 0 by each number of a state (nx,), on its tangent or not."""
+        after = self.step(0, [x], [u], p, smoothing)
+        varying, given = self._rows(0, [x], after, [u], p, smoothing)
+        return self._off.jacobians(varying, given, varying.shape[1])[0, :, -self.arguments.sizes[0] :]
 
     def _rows(self, k: Any, X: ArrayLike, after: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float) -> Any:
         x, aim, u, p = (np.atleast_2d(np.asarray(each, float)) for each in (X, after, U, P))
@@ -83,10 +86,12 @@ class LinearizedStep:
         time = np.broadcast_to(np.asarray(k, float) * self.rollout.dt, (count,))[:, None]
         if self.exact and smoothing:
             raise ValueError(f"this step is for smoothing 0 only, not for {smoothing:g}")
-        varying = np.concatenate([np.zeros((count, n)), u.reshape(count, m), p[:, self.arguments.varied]], axis=1)
+        parts = [np.zeros((count, n)), u.reshape(count, m), p[:, self.arguments.varied], np.zeros_like(x)]
+        varying = np.concatenate(parts, axis=1)
         return varying, np.concatenate([x, aim, time, p, np.full((count, 1), smoothing)], axis=1)
 
     def _built(self) -> tuple[Any, Any]:
+        """What gives states after the step, and what gives slopes."""
         note = ""
         if self.backend in PRECISIONS:
             count = processors() if self.threads is None else self.threads
@@ -103,23 +108,13 @@ class LinearizedStep:
 
 
 class _ByKernel:
-    """A lane for each state, or for each row of a Jacobian."""
+    """Lanes hold states."""
 
     def __init__(self, kernel: Kernel) -> None:
         self.kernel = kernel
 
     def values(self, varying: Array, given: Array) -> Array:
         return np.array(self.kernel.forward(varying, given)["after"])
-
-    def jacobians(self, varying: Array, given: Array, n: int) -> Array:
-        found = np.empty((len(varying), n, varying.shape[1]))
-        share = max(1, MOST_ROWS // max(n, 1))
-        for first in range(0, len(varying), share):
-            some = slice(first, first + share)
-            rows = [np.repeat(each[some], n, axis=0) for each in (varying, given)]
-            seeds = np.tile(np.eye(n), (len(varying[some]), 1))
-            found[some] = self.kernel.gradient(rows[0], seeds, rows[1])[1].reshape(-1, n, varying.shape[1])
-        return found
 
 
 class _BySlopes:
@@ -128,8 +123,8 @@ class _BySlopes:
     def __init__(self, kernel: SlopeKernel) -> None:
         self.kernel = kernel
 
-    def jacobians(self, varying: Array, given: Array, n: int) -> Array:
-        return self.kernel.jacobians(varying, given)
+    def jacobians(self, varying: Array, given: Array, columns: int) -> Array:
+        return self.kernel.jacobians(varying, given, columns)
 
 
 class _ByCasadi:
@@ -137,16 +132,18 @@ class _ByCasadi:
 
     def __init__(self, function: ca.Function) -> None:
         self.function = function
-        self._jacobian: ca.Function | None = None
+        self._jacobian: dict[int, ca.Function] = {}
 
     def values(self, varying: Array, given: Array) -> Array:
         rows = [np.array(self.function(*row)).ravel() for row in zip(varying, given, strict=True)]
         return np.array(rows).reshape(len(varying), self.function.size1_out(0))
 
-    def jacobians(self, varying: Array, given: Array, n: int) -> Array:
-        if self._jacobian is None:
-            symbols = [ca.MX.sym("varying", varying.shape[1]), ca.MX.sym("given", given.shape[1])]
-            slope = ca.jacobian(self.function(*symbols), symbols[0])
-            self._jacobian = ca.Function("slopes", symbols, [slope])
-        rows = [np.array(ca.DM(self._jacobian(*row))) for row in zip(varying, given, strict=True)]
-        return np.array(rows).reshape(-1, n, varying.shape[1])
+    def jacobians(self, varying: Array, given: Array, columns: int) -> Array:
+        if columns not in self._jacobian:
+            first, rest = ca.MX.sym("first", columns), ca.MX.sym("rest", varying.shape[1] - columns)
+            row = ca.MX.sym("given", given.shape[1])
+            slope = ca.jacobian(self.function(ca.vertcat(first, rest), row), first)
+            self._jacobian[columns] = ca.Function("slopes", [first, rest, row], [slope])
+        cut = (np.split(row, [columns]) for row in varying)
+        rows = [np.array(ca.DM(self._jacobian[columns](*row, more))) for row, more in zip(cut, given, strict=True)]
+        return np.array(rows).reshape(len(varying), -1, columns)

@@ -27,7 +27,8 @@ Expr = Any
 class StepArguments:
     """The arguments of one step, and which of them it is differentiated by.
 
-    What varies is (d, u, p as far as z sets it), what is given (x, the state after, time, p).
+    What varies is (d, u, p as far as z sets it, e), what is given (x, the state after, time, p). e (nx,) is what the
+    state may have beside its tangent, as initial states do.
 
     Attributes:
         rollout, tangent: of the step.
@@ -57,8 +58,8 @@ class StepArguments:
     @property
     def varying(self) -> list[int]:
         """Sizes of what varies."""
-        _, n, m, _ = self.sizes
-        return [n, m, len(self.varied)]
+        nx, n, m, _ = self.sizes
+        return [n, m, len(self.varied), nx]
 
     @property
     def given(self) -> list[int]:
@@ -93,9 +94,9 @@ class StepPlaces:
 def step_program(arguments: StepArguments, exact: bool, tangent: bool) -> Program:
     """The program of one step, whose output is ``after``; with ``tangent`` also ``off``.
 
-    Its vector is what varies and its parameters what is given, and the smoothing. d is 0 there, and the step begins at x
-    to the last bit: only the slopes by d are those of retract. ``off`` (n,) has the slopes of how far the state after
-    the step is from the one that is given. Without ``tangent`` d is left out of the step.
+    Its vector is what varies and its parameters what is given, and the smoothing. d and e are 0 there, and the step
+    begins at x to the last bit: only the slopes by d are those of retract. ``off`` (n,) has the slopes of how far the
+    state after the step is from the one that is given. Without ``tangent`` d and e are left out of the step.
     """
     places = StepPlaces(arguments)
     body = [*control_calls(arguments.rollout, places), *step_calls(places, exact)]
@@ -119,9 +120,9 @@ def step_program(arguments: StepArguments, exact: bool, tangent: bool) -> Progra
 def _begun(arguments: StepArguments, tangent: bool) -> ca.Function:
     """(varying, given) -> state, inputs, parameters, time and smoothing of the step."""
     varying, given = ca.SX.sym("varying", sum(arguments.varying)), ca.SX.sym("given", sum(arguments.given) + 1)
-    d, u, varied = parts(varying, arguments.varying)
+    d, u, varied, e = parts(varying, arguments.varying)
     x, _, time, p, smoothing = parts(given, [*arguments.given, 1])
-    start = x + ca.mtimes(arguments.tangent.basis(x, p), d) if tangent else x
+    start = x + ca.mtimes(arguments.tangent.basis(x, p), d) + e if tangent else x
     results = (start, u, arguments.replaced(p, varied), time, smoothing)
     return ca.Function("begun", [varying, given], [ca.densify(each) for each in results])
 
@@ -136,11 +137,11 @@ def _off(arguments: StepArguments) -> ca.Function:
 def step_functions(arguments: StepArguments) -> tuple[ca.Function, ca.Function]:
     """(varying, given with smoothing) -> after, and off: on casadi's virtual machine."""
     varying, given = ca.MX.sym("varying", sum(arguments.varying)), ca.MX.sym("given", sum(arguments.given) + 1)
-    d, u, varied = parts(varying, arguments.varying)
+    d, u, varied, e = parts(varying, arguments.varying)
     x, aim, time, p, smoothing = parts(given, [*arguments.given, 1])
     closed, tangent = arguments.rollout.closed, arguments.tangent
     put = u if arguments.rollout.feedback is None else ca.vertcat(u, time)
-    starts = x, x + ca.mtimes(tangent.basis(x, p), d)
+    starts = x, x + ca.mtimes(tangent.basis(x, p), d) + e
     first, moved = (call(closed, start, put, arguments.replaced(p, varied), smoothing)[0] for start in starts)
     off = ca.mtimes(tangent.projection(aim, p), moved - aim)
     return ca.Function("step", [varying, given], [first]), ca.Function("off", [varying, given], [off])

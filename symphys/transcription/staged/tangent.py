@@ -1,7 +1,7 @@
 """The tangent of a state: the numbers by which states can differ, places and velocities first, forces last.
 
-Of each kinematic tree its coordinates and then their rates (``tree_chart``); of each other body its position, a rotation
-vector (world frame), velocity and angular velocity; then what carries on as it is: forces of pairs, joints and
+Of each kinematic tree its coordinates and then their rates (``tree_chart``); of each other body its position, a
+rotation vector (world frame), velocity and angular velocity; then what carries on as it is: forces of pairs, joints and
 couplings, the torque (3) with which contacts act on each body that has pairs, ``lag`` if impacts cut steps, and what
 sensors remember. All reactions of bodies follow from these. A step leaves its trees' joints closed to rounding, so that
 nothing of its state is lost; what an initial state is off them is kept.
@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from symphys.dynamics.context import make_context
 from symphys.dynamics.joints.warm_start import add_joint_forces
-from symphys.dynamics.prediction import bodies_of
+from symphys.dynamics.prediction import bodies_of, jointed_bodies
 from symphys.dynamics.step import splits_of
 from symphys.maths import rotation
 from symphys.model.joints import kinematic_trees
@@ -96,7 +96,7 @@ class Tangent:
         return ca.Function("projection", [x, p], [ca.cse(slope)])
 
     def retract(self, X: ArrayLike, D: ArrayLike, p: ArrayLike | None = None) -> Array:
-        """(B, nx), (B, n) -> (B, nx): the states that are so far from others; ``p``: of all, None: as the guess has it."""
+        """(B, nx), (B, n) -> (B, nx): the states that are so far from others; ``p`` None: as the guess has it."""
         return self._batch(self.retraction, (X, D), p)
 
     def difference(self, X: ArrayLike, Y: ArrayLike, p: ArrayLike | None = None) -> Array:
@@ -145,16 +145,19 @@ class Tangent:
         return tuple((name, part.stop - part.start) for name, part in parts)
 
     @cached_property
-    def _touching(self) -> tuple[str, ...]:
-        """Names of the bodies on which contacts act."""
+    def _acted(self) -> tuple[str, ...]:
+        """Reactions that other parts of the state do not tell: torques of contacts; without warm start all."""
         world = self.rollout.world
-        indices = {i for pair in world.pairs for i in bodies_of(pair)}
-        return tuple(body.name for i, body in enumerate(world.bodies) if i in indices)
+        touching = {i for pair in world.pairs for i in bodies_of(pair)}
+        if self.rollout.problem.simulation.scheme().warm_start:
+            return tuple(f"{world.bodies[i].name}.reaction_torque" for i in sorted(touching))
+        acted = sorted(touching | jointed_bodies(world))
+        return tuple(f"{world.bodies[i].name}.{field}" for i in acted for field, _ in REACTIONS)
 
     @cached_property
     def _carried(self) -> tuple[tuple[str, int], ...]:
         """All numbers after coordinates and rates, by name."""
-        torques = tuple((f"{name}.reaction_torque", 3) for name in self._touching)
+        torques = tuple((name, 3) for name in self._acted)
         memory = self._layout_size - self._layout.size
         return (*self._raw, *torques, *((("memory", memory),) if memory else ()))
 
@@ -177,12 +180,12 @@ class Tangent:
                 self._put(new, i, VELOCITIES, after[i])
         for name, size in self._raw:
             new[name] = old[name] + cursor.take(size)
-        torques = {name: cursor.take(3) for name in self._touching}
+        more = {name: cursor.take(3) for name in self._acted}
         for body, before, after in zip(self.rollout.world.bodies, self._given(old), self._given(new), strict=True):
             for (field, _), a, b in zip(REACTIONS, before, after, strict=True):
                 new[f"{body.name}.{field}"] = old[f"{body.name}.{field}"] + (b - a)
-        for name, torque in torques.items():
-            new[f"{name}.reaction_torque"] += torque
+        for name, each in more.items():
+            new[name] += each
         return ca.vertcat(self._layout.pack(new), x[self._layout.size :] + d[cursor.at :])
 
     def _difference(self, x: Expr, y: Expr) -> Expr:
@@ -200,12 +203,10 @@ class Tangent:
                 rates = [chart.rates(*each) for each in zip(places, moving, strict=True)]
                 found += [chart.apart(*places), rates[1] - rates[0]]
         found += [new[name] - old[name] for name, _ in self._raw]
-        given = dict(
-            zip((b.name for b in self.rollout.world.bodies), zip(self._given(old), self._given(new)), strict=True)
-        )
-        for name in self._touching:
-            field = f"{name}.reaction_torque"
-            found.append(new[field] - old[field] - (given[name][1][1] - given[name][0][1]))
+        for body, before, after in zip(self.rollout.world.bodies, self._given(old), self._given(new), strict=True):
+            for k, (field, _) in enumerate(REACTIONS):
+                if (name := f"{body.name}.{field}") in self._acted:
+                    found.append(new[name] - old[name] - (after[k] - before[k]))
         return ca.vertcat(ca.SX(0, 1), *found, y[self._layout.size :] - x[self._layout.size :])
 
     def _given(self, state: Parts) -> list[tuple[Expr, Expr]]:

@@ -1,0 +1,91 @@
+"""A rollout's motion and the slopes of all its steps, from a decision vector."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from symphys.codegen.backends import BEST
+from symphys.shooting import Linearized, StagedMotion
+from symphys.transcription.formula_names import spans
+from symphys.transcription.rollout import Rollout
+from symphys.transcription.staged.linearized_step import LinearizedStep
+from symphys.transcription.staged.tangent import Tangent
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+ROUNDING = 1e-13
+"""Of the slopes of the first state: what is smaller is on its tangent."""
+
+
+class Linearization:
+    """Motions of decision vectors, state by state, and slopes about them.
+
+    Attributes:
+        rollout: of a problem.
+        tangent: of its states.
+        step: its step.
+        statics: (s,) the entries of z that are no knots of a control.
+    """
+
+    def __init__(self, rollout: Rollout, backend: str = BEST, threads: int | None = None, exact: bool = False) -> None:
+        """``exact``: for smoothing 0 only."""
+        self.rollout, self.tangent = rollout, Tangent(rollout)
+        self.statics = statics_of(rollout)
+        self.step = LinearizedStep(rollout, self.tangent, backend, threads, exact)
+
+    def motion(self, z: ArrayLike, smoothing: float) -> StagedMotion:
+        """The motion of z (len(z),)."""
+        given = np.asarray(z, float)
+        x0, u, p = self._begun(given)
+        states = [x0]
+        for k in range(self.rollout.steps):
+            states.append(self.step.step(k, states[-1][None], u[None, k], p, smoothing)[0])
+        return StagedMotion(given, np.array(states), u, smoothing)
+
+    def linearize(self, motion: StagedMotion) -> Linearized:
+        """Slopes of all steps about a motion.
+
+        What the static entries do to the first state beside its tangent, such as the velocity of one body of a robot,
+        is part of the first of ``c``: with it sums over the steps are exact.
+        """
+        _, u, p = self._begun(motion.z)
+        a, b, by_p = self.step.slopes(motion.x[:-1], u, p, motion.smoothing, motion.x[1:])
+        first, parameters = (np.array(ca.DM(part)) for part in self._start_slopes(motion.z))
+        x0 = motion.x[0]
+        start = self._sparse(self.tangent.projection, x0, p) @ first
+        c = by_p[:, :, self.step.arguments.varied] @ parameters[self.step.arguments.varied]
+        left = first - self._sparse(self.tangent.basis, x0, p) @ start
+        if len(c) and np.abs(left).max(initial=0.0) > ROUNDING * np.abs(first).max(initial=0.0):
+            c[0] += self.step.beside(x0, u[0], p, motion.smoothing) @ left
+        return Linearized(a, b, c, start)
+
+    def _begun(self, z: Array) -> tuple[Array, Array, Array]:
+        """First state (nx,), inputs (N, m) and p (np,)."""
+        x0, u, p = (np.array(part) for part in self._start.call([z]))
+        return x0.ravel(), np.ascontiguousarray(u.T), p.ravel()
+
+    @cached_property
+    def _start(self) -> ca.Function:
+        rollout = self.rollout
+        return ca.Function("start", [rollout.z], [ca.densify(part) for part in (rollout.x0, rollout.given, rollout.p)])
+
+    @cached_property
+    def _start_slopes(self) -> ca.Function:
+        """(z) -> first state and p by the static entries."""
+        rollout = self.rollout
+        slopes = [ca.jacobian(part, rollout.z)[:, self.statics.tolist()] for part in (rollout.x0, rollout.p)]
+        return ca.Function("slopes", [rollout.z], slopes)
+
+    def _sparse(self, function: ca.Function, x: Array, p: Array) -> Array:
+        return np.array(ca.DM(function(x, p)))
+
+
+def statics_of(rollout: Rollout) -> Indices:
+    """The entries of z that are no knots of a control."""
+    variables = rollout.problem.variables
+    found = [range(*span) for v, span in zip(variables, spans(variables), strict=True) if v.kind != "control"]
+    return np.array([i for each in found for i in each], np.int64)
