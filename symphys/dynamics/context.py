@@ -69,7 +69,7 @@ class StepContext:
         return None if columns is None else self.u[columns]
 
     @property
-    def shortest_kick(self) -> float:
+    def shortest_kick(self) -> Expr:
         """[s]: impulses of a shorter substep are stored as forces over this time; what an impact adds is no force."""
         return SHORTEST_KICK * self.settings.scheme.dt
 

@@ -106,7 +106,7 @@ def _pulls(before: Expr, paradox: Expr, press: Expr) -> Expr:
 
 
 @traced
-def _added(force: Expr, constraint: ContactConstraint, impulse: ContactImpulse, dt: float) -> Expr:
+def _added(force: Expr, constraint: ContactConstraint, impulse: ContactImpulse, dt: Expr) -> Expr:
     return force + impulse.linear(constraint.impulse_normal) / dt
 
 

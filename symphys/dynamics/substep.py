@@ -229,7 +229,7 @@ def _store_forces(
 
 @traced
 def _persistent(
-    constraint: ContactConstraint, impulse: ContactImpulse, kick: Expr, shortest: float
+    constraint: ContactConstraint, impulse: ContactImpulse, kick: Expr, shortest: Expr
 ) -> tuple[Expr, Expr]:
     share = (1 - constraint.leaving) * (1 - constraint.struck) / ca.fmax(kick, shortest)
     return share * impulse.linear(constraint.impulse_normal), share * impulse.angular(constraint.impulse_normal)

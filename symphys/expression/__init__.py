@@ -15,7 +15,7 @@ There are no comparisons, keywords, strings, attributes of values or anything el
 from symphys.expression.errors import FormulaError
 from symphys.expression.formula import Formula, MotionPart
 from symphys.expression.functions import FUNCTIONS
-from symphys.expression.names import CONSTANTS
+from symphys.expression.names import CONSTANTS, OVER_TIME
 from symphys.expression.parse import parse
 
-__all__ = ["CONSTANTS", "FUNCTIONS", "Formula", "FormulaError", "MotionPart", "parse"]
+__all__ = ["CONSTANTS", "FUNCTIONS", "OVER_TIME", "Formula", "FormulaError", "MotionPart", "parse"]

@@ -137,7 +137,7 @@ class Scheme:
     """How a step is taken; the switches exist so that a study can show what each trick buys.
 
     Attributes:
-        dt: time step [s].
+        dt: time step [s]; an SX expression of parameters where the duration is one of them.
         sweeps: projected Gauss-Seidel sweeps over the velocity constraints.
         position_sweeps: sweeps of the position pass, which removes penetration without adding velocity.
         push_out: share of a penetration that one step removes.
@@ -154,7 +154,7 @@ class Scheme:
         impact_friction: let friction at an impact aim at the velocity at the instant of impact.
     """
 
-    dt: float = 0.01
+    dt: Scalar = 0.01
     sweeps: int = 10
     position_sweeps: int = 2
     push_out: float = 1.0

@@ -4,6 +4,7 @@ from symphys.problem.feedback import Controller, ForceLaw, Sensor
 from symphys.problem.load import require_solvable
 from symphys.problem.model import (
     ALIVE,
+    DURATION,
     Constraint,
     Cost,
     Discretisation,
@@ -27,6 +28,7 @@ from symphys.problem.schema.reference import reference_page
 
 __all__ = [
     "ALIVE",
+    "DURATION",
     "Constraint",
     "Controller",
     "Cost",

@@ -25,7 +25,7 @@ from symphys.problem.parametric.forward_kinematics import forward_kinematics
 from symphys.problem.parametric.parts import Part
 from symphys.problem.parametric.reposition import check_anchors
 from symphys.problem.parametric.world import ParametricWorld
-from symphys.problem.quantities import Quantity, quantities, weight_quantities
+from symphys.problem.quantities import Quantity, duration_quantity, quantities, weight_quantities
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.reading.messages import report
 from symphys.problem.schema import Document
@@ -113,13 +113,15 @@ def build(
     check_laws(parametric, nominal, faults)
     check_couplings(nominal, faults)
     known = quantities(initial, parametric.parameters(), input_sizes(nominal))
+    known |= duration_quantity(simulation.duration)
     sensors, controllers = read_control(document, parametric, known, functions, starts, faults)
     known |= weight_quantities(controllers) | force_quantities(document.force)
     variables = read_variables(document.variable, known, simulation, faults)
     check_rollout(nominal, simulation, variables, faults)
     check_varied(parametric, nominal, variables, faults)
     check_anchors(parametric, variables, faults)
-    scenarios = read_scenarios(document.scenario, known, parametric, simulation, variables, faults)
+    sampled = {name: quantity for name, quantity in known.items() if quantity.kind != "duration"}
+    scenarios = read_scenarios(document.scenario, sampled, parametric, simulation, variables, faults)
     faults.stop_if_any()
     values = at_guess(parametric, known, variables)
     start = starts.of(parametric, values)
@@ -186,7 +188,8 @@ def read_termination_and_objectives(
     termination = read_termination(document, sensed, input_sizes(nominal), faults)
     names = {**named} | ({} if document.ending[1] is None else {ALIVE: ca.DM(1)})
     units = formula_units(nominal, names, variables)
-    objectives = read_objectives(document, simulation, names, units, faults)
+    free = any(variable.kind == "duration" for variable in variables)
+    objectives = read_objectives(document, simulation, names, units, faults, free)
     objectives = replace(objectives, costs=with_termination_cost(document, objectives.costs, faults))
     faults.stop_if_any()
     return termination, objectives

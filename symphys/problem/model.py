@@ -22,9 +22,11 @@ from symphys.problem.sweeps.sweep import Sweep
 Array = NDArray[np.float64]
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 
-Kind = Literal["initial", "parameter", "control", "weight"]
+Kind = Literal["initial", "parameter", "control", "weight", "duration"]
 ALIVE = "alive"
 """In formulas: 1 until the motion is over, 0 from then on."""
+DURATION = "simulation.duration"
+"""What a variable sets that chooses how long a motion takes: its steps become longer or shorter, not more or fewer."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,10 +34,12 @@ class Simulation(Scheme):
     """How time passes: the switches of the time step, and for how long.
 
     Attributes:
+        dt: time step [s].
         duration: [s], a whole number of steps.
         smoothing: [m/s] stages of the smoothing that solvers use, decreasing, at least one; 0 is the exact contact law.
     """
 
+    dt: float = 0.01
     duration: float
     smoothing: tuple[float, ...]
 
@@ -68,8 +72,8 @@ class Variable:
 
     Attributes:
         name: as in the file.
-        kind: what is set: the state at the start, a physical parameter, a force or torque over time, or the numbers of
-            a controller.
+        kind: what is set: the state at the start, a physical parameter, a force or torque over time, the numbers of a
+            controller or force law, or the duration.
         slots: all with the same number of components.
         knots: values over the duration; 1 unless a control. ``constant``: knot k holds over the k-th of ``knots``
             equal parts of the duration. ``linear``: knots at equal distances from start to end.
@@ -313,6 +317,11 @@ class ProblemData:
     scenarios: Scenarios | None = None
     outputs: tuple[Output, ...] = ()
     sweep: Sweep | None = None
+
+    @property
+    def free_duration(self) -> bool:
+        """Whether a variable sets the duration."""
+        return any(variable.kind == "duration" for variable in self.variables)
 
     @property
     def weights(self) -> dict[str, Array]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.problem.feedback import Controller
-from symphys.problem.model import Kind, VariableSlot
+from symphys.problem.model import DURATION, Kind, VariableSlot
 from symphys.problem.parametric.parts import VARIABLE
 from symphys.suggest import hint, quote
 
@@ -23,12 +23,13 @@ LIMITS: dict[str, tuple[float, float]] = {
     "radius": (0.0, inf),
     "size": (0.0, inf),
     "length": (0.0, inf),
+    "duration": (0.0, inf),
     **VARIABLE,
 }
 """What is physical; masses and sizes must exceed their limit."""
 ACTING = ("gain", "torque", "velocity", "range", "stiffness", "damping")
 """Parameters of motors and springs, which must not be negative."""
-OPEN = ("mass", "radius", "size", "length")
+OPEN = ("mass", "radius", "size", "length", "duration")
 LEAST_SHARE = 1e-3
 """Masses and sizes are not varied below this share of their value in the file, unless ``lower`` says so."""
 
@@ -56,6 +57,11 @@ def quantities(
     found = {name: Quantity("initial", value) for name, value in initial.items()}
     found |= {name: Quantity("control", np.zeros(size)) for name, size in inputs.items()}
     return found | {name: Quantity("parameter", value, own_scale=True) for name, value in parameters.items()}
+
+
+def duration_quantity(duration: float) -> dict[str, Quantity]:
+    """How long the motion takes [s]."""
+    return {DURATION: Quantity("duration", np.array([duration]), own_scale=True)}
 
 
 def weight_quantities(controllers: Iterable[Controller]) -> dict[str, Quantity]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -22,8 +22,8 @@ from symphys.dynamics.observation import (
 )
 from symphys.expression import Formula
 from symphys.model.state_layout import GIVEN, Layout, input_columns, input_sizes, inputs_size
-from symphys.model.world import World
-from symphys.problem import ALIVE, Problem, Variable
+from symphys.model.world import Scheme, World
+from symphys.problem import ALIVE, DURATION, Problem, Simulation, Variable
 from symphys.transcription.feedback.sensor_memory import SensorMemory
 
 Expr = Any
@@ -47,7 +47,7 @@ class Instant:
 
 @dataclass(frozen=True)
 class Parameters:
-    """What p stacks: the physical parameters that variables set, then the numbers of controllers.
+    """What p stacks: the physical parameters that variables set, the numbers of feedback, the duration if it is set.
 
     Attributes:
         names: in the order of p.
@@ -71,6 +71,14 @@ class Parameters:
         """The physical ones, by name."""
         return dict(zip(self.names[: self.physical], self.symbols, strict=False))
 
+    def step_length(self, simulation: Simulation, p: Expr) -> Expr:
+        """[s]: a number, or an entry of ``p`` (np,) over the number of steps where a variable sets the duration."""
+        return p[self.columns[DURATION]] / simulation.steps if DURATION in self.columns else simulation.dt
+
+    def scheme(self, simulation: Simulation) -> Scheme:
+        """How a step is taken; its ``dt`` is an expression of the symbols where a variable sets the duration."""
+        return replace(simulation.scheme(), dt=self.step_length(simulation, ca.vertcat(ca.SX(0, 1), *self.symbols)))
+
 
 def varied_parameters(problem: Problem) -> Parameters:
     """The parameters that some variable sets, in the order of first mention, and all numbers of feedback.
@@ -81,6 +89,7 @@ def varied_parameters(problem: Problem) -> Parameters:
     own = dict.fromkeys(slot.name for v in problem.variables if v.kind == "parameter" for slot in v.slots)
     names = (*own, *(name for name in swept_parameters(problem) if name not in own))
     values = {name: problem.parameters[name] for name in names} | problem.weights
+    values |= {DURATION: np.array([problem.simulation.duration])} if problem.free_duration else {}
     nominal = tuple(ca.DM(value) for value in values.values())
     symbols = tuple(ca.SX.sym(name, value.shape[0]) for name, value in zip(values, nominal, strict=True))
     return Parameters(tuple(values), symbols, nominal, len(names))
@@ -145,7 +154,8 @@ def namespace(
 ) -> dict[str, Expr]:
     """What names mean at an instant, variables aside; of what takes work to express only what is wanted."""
     layout = Layout(world)
-    names: dict[str, Expr] = {"time": at.time}
+    dt = parameters.step_length(problem.simulation, at.p)
+    names: dict[str, Expr] = {"time": at.time, "duration": ca.SX(dt * problem.simulation.steps)}
     if memory.terminates:
         names[ALIVE] = at.x[memory.columns[ALIVE]]
     for body in world.bodies:
@@ -160,7 +170,7 @@ def namespace(
         names.update(body_quantities(world, at.x))
     if not wanted.isdisjoint(site_quantity_names(world)):
         names.update(site_quantities(world, at.x))
-    names.update(accelerometers(world, at.x, memory.velocities(at.x), problem.simulation.dt))
+    names.update(accelerometers(world, at.x, memory.velocities(at.x), dt))
     return names
 
 

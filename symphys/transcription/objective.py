@@ -28,8 +28,8 @@ class Sampled(Protocol):
         """N."""
 
     @property
-    def dt(self) -> float:
-        """[s]."""
+    def interval(self) -> Expr:
+        """[s] the time step: a number, or an expression of z where a variable sets the duration."""
 
     def at(self, formula: Formula, when: str | float) -> Expr:
         """(m,) at the end or at a time."""
@@ -133,11 +133,11 @@ class _Cost(NamedTuple):
 def _cost(rollout: Sampled, cost: Cost) -> _Cost:
     if cost.at == "always":
         samples = rollout.over_steps(cost.formula)
-        weight = cost.weight * rollout.dt * rollout.steps / samples.shape[1]
+        weight = cost.weight * rollout.interval * rollout.steps / samples.shape[1]
     else:
         samples, weight = rollout.at(cost.formula, cost.at), cost.weight
     if cost.squares:
-        residual = np.sqrt(weight) * ca.vec(samples)
+        residual = ca.sqrt(weight) * ca.vec(samples)
         return _Cost(ca.sumsqr(residual), residual, _mean(samples))
     return _Cost(weight * ca.sum2(samples), None, _mean(samples))
 
@@ -159,7 +159,7 @@ class _Limit:
         self.lower = np.tile(np.broadcast_to(constraint.lower, (size,)), count)
         self.upper = np.tile(np.broadcast_to(constraint.upper, (size,)), count)
         violation = self._violation()
-        self.penalty = np.sqrt(constraint.penalty * (rollout.dt if always else 1.0)) * violation
+        self.penalty = ca.sqrt(constraint.penalty * (rollout.interval if always else 1.0)) * violation
         total: Expr = ca.sum1(violation)
         self.error = ca.if_else(total >= 0, ca.mmax(violation), total) / constraint.tolerance  # mmax hides a NaN
 

@@ -35,7 +35,7 @@ class ProgramSamples:
 
     def __init__(self, rollout: Rollout) -> None:
         """Places for z, smoothing, times, parameters, inputs and states."""
-        self.rollout, self.problem, self.steps, self.dt = rollout, rollout.problem, rollout.steps, rollout.dt
+        self.rollout, self.problem, self.steps = rollout, rollout.problem, rollout.steps
         self.layout = MemoryLayout()
         nx, nu, np_ = (int(part.shape[0]) for part in (rollout.x0, rollout.given, rollout.p))
         self.z, self.smoothing = self.layout.take(int(rollout.z.shape[0])), self.layout.take(1)
@@ -46,6 +46,13 @@ class ProgramSamples:
         self.calls: list[FunctionCall] = []
         self.symbols: dict[Place, Expr] = {}
 
+    @property
+    def interval(self) -> Expr:
+        """[s]: see ``Rollout.interval``."""
+        if not self.problem.free_duration:
+            return self.rollout.dt
+        return self.rollout.parameters.step_length(self.problem.simulation, self.symbol(self.p))
+
     def symbol(self, place: Place) -> Expr:
         """The symbol that stands for a still place."""
         if place not in self.symbols:
@@ -54,11 +61,11 @@ class ProgramSamples:
 
     def at(self, formula: Formula, when: str | float) -> Expr:
         """(m,): see ``Rollout.at``."""
-        k = self.steps if isinstance(when, str) else round(when / self.dt)
+        k = self.steps if isinstance(when, str) else self.rollout.tick(when)
         x, u = self.x.later(k).still(), self.u.later(min(k, self.steps - 1)).still()
         p, z = self.symbol(self.p), self.symbol(self.z)
         parts = part_arguments(self, formula)
-        return self.rollout.compiled(formula)(self.symbol(x), self.symbol(u), p, k * self.dt, z, *parts)
+        return self.rollout.compiled(formula)(self.symbol(x), self.symbol(u), p, k * self.interval, z, *parts)
 
     def after_steps(self, formula: Formula) -> Expr:
         """(m, N): see ``Rollout.after_steps``."""
@@ -108,6 +115,7 @@ def rollout_program(rollout: Rollout, exact: bool = False, recorded: Mapping[str
         outputs["alive"] = alive.later(rollout.steps).still()
     outputs |= series
     times = tuple(np.arange(rollout.steps + 1) * rollout.dt)
+    fixed = () if rollout.problem.free_duration else ((Place(samples.time.offset, len(times)), times),)
     return Program(
         size=samples.layout.size,
         z=samples.z,
@@ -117,7 +125,7 @@ def rollout_program(rollout: Rollout, exact: bool = False, recorded: Mapping[str
         prologue=(_prologue(samples),),
         body=(*body, *samples.calls),
         epilogue=(epilogue,),
-        constants=((Place(samples.time.offset, len(times)), times),),
+        constants=fixed,
         discounted=AdjointDiscount(samples.x, alive),
     )
 
@@ -126,7 +134,7 @@ def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:
     """The calls of one time step, from ``x`` and ``u`` to the ``x`` after."""
     rollout = samples.rollout
     columns = Columns(rollout.world)
-    recording = rollout.built(trace_step, rollout.problem.simulation.scheme(), exact)
+    recording = rollout.built(trace_step, exact)
     arguments = {"u": samples.u, "p": samples.p, "smoothing": samples.smoothing}
     after = samples.x.later() if rollout.termination is None else samples.layout.take(rollout.memory.size - 1)
     places: dict[TracedVector, Place] = {slot: _part(after, part) for slot, part in recording.results.items()}
@@ -172,9 +180,13 @@ def _prologue(samples: ProgramSamples) -> FunctionCall:
     rollout = samples.rollout
     start = start_of(samples.problem, rollout.world, rollout.inputs, rollout.parameters, rollout.z)
     results = [ca.densify(ca.vec(part)) for part in (rollout.memory.start(start.x0), start.u, start.p)]
-    function = ca.Function("start", [rollout.z], results).expand()
     u = Place(samples.given.offset, samples.given.size * samples.steps)
-    return FunctionCall(function, (samples.z,), (samples.x.still(), u, samples.p))
+    places = [samples.x.still(), u, samples.p]
+    if rollout.problem.free_duration:
+        results.append(ca.DM(np.arange(samples.steps + 1)) * rollout.interval)
+        places.append(Place(samples.time.offset, samples.steps + 1))
+    function = ca.Function("start", [rollout.z], results).expand()
+    return FunctionCall(function, (samples.z,), tuple(places))
 
 
 def _epilogue(samples: ProgramSamples, asked: Terms) -> tuple[FunctionCall, dict[str, Place]]:

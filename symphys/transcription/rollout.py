@@ -14,7 +14,7 @@ from symphys.dynamics.functions import step_function
 from symphys.dynamics.horizon import roll_out
 from symphys.dynamics.kept import kept
 from symphys.expression import Formula
-from symphys.model.world import Scheme, World
+from symphys.model.world import World
 from symphys.problem import Problem
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.feedback.controllers import Control
@@ -65,13 +65,14 @@ class Rollout:
     @cached_property
     def step(self) -> ca.Function:
         """One step (x, u, p, smoothing) -> x_next; built when first asked for, since one expression takes its time."""
-        scheme = self.problem.simulation.scheme()
-        return self.remembering(self.built(step_function, scheme))
+        return self.remembering(self.built(step_function))
 
-    def built(self, make: Callable[..., T], scheme: Scheme, *more: Hashable) -> T:
+    def built(self, make: Callable[..., T], *more: Hashable) -> T:
         """What a function makes of the world; problems of a sweep share it, as far as their worlds are equal."""
+        scheme = self.parameters.scheme(self.problem.simulation)
         arguments = (self.world, scheme, self.inputs, self.parameters.symbols)
-        return kept(make, *arguments, *more) if self.problem.varied else make(*arguments, *more)
+        shared = self.problem.varied and not self.problem.free_duration
+        return kept(make, *arguments, *more) if shared else make(*arguments, *more)
 
     def remembering(self, step: ca.Function) -> ca.Function:
         """A function (x, u, p, smoothing) -> (x_next, ...) of the world's state, for states with memory."""
@@ -125,7 +126,7 @@ class Rollout:
         """States (nx, N + 1), inputs (nu, N) and what else a step gives, N columns each; ``step`` is not closed."""
         given = self.given
         if self.feedback is not None:
-            given = ca.vertcat(given, ca.DM(np.arange(self.steps) * self.dt).T)
+            given = ca.vertcat(given, ca.DM(np.arange(self.steps)).T * self.interval)
         x, *others = roll_out(self.close(step), self.steps, self.x0, given, self.p, self.smoothing)
         return (x, self.given, others) if self.feedback is None else (x, others[-1], others[:-1])
 
@@ -151,8 +152,13 @@ class Rollout:
 
     @property
     def dt(self) -> float:
-        """[s]."""
+        """[s] as the file has it."""
         return self.problem.simulation.dt
+
+    @property
+    def interval(self) -> Expr:
+        """[s] the time step: ``dt``, or an expression of z where a variable sets the duration."""
+        return self.parameters.step_length(self.problem.simulation, self.p)
 
     def compiled(self, formula: Formula) -> ca.Function:
         """The formula as a casadi function of (x, u, p, time, z), and of its parts; see ``part_arguments``."""
@@ -167,7 +173,7 @@ class Rollout:
         k = self.tick(when)
         u = self.u[:, min(k, self.steps - 1)]
         parts = part_arguments(self, formula)
-        return self.compiled(formula)(self.x[:, k], u, self.p, k * self.dt, self.z, *parts)
+        return self.compiled(formula)(self.x[:, k], u, self.p, k * self.interval, self.z, *parts)
 
     def after_steps(self, formula: Formula) -> Expr:
         """(m, N): its value at the end of every step, with that step's inputs."""
@@ -184,7 +190,7 @@ class Rollout:
         stage = self.compiled(formula).map(self.steps)
         p, z = ca.repmat(self.p, 1, self.steps), self.z
         shared = ca.repmat(z, 1, self.steps) if self._uses_z(formula) else ca.DM(z.shape[0], self.steps)
-        return stage(x, self.u, p, ca.DM(ticks * self.dt).T, shared)
+        return stage(x, self.u, p, ca.DM(ticks).T * self.interval, shared)
 
     def moves(self, formula: Formula) -> bool:
         """Whether the formula depends on what changes within a step."""

@@ -33,7 +33,7 @@ class Record:
 
 def recorder(rollout: Rollout) -> ca.Function:
     """(z, smoothing) -> (x, u, given, p, forces, gaps, residual, crowded, ambiguous, paradox) of the whole horizon."""
-    step = rollout.built(report_function, rollout.problem.simulation.scheme())
+    step = rollout.built(report_function)
     x, u, happened = rollout.rolled(rollout.remembering(step))
     return ca.Function("record", [rollout.z, rollout.smoothing], [x, u, rollout.given, rollout.p, *happened])
 
@@ -42,9 +42,10 @@ def simulate(rollout: Rollout, record: Callable[..., Any], z: Array, smoothing: 
     """The rollout of z; NotFinite, which says where and why, if it has none."""
     x, u, given, p, *happened = (np.array(part).T for part in record(z, smoothing))
     z = np.asarray(z, float)
-    time = np.arange(rollout.steps + 1, dtype=np.float64) * rollout.dt
+    dt = rollout.parameters.step_length(rollout.problem.simulation, p.ravel())
+    time = np.arange(rollout.steps + 1, dtype=np.float64) * dt
     arrays = RolloutArrays(z, smoothing, x, u, given, p.ravel(), time)
-    motion = _trajectory(rollout, x, u, p.ravel(), *happened)
+    motion = _trajectory(rollout, time, x, u, p.ravel(), *happened)
     try:
         return Record(z, arrays, motion.require_finite())
     except NotFinite as error:
@@ -52,7 +53,15 @@ def simulate(rollout: Rollout, record: Callable[..., Any], z: Array, smoothing: 
 
 
 def _trajectory(
-    rollout: Rollout, x: Array, u: Array, p: Array, forces: Array, gaps: Array, residual: Array, *counted: Array
+    rollout: Rollout,
+    time: Array,
+    x: Array,
+    u: Array,
+    p: Array,
+    forces: Array,
+    gaps: Array,
+    residual: Array,
+    *counted: Array,
 ) -> Trajectory:
     world, steps = rollout.world, rollout.steps
     layout = Layout(world)
@@ -60,7 +69,7 @@ def _trajectory(
         field: _stack([x[:, layout[f"{body.name}.{field}"]] for body in world.bodies]) for field in GIVEN
     }
     return Trajectory(
-        time=np.arange(steps + 1, dtype=np.float64) * rollout.dt,
+        time=time,
         body_names=tuple(body.name for body in world.bodies),
         **bodies,
         force=_applied(rollout, u, "force"),

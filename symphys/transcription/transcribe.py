@@ -11,7 +11,12 @@ from symphys.problem import Problem
 from symphys.shooting import ShootingProblem
 from symphys.transcription.decision_variables import blocks
 from symphys.transcription.functions import ExpressionFunctions
-from symphys.transcription.network_rollout import has_large_nets, require_small_nets, transcribe_large
+from symphys.transcription.network_rollout import (
+    has_large_nets,
+    require_fixed_duration,
+    require_small_nets,
+    transcribe_large,
+)
 from symphys.transcription.objective import limits, terms
 from symphys.transcription.program import rollout_program
 from symphys.transcription.randomization import with_scenarios
@@ -43,6 +48,7 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
         plain = transcribe(replace(problem, scenarios=None), exact, "casadi", threads)
         return with_scenarios(plain, problem, exact, backend, threads)
     if has_large_nets(problem):
+        require_fixed_duration(problem)
         return transcribe_large(problem, exact, backend, threads)
     began = perf_counter()
     rollout = symbolic_rollout(problem)

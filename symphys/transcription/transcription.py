@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.codegen.backends import Description
-from symphys.problem import Problem
+from symphys.problem import DURATION, Problem
 from symphys.shooting import ShootingProblem
 from symphys.trajectory import Trajectory
 from symphys.transcription.functions import ExpressionFunctions, function_of
@@ -57,6 +57,15 @@ class Transcription:
     def record(self, z: Array, smoothing: float = 0.0) -> Record:
         """The motion and the states and arguments that it is made from; NotFinite if there is none."""
         return simulate(self.rollout, self._recorder, z, smoothing)
+
+    def timed(self, record: Record) -> Transcription:
+        """The same with the duration of a motion in place of that of the file; itself if no variable sets it."""
+        if not self.problem.free_duration:
+            return self
+        simulation, duration = self.problem.simulation, float(record.arrays.time[-1])
+        timed = replace(simulation, duration=duration, dt=duration / simulation.steps)
+        problem = replace(self.problem, simulation=timed)
+        return replace(self, problem=problem, rollout=replace(self.rollout, problem=problem))
 
     def prices(self, kinds: Iterable[str] = ("gradient", "jacobian")) -> dict[str, float]:
         """Measured cost of one "gradient", "jacobian" or "hessian" in rollouts, at the guess, one at a time.
@@ -113,6 +122,9 @@ class Transcription:
             adjoint, given, p = (np.array(part) for part in backward(*arguments, *results, adjoint, *inert)[:3])
             inputs[k - 1] = given[: inputs.shape[1]]
             parameters = parameters + p
+            if self.problem.free_duration and self.rollout.feedback is not None:  # the time of this step
+                duration = self.rollout.parameters.columns[DURATION]
+                parameters[duration] += given[-1:] * ((k - 1) / self.rollout.steps)
         return self._pulled_start(record.z, adjoint, inputs, parameters)
 
     def _pulled_start(self, z: Array, x0: Array, inputs: Array, p: Array) -> Array:

@@ -83,7 +83,7 @@ def slides(rollout: Rollout, record: Record) -> list[dict[str, Any]]:
 
 def slip_speeds(rollout: Rollout, record: Record) -> Array:
     """(N, C) [m/s]: how fast the surfaces of a contact move across its normal at the start of each step."""
-    scheme = rollout.problem.simulation.scheme()
+    scheme = rollout.parameters.scheme(rollout.problem.simulation)
     slip = slip_function(rollout.world, scheme, rollout.inputs, rollout.parameters.symbols).map(rollout.steps)
     arrays = record.arrays
     return np.array(slip(plain(rollout, arrays.x)[:-1].T, arrays.u.T, np.tile(arrays.p[:, None], rollout.steps))).T

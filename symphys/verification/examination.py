@@ -52,9 +52,10 @@ def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: No
     compared = gradient.compare_gradient(transcription, z)
     finer = refinement.refine(transcription, z, tell)
     tell(SWEEPING)
-    grown = sensitivity_growth(transcription, record)
+    timed = transcription.timed(record)
+    grown = sensitivity_growth(timed, record)
     tell(NEAR)
-    near = near_misses(transcription, record)
+    near = near_misses(timed, record)
     tell(CONFLICTS)
     standing = {**target_conflicts(transcription, record), "bounds": held_bounds(transcription, z)}
     tell(SMOOTHING)
@@ -68,7 +69,7 @@ def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: No
         **refinement.settling(transcription, z, motion["residual"], motion["impulse"]),
         "misses": near,
         **standing,
-        "slides": slides(transcription.rollout, record),
+        "slides": slides(timed.rollout, record),
         "fault": _fault(transcription, record, compared),
     }
 
@@ -89,5 +90,5 @@ def survey(transcription: Transcription, record: Record) -> dict[str, Any]:
 
     Each module says what its numbers are.
     """
-    rollout = transcription.rollout
+    rollout = transcription.timed(record).rollout
     return {**balance(rollout, record), **contacts(rollout, record), **tunnelling(rollout, record)}

@@ -96,8 +96,11 @@ def target_samples(rollout: Rollout, record: Record, functions: Sequence[ca.Func
 def target_slopes(transcription: Transcription, record: Record, samples: list[TargetSample]) -> Array | None:
     """(T, n): of weight * |value|^2 by z.
 
-    None where a formula depends on inputs or on a whole motion, or for problems with large nets.
+    None where a formula depends on inputs, on a whole motion or on the time of a free duration, or for problems with
+    large nets.
     """
+    if transcription.problem.free_duration and any("time" in each.target.formula.names for each in samples):
+        return None
     rows: list[Array] = []
     for first in range(0, len(samples), DIRECTIONS):
         some, states = samples[first : first + DIRECTIONS], dict[int, Array]()

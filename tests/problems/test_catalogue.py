@@ -23,6 +23,7 @@ SHIPPED = [
     "bowling",
     "cart_pole",
     "cost_of_transport",
+    "fastest_move",
     "free_kick",
     "gait_robot_build",
     "gait_robot_fast",

@@ -1,4 +1,4 @@
-"""Problems whose formulas take parts of the whole motion, against their closed forms."""
+"""Problems about whole motions, of which formulas take parts or whose duration is free, against closed forms."""
 
 from __future__ import annotations
 
@@ -23,3 +23,11 @@ def test_the_push_of_least_cost_of_transport_falls_linearly() -> None:
     assert made.judge(found.z).objective == pytest.approx(least, rel=1e-4)
     first = np.sqrt(3 * 5 / 0.02)
     assert found.z == pytest.approx(np.linspace(first, 0, 21), abs=0.01 * first)
+
+
+def test_the_fastest_move_is_bang_bang() -> None:
+    made = shipped("fastest_move")
+    found = solve("ipopt", made)
+    assert found.z[0] == pytest.approx(2 * np.sqrt(1.5 * 2 / 10), abs=1e-6)
+    assert found.z[1:] == pytest.approx(np.repeat([10.0, -10.0], 10), abs=1e-4)
+    assert made.simulate(found.z).time[-1] == pytest.approx(found.z[0])

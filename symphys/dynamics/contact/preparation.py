@@ -179,7 +179,7 @@ def width_of(settings: StepSettings, contact: Contact) -> Expr:
     return settings.smoothing * ca.exp(-((contact.rate / settings.fast) ** 2))
 
 
-def _leaves(rebound: Expr, pull: Expr, left: Expr, reference: Expr, dt: float, smoothing: Expr) -> Expr:
+def _leaves(rebound: Expr, pull: Expr, left: Expr, reference: Expr, dt: Expr, smoothing: Expr) -> Expr:
     """chi: 1 if the rebound is still off the surface when the step ends, 0 if it has fallen back by then."""
     fall = ca.fmax(-pull, reference) * left
     return clip((2 * rebound - fall) / (fall + MARGIN * dt), 0, 1, smoothing)

@@ -83,7 +83,7 @@ def strikes(settings: StepSettings, law: Law, contact: Contact) -> Expr:
 
 
 @traced
-def _earlier(earliest: tuple[Expr, Expr], closes: Expr, hit: Expr, time: Expr, dt: float) -> tuple[Expr, Expr]:
+def _earlier(earliest: tuple[Expr, Expr], closes: Expr, hit: Expr, time: Expr, dt: Expr) -> tuple[Expr, Expr]:
     """(whether there is an impact, when), with one more contact looked at; at a tie with the slope of this one."""
     meets = ca.logic_and(closes, hit)
     sooner = ca.logic_and(meets, time < earliest[1] + TOGETHER * dt)
@@ -91,7 +91,7 @@ def _earlier(earliest: tuple[Expr, Expr], closes: Expr, hit: Expr, time: Expr, d
 
 
 @traced
-def _until(earliest: Expr, first: Expr, dt: float) -> Expr:
+def _until(earliest: Expr, first: Expr, dt: Expr) -> Expr:
     """When the last of the impacts that share the split may be; none may be left between its instant and the split."""
     return ca.fmax(earliest, first) + TOGETHER * dt
 

@@ -112,7 +112,7 @@ def regular_mobility(terms: tuple[BodyTerm, ...], seen: Directions, same: bool) 
     return k + REDUNDANT * ca.diag(ca.diag(mobility(apart, seen, False)))
 
 
-def _softness(joint: Joint, mobilities: Expr, dt: float) -> tuple[Expr, Expr]:
+def _softness(joint: Joint, mobilities: Expr, dt: Expr) -> tuple[Expr, Expr]:
     """(share of the error that velocities take back in a step, gamma), (n,) each."""
     if not joint.soft:
         return ca.SX(mobilities.size1(), 1), ca.SX(mobilities.size1(), 1)

@@ -119,7 +119,7 @@ def _lasting(
     k: int | None,
     struck: Expr,
     kick: Expr,
-    shortest: float,
+    shortest: Expr,
 ) -> Expr:
     return ca.if_else(struck, own(old, k), constraint.carried(impulse) / ca.fmax(kick, shortest))
 
@@ -206,7 +206,7 @@ def keep_momentum(
 
 
 @traced
-def _kept_up(momentum: Momentum, made: JointCorrection, impact: Expr, duration: Expr, dt: float) -> Momentum:
+def _kept_up(momentum: Momentum, made: JointCorrection, impact: Expr, duration: Expr, dt: Expr) -> Momentum:
     velocity, angular = made.by_tree.velocity, made.by_tree.angular
     if made.by_loops is not None:
         velocity += ca.if_else(impact, 0, made.by_loops.velocity)
@@ -238,7 +238,7 @@ def keep_rotors(
 
 
 @traced
-def _turned(rate: Expr, by_tree: Expr, by_loops: Expr | None, impact: Expr, duration: Expr, dt: float) -> Expr:
+def _turned(rate: Expr, by_tree: Expr, by_loops: Expr | None, impact: Expr, duration: Expr, dt: Expr) -> Expr:
     made = by_tree if by_loops is None else by_tree + ca.if_else(impact, 0, by_loops)
     return rate + duration / dt**2 * made
 

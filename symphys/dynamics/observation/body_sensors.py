@@ -35,7 +35,7 @@ def body_quantities(world: World, x: Expr) -> dict[str, Expr]:
     return named
 
 
-def accelerometers(world: World, x: Expr, before: Mapping[str, Expr], dt: float) -> dict[str, Expr]:
+def accelerometers(world: World, x: Expr, before: Mapping[str, Expr], dt: Expr) -> dict[str, Expr]:
     """``torso.accelerometer`` (3,): what a sensor at the centre of mass reads, in the body's frame [m/s^2].
 
     The mean acceleration over the last step less gravity: at rest it reads 9.81 upwards, in free fall nothing.

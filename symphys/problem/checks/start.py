@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from symphys.model.joints.frames import MEET, WORLD
 from symphys.problem.checks.start_values import Start
-from symphys.problem.model import Variable
+from symphys.problem.model import DURATION, Variable
 from symphys.problem.parametric.reposition import reposition
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.quantities import Quantity
@@ -48,7 +48,7 @@ def varied(variables: Sequence[Variable]) -> list[str]:
 def formula_names(values: Mapping[str, Array], start: Start, variables: Sequence[Variable]) -> dict[str, Any]:
     """Every name that a formula may use, with a value of its shape."""
     named: dict[str, Any] = {name: ca.DM(value) for name, value in values.items() if "-" not in name}
-    named["time"] = ca.DM(0.0)
+    named |= {"time": ca.DM(0.0), "duration": ca.DM(values[DURATION])}
     named |= start.quantities()
     return named | {variable.name: ca.DM(variable.guess) for variable in variables}
 

@@ -10,11 +10,11 @@ from typing import Any, TypeGuard
 
 from pydantic_core import PydanticCustomError
 
-from symphys.expression import CONSTANTS, FUNCTIONS
+from symphys.expression import CONSTANTS, FUNCTIONS, OVER_TIME
 from symphys.problem.reading.value_texts import shown
 from symphys.suggest import quote
 
-RESERVED = frozenset({*FUNCTIONS, *CONSTANTS, *keyword.kwlist, "time", "gravity", "ground"})
+RESERVED = frozenset({*FUNCTIONS, *CONSTANTS, *keyword.kwlist, *OVER_TIME, "time", "gravity", "ground"})
 IDENTIFIER = "[A-Za-z][A-Za-z0-9_]*"
 MAX_IDENTIFIER = 64
 MAX_LABEL = 100

@@ -37,9 +37,13 @@ def read_objectives(
     sample: Mapping[str, Any],
     units: Mapping[str, str],
     faults: Faults,
+    free: bool = False,
 ) -> Objectives:
-    """All of them; ``sample`` has a value for each name in formulas, ``units`` its unit where that is known."""
-    reader = ObjectiveReader(simulation, sample, units, faults)
+    """All of them; ``sample`` has a value for each name in formulas, ``units`` its unit where that is known.
+
+    ``free``: whether a variable sets the duration.
+    """
+    reader = ObjectiveReader(simulation, sample, units, faults, free)
     costs = [reader.cost(index, table) for index, table in enumerate(document.cost)]
     targets = [reader.target(index, table) for index, table in enumerate(document.target)]
     constraints = [reader.constraint(index, table) for index, table in enumerate(document.constraint)]
@@ -56,13 +60,25 @@ class ObjectiveReader:
     """Reads one table at a time; None stands for one with a faulty formula."""
 
     def __init__(
-        self, simulation: Simulation, sample: Mapping[str, Any], units: Mapping[str, str], faults: Faults
+        self,
+        simulation: Simulation,
+        sample: Mapping[str, Any],
+        units: Mapping[str, str],
+        faults: Faults,
+        free: bool,
     ) -> None:
         """Keep what every table needs."""
         self.simulation = simulation
         self.sample = sample
         self.units = units
-        self.faults = faults
+        self.faults, self.free = faults, free
+
+    def check_moment(self, at: str | float, place: Place) -> None:
+        """A time must be that of a step, whatever the duration."""
+        check_moment(at, self.simulation, (*place, "at"), self.faults)
+        if self.free and at not in ("end", "always", 0):
+            text = 'is no time of a step, since a variable sets the duration; take "end", "always" or 0'
+            self.faults.add((*place, "at"), text)
 
     def formula(self, place: Place, text: str, at: str | float) -> tuple[Formula, int] | None:
         """The formula and the length of its value; notes why there is none."""
@@ -85,7 +101,7 @@ class ObjectiveReader:
     def cost(self, index: int, table: CostTable) -> Cost | None:
         """One cost."""
         place = ("cost", index)
-        check_moment(table.at, self.simulation, (*place, "at"), self.faults)
+        self.check_moment(table.at, place)
         if (table.value is None) == (table.squares is None):
             self.faults.add((*place, "value"), "give either value (a number) or squares (a vector)")
             return None
@@ -102,7 +118,7 @@ class ObjectiveReader:
     def target(self, index: int, table: TargetTable) -> Target | None:
         """One target."""
         place = ("target", index)
-        check_moment(table.at, self.simulation, (*place, "at"), self.faults)
+        self.check_moment(table.at, place)
         found = self.formula((*place, "value"), table.value, table.at)
         if not found:
             return None
@@ -112,7 +128,7 @@ class ObjectiveReader:
     def output(self, index: int, table: OutputTable) -> Output | None:
         """One output."""
         place = ("output", index)
-        check_moment(table.at, self.simulation, (*place, "at"), self.faults)
+        self.check_moment(table.at, place)
         found = self.formula((*place, "value"), table.value, table.at)
         if found and found[1] != 1:
             self.faults.add((*place, "value"), f"must be a number, but is a vector of {found[1]}; give one for each")
@@ -121,7 +137,7 @@ class ObjectiveReader:
     def constraint(self, index: int, table: ConstraintTable) -> Constraint | None:
         """One constraint."""
         place = ("constraint", index)
-        check_moment(table.at, self.simulation, (*place, "at"), self.faults)
+        self.check_moment(table.at, place)
         found = self.formula((*place, "value"), table.value, table.at)
         if table.equals is not None and (table.lower is not None or table.upper is not None):
             self.faults.add((*place, "equals"), "stands instead of lower and upper; leave them out")

@@ -29,7 +29,7 @@ def force_function(
 ) -> ca.Function:
     """(x, u, p, time) -> the inputs: u, and what all laws of the state add; x with its memory."""
     at = instant(world, inputs, parameters, memory, 0)
-    scheme = problem.simulation.scheme()
+    scheme = parameters.scheme(problem.simulation)
     ahead = half_step_function(world, scheme, inputs, parameters.symbols)
     plain = Layout(world).size
 

@@ -26,4 +26,4 @@ def _part(samples: Sampled, part: MotionPart) -> Expr:
         return samples.at(part.formula, 0.0 if part.kind == "start" else "end")
     values = samples.over_steps(part.formula)
     average = ca.sum2(values) / values.shape[1]
-    return average if part.kind == "average" else samples.dt * samples.steps * average
+    return average if part.kind == "average" else samples.interval * samples.steps * average

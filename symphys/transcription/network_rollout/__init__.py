@@ -1,7 +1,15 @@
 """Rollouts with large nets: matrix products over the batch between compiled steps, weights shared by all robots."""
 
 from symphys.transcription.network_rollout.evaluator import LargeEvaluator, Shared
-from symphys.transcription.network_rollout.partition import has_large_nets, require_small_nets
+from symphys.transcription.network_rollout.partition import has_large_nets, require_fixed_duration, require_small_nets
 from symphys.transcription.network_rollout.transcription import LargeTranscription, transcribe_large
 
-__all__ = ["LargeEvaluator", "LargeTranscription", "Shared", "has_large_nets", "require_small_nets", "transcribe_large"]
+__all__ = [
+    "LargeEvaluator",
+    "LargeTranscription",
+    "Shared",
+    "has_large_nets",
+    "require_fixed_duration",
+    "require_small_nets",
+    "transcribe_large",
+]

@@ -136,6 +136,14 @@ def refuse_large(problem: Problem, nets: Sequence[Controller], most: int, what: 
         raise ProblemError(problem.file, issues)
 
 
+def require_fixed_duration(problem: Problem) -> None:
+    """ProblemError if a variable sets the duration."""
+    text = "sets the duration, which a problem with a net that is so large cannot vary"
+    issues = [Issue(f'variable "{each.name}".sets', text) for each in problem.variables if each.kind == "duration"]
+    if issues:
+        raise ProblemError(problem.file, issues)
+
+
 def refuse_formulas(problem: Problem, names: Sequence[str]) -> None:
     """ProblemError if a formula looks at the weights of large nets, by these names of variables or numbers."""
     issues = [

@@ -35,7 +35,7 @@ class FormulaSamples:
 
     def __init__(self, rollout: Rollout) -> None:
         """Nothing is asked for yet."""
-        self.rollout, self.problem, self.steps, self.dt = rollout, rollout.problem, rollout.steps, rollout.dt
+        self.rollout, self.problem, self.steps, self.interval = rollout, rollout.problem, rollout.steps, rollout.dt
         self.z = ca.MX.sym("z", rollout.z.shape[0])
         self.p = ca.MX.sym("p", rollout.p.shape[0])
         self.moments: dict[tuple[int, int], tuple[Expr, Expr]] = {}
@@ -49,7 +49,7 @@ class FormulaSamples:
         if key not in self.moments:
             self.moments[key] = ca.MX.sym("x", sizes[0]), ca.MX.sym("u", sizes[1])
         x, u = self.moments[key]
-        return self.rollout.compiled(formula)(x, u, self.p, k * self.dt, self.z, *part_arguments(self, formula))
+        return self.rollout.compiled(formula)(x, u, self.p, k * self.interval, self.z, *part_arguments(self, formula))
 
     def after_steps(self, formula: Formula) -> Expr:
         """See ``Sampled``."""

@@ -91,6 +91,9 @@ def opened(problem: Problem, controllers: Sequence[str] | None = None, sensors: 
     if not actions:
         text = "nothing can act: it has no controller, no motor, and no variable that sets an input over time"
         raise SymphysError(f"{problem.name}: {text}")
+    if problem.free_duration:
+        text = "a variable sets the duration, and a single step has a length of its own; leave that variable out"
+        raise SymphysError(f"{problem.name}: {text}")
     refuse_motion_parts(problem)
     refuse_formulas(problem, {**dict.fromkeys(names, "nothing else"), **{v.name: slots(v) for v in dropped}})
     rest = replace(
