@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
 
@@ -79,7 +79,7 @@ class Chain:
         inputs.eliminate_zeros()
         self.weights = sp.hstack([inputs, sp.csr_array((steps * m, s))]).tocsr()
         self.lower, self.upper = (np.array([*list(limits[side]) * steps, *end[side]], float) for side in (0, 1))
-        self.squares = True
+        self.squares, self.penalties = True, np.full(len(self.lower), 1e3)
         self._build()
 
     def _build(self) -> None:
@@ -148,7 +148,6 @@ class Chain:
         return np.array(objectives), np.array(limits)
 
     def expand(self, motion: StagedMotion, multipliers: Array, penalties: Array) -> Expansion:
-        assert not np.any(penalties), "these toys have no augmented Lagrangian"
         N, n, s = self.steps, self.tangent_size, len(self.statics)
         P = np.tile(self.p(motion.z), (N, 1))
         r, rx, ru, rp = blocks(self.f_r, motion.x[:-1], motion.u, P)
@@ -157,17 +156,52 @@ class Chain:
         x[:-1], x[-1] = 2 * T(rx, r)[..., 0], 2 * (fx.T @ rf)[:, 0]
         xx[:-1], xx[-1] = 2 * T(rx, rx), 2 * fx.T @ fx
         sx[:-1], sx[-1] = 2 * T(rp, rx), 2 * fp.T @ fx
-        return Expansion(
+        found = Expansion(
             value=float((r**2).sum() + (rf**2).sum()),
             x=x,
             xx=xx,
             u=2 * T(ru, r)[..., 0],
             uu=2 * T(ru, ru),
             ux=2 * T(ru, rx),
+            uy=np.zeros((N, self.input_size, n)),
             s=2 * T(rp, r)[..., 0].sum(0) + 2 * (fp.T @ rf)[:, 0],
             ss=2 * T(rp, rp).sum(0) + 2 * fp.T @ fp,
             sx=sx,
             su=2 * T(rp, ru),
+        )
+        return self._augmented(found, motion, multipliers, penalties) if np.any(penalties) else found
+
+    def _augmented(self, costs: Expansion, motion: StagedMotion, multipliers: Array, penalties: Array) -> Expansion:
+        """With the augmented Lagrangian of the limits."""
+        values, by_x, by_u, by_s = self.limit_slopes(motion)
+        moved = values + multipliers / penalties
+        beyond = moved - np.clip(moved, self.lower, self.upper)
+        weight = sp.diags_array(penalties * (beyond != 0))
+        value = costs.value + float(penalties @ beyond**2) / 2
+        N, n, m, s = self.steps, self.tangent_size, self.input_size, len(self.statics)
+
+        def cut(a: Any, b: Any, rows: int, columns: int, count: int) -> Array:
+            whole = (a.T @ weight @ b).toarray()
+            return np.array([whole[k * rows : (k + 1) * rows, k * columns : (k + 1) * columns] for k in range(count)])
+
+        def first(by: Any) -> Array:
+            return np.asarray(by.T @ (penalties * beyond))
+
+        head = by_x[:, : N * n]
+        by_static = (by_s.T @ weight @ by_x).toarray().reshape(s, N + 1, n).transpose(1, 0, 2)
+        of_inputs = (by_s.T @ weight @ by_u).toarray().reshape(s, N, m).transpose(1, 0, 2)
+        return replace(
+            costs,
+            value=value,
+            x=costs.x + first(by_x).reshape(N + 1, n),
+            xx=costs.xx + cut(by_x, by_x, n, n, N + 1),
+            u=costs.u + first(by_u).reshape(N, m),
+            uu=costs.uu + cut(by_u, by_u, m, m, N),
+            ux=costs.ux + cut(by_u, head, m, n, N),
+            s=costs.s + first(by_s),
+            ss=costs.ss + (by_s.T @ weight @ by_s).toarray(),
+            sx=costs.sx + by_static,
+            su=costs.su + of_inputs,
         )
 
     def limit_slopes(self, motion: StagedMotion) -> tuple[Array, Any, Any, Any]:

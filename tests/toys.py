@@ -19,8 +19,8 @@ from symphys.codegen.toolchain.compiler import find_compiler
 from symphys.shooting import Evaluator, ShootingProblem, Values, VariableBlock
 from symphys.solvers import SOLVERS, Outcome, TraceRow, solver
 
-PLAIN = [name for name, each in SOLVERS.items() if not each.scenarios and name != "multiple_shooting"]
-"""The solvers that need neither a scenario nor steps; test_multiple_shooting.py has the laws of the other."""
+PLAIN = [name for name, each in SOLVERS.items() if not each.scenarios and name not in ("ilqr", "multiple_shooting")]
+"""The solvers that need neither a scenario nor steps; test_ilqr.py and test_multiple_shooting.py have the others."""
 
 Array = NDArray[np.float64]
 Formula = Callable[[Any, Any], Any]

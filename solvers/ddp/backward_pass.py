@@ -26,7 +26,7 @@ class Bounds:
 
 
 @dataclass(frozen=True)
-class Gain:
+class KnotGain:
     """How the new knots of a step answer: ``ahead`` (w,), and ``back`` (w, n + o + s) of state, old knots, statics."""
 
     ahead: Array
@@ -44,7 +44,7 @@ class Policy:
         gradient: (len(z),) of the augmented objective.
     """
 
-    gains: Sequence[Gain | None]
+    gains: Sequence[KnotGain | None]
     statics: Array
     first: float
     second: float
@@ -83,7 +83,7 @@ def backward_pass(
     n, s = slopes.a.shape[1], len(statics)
     curve = _joined(costs.xx[-1], costs.sx[-1], np.zeros((s, s)))
     value = _Value(np.concatenate([costs.x[-1], np.zeros(s)]), curve)
-    gains: list[Gain | None] = [None] * len(knots)
+    gains: list[KnotGain | None] = [None] * len(knots)
     gradient, first, second = np.zeros(len(bounds.scale)), 0.0, 0.0
     adjoint = costs.x[-1].copy()
     by_static = costs.s.copy()
@@ -154,7 +154,7 @@ def _before(slopes: Linearized, costs: Expansion, knot: KnotStep, value: _Value,
 
 def _decide(
     slope: Array, curve: Array, place: slice, bounds: Bounds, new: NDArray[np.int64], damping: float
-) -> tuple[Gain, _Value, tuple[float, float]] | None:
+) -> tuple[KnotGain, _Value, tuple[float, float]] | None:
     """The best new knots, the cost to go without them, and the expected fall."""
     rest = np.r_[0 : place.start, place.stop : len(slope)]
     hessian = curve[place, place]
@@ -167,7 +167,7 @@ def _decide(
     left_slope = slope[rest] + back.T @ (hessian @ ahead + slope[place]) + cross.T @ ahead
     left = curve[np.ix_(rest, rest)] + back.T @ hessian @ back + back.T @ cross + cross.T @ back
     value = _Value(left_slope, (left + left.T) / 2)
-    return Gain(ahead, back), value, (float(slope[place] @ ahead), float(ahead @ hessian @ ahead) / 2)
+    return KnotGain(ahead, back), value, (float(slope[place] @ ahead), float(ahead @ hessian @ ahead) / 2)
 
 
 def _answers(found: BoxSolution, cross: Array) -> Array:

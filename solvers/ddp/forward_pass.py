@@ -15,7 +15,7 @@ from symphys.solvers.ddp.knots import KnotStep
 Array = NDArray[np.float64]
 
 
-class Motions(NamedTuple):
+class MotionBatch(NamedTuple):
     """A batch: ``z`` (B, len(z)), ``x`` (B, N + 1, nx), ``u`` (B, N, m)."""
 
     z: Array
@@ -34,7 +34,7 @@ def forward_pass(
     knots: Sequence[KnotStep],
     lengths: Array,
     bounds: tuple[Array, Array],
-) -> Motions:
+) -> MotionBatch:
     """The motions of step lengths (B,), their z within bounds (len(z),) each.
 
     A motion that is not finite stays so to its end.
@@ -55,4 +55,4 @@ def forward_pass(
             z[:, knot.new] = np.clip(wanted, lower[knot.new], upper[knot.new])
         u[:, k] = z[:, knot.acting] @ knot.weights.T
         x[:, k + 1] = problem.step(k, x[:, k], u[:, k], z, motion.smoothing)
-    return Motions(z, x, u)
+    return MotionBatch(z, x, u)

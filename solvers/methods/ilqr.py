@@ -19,7 +19,7 @@ from symphys.solvers.core.options import SolverOptions, at_least, require
 from symphys.solvers.core.outcome import Array, Counts, Status, StopReason
 from symphys.solvers.core.point import Point
 from symphys.solvers.ddp.backward_pass import Bounds, Policy, backward_pass
-from symphys.solvers.ddp.forward_pass import Motions, forward_pass
+from symphys.solvers.ddp.forward_pass import MotionBatch, forward_pass
 from symphys.solvers.ddp.knots import KnotStep, knot_steps
 
 LENGTHS = 0.5 ** np.arange(8.0)
@@ -215,15 +215,15 @@ class Ilqr(Method[IlqrState]):
 
     _kept: StagedMotion | None = None
 
-    def _single(self, z: Array) -> Motions:
+    def _single(self, z: Array) -> MotionBatch:
         motion = self._motion(z)
-        return Motions(z[None], motion.x[None], motion.u[None])
+        return MotionBatch(z[None], motion.x[None], motion.u[None])
 
-    def _limits(self, motions: Motions) -> Array:
+    def _limits(self, motions: MotionBatch) -> Array:
         """(B, c)."""
         return self.staged.measure(*motions)[1]
 
-    def _values(self, state: IlqrState, motions: Motions) -> Array:
+    def _values(self, state: IlqrState, motions: MotionBatch) -> Array:
         """(B,) the augmented objective."""
         objective, limits = self.staged.measure(*motions)
         beyond = self._beyond(limits, state.multipliers, state.penalties)
