@@ -150,7 +150,7 @@ class AdjointPlaces:
     def __init__(self, program: Program, target: Place, backward: Sequence[_Pull]) -> None:
         """Hand out the words; ``backward`` in the order in which adjoints are computed."""
         read, written = dict[tuple[int, int], int](), dict[tuple[int, int], int]()
-        parts: Flags = np.zeros(program.size, np.int64)
+        parts: Words = np.zeros(program.size, np.int64)
         for i, pull in enumerate(backward):
             for place in _marked(pull.reach.call.inputs, pull.inputs):
                 read.setdefault((place.offset, place.size), i)
