@@ -1,7 +1,8 @@
 /* Jacobians: values of LANES points at once, then blocks of LANES rows of each point by adjoints. */
 #include <string.h>
 
-typedef struct { word count; const word *entries, *rows; } block; /* rows: LANES numbers, -1 for none */
+typedef struct { word count; const word *entries, *rows; word left; const word *words; } block;
+/* rows: LANES numbers, -1 for none; words: (first, count) of what is to be zeroed, which is 0 where all is finite */
 typedef struct {
   word size, tape, adjoints, height, width, result; /* result: where the adjoint of z begins */
   word z, z_size, parameters, parameters_size;
@@ -51,6 +52,7 @@ API void jacobians(const slopes *p, const points *x, V *m) {
             if (rows->rows[r] >= 0) to[rows->rows[r] * x->columns + j] = (double)LANE(found, r);
         }
         memset(b + p->result, 0, sizeof(V) * p->width);
+        for (word r = 0; r < rows->left; r++) memset(b + rows->words[2 * r], 0, sizeof(V) * rows->words[2 * r + 1]);
       }
     }
   }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import time
+from collections.abc import Sequence
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -33,7 +34,7 @@ PARTS = 4
 
 
 class _Block(ctypes.Structure):
-    _fields_ = (("count", WORD), ("entries", POINTER), ("rows", POINTER))
+    _fields_ = (("count", WORD), ("entries", POINTER), ("rows", POINTER), ("left", WORD), ("words", POINTER))
 
 
 class _Slopes(ctypes.Structure):
@@ -102,9 +103,10 @@ class SlopeKernel:
 
     def _slopes(self, planned: SlopePlan, lanes: int) -> _Slopes:
         blocks = (_Block * max(len(planned.blocks), 1))()
-        for block, (rows, entries) in zip(blocks, planned.blocks, strict=False):
-            numbers = [*rows, *[-1] * (lanes - len(rows))]
-            block.count, block.entries, block.rows = len(entries), self._flat(entries), self._words(numbers)
+        for block, plan in zip(blocks, planned.blocks, strict=False):
+            numbers = [*plan.rows, *[-1] * (lanes - len(plan.rows))]
+            block.count, block.entries, block.rows = len(plan.entries), self._flat(plan.entries), self._words(numbers)
+            block.left, block.words = len(plan.left), self._flat(plan.left)
         self._kept.append(blocks)
         program = self.program
         z, parameters, height = program.z, program.parameters, program.outputs[self.output].size
@@ -118,7 +120,7 @@ class SlopeKernel:
             ctypes.addressof(blocks),
         )
 
-    def _flat(self, entries: list[list[int]]) -> int:
+    def _flat(self, entries: Sequence[Sequence[int]]) -> int:
         return self._words([x for row in entries for x in row])
 
     def _words(self, values: list[int]) -> int:

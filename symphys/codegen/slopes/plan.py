@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,13 +32,29 @@ LARGEST = 4000
 
 
 @dataclass(frozen=True)
+class RowBlock:
+    """Rows that are computed at once.
+
+    Attributes:
+        rows: their numbers.
+        entries: table entries of the adjoints that they take.
+        left: words of the adjoint memory, as (first, count), that these adjoints write and none of them reads. They are
+            0 where the values are finite, since nothing that a row depends on is left out.
+    """
+
+    rows: list[int]
+    entries: list[list[int]]
+    left: list[tuple[int, int]]
+
+
+@dataclass(frozen=True)
 class SlopePlan:
     """What the compiler and the driver need.
 
     Attributes:
         functions: the C functions, in the order of their numbers.
         forward: table entries of all calls.
-        blocks: of each block of rows the numbers of its rows, and its table entries.
+        blocks: of rows.
         tape: words after the program's own.
         adjoints: words of the adjoint memory.
         seeds: (rows,) the word of the adjoint memory of each row.
@@ -46,7 +63,7 @@ class SlopePlan:
 
     functions: tuple[tuple[Graph, Form], ...]
     forward: list[list[int]]
-    blocks: list[tuple[list[int], list[list[int]]]]
+    blocks: list[RowBlock]
     tape: int
     adjoints: int
     seeds: list[int]
@@ -63,6 +80,11 @@ class _Pull:
     outputs: Mask
     taped: Taped | None
     tape: Place
+
+    def marked(self, side: Literal["inputs", "outputs"]) -> list[Place]:
+        """The places whose adjoints it writes, or reads and zeroes."""
+        places, marks = getattr(self.reach.call, side), getattr(self, side)
+        return [place for place, on in zip(places, marks, strict=True) if on and place.size]
 
     @property
     def work(self) -> int:
@@ -97,10 +119,23 @@ def slope_plan(program: Program, output: str, lanes: int) -> SlopePlan:
     entries = [_entry(pull, places, functions) for pull in backward]
     blocks = []
     for rows, taken in row_blocks(program, target, backward, lanes, functions):
-        blocks.append((rows, [entries[i] for i in np.flatnonzero(taken)]))
+        mine = [i for i, on in enumerate(taken) if on]
+        left = _left(program, [backward[i] for i in mine])
+        blocks.append(RowBlock(rows, [entries[i] for i in mine], [(places.of(place), place.size) for place in left]))
     seeds = [places.static[target.offset + row] for row in range(target.size)]
     result = places.static[program.z.offset] if program.z.size else 0
     return SlopePlan(tuple(functions.listed), forward, blocks, end - program.size, places.size, seeds, result)
+
+
+def _left(program: Program, pulls: Sequence[_Pull]) -> list[Place]:
+    """Places that these adjoints write, and do not read and zero; without that of z."""
+    read = np.zeros(program.size, bool)
+    read[program.z.offset : program.z.offset + program.z.size] = True
+    for pull in pulls:
+        for place in pull.marked("outputs"):
+            read[place.offset : place.offset + place.size] = True
+    written = dict.fromkeys(Place(place.offset, place.size) for pull in pulls for place in pull.marked("inputs"))
+    return [place for place in written if not read[place.offset : place.offset + place.size].all()]
 
 
 def _reach(call: FunctionCall, functions: DistinctFunctions) -> CallActivity:
@@ -135,7 +170,7 @@ def _entry(pull: _Pull, places: AdjointPlaces, functions: DistinctFunctions) -> 
     call, taped = pull.reach.call, pull.taped
     primal = [*call.inputs, *([pull.tape] if taped else [])]
     form = Form(primal=len(primal), adds=True, backward=True, clears=True, shared=True)
-    marked = [*_marked(call.outputs, pull.outputs), *_marked(call.inputs, pull.inputs)]
+    marked = [*pull.marked("outputs"), *pull.marked("inputs")]
     adjoints = [Place(places.of(place), place.size) for place in marked]
     return functions.entry(taped.adjoint if taped else pull.graph, form, [*map(Place.still, primal), *adjoints])
 
@@ -150,11 +185,11 @@ class AdjointPlaces:
     def __init__(self, program: Program, target: Place, backward: Sequence[_Pull]) -> None:
         """Hand out the words; ``backward`` in the order in which adjoints are computed."""
         read, written = dict[tuple[int, int], int](), dict[tuple[int, int], int]()
-        parts: Flags = np.zeros(program.size, np.int64)
+        parts: Words = np.zeros(program.size, np.int64)
         for i, pull in enumerate(backward):
-            for place in _marked(pull.reach.call.inputs, pull.inputs):
+            for place in pull.marked("inputs"):
                 read.setdefault((place.offset, place.size), i)
-            for place in _marked(pull.reach.call.outputs, pull.outputs):
+            for place in pull.marked("outputs"):
                 written[place.offset, place.size] = i
         for offset, size in {*read, *written}:
             parts[offset : offset + size] += 1
@@ -242,7 +277,3 @@ def _sparsity(graph: Graph) -> NDArray[np.float32]:
     rows = [bits[x].to_bytes(starts[-1] // 8 + 1, "little") for result in graph.results for x in result]
     flags = np.frombuffer(b"".join(rows), np.uint8).reshape(len(rows), -1)
     return np.unpackbits(flags, axis=1, count=starts[-1], bitorder="little").astype(np.float32)
-
-
-def _marked(places: Sequence[Place], marks: Mask) -> list[Place]:
-    return [place for place, on in zip(places, marks, strict=True) if on]

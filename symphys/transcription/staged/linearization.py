@@ -56,6 +56,7 @@ class Linearization:
         a, b, by_p = self.step.slopes(motion.x[:-1], u, p, motion.smoothing, motion.x[1:])
         first, parameters = (np.array(ca.DM(part)) for part in self._start_slopes(motion.z))
         x0 = motion.x[0]
+        first = first - self._sparse(self.tangent.shift, x0, p) @ parameters
         start = self._sparse(self.tangent.projection, x0, p) @ first
         c = by_p[:, :, self.step.arguments.varied] @ parameters[self.step.arguments.varied]
         left = first - self._sparse(self.tangent.basis, x0, p) @ start

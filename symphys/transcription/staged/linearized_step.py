@@ -73,10 +73,10 @@ class LinearizedStep:
         c[:, :, self.arguments.varied] = varied
         return a, b, c
 
-    def beside(self, x: ArrayLike, u: ArrayLike, p: ArrayLike, smoothing: float) -> Array:
+    def beside(self, x: Array, u: Array, p: Array, smoothing: float) -> Array:
         """(n, nx): the slope of step 0 by each number of a state (nx,), on its tangent or not."""
-        after = self.step(0, [x], [u], p, smoothing)
-        varying, given = self._rows(0, [x], after, [u], p, smoothing)
+        after = self.step(0, x[None], u[None], p, smoothing)
+        varying, given = self._rows(0, x[None], after, u[None], p, smoothing)
         return self._off.jacobians(varying, given, varying.shape[1])[0, :, -self.arguments.sizes[0] :]
 
     def _rows(self, k: Any, X: ArrayLike, after: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float) -> Any:
@@ -90,7 +90,7 @@ class LinearizedStep:
         varying = np.concatenate(parts, axis=1)
         return varying, np.concatenate([x, aim, time, p, np.full((count, 1), smoothing)], axis=1)
 
-    def _built(self) -> tuple[Any, Any]:
+    def _built(self) -> tuple[_ByKernel | _ByCasadi, _BySlopes | _ByCasadi]:
         """What gives states after the step, and what gives slopes."""
         note = ""
         if self.backend in PRECISIONS:
@@ -104,7 +104,8 @@ class LinearizedStep:
             except (KernelUnavailable, ProgramError) as error:
                 note = f"; {error}"
         self.description = f"casadi's virtual machine{note}"
-        return tuple(_ByCasadi(function) for function in step_functions(self.arguments))
+        step_function, off_function = step_functions(self.arguments)
+        return _ByCasadi(step_function), _ByCasadi(off_function)
 
 
 class _ByKernel:

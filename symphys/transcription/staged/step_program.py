@@ -67,6 +67,11 @@ class StepArguments:
         nx, _, _, np_ = self.sizes
         return [nx, nx, 1, np_]
 
+    def shift(self, x: Expr, p: Expr, varied: Expr) -> Expr:
+        """(nx,) how a state moves with its joints, when p becomes what varies."""
+        slope = self.tangent.shift(x, p)
+        return ca.mtimes(slope[:, self.varied.tolist()], varied - p[self.varied.tolist()]) if len(self.varied) else 0
+
     def replaced(self, p: Expr, varied: Expr) -> Expr:
         """P with the entries that vary."""
         if not len(self.varied):
@@ -103,7 +108,7 @@ def step_program(arguments: StepArguments, exact: bool, tangent: bool) -> Progra
     after, outputs, epilogue = places.x.later().still(), dict[str, Place](), tuple[FunctionCall, ...]()
     if tangent:
         outputs["off"] = places.layout.take(arguments.tangent.size)
-        epilogue = (FunctionCall(_off(arguments), (places.given_row, after), (outputs["off"],)),)
+        epilogue = (FunctionCall(_off(arguments), (places.varying, places.given_row, after), (outputs["off"],)),)
     written = (places.x.still(), places.given, places.p, places.time.still(), places.smoothing)
     return Program(
         size=places.layout.size,
@@ -122,16 +127,19 @@ def _begun(arguments: StepArguments, tangent: bool) -> ca.Function:
     varying, given = ca.SX.sym("varying", sum(arguments.varying)), ca.SX.sym("given", sum(arguments.given) + 1)
     d, u, varied, e = parts(varying, arguments.varying)
     x, _, time, p, smoothing = parts(given, [*arguments.given, 1])
-    start = x + ca.mtimes(arguments.tangent.basis(x, p), d) + e if tangent else x
+    moved = ca.mtimes(arguments.tangent.basis(x, p), d) + e + arguments.shift(x, p, varied)
+    start = x + moved if tangent else x
     results = (start, u, arguments.replaced(p, varied), time, smoothing)
     return ca.Function("begun", [varying, given], [ca.densify(each) for each in results])
 
 
 def _off(arguments: StepArguments) -> ca.Function:
-    """(given, after) -> how far ``after`` is from the state that is given."""
-    given, after = ca.SX.sym("given", sum(arguments.given) + 1), ca.SX.sym("after", arguments.sizes[0])
-    _, aim, _, p, _ = parts(given, [*arguments.given, 1])
-    return ca.Function("off", [given, after], [ca.mtimes(arguments.tangent.projection(aim, p), after - aim)])
+    """(varying, given, after) -> how far ``after`` is from the state that is given."""
+    varying, given = ca.SX.sym("varying", sum(arguments.varying)), ca.SX.sym("given", sum(arguments.given) + 1)
+    after = ca.SX.sym("after", arguments.sizes[0])
+    varied, (_, aim, _, p, _) = parts(varying, arguments.varying)[2], parts(given, [*arguments.given, 1])
+    beside = after - aim - arguments.shift(aim, p, varied)
+    return ca.Function("off", [varying, given, after], [ca.mtimes(arguments.tangent.projection(aim, p), beside)])
 
 
 def step_functions(arguments: StepArguments) -> tuple[ca.Function, ca.Function]:
@@ -141,9 +149,9 @@ def step_functions(arguments: StepArguments) -> tuple[ca.Function, ca.Function]:
     x, aim, time, p, smoothing = parts(given, [*arguments.given, 1])
     closed, tangent = arguments.rollout.closed, arguments.tangent
     put = u if arguments.rollout.feedback is None else ca.vertcat(u, time)
-    starts = x, x + ca.mtimes(tangent.basis(x, p), d) + e
+    starts = x, x + ca.mtimes(tangent.basis(x, p), d) + e + arguments.shift(x, p, varied)
     first, moved = (call(closed, start, put, arguments.replaced(p, varied), smoothing)[0] for start in starts)
-    off = ca.mtimes(tangent.projection(aim, p), moved - aim)
+    off = ca.mtimes(tangent.projection(aim, p), moved - aim - arguments.shift(aim, p, varied))
     return ca.Function("step", [varying, given], [first]), ca.Function("off", [varying, given], [off])
 
 

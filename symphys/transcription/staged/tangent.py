@@ -95,6 +95,20 @@ class Tangent:
         slope = ca.substitute(ca.jacobian(self.distance(x, y, p), y), y, x)
         return ca.Function("projection", [x, p], [ca.cse(slope)])
 
+    @cached_property
+    def shift(self) -> ca.Function:
+        """(x, p) -> (nx, np) how a state changes with p while its tangent does not: where p moves joints."""
+        x, p = ca.SX.sym("x", self._layout_size), self._p
+        old = self._parts(x)
+        kept, rebuilt = self._rebuilt(old)
+        slope = ca.jacobian(rebuilt, p) if p.numel() else ca.SX(self._layout.size, 0)
+        if slope.nnz():
+            known = ca.vertcat(ca.SX(0, 1), *(value for _, value in kept))
+            symbols = ca.vertcat(ca.SX(0, 1), *(symbol for symbol, _ in kept))
+            slope = ca.cse(ca.substitute(slope, symbols, known))
+        memory = ca.SX(self._layout_size - self._layout.size, slope.size2())
+        return ca.Function("shift", [x, p], [ca.vertcat(slope, memory)])
+
     def retract(self, X: ArrayLike, D: ArrayLike, p: ArrayLike | None = None) -> Array:
         """(B, nx), (B, n) -> (B, nx): the states that are so far from others; ``p`` None: as the guess has it."""
         return self._batch(self.retraction, (X, D), p)
@@ -105,11 +119,12 @@ class Tangent:
 
     def _batch(self, function: ca.Function, rows: tuple[ArrayLike, ArrayLike], p: ArrayLike | None) -> Array:
         first, second = (np.asarray(each, float) for each in rows)
-        given = np.array(ca.vertcat(ca.DM(0, 1), *self.rollout.parameters.nominal)).ravel() if p is None else p
+        nominal = ca.vertcat(ca.DM(0, 1), *self.rollout.parameters.nominal)
+        given = nominal if p is None else ca.DM(np.asarray(p, float))
         if not len(first):
             return np.zeros((0, function.size1_out(0)))
         mapped = function.map(len(first))
-        return np.ascontiguousarray(np.array(mapped(first.T, second.T, ca.repmat(ca.DM(given), 1, len(first)))).T)
+        return np.ascontiguousarray(np.array(mapped(first.T, second.T, ca.repmat(given, 1, len(first)))).T)
 
     @property
     def _p(self) -> Expr:
@@ -168,10 +183,10 @@ class Tangent:
             bodies = (index,) if chart is None else chart.tree.bodies
             poses, moving = ({i: self._pair(old, i, fields) for i in bodies} for fields in (POSES, VELOCITIES))
             if chart is None:
-                (p, q), (v, w) = poses[index], moving[index]
-                shift, turn, speed, spin = (cursor.take(3) for _ in range(4))
-                moved = {index: (p + shift, rotation.multiply(rotation.exponential(turn), q))}
-                after = {index: (v + speed, w + spin)}
+                (place, turned), (velocity, spin) = poses[index], moving[index]
+                more = [cursor.take(3) for _ in range(4)]
+                moved = {index: (place + more[0], rotation.multiply(rotation.exponential(more[1]), turned))}
+                after = {index: (velocity + more[2], spin + more[3])}
             else:
                 moved = chart.moved(poses, cursor.take(chart.tree.size))
                 after = _carried_on(chart, poses, moving, moved, cursor.take(chart.tree.size))
@@ -180,11 +195,11 @@ class Tangent:
                 self._put(new, i, VELOCITIES, after[i])
         for name, size in self._raw:
             new[name] = old[name] + cursor.take(size)
-        more = {name: cursor.take(3) for name in self._acted}
-        for body, before, after in zip(self.rollout.world.bodies, self._given(old), self._given(new), strict=True):
-            for (field, _), a, b in zip(REACTIONS, before, after, strict=True):
+        others = {name: cursor.take(3) for name in self._acted}
+        for body, first, second in zip(self.rollout.world.bodies, self._given(old), self._given(new), strict=True):
+            for (field, _), a, b in zip(REACTIONS, first, second, strict=True):
                 new[f"{body.name}.{field}"] = old[f"{body.name}.{field}"] + (b - a)
-        for name, each in more.items():
+        for name, each in others.items():
             new[name] += each
         return ca.vertcat(self._layout.pack(new), x[self._layout.size :] + d[cursor.at :])
 
@@ -196,18 +211,44 @@ class Tangent:
             places = [{i: self._pair(state, i, POSES) for i in bodies} for state in (old, new)]
             moving = [{i: self._pair(state, i, VELOCITIES) for i in bodies} for state in (old, new)]
             if chart is None:
-                (p, q), (r, s) = places[0][index], places[1][index]
-                found += [r - p, rotation.between(q, s)]
+                before, after = (each[index] for each in places)
+                found += [after[0] - before[0], rotation.between(before[1], after[1])]
                 found += [b - a for a, b in zip(moving[0][index], moving[1][index], strict=True)]
             else:
                 rates = [chart.rates(*each) for each in zip(places, moving, strict=True)]
                 found += [chart.apart(*places), rates[1] - rates[0]]
         found += [new[name] - old[name] for name, _ in self._raw]
-        for body, before, after in zip(self.rollout.world.bodies, self._given(old), self._given(new), strict=True):
+        for body, first, second in zip(self.rollout.world.bodies, self._given(old), self._given(new), strict=True):
             for k, (field, _) in enumerate(REACTIONS):
                 if (name := f"{body.name}.{field}") in self._acted:
-                    found.append(new[name] - old[name] - (after[k] - before[k]))
+                    found.append(new[name] - old[name] - (second[k] - first[k]))
         return ca.vertcat(ca.SX(0, 1), *found, y[self._layout.size :] - x[self._layout.size :])
+
+    def _rebuilt(self, old: Parts) -> tuple[list[tuple[Expr, Expr]], Expr]:
+        """The state from how joints, rates and reactions are: symbols for these with their values, and the state."""
+        kept, new = list[tuple[Expr, Expr]](), dict(old)
+
+        def known(value: Expr) -> Expr:
+            kept.append((ca.SX.sym("kept", value.numel()), value))
+            return kept[-1][0]
+
+        for _, chart in self._charts:
+            if chart is None:
+                continue
+            bodies = chart.tree.bodies
+            poses, moving = ({i: self._pair(old, i, fields) for i in bodies} for fields in (POSES, VELOCITIES))
+            rates = chart.rates(poses, moving)
+            fit, moved = chart.velocities(poses, rates), chart.rebuilt(poses, known(chart.held(poses)))
+            after = chart.velocities(moved, known(rates))
+            for i in bodies:
+                off = (known(now - then) for now, then in zip(moving[i], fit[i], strict=True))
+                self._put(new, i, POSES, moved[i])
+                both = [value + more for value, more in zip(after[i], off, strict=True)]
+                self._put(new, i, VELOCITIES, (both[0], both[1]))
+        for body, before, after in zip(self.rollout.world.bodies, self._given(old), self._given(new), strict=True):
+            for (field, _), a, b in zip(REACTIONS, before, after, strict=True):
+                new[f"{body.name}.{field}"] = known(old[f"{body.name}.{field}"] - a) + b
+        return kept, self._layout.pack(new)
 
     def _given(self, state: Parts) -> list[tuple[Expr, Expr]]:
         """Force and torque on each body as far as other parts of the state tell them: joints', and forces of pairs."""

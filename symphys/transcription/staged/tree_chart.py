@@ -17,7 +17,7 @@ from symphys.dynamics.articulated import spatial
 from symphys.dynamics.articulated.forward_kinematics import HERE, JointStart, final_poses
 from symphys.dynamics.joints.joint_frames import JointFrames, joint_frames_at
 from symphys.maths import rotation
-from symphys.model.joints import Joint, KinematicTree, Link
+from symphys.model.joints import Joint, JointFrame, KinematicTree, Link
 
 Expr = Any
 """casadi SX"""
@@ -26,6 +26,8 @@ Pose = tuple[Expr, Expr]
 Moving = tuple[Expr, Expr]
 """Velocity and angular velocity (3,) each."""
 NOW = ca.SX(0)
+HOME: Pose = (ca.SX.zeros(3), ca.SX([1, 0, 0, 0]))
+"""Of the world."""
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,41 @@ class TreeChart:
             found[link.body] = at - ca.cross(after, mine), after
         return found
 
+    def held(self, poses: Mapping[int, Pose]) -> Expr:
+        """(7 a joint,) how the frames of each joint lie to each other: rotation (4), place in the second (3) [m]."""
+        found = []
+        for _, joint in self._links():
+            if joint is not None:
+                (first, a), (second, b) = self._sides(joint, poses)
+                found += [rotation.multiply(inverse(b), a), rotation.rotate(inverse(b), first - second)]
+        return ca.vertcat(ca.SX(0, 1), *found)
+
+    def rebuilt(self, poses: Mapping[int, Pose], held: Expr) -> dict[int, Pose]:
+        """The poses in which frames lie to each other as ``held`` has it; the first link's as they are if it floats."""
+        found, row = dict[int, Pose](), 0
+        for link, joint in self._links():
+            if joint is None:
+                found[link.body] = poses[link.body]
+                continue
+            turn, apart = held[row : row + 4], held[row + 4 : row + 7]
+            own, other = joint.frames if link.sign > 0 else joint.frames[::-1]
+            parent = HOME if link.parent is None else found[link.parent]
+            place, q = _frame(parent, other)
+            if link.sign > 0:
+                place, q = place + rotation.rotate(q, apart), rotation.multiply(q, turn)
+            else:
+                q = rotation.multiply(q, inverse(turn))
+                place = place - rotation.rotate(q, apart)
+            q = rotation.multiply(q, inverse(ca.vertcat(*own.orientation)))
+            found[link.body] = place - rotation.rotate(q, ca.vertcat(*own.point)), q
+            row += 7
+        return found
+
+    def _sides(self, joint: Joint, poses: Mapping[int, Pose]) -> tuple[Pose, Pose]:
+        """Place and orientation of the frames of both sides."""
+        second = HOME if joint.second is None else poses[joint.second]
+        return _frame(poses[joint.first], joint.frames[0]), _frame(second, joint.frames[1])
+
     def _links(self) -> Iterator[tuple[Link, Joint | None]]:
         for link in self.tree.links:
             yield link, None if link.joint is None else self.joints[link.joint]
@@ -126,6 +163,11 @@ class TreeChart:
             parent = rotation.multiply(after[link.parent][1], inverse(before[link.parent][1]))
             own = rotation.multiply(inverse(parent), own)
         return link.sign * rotation.logarithm(own)
+
+
+def _frame(pose: Pose, frame: JointFrame) -> Pose:
+    place, q = pose
+    return place + rotation.rotate(q, ca.vertcat(*frame.point)), rotation.multiply(q, ca.vertcat(*frame.orientation))
 
 
 def inverse(q: Expr) -> Expr:

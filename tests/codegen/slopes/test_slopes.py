@@ -1,0 +1,76 @@
+"""Jacobians of one-step programs: those of casadi, whatever the block of a row and the batch of a point."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from symphys.codegen import FunctionCall, MemoryLayout, Program, ProgramError
+from symphys.codegen.slopes import SlopeKernel, compile_slopes
+from symphys.codegen.slopes.plan import slope_plan
+
+SIZE, ROWS = 5, 11
+
+
+def chain(steps: int = 1) -> tuple[Program, ca.Function]:
+    """Three calls, of which some rows need one only; and the whole as a function of (z, parameter)."""
+    z, a, y = ca.SX.sym("z", SIZE), ca.SX.sym("a"), ca.SX.sym("y", 3)
+    first = ca.Function("first", [z, a], [ca.vertcat(ca.sin(z[0] * z[1]), a * z[2] ** 3, ca.fmax(z[3], 0.1))])
+    second = ca.Function("second", [y], [ca.vertcat(ca.sqrt(1 + ca.sumsqr(y)), y[0] / (2 + y[1]), ca.exp(-y[2]))])
+    last = ca.Function("last", [z, y], [ca.vertcat(*(z[k % SIZE] * y[k % 3] for k in range(ROWS - 3)), z[0], 0, z[4])])
+    at = MemoryLayout()
+    place, given = at.take(SIZE), at.take(1)
+    middle, end, out = at.take(3), at.take(3), at.series(ROWS, 1)
+    calls = (
+        FunctionCall(first, (place, given), (middle,)),
+        FunctionCall(second, (middle,), (end,)),
+        FunctionCall(last, (place, end), (out,)),
+    )
+    program = Program(at.size, place, given, steps, {"out": out.still()}, body=calls)
+    return program, ca.Function("whole", [z, a], [last(z, second(first(z, a)))])
+
+
+@pytest.fixture(scope="module")
+def kernel() -> SlopeKernel:
+    return compile_slopes(chain()[0], "out", threads=2)
+
+
+def test_jacobians_are_casadis(kernel: SlopeKernel) -> None:
+    rng = np.random.default_rng(0)
+    Z, A = rng.normal(size=(19, SIZE)), rng.uniform(1, 2, (19, 1))
+    whole, z, a = chain()[1], ca.SX.sym("z", SIZE), ca.SX.sym("a")
+    exact = ca.Function("exact", [z, a], [ca.densify(ca.jacobian(whole(z, a), z))])
+    found = kernel.jacobians(Z, A)
+    for row, given, jacobian in zip(Z, A, found, strict=True):
+        assert jacobian == pytest.approx(np.array(exact(row, given)), abs=1e-14)
+    assert np.array_equal(kernel.jacobians(Z, A, columns=2), found[:, :, :2])
+    assert np.array_equal(kernel.jacobians(Z[:3], A[:3]), found[:3])
+    assert np.array_equal(kernel.jacobians(Z, A[0])[0], found[0])
+    assert kernel.jacobians(Z[:0], A[:0]).shape == (0, ROWS, SIZE)
+
+
+def test_a_number_that_is_none_stays_in_its_point(kernel: SlopeKernel) -> None:
+    Z, A = np.ones((4, SIZE)), np.ones((4, 1))
+    Z[1, 0] = np.nan
+    found = kernel.jacobians(Z, A)
+    assert np.isnan(found[1]).any() and np.isfinite(found[[0, 2, 3]]).all()
+
+
+def test_rows_take_only_the_calls_that_reach_them() -> None:
+    """The two rows that are entries of z, and the one that is 0, need no call but the last."""
+    blocks = slope_plan(chain()[0], "out", 4).blocks
+    assert sorted(row for block in blocks for row in block.rows) == list(range(ROWS))
+    apart = next(block for block in blocks if ROWS - 1 in block.rows)
+    assert set(apart.rows) == {ROWS - 3, ROWS - 2, ROWS - 1} and len(apart.entries) == 1
+
+
+def test_what_is_wrong_is_said(kernel: SlopeKernel) -> None:
+    with pytest.raises(ProgramError, match="of one step"):
+        slope_plan(replace(chain()[0], steps=0, body=(), outputs={"out": chain()[0].z}), "out", 4)
+    with pytest.raises(ProgramError, match=r"wanted is \(batch, 5\)"):
+        kernel.jacobians(np.ones((2, 3)), np.ones((2, 1)))
+    with pytest.raises(ProgramError, match="differ"):
+        kernel.jacobians(np.ones((2, SIZE)), np.ones((3, 1)))

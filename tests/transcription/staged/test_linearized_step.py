@@ -1,0 +1,122 @@
+"""Slopes of steps, multiplied along a motion, are the adjoint of its rollout."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+from driven import TABLES
+from repeats import thorough
+from staged_worlds import problem_of
+
+import symphys
+from symphys.codegen import KernelUnavailable
+from symphys.problem import Problem
+from symphys.transcription.rollout import Rollout, symbolic_rollout
+from symphys.transcription.staged import linearized_step
+from symphys.transcription.staged.linearization import Linearization
+
+KERNELS = ("loop", "leg", thorough("soft"), thorough("hopper_jump"), thorough("gait_robot_trot"))
+
+
+def guess_of(problem: Problem) -> np.ndarray:
+    """(n,) the decision vector at which slopes are compared."""
+    return np.concatenate([np.zeros(0), *(variable.guess for variable in problem.variables)])
+
+
+def adjoint_of(rollout: Rollout, z: np.ndarray, weights: np.ndarray, smoothing: float) -> np.ndarray:
+    """(n,) of weights . the last state, by casadi's reverse mode on the whole rollout."""
+    slope = ca.jtimes(rollout.x[:, -1], rollout.z, ca.DM(weights), True)
+    return np.array(ca.Function("adjoint", [rollout.z, rollout.smoothing], [slope])(z, smoothing)).ravel()
+
+
+def chained(made: Linearization, z: np.ndarray, weights: np.ndarray, smoothing: float) -> np.ndarray:
+    """(n,) the same from the slopes of the steps."""
+    motion = made.motion(z, smoothing)
+    slopes = made.linearize(motion)
+    p = made._begun(z)[2]
+    basis, moved = (np.array(ca.DM(each(motion.x[-1], p))) for each in (made.tangent.basis, made.tangent.shift))
+    adjoint, inputs = basis.T @ weights, np.zeros_like(motion.u)
+    statics = np.array(ca.DM(made._start_slopes(z)[1])).T @ moved.T @ weights
+    for k in reversed(range(len(slopes.a))):
+        inputs[k] = slopes.b[k].T @ adjoint
+        statics += slopes.c[k].T @ adjoint
+        adjoint = slopes.a[k].T @ adjoint
+    given, variables = made.rollout.given, made.rollout.z
+    weights_of = np.array(ca.DM(ca.Function("weights", [variables], [ca.jacobian(ca.vec(given), variables)])(z)))
+    found = weights_of.T @ inputs.ravel()
+    found[made.statics] += statics + slopes.start.T @ adjoint
+    return np.asarray(found)
+
+
+def off_by(problem: Problem, backend: str, smoothing: float = 0.0) -> float:
+    """How far chained slopes are from the adjoint, as a share of it."""
+    rollout = symbolic_rollout(problem)
+    made, z = Linearization(rollout, backend, 1), guess_of(problem)
+    weights = np.random.default_rng(0).normal(size=rollout.memory.size)
+    aim = adjoint_of(rollout, z, weights, smoothing)
+    return float(np.abs(chained(made, z, weights, smoothing) - aim).max() / np.abs(aim).max())
+
+
+@pytest.mark.parametrize("name", KERNELS)
+def test_chained_slopes_are_the_adjoint(name: str, tmp_path: Path) -> None:
+    """In ``leg`` a parameter moves a joint, and with it the first state."""
+    assert off_by(problem_of(name, tmp_path), "auto") < 1e-10
+
+
+@pytest.mark.parametrize("name", ["ball_throw", "soft", thorough("leg")])
+def test_so_they_are_on_the_virtual_machine(name: str, tmp_path: Path) -> None:
+    """In ``soft`` a variable sets the velocity of one body, and impacts cut steps."""
+    assert off_by(problem_of(name, tmp_path), "casadi", 0.01) < 1e-10
+
+
+def test_controllers_are_part_of_the_step() -> None:
+    assert off_by(symphys.load(TABLES), "casadi") < 1e-10
+
+
+def test_a_start_beside_the_tangent_counts(tmp_path: Path) -> None:
+    """The velocity of one body of a robot alone breaks its joints, and yet its slope is exact."""
+    problem = problem_of(
+        "loop", tmp_path, more='[[variable]]\nname = "blow"\nsets = "rod.velocity"\nguess = [0.1, 0, 0.3]'
+    )
+    assert off_by(problem, "casadi") < 1e-10
+
+
+def test_without_a_compiler_casadi_evaluates(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*arguments: object) -> None:
+        raise KernelUnavailable("there is no compiler")
+
+    monkeypatch.setattr(linearized_step, "build_kernel", refuse)
+    made = Linearization(symbolic_rollout(problem_of("ball_throw", tmp_path)))
+    assert "there is no compiler" in made.step.description
+
+
+def test_steps_are_those_of_the_rollout_to_the_bit(tmp_path: Path) -> None:
+    problem = problem_of("loop", tmp_path)
+    rollout = symbolic_rollout(problem)
+    z = guess_of(problem)
+    states = ca.Function("states", [rollout.z, rollout.smoothing], [rollout.x])(z, 0.0)
+    motion = Linearization(rollout, "auto", 1).motion(z, 0.0)
+    assert np.array_equal(motion.x, np.array(states).T)
+
+
+def test_states_and_threads_do_not_change_each_others_numbers(tmp_path: Path) -> None:
+    problem = problem_of("loop", tmp_path)
+    made = [Linearization(symbolic_rollout(problem), "auto", threads) for threads in (1, 2)]
+    motion = made[0].motion(guess_of(problem), 0.0)
+    one, two = (each.linearize(motion) for each in made)
+    assert np.array_equal(one.a, two.a) and np.array_equal(one.b, two.b)
+    _, u, p = made[0]._begun(motion.z)
+    few, _, _ = made[0].step.slopes(motion.x[:3], u[:3], p, 0.0)
+    assert np.array_equal(few, one.a[:3])
+
+
+def test_what_is_not_finite_stays_so(tmp_path: Path) -> None:
+    problem = problem_of("loop", tmp_path)
+    made = Linearization(symbolic_rollout(problem), "auto", 1)
+    motion = made.motion(guess_of(problem), 0.0)
+    motion.x[1, 0] = np.nan
+    found = made.linearize(motion).a
+    assert np.isnan(found[1]).any() and np.isfinite(found[0]).all() and np.isfinite(found[2:]).all()
