@@ -88,7 +88,7 @@ def read_references(document: Document, faults: Faults) -> tuple[tuple[Reference
             else:
                 text = series_text(Path(faults.origin(place).file).parent / table.file)
                 if texts.setdefault(table.file, text) != text:
-                    raise SeriesError(f"{table.file}: another file of this name holds other numbers; rename one of them")
+                    raise SeriesError(f"{table.file}: another file of this name holds other numbers; rename one")
             time, columns = read_series(text, label)
         except SeriesError as error:
             faults.add((*place, key), str(error))
