@@ -19,6 +19,7 @@ from symphys.problem.checks.pair_limit import check_pair_limit
 from symphys.problem.checks.start import at_guess, check_joints, check_overlap, formula_names, sensor_names
 from symphys.problem.checks.start_values import StartValues
 from symphys.problem.feedback import Controller, Sensor
+from symphys.problem.include.files import appendix
 from symphys.problem.model import ALIVE, Array, ProblemData, Simulation, Termination, Variable
 from symphys.problem.parametric.collision_filter import CollisionFilter
 from symphys.problem.parametric.forward_kinematics import forward_kinematics
@@ -28,6 +29,7 @@ from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.quantities import Quantity, duration_quantity, quantities, weight_quantities
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.reading.messages import report
+from symphys.problem.references import read_references, reference_values
 from symphys.problem.schema import Document
 from symphys.problem.sweeps.sweep import Sweep
 from symphys.problem.tables.attached import check_couplings, read_couplings, read_sites
@@ -51,7 +53,7 @@ from symphys.problem.tables.variables import read_variables
 from symphys.problem.units import formula_units
 
 MEMBERS = ("body", "plane", "block", "terrain")
-SHARED_NAMES = (*MEMBERS, "joint", "coupling", "site", "sensor", "controller", "force", "variable")
+SHARED_NAMES = (*MEMBERS, "joint", "coupling", "site", "sensor", "controller", "force", "reference", "variable")
 OWN_NAMES = ("cost", "target", "constraint", "output", "scenario")
 
 
@@ -107,6 +109,8 @@ def build(
 ) -> ProblemData:
     """The problem; each stage needs the ones before without fault."""
     simulation = read_simulation(document.simulation, faults)
+    references, texts = read_references(document, faults)
+    given = reference_values(references, ca.DM(0))
     parametric, initial = read_world(document, faults)
     faults.stop_if_any()
     nominal = parametric.world({})
@@ -114,7 +118,7 @@ def build(
     check_couplings(nominal, faults)
     known = quantities(initial, parametric.parameters(), input_sizes(nominal))
     known |= duration_quantity(simulation.duration)
-    sensors, controllers = read_control(document, parametric, known, functions, starts, faults)
+    sensors, controllers = read_control(document, parametric, known, functions, starts, given, faults)
     known |= weight_quantities(controllers) | force_quantities(document.force)
     variables = read_variables(document.variable, known, simulation, faults)
     check_rollout(nominal, simulation, variables, faults)
@@ -127,7 +131,7 @@ def build(
     start = starts.of(parametric, values)
     check_overlap(parametric, start, faults)
     check_joints(parametric, start, faults)
-    named = formula_names(values, start, variables)
+    named = {**formula_names(values, start, variables), **given}
     forces = read_forces(document.force, known, named, variables, faults)
     termination, objectives = read_termination_and_objectives(document, simulation, nominal, named, variables, faults)
     return ProblemData(
@@ -135,7 +139,7 @@ def build(
         title=document.title or printable(path.stem),
         description=document.description,
         file=str(path),
-        text=text,
+        text=text + appendix(texts),
         simulation=simulation,
         parametric=parametric,
         initial=initial,
@@ -148,6 +152,7 @@ def build(
         sensors=sensors,
         controllers=controllers,
         forces=forces,
+        references=references,
         solvers=None if document.solvers is None else tuple(dict.fromkeys(document.solvers)),
         termination=termination,
         scenarios=scenarios or None,
@@ -161,13 +166,15 @@ def read_control(
     known: Mapping[str, Quantity],
     functions: Mapping[str, ca.Function],
     starts: StartValues,
+    given: Mapping[str, Any],
     faults: Faults,
 ) -> tuple[tuple[Sensor, ...], tuple[Controller, ...]]:
     """Sensors and controllers without fault."""
     sensors: tuple[Sensor, ...] = ()
     if document.sensor:
         values = at_guess(parametric, known, ())
-        sensors = read_sensors(document.sensor, sensor_names(values, starts.of(parametric, values)), faults)
+        read = {**sensor_names(values, starts.of(parametric, values)), **given}
+        sensors = read_sensors(document.sensor, read, faults)
         faults.stop_if_any()
     varied = {name.partition("[")[0].strip() for table in document.variable for name in table.sets}
     controllers = read_controllers(document.controller, sensors, known, functions, faults, varied)
@@ -184,7 +191,8 @@ def read_termination_and_objectives(
     faults: Faults,
 ) -> tuple[Termination | None, Objectives]:
     """Termination and objectives; ``named`` has a value for each name in formulas, as the guess has it."""
-    sensed = {name: value for name, value in named.items() if name not in {each.name for each in variables}}
+    others = {each.name for each in variables} | {each.name for each in document.reference}
+    sensed = {name: value for name, value in named.items() if name.partition(".")[0] not in others}
     termination = read_termination(document, sensed, input_sizes(nominal), faults)
     names = {**named} | ({} if document.ending[1] is None else {ALIVE: ca.DM(1)})
     units = formula_units(nominal, names, variables)

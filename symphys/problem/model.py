@@ -17,6 +17,7 @@ from symphys.model.world import Scheme, World
 from symphys.problem.feedback import Controller, ForceLaw, Sensor
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.parametric.world import ParametricWorld
+from symphys.problem.references import ReferenceTrajectory
 from symphys.problem.sweeps.sweep import Sweep
 
 Array = NDArray[np.float64]
@@ -286,7 +287,7 @@ class ProblemData:
         solvers: the names of those that the problem is for, as the file has them; None for all.
         solver_tables: the raw [solver.NAME] tables by NAME.
         sensors, controllers: in the file's order.
-        forces: laws of the state, in the file's order.
+        forces, references: laws of the state, and trajectories that formulas name, in the file's order.
         termination: where a motion is over before its time; None: nowhere.
         scenarios: what differs from sample to sample; None: nothing.
         outputs: numbers that are reported, in the file's order.
@@ -312,6 +313,7 @@ class ProblemData:
     sensors: tuple[Sensor, ...] = ()
     controllers: tuple[Controller, ...] = ()
     forces: tuple[ForceLaw, ...] = ()
+    references: tuple[ReferenceTrajectory, ...] = ()
     solvers: tuple[str, ...] | None = None
     termination: Termination | None = None
     scenarios: Scenarios | None = None

@@ -24,6 +24,7 @@ from symphys.expression import Formula
 from symphys.model.state_layout import GIVEN, Layout, input_columns, input_sizes, inputs_size
 from symphys.model.world import Scheme, World
 from symphys.problem import ALIVE, DURATION, Problem, Simulation, Variable
+from symphys.problem.references import reference_values
 from symphys.transcription.feedback.sensor_memory import SensorMemory
 
 Expr = Any
@@ -164,6 +165,7 @@ def namespace(
     names.update({name: at.u[part] for name, part in input_columns(world, inputs).items()})
     names.update({name: ca.DM(value) for name, value in problem.parameters.items()})
     names.update(zip(parameters.names, parameters.symbols, strict=True))
+    names.update(reference_values([each for each in problem.references if not wanted.isdisjoint(each.names)], at.time))
     if not wanted.isdisjoint(joint_quantity_names(world)):
         names.update(joint_quantities(world, at.x))
     if not wanted.isdisjoint(body_quantity_names(world)):

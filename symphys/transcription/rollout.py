@@ -198,7 +198,7 @@ class Rollout:
 
     @cached_property
     def _moving(self) -> frozenset[str]:
-        return moving_names(self.world)
+        return moving_names(self.world).union(*(each.names for each in self.problem.references))
 
     def _uses_z(self, formula: Formula) -> bool:
         return any(variable.name in formula.names for variable in self.problem.variables)

@@ -24,6 +24,7 @@ SHIPPED = [
     "cart_pole",
     "cost_of_transport",
     "fastest_move",
+    "follow_swing",
     "free_kick",
     "gait_robot_build",
     "gait_robot_fast",

@@ -1,4 +1,4 @@
-"""Tables of sensors, controllers and force laws: what is sensed, and how motors and forces follow from the state."""
+"""Tables of sensors, controllers, force laws and references: how motors and forces follow from state and time."""
 
 from __future__ import annotations
 
@@ -93,4 +93,21 @@ class ForceTable(SchemaTable):
     )
     numbers: dict[Identifier, Numbers] = Field(
         default={}, description="numbers of the formula, which variables may set: { c = 0.02 } is drag.c"
+    )
+
+
+class ReferenceTable(SchemaTable):
+    """A trajectory that is given, whose columns formulas name: "walk.hip" is its column hip at `time`."""
+
+    name: Identifier = Field(description='formulas name its columns: "walk.hip"')
+    file: str | None = Field(
+        default=None,
+        min_length=1,
+        description="a CSV file with a header, or an NPZ file, beside this file; one column is `time` [s], increasing",
+    )
+    table: dict[str, list[Finite]] | None = Field(
+        default=None, description="its columns, instead of a file: { time = [0, 1], hip = [0, 0.5] }"
+    )
+    interpolation: Literal["linear", "cubic"] = Field(
+        default="linear", description="between rows; before the first and after the last the values stay"
     )

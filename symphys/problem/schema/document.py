@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import ConfigDict, Field
 
-from symphys.problem.schema.control import ControllerTable, ForceTable, SensorTable
+from symphys.problem.schema.control import ControllerTable, ForceTable, ReferenceTable, SensorTable
 from symphys.problem.schema.include import MOST_INCLUDES, IncludedTable, IncludeTable
 from symphys.problem.schema.joints import CouplingTable, JointTable, SiteTable
 from symphys.problem.schema.objectives import (
@@ -61,6 +61,7 @@ class Document(SchemaTable):
     sensor: list[SensorTable] = Field(default=[])
     controller: list[ControllerTable] = Field(default=[])
     force: list[ForceTable] = Field(default=[])
+    reference: list[ReferenceTable] = Field(default=[])
     variable: list[VariableTable] = Field(default=[])
     cost: list[CostTable] = Field(default=[])
     target: list[TargetTable] = Field(default=[])
