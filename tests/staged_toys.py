@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -177,7 +177,6 @@ class Chain:
         moved = values + multipliers / penalties
         beyond = moved - np.clip(moved, self.lower, self.upper)
         weight = sp.diags_array(penalties * (beyond != 0))
-        value = costs.value + float(penalties @ beyond**2) / 2
         N, n, m, s = self.steps, self.tangent_size, self.input_size, len(self.statics)
 
         def cut(a: Any, b: Any, rows: int, columns: int, count: int) -> Array:
@@ -187,21 +186,22 @@ class Chain:
         def first(by: Any) -> Array:
             return np.asarray(by.T @ (penalties * beyond))
 
-        head = by_x[:, : N * n]
-        by_static = (by_s.T @ weight @ by_x).toarray().reshape(s, N + 1, n).transpose(1, 0, 2)
-        of_inputs = (by_s.T @ weight @ by_u).toarray().reshape(s, N, m).transpose(1, 0, 2)
+        def crossed(by: Any, size: int) -> Array:
+            shape = s, by.shape[1] // size, size
+            return np.asarray((by_s.T @ weight @ by).toarray().reshape(shape).transpose(1, 0, 2))
+
         return replace(
             costs,
-            value=value,
+            value=costs.value + float(penalties @ beyond**2) / 2,
             x=costs.x + first(by_x).reshape(N + 1, n),
             xx=costs.xx + cut(by_x, by_x, n, n, N + 1),
             u=costs.u + first(by_u).reshape(N, m),
             uu=costs.uu + cut(by_u, by_u, m, m, N),
-            ux=costs.ux + cut(by_u, head, m, n, N),
+            ux=costs.ux + cut(by_u, by_x[:, : N * n], m, n, N),
             s=costs.s + first(by_s),
             ss=costs.ss + (by_s.T @ weight @ by_s).toarray(),
-            sx=costs.sx + by_static,
-            su=costs.su + of_inputs,
+            sx=costs.sx + crossed(by_x, n),
+            su=costs.su + crossed(by_u, m),
         )
 
     def limit_slopes(self, motion: StagedMotion) -> tuple[Array, Any, Any, Any]:
@@ -269,14 +269,6 @@ class Judge(WithoutResiduals):
 
     def gradient(self, Z: Array, smoothing: float) -> Values:
         raise NotImplementedError
-
-
-@dataclass(frozen=True)
-class Toy:
-    """A chain and its shooting problem."""
-
-    chain: Chain
-    problem: ShootingProblem = field(repr=False)
 
 
 def shooting(chain: Chain, guess: Array, lower: Array, upper: Array, **more: Any) -> ShootingProblem:

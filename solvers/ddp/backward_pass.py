@@ -108,8 +108,8 @@ def backward_pass(
     chosen = _static_step(slope, curve, bounds, statics, damping)
     if chosen is None:
         return None
-    first, second = first + slope @ chosen, second + chosen @ curve @ chosen / 2
-    return Policy(gains, chosen, float(first), float(second), gradient)
+    first, second = first + float(slope @ chosen), second + float(chosen @ curve @ chosen) / 2
+    return Policy(gains, chosen, first, second, gradient)
 
 
 def _joined(xx: Array, sx: Array, ss: Array) -> Array:

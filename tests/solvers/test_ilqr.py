@@ -80,7 +80,7 @@ def test_budgets_seeds_and_refusals() -> None:
     refused = solve(quadratic())
     assert refused.status is Status.NOT_APPLICABLE and "step by step" in refused.advice
     counts = short.counts
-    assert counts.jacobians == 3 and counts.rollouts >= 3 * 8
+    assert counts.gradients == 3 * 4 and counts.rollouts >= 3 * 8
 
 
 @pytest.mark.parametrize(

@@ -23,14 +23,15 @@ from symphys.solvers.core.outcome import StopReason
 
 AT_ONCE = {"max_seconds": 1e-9}
 every_solver = pytest.mark.parametrize("name", list(SOLVERS))
-ALONE = [*PLAIN, "multiple_shooting"]
+STEPWISE = ("ilqr", "multiple_shooting")
+ALONE = [*PLAIN, *STEPWISE]
 """Without samples."""
 descents = pytest.mark.parametrize("name", [name for name in SOLVERS if name not in ALONE])
 
 
 def problem_of(name: str, **more: Any) -> ShootingProblem:
     """One that takes the solver more than a few iterations."""
-    if name == "multiple_shooting":
+    if name in STEPWISE:
         return replace(boxed(pendulum(), 8.0), **more)
     return rosenbrock(**more) if name in PLAIN else replace(windy(), **more)
 

@@ -94,7 +94,7 @@ class StageTerm:
     @property
     def _times(self) -> Array:
         """(T,) [s]."""
-        return self.states * self.dt
+        return np.asarray(self.states * self.dt, float)
 
     @cached_property
     def _slopes(self) -> ca.Function:
@@ -123,8 +123,11 @@ def stage_terms(rollout: Rollout, statics: Indices) -> list[StageTerm]:
     """Everything that a problem asks of its motion, term by term; their weighted sum is its objective.
 
     Raises:
-        SymphysError: for a formula that is no function of one state and one input.
+        SymphysError: for a formula that is no function of one state and one input, and for a duration that varies.
     """
+    if rollout.problem.free_duration:
+        text = "a variable sets simulation.duration, so all steps hang together"
+        raise SymphysError(f"{rollout.problem.name}: {text}: take least_squares, gradient or ipopt")
     return list(_terms(rollout, statics))
 
 

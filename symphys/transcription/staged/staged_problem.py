@@ -45,20 +45,13 @@ class RolloutStages:
         self._step = LinearizedStep(rollout, self.tangent, backend, threads, exact)
         self.state_size, self.tangent_size = int(rollout.x0.shape[0]), self.tangent.size
         self.input_size = int(rollout.given.shape[0])
+        self.weights = _input_weights(rollout)
         self.squares = all(term.kind != "cost" for term in self.terms)
         found = zip(problem.constraints, (term for term in self.terms if term.kind == "limit"), strict=True)
         parts = [_limit(each, term) for each, term in found]
-        columns = [np.zeros(0)] * 3 if not parts else [np.concatenate(each) for each in zip(*parts, strict=True)]
-        self.lower, self.upper, self.penalties = columns
-
-    @cached_property
-    def weights(self) -> Any:
-        """(N * m, len(z)) scipy.sparse: u = weights @ z."""
-        u = ca.vec(self.rollout.given)
-        slope = ca.DM(ca.Function("u", [self.rollout.z], [ca.jacobian(u, self.rollout.z)])(0))
-        rows, columns = slope.sparsity().get_triplet()
-        shape = (int(slope.shape[0]), int(slope.shape[1]))
-        return scipy.sparse.csr_array((np.array(slope.nonzeros()), (rows, columns)), shape=shape)
+        none: list[Array] = [np.zeros(0)] * 3
+        columns = [np.concatenate(each) for each in zip(*parts, strict=True)] if parts else none
+        self.lower, self.upper, self.penalties = columns[0], columns[1], columns[2]
 
     def start(self, Z: Array) -> Array:
         """(B, nx)."""
@@ -226,6 +219,15 @@ class RolloutStages:
         z, statics = ca.SX.sym("z", int(self.rollout.z.shape[0])), self.statics.tolist()
         parts = [ca.densify(ca.jacobian(part, z)[:, statics]) for part in self._start(z)]
         return ca.Function("start_slopes", [z], parts)
+
+
+def _input_weights(rollout: Rollout) -> Any:
+    """(N * m, len(z)) scipy.sparse: u = weights @ z."""
+    u = ca.vec(rollout.given)
+    slope = ca.DM(ca.Function("u", [rollout.z], [ca.jacobian(u, rollout.z)])(0))
+    rows, columns = slope.sparsity().get_triplet()
+    shape = (int(slope.shape[0]), int(slope.shape[1]))
+    return scipy.sparse.csr_array((np.array(slope.nonzeros()), (rows, columns)), shape=shape)
 
 
 OFF = 1e-13
