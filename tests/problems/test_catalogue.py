@@ -14,6 +14,7 @@ from symphys.errors import SymphysError
 from symphys.problem import load_problem
 
 SHIPPED = [
+    "acrobot",
     "ant_walk",
     "arm_reach",
     "ball_throw",
