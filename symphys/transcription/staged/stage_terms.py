@@ -17,6 +17,7 @@ from symphys.problem import Problem
 from symphys.suggest import quote
 from symphys.transcription.formula_names import spans
 from symphys.transcription.rollout import Rollout
+from symphys.transcription.staged.columns import ByColumns
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -76,14 +77,14 @@ class StageTerm:
         batch, ticks = len(X), len(self.states)
         arguments = [np.repeat(P, ticks, axis=0), np.tile(self._times, batch)[:, None], np.repeat(Z, ticks, axis=0)]
         rows = [X[:, self.states].reshape(batch * ticks, -1), U[:, self.inputs].reshape(batch * ticks, -1), *arguments]
-        found = self.formula.map(batch * ticks)(*(row.T for row in rows))
-        return np.asarray(found, float).T.reshape(batch, ticks, self.size)
+        (found,) = self._values(*(row.T for row in rows))
+        return found.T.reshape(batch, ticks, self.size)
 
     def slopes(self, x: Array, u: Array, p: Array, z: Array, by_p: Array) -> Slopes:
         """(N + 1, nx), (N, m), (np,), (len(z),), and (np, s) the parameters by the static entries of z."""
         ticks = len(self.states)
         shared = (np.tile(p[:, None], ticks), self._times[None], np.tile(z[:, None], ticks))
-        found = self._slopes.map(ticks)(x[self.states].T, u[self.inputs].T, *shared)
+        found = self._slopes(x[self.states].T, u[self.inputs].T, *shared)
         value, by_x, by_u, of_p, by_s, *curved = (_blocks(each, ticks) for each in found)
         second = None
         if curved:
@@ -97,7 +98,11 @@ class StageTerm:
         return np.asarray(self.states * self.dt, float)
 
     @cached_property
-    def _slopes(self) -> ca.Function:
+    def _values(self) -> ByColumns:
+        return ByColumns(self.formula)
+
+    @cached_property
+    def _slopes(self) -> ByColumns:
         """-> value, its derivatives by the columns of x, u, p and the static entries of z, and a second derivative."""
         arguments = self.formula.sx_in()
         x, u, p, _, z = arguments
@@ -110,12 +115,11 @@ class StageTerm:
             acting = [*columns, *range(x.shape[0], both.shape[0])]
             second = ca.jacobian(ca.gradient(value, both), both)[acting, acting] if value.shape[0] else ca.SX(0, 0)
             results += [second] if second.nnz() else []
-        return ca.Function("slopes", arguments, [ca.densify(result) for result in results])
+        return ByColumns(ca.Function("slopes", arguments, [ca.densify(result) for result in results]))
 
 
-def _blocks(stacked: Any, count: int) -> Array:
+def _blocks(array: Array, count: int) -> Array:
     """(T, r, c) of what a mapped function gives: T blocks (r, c) beside each other."""
-    array = np.array(stacked, float)
     return np.ascontiguousarray(array.reshape(array.shape[0], count, -1).transpose(1, 0, 2))
 
 

@@ -14,6 +14,7 @@ from symphys.codegen.backends import BEST
 from symphys.problem import Constraint
 from symphys.shooting import Expansion, Linearized, StagedMotion
 from symphys.transcription.rollout import Rollout
+from symphys.transcription.staged.columns import ByColumns
 from symphys.transcription.staged.linearized_step import LinearizedStep
 from symphys.transcription.staged.stage_terms import Slopes, StageTerm, stage_terms, static_entries
 from symphys.transcription.staged.tangent import Tangent
@@ -193,14 +194,14 @@ class RolloutStages:
         if columns not in self._bases:
             x, p = ca.SX.sym("x", self.state_size), ca.SX.sym("p", int(self.rollout.p.shape[0]))
             rows = ca.densify(self.tangent.basis(x, p)[list(columns), :])
-            self._bases[columns] = ca.Function("rows", [x, p], [ca.cse(rows)])
+            self._bases[columns] = ByColumns(ca.Function("rows", [x, p], [ca.cse(rows)]))
         ticks, p = len(term.states), self.parameters(motion.z[None])[0]
-        found = self._bases[columns].map(ticks)(motion.x[term.states].T, np.tile(p[:, None], ticks))
-        array = np.array(found, float).reshape(len(columns), len(term.states), self.tangent_size)
+        (found,) = self._bases[columns](motion.x[term.states].T, np.tile(p[:, None], ticks))
+        array = found.reshape(len(columns), len(term.states), self.tangent_size)
         return np.ascontiguousarray(array.transpose(1, 0, 2))
 
     @cached_property
-    def _bases(self) -> dict[tuple[int, ...], ca.Function]:
+    def _bases(self) -> dict[tuple[int, ...], ByColumns]:
         return {}
 
     @cached_property
