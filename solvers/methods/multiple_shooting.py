@@ -30,18 +30,13 @@ from symphys.solvers.core.outcome import Array, Status, StopReason
 from symphys.solvers.methods.ipopt import ENDS, GOOD, worse
 from symphys.solvers.methods.ipopt_options import RESERVED
 from symphys.solvers.methods.ipopt_options import refusal as refused_by_ipopt
-from symphys.solvers.multiple_shooting.backends import (
-    ITERATIONS_USED,
-    NO_STEP,
-    LibraryRequest,
-    solve_by_fatrop,
-    solve_by_ipopt,
-)
+from symphys.solvers.multiple_shooting.by_fatrop import NO_STEP, SlopesNotFinite, solve_by_fatrop
+from symphys.solvers.multiple_shooting.by_ipopt import solve_by_ipopt
 from symphys.solvers.multiple_shooting.chart import interpolated
 from symphys.solvers.multiple_shooting.grid import make_grid
-from symphys.solvers.multiple_shooting.layout import shared, staged
+from symphys.solvers.multiple_shooting.library import ITERATIONS_USED, LibraryRequest
 from symphys.solvers.multiple_shooting.nlp import MultipleShootingNlp
-from symphys.solvers.multiple_shooting.shots import IntervalSteps, ShootingPlan
+from symphys.solvers.multiple_shooting.programs import Programs
 
 DEFECT = "largest defect"
 NO_STEPS = (
@@ -127,14 +122,16 @@ def stage(
     assert evaluator.problem.staged is not None, "refused otherwise"
     problem = evaluator.problem.staged()
     state = revive(MultipleShootingState, saved) if saved else guess(problem, context, options)
-    programs = Programs(problem, evaluator, options, state.z)
-    if state.nodes.shape != (programs.grid.intervals, problem.state_size):
+    grid = make_grid(problem, options.steps_between_nodes)
+    if state.nodes.shape != (grid.intervals, problem.state_size):
         raise damaged(ValueError("other nodes"))
-    if not saved:
-        point = evaluator.value(state.z)
-        if not point.finite and not options.nodes:
-            return not_finite(point)
-        recorder.commit(Iteration(state, point))
+    point = None if saved else evaluator.value(state.z)
+    if point is not None and not point.finite and not options.nodes:
+        return not_finite(point)
+    layout_in_stages, exact = options.backend == "fatrop", options.hessian == "exact"
+    programs = Programs(problem, grid, evaluator, state.z, state.nodes, layout_in_stages, exact)
+    if point is not None:
+        recorder.commit(Iteration(state, point, outputs={DEFECT: programs.at(state.nodes).largest_defect(state.z)}))
     while True:
         spent = recorder.spent()
         if spent is not None:
@@ -145,6 +142,8 @@ def stage(
         watch, first = ShootingWatch(evaluator, recorder, nlp, state), recorder.rows
         ending, w = run(nlp, evaluator, options, state, watch, context)
         recorder.distribute(nlp.work, first)
+        if isinstance(watch.error, SlopesNotFinite):
+            return StopReason(*ENDS["Invalid_Number_Detected"])
         if watch.error:
             raise watch.error
         if watch.spent is not None:
@@ -168,38 +167,6 @@ def guess(problem: StagedProblem, context: StageContext, options: MultipleShooti
     else:
         nodes = problem.roll_out(z, evaluator.smoothing).x[starts]
     return MultipleShootingState(0, z, nodes, np.zeros(0), np.zeros(0), math.nan)
-
-
-class Programs:
-    """Makes the program of a stage of smoothing at any references; grid and layout are always the same."""
-
-    def __init__(
-        self, problem: StagedProblem, evaluator: CountingEvaluator, options: MultipleShootingOptions, z: Array
-    ) -> None:
-        """Find which stages the limits depend on, at the rollout of z."""
-        self.problem, self.evaluator, self.options = problem, evaluator, options
-        motion = problem.roll_out(z, evaluator.smoothing)
-        self.steps, self.grid = IntervalSteps(problem, motion), make_grid(problem, options.steps_between_nodes)
-        stages: list[set[int]] = [set() for _ in problem.lower]
-        if stages:
-            _, by_state, by_input, _ = problem.limit_slopes(motion)
-            owner = self.grid.stage_of_state
-            for slopes, size in ((by_state, problem.tangent_size), (by_input, problem.input_size)):
-                rows, columns = slopes.tocoo().coords
-                for row, of in zip(rows.tolist(), owner[columns // size].tolist(), strict=True):
-                    stages[row].add(of)
-        found = [sorted(each) or [0] for each in stages]
-        count = self.grid.intervals + 1
-        self.limit_rows = [np.array([r for r, of in enumerate(found) if j in of], np.int64) for j in range(count)]
-        variables = evaluator.problem.n
-        fatrop = options.backend == "fatrop"
-        self.layout = staged(self.grid, variables, found) if fatrop else shared(self.grid, variables, len(stages))
-
-    def at(self, reference: Array) -> MultipleShootingNlp:
-        """The program with tangents at these states (M, nx)."""
-        plan = ShootingPlan(self.problem, self.grid, self.steps, reference, self.evaluator.smoothing)
-        exact = self.options.hessian == "exact"
-        return MultipleShootingNlp(plan, self.layout, self.limit_rows, self.evaluator.scale, exact)
 
 
 def run(
@@ -228,7 +195,9 @@ def run(
         options.options,
         context.log,
     )
-    return (solve_by_fatrop if options.backend == "fatrop" else solve_by_ipopt)(request, watch)
+    if options.backend == "fatrop":
+        return solve_by_fatrop(request, watch)
+    return solve_by_ipopt(request, watch)
 
 
 class ShootingWatch:

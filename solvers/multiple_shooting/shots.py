@@ -58,6 +58,7 @@ class ShootingPlan:
         steps: of several intervals.
         reference: (M, nx) states at which the tangents of nodes 1 to M begin.
         smoothing: of the steps.
+        curved: entries of tangents, see ``curved_columns``.
     """
 
     problem: StagedProblem
@@ -65,6 +66,7 @@ class ShootingPlan:
     steps: IntervalSteps
     reference: Array
     smoothing: float
+    curved: Indices
 
 
 class Shots:
@@ -111,13 +113,13 @@ class Shots:
     @cached_property
     def turns(self) -> Array:
         """(M, n, n): the nodes in their own tangents by d."""
-        return pulled(self.plan.problem, self.plan.reference, self.nodes, self.d)
+        return pulled(self.plan.problem, self.plan.reference, self.nodes, self.d, self.plan.curved)
 
     @cached_property
     def slopes(self) -> list[StageSlopes]:
         """Of all stages."""
         linearized = self.plan.problem.linearize(self.motion)
-        transport = transported(self.plan.problem, self.plan.reference, self.ends)
+        transport = transported(self.plan.problem, self.plan.reference, self.ends, self.plan.curved)
         return [
             stage_slopes(self.plan.grid, stage, linearized, self.turns, transport)
             for stage in range(self.plan.grid.intervals + 1)

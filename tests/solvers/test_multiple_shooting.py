@@ -17,9 +17,11 @@ from symphys.shooting import ShootingProblem
 from symphys.solvers import SOLVERS, MultipleShootingOptions, Outcome, Status
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.point import Incumbent
-from symphys.solvers.methods.multiple_shooting import DEFECT, Programs
-from symphys.solvers.multiple_shooting.chart import interpolated
+from symphys.solvers.methods.multiple_shooting import DEFECT
+from symphys.solvers.multiple_shooting.chart import curved_columns, interpolated
+from symphys.solvers.multiple_shooting.grid import make_grid
 from symphys.solvers.multiple_shooting.nlp import MultipleShootingNlp
+from symphys.solvers.multiple_shooting.programs import Programs
 from symphys.solvers.multiple_shooting.shots import IntervalSteps
 
 SWING = 98.637754
@@ -44,8 +46,10 @@ def program(problem: ShootingProblem, z: Any, nodes: Any = None, **options: Any)
     assert problem.staged is not None
     chain = problem.staged()
     evaluator = CountingEvaluator(problem, 0.0, Incumbent(stop_when_met=False))
-    programs = Programs(chain, evaluator, MultipleShootingOptions(**options), z)
-    return programs.at(chain.roll_out(z, 0.0).x[programs.grid.starts[1:]] if nodes is None else nodes)
+    chosen = MultipleShootingOptions(**options)
+    grid = make_grid(chain, chosen.steps_between_nodes)
+    nodes = chain.roll_out(z, 0.0).x[grid.starts[1:]] if nodes is None else nodes
+    return Programs(chain, grid, evaluator, z, nodes, chosen.backend == "fatrop", chosen.hessian == "exact").at(nodes)
 
 
 def defect(found: Outcome) -> float:
@@ -268,6 +272,11 @@ def test_lines_between_states_stay_on_their_manifold() -> None:
     assert np.abs(states[2]) == pytest.approx(turned)
 
 
+def test_only_rotations_are_curved() -> None:
+    assert curved_columns(attitude(), attitude().roll_out(np.ones(90), 0.0).x[1:]).tolist() == [0, 1, 2]
+    assert curved_columns(acrobot(), acrobot().roll_out(np.ones(40), 0.0).x[1:]).tolist() == []
+
+
 def test_steps_that_depend_on_time_are_taken_one_by_one() -> None:
     """The batch of one call shares its number of the step."""
     chain = pendulum(steps=6)
@@ -305,12 +314,68 @@ def test_it_is_silent_and_counts(backend: str, capfd: pytest.CaptureFixture[str]
     assert capfd.readouterr() == ("", "")
     assert found.counts.rollouts > len(found.trace) and found.counts.jacobians >= len(found.trace) - 1
     assert any("intervals of 1 steps, defects up to" in line for line in lines)
-    assert all(DEFECT in row.outputs for row in found.trace[1:])
+    assert all(DEFECT in row.outputs for row in found.trace)
 
 
 def test_a_start_that_is_not_finite() -> None:
     found = solve(boxed(pendulum(), guess=np.nan))
     assert found.status is Status.NOT_FINITE and "start" in found.advice
+
+
+def fragile(chain: Chain) -> tuple[Chain, list[int]]:
+    """With steps that are not finite beyond a speed of 25 rad/s, and how many of these each call made."""
+    whole, seen = chain.step, []
+
+    def step(k: int, X: Any, U: Any, Z: Any, smoothing: float) -> Any:
+        wild = ~(np.abs(X[:, 2:]).max(axis=1) < 25)
+        seen.append(int(wild.sum()))
+        return np.where(wild[:, None], np.nan, whole(k, X, U, Z, smoothing))
+
+    chain.step = step  # type: ignore[method-assign]
+    return chain, seen
+
+
+@every_backend
+@pytest.mark.parametrize("at", [1, 4])
+def test_slopes_that_are_not_finite(backend: str, at: int, monkeypatch: Any) -> None:
+    chain = acrobot()
+    whole, count = chain.linearize, [0]
+
+    def spoiled(motion: Any) -> Any:
+        count[0] += 1
+        found = whole(motion)
+        return replace(found, a=found.a * np.nan) if count[0] >= at else found
+
+    monkeypatch.setattr(chain, "linearize", spoiled)
+    found = solve(boxed(chain), nodes=LINE, backend=backend)
+    assert found.status is Status.NOT_FINITE and "derivative" in found.advice
+
+
+@every_backend
+def test_simulations_that_are_not_finite_shorten_the_step(backend: str) -> None:
+    chain, seen = fragile(acrobot())
+    found = solve(boxed(chain), backend=backend, nodes=LINE, steps_between_nodes=4)
+    assert sum(seen) > 0
+    assert found.trace[-1].best == pytest.approx(SWING, abs=1e-3)
+
+
+@every_backend
+def test_a_guess_of_states_makes_up_for_controls_that_cannot_be_simulated(backend: str) -> None:
+    problem = boxed(fragile(acrobot())[0], guess=50.0)
+    assert solve(problem, backend=backend).status is Status.NOT_FINITE
+    found = solve(problem, backend=backend, nodes=LINE)
+    assert found.status is Status.CONVERGED and not np.isfinite(found.trace[0].objective)
+    assert found.trace[-1].best == pytest.approx(SWING, abs=1e-4)
+
+
+@every_backend
+def test_it_stops_where_all_is_met(backend: str) -> None:
+    """At the first iterate whose rollout meets the end, if the problem asks for no more."""
+    problem = replace(boxed(pendulum(), 8.0), stop_when_met=True)
+    found = solve(problem, backend=backend)
+    assert found.status is Status.MET
+    assert all(row.max_violation > 1 for row in found.trace[:-1])
+    assert len(found.trace) < len(solve(boxed(pendulum(), 8.0), backend=backend).trace)
 
 
 @every_backend
