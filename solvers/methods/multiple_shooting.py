@@ -30,7 +30,13 @@ from symphys.solvers.core.outcome import Array, Status, StopReason
 from symphys.solvers.methods.ipopt import ENDS, GOOD, worse
 from symphys.solvers.methods.ipopt_options import RESERVED
 from symphys.solvers.methods.ipopt_options import refusal as refused_by_ipopt
-from symphys.solvers.multiple_shooting.by_fatrop import NO_STEP, SlopesNotFinite, solve_by_fatrop
+from symphys.solvers.multiple_shooting.by_fatrop import (
+    NO_STEP,
+    RESERVED_OF_FATROP,
+    SlopesNotFinite,
+    refused_by_fatrop,
+    solve_by_fatrop,
+)
 from symphys.solvers.multiple_shooting.by_ipopt import solve_by_ipopt
 from symphys.solvers.multiple_shooting.chart import interpolated
 from symphys.solvers.multiple_shooting.grid import make_grid
@@ -280,11 +286,11 @@ def check(options: MultipleShootingOptions) -> None:
     """SymphysError for an option that the library does not take, or a library that is not there."""
     if not ca.has_nlpsol(options.backend):
         raise SymphysError(f"solver.multiple_shooting.backend: this casadi has no {options.backend}")
-    if options.backend == "ipopt":
-        for name, value in options.options.items():
-            why = RESERVED.get(name) or refused_by_ipopt(name, value)
-            if why:
-                raise refuse("multiple_shooting", name, f"IPOPT does not take {value!r}: {why}")
+    library, refused = ("IPOPT", refused_by_ipopt) if options.backend == "ipopt" else ("FATROP", refused_by_fatrop)
+    for name, value in options.options.items():
+        why = (RESERVED | RESERVED_OF_FATROP).get(name) or refused(name, value)
+        if why:
+            raise refuse("multiple_shooting", name, f"{library} does not take {value!r}: {why}")
 
 
 MULTIPLE_SHOOTING = make_solver(

@@ -28,6 +28,20 @@ from symphys.solvers.multiple_shooting.library import (
 SUCCEEDED, NO_STEP = "Solve_Succeeded", "Fatrop_No_Step"
 """How FATROP ends, beside a budget that is used up."""
 LARGE = 1e20
+RESERVED_OF_FATROP = {"tolerance": "use tolerance beside backend"}
+"""Beside those of IPOPT."""
+
+
+def refused_by_fatrop(name: str, value: Any) -> str:
+    """Why FATROP refuses an option, tried on a tiny problem; empty if it does not."""
+    x = ca.MX.sym("x")
+    try:
+        settings: dict[str, Any] = {"fatrop": {"print_level": 0, name: value}, "print_time": False}
+        program: dict[str, Any] = {"x": x, "f": (x - 1) ** 2}
+        ca.nlpsol("trial", "fatrop", program, settings)(x0=0)
+    except (RuntimeError, NotImplementedError) as error:
+        return "there is no such option" if "not supported" in str(error) else str(error).strip().splitlines()[-1]
+    return ""
 
 
 class SlopesNotFinite(Exception):

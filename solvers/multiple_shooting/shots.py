@@ -23,21 +23,20 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
+SAME = 1e-10
+"""Relative or absolute: steps whose results differ by less are the same function."""
+
+
 class IntervalSteps:
     """Steps of several intervals at once, in one batch where all steps of the problem are the same function."""
 
     def __init__(self, problem: StagedProblem, motion: StagedMotion) -> None:
         """Compare, along a motion, step k with step 0: a problem whose steps depend on time has none alike."""
-        self.problem = problem
-        Z = motion.z[None]
-        self.alike = all(
-            np.array_equal(
-                problem.step(k, motion.x[k : k + 1], motion.u[k : k + 1], Z, motion.smoothing),
-                problem.step(0, motion.x[k : k + 1], motion.u[k : k + 1], Z, motion.smoothing),
-                equal_nan=True,
-            )
-            for k in range(problem.steps)
-        )
+        self.problem, self.alike = problem, True
+        together = self(np.arange(problem.steps), motion.x[:-1], motion.u, motion.z, motion.smoothing)
+        self.alike = False
+        alone = self(np.arange(problem.steps), motion.x[:-1], motion.u, motion.z, motion.smoothing)
+        self.alike = np.allclose(together, alone, rtol=SAME, atol=SAME, equal_nan=True)
 
     def __call__(self, steps: Indices, X: Array, U: Array, z: Array, smoothing: float) -> Array:
         """(B,) steps, (B, nx), (B, m), (len(z),) -> (B, nx)."""
