@@ -21,8 +21,6 @@ SWING = 98.637754
 LINE = ((0.0, 0.0, 0.0, 0.0), (np.pi, 0.0, 0.0, 0.0))
 WAYS = [("ipopt", "gauss-newton"), ("ipopt", "exact"), ("fatrop", "gauss-newton"), ("fatrop", "exact")]
 every_way = pytest.mark.parametrize(("backend", "hessian"), WAYS)
-robust = pytest.mark.parametrize(("backend", "hessian"), [way for way in WAYS if way != ("fatrop", "gauss-newton")])
-"""FATROP may stall where limits are active and the Hessian lacks curvature."""
 every_backend = pytest.mark.parametrize("backend", ["ipopt", "fatrop"])
 
 

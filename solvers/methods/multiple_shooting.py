@@ -54,7 +54,7 @@ APART = (
     "that what is left of the defects grows along it (a lower `tolerance`, or a feedback controller)"
 )
 STUCK = (
-    "FATROP found no step that leads on: take hessian = 'exact', which it needs more than IPOPT, or backend = 'ipopt'"
+    "FATROP found no step that leads on: try backend = 'ipopt', another guess of the `nodes`, or a larger `tolerance`"
 )
 TURN = 0.5
 """A node whose tangent's slope is so far from the unit matrix has turned by about a radian: it gets a new reference."""
@@ -69,8 +69,8 @@ class MultipleShootingOptions(SolverOptions):
         tolerance: on the scaled optimality error of IPOPT or FATROP; defects are at most so large.
         steps_between_nodes: a node every so many steps; 0: so many that there are at most 40 intervals.
         backend: "ipopt" or "fatrop", which factorises stage after stage.
-        hessian: "gauss-newton" leaves the curvature of the steps out; "exact" has it, by differences of slopes;
-            "limited-memory" is IPOPT's own approximation.
+        hessian: "gauss-newton" leaves the curvature of the steps out; "exact" has it, by differences of slopes, and is
+            what FATROP goes on with where it finds no step; "limited-memory" is IPOPT's own approximation.
         nodes: states between which the guess of the nodes is a straight line, at equal times from the first state to
             the last: two, or those of another run on any grid. Empty: the rollout of the guess.
         options: those of IPOPT, such as {mu_strategy = "adaptive"}, or of FATROP, passed on as they are.
@@ -155,9 +155,13 @@ def stage(
         if watch.spent is not None:
             return watch.spent
         state = watch.state
-        if not watch.turned:
+        if watch.turned:
+            context.log("nodes have turned far: new references")
+        elif ending == NO_STEP and not programs.exact:
+            programs.exact = True
+            context.log("FATROP found no step that leads on: exact Hessians from here")
+        else:
             return reason(context, nlp, ending, w)
-        context.log("nodes have turned far: new references")
 
 
 def guess(problem: StagedProblem, context: StageContext, options: MultipleShootingOptions) -> MultipleShootingState:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from shots_of_toys import LINE, SWING, WAYS, defect, every_backend, every_way, robust, solve
+from shots_of_toys import LINE, SWING, WAYS, defect, every_backend, every_way, solve
 from staged_toys import acrobot, attitude, boxed, pendulum
 from toys import stop_at, through_json
 
@@ -57,7 +57,7 @@ def test_a_free_parameter_of_all_steps(backend: str) -> None:
     assert found.z[-1] < 1.2
 
 
-@robust
+@every_way
 def test_a_free_initial_speed(backend: str, hessian: str) -> None:
     """A torque too weak to lift the pendulum: it is thrown."""
     found = solve(boxed(pendulum(throw=True), 3.0, statics=[1.0]), backend=backend, hessian=hessian)
@@ -66,7 +66,7 @@ def test_a_free_initial_speed(backend: str, hessian: str) -> None:
     assert abs(found.z[-1]) > 3
 
 
-@robust
+@every_way
 def test_limits_of_controls_and_of_the_path(backend: str, hessian: str) -> None:
     """Some controls are at their bounds and some speeds at their limit, and none beyond; the end is met."""
     chain = pendulum(fast=4.0, knots=11)
