@@ -1,13 +1,18 @@
 """The program of multiple shooting handed to a library through casadi's nlpsol, function by function.
 
 No exception may leave a callback, since casadi would lose it. After the first, or where the solve is to end, a callback
-returns what makes the library end.
+returns what makes the library end. Ctrl-C may come between two callbacks, where an exception would be lost as well: its
+handler is called as ever, and what it raises is kept until the library has ended.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from types import FrameType
 from typing import Any, Protocol
 
 import casadi as ca
@@ -114,6 +119,27 @@ class NlpPart(ca.Callback):
         return [ca.DM(sparsity, each) for sparsity, each in zip(self.outputs, self.rest, strict=True)]
 
 
+@contextmanager
+def kept_interruptions(watch: IterateWatch) -> Iterator[None]:
+    """Let ``watch`` keep what the handler of Ctrl-C raises within the block."""
+    handler = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(handler):
+        yield
+        return
+
+    def keep(number: int, frame: FrameType | None) -> None:
+        try:
+            handler(number, frame)
+        except KeyboardInterrupt as stopped:
+            watch.error = stopped
+
+    signal.signal(signal.SIGINT, keep)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+
+
 def called(
     library: str, parts: tuple[NlpPart, NlpPart], settings: dict[str, Any], request: LibraryRequest
 ) -> tuple[Array, dict[str, Any]]:
@@ -133,5 +159,6 @@ def called(
     }
     if request.row_duals.size:
         given |= {"lam_x0": request.bound_duals, "lam_g0": request.row_duals}
-    result = solver(**given)
+    with kept_interruptions(parts[0].watch):
+        result = solver(**given)
     return result["x"].full().ravel(), solver.stats()

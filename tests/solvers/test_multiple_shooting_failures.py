@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import threading
+import time
 from dataclasses import replace
 from typing import Any
 
@@ -39,6 +43,29 @@ def test_what_an_evaluation_raises(backend: str, kind: str, error: BaseException
         assert rest.trace[-1].best == pytest.approx(SWING, abs=1e-4)
     else:
         assert found.status is Status.FAILED and str(error) in found.advice
+
+
+@every_backend
+@pytest.mark.parametrize("after", [0.1, 0.15, 0.2, 0.25])
+def test_a_signal_is_not_lost(backend: str, after: float) -> None:
+    """Wherever it comes: in Python, in the library, or on the way between the two."""
+    timer = threading.Timer(after, lambda: os.kill(os.getpid(), signal.SIGINT))
+    slow, chain = [0.0], acrobot()
+    whole = chain.linearize
+
+    def lasting(motion: Any) -> Any:
+        time.sleep(slow[0])
+        return whole(motion)
+
+    chain.linearize = lasting  # type: ignore[method-assign]
+    problem = boxed(chain)
+    solve(problem, nodes=LINE, backend=backend, iterations=1)
+    slow[0] = 0.05
+    timer.start()
+    found = solve(problem, nodes=LINE, backend=backend)
+    timer.join()
+    assert found.status is Status.INTERRUPTED
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_a_start_that_is_not_finite() -> None:
