@@ -30,18 +30,19 @@ from symphys.solvers.core.outcome import Array, Status, StopReason
 from symphys.solvers.methods.ipopt import ENDS, GOOD, worse
 from symphys.solvers.methods.ipopt_options import RESERVED
 from symphys.solvers.methods.ipopt_options import refusal as refused_by_ipopt
-from symphys.solvers.multiple_shooting.backends import (
-    ITERATIONS_USED,
+from symphys.solvers.multiple_shooting.by_fatrop import (
     NO_STEP,
-    LibraryRequest,
+    RESERVED_OF_FATROP,
+    SlopesNotFinite,
+    refused_by_fatrop,
     solve_by_fatrop,
-    solve_by_ipopt,
 )
+from symphys.solvers.multiple_shooting.by_ipopt import solve_by_ipopt
 from symphys.solvers.multiple_shooting.chart import interpolated
 from symphys.solvers.multiple_shooting.grid import make_grid
-from symphys.solvers.multiple_shooting.layout import shared, staged
+from symphys.solvers.multiple_shooting.library import ITERATIONS_USED, LibraryRequest
 from symphys.solvers.multiple_shooting.nlp import MultipleShootingNlp
-from symphys.solvers.multiple_shooting.shots import IntervalSteps, ShootingPlan
+from symphys.solvers.multiple_shooting.programs import Programs
 
 DEFECT = "largest defect"
 NO_STEPS = (
@@ -53,7 +54,7 @@ APART = (
     "that what is left of the defects grows along it (a lower `tolerance`, or a feedback controller)"
 )
 STUCK = (
-    "FATROP found no step that leads on: take hessian = 'exact', which it needs more than IPOPT, or backend = 'ipopt'"
+    "FATROP found no step that leads on: try backend = 'ipopt', another guess of the `nodes`, or a larger `tolerance`"
 )
 TURN = 0.5
 """A node whose tangent's slope is so far from the unit matrix has turned by about a radian: it gets a new reference."""
@@ -68,8 +69,8 @@ class MultipleShootingOptions(SolverOptions):
         tolerance: on the scaled optimality error of IPOPT or FATROP; defects are at most so large.
         steps_between_nodes: a node every so many steps; 0: so many that there are at most 40 intervals.
         backend: "ipopt" or "fatrop", which factorises stage after stage.
-        hessian: "gauss-newton" leaves the curvature of the steps out; "exact" has it, by differences of slopes;
-            "limited-memory" is IPOPT's own approximation.
+        hessian: "gauss-newton" leaves the curvature of the steps out; "exact" has it, by differences of slopes, and is
+            what FATROP goes on with where it finds no step; "limited-memory" is IPOPT's own approximation.
         nodes: states between which the guess of the nodes is a straight line, at equal times from the first state to
             the last: two, or those of another run on any grid. Empty: the rollout of the guess.
         options: those of IPOPT, such as {mu_strategy = "adaptive"}, or of FATROP, passed on as they are.
@@ -127,14 +128,16 @@ def stage(
     assert evaluator.problem.staged is not None, "refused otherwise"
     problem = evaluator.problem.staged()
     state = revive(MultipleShootingState, saved) if saved else guess(problem, context, options)
-    programs = Programs(problem, evaluator, options, state.z)
-    if state.nodes.shape != (programs.grid.intervals, problem.state_size):
+    grid = make_grid(problem, options.steps_between_nodes)
+    if state.nodes.shape != (grid.intervals, problem.state_size):
         raise damaged(ValueError("other nodes"))
-    if not saved:
-        point = evaluator.value(state.z)
-        if not point.finite and not options.nodes:
-            return not_finite(point)
-        recorder.commit(Iteration(state, point))
+    point = None if saved else evaluator.value(state.z)
+    if point is not None and not point.finite and not options.nodes:
+        return not_finite(point)
+    layout_in_stages, exact = options.backend == "fatrop", options.hessian == "exact"
+    programs = Programs(problem, grid, evaluator, state.z, state.nodes, layout_in_stages, exact)
+    if point is not None:
+        recorder.commit(Iteration(state, point, outputs={DEFECT: programs.at(state.nodes).largest_defect(state.z)}))
     while True:
         spent = recorder.spent()
         if spent is not None:
@@ -145,14 +148,20 @@ def stage(
         watch, first = ShootingWatch(evaluator, recorder, nlp, state), recorder.rows
         ending, w = run(nlp, evaluator, options, state, watch, context)
         recorder.distribute(nlp.work, first)
+        if isinstance(watch.error, SlopesNotFinite):
+            return StopReason(*ENDS["Invalid_Number_Detected"])
         if watch.error:
             raise watch.error
         if watch.spent is not None:
             return watch.spent
         state = watch.state
-        if not watch.turned:
+        if watch.turned:
+            context.log("nodes have turned far: new references")
+        elif ending == NO_STEP and not programs.exact:
+            programs.exact = True
+            context.log("FATROP found no step that leads on: exact Hessians from here")
+        else:
             return reason(context, nlp, ending, w)
-        context.log("nodes have turned far: new references")
 
 
 def guess(problem: StagedProblem, context: StageContext, options: MultipleShootingOptions) -> MultipleShootingState:
@@ -168,38 +177,6 @@ def guess(problem: StagedProblem, context: StageContext, options: MultipleShooti
     else:
         nodes = problem.roll_out(z, evaluator.smoothing).x[starts]
     return MultipleShootingState(0, z, nodes, np.zeros(0), np.zeros(0), math.nan)
-
-
-class Programs:
-    """Makes the program of a stage of smoothing at any references; grid and layout are always the same."""
-
-    def __init__(
-        self, problem: StagedProblem, evaluator: CountingEvaluator, options: MultipleShootingOptions, z: Array
-    ) -> None:
-        """Find which stages the limits depend on, at the rollout of z."""
-        self.problem, self.evaluator, self.options = problem, evaluator, options
-        motion = problem.roll_out(z, evaluator.smoothing)
-        self.steps, self.grid = IntervalSteps(problem, motion), make_grid(problem, options.steps_between_nodes)
-        stages: list[set[int]] = [set() for _ in problem.lower]
-        if stages:
-            _, by_state, by_input, _ = problem.limit_slopes(motion)
-            owner = self.grid.stage_of_state
-            for slopes, size in ((by_state, problem.tangent_size), (by_input, problem.input_size)):
-                rows, columns = slopes.tocoo().coords
-                for row, of in zip(rows.tolist(), owner[columns // size].tolist(), strict=True):
-                    stages[row].add(of)
-        found = [sorted(each) or [0] for each in stages]
-        count = self.grid.intervals + 1
-        self.limit_rows = [np.array([r for r, of in enumerate(found) if j in of], np.int64) for j in range(count)]
-        variables = evaluator.problem.n
-        fatrop = options.backend == "fatrop"
-        self.layout = staged(self.grid, variables, found) if fatrop else shared(self.grid, variables, len(stages))
-
-    def at(self, reference: Array) -> MultipleShootingNlp:
-        """The program with tangents at these states (M, nx)."""
-        plan = ShootingPlan(self.problem, self.grid, self.steps, reference, self.evaluator.smoothing)
-        exact = self.options.hessian == "exact"
-        return MultipleShootingNlp(plan, self.layout, self.limit_rows, self.evaluator.scale, exact)
 
 
 def run(
@@ -228,7 +205,9 @@ def run(
         options.options,
         context.log,
     )
-    return (solve_by_fatrop if options.backend == "fatrop" else solve_by_ipopt)(request, watch)
+    if options.backend == "fatrop":
+        return solve_by_fatrop(request, watch)
+    return solve_by_ipopt(request, watch)
 
 
 class ShootingWatch:
@@ -311,11 +290,11 @@ def check(options: MultipleShootingOptions) -> None:
     """SymphysError for an option that the library does not take, or a library that is not there."""
     if not ca.has_nlpsol(options.backend):
         raise SymphysError(f"solver.multiple_shooting.backend: this casadi has no {options.backend}")
-    if options.backend == "ipopt":
-        for name, value in options.options.items():
-            why = RESERVED.get(name) or refused_by_ipopt(name, value)
-            if why:
-                raise refuse("multiple_shooting", name, f"IPOPT does not take {value!r}: {why}")
+    library, refused = ("IPOPT", refused_by_ipopt) if options.backend == "ipopt" else ("FATROP", refused_by_fatrop)
+    for name, value in options.options.items():
+        why = (RESERVED | RESERVED_OF_FATROP).get(name) or refused(name, value)
+        if why:
+            raise refuse("multiple_shooting", name, f"{library} does not take {value!r}: {why}")
 
 
 MULTIPLE_SHOOTING = make_solver(

@@ -2,8 +2,8 @@
 
 A problem gives slopes in the tangent of the state itself. A node that is ``retract(reference, d)`` with d other than 0
 needs the slope of that tangent by d; a defect that is measured at the reference of the next node needs the slope of
-``difference(reference, state)`` by the tangent of the state. Both are the unit matrix but for rotations. They are
-differences of fourth order, whose error is that of rounding: retract and difference are smooth and cheap.
+``difference(reference, state)`` by the tangent of the state. Both are the unit matrix but for the columns of rotations,
+which are differences of fourth order, with an error like that of rounding: retract and difference are smooth and cheap.
 """
 
 from __future__ import annotations
@@ -16,36 +16,56 @@ from numpy.typing import NDArray
 from symphys.shooting import StagedProblem
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 STEP = 1e-3
 """Of the differences, in tangents: radians, metres. Their error is below 1e-12 for rotations of some radians."""
+FLAT = 1e-7
+"""A column of the unit matrix up to so much, at random offsets, is one everywhere."""
 STENCIL = ((1, 8 / 12), (-1, -8 / 12), (2, -1 / 12), (-2, 1 / 12))
 """(offset, weight) of the fourth-order difference."""
 
 
-def slopes(moved: Callable[[Array], Array], count: int, size: int) -> Array:
-    """(count, size, size): slope of ``moved`` by offsets at 0, where it takes (rows, count, size) to the same."""
-    offsets = STEP * np.eye(size)[:, None, :] * np.ones((1, count, 1))
-    total = np.zeros((size, count, size))
-    for factor, weight in STENCIL:
-        total += weight / STEP * moved(factor * offsets)
-    return np.ascontiguousarray(total.transpose(1, 2, 0))
+def curved_columns(problem: StagedProblem, states: Array) -> Indices:
+    """The entries of tangents whose columns are not those of the unit matrix, found at random offsets from (M, nx)."""
+    tangents = np.random.default_rng(0).standard_normal((len(states), problem.tangent_size))
+    every, there = np.arange(problem.tangent_size), problem.retract(states, tangents)
+    found = np.zeros(problem.tangent_size, bool)
+    for matrix in (pulled(problem, states, there, tangents, every), transported(problem, states, there, every)):
+        off = np.abs(matrix - np.eye(problem.tangent_size)).max(axis=(0, 1))
+        found |= ~(off < FLAT)
+    return np.flatnonzero(found)
 
 
-def pulled(problem: StagedProblem, reference: Array, nodes: Array, tangents: Array) -> Array:
+def slopes(moved: Callable[[Array], Array], count: int, size: int, columns: Indices) -> Array:
+    """(count, size, size): slope of ``moved`` by offsets at 0, where it takes (rows, count, size) to the same.
+
+    Of the columns that are not asked for the slope is that of the unit matrix.
+    """
+    matrix = np.broadcast_to(np.eye(size), (count, size, size)).copy()
+    if len(columns):
+        offsets = STEP * np.eye(size)[columns][:, None, :] * np.ones((1, count, 1))
+        total = np.zeros((len(columns), count, size))
+        for factor, weight in STENCIL:
+            total += weight / STEP * moved(factor * offsets)
+        matrix[:, :, columns] = total.transpose(1, 2, 0)
+    return matrix
+
+
+def pulled(problem: StagedProblem, reference: Array, nodes: Array, tangents: Array, columns: Indices) -> Array:
     """(M, n, n): the node in its own tangent by the tangent d at its reference; reference, nodes (M, nx), d (M, n)."""
     count, size = tangents.shape
     if not np.any(tangents):
-        return np.broadcast_to(np.eye(size), (count, size, size)).copy()
+        columns = columns[:0]
 
     def moved(offsets: Array) -> Array:
         rows = len(offsets)
         there = problem.retract(np.tile(reference, (rows, 1)), (tangents + offsets).reshape(-1, size))
         return problem.difference(np.tile(nodes, (rows, 1)), there).reshape(rows, count, size)
 
-    return slopes(moved, count, size)
+    return slopes(moved, count, size, columns)
 
 
-def transported(problem: StagedProblem, reference: Array, states: Array) -> Array:
+def transported(problem: StagedProblem, reference: Array, states: Array, columns: Indices) -> Array:
     """(M, n, n): ``difference(reference, state)`` by the state in its own tangent; both (M, nx)."""
     count, size = len(reference), problem.tangent_size
 
@@ -54,7 +74,7 @@ def transported(problem: StagedProblem, reference: Array, states: Array) -> Arra
         there = problem.retract(np.tile(states, (rows, 1)), offsets.reshape(-1, size))
         return problem.difference(np.tile(reference, (rows, 1)), there).reshape(rows, count, size)
 
-    return slopes(moved, count, size)
+    return slopes(moved, count, size, columns)
 
 
 def interpolated(problem: StagedProblem, states: Array, fractions: Array) -> Array:

@@ -114,6 +114,11 @@ class MultipleShootingNlp:
             self.work += Counts(rollouts=1)
         return self._shots
 
+    def largest_defect(self, z: Array) -> float:
+        """With all nodes at their references."""
+        nodes = np.zeros(self.layout.nodes.shape)
+        return float(np.abs(self.shots(self.pack(z, nodes)).defects).max())
+
     def objective(self, w: Array) -> float:
         """At w."""
         return self.shots(w).measured[0]
@@ -146,6 +151,13 @@ class MultipleShootingNlp:
         copies = np.ones(len(self.layout.copies))
         self._kept["jacobian"] = self.jacobian_pattern.nonzeros(np.concatenate([*entries, copies, -copies]))
         return self._kept["jacobian"]
+
+    def unit_slopes(self) -> Array:
+        """Nonzeros of the slopes if no interval and no limit depended on anything."""
+        entries, copies = np.zeros(len(self.jacobian_pattern.place)), len(self.layout.copies)
+        entries[: self.layout.nodes.size] = 1
+        entries[len(entries) - 2 * copies :] = np.repeat([1, -1], copies)
+        return self.jacobian_pattern.nonzeros(entries)
 
     def hessian(self, w: Array, factor: float, multipliers: Array, upper: bool) -> Array:
         """Nonzeros of the Hessian of factor * objective + multipliers . constraints, or of its upper half."""

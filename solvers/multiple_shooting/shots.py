@@ -23,21 +23,20 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
+SAME = 1e-10
+"""Relative or absolute: steps whose results differ by less are the same function."""
+
+
 class IntervalSteps:
     """Steps of several intervals at once, in one batch where all steps of the problem are the same function."""
 
     def __init__(self, problem: StagedProblem, motion: StagedMotion) -> None:
         """Compare, along a motion, step k with step 0: a problem whose steps depend on time has none alike."""
-        self.problem = problem
-        Z = motion.z[None]
-        self.alike = all(
-            np.array_equal(
-                problem.step(k, motion.x[k : k + 1], motion.u[k : k + 1], Z, motion.smoothing),
-                problem.step(0, motion.x[k : k + 1], motion.u[k : k + 1], Z, motion.smoothing),
-                equal_nan=True,
-            )
-            for k in range(problem.steps)
-        )
+        self.problem, self.alike = problem, True
+        together = self(np.arange(problem.steps), motion.x[:-1], motion.u, motion.z, motion.smoothing)
+        self.alike = False
+        alone = self(np.arange(problem.steps), motion.x[:-1], motion.u, motion.z, motion.smoothing)
+        self.alike = np.allclose(together, alone, rtol=SAME, atol=SAME, equal_nan=True)
 
     def __call__(self, steps: Indices, X: Array, U: Array, z: Array, smoothing: float) -> Array:
         """(B,) steps, (B, nx), (B, m), (len(z),) -> (B, nx)."""
@@ -58,6 +57,7 @@ class ShootingPlan:
         steps: of several intervals.
         reference: (M, nx) states at which the tangents of nodes 1 to M begin.
         smoothing: of the steps.
+        curved: entries of tangents, see ``curved_columns``.
     """
 
     problem: StagedProblem
@@ -65,6 +65,7 @@ class ShootingPlan:
     steps: IntervalSteps
     reference: Array
     smoothing: float
+    curved: Indices
 
 
 class Shots:
@@ -111,13 +112,13 @@ class Shots:
     @cached_property
     def turns(self) -> Array:
         """(M, n, n): the nodes in their own tangents by d."""
-        return pulled(self.plan.problem, self.plan.reference, self.nodes, self.d)
+        return pulled(self.plan.problem, self.plan.reference, self.nodes, self.d, self.plan.curved)
 
     @cached_property
     def slopes(self) -> list[StageSlopes]:
         """Of all stages."""
         linearized = self.plan.problem.linearize(self.motion)
-        transport = transported(self.plan.problem, self.plan.reference, self.ends)
+        transport = transported(self.plan.problem, self.plan.reference, self.ends, self.plan.curved)
         return [
             stage_slopes(self.plan.grid, stage, linearized, self.turns, transport)
             for stage in range(self.plan.grid.intervals + 1)

@@ -1,0 +1,47 @@
+"""Multiple shooting of the toys step by step: solves, programs, and what is known of their answers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from symphys.shooting import ShootingProblem
+from symphys.solvers import SOLVERS, MultipleShootingOptions, Outcome
+from symphys.solvers.core.evaluator import CountingEvaluator
+from symphys.solvers.core.point import Incumbent
+from symphys.solvers.methods.multiple_shooting import DEFECT
+from symphys.solvers.multiple_shooting.grid import make_grid
+from symphys.solvers.multiple_shooting.nlp import MultipleShootingNlp
+from symphys.solvers.multiple_shooting.programs import Programs
+
+SWING = 98.637754
+"""The least objective of the acrobot's swing-up that is known."""
+LINE = ((0.0, 0.0, 0.0, 0.0), (np.pi, 0.0, 0.0, 0.0))
+WAYS = [("ipopt", "gauss-newton"), ("ipopt", "exact"), ("fatrop", "gauss-newton"), ("fatrop", "exact")]
+every_way = pytest.mark.parametrize(("backend", "hessian"), WAYS)
+every_backend = pytest.mark.parametrize("backend", ["ipopt", "fatrop"])
+
+
+def solve(problem: ShootingProblem, start: Any = None, **options: Any) -> Outcome:
+    """The rest of the arguments of a solve are among the options."""
+    more = {name: options.pop(name) for name in ("monitor", "checkpoint", "keep", "log") if name in options}
+    z = problem.start(0) if start is None else start
+    return SOLVERS["multiple_shooting"].solve(problem, z, MultipleShootingOptions(**options), **more)
+
+
+def program(problem: ShootingProblem, z: Any, nodes: Any = None, **options: Any) -> MultipleShootingNlp:
+    """The nonlinear program with references at the rollout of z, or at given nodes."""
+    assert problem.staged is not None
+    chain = problem.staged()
+    evaluator = CountingEvaluator(problem, 0.0, Incumbent(stop_when_met=False))
+    chosen = MultipleShootingOptions(**options)
+    grid = make_grid(chain, chosen.steps_between_nodes)
+    nodes = chain.roll_out(z, 0.0).x[grid.starts[1:]] if nodes is None else nodes
+    return Programs(chain, grid, evaluator, z, nodes, chosen.backend == "fatrop", chosen.hessian == "exact").at(nodes)
+
+
+def defect(found: Outcome) -> float:
+    """Of the last iterate."""
+    return found.trace[-1].outputs[DEFECT]
