@@ -88,12 +88,13 @@ class RolloutStages:
     def linearize(self, motion: StagedMotion) -> Linearized:
         """Slopes of all steps."""
         p = self.parameters(motion.z[None])[0]
-        a, b, by_p = self._step.slopes(motion.x[:-1], motion.u, p, motion.smoothing, motion.x[1:])
+        a, b, by_p = self._step.slopes(motion.x[:-1], motion.u, p, motion.smoothing)
         _, of_p = self._start_slopes(motion.z)
         start, off = self._start_tangents(motion)
         c = by_p @ of_p
         if off.any():
-            c[0] += np.array(self.tangent.projection(motion.x[1], p)) @ self._pushed(motion, p, off)
+            after = self.step(0, motion.x[:1], motion.u[:1], motion.z[None], motion.smoothing)[0]
+            c[0] += np.array(self.tangent.projection(after, p)) @ self._pushed(motion, p, off)
         return Linearized(a, b, c, start)
 
     def _start_tangents(self, motion: StagedMotion) -> tuple[Array, Array]:
