@@ -35,6 +35,7 @@ SHIPPED = [
     "juggle",
     "knock",
     "parcel",
+    "push_and_fly",
     "putt",
     "quadruped_shift",
     "quadruped_walk",
