@@ -309,7 +309,8 @@ class ProblemData:
         solvers: the names of those that the problem is for, as the file has them; None for all.
         solver_tables: the raw [solver.NAME] tables by NAME.
         sensors, controllers: in the file's order.
-        forces, references: laws of the state, and trajectories that formulas name, in the file's order.
+        forces, references, phases: laws of the state, trajectories that formulas name, and the stretches of the motion,
+            in the file's order.
         termination: where a motion is over before its time; None: nowhere.
         scenarios: what differs from sample to sample; None: nothing.
         outputs: numbers that are reported, in the file's order.
@@ -336,6 +337,7 @@ class ProblemData:
     controllers: tuple[Controller, ...] = ()
     forces: tuple[ForceLaw, ...] = ()
     references: tuple[ReferenceTrajectory, ...] = ()
+    phases: tuple[Phase, ...] = ()
     solvers: tuple[str, ...] | None = None
     termination: Termination | None = None
     scenarios: Scenarios | None = None

@@ -32,6 +32,7 @@ class Objectives:
     targets: tuple[Target, ...]
     constraints: tuple[Constraint, ...]
     outputs: tuple[Output, ...]
+    phases: tuple[Phase, ...] = ()
 
 
 def read_objectives(
@@ -57,6 +58,7 @@ def read_objectives(
         tuple(target for target in targets if target),
         tuple(constraint for constraint in constraints if constraint),
         tuple(output for output in outputs if output),
+        tuple(reader.phases.values()),
     )
 
 
