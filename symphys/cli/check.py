@@ -142,7 +142,10 @@ def moment(thing: Cost | Target | Constraint) -> str:
 
 def given(problem: Problem) -> list[str]:
     """What acts by formulas, what is given over time, and how the motion is divided, in lines."""
-    lines = [f"  force        {law.name}: {' '.join(law.formula.text.split())}, on {law.on}" for law in problem.forces]
+    lines = []
+    for law in problem.forces:
+        acted = " against ".join(name for name, _, _ in law.acts_on)
+        lines.append(f"  force        {law.name}: {' '.join(law.formula.text.split())}, on {acted}")
     for reference in problem.references:
         names = f"{listed(reference.columns)}, {reference.interpolation}"
         lines.append(f"  reference    {reference.name}: {several(reference.time.size, 'row')} of {names}")
