@@ -92,15 +92,17 @@ def found(folder: Path, transcription: Transcription) -> NDArray[Any]:
 def describe(problem: Problem) -> list[str]:
     """What the file contains, in lines."""
     world, simulation = problem.world(), problem.simulation
+    free = ", before a variable sets it" if problem.free_duration else ""
     lines = [
         f"{problem.name}: {problem.title}",
-        f"  time         {simulation.duration:g} s in {simulation.steps} steps of {simulation.dt:g} s",
+        f"  time         {simulation.duration:g} s in {simulation.steps} steps of {simulation.dt:g} s{free}",
         f"  bodies       {listed(body.name for body in world.bodies)}",
         f"  planes       {listed(plane.name for plane in world.statics)}",
         f"  contacts     {listed(dict.fromkeys(pair.name.partition(':')[0] for pair in world.pairs))}",
     ]
     if world.joints:
         lines.append(f"  joints       {listed(f'{joint.name} ({joint.kind.name})' for joint in world.joints)}")
+    lines += given(problem)
     for variable in problem.variables:
         alike = " alike" if len(variable.slots) > 1 else ""
         sets = listed(slot.name for slot in variable.slots)
@@ -109,7 +111,7 @@ def describe(problem: Problem) -> list[str]:
     for kind, things in (("cost", problem.costs), ("target", problem.targets), ("constraint", problem.constraints)):
         for thing in things:
             formula = " ".join(thing.formula.text.split())
-            lines.append(f"  {kind:<12} {thing.name}: {formula} ({moment(thing.at)}{in_unit(thing)})")
+            lines.append(f"  {kind:<12} {thing.name}: {formula} ({moment(thing)}{in_unit(thing)})")
     if problem.termination is not None:
         lines.append(f"  over         where {' '.join(problem.termination.margin.text.split())} < 0")
     if problem.scenarios is not None:
@@ -130,6 +132,25 @@ def in_unit(thing: Cost | Target | Constraint) -> str:
     return f", in {unit}" if unit else ""
 
 
-def moment(at: str | float) -> str:
+def moment(thing: Cost | Target | Constraint) -> str:
     """When something is looked at."""
-    return at if isinstance(at, str) else f"at {at:g} s"
+    during = getattr(thing, "during", None)
+    if during is not None:
+        return f"during {during.name}"
+    return thing.at if isinstance(thing.at, str) else f"at {thing.at:g} s"
+
+
+def given(problem: Problem) -> list[str]:
+    """What acts by formulas, what is given over time, and how the motion is divided, in lines."""
+    lines = []
+    for law in problem.forces:
+        acted = " against ".join(name for name, _, _ in law.acts_on)
+        lines.append(f"  force        {law.name}: {' '.join(law.formula.text.split())}, on {acted}")
+    for reference in problem.references:
+        names = f"{listed(reference.columns)}, {reference.interpolation}"
+        lines.append(f"  reference    {reference.name}: {several(reference.time.size, 'row')} of {names}")
+    steps, dt = problem.simulation.steps, problem.simulation.dt
+    for phase in problem.phases:
+        first, last = phase.ticks(steps)
+        lines.append(f"  phase        {phase.name}: {first * dt:g} s to {last * dt:g} s")
+    return lines

@@ -70,7 +70,8 @@ class MjcfModel:
 def problem_model(problem: Problem, approximate: bool = False) -> MjcfModel:
     """The model of a problem's world; see ``mjcf_model``."""
     dt, name = problem.simulation.dt, problem.name
-    return mjcf_model(problem.world(), problem.initial, dt, name, problem.sensors, approximate=approximate)
+    laws = [Departure("left out", (law.name,), "a force law; MuJoCo has no formulas") for law in problem.forces]
+    return mjcf_model(problem.world(), problem.initial, dt, name, problem.sensors, laws, approximate=approximate)
 
 
 def mjcf_files(problem: Problem, approximate: bool = False) -> dict[str, bytes]:
@@ -89,6 +90,7 @@ def mjcf_model(
     dt: float,
     name: str = "world",
     sensors: Sequence[Sensor] = (),
+    laws: Sequence[Departure] = (),
     *,
     approximate: bool = False,
 ) -> MjcfModel:
@@ -100,6 +102,7 @@ def mjcf_model(
         dt: time step [s].
         name: of the model.
         sensors: of the problem.
+        laws: what of the problem's force laws is left out.
         approximate: leave out what MJCF cannot say, instead of refusing it.
 
     Raises:
@@ -107,7 +110,7 @@ def mjcf_model(
     """
     start = StartState(world, initial)
     felt = sensor_elements(world, sensors)
-    found = departures(start)
+    found = [*laws, *departures(start)]
     require_expressible(found, name, approximate)
     if felt.left_out:
         found.append(Departure("left out", tuple(felt.left_out), "a sensor of a formula that MuJoCo has none for"))

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+import numpy as np
+
 from symphys.model.state_layout import Layout, input_columns, input_size
 from symphys.model.world import World
-from symphys.problem import Problem, Variable, VariableSlot
+from symphys.problem import DURATION, Problem, Variable, VariableSlot
 from symphys.problem.units import quantity_unit
 from symphys.transcription import Transcription
 from symphys.transcription.rollout import Rollout
@@ -38,7 +40,7 @@ def _sets(problem: Problem, world: World, variable: Variable) -> str:
 
 def _slot(problem: Problem, world: World, slot: VariableSlot) -> str:
     """What a slot sets."""
-    known = {**problem.initial, **problem.parameters}
+    known = {**problem.initial, **problem.parameters, **problem.weights, DURATION: np.zeros(1)}
     whole = len(known[slot.name]) if slot.name in known else input_size(world, slot.name)
     return slot.name if len(slot.components) == whole else f"{slot.name}[{','.join(map(str, slot.components))}]"
 

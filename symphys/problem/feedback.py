@@ -63,6 +63,7 @@ class ForceLaw:
         on: the input: ``ball.force`` [N], ``ball.torque`` [N m], both world frame, or ``knee.command``.
         components: of the input.
         formula: of as many numbers.
+        against: an input and components to which the opposite is added; None: nothing.
         numbers: of the formula, as the file has them.
     """
 
@@ -71,6 +72,13 @@ class ForceLaw:
     components: tuple[int, ...]
     formula: Formula
     numbers: dict[str, Array] = field(repr=False)
+    against: tuple[str, tuple[int, ...]] | None = None
+
+    @property
+    def acts_on(self) -> tuple[tuple[str, tuple[int, ...], int], ...]:
+        """Inputs, their components, and the sign with which the formula is added."""
+        opposite = () if self.against is None else ((*self.against, -1),)
+        return ((self.on, self.components, 1), *opposite)
 
     @property
     def commands(self) -> bool:

@@ -54,7 +54,7 @@ from symphys.problem.units import formula_units
 
 MEMBERS = ("body", "plane", "block", "terrain")
 SHARED_NAMES = (*MEMBERS, "joint", "coupling", "site", "sensor", "controller", "force", "reference", "variable")
-OWN_NAMES = ("cost", "target", "constraint", "output", "scenario")
+OWN_NAMES = ("phase", "cost", "target", "constraint", "output", "scenario")
 
 
 def read_document(data: Mapping[str, Any], faults: Faults) -> Document:

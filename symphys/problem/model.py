@@ -55,6 +55,24 @@ class Simulation(Scheme):
 
 
 @dataclass(frozen=True)
+class Phase:
+    """A stretch of the motion.
+
+    Attributes:
+        name: as in the file.
+        start, end: shares of the duration.
+    """
+
+    name: str
+    start: float
+    end: float
+
+    def ticks(self, steps: int) -> tuple[int, int]:
+        """The numbers of its first and last state, of ``steps`` time steps."""
+        return round(self.start * steps), round(self.end * steps)
+
+
+@dataclass(frozen=True)
 class VariableSlot:
     """Where a variable's components go.
 
@@ -109,6 +127,7 @@ class Cost:
         at: ``end``, ``always`` (integral over time) or a time [s].
         weight: factor.
         squares: whether the cost is weight * sum of squares.
+        during: where ``at`` is ``always``: the phase that is meant; None: the whole motion.
     """
 
     name: str
@@ -116,6 +135,7 @@ class Cost:
     at: str | float
     weight: float
     squares: bool
+    during: Phase | None = None
 
 
 @dataclass(frozen=True)
@@ -151,6 +171,7 @@ class Constraint:
         tolerance: largest violation of a component that counts as met.
         penalty: weight of squared violations for solvers that know no constraints.
         unit: of the value; empty where it has none or where it is not known.
+        during: where ``at`` is ``always``: the phase that is meant; None: the whole motion.
     """
 
     name: str
@@ -161,6 +182,7 @@ class Constraint:
     tolerance: float
     penalty: float
     unit: str = ""
+    during: Phase | None = None
 
 
 @dataclass(frozen=True)
@@ -287,7 +309,8 @@ class ProblemData:
         solvers: the names of those that the problem is for, as the file has them; None for all.
         solver_tables: the raw [solver.NAME] tables by NAME.
         sensors, controllers: in the file's order.
-        forces, references: laws of the state, and trajectories that formulas name, in the file's order.
+        forces, references, phases: laws of the state, trajectories that formulas name, and the stretches of the motion,
+            in the file's order.
         termination: where a motion is over before its time; None: nowhere.
         scenarios: what differs from sample to sample; None: nothing.
         outputs: numbers that are reported, in the file's order.
@@ -314,6 +337,7 @@ class ProblemData:
     controllers: tuple[Controller, ...] = ()
     forces: tuple[ForceLaw, ...] = ()
     references: tuple[ReferenceTrajectory, ...] = ()
+    phases: tuple[Phase, ...] = ()
     solvers: tuple[str, ...] | None = None
     termination: Termination | None = None
     scenarios: Scenarios | None = None

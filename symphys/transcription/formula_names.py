@@ -105,7 +105,8 @@ def input_names(problem: Problem) -> tuple[str, ...]:
     """The forces, torques and commands that variables set, controllers drive or force laws act on, in that order."""
     set_ = [slot.name for v in problem.variables if v.kind == "control" for slot in v.slots]
     driven = [name for controller in problem.controllers for name, _ in controller.drives]
-    return tuple(dict.fromkeys([*set_, *driven, *(law.on for law in problem.forces)]))
+    acted = [name for law in problem.forces for name, _, _ in law.acts_on]
+    return tuple(dict.fromkeys([*set_, *driven, *acted]))
 
 
 def instant(world: World, inputs: Sequence[str], parameters: Parameters, memory: SensorMemory, n: int) -> Instant:

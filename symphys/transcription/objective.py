@@ -10,7 +10,7 @@ import numpy as np
 
 from symphys.expression import Formula
 from symphys.maths.smoothing import length
-from symphys.problem import Constraint, Cost, Problem, Target
+from symphys.problem import Constraint, Cost, Phase, Problem, Target
 
 Expr = Any
 """casadi MX"""
@@ -122,6 +122,15 @@ def _mean(samples: Expr) -> Expr:
     return ca.sum2(samples) / samples.shape[1]
 
 
+def within(samples: Expr, phase: Phase | None, steps: int) -> tuple[Expr, int]:
+    """The columns of a phase, of N or 2N as ``Sampled.over_steps`` gives them, and how many steps it has."""
+    if phase is None:
+        return samples, steps
+    first, last = phase.ticks(steps)
+    parts = [samples[:, start + first : start + last] for start in range(0, samples.shape[1], steps)]
+    return ca.horzcat(*parts), last - first
+
+
 class _Cost(NamedTuple):
     """A weighted cost, the residuals whose squares sum to it (or None), the mean of its formula."""
 
@@ -132,8 +141,8 @@ class _Cost(NamedTuple):
 
 def _cost(rollout: Sampled, cost: Cost) -> _Cost:
     if cost.at == "always":
-        samples = rollout.over_steps(cost.formula)
-        weight = cost.weight * rollout.interval * rollout.steps / samples.shape[1]
+        samples, steps = within(rollout.over_steps(cost.formula), cost.during, rollout.steps)
+        weight = cost.weight * rollout.interval * steps / samples.shape[1]
     else:
         samples, weight = rollout.at(cost.formula, cost.at), cost.weight
     if cost.squares:
@@ -151,7 +160,10 @@ class _Limit:
 
     def __init__(self, rollout: Sampled, constraint: Constraint) -> None:
         always = constraint.at == "always"
-        values = rollout.after_steps(constraint.formula) if always else rollout.at(constraint.formula, constraint.at)
+        if always:
+            values, _ = within(rollout.after_steps(constraint.formula), constraint.during, rollout.steps)
+        else:
+            values = rollout.at(constraint.formula, constraint.at)
         count = values.shape[1]
         self.name = constraint.name
         self.value, self.mean = ca.vec(values), _mean(values)

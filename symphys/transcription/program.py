@@ -122,7 +122,7 @@ def rollout_program(rollout: Rollout, exact: bool = False, recorded: Mapping[str
         parameters=samples.smoothing,
         steps=rollout.steps,
         outputs=outputs,
-        prologue=(_prologue(samples),),
+        prologue=_prologue(samples),
         body=(*body, *samples.calls),
         epilogue=(epilogue,),
         constants=fixed,
@@ -176,17 +176,19 @@ def _part(place: Place, columns: slice) -> Place:
     return Place(place.offset + start, stop - start, place.stride)
 
 
-def _prologue(samples: ProgramSamples) -> FunctionCall:
+def _prologue(samples: ProgramSamples) -> tuple[FunctionCall, ...]:
     rollout = samples.rollout
-    start = start_of(samples.problem, rollout.world, rollout.inputs, rollout.parameters, rollout.z)
-    results = [ca.densify(ca.vec(part)) for part in (rollout.memory.start(start.x0), start.u, start.p)]
+    first = start_of(samples.problem, rollout.world, rollout.inputs, rollout.parameters, rollout.z)
+    results = [ca.densify(ca.vec(part)) for part in (rollout.memory.start(first.x0), first.u, first.p)]
     u = Place(samples.given.offset, samples.given.size * samples.steps)
-    places = [samples.x.still(), u, samples.p]
-    if rollout.problem.free_duration:
-        results.append(ca.DM(np.arange(samples.steps + 1)) * rollout.interval)
-        places.append(Place(samples.time.offset, samples.steps + 1))
     function = ca.Function("start", [rollout.z], results).expand()
-    return FunctionCall(function, (samples.z,), tuple(places))
+    start = FunctionCall(function, (samples.z,), (samples.x.still(), u, samples.p))
+    if not rollout.problem.free_duration:
+        return (start,)
+    p = ca.SX.sym("p", samples.p.size)
+    dt = rollout.parameters.step_length(rollout.problem.simulation, p)
+    times = ca.Function("times", [p], [ca.densify(ca.DM(np.arange(samples.steps + 1)) * dt)])
+    return start, FunctionCall(times, (samples.p,), (Place(samples.time.offset, samples.steps + 1),))
 
 
 def _epilogue(samples: ProgramSamples, asked: Terms) -> tuple[FunctionCall, dict[str, Place]]:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from symphys.export import words
-from symphys.problem import load_problem
+import pytest
+
+from symphys.export import ExportError, problem_model, words
+from symphys.problem import load_problem, problem_of_tables
 from symphys.transcription.rollout import symbolic_rollout
 
 ARM = """
@@ -69,3 +71,23 @@ def test_commands_have_their_sizes_and_units(tmp_path: Path) -> None:
     assert any(line.endswith("rail.motor [N]") for line in states)
     assert any(line.endswith("wrist.motor [N m]") for line in states)
     assert [" ".join(line.split()) for line in words.parameter_lines(rollout)] == ["p[0] wrist.torque [N m]"]
+
+
+def test_a_free_duration_and_numbers_of_laws_are_named() -> None:
+    law = {"name": "drag", "on": "ball.force", "value": "-drag.c[0] * ball.velocity", "numbers": {"c": [0.1, 0.2]}}
+    problem = problem_of_tables(
+        {
+            "simulation": {"duration": 0.1, "dt": 0.01},
+            "body": [{"name": "ball", "mass": 1, "inertia": 1}],
+            "force": [law],
+            "variable": [{"name": "T", "sets": "simulation.duration"}, {"name": "c", "sets": "drag.c[0]"}],
+            "cost": [{"name": "c", "value": "ball.position[0]"}],
+        }
+    )
+    assert [line.split(None, 1)[1] for line in words.decision_lines(problem)] == [
+        "T: simulation.duration [s]",
+        "c: drag.c[0]",
+    ]
+    with pytest.raises(ExportError, match="drag: a force law; MuJoCo has no formulas"):
+        problem_model(problem)
+    assert "drag" in problem_model(problem, approximate=True).text

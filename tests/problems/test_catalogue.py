@@ -36,6 +36,7 @@ SHIPPED = [
     "juggle",
     "knock",
     "parcel",
+    "push_and_fly",
     "putt",
     "quadruped_shift",
     "quadruped_walk",

@@ -31,3 +31,12 @@ def test_the_fastest_move_is_bang_bang() -> None:
     assert found.z[0] == pytest.approx(2 * np.sqrt(1.5 * 2 / 10), abs=1e-6)
     assert found.z[1:] == pytest.approx(np.repeat([10.0, -10.0], 10), abs=1e-4)
     assert made.simulate(found.z).time[-1] == pytest.approx(found.z[0])
+
+
+def test_the_push_before_the_flight_falls_linearly() -> None:
+    made = shipped("push_and_fly")
+    found = solve("ipopt", made)
+    slope = 3 * 2 * (0.5 + GRAVITY / 2) / (1 - 0.6**3)
+    middles = (np.arange(20) + 0.5) / 50
+    assert found.z[:20] == pytest.approx(slope * (1 - middles), abs=0.05)
+    assert found.z[20:] == pytest.approx(0, abs=1e-3)

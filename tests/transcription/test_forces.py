@@ -138,6 +138,17 @@ def test_laws_add_to_controllers_and_to_each_other() -> None:
     assert value.objective[0] == pytest.approx(np.sum((found.position[-1, 0] - [1, 2, 3]) ** 2), rel=1e-12)
 
 
+def test_a_spring_between_two_bodies_keeps_their_momentum() -> None:
+    other = {**BALL, "name": "other", "mass": 1.5, "position": [1, 0, 0], "collides_with": []}
+    spring = {"name": "spring", "on": "ball.force", "against": "other.force"}
+    spring["value"] = "20 * (norm(other.position - ball.position) - 0.5) * (other.position - ball.position)"
+    made = transcribe(problem([spring], 0.005, body=[{**BALL, "velocity": [0, 0.3, 0]}, other]), backend="casadi")
+    found = made.simulate(made.shooting.start(0))
+    momentum = MASS * found.velocity[:, 0] + 1.5 * found.velocity[:, 1]
+    assert momentum == pytest.approx(np.tile(momentum[0], (len(momentum), 1)), abs=1e-12)
+    assert np.abs(found.force).max() > 5
+
+
 @pytest.mark.parametrize(
     ("law", "message"),
     [
@@ -145,6 +156,8 @@ def test_laws_add_to_controllers_and_to_each_other() -> None:
         ({"on": "ball.force[0]"}, r'"drag".value: has 3 components, but ball.force\[0\] has 1 component'),
         ({"value": "ball.velocty"}, r'"drag".value: unknown name "ball.velocty"; did you mean "ball.velocity"'),
         ({"value": "end.ball.velocity"}, r"is of a whole motion; costs"),
+        ({"against": "ball.torque"}, r'"drag".against: must be as ball.force, but of another body'),
+        ({"against": "post.force"}, r'"drag".against: there is no quantity "post.force"'),
         ({"value": "throw"}, r'the variable "throw" sets ball.velocity; name that instead'),
         ({"value": "ball.accelerometer"}, r"is not known while the force is"),
         ({"value": "ball.velocity / ball.velocity[0]"}, r"is not a finite number at the start of the guess"),

@@ -147,6 +147,34 @@ FORMS = ("skip = true", 'activation = "tanh"', 'activation = "relu", biases = fa
 HOPS, LIFTS = ([text.replace("ACTIVATION", form) for form in FORMS] for text in (HOPPING, LIFTED))
 """Each with nets of each form."""
 
+ASKED = (
+    LIFTS[1]
+    + """
+[[force]]
+name = "air"
+on = "bob.force[2]"
+value = "-2 * bob.velocity[2] + way.z"
+
+[[reference]]
+name = "way"
+table = { time = [0, 0.1, 0.2], z = [0, 1, 0.5] }
+
+[[phase]]
+name = "first"
+share = 0.3
+
+[[cost]]
+name = "in the first"
+during = "first"
+squares = "bob.velocity[2] - way.z"
+
+[[cost]]
+name = "whole"
+value = "integral(bob.velocity[2]**2) / (1 + end.bob.position[2] - start.bob.position[2])"
+"""
+)
+"""With a force law, a reference, a phase, and parts of the whole motion."""
+
 
 def problems(*texts: str) -> pytest.MarkDecorator:
     """These problems in every run of the tests, the other hops with ``make thorough``."""
@@ -157,7 +185,8 @@ def problems(*texts: str) -> pytest.MarkDecorator:
 def named(text: str) -> str:
     """A problem by what moves and its net's form."""
     form = next(form for form in FORMS if f", {form} }}" in text.partition('name = "other"')[0])
-    return f"{'hop' if text in HOPS else 'lift'}-{form}"
+    kind = "hop" if text in HOPS else "asked" if text == ASKED else "lift"
+    return f"{kind}-{form}"
 
 
 @pytest.fixture(scope="module")
@@ -188,7 +217,7 @@ def points(context: Transcription) -> Array:
     return start + 0.05 * np.random.default_rng(5).standard_normal((2, start.size))
 
 
-@problems(HOPS[0], *LIFTS[1:])
+@problems(HOPS[0], *LIFTS[1:], ASKED)
 @pytest.mark.parametrize("smoothing", [0.0, 0.05])
 def test_values_and_gradients(both: tuple[Transcription, LargeTranscription], smoothing: float) -> None:
     """To rounding, which impacts amplify, whatever the length of segments."""
@@ -318,3 +347,11 @@ def test_what_large_nets_cannot_have(tmp_path: Path, monkeypatch: pytest.MonkeyP
         transcribe(problem)
     with pytest.raises(ProblemError, match=r'controller "brain"\.net: has \d+ weights; export takes up to 10'):
         require_small_nets(problem, "export")
+
+
+def test_the_duration_cannot_be_free(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "large.toml"
+    path.write_text(f'{LIFTS[1]}\n[[variable]]\nname = "T"\nsets = "simulation.duration"\n')
+    monkeypatch.setattr(split, "MOST_WEIGHTS", 10)
+    with pytest.raises(ProblemError, match=r'variable "T".sets: sets the duration, which a problem with a net'):
+        transcribe(load_problem(path))

@@ -8,7 +8,7 @@ from typing import Any
 
 LABELLED = ("cost", "target", "constraint", "scenario")
 """Tables whose names nothing refers to."""
-OTHER_TEXTS = ("at", "file", "interpolation", "height", "activation", "output", "weights")
+OTHER_TEXTS = ("at", "during", "file", "interpolation", "height", "activation", "output", "weights")
 """Keys whose texts name nothing of the file."""
 
 BEFORE = r"(?:(?<![\w.])|(?<=\bstart\.)|(?<=\bend\.))"

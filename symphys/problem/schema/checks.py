@@ -202,23 +202,27 @@ def smoothing(value: object) -> list[float]:
     return stages
 
 
+OF_PHASE = "(end|start) of (.+)"
+"""An instant by the name of a phase."""
+
+
 def moment(value: object) -> str | float:
-    """``end``, ``always`` or a time."""
+    """``end``, ``always``, a time, or ``end of`` a phase."""
     if is_number(value):
         return float(value)
-    if isinstance(value, str) and value in ("end", "always"):
+    if isinstance(value, str) and (value in ("end", "always") or re.fullmatch(OF_PHASE, value)):
         return value
-    raise fault('must be "end", "always" or a time in seconds')
+    raise fault('must be "end", "always" or a time in seconds, or "end of" a phase')
 
 
 def instant(value: object) -> str | float:
-    """``end`` or a time."""
+    """``end``, a time, or ``end of`` a phase."""
     if is_number(value):
         return float(value)
-    if isinstance(value, str) and value == "end":
+    if isinstance(value, str) and (value == "end" or re.fullmatch(OF_PHASE, value)):
         return value
     advice = '; for "always" use a [[constraint]] or a [[cost]]' if value == "always" else ""
-    raise fault(f'must be "end" or a time in seconds{advice}')
+    raise fault(f'must be "end" or a time in seconds, or "end of" a phase{advice}')
 
 
 def inertia(value: object) -> Any:

@@ -87,6 +87,9 @@ class ForceTable(SchemaTable):
 
     name: Identifier = Field(description='formulas name its numbers: "drag.c"')
     on: str = Field(description='what it is added to: "ball.force", "ball.torque", "knee.command", "ball.force[0:2]"')
+    against: str | None = Field(
+        default=None, description="what the opposite is added to, as of a spring between two bodies: post.force"
+    )
     value: str = Field(
         description='formula in N or N m, world frame: "-drag.c * norm(ball.velocity) * ball.velocity"; it is '
         "evaluated in the middle of each step, that of a command at its start"

@@ -14,6 +14,7 @@ from symphys.problem.schema.objectives import (
     CostTable,
     ObjectiveTable,
     OutputTable,
+    PhaseTable,
     TargetTable,
     TerminationTable,
     VariableTable,
@@ -63,6 +64,7 @@ class Document(SchemaTable):
     force: list[ForceTable] = Field(default=[])
     reference: list[ReferenceTable] = Field(default=[])
     variable: list[VariableTable] = Field(default=[])
+    phase: list[PhaseTable] = Field(default=[])
     cost: list[CostTable] = Field(default=[])
     target: list[TargetTable] = Field(default=[])
     constraint: list[ConstraintTable] = Field(default=[])

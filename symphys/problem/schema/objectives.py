@@ -54,11 +54,26 @@ class VariableTable(SchemaTable):
     )
 
 
+class PhaseTable(SchemaTable):
+    """A stretch of the motion. Phases follow each other from the start, in the order of the file."""
+
+    name: Label = Field(description='costs and constraints name it: during = "flight", at = "end of flight"')
+    until: Positive | None = Field(default=None, description="when it ends [s]; the last may leave that out")
+    share: Positive | None = Field(
+        default=None,
+        le=1,
+        description="when it ends, as a share of the duration, at the nearest step",
+    )
+
+
 class CostTable(SchemaTable):
     """A term of the objective: a number to make small, or a vector whose squares are summed."""
 
     name: Label = Field(description="how results and reports refer to it")
-    at: Moment = Field(default="end", description='"end", "always" (integral over time) or a time [s]')
+    at: Moment = Field(
+        default="end", description='"end", "always" (integral over time), a time [s], or "end of" or "start of" a phase'
+    )
+    during: Label | None = Field(default=None, description="a phase over which it is integrated, instead of at")
     value: str | None = Field(default=None, description="formula of a number")
     squares: str | None = Field(default=None, description="formula of a vector; the cost is the sum of its squares")
     weight: Finite = Field(default=1.0, description="factor of the term; a negative one makes the value large")
@@ -68,7 +83,7 @@ class TargetTable(SchemaTable):
     """A vector that should be zero within a tolerance; the objective gets weight * |value|^2."""
 
     name: Label = Field(description="how results and reports refer to it")
-    at: Instant = Field(default="end", description='"end" or a time [s]')
+    at: Instant = Field(default="end", description='"end", a time [s], or "end of" or "start of" a phase')
     value: str = Field(description="formula of what should be zero")
     unit: Label | None = Field(default=None, description=UNIT)
     tolerance: Positive = Field(description="met where the Euclidean norm of the value is at most this")
@@ -79,7 +94,10 @@ class ConstraintTable(SchemaTable):
     """Bounds on every component of a vector."""
 
     name: Label = Field(description="how results and reports refer to it")
-    at: Moment = Field(default="end", description='"end", "always" (every time step) or a time [s]')
+    at: Moment = Field(
+        default="end", description='"end", "always" (every time step), a time [s], or "end of" or "start of" a phase'
+    )
+    during: Label | None = Field(default=None, description="a phase in which it holds always, instead of at")
     value: str = Field(description="formula of what is bounded")
     lower: Bounds | None = Field(default=None, description="for all components, or one for each; default: none")
     upper: Bounds | None = Field(default=None, description="likewise; default: none")
@@ -95,7 +113,7 @@ class OutputTable(SchemaTable):
     """A number that is reported: while solvers work, in results and in reports. Nothing depends on it."""
 
     name: Label = Field(description="how results and reports refer to it")
-    at: Instant = Field(default="end", description='"end" or a time [s]')
+    at: Instant = Field(default="end", description='"end", a time [s], or "end of" or "start of" a phase')
     value: str = Field(description="formula of a number")
     unit: Label | None = Field(default=None, description='such as "m/s"')
 

@@ -200,6 +200,8 @@ def type_of(key: Schema, titles: Mapping[str, str]) -> str:
     if key.get("type") == "array":
         return list_type(key, titles)
     if key.get("type") == "string":
+        if "examples" in key:
+            return f'`"{key["examples"][0]}"`'
         return "name" if "pattern" in key else "text"
     if key.get("type") == "object":
         return "table"

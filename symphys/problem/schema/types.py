@@ -105,15 +105,16 @@ Identifier = Annotated[
 Label = Annotated[
     str, PlainValidator(checks.label), WithJsonSchema({"type": "string", "minLength": 1, "maxLength": checks.MAX_LABEL})
 ]
+PHASE = {"type": "string", "pattern": f"^{checks.OF_PHASE}$", "examples": ["end of flight"]}
 Moment = Annotated[
     str | float,
     PlainValidator(checks.moment),
-    WithJsonSchema({"anyOf": [{"enum": ["end", "always"]}, {"type": "number", "minimum": 0}]}),
+    WithJsonSchema({"anyOf": [{"enum": ["end", "always"]}, {"type": "number", "minimum": 0}, PHASE]}),
 ]
 Instant = Annotated[
     str | float,
     PlainValidator(checks.instant),
-    WithJsonSchema({"anyOf": [{"const": "end"}, {"type": "number", "minimum": 0}]}),
+    WithJsonSchema({"anyOf": [{"const": "end"}, {"type": "number", "minimum": 0}, PHASE]}),
 ]
 Inertia = Annotated[NestedList, PlainValidator(checks.inertia), WithJsonSchema(numbers_schema())]
 Texts = Annotated[

@@ -10,9 +10,9 @@ import numpy as np
 
 from symphys.expression import FormulaError, parse
 from symphys.problem.feedback import ForceLaw
-from symphys.problem.model import Variable
+from symphys.problem.model import Variable, VariableSlot
 from symphys.problem.quantities import Quantity, SlotError, read_slot
-from symphys.problem.reading.faults import Faults
+from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.control import ForceTable
 from symphys.suggest import quote
 
@@ -60,12 +60,14 @@ def _read(
     faults: Faults,
 ) -> ForceLaw | None:
     place = ("force", index)
-    inputs = {name: quantity for name, quantity in known.items() if quantity.kind == "control"}
-    try:
-        slot = read_slot(table.on, inputs)
-    except SlotError as error:
-        faults.add((*place, "on"), f"{error}; forces act on bodies and motors: ball.force, ball.torque, knee.command")
+    slot = _slot("on", table.on, known, place, faults)
+    against = None if table.against is None else _slot("against", table.against, known, place, faults)
+    if slot is None or (against is None and table.against is not None):
         return None
+    if against is not None:
+        fields = {part.name.rpartition(".")[2] for part in (slot, against)}
+        if len(fields) > 1 or len(slot.components) != len(against.components) or slot == against:
+            faults.add((*place, "against"), f"must be as {table.on}, but of another body or motor")
     try:
         formula = parse(table.value)
         value = ca.DM(formula.evaluate(sample))
@@ -86,4 +88,15 @@ def _read(
     elif not value.is_regular():
         faults.add((*place, "value"), "is not a finite number at the start of the guess")
     numbers = {key: known[f"{table.name}.{key}"].nominal for key in table.numbers}
-    return ForceLaw(table.name, slot.name, slot.components, formula, numbers)
+    opposite = None if against is None else (against.name, against.components)
+    return ForceLaw(table.name, slot.name, slot.components, formula, numbers, opposite)
+
+
+def _slot(key: str, text: str, known: Mapping[str, Quantity], place: Place, faults: Faults) -> VariableSlot | None:
+    """The input that a key names; None after a fault."""
+    inputs = {name: quantity for name, quantity in known.items() if quantity.kind == "control"}
+    try:
+        return read_slot(text, inputs)
+    except SlotError as error:
+        faults.add((*place, key), f"{error}; forces act on bodies and motors: ball.force, ball.torque, knee.command")
+        return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -12,11 +13,13 @@ from numpy.typing import NDArray
 
 from symphys.expression import Formula, FormulaError, parse
 from symphys.expression.units import unit_of
-from symphys.problem.model import Constraint, Cost, Output, Simulation, Target
+from symphys.problem.model import Constraint, Cost, Output, Phase, Simulation, Target
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema import Document
+from symphys.problem.schema.checks import OF_PHASE
 from symphys.problem.schema.objectives import ConstraintTable, CostTable, OutputTable, TargetTable
-from symphys.problem.tables.simulation import check_moment
+from symphys.problem.tables.simulation import check_moment, read_phases
+from symphys.suggest import hint, quote
 
 Array = NDArray[np.float64]
 
@@ -29,6 +32,7 @@ class Objectives:
     targets: tuple[Target, ...]
     constraints: tuple[Constraint, ...]
     outputs: tuple[Output, ...]
+    phases: tuple[Phase, ...] = ()
 
 
 def read_objectives(
@@ -44,6 +48,7 @@ def read_objectives(
     ``free``: whether a variable sets the duration.
     """
     reader = ObjectiveReader(simulation, sample, units, faults, free)
+    reader.phases = read_phases(document.phase, simulation, free, faults)
     costs = [reader.cost(index, table) for index, table in enumerate(document.cost)]
     targets = [reader.target(index, table) for index, table in enumerate(document.target)]
     constraints = [reader.constraint(index, table) for index, table in enumerate(document.constraint)]
@@ -53,6 +58,7 @@ def read_objectives(
         tuple(target for target in targets if target),
         tuple(constraint for constraint in constraints if constraint),
         tuple(output for output in outputs if output),
+        tuple(reader.phases.values()),
     )
 
 
@@ -72,13 +78,35 @@ class ObjectiveReader:
         self.sample = sample
         self.units = units
         self.faults, self.free = faults, free
+        self.phases: dict[str, Phase] = {}
 
-    def check_moment(self, at: str | float, place: Place) -> None:
-        """A time must be that of a step, whatever the duration."""
+    def moment(self, table: CostTable | ConstraintTable, place: Place) -> tuple[str | float, Phase | None]:
+        """When a formula is evaluated, and the phase in which it always is."""
+        if table.during is None:
+            return self.instant(table.at, place), None
+        if "at" in table.model_fields_set:
+            self.faults.add((*place, "during"), "stands instead of at; leave one of them out")
+        return "always", self.phase(table.during, (*place, "during"))
+
+    def phase(self, name: str, place: Place) -> Phase | None:
+        """The phase of that name; notes where there is none."""
+        if name not in self.phases:
+            known = hint(name, self.phases) if self.phases else "there is no [[phase]]"
+            self.faults.add(place, f"there is no phase {quote(name)}; {known}")
+        return self.phases.get(name)
+
+    def instant(self, at: str | float, place: Place) -> str | float:
+        """The end, or a time; that of a step, whatever the duration. "end of" a phase is a time as well."""
+        named = re.fullmatch(OF_PHASE, at) if isinstance(at, str) else None
+        if named:
+            phase = self.phase(named[2], (*place, "at"))
+            tick = 0 if phase is None else phase.ticks(self.simulation.steps)[named[1] == "end"]
+            return "end" if tick == self.simulation.steps else tick * self.simulation.dt
         check_moment(at, self.simulation, (*place, "at"), self.faults)
         if self.free and at not in ("end", "always", 0):
-            text = 'is no time of a step, since a variable sets the duration; take "end", "always" or 0'
+            text = 'is no time of a step, since a variable sets the duration; take "end", "always", 0, or a [[phase]]'
             self.faults.add((*place, "at"), text)
+        return at
 
     def formula(self, place: Place, text: str, at: str | float) -> tuple[Formula, int] | None:
         """The formula and the length of its value; notes why there is none."""
@@ -101,44 +129,44 @@ class ObjectiveReader:
     def cost(self, index: int, table: CostTable) -> Cost | None:
         """One cost."""
         place = ("cost", index)
-        self.check_moment(table.at, place)
+        at, during = self.moment(table, place)
         if (table.value is None) == (table.squares is None):
             self.faults.add((*place, "value"), "give either value (a number) or squares (a vector)")
             return None
         squares = table.squares is not None
         key = "squares" if squares else "value"
-        found = self.formula((*place, key), table.squares or table.value or "", table.at)
+        found = self.formula((*place, key), table.squares or table.value or "", at)
         if found and not squares and found[1] != 1:
             text = f"must be a number, but is a vector of {found[1]}; use squares instead of value, or sumsqr(...)"
             self.faults.add((*place, key), text)
         if squares and table.weight < 0:
             self.faults.add((*place, "weight"), "a sum of squares needs a weight of at least 0; use value to maximise")
-        return found and Cost(table.name, found[0], table.at, table.weight, squares)
+        return found and Cost(table.name, found[0], at, table.weight, squares, during)
 
     def target(self, index: int, table: TargetTable) -> Target | None:
         """One target."""
         place = ("target", index)
-        self.check_moment(table.at, place)
-        found = self.formula((*place, "value"), table.value, table.at)
+        at = self.instant(table.at, place)
+        found = self.formula((*place, "value"), table.value, at)
         if not found:
             return None
         unit = table.unit or unit_of(found[0], self.units)
-        return Target(table.name, found[0], table.at, table.tolerance, table.weight, unit)
+        return Target(table.name, found[0], at, table.tolerance, table.weight, unit)
 
     def output(self, index: int, table: OutputTable) -> Output | None:
         """One output."""
         place = ("output", index)
-        self.check_moment(table.at, place)
-        found = self.formula((*place, "value"), table.value, table.at)
+        at = self.instant(table.at, place)
+        found = self.formula((*place, "value"), table.value, at)
         if found and found[1] != 1:
             self.faults.add((*place, "value"), f"must be a number, but is a vector of {found[1]}; give one for each")
-        return found and Output(table.name, found[0], table.at, table.unit or "")
+        return found and Output(table.name, found[0], at, table.unit or "")
 
     def constraint(self, index: int, table: ConstraintTable) -> Constraint | None:
         """One constraint."""
         place = ("constraint", index)
-        self.check_moment(table.at, place)
-        found = self.formula((*place, "value"), table.value, table.at)
+        at, during = self.moment(table, place)
+        found = self.formula((*place, "value"), table.value, at)
         if table.equals is not None and (table.lower is not None or table.upper is not None):
             self.faults.add((*place, "equals"), "stands instead of lower and upper; leave them out")
         if table.equals is None and table.lower is None and table.upper is None:
@@ -150,7 +178,7 @@ class ObjectiveReader:
         if lower.shape == upper.shape and np.any(lower > upper):
             self.faults.add((*place, "lower"), "exceeds upper")
         unit = table.unit or unit_of(found[0], self.units)
-        return Constraint(table.name, found[0], table.at, lower, upper, table.tolerance, table.penalty, unit)
+        return Constraint(table.name, found[0], at, lower, upper, table.tolerance, table.penalty, unit, during)
 
     def bound(self, place: Place, table: ConstraintTable, key: str, default: float, length: int) -> Array:
         """(length,): one of the two bounds."""

@@ -1,11 +1,13 @@
-"""The [simulation] table."""
+"""The [simulation] table, and the [[phase]] tables that divide its duration."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import ceil, floor
 
-from symphys.problem.model import Simulation
+from symphys.problem.model import Phase, Simulation
 from symphys.problem.reading.faults import Faults, Place
+from symphys.problem.schema.objectives import PhaseTable
 from symphys.problem.schema.physics import SimulationTable
 
 MAX_STEPS = 1_000_000
@@ -50,3 +52,27 @@ def check_moment(at: str | float, simulation: Simulation, place: tuple[str | int
     if abs(step - round(step)) > 1e-6:
         near = [floor(step) * simulation.dt, ceil(step) * simulation.dt]
         faults.add(place, f"the time {at:g} s falls between two steps; nearest: {near[0]:.10g} or {near[1]:.10g} s")
+
+
+def read_phases(tables: Sequence[PhaseTable], simulation: Simulation, free: bool, faults: Faults) -> dict[str, Phase]:
+    """The phases by name; ``free``: whether a variable sets the duration, so that times are not known."""
+    found, start = dict[str, Phase](), 0.0
+    for index, table in enumerate(tables):
+        place = ("phase", index)
+        key = "share" if table.share is not None else "until"
+        if table.until is not None and table.share is not None:
+            faults.add((*place, "share"), "stands instead of until; leave one of them out")
+        elif table.until is not None and free:
+            faults.add((*place, "until"), "is not known, since a variable sets the duration; give share")
+        elif table.until is not None:
+            check_moment(table.until, simulation, (*place, "until"), faults)
+        elif table.share is None and index + 1 < len(tables):
+            faults.add((*place, "until"), "is needed, or share: only the last phase goes on until the end")
+        end = 1.0 if table.until is None else table.until / simulation.duration
+        phase = Phase(table.name, start, end if table.share is None else table.share)
+        first, last = phase.ticks(simulation.steps)
+        if last <= first:
+            ended = f"{first * simulation.dt:g} s" if key == "until" else f"{start:g}"
+            faults.add((*place, key), f"the phase before ends at {ended}, and one step more is the least")
+        found[table.name], start = phase, phase.end
+    return found

@@ -64,6 +64,7 @@ def _added(
             names[variable.name] = ca.vertcat(*(names[slot.name][k] for k in slot.components))
     for law in laws:
         value = law.formula.evaluate({name: names[name] for name in law.formula.names})
-        for k, component in enumerate(law.components):
-            total[columns[law.on].start + component] += value[k]
+        for name, components, sign in law.acts_on:
+            for k, component in enumerate(components):
+                total[columns[name].start + component] += sign * value[k]
     return total

@@ -128,10 +128,12 @@ def _instants(rollout: Rollout) -> Iterator[tuple[str, Asked, Formula, int, int]
             k = rollout.tick(asked.at)
             yield kind, asked, formula, k, min(k, steps - 1)
             continue
+        during = asked.during if isinstance(asked, Cost | Constraint) else None
+        first, last = (0, steps) if during is None else during.ticks(steps)
         if kind == "cost":
-            yield from ((kind, asked, formula, k, k) for k in range(steps))
+            yield from ((kind, asked, formula, k, k) for k in range(first, last))
         if kind == "constraint" or rollout.moves(formula):
-            yield from ((kind, asked, formula, k, k - 1) for k in range(1, steps + 1))
+            yield from ((kind, asked, formula, k, k - 1) for k in range(first + 1, last + 1))
 
 
 def _formula_arguments(rollout: Rollout, arrays: RolloutArrays, formula: Formula, k: int, row: int) -> list[Array]:

@@ -189,6 +189,11 @@ def refuse_motion_parts(problem: Problem) -> None:
         for each in every
         if each.formula.parts
     ]
+    issues += [
+        Issue(f'cost "{cost.name}".during', f"{quote(cost.during.name)} is a phase of a whole motion; this is one step")
+        for cost in problem.costs
+        if cost.during is not None
+    ]
     if issues:
         raise ProblemError(problem.file, issues)
 

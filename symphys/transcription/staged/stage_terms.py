@@ -137,8 +137,8 @@ def stage_terms(rollout: Rollout, statics: Indices) -> list[StageTerm]:
 
 def _terms(rollout: Rollout, statics: Indices) -> Iterator[StageTerm]:
     problem, steps, dt = rollout.problem, rollout.steps, rollout.dt
-    every = np.arange(steps)
     for cost in problem.costs:
+        every = np.arange(*(cost.during.ticks(steps) if cost.during else (0, steps)))
         kind: Literal["cost", "squares"] = "squares" if cost.squares else "cost"
         if cost.at != "always":
             yield _term(rollout, statics, cost.name, kind, cost.weight, cost.formula, *_instant(rollout, cost.at))
@@ -151,6 +151,7 @@ def _terms(rollout: Rollout, statics: Indices) -> Iterator[StageTerm]:
         ticks = _instant(rollout, target.at)
         yield _term(rollout, statics, target.name, "squares", target.weight, target.formula, *ticks)
     for limit in problem.constraints:
+        every = np.arange(*(limit.during.ticks(steps) if limit.during else (0, steps)))
         always = limit.at == "always"
         ticks = (every + 1, every) if always else _instant(rollout, limit.at)
         weight = limit.penalty * (dt if always else 1.0)

@@ -53,9 +53,16 @@ at = "always"
 squares = "rail.command * time"
 weight = 0.001
 
+[[phase]]
+name = "first"
+share = 0.4
+
+[[phase]]
+name = "then"
+
 [[cost]]
 name = "power"
-at = "always"
+during = "then"
 squares = "0.1 * rail.command * rail.rate"
 
 [[cost]]
@@ -70,7 +77,7 @@ tolerance = 0.1
 
 [[constraint]]
 name = "slow"
-at = "always"
+during = "then"
 value = "[rail.rate, rail.command / 10]"
 lower = [-1, -0.1]
 upper = [0.35, 0.55]

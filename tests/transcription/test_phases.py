@@ -1,0 +1,117 @@
+"""Phases: costs and constraints of a stretch of the motion, instants at its ends; what cannot be is said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from symphys.codegen import compile_program, interpret
+from symphys.errors import ProblemError, SymphysError
+from symphys.problem import problem_of_tables
+from symphys.transcription import rollout_program, transcribe
+from symphys.transcription.open_step import compile_open_step
+
+TABLES: dict[str, Any] = {
+    "simulation": {"duration": 0.5, "dt": 0.01},
+    "body": [{"name": "ball", "shape": {"sphere": {"radius": 0.1}}, "mass": 0.5, "position": [0, 0, 1]}],
+    "phase": [{"name": "push", "until": 0.2}, {"name": "short", "share": 0.5}, {"name": "flight"}],
+    "variable": [
+        {"name": "throw", "sets": "ball.velocity", "guess": [1, 0.5, 0.2]},
+        {"name": "force", "sets": "ball.force[0]", "knots": 50, "guess": 1},
+    ],
+    "cost": [
+        {"name": "push", "during": "push", "squares": "[ball.velocity, ball.force[0]]"},
+        {"name": "short", "during": "short", "squares": "[ball.velocity, ball.force[0]]"},
+        {"name": "flight", "during": "flight", "squares": "[ball.velocity, ball.force[0]]"},
+        {"name": "all", "at": "always", "squares": "[ball.velocity, ball.force[0]]"},
+    ],
+    "target": [{"name": "take off", "at": "end of push", "value": "ball.position", "tolerance": 0.01}],
+    "constraint": [{"name": "high", "during": "short", "value": "ball.position[2]", "lower": 0.99}],
+    "output": [
+        {"name": "from", "at": "start of short", "value": "time"},
+        {"name": "to", "at": "end of short", "value": "time"},
+        {"name": "last", "at": "end of flight", "value": "time"},
+    ],
+}
+
+
+def test_phases_add_up_and_begin_and_end_where_they_say() -> None:
+    made = transcribe(problem_of_tables(TABLES), backend="casadi")
+    z = made.shooting.start(0)
+    judged, motion = made.judge(z), made.simulate(z)
+    costs = judged.costs
+    assert costs["push"] + costs["short"] + costs["flight"] == pytest.approx(costs["all"], rel=1e-13)
+    squares = (motion.velocity[:, 0] ** 2).sum(axis=1)
+    inside = 0.01 * ((squares[20:25] + squares[21:26]).sum() / 2 + 5)
+    assert costs["short"] == pytest.approx(inside, rel=1e-12)
+    assert list(judged.outputs.values()) == pytest.approx([0.2, 0.25, 0.5], rel=1e-12)
+    take_off, high = judged.checks
+    assert take_off.error == pytest.approx(np.linalg.norm(motion.position[20, 0]), rel=1e-12)
+    assert high.error == pytest.approx(0.99 - motion.position[21:26, 0, 2].min(), rel=1e-12)
+    assert made.shooting.constraint_lower.size == 5
+
+
+def test_the_kernel_agrees_and_slopes_are_those_of_differences() -> None:
+    made = transcribe(problem_of_tables(TABLES), backend="casadi")
+    z, h = made.shooting.start(1), 1e-6
+    merit, *_, slope, _ = (np.array(part).ravel() for part in made.functions.gradient(z, 0.0))
+    value = made.functions.value
+    differences = [(float(value(z + e, 0.0)[0]) - float(value(z - e, 0.0)[0])) / (2 * h) for e in h * np.eye(z.size)]
+    assert slope == pytest.approx(differences, rel=1e-6, abs=1e-6)
+    program = rollout_program(made.rollout)
+    assert interpret(program, z, [0.0])["merit"] == pytest.approx(merit, rel=1e-12)
+    outputs, gradient = compile_program(program, seeded=("merit",), threads=1).gradient(z, [1.0], [0.0])
+    assert outputs["merit"][0] == pytest.approx(merit, rel=1e-12)
+    assert gradient[0] == pytest.approx(slope, rel=1e-9)
+
+
+def test_phases_are_the_same_on_a_finer_grid_and_scale_with_a_free_duration() -> None:
+    problem = problem_of_tables(TABLES)
+    finer = replace(problem, simulation=replace(problem.simulation, dt=0.005))
+    made = transcribe(finer, backend="casadi")
+    assert list(made.judge(made.shooting.start(0)).outputs.values()) == pytest.approx([0.2, 0.25, 0.5])
+    shares = [{"name": "push", "share": 0.4}, {"name": "short", "share": 0.5}, {"name": "flight"}]
+    free = {"name": "T", "sets": "simulation.duration", "guess": 1.0}
+    tables = {**TABLES, "phase": shares, "variable": [*TABLES["variable"], free]}
+    made = transcribe(problem_of_tables(tables), backend="casadi")
+    judged = made.judge(made.shooting.start(0))
+    assert list(judged.outputs.values()) == pytest.approx([0.4, 0.5, 1.0])
+    costs = judged.costs
+    assert costs["push"] + costs["short"] + costs["flight"] == pytest.approx(costs["all"], rel=1e-13)
+
+
+FREE = {"name": "T", "sets": "simulation.duration"}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            {"output": [{"name": "o", "at": "end of flght", "value": "time"}]},
+            r'"o".at: there is no phase "flght"; did',
+        ),
+        ({"cost": [{"name": "c", "during": "fligt", "value": "time"}]}, r'"c".during: .*did you mean "flight"'),
+        ({"cost": [{"name": "c", "during": "push", "at": "always", "value": "time"}]}, r"stands instead of at"),
+        ({"cost": [{"name": "c", "during": "push", "value": "end.time"}]}, r"is of the whole motion"),
+        ({"phase": [{"name": "push"}, {"name": "short"}, {"name": "flight"}]}, r'phase "push".until: is needed'),
+        ({"phase": [{"name": "push", "until": 0.2, "share": 0.2}]}, r"stands instead of until"),
+        ({"phase": [{"name": "push", "until": 0.205}]}, r"falls between two steps"),
+        (
+            {"phase": [{"name": "push", "until": 0.3}, {"name": "short", "until": 0.2}]},
+            r'"short".until: the phase before',
+        ),
+        ({"phase": []}, r"there is no \[\[phase\]\]"),
+        ({"variable": [FREE]}, r'"push".until: is not known, since a variable sets the duration; give share'),
+    ],
+)
+def test_what_cannot_be_names_table_and_key(change: dict[str, Any], message: str) -> None:
+    with pytest.raises(ProblemError, match=message):
+        problem_of_tables({**TABLES, **change})
+
+
+def test_a_single_step_has_no_phases() -> None:
+    with pytest.raises(SymphysError, match="is a phase of a whole motion; this is one step"):
+        compile_open_step(problem_of_tables(TABLES), backend="casadi")
