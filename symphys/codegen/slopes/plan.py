@@ -56,6 +56,7 @@ class SlopePlan:
         forward: table entries of all calls.
         blocks: of rows.
         tape: words after the program's own.
+        read: what adjoints read of all these, as (first, count), one after the other in the memory of one point.
         adjoints: words of the adjoint memory.
         seeds: (rows,) the word of the adjoint memory of each row.
         result: where the adjoint of z begins.
@@ -65,6 +66,7 @@ class SlopePlan:
     forward: list[list[int]]
     blocks: list[RowBlock]
     tape: int
+    read: list[tuple[int, int]]
     adjoints: int
     seeds: list[int]
     result: int
@@ -116,7 +118,8 @@ def slope_plan(program: Program, output: str, lanes: int) -> SlopePlan:
     forward = [_push(reach.call, pull, functions) for reach, pull in zip(reaches, pulls, strict=True)]
     backward = [pull for pull in reversed(pulls) if pull]
     places = AdjointPlaces(program, target, backward)
-    entries = [_entry(pull, places, functions) for pull in backward]
+    values = PointPlaces()
+    entries = [_entry(pull, places, values, functions) for pull in backward]
     blocks = []
     for rows, taken in row_blocks(program, target, backward, lanes, functions):
         mine = [i for i, on in enumerate(taken) if on]
@@ -124,7 +127,9 @@ def slope_plan(program: Program, output: str, lanes: int) -> SlopePlan:
         blocks.append(RowBlock(rows, [entries[i] for i in mine], [(places.of(place), place.size) for place in left]))
     seeds = [places.static[target.offset + row] for row in range(target.size)]
     result = places.static[program.z.offset] if program.z.size else 0
-    return SlopePlan(tuple(functions.listed), forward, blocks, end - program.size, places.size, seeds, result)
+    return SlopePlan(
+        tuple(functions.listed), forward, blocks, end - program.size, values.read, places.size, seeds, result
+    )
 
 
 def _left(program: Program, pulls: Sequence[_Pull]) -> list[Place]:
@@ -166,13 +171,34 @@ def _push(call: FunctionCall, pull: _Pull | None, functions: DistinctFunctions) 
     return functions.entry(pull.taped.forward, form, [*places, pull.tape])
 
 
-def _entry(pull: _Pull, places: AdjointPlaces, functions: DistinctFunctions) -> list[int]:
+def _entry(pull: _Pull, places: AdjointPlaces, values: PointPlaces, functions: DistinctFunctions) -> list[int]:
     call, taped = pull.reach.call, pull.taped
-    primal = [*call.inputs, *([pull.tape] if taped else [])]
+    used = functions.arguments(taped.adjoint if taped else pull.graph)
+    whole = enumerate([*call.inputs, *([pull.tape] if taped else [])])
+    primal = [Place(values.of(place) if i in used else 0, place.size) for i, place in whole]
     form = Form(primal=len(primal), adds=True, backward=True, clears=True, shared=True)
     marked = [*pull.marked("outputs"), *pull.marked("inputs")]
     adjoints = [Place(places.of(place), place.size) for place in marked]
-    return functions.entry(taped.adjoint if taped else pull.graph, form, [*map(Place.still, primal), *adjoints])
+    return functions.entry(taped.adjoint if taped else pull.graph, form, [*primal, *adjoints])
+
+
+class PointPlaces:
+    """Where the values of one point lie that adjoints read: in the order in which they read them."""
+
+    def __init__(self) -> None:
+        """Nothing is read yet."""
+        self.read: list[tuple[int, int]] = []
+        self._found: dict[tuple[int, int], int] = {}
+        self._size = 0
+
+    def of(self, place: Place) -> int:
+        """The first word of a place."""
+        key = place.offset, place.size
+        if key not in self._found:
+            self._found[key] = self._size
+            self._size += place.size
+            self.read.append(key)
+        return self._found[key]
 
 
 class AdjointPlaces:
