@@ -22,6 +22,7 @@ from symphys.codegen.graph.adjoint import Mask
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.rewrite import Taped
 from symphys.codegen.program.program import FunctionCall, Place, Program
+from symphys.codegen.slopes.merging import merged
 
 Flags = NDArray[np.bool_]
 Words = NDArray[np.int64]
@@ -105,11 +106,8 @@ def slope_plan(program: Program, output: str, lanes: int) -> SlopePlan:
     if program.steps != 1 or any(call.accumulate for call in program.calls):
         raise ProgramError("slopes are of programs of one step, whose calls add to nothing")
     functions, target = DistinctFunctions(), program.outputs[output]
-    phases = [
-        [_reach(call, functions) for call in calls] for calls in (program.prologue, program.body, program.epilogue)
-    ]
-    activity = Activity(program, phases, [target])
-    reaches = [reach for phase in phases for reach in phase]
+    reaches = [_reach(call, functions) for call in merged(program)]
+    activity = Activity(program, [reaches, [], []], [target])
     pulls, end = list[_Pull | None](), program.size
     for reach in reaches:
         pull = _pull(reach, activity, functions, end)
