@@ -21,15 +21,15 @@ from symphys.codegen.graph.activity import Activity, CallActivity
 from symphys.codegen.graph.adjoint import Mask
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.rewrite import Taped
-from symphys.codegen.program.program import FunctionCall, Place, Program
+from symphys.codegen.program.program import Function, FunctionCall, Place, Program
 from symphys.codegen.slopes.merging import merged
 
 Flags = NDArray[np.bool_]
 Words = NDArray[np.int64]
 TABLED = 1.5
 """Operations of products with slopes on the tape that take as long as one of other adjoints, which store more."""
-LARGEST = 4000
-"""Slopes of a call beyond which they are not put on the tape."""
+LARGEST = 6000
+"""Slopes of a call beyond which it is not asked whether a table of them is less."""
 
 
 @dataclass(frozen=True)
@@ -108,9 +108,9 @@ def slope_plan(program: Program, output: str, lanes: int) -> SlopePlan:
     functions, target = DistinctFunctions(), program.outputs[output]
     reaches = [_reach(call, functions) for call in merged(program)]
     activity = Activity(program, [reaches, [], []], [target])
-    pulls, end = list[_Pull | None](), program.size
+    pulls, end, known = list[_Pull | None](), program.size, dict[tuple[int, Mask, Mask], tuple[Graph, Taped | None]]()
     for reach in reaches:
-        pull = _pull(reach, activity, functions, end)
+        pull = _pull(reach, activity, functions, end, known)
         end += pull.tape.size if pull else 0
         pulls.append(pull)
     forward = [_push(reach.call, pull, functions) for reach, pull in zip(reaches, pulls, strict=True)]
@@ -146,19 +146,36 @@ def _reach(call: FunctionCall, functions: DistinctFunctions) -> CallActivity:
     return CallActivity(call, inputs, outputs, functions.dependence(call.function))
 
 
-def _pull(reach: CallActivity, activity: Activity, functions: DistinctFunctions, end: int) -> _Pull | None:
-    inputs, outputs = activity.marks(reach.inputs), activity.marks(reach.outputs)
-    if not any(inputs) or not any(outputs):
-        return None
-    function = reach.call.function
+def _cheaper(
+    function: Function, inputs: Mask, outputs: Mask, functions: DistinctFunctions
+) -> tuple[Graph, Taped | None]:
+    """The adjoint that takes less for a block of rows: the function's own, or products with a table of its slopes."""
     forward = functions.forward(function)
     graph = functions.adjoint(function, inputs, outputs)
     taped = functions.taped(forward, graph)
+    if _sparsity(forward).sum() > LARGEST:
+        return graph, taped
     table = functions.adjoint(function, inputs, outputs, tabled=True)
-    if table is not graph:
-        other = functions.taped(forward, table)
-        if operations(table, other) < TABLED * operations(graph, taped):
-            graph, taped = table, other
+    other = functions.taped(forward, table)
+    less = operations(table, other) < TABLED * operations(graph, taped)
+    return (table, other) if less else (graph, taped)
+
+
+def _pull(
+    reach: CallActivity,
+    activity: Activity,
+    functions: DistinctFunctions,
+    end: int,
+    known: dict[tuple[int, Mask, Mask], tuple[Graph, Taped | None]],
+) -> _Pull | None:
+    """The adjoint of a call, with its tape at ``end``; None if nothing that matters goes through it."""
+    inputs, outputs = activity.marks(reach.inputs), activity.marks(reach.outputs)
+    if not any(inputs) or not any(outputs):
+        return None
+    key = id(functions.forward(reach.call.function)), inputs, outputs
+    if key not in known:
+        known[key] = _cheaper(reach.call.function, inputs, outputs, functions)
+    graph, taped = known[key]
     return _Pull(reach, graph, inputs, outputs, taped, Place(end, taped.size if taped else 0))
 
 
