@@ -11,6 +11,8 @@ typedef struct {
   const word *entries;
   word blocks;
   const block *rows;
+  word kept, reads; /* words of one point that adjoints read, and where they come from: (first, count) */
+  const word *read;
 } slopes;
 typedef struct { word points; const double *z, *parameters; word shared, columns; double *jacobian; } points;
 
@@ -26,11 +28,17 @@ static void gather(V *to, word size, const double *from, word stride, word first
   }
 }
 
-/* Memory: size + tape vectors of values; as many numbers of one point; adjoints. */
+/* What adjoints read, point by point. */
+static void part(const slopes *p, const V *m, R *s) {
+  for (word i = 0, j = 0; i < p->reads; i++)
+    for (word w = p->read[2 * i]; w < p->read[2 * i] + p->read[2 * i + 1]; w++, j++)
+      for (word l = 0; l < LANES; l++) s[l * p->kept + j] = LANE(m[w], l);
+}
+
+/* Memory: size + tape vectors of values; kept numbers of each point; adjoints. */
 API void jacobians(const slopes *p, const points *x, V *m) {
-  const word kept = p->size + p->tape;
-  R *s = (R *)(m + kept);
-  V *b = m + kept + (kept + LANES - 1) / LANES;
+  R *values = (R *)(m + p->size + p->tape);
+  V *b = m + p->size + p->tape + p->kept;
   memset(m, 0, sizeof(V) * p->size);
   memset(b, 0, sizeof(V) * p->adjoints);
   for (word first = 0; first < x->points; first += LANES) {
@@ -38,14 +46,15 @@ API void jacobians(const slopes *p, const points *x, V *m) {
     gather(m + p->z, p->z_size, x->z, p->z_size, first, count);
     gather(m + p->parameters, p->parameters_size, x->parameters, x->shared ? 0 : p->parameters_size, first, count);
     run(p->entries, p->calls, m, 0);
+    part(p, m, values);
     for (word l = 0; l < count; l++) {
+      V *s = (V *)(values + l * p->kept);
       double *to = x->jacobian + (first + l) * p->height * x->columns;
-      for (word j = 0; j < kept; j++) s[j] = LANE(m[j], l);
       for (word i = 0; i < p->blocks; i++) {
         const block *rows = p->rows + i;
         for (word r = 0; r < LANES; r++)
           if (rows->rows[r] >= 0) LANE(b[p->seeds[rows->rows[r]]], r) = (R)1;
-        run(rows->entries, rows->count, (V *)s, b);
+        run(rows->entries, rows->count, s, b);
         for (word j = 0; j < x->columns; j++) {
           const V found = b[p->result + j];
           for (word r = 0; r < LANES; r++)

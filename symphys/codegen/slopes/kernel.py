@@ -46,6 +46,8 @@ class _Slopes(ctypes.Structure):
         ("entries", POINTER),
         ("blocks", WORD),
         ("rows", POINTER),
+        *((name, WORD) for name in ("kept", "reads")),
+        ("read", POINTER),
     )
 
 
@@ -71,8 +73,8 @@ class SlopeKernel:
         self._evaluate.argtypes, self._evaluate.restype = (POINTER, POINTER, POINTER), None
         self._kept: list[Any] = []
         self._data = self._slopes(planned, report.lanes)
-        kept = program.size + planned.tape
-        self._pool = MemoryPool(kept + -(-kept // report.lanes) + planned.adjoints, report.lanes, np.float64)
+        words = program.size + planned.tape + self._data.kept + planned.adjoints
+        self._pool = MemoryPool(words, report.lanes, np.float64)
 
     def jacobians(self, Z: ArrayLike, parameters: ArrayLike, columns: int | None = None) -> Array:
         """(B, n) and (B, p), or (p,) for all points -> (B, outputs, columns): by the first of z; None: by all."""
@@ -118,6 +120,9 @@ class SlopeKernel:
             self._flat(planned.forward),
             len(planned.blocks),
             ctypes.addressof(blocks),
+            sum(count for _, count in planned.read),
+            len(planned.read),
+            self._flat(planned.read),
         )
 
     def _flat(self, entries: Sequence[Sequence[int]]) -> int:

@@ -21,14 +21,15 @@ from symphys.codegen.graph.activity import Activity, CallActivity
 from symphys.codegen.graph.adjoint import Mask
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.rewrite import Taped
-from symphys.codegen.program.program import FunctionCall, Place, Program
+from symphys.codegen.program.program import Function, FunctionCall, Place, Program
+from symphys.codegen.slopes.merging import merged
 
 Flags = NDArray[np.bool_]
 Words = NDArray[np.int64]
 TABLED = 1.5
 """Operations of products with slopes on the tape that take as long as one of other adjoints, which store more."""
-LARGEST = 4000
-"""Slopes of a call beyond which they are not put on the tape."""
+LARGEST = 6000
+"""Slopes of a call beyond which it is not asked whether a table of them is less."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,7 @@ class SlopePlan:
         forward: table entries of all calls.
         blocks: of rows.
         tape: words after the program's own.
+        read: what adjoints read of all these, as (first, count), one after the other in the memory of one point.
         adjoints: words of the adjoint memory.
         seeds: (rows,) the word of the adjoint memory of each row.
         result: where the adjoint of z begins.
@@ -65,6 +67,7 @@ class SlopePlan:
     forward: list[list[int]]
     blocks: list[RowBlock]
     tape: int
+    read: list[tuple[int, int]]
     adjoints: int
     seeds: list[int]
     result: int
@@ -103,20 +106,18 @@ def slope_plan(program: Program, output: str, lanes: int) -> SlopePlan:
     if program.steps != 1 or any(call.accumulate for call in program.calls):
         raise ProgramError("slopes are of programs of one step, whose calls add to nothing")
     functions, target = DistinctFunctions(), program.outputs[output]
-    phases = [
-        [_reach(call, functions) for call in calls] for calls in (program.prologue, program.body, program.epilogue)
-    ]
-    activity = Activity(program, phases, [target])
-    reaches = [reach for phase in phases for reach in phase]
-    pulls, end = list[_Pull | None](), program.size
+    reaches = [_reach(call, functions) for call in merged(program)]
+    activity = Activity(program, [reaches, [], []], [target])
+    pulls, end, known = list[_Pull | None](), program.size, dict[tuple[int, Mask, Mask], tuple[Graph, Taped | None]]()
     for reach in reaches:
-        pull = _pull(reach, activity, functions, end)
+        pull = _pull(reach, activity, functions, end, known)
         end += pull.tape.size if pull else 0
         pulls.append(pull)
     forward = [_push(reach.call, pull, functions) for reach, pull in zip(reaches, pulls, strict=True)]
     backward = [pull for pull in reversed(pulls) if pull]
     places = AdjointPlaces(program, target, backward)
-    entries = [_entry(pull, places, functions) for pull in backward]
+    values = PointPlaces()
+    entries = [_entry(pull, places, values, functions) for pull in backward]
     blocks = []
     for rows, taken in row_blocks(program, target, backward, lanes, functions):
         mine = [i for i, on in enumerate(taken) if on]
@@ -124,7 +125,9 @@ def slope_plan(program: Program, output: str, lanes: int) -> SlopePlan:
         blocks.append(RowBlock(rows, [entries[i] for i in mine], [(places.of(place), place.size) for place in left]))
     seeds = [places.static[target.offset + row] for row in range(target.size)]
     result = places.static[program.z.offset] if program.z.size else 0
-    return SlopePlan(tuple(functions.listed), forward, blocks, end - program.size, places.size, seeds, result)
+    return SlopePlan(
+        tuple(functions.listed), forward, blocks, end - program.size, values.read, places.size, seeds, result
+    )
 
 
 def _left(program: Program, pulls: Sequence[_Pull]) -> list[Place]:
@@ -143,19 +146,36 @@ def _reach(call: FunctionCall, functions: DistinctFunctions) -> CallActivity:
     return CallActivity(call, inputs, outputs, functions.dependence(call.function))
 
 
-def _pull(reach: CallActivity, activity: Activity, functions: DistinctFunctions, end: int) -> _Pull | None:
-    inputs, outputs = activity.marks(reach.inputs), activity.marks(reach.outputs)
-    if not any(inputs) or not any(outputs):
-        return None
-    function = reach.call.function
+def _cheaper(
+    function: Function, inputs: Mask, outputs: Mask, functions: DistinctFunctions
+) -> tuple[Graph, Taped | None]:
+    """The adjoint that takes less for a block of rows: the function's own, or products with a table of its slopes."""
     forward = functions.forward(function)
     graph = functions.adjoint(function, inputs, outputs)
     taped = functions.taped(forward, graph)
+    if _sparsity(forward).sum() > LARGEST:
+        return graph, taped
     table = functions.adjoint(function, inputs, outputs, tabled=True)
-    if table is not graph:
-        other = functions.taped(forward, table)
-        if operations(table, other) < TABLED * operations(graph, taped):
-            graph, taped = table, other
+    other = functions.taped(forward, table)
+    less = operations(table, other) < TABLED * operations(graph, taped)
+    return (table, other) if less else (graph, taped)
+
+
+def _pull(
+    reach: CallActivity,
+    activity: Activity,
+    functions: DistinctFunctions,
+    end: int,
+    known: dict[tuple[int, Mask, Mask], tuple[Graph, Taped | None]],
+) -> _Pull | None:
+    """The adjoint of a call, with its tape at ``end``; None if nothing that matters goes through it."""
+    inputs, outputs = activity.marks(reach.inputs), activity.marks(reach.outputs)
+    if not any(inputs) or not any(outputs):
+        return None
+    key = id(functions.forward(reach.call.function)), inputs, outputs
+    if key not in known:
+        known[key] = _cheaper(reach.call.function, inputs, outputs, functions)
+    graph, taped = known[key]
     return _Pull(reach, graph, inputs, outputs, taped, Place(end, taped.size if taped else 0))
 
 
@@ -166,13 +186,34 @@ def _push(call: FunctionCall, pull: _Pull | None, functions: DistinctFunctions) 
     return functions.entry(pull.taped.forward, form, [*places, pull.tape])
 
 
-def _entry(pull: _Pull, places: AdjointPlaces, functions: DistinctFunctions) -> list[int]:
+def _entry(pull: _Pull, places: AdjointPlaces, values: PointPlaces, functions: DistinctFunctions) -> list[int]:
     call, taped = pull.reach.call, pull.taped
-    primal = [*call.inputs, *([pull.tape] if taped else [])]
+    used = functions.arguments(taped.adjoint if taped else pull.graph)
+    whole = enumerate([*call.inputs, *([pull.tape] if taped else [])])
+    primal = [Place(values.of(place) if i in used else 0, place.size) for i, place in whole]
     form = Form(primal=len(primal), adds=True, backward=True, clears=True, shared=True)
     marked = [*pull.marked("outputs"), *pull.marked("inputs")]
     adjoints = [Place(places.of(place), place.size) for place in marked]
-    return functions.entry(taped.adjoint if taped else pull.graph, form, [*map(Place.still, primal), *adjoints])
+    return functions.entry(taped.adjoint if taped else pull.graph, form, [*primal, *adjoints])
+
+
+class PointPlaces:
+    """Where the values of one point lie that adjoints read: in the order in which they read them."""
+
+    def __init__(self) -> None:
+        """Nothing is read yet."""
+        self.read: list[tuple[int, int]] = []
+        self._found: dict[tuple[int, int], int] = {}
+        self._size = 0
+
+    def of(self, place: Place) -> int:
+        """The first word of a place."""
+        key = place.offset, place.size
+        if key not in self._found:
+            self._found[key] = self._size
+            self._size += place.size
+            self.read.append(key)
+        return self._found[key]
 
 
 class AdjointPlaces:

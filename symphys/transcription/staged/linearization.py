@@ -40,7 +40,7 @@ class Linearization:
     def motion(self, z: ArrayLike, smoothing: float) -> StagedMotion:
         """The motion of z (len(z),)."""
         given = np.asarray(z, float)
-        x0, u, p = self._begun(given)
+        x0, u, p = self.begun(given)
         states = [x0]
         for k in range(self.rollout.steps):
             states.append(self.step.step(k, states[-1][None], u[None, k], p, smoothing)[0])
@@ -52,7 +52,7 @@ class Linearization:
         What the static entries do to the first state beside its tangent, such as the velocity of one body of a robot,
         is part of the first of ``c``: with it sums over the steps are exact.
         """
-        _, u, p = self._begun(motion.z)
+        _, u, p = self.begun(motion.z)
         a, b, by_p = self.step.slopes(motion.x[:-1], u, p, motion.smoothing, motion.x[1:])
         first, parameters = (np.array(ca.DM(part)) for part in self._start_slopes(motion.z))
         x0 = motion.x[0]
@@ -64,7 +64,7 @@ class Linearization:
             c[0] += self.step.beside(x0, u[0], p, motion.smoothing) @ left
         return Linearized(a, b, c, start)
 
-    def _begun(self, z: Array) -> tuple[Array, Array, Array]:
+    def begun(self, z: Array) -> tuple[Array, Array, Array]:
         """First state (nx,), inputs (N, m) and p (np,)."""
         x0, u, p = (np.array(part) for part in self._start.call([z]))
         return x0.ravel(), np.ascontiguousarray(u.T), p.ravel()

@@ -49,7 +49,7 @@ class LinearizedStep:
 
     def step(self, k: int | NDArray[np.int64], X: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float) -> Array:
         """(B, nx), (B, m), (B, np) or (np,) -> (B, nx): states after step ``k``, or after steps k (B,)."""
-        varying, given = self._rows(k, X, X, U, P, smoothing)
+        varying, given = self.rows(k, X, X, U, P, smoothing)
         return self._step.values(varying, given)
 
     def slopes(
@@ -64,7 +64,7 @@ class LinearizedStep:
         k = np.arange(len(states))
         if after is None:
             after = self.step(k, states, U, P, smoothing)
-        varying, given = self._rows(k, states, after, U, P, smoothing)
+        varying, given = self.rows(k, states, after, U, P, smoothing)
         _, n, m, np_ = self.arguments.sizes
         a, b, varied = np.split(self._off.jacobians(varying, given, n + m + len(self.arguments.varied)), [n, n + m], 2)
         if not varied.shape[2]:
@@ -76,10 +76,13 @@ class LinearizedStep:
     def beside(self, x: Array, u: Array, p: Array, smoothing: float) -> Array:
         """(n, nx): the slope of step 0 by each number of a state (nx,), on its tangent or not."""
         after = self.step(0, x[None], u[None], p, smoothing)
-        varying, given = self._rows(0, x[None], after, u[None], p, smoothing)
+        varying, given = self.rows(0, x[None], after, u[None], p, smoothing)
         return self._off.jacobians(varying, given, varying.shape[1])[0, :, -self.arguments.sizes[0] :]
 
-    def _rows(self, k: Any, X: ArrayLike, after: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float) -> Any:
+    def rows(
+        self, k: Any, X: ArrayLike, after: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float
+    ) -> tuple[Array, Array]:
+        """What varies and what is given, a row a state; see ``StepArguments``."""
         x, aim, u, p = (np.atleast_2d(np.asarray(each, float)) for each in (X, after, U, P))
         count, (_, n, m, np_) = len(x), self.arguments.sizes
         p = np.broadcast_to(p, (count, np_))

@@ -82,7 +82,7 @@ class StepArguments:
         return ca.vertcat(varied, kept)[order.tolist()]
 
 
-class StepPlaces:
+class TangentStepPlaces:
     """Where a program keeps one step; see ``Places``."""
 
     def __init__(self, arguments: StepArguments) -> None:
@@ -103,7 +103,7 @@ def step_program(arguments: StepArguments, exact: bool, tangent: bool) -> Progra
     begins at x to the last bit: only the slopes by d are those of retract. ``off`` (n,) has the slopes of how far the
     state after the step is from the one that is given. Without ``tangent`` d and e are left out of the step.
     """
-    places = StepPlaces(arguments)
+    places = TangentStepPlaces(arguments)
     body = [*control_calls(arguments.rollout, places), *step_calls(places, exact)]
     after, outputs, epilogue = places.x.later().still(), dict[str, Place](), tuple[FunctionCall, ...]()
     if tangent:

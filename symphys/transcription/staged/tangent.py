@@ -245,8 +245,8 @@ class Tangent:
                 self._put(new, i, POSES, moved[i])
                 both = [value + more for value, more in zip(after[i], off, strict=True)]
                 self._put(new, i, VELOCITIES, (both[0], both[1]))
-        for body, before, after in zip(self.rollout.world.bodies, self._given(old), self._given(new), strict=True):
-            for (field, _), a, b in zip(REACTIONS, before, after, strict=True):
+        for body, first, second in zip(self.rollout.world.bodies, self._given(old), self._given(new), strict=True):
+            for (field, _), a, b in zip(REACTIONS, first, second, strict=True):
                 new[f"{body.name}.{field}"] = known(old[f"{body.name}.{field}"] - a) + b
         return kept, self._layout.pack(new)
 

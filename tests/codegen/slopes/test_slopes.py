@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import casadi as ca
 import numpy as np
 import pytest
 
 from symphys.codegen import FunctionCall, MemoryLayout, Program, ProgramError
-from symphys.codegen.slopes import SlopeKernel, compile_slopes
+from symphys.codegen.slopes import SlopeKernel, compile_slopes, merging
 from symphys.codegen.slopes.plan import slope_plan
 
 SIZE, ROWS = 5, 11
@@ -50,6 +51,24 @@ def test_jacobians_are_casadis(kernel: SlopeKernel) -> None:
     assert np.array_equal(kernel.jacobians(Z[:3], A[:3]), found[:3])
     assert np.array_equal(kernel.jacobians(Z, A[0])[0], found[0])
     assert kernel.jacobians(Z[:0], A[:0]).shape == (0, ROWS, SIZE)
+
+
+def test_calls_that_follow_each_other_are_merged(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Six steps of a pendulum: calls of four and of two, with the same Jacobian."""
+    monkeypatch.setattr(merging, "SMALLEST", 0)
+    y, a = ca.SX.sym("y", 2), ca.SX.sym("a")
+    swing = ca.Function("swing", [y, a], [y + 0.1 * ca.vertcat(y[1], -a * ca.sin(y[0]))])
+    at = MemoryLayout()
+    start, given = at.take(2), at.take(1)
+    places = [start, *(at.take(2) for _ in range(5)), at.series(2, 1)]
+    calls = tuple(FunctionCall(swing, (x, given), (after,)) for x, after in pairwise(places))
+    program = Program(at.size, start, given, 1, {"end": places[-1].still()}, body=calls)
+    assert len(merging.merged(program)) == 2
+    found = compile_slopes(program, "end", threads=1).jacobians([[0.3, 0.1]], [2.0])[0]
+    whole = y
+    for _ in range(6):
+        whole = swing(whole, a)
+    assert found == pytest.approx(np.array(ca.Function("exact", [y, a], [ca.jacobian(whole, y)])([0.3, 0.1], 2)))
 
 
 def test_a_number_that_is_none_stays_in_its_point(kernel: SlopeKernel) -> None:

@@ -36,7 +36,7 @@ def chained(made: Linearization, z: np.ndarray, weights: np.ndarray, smoothing: 
     """(n,) the same from the slopes of the steps."""
     motion = made.motion(z, smoothing)
     slopes = made.linearize(motion)
-    p = made._begun(z)[2]
+    p = made.begun(z)[2]
     basis, moved = (np.array(ca.DM(each(motion.x[-1], p))) for each in (made.tangent.basis, made.tangent.shift))
     adjoint, inputs = basis.T @ weights, np.zeros_like(motion.u)
     statics = np.array(ca.DM(made._start_slopes(z)[1])).T @ moved.T @ weights
@@ -108,7 +108,7 @@ def test_states_and_threads_do_not_change_each_others_numbers(tmp_path: Path) ->
     motion = made[0].motion(guess_of(problem), 0.0)
     one, two = (each.linearize(motion) for each in made)
     assert np.array_equal(one.a, two.a) and np.array_equal(one.b, two.b)
-    _, u, p = made[0]._begun(motion.z)
+    _, u, p = made[0].begun(motion.z)
     few, _, _ = made[0].step.slopes(motion.x[:3], u[:3], p, 0.0)
     assert np.array_equal(few, one.a[:3])
 

@@ -1,0 +1,99 @@
+"""Jacobians of a step by state and inputs: milliseconds of CPU time a step, one thread; MuJoCo's, and the plain way.
+
+    python benchmarks/step_jacobians.py [--turns 9]
+
+Ours are exact, of the whole step with its controllers, in the robot's coordinates: ``LinearizedStep``. The plain way is
+the gradient kernel with a lane for each row. MuJoCo's are ``mjd_transitionFD``, finite differences of the same robot by
+our exporter, by positions, velocities, activations and controls. Ways take turns; the fastest turn counts.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from time import process_time
+from typing import Any
+
+import numpy as np
+from mujoco_runs import mujoco
+from numpy.typing import NDArray
+from table_robot import table_problem
+
+from symphys.codegen import compile_program
+from symphys.export import mjcf
+from symphys.problem import Problem, load_problem
+from symphys.problems import find
+from symphys.transcription.rollout import symbolic_rollout
+from symphys.transcription.staged.linearization import Linearization
+from symphys.transcription.staged.linearized_step import LinearizedStep
+from symphys.transcription.staged.step_program import StepArguments, step_program
+
+Array = NDArray[np.float64]
+STEPS, SETTLED, TURNS = 32, 0.3, 9
+"""Steps of a call; [s] after which MuJoCo's are counted."""
+Call = Callable[[], Any]
+
+
+def main() -> None:
+    """A table for each robot."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--turns", type=int, default=TURNS)
+    turns = parser.parse_args().turns
+    for problem in (table_problem([], STEPS), load_problem(find("quadruped_walk"))):
+        calls = {**ours(problem), **theirs(problem)}
+        best = dict.fromkeys(calls, np.inf)
+        for _ in range(turns):
+            for way, call in calls.items():
+                began = process_time()
+                call()
+                best[way] = min(best[way], (process_time() - began) / STEPS)
+        for way, seconds in best.items():
+            print(f"{problem.name:<16} {way:<44} {1e3 * seconds:7.3f} ms a step", flush=True)
+
+
+def ours(problem: Problem) -> dict[str, Call]:
+    """By this engine: with a tape for all rows of a state, and with a lane for each row that computes all."""
+    made = Linearization(symbolic_rollout(problem), threads=1, exact=True)
+    z = np.concatenate([variable.guess for variable in problem.variables])
+    x0, u, p = made.begun(z)
+    states = [x0]
+    for k in range(STEPS):
+        states.append(made.step.step(k, states[-1][None], u[None, k], p, 0.0)[0])
+    x, after = np.array(states[:-1]), np.array(states[1:])
+    step = LinearizedStep(made.rollout, made.tangent, threads=1, exact=True, parameters=False)
+    plain = compile_program(step_program(StepArguments(made.rollout, made.tangent, False), True, True), seeded=["off"])
+    varying, given = step.rows(np.arange(STEPS), x, after, u[:STEPS], p, 0.0)
+    n = made.tangent.size
+    seeds = np.tile(np.eye(n), (STEPS, 1))
+    rows = [np.repeat(each, n, axis=0) for each in (varying, given)]
+    print(f"{problem.name}: {n} numbers of a state, {u.shape[1]} inputs; {step.description}")
+    return {
+        "by state and inputs": lambda: step.slopes(x, u[:STEPS], p, 0.0, after),
+        "by state, inputs and static entries": lambda: made.step.slopes(x, u[:STEPS], p, 0.0, after),
+        "the plain way: a gradient a row": lambda: plain.gradient(rows[0], seeds, rows[1]),
+        "the steps alone": lambda: step.step(np.arange(STEPS), x, u[:STEPS], p, 0.0),
+    }
+
+
+def theirs(problem: Problem) -> dict[str, Call]:
+    """By MuJoCo, on the ground."""
+    text = mjcf(problem.world(), problem.initial, problem.simulation.dt, problem.name, approximate=True)
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    for _ in range(round(SETTLED / model.opt.timestep)):
+        mujoco.mj_step(model, data)
+    size = 2 * model.nv + model.na
+    a, b = np.zeros((size, size)), np.zeros((size, model.nu))
+
+    def differences(centred: bool) -> None:
+        for _ in range(STEPS):
+            mujoco.mjd_transitionFD(model, data, 1e-6, centred, a, b, None, None)
+
+    return {
+        f"MuJoCo, {size} numbers of a state, one-sided": lambda: differences(False),
+        "MuJoCo, centred": lambda: differences(True),
+    }
+
+
+if __name__ == "__main__":
+    main()
