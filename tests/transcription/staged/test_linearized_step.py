@@ -18,7 +18,7 @@ from symphys.transcription.rollout import Rollout, symbolic_rollout
 from symphys.transcription.staged import linearized_step
 from symphys.transcription.staged.linearization import Linearization
 
-KERNELS = ("loop", "leg", thorough("soft"), thorough("hopper_jump"), thorough("gait_robot_trot"))
+KERNELS = ("loop", "leg", thorough("soft"), thorough("hopper_jump"))
 
 
 def guess_of(problem: Problem) -> np.ndarray:
