@@ -52,17 +52,22 @@ class Linearization:
         What the static entries do to the first state beside its tangent, such as the velocity of one body of a robot,
         is part of the first of ``c``: with it sums over the steps are exact.
         """
-        _, u, p = self.begun(motion.z)
-        a, b, by_p = self.step.slopes(motion.x[:-1], u, p, motion.smoothing, motion.x[1:])
+        p = self.begun(motion.z)[2]
+        a, b, by_p = self.step.slopes(motion.x[:-1], motion.u, p, motion.smoothing)
+        start, left, parameters = self.start_slopes(motion)
+        c = by_p[:, :, self.step.arguments.varied] @ parameters[self.step.arguments.varied]
+        if len(c) and left.any():
+            c[0] += self.step.beside(motion.x[0], motion.u[0], p, motion.smoothing) @ left
+        return Linearized(a, b, c, start)
+
+    def start_slopes(self, motion: StagedMotion) -> tuple[Array, Array, Array]:
+        """By the static entries: the first state in its tangent (n, s), what lies beside that (nx, s), p (np, s)."""
+        x0, p = motion.x[0], self.begun(motion.z)[2]
         first, parameters = (np.array(ca.DM(part)) for part in self._start_slopes(motion.z))
-        x0 = motion.x[0]
         first = first - self._sparse(self.tangent.shift, x0, p) @ parameters
         start = self._sparse(self.tangent.projection, x0, p) @ first
-        c = by_p[:, :, self.step.arguments.varied] @ parameters[self.step.arguments.varied]
         left = first - self._sparse(self.tangent.basis, x0, p) @ start
-        if len(c) and np.abs(left).max(initial=0.0) > ROUNDING * np.abs(first).max(initial=0.0):
-            c[0] += self.step.beside(x0, u[0], p, motion.smoothing) @ left
-        return Linearized(a, b, c, start)
+        return start, np.where(np.abs(left) > ROUNDING * np.abs(first).max(initial=0.0), left, 0.0), parameters
 
     def begun(self, z: Array) -> tuple[Array, Array, Array]:
         """First state (nx,), inputs (N, m) and p (np,)."""

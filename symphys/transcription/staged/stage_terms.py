@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
@@ -15,7 +15,6 @@ from symphys.errors import SymphysError
 from symphys.expression import Formula
 from symphys.problem import Problem
 from symphys.suggest import quote
-from symphys.transcription.formula_names import spans
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.columns import ByColumns
 
@@ -201,13 +200,3 @@ def require_local(problem: Problem, name: str, formula: Formula) -> None:
     if found:
         text = f"looks at {', '.join(found)}, which a controller or a force law drives"
         raise SymphysError(f"{name}: {text}: no solver that goes step by step can take that")
-
-
-def static_entries(problem: Problem) -> Indices:
-    """(s,) the entries of z that are no knots of a control."""
-    parts: Sequence[Indices] = [
-        np.arange(start, stop)
-        for variable, (start, stop) in zip(problem.variables, spans(problem.variables), strict=True)
-        if variable.kind != "control"
-    ]
-    return np.concatenate([np.zeros(0, np.int64), *parts])

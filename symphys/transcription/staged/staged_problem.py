@@ -15,9 +15,8 @@ from symphys.problem import Constraint
 from symphys.shooting import Expansion, Linearized, StagedMotion
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.columns import ByColumns
-from symphys.transcription.staged.linearized_step import LinearizedStep
-from symphys.transcription.staged.stage_terms import Slopes, StageTerm, stage_terms, static_entries
-from symphys.transcription.staged.tangent import Tangent
+from symphys.transcription.staged.linearization import Linearization, statics_of
+from symphys.transcription.staged.stage_terms import Slopes, StageTerm, stage_terms
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -40,10 +39,10 @@ class RolloutStages:
         """
         problem = rollout.problem
         self.rollout, self.steps = rollout, rollout.steps
-        self.statics = static_entries(problem)
+        self.statics = statics_of(rollout)
         self.terms = stage_terms(rollout, self.statics)
-        self.tangent = Tangent(rollout)
-        self._step = LinearizedStep(rollout, self.tangent, backend, threads, exact)
+        self._linearization = Linearization(rollout, backend, threads, exact)
+        self.tangent = self._linearization.tangent
         self.state_size, self.tangent_size = int(rollout.x0.shape[0]), self.tangent.size
         self.input_size = int(rollout.given.shape[0])
         self.weights = _input_weights(rollout)
@@ -56,71 +55,33 @@ class RolloutStages:
 
     def start(self, Z: Array) -> Array:
         """(B, nx)."""
-        return np.array([np.array(self._start(z)[0]).ravel() for z in Z])
+        return self._begun(Z)[0]
 
     def parameters(self, Z: Array) -> Array:
         """(B, np)."""
+        return self._begun(Z)[1]
+
+    def _begun(self, Z: Array) -> tuple[Array, Array]:
+        """First states and parameters; those that were asked for last are kept."""
         key = Z[:, self.statics].tobytes()
         if self._known is None or self._known[0] != key:
-            self._known = key, np.array([np.array(self._start(z)[1]).ravel() for z in Z])
+            parts = [self._linearization.begun(z) for z in Z]
+            self._known = key, (np.array([x for x, _, _ in parts]), np.array([p for _, _, p in parts]))
         return self._known[1]
 
-    _known: tuple[bytes, Array] | None = None
-    """The parameters that were asked for last."""
+    _known: tuple[bytes, tuple[Array, Array]] | None = None
 
     def step(self, k: int, X: Array, U: Array, Z: Array, smoothing: float) -> Array:
         """(B, nx) after step k."""
-        return self._step.step(k, X, U, self.parameters(Z), smoothing)
+        return self._linearization.step.step(k, X, U, self.parameters(Z), smoothing)
 
     def roll_out(self, z: Array, smoothing: float) -> StagedMotion:
         """The motion of z."""
-        p, u = self.parameters(z[None]), self.inputs(z)
-        x = np.empty((self.steps + 1, self.state_size))
-        x[0] = self.start(z[None])[0]
-        for k in range(self.steps):
-            x[k + 1] = self._step.step(k, x[None, k], u[None, k], p, smoothing)[0]
-        return StagedMotion(np.array(z, float), x, u, smoothing)
-
-    def inputs(self, z: Array) -> Array:
-        """(N, m)."""
-        return np.asarray(self.weights @ z).reshape(self.steps, self.input_size)
+        return self._linearization.motion(z, smoothing)
 
     def linearize(self, motion: StagedMotion) -> Linearized:
         """Slopes of all steps."""
-        p = self.parameters(motion.z[None])[0]
-        a, b, by_p = self._step.slopes(motion.x[:-1], motion.u, p, motion.smoothing)
-        _, of_p = self._start_slopes(motion.z)
-        start, off = self._start_tangents(motion)
-        c = by_p @ of_p
-        if off.any():
-            after = self.step(0, motion.x[:1], motion.u[:1], motion.z[None], motion.smoothing)[0]
-            c[0] += np.array(self.tangent.projection(after, p)) @ self._pushed(motion, p, off)
-        return Linearized(a, b, c, start)
-
-    def _start_tangents(self, motion: StagedMotion) -> tuple[Array, Array]:
-        """(n, s) and (nx, s): the first state by the static entries, in its tangent, and what lies off that.
-
-        A variable may set the velocity of one body of a tree: the first step brings the others to it.
-        """
-        by_x0, _ = self._start_slopes(motion.z)
-        place = motion.x[0], self.parameters(motion.z[None])[0]
-        start = np.array(self.tangent.projection(*place)) @ by_x0
-        off = by_x0 - np.array(self.tangent.basis(*place)) @ start
-        return start, np.where(np.abs(off) > OFF, off, 0.0)
-
-    def _pushed(self, motion: StagedMotion, p: Array, off: Array) -> Array:
-        """(nx, s): what the first step makes of these changes of the first state."""
-        step, count = self.rollout.closed, off.shape[1]
-        if self._forward is None:
-            self._forward = step.forward(count)
-        given = motion.u[0] if self.rollout.feedback is None else np.append(motion.u[0], 0.0)
-        arguments = motion.x[0], given, p, motion.smoothing
-        results = [np.zeros(step.size_out(i)) for i in range(step.n_out())]
-        still = [np.zeros((step.size1_in(i), count)) for i in range(1, step.n_in())]
-        found = self._forward(*arguments, *results, off, *still)
-        return np.array(found[0] if isinstance(found, list | tuple) else found)
-
-    _forward: ca.Function | None = None
+        return self._linearization.linearize(motion)
 
     def retract(self, X: Array, D: Array) -> Array:
         """(B, nx)."""
@@ -179,13 +140,15 @@ class RolloutStages:
     def _along(self, motion: StagedMotion) -> list[tuple[StageTerm, Slopes, Array]]:
         """Every term with its slopes, and those by the tangents of its states (T, r, n)."""
         p = self.parameters(motion.z[None])[0]
-        _, of_p = self._start_slopes(motion.z)
-        _, off = self._start_tangents(motion)
+        _, left, of_p = self._linearization.start_slopes(motion)
         found = []
         for term in self.terms:
             slopes = term.slopes(motion.x, motion.u, p, motion.z, of_p)
-            if off.any():
-                slopes.s[term.states == 0] += slopes.x[term.states == 0] @ off[term.columns]
+            if left.any():
+                slopes.s[term.states == 0] += slopes.x[term.states == 0] @ left[term.columns]
+            if self.tangent.shifts:
+                moved = [np.array(ca.DM(self.tangent.shift(x, p)))[term.columns] for x in motion.x[term.states]]
+                slopes.s[:] += slopes.x @ (np.array(moved) @ of_p)
             found.append((term, slopes, slopes.x @ self._rows(motion, term)))
         return found
 
@@ -205,23 +168,6 @@ class RolloutStages:
     def _bases(self) -> dict[tuple[int, ...], ByColumns]:
         return {}
 
-    @cached_property
-    def _start(self) -> ca.Function:
-        """Z -> (x0, p)."""
-        rollout = self.rollout
-        return ca.Function("start", [rollout.z], [ca.densify(rollout.x0), ca.densify(rollout.p)]).expand()
-
-    def _start_slopes(self, z: Array) -> tuple[Array, Array]:
-        """(nx, s) and (np, s): the first state and the parameters by the static entries."""
-        x0, p = (np.array(part, float) for part in self._start_jacobian(z))
-        return x0, p
-
-    @cached_property
-    def _start_jacobian(self) -> ca.Function:
-        z, statics = ca.SX.sym("z", int(self.rollout.z.shape[0])), self.statics.tolist()
-        parts = [ca.densify(ca.jacobian(part, z)[:, statics]) for part in self._start(z)]
-        return ca.Function("start_slopes", [z], parts)
-
 
 def _input_weights(rollout: Rollout) -> Any:
     """(N * m, len(z)) scipy.sparse: u = weights @ z."""
@@ -230,10 +176,6 @@ def _input_weights(rollout: Rollout) -> Any:
     rows, columns = slope.sparsity().get_triplet()
     shape = (int(slope.shape[0]), int(slope.shape[1]))
     return scipy.sparse.csr_array((np.array(slope.nonzeros()), (rows, columns)), shape=shape)
-
-
-OFF = 1e-13
-"""Slopes of the first state that are nearer to its tangent lie in it."""
 
 
 def _limit(limit: Constraint, term: StageTerm) -> tuple[Array, Array, Array]:

@@ -26,6 +26,7 @@ from symphys.maths import rotation
 from symphys.model.joints import kinematic_trees
 from symphys.model.state_layout import BODY_FIELDS, Layout
 from symphys.transcription.rollout import Rollout
+from symphys.transcription.staged.columns import ByColumns
 from symphys.transcription.staged.tree_chart import Moving, Pose, TreeChart
 
 Array = NDArray[np.float64]
@@ -111,20 +112,33 @@ class Tangent:
 
     def retract(self, X: ArrayLike, D: ArrayLike, p: ArrayLike | None = None) -> Array:
         """(B, nx), (B, n) -> (B, nx): the states that are so far from others; ``p`` None: as the guess has it."""
-        return self._batch(self.retraction, (X, D), p)
+        return self._batch(self._retractions, (X, D), p)
 
     def difference(self, X: ArrayLike, Y: ArrayLike, p: ArrayLike | None = None) -> Array:
         """(B, nx), (B, nx) -> (B, n): D with retract(X, D) = Y."""
-        return self._batch(self.distance, (X, Y), p)
+        return self._batch(self._distances, (X, Y), p)
 
-    def _batch(self, function: ca.Function, rows: tuple[ArrayLike, ArrayLike], p: ArrayLike | None) -> Array:
+    @cached_property
+    def shifts(self) -> bool:
+        """Whether parameters move joints."""
+        return bool(self.shift.nnz_out(0))
+
+    @cached_property
+    def _retractions(self) -> ByColumns:
+        return ByColumns(self.retraction)
+
+    @cached_property
+    def _distances(self) -> ByColumns:
+        return ByColumns(self.distance)
+
+    def _batch(self, function: ByColumns, rows: tuple[ArrayLike, ArrayLike], p: ArrayLike | None) -> Array:
         first, second = (np.asarray(each, float) for each in rows)
         nominal = ca.vertcat(ca.DM(0, 1), *self.rollout.parameters.nominal)
         given = nominal if p is None else ca.DM(np.asarray(p, float))
         if not len(first):
-            return np.zeros((0, function.size1_out(0)))
-        mapped = function.map(len(first))
-        return np.ascontiguousarray(np.array(mapped(first.T, second.T, ca.repmat(given, 1, len(first)))).T)
+            return np.zeros((0, function.function.size1_out(0)))
+        (found,) = function(first.T, second.T, ca.repmat(given, 1, len(first)))
+        return np.ascontiguousarray(found.T)
 
     @property
     def _p(self) -> Expr:

@@ -42,6 +42,12 @@ guess = 0.3
 spread = 0.05
 
 [[variable]]
+name = "hinge"
+sets = "pivot.anchor[2]"
+guess = 0.0
+spread = 0.02
+
+[[variable]]
 name = "shove"
 sets = "cart.velocity[0]"
 guess = 0.2
