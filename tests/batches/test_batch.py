@@ -106,7 +106,8 @@ def test_a_transcription_is_made_once_per_problem(make_job: MakeJob, recorder: A
 def test_a_file_says_which_solvers_it_is_for(problem_file: Path, tmp_path: Path) -> None:
     """Where none is asked for; twice is once, in the file's order."""
     everything = make_jobs([load_problem(problem_file)], None, [0], {}, tmp_path)
-    assert [job.config.solver for job in everything] == [name for name, each in SOLVERS.items() if not each.scenarios]
+    plain = [name for name, each in SOLVERS.items() if not (each.scenarios or each.by_name)]
+    assert [job.config.solver for job in everything] == plain
     text = problem_file.read_text(encoding="utf-8")
     problem_file.write_text('solvers = ["gradient", "cma", "gradient"]\n' + text, encoding="utf-8")
     problem = load_problem(problem_file)

@@ -14,7 +14,7 @@ from symphys.importing.problem import ImportProblem
 from symphys.model.state_layout import input_sizes
 from symphys.problem.checks.start import at_guess, formula_names
 from symphys.problem.checks.start_values import StartValues
-from symphys.problem.quantities import quantities
+from symphys.problem.quantities import duration_quantity, quantities
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -61,6 +61,7 @@ def names_at_start(problem: Any) -> dict[str, Any]:
     """What names in formulas are at the start."""
     world = problem.world()
     known = quantities(problem.initial, problem.parameters, input_sizes(world))
+    known |= duration_quantity(problem.simulation.duration)
     values = at_guess(problem.parametric, known, ())
     return formula_names(values, StartValues().of(problem.parametric, values), ())
 
