@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from repeats import first
 
 from symphys import problems
 from symphys.codegen import compile_program, interpret
@@ -92,7 +93,7 @@ def free(name: str, **settings: Any) -> Problem:
     return load_problem(path, settings)
 
 
-@pytest.mark.parametrize("name", ["parcel", "quadruped_shift"])
+@first("name", ["parcel", "quadruped_shift"])
 def test_a_free_duration_at_the_value_of_the_file_changes_nothing(name: str, tmp_path: Any) -> None:
     settings = {"simulation.duration": 0.2}
     made = transcribe(free(name, folder=tmp_path, **settings), backend="casadi")
