@@ -57,6 +57,11 @@ class Counts:
     jacobians: int = 0
     hessians: int = 0
 
+    @classmethod
+    def of_slopes(cls, rows: int) -> Counts:
+        """The work of the slopes of all steps: an adjoint for each of the ``rows`` numbers of a state's tangent."""
+        return cls(gradients=rows)
+
     def __add__(self, other: Counts) -> Counts:
         """Return the work of both."""
         return Counts(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))

@@ -131,7 +131,7 @@ class Ilqr(Method[IlqrState]):
         motion = self._motion(state.z)
         slopes = self.staged.linearize(motion)
         costs = self.staged.expand(motion, state.multipliers, state.penalties)
-        self.evaluator.counter.add(Counts(gradients=self.staged.tangent_size))
+        self.evaluator.counter.add(Counts.of_slopes(self.staged.tangent_size))
         damping, growth = state.damping, state.growth
         while damping <= STIFFEST:
             policy = backward_pass(slopes, costs, self.knots, self.staged.statics, self._room(state.z), damping)

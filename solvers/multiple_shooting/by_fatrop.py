@@ -106,7 +106,9 @@ class FatropParts:
         return value if np.isfinite(value) else LARGE
 
     def _constraints(self, x: Array) -> Array:
-        return np.nan_to_num(self.nlp.constraints(x), nan=LARGE, posinf=LARGE, neginf=-LARGE)
+        """FATROP cannot be told to refuse a point: one that is not finite violates so much that it takes none."""
+        found = self.nlp.constraints(x)
+        return np.where(np.isfinite(found), found, np.where(found < 0, -LARGE, LARGE))
 
     def _jacobian(self, x: Array, p: Array) -> list[Any]:
         """The slopes are asked for once an iterate, the start included."""
@@ -131,5 +133,6 @@ class FatropParts:
 
 def within(lower: Array, upper: Array) -> Array:
     """Numbers between bounds, of which either may be infinite."""
-    low, high = np.where(np.isfinite(lower), lower, upper - 2), np.where(np.isfinite(upper), upper, lower + 2)
-    return np.nan_to_num((low + high) / 2, nan=0.0, posinf=0.0, neginf=0.0)
+    least, most = np.isfinite(lower), np.isfinite(upper)
+    low, high = np.where(least, lower, 0.0), np.where(most, upper, 0.0)
+    return np.select([least & most, least, most], [(low + high) / 2, low + 1, high - 1], 0.0)

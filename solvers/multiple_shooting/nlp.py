@@ -172,7 +172,7 @@ class MultipleShootingNlp:
     def _sloped(self, w: Array) -> Shots:
         shots = self.shots(w)
         if "slopes" not in shots.__dict__:
-            self.work += Counts(jacobians=1)
+            self.work += Counts.of_slopes(self.plan.problem.tangent_size)
         return shots
 
     def _gathered(self, local: list[Array]) -> Array:
@@ -227,7 +227,7 @@ class MultipleShootingNlp:
         return [(block + block.T) / 2 for block in blocks]
 
     def _moved(self, z: Array, u: Array, d: Array) -> Shots:
-        self.work += Counts(rollouts=1, jacobians=1)
+        self.work += Counts(rollouts=1) + Counts.of_slopes(self.plan.problem.tangent_size)
         return Shots(self.plan, z, u, d)
 
     def _lagrangian(self, shots: Shots, factor: float, multipliers: Array) -> list[Array]:
