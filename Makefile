@@ -9,8 +9,8 @@ QUICK := $(addprefix tests/,house model expression findings problem solvers dyna
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
 
-demo: $(VENV)/.installed  ## solve the ball throw with every solver and write the report
-	$(BIN)/symphys solve problems/ball_throw.toml --out reports
+demo: $(VENV)/.installed  ## solve the ball throw with four solvers and write the report
+	$(BIN)/symphys solve problems/ball_throw.toml --solver gradient,least_squares,ipopt,cma --out reports
 
 demo-walk: $(VENV)/.installed  ## a quadruped learns to walk, in two minutes; Ctrl-C stops it, and the same command goes on
 	$(BIN)/symphys solve quadruped_walk --set solver.stochastic.iterations=120 --unexamined --out reports/walk
@@ -115,7 +115,7 @@ bench-gpu: $(VENV)/.benching  ## the same on a GPU, with the floors; without one
 	$(BIN)/python benchmarks/gpu.py
 
 gallery: $(VENV)/.installed  ## make the figures of the README again
-	$(BIN)/symphys solve ball_throw bank_shot sled basket knock putt cart_pole --out build/gallery
+	$(BIN)/symphys solve ball_throw bank_shot sled basket knock putt cart_pole --solver gradient,least_squares,ipopt,cma --out build/gallery
 	cp build/gallery/figures/ball_throw-motion.svg build/gallery/figures/ball_throw-convergence.svg \
 	    build/gallery/figures/bank_shot-motion.svg build/gallery/figures/basket-motion.svg \
 	    build/gallery/figures/knock-motion.svg build/gallery/figures/putt-motion.svg \
