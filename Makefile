@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 QUICK := $(addprefix tests/,house model expression findings problem solvers dynamics)
 
-.PHONY: help demo demo-walk test test-quick test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-table1 bench-gpu bench-walk bench-lessons stress bench-pipelines bench-runs bench-gaits bench-imports gallery clean
+.PHONY: help demo demo-walk test test-quick test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-table1 bench-gpu bench-walk bench-lessons stress bench-pipelines bench-runs bench-gaits bench-imports profiles gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
@@ -104,6 +104,9 @@ bench-imports: $(VENV)/.benching  ## 56 robots of gymnasium, dm_control and exam
 	$(BIN)/python -m pip install --quiet --editable '.[models]'
 	$(BIN)/python benchmarks/imported_robots.py build/imported
 	$(BIN)/python benchmarks/imported_statics.py
+
+profiles: $(VENV)/.installed  ## every method on the shipped problems from 15 starts: which one to take when (an hour); the same command goes on
+	$(BIN)/python benchmarks/profiles.py build/profiles
 
 bench-table1: $(VENV)/.benching  ## the timing table of Degrave et al. (1 and 128 robots, small and large net), cost against weights
 	$(BIN)/python benchmarks/table1.py
