@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -52,8 +53,12 @@ def test_expected_running_time_is_all_work_over_successes() -> None:
     assert ratios(times, ["p"]) == pytest.approx({"a": 1.0, "b": 7.5})
     both = {"p": {"a": 1.0, "b": 4.0}, "q": {"a": math.inf, "b": 2.0}, "nobody": {"a": math.inf, "b": math.inf}}
     assert ratios(both, both) == pytest.approx({"a": math.sqrt(WORST), "b": 2.0})
-    assert advice(profiles()) == [
-        "all (1): a (1 times the best, 50 %), then b (7.5 times the best, 50 %); surest a (50 %)"
+    assert advice(profiles()) == ["all (1): take a (50 %, 1 times the best)"]
+    slow = tuple(replace(each, method="slow") for each in profiles().solves if each.method == "b")
+    sure = (*slow[:1], replace(slow[0], instance=1))
+    both = replace(profiles(), solves=(*profiles().solves[:2], *sure))
+    assert advice(both) == [
+        "all (1): take slow (100 %, 2.5 times the best); quicker where it succeeds: a (50 %, 1 times the best)"
     ]
 
 
