@@ -6,8 +6,8 @@ the lowest from the same start). A data profile is the share of solves that have
 in rollouts here, not in simplex gradients, and in seconds.
 
 The expected running time is the sum of what all solves took, up to their success or their end, over the number of
-successes (Hansen et al., COCO, 2021, section 3). Success: everything is met; of a problem that asks for nothing to be
-met, convergence at 1e-3.
+successes (Hansen et al., COCO, Optimization Methods and Software 36, 2021). Success: everything is met; of a problem
+that asks for nothing to be met, convergence at 1e-3.
 """
 
 from __future__ import annotations

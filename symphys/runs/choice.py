@@ -136,7 +136,7 @@ SITUATIONS = (
         staged,
         (
             ChosenSolver("ilqr", "its controls act over time, and what it asks for is summed step by step"),
-            ChosenSolver("gradient", "a gradient costs the same for any number of knots, and passes kinks"),
+            ChosenSolver("ipopt", "it sees the motion as a whole, where kinks stop what goes step by step"),
         ),
     ),
     Situation(
