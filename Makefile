@@ -4,13 +4,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 QUICK := $(addprefix tests/,house model expression findings problem solvers dynamics)
 
-.PHONY: help demo demo-walk test test-quick test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-table1 bench-gpu bench-walk bench-lessons stress bench-pipelines bench-runs bench-gaits bench-imports gallery clean
+.PHONY: help demo demo-walk test test-quick test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-table1 bench-gpu bench-walk bench-lessons stress bench-pipelines bench-runs bench-gaits bench-imports profiles gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
 
-demo: $(VENV)/.installed  ## solve the ball throw with every solver and write the report
-	$(BIN)/symphys solve problems/ball_throw.toml --out reports
+demo: $(VENV)/.installed  ## solve the ball throw with four solvers and write the report
+	$(BIN)/symphys solve problems/ball_throw.toml --solver gradient,least_squares,ipopt,cma --out reports
 
 demo-walk: $(VENV)/.installed  ## a quadruped learns to walk, in two minutes; Ctrl-C stops it, and the same command goes on
 	$(BIN)/symphys solve quadruped_walk --set solver.stochastic.iterations=120 --unexamined --out reports/walk
@@ -105,6 +105,9 @@ bench-imports: $(VENV)/.benching  ## 56 robots of gymnasium, dm_control and exam
 	$(BIN)/python benchmarks/imported_robots.py build/imported
 	$(BIN)/python benchmarks/imported_statics.py
 
+profiles: $(VENV)/.installed  ## every method on the shipped problems from 15 starts: which one to take when (an hour); the same command goes on
+	$(BIN)/python benchmarks/profiles.py build/profiles
+
 bench-table1: $(VENV)/.benching  ## the timing table of Degrave et al. (1 and 128 robots, small and large net), cost against weights
 	$(BIN)/python benchmarks/table1.py
 	$(BIN)/python benchmarks/weights.py build
@@ -115,7 +118,7 @@ bench-gpu: $(VENV)/.benching  ## the same on a GPU, with the floors; without one
 	$(BIN)/python benchmarks/gpu.py
 
 gallery: $(VENV)/.installed  ## make the figures of the README again
-	$(BIN)/symphys solve ball_throw bank_shot sled basket knock putt cart_pole --out build/gallery
+	$(BIN)/symphys solve ball_throw bank_shot sled basket knock putt cart_pole --solver gradient,least_squares,ipopt,cma --out build/gallery
 	cp build/gallery/figures/ball_throw-motion.svg build/gallery/figures/ball_throw-convergence.svg \
 	    build/gallery/figures/bank_shot-motion.svg build/gallery/figures/basket-motion.svg \
 	    build/gallery/figures/knock-motion.svg build/gallery/figures/putt-motion.svg \

@@ -90,7 +90,6 @@ def make_solver(
     prepare: Callable[[], None] = nothing,
     threaded: bool = False,
     scenarios: bool | None = False,
-    by_name: bool = False,
 ) -> Solver[O_inv]:
     """A solver of its parts; those that are not named here are the fields of ``Solver``.
 
@@ -124,7 +123,7 @@ def make_solver(
         request = Request(name, problem, start, options, seed, monitor, checkpoint, log or silent, constraints, keep)
         return Driver(request, run_stage, rate(options, seed)).run()
 
-    return Solver(name, summary, Options, solve, prepare, threaded, scenarios, by_name)
+    return Solver(name, summary, Options, solve, prepare, threaded, scenarios)
 
 
 @dataclass(frozen=True)

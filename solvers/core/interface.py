@@ -155,7 +155,6 @@ class Solver(Generic[O_inv]):
             works without, and a second call costs nothing.
         threaded: whether several solves may run in threads side by side, see ``multi_start``.
         scenarios: whether it is for problems with scenarios, and for no others; None: for all.
-        by_name: whether it solves only where it is named; the others solve wherever no solver is.
     """
 
     name: str
@@ -165,4 +164,3 @@ class Solver(Generic[O_inv]):
     prepare: Callable[[], None] = nothing
     threaded: bool = False
     scenarios: bool | None = False
-    by_name: bool = False

@@ -254,5 +254,4 @@ ILQR = make_solver(
     iterating(Ilqr),
     refusal=refusal,
     constraints=True,
-    by_name=True,
 )

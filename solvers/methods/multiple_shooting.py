@@ -305,5 +305,4 @@ MULTIPLE_SHOOTING = make_solver(
     check=check,
     refusal=refusal,
     constraints=True,
-    by_name=True,
 )

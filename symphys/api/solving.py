@@ -17,7 +17,7 @@ from symphys.problem import Problem
 from symphys.problem.loading import Source, load
 from symphys.results.run import read_run
 from symphys.runs import Job, Result, execute, make_jobs
-from symphys.runs.job import fitting
+from symphys.runs.choice import chosen
 from symphys.solvers import TraceRow
 
 Progress = Callable[[TraceRow], None]
@@ -39,7 +39,8 @@ def solve(
 
     Args:
         problem: what ``load`` takes.
-        solver: its name; None: the first that the problem names, else the first that fits it.
+        solver: its name; None: the first that the problem names, else the one that fits it best, see
+            ``symphys.runs.choice``; then ``solution.run.provenance["chosen"]`` says why.
         seed: 0 starts from the guess; others from one perturbed by the ``spread`` of each variable.
         folder: where run folders are kept, as by ``symphys solve --out``: what is done already is not done again, what
             was interrupted goes on. None: nothing is kept.
@@ -64,10 +65,11 @@ def solve(
         (True, ['spin', 'throw'])
     """
     read_in = load(problem)
-    name = solver or (read_in.solvers or tuple(fitting(read_in)))[0]
+    name = solver or (read_in.solvers or [each.solver for each in chosen(read_in)])[0]
     asked = read_in.set({f"solver.{name}.{key}": value for key, value in options.items()}) if options else read_in
     with kept(folder) as out:
-        (job,) = make_jobs([asked], [name], [seed], dict(asked.settings), out, "", backend, examine)
+        jobs = make_jobs([asked], [solver] if solver else None, [seed], dict(asked.settings), out, "", backend, examine)
+        job = jobs[0]
         if run(job, read_in, backend, threads, progress).interrupted:
             later = "with a folder, the same call would go on" if folder is None else "the same call goes on from there"
             raise KeyboardInterrupt(f"interrupted in {job.folder.path}; {later}")

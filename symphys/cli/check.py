@@ -118,7 +118,16 @@ def describe(problem: Problem) -> list[str]:
         lines.append(f"  differs      {listed(each.name for each in problem.scenarios)}")
     if problem.sweep is not None:
         lines.append(f"  sweep        {problem.sweep.words()}")
-    return lines
+    return lines + solvers_of(problem)
+
+
+def solvers_of(problem: Problem) -> list[str]:
+    """Which solvers it gets, and why, in lines."""
+    from symphys.runs.choice import chosen
+
+    if problem.solvers:
+        return [f"  solvers      {listed(problem.solvers)}, as the file says"]
+    return [f"  solver       {each}" for each in chosen(problem)] if problem.variables else []
 
 
 def listed(names: Any) -> str:

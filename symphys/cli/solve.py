@@ -50,7 +50,7 @@ INTERRUPTED = 130
     "names",
     metavar="A,B",
     shell_complete=complete_solvers,
-    help="Solvers, separated by commas.  [default: the file's `solvers`, else all]",
+    help="Solvers, separated by commas.  [default: the file's `solvers`, else what fits it]",
 )
 @click.option(
     "--seeds",
@@ -113,6 +113,7 @@ def solve(
     from symphys.batches import BatchLimits, run_batch, run_on
     from symphys.cli.watching import watch, working
     from symphys.runs import make_jobs
+    from symphys.runs.choice import chosen_lines
     from symphys.transcription import transcribe
 
     solvers, backend = read_solvers(names), read_backend(backend)
@@ -126,6 +127,8 @@ def solve(
     if how.dry_run:
         return print_previews(asked, how.rerun)
     for problem in problems:
+        if not (how.quiet or how.json):
+            click.echo("".join(f"{line}\n" for line in chosen_lines(problem, solvers)), err=True, nl=False)
         if note := many_pairs(problem.name, len(problem.world().pairs)):
             click.echo(note, err=True)
     require_folder(out)

@@ -68,7 +68,7 @@ def unfelt(check: GradientCheck) -> bool:
 
 
 def refined_finding(refined: Refined, judged: Judged) -> Finding:
-    """The same z, simulated more finely."""
+    """The same z, simulated more finely; what was met and is missed by far then is refuted."""
     what = f"Simulated again with {unbroken(refined.what) or 'a refinement'}"
     number = f"objective {show(refined.objective)}"
     if judged.checked and not math.isnan(refined.worst):
@@ -81,7 +81,11 @@ def refined_finding(refined: Refined, judged: Judged) -> Finding:
             BAD: "Misses by far: the solution belongs to this time grid, not to the physics.",
             UNKNOWN: "Could not be simulated.",
         }[level]
-        return Finding(GRID, level, what, number, meaning)
+        doubt = {
+            BAD: f"simulated with {refined.what} it misses by {show(refined.worst, 2)} × tolerance",  # noqa: RUF001
+            UNKNOWN: f"it cannot be simulated with {refined.what}",
+        }.get(level, "")
+        return Finding(GRID, level, what, number, meaning, doubt)
     change = relative_change(judged.objective, refined.objective)
     level = graded(change, OBJECTIVE_LIMITS)
     meaning = "Could not be compared." if level == UNKNOWN else f"The objective changes by {percent(change)}."

@@ -196,7 +196,8 @@ class Result:
             of another or the guess is better exactly.
         versions: of everything that took part.
         provenance: the machine, the process and the working copy, with the keys of ``symphys.runs.provenance``,
-            and "flags", those of the compiler, where something was compiled.
+            "flags", those of the compiler, where something was compiled, and "chosen", why the solver was taken where
+            none was named.
         when: UTC time of the end, ISO 8601.
         command: what was typed.
         backend: what evaluated the functions.

@@ -11,6 +11,7 @@ from symphys.codegen.backends import BEST
 from symphys.problem import Problem, require_solvable, require_solvers, validate_options
 from symphys.results.case_name import case_name
 from symphys.results.config import Config, make_config
+from symphys.runs.choice import chosen
 from symphys.runs.folder import RunFolder
 from symphys.solvers import SOLVERS, recorded_options, solver
 
@@ -27,6 +28,7 @@ class Job:
         command: what was typed.
         examine: whether the solution is examined.
         outdated: the stamp, see ``standing``, of a result that is to be made again although it is there.
+        chosen: why it has its solver, where none was named.
     """
 
     problem: Problem
@@ -36,6 +38,7 @@ class Job:
     command: str
     examine: bool = True
     outdated: str = ""
+    chosen: str = ""
 
     @property
     def name(self) -> str:
@@ -75,7 +78,7 @@ def make_jobs(
 ) -> list[Job]:
     """Every problem with every solver and seed, below the folder ``out``; other settings, another folder.
 
-    ``solvers`` None: those that each problem names, or those that fit it.
+    ``solvers`` None: those that each problem names, or those that are chosen for it, see ``choice``.
 
     ProblemError for a problem without variables or objectives, and for bad solver options.
     """
@@ -84,20 +87,16 @@ def make_jobs(
     for problem in problems:
         require_solvable(problem)
         check_tables(problem)
-        for name in solvers or problem.solvers or fitting(problem):
+        reasons = {} if solvers or problem.solvers else {each.solver: each.reason for each in chosen(problem)}
+        for name in solvers or problem.solvers or reasons:
             options = solver_options(problem, name)
             plain = recorded_options(options)
             for seed in seeds:
                 config = make_config(problem.name, problem.identity, name, seed, settings, plain, backend)
                 folder = RunFolder.of(out, problem.name, name, seed, settings)
-                jobs.append(Job(problem, config, options, folder, command, examine))
+                why = reasons.get(name, "")
+                jobs.append(Job(problem, config, options, folder, command, examine, chosen=why))
     return jobs
-
-
-def fitting(problem: Problem) -> list[str]:
-    """The solvers that are for such problems, with scenarios or without, and need not be named."""
-    scenarios = (None, problem.scenarios is not None)
-    return [name for name, each in SOLVERS.items() if each.scenarios in scenarios and not each.by_name]
 
 
 def solver_options(problem: Problem, name: str) -> Any:

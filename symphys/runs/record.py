@@ -171,13 +171,14 @@ def provenance(job: Job, flags: Sequence[str] = ()) -> dict[str, Any]:
 
     ``flags``: with which a compiler made what evaluated; none where nothing was compiled.
     """
+    told = {"flags": " ".join(flags), "chosen": job.chosen}
     return {
         "problem": job.config.problem,
         "title": job.problem.title,
         "solver": job.config.solver,
         "seed": job.config.seed,
         "versions": versions(),
-        "provenance": origin() | ({"flags": " ".join(flags)} if flags else {}),
+        "provenance": origin() | {key: text for key, text in told.items() if text},
         "when": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "command": job.command,
     }

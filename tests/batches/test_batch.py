@@ -18,8 +18,9 @@ import pytest
 from symphys.batches import run_batch
 from symphys.problem import Problem, load_problem
 from symphys.runs import Job, make_jobs
+from symphys.runs.choice import chosen
 from symphys.runs.solving import JUDGING
-from symphys.solvers import SOLVERS, TraceRow
+from symphys.solvers import TraceRow
 from symphys.transcription import transcribe
 from symphys.verification.examination import PARTS
 
@@ -106,13 +107,14 @@ def test_a_transcription_is_made_once_per_problem(make_job: MakeJob, recorder: A
 def test_a_file_says_which_solvers_it_is_for(problem_file: Path, tmp_path: Path) -> None:
     """Where none is asked for; twice is once, in the file's order."""
     everything = make_jobs([load_problem(problem_file)], None, [0], {}, tmp_path)
-    plain = [name for name, each in SOLVERS.items() if not (each.scenarios or each.by_name)]
-    assert [job.config.solver for job in everything] == plain
+    assert [job.config.solver for job in everything] == [each.solver for each in chosen(load_problem(problem_file))]
+    assert all(job.chosen for job in everything)
     text = problem_file.read_text(encoding="utf-8")
     problem_file.write_text('solvers = ["gradient", "cma", "gradient"]\n' + text, encoding="utf-8")
     problem = load_problem(problem_file)
     assert [job.config.solver for job in make_jobs([problem], None, [0], {}, tmp_path)] == ["gradient", "cma"]
-    assert [job.config.solver for job in make_jobs([problem], ["ipopt"], [0], {}, tmp_path)] == ["ipopt"]
+    named = make_jobs([problem], ["ipopt"], [0], {}, tmp_path)
+    assert [(job.config.solver, job.chosen) for job in named] == [("ipopt", "")]
 
 
 def test_workers_do_what_one_process_does(problem_file: Path, tmp_path: Path, recorder: Any) -> None:

@@ -18,6 +18,19 @@ def test_check_describes_the_file_and_compares_gradients(run: Run, throw: Path) 
     assert "is at half a metre: ball.position[0:2] - [0.5, 0] (end, in m)" in out
 
 
+def test_check_and_solve_say_which_solvers_are_taken_and_why(run: Run, throw: Path) -> None:
+    """Where none is named; a list in the file is only repeated, and events and silence stay clean."""
+    since = "least_squares, since a few numbers set what is squared"
+    assert f"  solver       {since}" in run("check", throw)[1]
+    code, table, err = run("solve", throw, "--backend", "casadi", "--unexamined", "--no-report")
+    assert code == 0 and f"throw: {since}\n" in err and "throw: cma, since " in err
+    assert "gradient" not in table and table.count("1/1") == 2
+    assert run("solve", throw, "--backend", "casadi", "--unexamined", "--no-report", "--quiet")[2] == ""
+    assert "since" not in run("solve", throw, "--solver", "cma", "--backend", "casadi", "--unexamined")[2]
+    throw.write_text('solvers = ["cma"]\n' + throw.read_text(encoding="utf-8"), encoding="utf-8")
+    assert "  solvers      cma, as the file says" in run("check", throw)[1]
+
+
 def test_check_calls_no_gradient_right_that_nothing_depends_on(run: Run, throw: Path) -> None:
     text = throw.read_text(encoding="utf-8")
     throw.write_text(text.replace("ball.position[0:2] - [0.5, 0]", "ball.position[2] - 3"), encoding="utf-8")

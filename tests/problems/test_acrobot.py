@@ -9,6 +9,13 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from shipped import Array, seeds, shipped, solve
 
+from symphys.findings.verdict import DOUBTED, rule
+from symphys.problem import load_problem
+from symphys.problems import find
+from symphys.runs.record import judged
+from symphys.transcription import transcribe
+from symphys.verification.refinement import refine
+
 GRAVITY, DAMPING, TIME, KNOTS = 9.81, 0.1, 2.0, 41
 COST = 94.836286
 """Of the swing that every seed finds."""
@@ -48,3 +55,16 @@ def test_every_seed_finds_the_swing(seed: int) -> None:
     motion = made.simulate(found.z)
     ends = [motion[name][-1] for name in ("shoulder.angle", "elbow.angle", "shoulder.rate", "elbow.rate")]
     np.testing.assert_allclose(ends, swung(found.z), atol=0.08)
+
+
+def test_a_swing_that_half_the_step_refutes_is_not_solved() -> None:
+    """Torques that are held, in steps of 40 ms: what meets all there misses by ten tolerances at half the step."""
+    held = {"simulation.dt": 0.04, "twist.interpolation": "constant", "twist.knots": 50}
+    made = transcribe(load_problem(find("acrobot"), held), exact=True, backend="casadi")
+    found = solve("ilqr", made)
+    trust = refine(made, found.z)
+    verdict = judged(made.judge(found.z))
+    assert verdict.met and trust["refined"][0]["worst"] > 3
+    ruling = rule(found.status.value, verdict, trust)
+    assert ruling.verdict == DOUBTED
+    assert any("dt / 2" in doubt for doubt in ruling.doubts)

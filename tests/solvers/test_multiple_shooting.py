@@ -12,8 +12,6 @@ from shots_of_toys import LINE, SWING, WAYS, defect, every_backend, every_way, s
 from staged_toys import acrobot, attitude, boxed, pendulum
 from toys import stop_at, through_json
 
-from symphys import load
-from symphys.runs.job import fitting
 from symphys.solvers import Status
 from symphys.solvers.methods.multiple_shooting import DEFECT
 
@@ -146,8 +144,3 @@ def test_it_stops_where_all_is_met(backend: str) -> None:
     assert found.status is Status.MET
     assert all(row.max_violation > 1 for row in found.trace[:-1])
     assert len(found.trace) < len(solve(boxed(pendulum(), 8.0), backend=backend).trace)
-
-
-def test_it_solves_only_where_it_is_named() -> None:
-    assert "multiple_shooting" not in fitting(load("ball_throw"))
-    assert {"gradient", "ipopt"} <= set(fitting(load("ball_throw")))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
@@ -60,11 +60,13 @@ class LargeTranscription(Transcription):
         found = simulate(self.rollout, lambda *_: self._happened(motion, smoothing), motion.z[0], smoothing)
         return replace(found, z=np.asarray(z, float))
 
-    def prices(self, kinds: Iterable[str] = ("gradient",)) -> dict[str, float]:
+    def prices(
+        self, kinds: Iterable[str] = ("gradient",), clock: Callable[[], float] = perf_counter
+    ) -> dict[str, float]:
         """See ``Transcription``."""
         z, evaluator = self.shooting.start(0)[None], self.shooting.evaluator
-        one = fastest(lambda: evaluator.value(z, 0.0))
-        return {kind: fastest(lambda: evaluator.gradient(z, 0.0)) / one for kind in kinds if kind == "gradient"}
+        one = fastest(lambda: evaluator.value(z, 0.0), clock)
+        return {kind: fastest(lambda: evaluator.gradient(z, 0.0), clock) / one for kind in kinds if kind == "gradient"}
 
     @cached_property
     def probe(self) -> Probe:

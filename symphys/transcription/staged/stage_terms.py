@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from symphys.errors import SymphysError
 from symphys.expression import Formula
-from symphys.problem import Problem
+from symphys.problem import Constraint, Cost, Problem, Target
 from symphys.suggest import quote
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.columns import ByColumns
@@ -128,10 +128,22 @@ def stage_terms(rollout: Rollout, statics: Indices) -> list[StageTerm]:
     Raises:
         SymphysError: for a formula that is no function of one state and one input, and for a duration that varies.
     """
-    if rollout.problem.free_duration:
-        text = "a variable sets simulation.duration, so all steps hang together"
-        raise SymphysError(f"{rollout.problem.name}: {text}: take least_squares, gradient or ipopt")
+    require_stages(rollout.problem)
     return list(_terms(rollout, statics))
+
+
+def require_stages(problem: Problem) -> None:
+    """Refuse problems that cannot be taken step by step, before anything is built.
+
+    Raises:
+        SymphysError: see ``stage_terms``.
+    """
+    if problem.free_duration:
+        text = "a variable sets simulation.duration, so all steps hang together"
+        raise SymphysError(f"{problem.name}: {text}: take least_squares, gradient or ipopt")
+    asked: tuple[Cost | Target | Constraint, ...] = (*problem.costs, *problem.targets, *problem.constraints)
+    for each in asked:
+        require_local(problem, each.name, each.formula)
 
 
 def _terms(rollout: Rollout, statics: Indices) -> Iterator[StageTerm]:
@@ -172,7 +184,6 @@ def _term(
     states: Indices,
     inputs: Indices,
 ) -> StageTerm:
-    require_local(rollout.problem, name, formula)
     compiled = rollout.compiled(formula)
     columns = np.unique(np.array(compiled.jac_sparsity(0, 0).get_triplet()[1], np.int64))
     size = int(compiled.size1_out(0))
