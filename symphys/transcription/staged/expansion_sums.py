@@ -20,7 +20,7 @@ class ExpansionSums:
     control knots that are named together with what happens at other steps, it is left out.
     """
 
-    def __init__(self, sizes: tuple[int, int, int, int], of_constants: Array, knots: tuple[Indices, Array]) -> None:
+    def __init__(self, sizes: tuple[int, int, int, int], of_constants: Array, knots: tuple[Indices, Indices]) -> None:
         """Zeros.
 
         Args:
@@ -84,7 +84,7 @@ class ExpansionSums:
         """(T, r, k) the slopes by knots among constants, and their places (k, 2)."""
         which, places = self.knots
         _, mine, theirs = np.intersect1d(block.columns, which, return_indices=True)
-        return block.slopes[:, :, mine], places[theirs]
+        return block.slopes[:, :, mine], np.asarray(places[theirs], np.int64)
 
     def _of_knots(self, block: Block, by_s: Array, scaled: Array) -> None:
         """Knots of one step with each other and with static entries."""

@@ -46,7 +46,7 @@ class StepRows(NamedTuple):
     after: Array
     u: Array
     constants: Array
-    ticks: Array
+    ticks: Indices
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,8 +144,8 @@ class StageFunctions:
         size, calls = layout.size, []
         for each in self.functions:
             inputs = tuple(places.get(key, nothing) for key in each.segments)
-            outputs = tuple(layout.take(int(each.function.numel_out(o))) for o in range(each.function.n_out()))
-            calls.append(FunctionCall(each.function, inputs, outputs))
+            results = tuple(layout.take(int(each.function.numel_out(o))) for o in range(each.function.n_out()))
+            calls.append(FunctionCall(each.function, inputs, results))
         outputs = {"all": Place(size, int(self._ends[-1]))}
         return Program(layout.size, Place(0, size), nothing, 1, outputs, epilogue=tuple(calls))
 

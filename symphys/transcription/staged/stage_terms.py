@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.expression import Formula, parse
-from symphys.problem import Problem
+from symphys.problem import Constraint, Cost, Problem, Target
 from symphys.transcription.formula_names import spans
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.motion_sums import MotionSums
@@ -159,18 +159,21 @@ class StageSymbols:
 
 def named_entries(problem: Problem) -> Indices:
     """The entries of z whose variables some formula names."""
-    tables = (*problem.costs, *problem.targets, *problem.constraints)
-    names = frozenset[str]().union(*(each.formula.needed for each in tables))
+    names = frozenset[str]().union(*(each.formula.needed for each in _tables(problem)))
     found = [
         range(*span) for v, span in zip(problem.variables, spans(problem.variables), strict=True) if v.name in names
     ]
     return np.array([i for each in found for i in each], np.int64)
 
 
+def _tables(problem: Problem) -> list[Cost | Target | Constraint]:
+    return [*problem.costs, *problem.targets, *problem.constraints]
+
+
 def motion_sums(rollout: Rollout) -> MotionSums:
     """The sums and starts that the formulas of a problem need."""
     problem, found = rollout.problem, MotionSums(rollout)
-    for each in (*problem.costs, *problem.targets, *problem.constraints):
+    for each in _tables(problem):
         if each.formula.parts:
             found.note(each.name, each.formula, rollout.tick(each.at))
     return found

@@ -25,7 +25,15 @@ Indices = NDArray[np.int64]
 
 
 class SlopedTerm(NamedTuple):
-    """A term along a motion: values (T, r), slopes, those by static entries (T, r, s), and what curvature is made of."""
+    """A term along a motion.
+
+    Attributes:
+        term: which.
+        value: (T, r).
+        blocks: its slopes.
+        by_s: (T, r, s) its slopes by the static entries of z.
+        slopes, found: what its curvature is made of.
+    """
 
     term: StageTerm
     value: Array
@@ -233,7 +241,7 @@ class RolloutStages:
             rows = first + np.arange(each.value.size).reshape(each.value.shape)
             first += each.value.size
             values.append(each.value.ravel())
-            by_s.append(each.by_s.reshape(-1, s))
+            by_s.append(each.by_s.reshape(each.value.size, s))
             x.add(rows, term.states[:, None, None] * n + blocks.x.columns, blocks.x.slopes)
             x.add(rows, term.steps[:, None, None] * n + blocks.first.columns, blocks.first.slopes)
             u.add(rows, term.steps[:, None, None] * m + blocks.u.columns, blocks.u.slopes)

@@ -27,8 +27,8 @@ Expr = Any
 class StepArguments:
     """The arguments of one step, and which of them it is differentiated by.
 
-    What varies is (d, u, p as far as z sets it, e), what is given (x, the state after, the step's number, p). e (nx,) is what the
-    state may have beside its tangent, as initial states do.
+    What varies is (d, u, p as far as z sets it, e), what is given (x, the state after, the number of the step, p).
+    e (nx,) is what the state may have beside its tangent, as initial states do.
 
     Attributes:
         rollout, tangent: of the step.

@@ -51,10 +51,11 @@ class TermGroups:
                 continue
             steps, batch = self.terms[group.numbers[0]].steps, len(X)
             parts = (X[:, steps], X[:, steps + 1], U[:, steps])
-            flat = [part.reshape(batch * len(steps), -1) for part in parts]
-            rows = StepRows(*flat, np.repeat(constants, len(steps), axis=0), np.tile(steps, batch))
+            before, after, u = (part.reshape(batch * len(steps), part.shape[2]) for part in parts)
+            shared, ticks = np.repeat(constants, len(steps), axis=0), np.tile(steps, batch)
+            rows = StepRows(before, after, u, shared, ticks)
             for number, (value,) in zip(group.numbers, functions(rows), strict=True):
-                found[number] = value.reshape(batch, len(steps), -1)
+                found[number] = value.reshape(batch, len(steps), value.shape[1])
         return [(self.terms[number], found[number]) for number in sorted(found)]
 
     def summed(self, rows: StepRows) -> Array:

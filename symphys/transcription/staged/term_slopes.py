@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -116,7 +117,7 @@ def term_slopes(symbols: StageSymbols, term: StageTerm, known: dict[Any, TermSlo
     value, arguments = term.value, symbols.arguments[:4]
     raw = [ca.sparsify(ca.jacobian(value, each)) for each in arguments]
     moved = [_times(raw[i], symbols.bases[i]) if raw[i].nnz() else ca.SX(value.shape[0], 0) for i in (0, 1)]
-    constants = raw[3]
+    constants: Expr = raw[3]
     if symbols.shifts is not None:
         for slope, shift in zip(raw[:2], symbols.shifts, strict=True):
             more = symbols.constants.shape[0] - symbols.parameter_size
@@ -129,7 +130,7 @@ def term_slopes(symbols: StageSymbols, term: StageTerm, known: dict[Any, TermSlo
     if second is not None:
         results += [_nonzeros(second), *(_nonzeros(each) for each in bases)]
         ends = np.cumsum([0, *(len(each) for each in acting)]).tolist()
-        parts = tuple(slice(*pair) for pair in zip(ends[:-1], ends[1:], strict=True))
+        parts = tuple(slice(*pair) for pair in pairwise(ends))
     found = TermSlopes(
         reading(results, symbols.arguments, term.after),
         tuple(Pattern.of(each) for each in slopes),

@@ -217,7 +217,7 @@ weight = 1e-3
 
 [[cost]]
 name = "cost of transport"
-value = "integral(rail.command**2 + 5 * gain) / (9.81 * (end.rail.position - start.rail.position + 0.5 * start.cart.velocity[0]))"
+value = "integral(rail.command**2 + 5 * gain) / (end.rail.position - start.rail.position + start.cart.velocity[0])"
 
 [[cost]]
 name = "soon"
