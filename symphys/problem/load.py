@@ -20,7 +20,7 @@ from symphys.problem.checks.start import at_guess, check_joints, check_overlap, 
 from symphys.problem.checks.start_values import StartValues
 from symphys.problem.feedback import Controller, Sensor
 from symphys.problem.include.files import appendix
-from symphys.problem.model import ALIVE, Array, ProblemData, Simulation, Termination, Variable
+from symphys.problem.model import ALIVE, Array, Phase, ProblemData, Simulation, Termination, Variable
 from symphys.problem.parametric.collision_filter import CollisionFilter
 from symphys.problem.parametric.forward_kinematics import forward_kinematics
 from symphys.problem.parametric.parts import Part
@@ -46,7 +46,7 @@ from symphys.problem.tables.forces import force_quantities, read_forces
 from symphys.problem.tables.joints import read_joints
 from symphys.problem.tables.objectives import Objectives, read_objectives
 from symphys.problem.tables.scenarios import read_scenarios
-from symphys.problem.tables.simulation import read_simulation
+from symphys.problem.tables.simulation import read_phases, read_simulation
 from symphys.problem.tables.statics import read_statics
 from symphys.problem.tables.termination import read_termination, with_termination_cost
 from symphys.problem.tables.variables import read_variables
@@ -132,8 +132,12 @@ def build(
     check_overlap(parametric, start, faults)
     check_joints(parametric, start, faults)
     named = {**formula_names(values, start, variables), **given}
-    forces = read_forces(document.force, known, named, variables, faults)
-    termination, objectives = read_termination_and_objectives(document, simulation, nominal, named, variables, faults)
+    free = any(variable.kind == "duration" for variable in variables)
+    phases = read_phases(document.phase, simulation, free, faults)
+    forces = read_forces(document.force, known, named, variables, phases, faults)
+    termination, objectives = read_termination_and_objectives(
+        document, simulation, nominal, named, variables, phases, faults
+    )
     return ProblemData(
         name=printable(path.stem),
         title=document.title or printable(path.stem),
@@ -188,6 +192,7 @@ def read_termination_and_objectives(
     nominal: World,
     named: Mapping[str, Any],
     variables: Sequence[Variable],
+    phases: Mapping[str, Phase],
     faults: Faults,
 ) -> tuple[Termination | None, Objectives]:
     """Termination and objectives; ``named`` has a value for each name in formulas, as the guess has it."""
@@ -197,7 +202,7 @@ def read_termination_and_objectives(
     names = {**named} | ({} if document.ending[1] is None else {ALIVE: ca.DM(1)})
     units = formula_units(nominal, names, variables)
     free = any(variable.kind == "duration" for variable in variables)
-    objectives = read_objectives(document, simulation, names, units, faults, free)
+    objectives = read_objectives(document, simulation, names, units, faults, phases, free)
     objectives = replace(objectives, costs=with_termination_cost(document, objectives.costs, faults))
     faults.stop_if_any()
     return termination, objectives
