@@ -80,10 +80,13 @@ def smooth_larger(*arguments: Expr) -> Expr:
     require_length(width, 1, "the width, the last argument,")
     if width.is_constant() and not bool(ca.DM(width) > 0):
         raise UnfitError("the width, the last argument, must be a number above 0")
-    parts = ca.vertsplit(values[0]) if len(values) == 1 else values
+    parts: list[Expr] = ca.vertsplit(values[0]) if len(values) == 1 else list(values)
     require_fit(*parts)
-    top = reduce(larger, parts)
-    return top + width * ca.log(sum(ca.exp((part - top) / width) for part in parts))
+    top: Expr = reduce(larger, parts)
+    total: Expr = ca.DM(0)
+    for part in parts:
+        total = total + ca.exp((part - top) / width)
+    return top + width * ca.log(total)
 
 
 def smooth_smaller(*arguments: Expr) -> Expr:

@@ -1,4 +1,4 @@
-"""Problems about whole motions, of which formulas take parts or whose duration is free, against closed forms."""
+"""Problems about whole motions and their phases, or whose duration is free, against closed forms."""
 
 from __future__ import annotations
 
@@ -46,3 +46,13 @@ def test_the_push_before_the_flight_falls_linearly(solver: str) -> None:
     middles = (np.arange(20) + 0.5) / 50
     assert found.z[:20] == pytest.approx(slope * (1 - middles), abs=0.05)
     assert found.z[20:] == pytest.approx(0, abs=1e-3)
+
+
+@first("solver", ["ilqr", "multiple_shooting", "least_squares"])
+def test_the_brake_takes_what_two_velocities_and_the_way_ask_for(solver: str) -> None:
+    """Coasting, an exponential decay, coasting: the way of the decay is that of the logarithmic mean."""
+    made = shipped("eddy_brake", "casadi")
+    speed, strength = solve(solver, made).z
+    mean = (speed - 0.5) / np.log(speed / 0.5)
+    assert 0.4 * speed + 0.4 * mean + 0.2 * 0.5 == pytest.approx(1.5, abs=2e-4)
+    assert strength == pytest.approx(2 * np.log(speed / 0.5) / 0.4, rel=1e-3)
