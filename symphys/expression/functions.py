@@ -9,6 +9,7 @@ from functools import reduce
 import casadi as ca
 
 from symphys.expression.columns import Expr, length, require_fit, require_length, require_same
+from symphys.expression.errors import UnfitError
 from symphys.maths import rotation
 
 NORM_WIDTH = 1e-12
@@ -68,6 +69,30 @@ def extreme(choose: Callable[[Expr, Expr], Expr]) -> Callable[..., Expr]:
 def clip(x: Expr, lower: Expr, upper: Expr) -> Expr:
     """X limited to [lower, upper]."""
     return smaller(larger(x, lower), upper)
+
+
+def smooth_larger(*arguments: Expr) -> Expr:
+    """Width * log(sum of exp(value / width)), of values shifted by the largest, so that no exponential overflows.
+
+    It exceeds the largest of n values by at most width * log(n); the last argument is the width.
+    """
+    *values, width = arguments
+    require_length(width, 1, "the width, the last argument,")
+    if width.is_constant() and not bool(ca.DM(width) > 0):
+        raise UnfitError("the width, the last argument, must be a number above 0")
+    parts: list[Expr] = ca.vertsplit(values[0]) if len(values) == 1 else list(values)
+    require_fit(*parts)
+    top: Expr = reduce(larger, parts)
+    total: Expr = ca.DM(0)
+    for part in parts:
+        total = total + ca.exp((part - top) / width)
+    return top + width * ca.log(total)
+
+
+def smooth_smaller(*arguments: Expr) -> Expr:
+    """The mirror image of ``smooth_larger``: below the smallest by at most width * log(n)."""
+    *values, width = arguments
+    return -smooth_larger(*(-value for value in values), width)
 
 
 def length_of(*squares: Expr) -> Expr:
@@ -133,6 +158,14 @@ FUNCTIONS: dict[str, Function] = {
     "max": Function(
         "max(a, b, ...)", "largest, component by component; of one vector its greatest", extreme(larger), 1, None
     ),
+    "smooth_max": Function(
+        "smooth_max(a, b, ..., width)",
+        "max with rounded corners: width log(sum exp(a / width))",
+        smooth_larger,
+        2,
+        None,
+    ),
+    "smooth_min": Function("smooth_min(a, b, ..., width)", "min with rounded corners", smooth_smaller, 2, None),
     "clip": Function("clip(x, lower, upper)", "x limited to a range", elementwise(clip), 3, 3),
     "hypot": Function("hypot(a, b)", "sqrt(a^2 + b^2), finite slope at 0", elementwise(hypot), 2, 2),
     "norm": Function("norm(v)", "Euclidean length, finite slope at 0", norm),

@@ -160,10 +160,12 @@ def giving(result: Powers, *allowed: Powers) -> Callable[[Apply, list[Powers]], 
     return lambda node, parts: result if parts[0] in allowed else None
 
 
+KEEPING = ("abs", "min", "max", "smooth_max", "smooth_min", "clip", "hypot", "norm", "sum", "mean")
+"""Functions that keep the unit of their arguments."""
 RULES: dict[Callable[..., Any], Callable[[Apply, list[Powers]], Found]] = {
     **dict.fromkeys((OPERATORS[ast.Add], OPERATORS[ast.Sub], neg, pos), alike),
     **dict.fromkeys((columns.join, columns.component, columns.part), alike),
-    **{FUNCTIONS[name].apply: alike for name in ("abs", "min", "max", "clip", "hypot", "norm", "sum", "mean")},
+    **{FUNCTIONS[name].apply: alike for name in KEEPING},
     OPERATORS[ast.Mult]: product,
     OPERATORS[ast.Div]: partial(product, times=-1),
     OPERATORS[ast.Pow]: power,

@@ -65,6 +65,7 @@ class ForceLaw:
         formula: of as many numbers.
         against: an input and components to which the opposite is added; None: nothing.
         numbers: of the formula, as the file has them.
+        during: where the phase in which alone it acts begins and ends, as shares of the duration; None: it acts always.
     """
 
     name: str
@@ -73,6 +74,7 @@ class ForceLaw:
     formula: Formula
     numbers: dict[str, Array] = field(repr=False)
     against: tuple[str, tuple[int, ...]] | None = None
+    during: tuple[float, float] | None = None
 
     @property
     def acts_on(self) -> tuple[tuple[str, tuple[int, ...], int], ...]:

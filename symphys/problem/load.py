@@ -18,7 +18,7 @@ from symphys.problem.checks.memory import check_rollout
 from symphys.problem.checks.pair_limit import check_pair_limit
 from symphys.problem.checks.start import at_guess, check_joints, check_overlap, formula_names, sensor_names
 from symphys.problem.checks.start_values import StartValues
-from symphys.problem.feedback import Controller, Sensor
+from symphys.problem.feedback import Controller, ForceLaw, Sensor
 from symphys.problem.include.files import appendix
 from symphys.problem.model import ALIVE, Array, ProblemData, Simulation, Termination, Variable
 from symphys.problem.parametric.collision_filter import CollisionFilter
@@ -46,7 +46,7 @@ from symphys.problem.tables.forces import force_quantities, read_forces
 from symphys.problem.tables.joints import read_joints
 from symphys.problem.tables.objectives import Objectives, read_objectives
 from symphys.problem.tables.scenarios import read_scenarios
-from symphys.problem.tables.simulation import read_simulation
+from symphys.problem.tables.simulation import read_phases, read_simulation
 from symphys.problem.tables.statics import read_statics
 from symphys.problem.tables.termination import read_termination, with_termination_cost
 from symphys.problem.tables.variables import read_variables
@@ -132,8 +132,7 @@ def build(
     check_overlap(parametric, start, faults)
     check_joints(parametric, start, faults)
     named = {**formula_names(values, start, variables), **given}
-    forces = read_forces(document.force, known, named, variables, faults)
-    termination, objectives = read_termination_and_objectives(document, simulation, nominal, named, variables, faults)
+    forces, termination, objectives = read_laws(document, simulation, nominal, known, named, variables, faults)
     return ProblemData(
         name=printable(path.stem),
         title=document.title or printable(path.stem),
@@ -182,25 +181,28 @@ def read_control(
     return sensors, controllers
 
 
-def read_termination_and_objectives(
+def read_laws(
     document: Document,
     simulation: Simulation,
     nominal: World,
+    known: Mapping[str, Quantity],
     named: Mapping[str, Any],
     variables: Sequence[Variable],
     faults: Faults,
-) -> tuple[Termination | None, Objectives]:
-    """Termination and objectives; ``named`` has a value for each name in formulas, as the guess has it."""
+) -> tuple[tuple[ForceLaw, ...], Termination | None, Objectives]:
+    """Force laws, termination and objectives; ``named`` has a value for each name in formulas, as the guess has it."""
+    free = any(variable.kind == "duration" for variable in variables)
+    phases = read_phases(document.phase, simulation, free, faults)
+    forces = read_forces(document.force, known, named, variables, phases, faults)
     others = {each.name for each in variables} | {each.name for each in document.reference}
     sensed = {name: value for name, value in named.items() if name.partition(".")[0] not in others}
     termination = read_termination(document, sensed, input_sizes(nominal), faults)
     names = {**named} | ({} if document.ending[1] is None else {ALIVE: ca.DM(1)})
     units = formula_units(nominal, names, variables)
-    free = any(variable.kind == "duration" for variable in variables)
-    objectives = read_objectives(document, simulation, names, units, faults, free)
+    objectives = read_objectives(document, simulation, names, units, faults, phases, free)
     objectives = replace(objectives, costs=with_termination_cost(document, objectives.costs, faults))
     faults.stop_if_any()
-    return termination, objectives
+    return forces, termination, objectives
 
 
 def read_world(document: Document, faults: Faults) -> tuple[ParametricWorld, dict[str, Array]]:

@@ -9,9 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from symphys.errors import SymphysError
-from symphys.problem import Constraint, Cost, Problem
-from symphys.transcription.staged.stage_terms import require_stages
+from symphys.problem import Constraint, Cost, Problem, Target
 
 FEW = 300
 """Numbers up to which a search without gradients, or a Jacobian, is worth its evaluations."""
@@ -71,12 +69,9 @@ def few_scenarios(problem: Problem) -> bool:
 
 
 def staged(problem: Problem) -> bool:
-    """Whether controls act over time, and everything that is asked for looks at one state and one input each."""
-    try:
-        require_stages(problem)
-    except SymphysError:
-        return False
-    return controls(problem)
+    """Whether controls act over time, and everything that is asked for is of one state and one input each."""
+    asked: tuple[Cost | Target | Constraint, ...] = (*problem.costs, *problem.targets, *problem.constraints)
+    return controls(problem) and not problem.free_duration and not any(each.formula.parts for each in asked)
 
 
 def controls(problem: Problem) -> bool:
@@ -143,7 +138,7 @@ SITUATIONS = (
         "controls over time, seen as a whole",
         controls,
         (
-            ChosenSolver("ipopt", "what it asks for hangs on the whole motion, and constraints may bind"),
+            ChosenSolver("ipopt", "what it asks for is of the whole motion, and constraints may bind"),
             ChosenSolver("gradient", "a gradient costs the same for any number of knots"),
         ),
     ),

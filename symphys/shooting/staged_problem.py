@@ -94,7 +94,7 @@ class StagedProblem(Protocol):
         statics: (s,) the entries of z that are no knots of a control: initial states, parameters.
         weights: (N * m, len(z)) such that u = weights @ z, step after step; 0 for static entries.
         lower, upper: (c,) bounds of the limits: the problem's constraints, in their order.
-        penalties: (c,) the weights of their squared violations in the merit.
+        penalties: (c,) the weights of their squared violations in the merit, at the time step of the file.
         squares: whether every cost is a sum of squares.
     """
 

@@ -106,6 +106,8 @@ def test_refused_when_read(text: str, message: str) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
+        ("smooth_max(pair, 0)", "the width, the last argument, must be a number above 0"),
+        ("smooth_max(ball.mass, pair)", "the width, the last argument, must have 1 component"),
         ("ball.velocty", 'unknown name "ball.velocty"; did you mean "ball.velocity"'),
         ("bll.mass", 'did you mean "ball.mass"'),
         ("ball", "unknown name"),

@@ -59,6 +59,9 @@ CASES = [
     ("min(ball.position, 0)", [0, -2, 0]),
     ("max(1, time, ball.mass)", [4]),
     ("clip(ball.position, -1, [0, 1, 2])", [0, -1, 2]),
+    ("smooth_max(time, ball.mass, 0.5)", [4 + 0.5 * math.log(1 + math.exp(-4))]),
+    ("smooth_max(ball.position, 1)", [math.log(math.exp(1) + math.exp(-2) + math.exp(3))]),
+    ("smooth_min(ball.position, 0, 2)", [-2 * math.log(1 + math.exp(-x / 2)) for x in (1, -2, 3)]),
     ("hypot(3, 4)", [5]),
     ("norm(ball.position)", [math.sqrt(14)]),
     ("sumsqr(ball.position)", [14]),
@@ -104,7 +107,22 @@ def test_lengths_have_finite_derivatives_at_zero(text: str) -> None:
     assert np.all(np.isfinite(np.array(curvature)))
 
 
-@pytest.mark.parametrize("text", ["max(v, 0)", "min(v, 0)", "max(0, v)", "min(v)", "clip(v, -1, 1)"])
+@pytest.mark.parametrize("gap", [0.0, 1e-9, 0.3, 1e6])
+def test_a_smooth_maximum_has_the_slopes_and_curvature_of_a_soft_choice(gap: float) -> None:
+    v, width = ca.SX.sym("v", 2), 0.1
+    value = parse("smooth_max(v[0], v[1], 0.1)").evaluate({"v": v})
+    slope = ca.gradient(value, v)
+    slopes, curvature = ca.Function("d", [v], [slope, ca.jacobian(slope, v)])([gap, 0])
+    share = 1 / (1 + math.exp(-gap / width))
+    np.testing.assert_allclose(np.array(slopes).ravel(), [share, 1 - share], atol=1e-14)
+    bend = share * (1 - share) / width
+    np.testing.assert_allclose(np.array(curvature), [[bend, -bend], [-bend, bend]], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["smooth_max(v, 0.1)", "smooth_min(v, 0, 0.1)", "max(v, 0)", "min(v, 0)", "max(0, v)", "min(v)", "clip(v, -1, 1)"],
+)
 def test_a_nan_stays_a_nan(text: str) -> None:
     v = ca.SX.sym("v", 2)
     function = ca.Function("f", [v], [parse(text).evaluate({"v": v})])

@@ -24,6 +24,7 @@ SHIPPED = [
     "bowling",
     "cart_pole",
     "cost_of_transport",
+    "eddy_brake",
     "fastest_move",
     "follow_swing",
     "free_kick",

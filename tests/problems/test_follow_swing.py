@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+from repeats import first
 from shipped import shipped, solve
 
 
-def test_the_torque_is_that_of_inverse_dynamics() -> None:
+@first("solver", ["ilqr", "multiple_shooting", "least_squares"])
+def test_the_torque_is_that_of_inverse_dynamics(solver: str) -> None:
     made = shipped("follow_swing")
-    found = solve("least_squares", made)
+    found = solve(solver, made)
     (bar,) = made.problem.world().bodies
     distance = 0.3
     inertia = float(bar.inertia[0]) + distance**2

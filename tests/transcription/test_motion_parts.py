@@ -133,3 +133,20 @@ def test_a_single_step_has_no_whole_motion(tmp_path: Path) -> None:
 def test_what_cannot_be_names_table_and_key(tmp_path: Path, found: str, given: str, message: str) -> None:
     with pytest.raises(ProblemError, match=message):
         load(tmp_path, BALL.replace(found, given, 1))
+
+
+def test_the_largest_value_along_a_motion_is_a_smooth_maximum_over_time(tmp_path: Path) -> None:
+    width = 1e-3
+    text = (
+        BALL
+        + f'[[output]]\nname = "top"\nvalue = "{width} * log(average(exp((ball.position[2] - 1) / {width}))) + 1"\n'
+    )
+    file = tmp_path / "peak.toml"
+    file.write_text(text.replace("guess = [1, 0.5, 0.2]", "guess = [1, 0.5, 2]"))
+    made = transcribe(load_problem(file), backend="casadi")
+    z = made.shooting.start(0)
+    peak = 1 + 2**2 / (2 * 9.81)
+    found = float(made.judge(z).outputs["top"])
+    # about the peak the height is peak - g t^2 / 2, so that the mean is a Gaussian integral
+    expected = peak + width * np.log(np.sqrt(2 * np.pi * width / 9.81) / 0.6)
+    assert found == pytest.approx(expected, abs=0.02 * width)

@@ -83,6 +83,58 @@ def test_phases_are_the_same_on_a_finer_grid_and_scale_with_a_free_duration() ->
     assert costs["push"] + costs["short"] + costs["flight"] == pytest.approx(costs["all"], rel=1e-13)
 
 
+WADING: dict[str, Any] = {
+    "simulation": {"duration": 1.0, "dt": 0.005},
+    "world": {"gravity": [0, 0, 0]},
+    "body": [{"name": "ball", "shape": {"sphere": {"radius": 0.1}}, "mass": 0.5}],
+    "phase": [{"name": "air", "share": 0.4}, {"name": "water", "share": 0.9}, {"name": "beyond"}],
+    "force": [
+        {"name": "drag", "on": "ball.force", "during": "water", "value": "-1.5 * ball.velocity"},
+        {"name": "jet", "on": "ball.force[2]", "during": "beyond", "value": "2"},
+    ],
+    "variable": [{"name": "throw", "sets": "ball.velocity", "guess": [3, 0, 0]}],
+    "cost": [{"name": "place", "value": "sumsqr(ball.position - [1, 0, 0])"}],
+    "output": [{"name": "far", "value": "ball.position[0]"}],
+}
+"""Nothing acts in air, drag in water, a jet beyond."""
+
+
+@pytest.mark.parametrize("duration", [1.0, 1.6])
+def test_a_force_acts_in_its_phase_alone(duration: float) -> None:
+    """Against x = v t, then v m / c (1 - exp(-c t / m)), then a steady velocity; the jet gives t^2 / 2 F / m."""
+    free = {"name": "T", "sets": "simulation.duration", "guess": duration}
+    more = [] if duration == 1.0 else [free]
+    problem = problem_of_tables({**WADING, "variable": [*WADING["variable"], *more]})
+    made = transcribe(problem, backend="casadi")
+    z = made.shooting.start(0)
+    motion = made.simulate(z)
+    air, water, beyond = 0.4 * duration, 0.5 * duration, 0.1 * duration
+    slowed = 3 * np.exp(-1.5 * water / 0.5)
+    far = 3 * air + (3 - slowed) * 0.5 / 1.5 + slowed * beyond
+    assert motion.position[80, 0, 0] == pytest.approx(3 * air, rel=1e-12)
+    assert motion.position[-1, 0, 0] == pytest.approx(far, rel=1e-4)
+    assert motion.position[-1, 0, 2] == pytest.approx(beyond**2 / 2 * 2 / 0.5, rel=1e-9)
+    assert np.all(motion.force[80:180, 0, 2] == 0)
+    assert np.all(motion.force[:80, 0, 0] == 0)
+    assert np.all(motion.force[80:180, 0, 0] < 0)
+    program = rollout_program(made.rollout)
+    assert interpret(program, z, [0.0])["merit"] == pytest.approx(made.judge(z).objective, rel=1e-12)
+
+
+def test_steps_with_forces_of_phases_are_linearized_as_the_whole_is() -> None:
+    made = transcribe(problem_of_tables(WADING), backend="casadi")
+    assert made.shooting.staged is not None
+    staged, z = made.shooting.staged(), made.shooting.start(0)
+    motion = staged.roll_out(z, 0.0)
+    slopes = staged.linearize(motion)
+    total = slopes.start
+    for a, c in zip(slopes.a, slopes.c, strict=True):
+        total = a @ total + c
+    costs = staged.expand(motion, np.zeros(0), np.zeros(0))
+    gradient = np.array(made.functions.gradient(z, 0.0)[3]).ravel()
+    np.testing.assert_allclose(costs.x[-1] @ total, gradient, atol=1e-10 * np.abs(gradient).max())
+
+
 FREE = {"name": "T", "sets": "simulation.duration"}
 
 
@@ -103,6 +155,10 @@ FREE = {"name": "T", "sets": "simulation.duration"}
             {"phase": [{"name": "push", "until": 0.3}, {"name": "short", "until": 0.2}]},
             r'"short".until: the phase before',
         ),
+        (
+            {"force": [{"name": "f", "on": "ball.force[0]", "value": "1", "during": "pusch"}]},
+            r'force "f".during: there is no phase "pusch"; did you mean "push"',
+        ),
         ({"phase": []}, r"there is no \[\[phase\]\]"),
         ({"variable": [FREE]}, r'"push".until: is not known, since a variable sets the duration; give share'),
     ],
@@ -115,3 +171,6 @@ def test_what_cannot_be_names_table_and_key(change: dict[str, Any], message: str
 def test_a_single_step_has_no_phases() -> None:
     with pytest.raises(SymphysError, match="is a phase of a whole motion; this is one step"):
         compile_open_step(problem_of_tables(TABLES), backend="casadi")
+    with pytest.raises(SymphysError, match=r'force "drag".during: is a phase of a whole motion; this is one step'):
+        push = {"name": "push", "sets": "ball.force", "knots": 2}
+        compile_open_step(problem_of_tables({**WADING, "variable": [push]}), backend="casadi")

@@ -94,6 +94,7 @@ class ForceTable(SchemaTable):
         description='formula in N or N m, world frame: "-drag.c * norm(ball.velocity) * ball.velocity"; it is '
         "evaluated in the middle of each step, that of a command at its start"
     )
+    during: str | None = Field(default=None, min_length=1, description="the phase in which alone it acts; else always")
     numbers: dict[Identifier, Numbers] = Field(
         default={}, description="numbers of the formula, which variables may set: { c = 0.02 } is drag.c"
     )

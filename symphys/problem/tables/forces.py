@@ -10,10 +10,11 @@ import numpy as np
 
 from symphys.expression import FormulaError, parse
 from symphys.problem.feedback import ForceLaw
-from symphys.problem.model import Variable, VariableSlot
+from symphys.problem.model import Phase, Variable, VariableSlot
 from symphys.problem.quantities import Quantity, SlotError, read_slot
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.control import ForceTable
+from symphys.problem.tables.simulation import find_phase
 from symphys.suggest import quote
 
 NOT_AHEAD = "accelerometer"
@@ -36,6 +37,7 @@ def read_forces(
     known: Mapping[str, Quantity],
     sample: Mapping[str, Any],
     variables: Sequence[Variable],
+    phases: Mapping[str, Phase],
     faults: Faults,
 ) -> tuple[ForceLaw, ...]:
     """Every law that is clear.
@@ -45,9 +47,10 @@ def read_forces(
         known: every quantity; those of kind "control" can be added to.
         sample: a value for each name in formulas, as the guess has it.
         variables: of the problem.
+        phases: by name.
         faults: gets what is wrong.
     """
-    found = [_read(index, table, known, sample, variables, faults) for index, table in enumerate(tables)]
+    found = [_read(index, table, known, sample, variables, phases, faults) for index, table in enumerate(tables)]
     return tuple(law for law in found if law is not None)
 
 
@@ -57,6 +60,7 @@ def _read(
     known: Mapping[str, Quantity],
     sample: Mapping[str, Any],
     variables: Sequence[Variable],
+    phases: Mapping[str, Phase],
     faults: Faults,
 ) -> ForceLaw | None:
     place = ("force", index)
@@ -89,7 +93,9 @@ def _read(
         faults.add((*place, "value"), "is not a finite number at the start of the guess")
     numbers = {key: known[f"{table.name}.{key}"].nominal for key in table.numbers}
     opposite = None if against is None else (against.name, against.components)
-    return ForceLaw(table.name, slot.name, slot.components, formula, numbers, opposite)
+    phase = None if table.during is None else find_phase(table.during, phases, (*place, "during"), faults)
+    during = None if phase is None else (phase.start, phase.end)
+    return ForceLaw(table.name, slot.name, slot.components, formula, numbers, opposite, during)
 
 
 def _slot(key: str, text: str, known: Mapping[str, Quantity], place: Place, faults: Faults) -> VariableSlot | None:

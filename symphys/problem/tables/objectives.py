@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import casadi as ca
@@ -18,10 +19,10 @@ from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema import Document
 from symphys.problem.schema.checks import OF_PHASE
 from symphys.problem.schema.objectives import ConstraintTable, CostTable, OutputTable, TargetTable
-from symphys.problem.tables.simulation import check_moment, read_phases
-from symphys.suggest import hint, quote
+from symphys.problem.tables.simulation import check_moment, find_phase
 
 Array = NDArray[np.float64]
+NO_PHASES: Mapping[str, Phase] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -41,14 +42,15 @@ def read_objectives(
     sample: Mapping[str, Any],
     units: Mapping[str, str],
     faults: Faults,
+    phases: Mapping[str, Phase] = NO_PHASES,
     free: bool = False,
 ) -> Objectives:
     """All of them; ``sample`` has a value for each name in formulas, ``units`` its unit where that is known.
 
-    ``free``: whether a variable sets the duration.
+    ``phases`` by name; ``free``: whether a variable sets the duration.
     """
     reader = ObjectiveReader(simulation, sample, units, faults, free)
-    reader.phases = read_phases(document.phase, simulation, free, faults)
+    reader.phases = dict(phases)
     costs = [reader.cost(index, table) for index, table in enumerate(document.cost)]
     targets = [reader.target(index, table) for index, table in enumerate(document.target)]
     constraints = [reader.constraint(index, table) for index, table in enumerate(document.constraint)]
@@ -90,10 +92,7 @@ class ObjectiveReader:
 
     def phase(self, name: str, place: Place) -> Phase | None:
         """The phase of that name; notes where there is none."""
-        if name not in self.phases:
-            known = hint(name, self.phases) if self.phases else "there is no [[phase]]"
-            self.faults.add(place, f"there is no phase {quote(name)}; {known}")
-        return self.phases.get(name)
+        return find_phase(name, self.phases, place, self.faults)
 
     def instant(self, at: str | float, place: Place) -> str | float:
         """The end, or a time; that of a step, whatever the duration. "end of" a phase is a time as well."""

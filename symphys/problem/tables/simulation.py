@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import ceil, floor
 
 from symphys.problem.model import Phase, Simulation
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.objectives import PhaseTable
 from symphys.problem.schema.physics import SimulationTable
+from symphys.suggest import hint, quote
 
 MAX_STEPS = 1_000_000
 WHOLE = 1e-9
@@ -52,6 +53,14 @@ def check_moment(at: str | float, simulation: Simulation, place: tuple[str | int
     if abs(step - round(step)) > 1e-6:
         near = [floor(step) * simulation.dt, ceil(step) * simulation.dt]
         faults.add(place, f"the time {at:g} s falls between two steps; nearest: {near[0]:.10g} or {near[1]:.10g} s")
+
+
+def find_phase(name: str, phases: Mapping[str, Phase], place: Place, faults: Faults) -> Phase | None:
+    """The phase of that name; notes where there is none."""
+    if name not in phases:
+        known = hint(name, phases) if phases else "there is no [[phase]]"
+        faults.add(place, f"there is no phase {quote(name)}; {known}")
+    return phases.get(name)
 
 
 def read_phases(tables: Sequence[PhaseTable], simulation: Simulation, free: bool, faults: Faults) -> dict[str, Phase]:

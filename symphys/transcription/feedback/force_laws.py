@@ -22,6 +22,8 @@ from symphys.transcription.formula_names import Instant, Parameters, instant, na
 
 Expr = Any
 """casadi SX"""
+QUARTER = 0.25
+"""Of a step: so far from its ends it is asked which step a time belongs to, so that rounding does not matter."""
 
 
 def force_function(
@@ -62,9 +64,18 @@ def _added(
         if variable.name in wanted:
             slot = variable.slots[0]
             names[variable.name] = ca.vertcat(*(names[slot.name][k] for k in slot.components))
+    tick = at.time / parameters.step_length(problem.simulation, at.p)
     for law in laws:
         value = law.formula.evaluate({name: names[name] for name in law.formula.names})
+        if law.during is not None:
+            value = value * _within(tick, law.during, problem.simulation.steps)
         for name, components, sign in law.acts_on:
             for k, component in enumerate(components):
                 total[columns[name].start + component] += sign * value[k]
     return total
+
+
+def _within(tick: Expr, shares: tuple[float, float], steps: int) -> Expr:
+    """1 in the steps of a phase, else 0: at the start of a step, whose number ``tick`` is, or half a step later."""
+    first, last = (round(share * steps) - QUARTER for share in shares)
+    return ca.logic_and(tick > first, tick < last)

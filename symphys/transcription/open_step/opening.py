@@ -194,6 +194,11 @@ def refuse_motion_parts(problem: Problem) -> None:
         for cost in problem.costs
         if cost.during is not None
     ]
+    issues += [
+        Issue(f'force "{law.name}".during', "is a phase of a whole motion; this is one step")
+        for law in problem.forces
+        if law.during is not None
+    ]
     if issues:
         raise ProblemError(problem.file, issues)
 

@@ -86,12 +86,12 @@ class LinearizedStep:
         x, aim, u, p = (np.atleast_2d(np.asarray(each, float)) for each in (X, after, U, P))
         count, (_, n, m, np_) = len(x), self.arguments.sizes
         p = np.broadcast_to(p, (count, np_))
-        time = np.broadcast_to(np.asarray(k, float) * self.rollout.dt, (count,))[:, None]
+        tick = np.broadcast_to(np.asarray(k, float), (count,))[:, None]
         if self.exact and smoothing:
             raise ValueError(f"this step is for smoothing 0 only, not for {smoothing:g}")
         parts = [np.zeros((count, n)), u.reshape(count, m), p[:, self.arguments.varied], np.zeros_like(x)]
         varying = np.concatenate(parts, axis=1)
-        return varying, np.concatenate([x, aim, time, p, np.full((count, 1), smoothing)], axis=1)
+        return varying, np.concatenate([x, aim, tick, p, np.full((count, 1), smoothing)], axis=1)
 
     def _built(self) -> tuple[_ByKernel | _ByCasadi, _BySlopes | _ByCasadi]:
         """What gives states after the step, and what gives slopes."""

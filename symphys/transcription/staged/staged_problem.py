@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -14,16 +13,42 @@ from symphys.codegen.backends import BEST
 from symphys.problem import Constraint
 from symphys.shooting import Expansion, Linearized, StagedMotion
 from symphys.transcription.rollout import Rollout
-from symphys.transcription.staged.columns import ByColumns
+from symphys.transcription.staged.expansion_sums import ExpansionSums
 from symphys.transcription.staged.linearization import Linearization, statics_of
-from symphys.transcription.staged.stage_terms import Slopes, StageTerm, stage_terms
+from symphys.transcription.staged.stage_functions import StepRows
+from symphys.transcription.staged.stage_terms import StageTerm
+from symphys.transcription.staged.term_groups import TermGroups
+from symphys.transcription.staged.term_slopes import Blocks, TermSlopes
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
+class SlopedTerm(NamedTuple):
+    """A term along a motion.
+
+    Attributes:
+        term: which.
+        value: (T, r).
+        blocks: its slopes.
+        by_s: (T, r, s) its slopes by the static entries of z.
+        slopes, found: what its curvature is made of.
+    """
+
+    term: StageTerm
+    value: Array
+    blocks: Blocks
+    by_s: Array
+    slopes: TermSlopes
+    found: list[Array]
+
+
 class RolloutStages:
-    """The steps of a rollout, compiled; see ``symphys.shooting.StagedProblem`` for what is public."""
+    """The steps of a rollout, compiled; see ``symphys.shooting.StagedProblem`` for what is public.
+
+    A state is that of the rollout, then the sums that formulas take of a whole motion. Inputs are those of the rollout,
+    then control knots that formulas name, each at the first step in which it acts.
+    """
 
     def __init__(self, rollout: Rollout, backend: str = BEST, threads: int | None = None, exact: bool = False) -> None:
         """Compile the step.
@@ -33,22 +58,23 @@ class RolloutStages:
             backend: what evaluates the step.
             threads: that share a batch; None: one for each processor.
             exact: whether it is for smoothing 0 only.
-
-        Raises:
-            SymphysError: for formulas that look at more than one state.
         """
         problem = rollout.problem
         self.rollout, self.steps = rollout, rollout.steps
         self.statics = statics_of(rollout)
-        self.terms = stage_terms(rollout, self.statics)
         self._linearization = Linearization(rollout, backend, threads, exact)
         self.tangent = self._linearization.tangent
-        self.state_size, self.tangent_size = int(rollout.x0.shape[0]), self.tangent.size
-        self.input_size = int(rollout.given.shape[0])
-        self.weights = _input_weights(rollout)
+        self._groups = TermGroups(rollout, self.tangent, backend, threads)
+        self.terms = self._groups.terms
+        self._sums = len(self._groups.symbols.sums.sums)
+        self._given = int(rollout.given.shape[0])
+        self.state_size, self.tangent_size = int(rollout.x0.shape[0]) + self._sums, self.tangent.size + self._sums
+        self.weights, (which, places) = _input_weights(rollout, self._groups.symbols.named, self.statics)
+        self._knots = int(rollout.p.shape[0]) + which, places
+        self.input_size = self.weights.shape[0] // self.steps
         self.squares = all(term.kind != "cost" for term in self.terms)
         found = zip(problem.constraints, (term for term in self.terms if term.kind == "limit"), strict=True)
-        parts = [_limit(each, term) for each, term in found]
+        parts = [_limit(each, term, rollout.dt) for each, term in found]
         none: list[Array] = [np.zeros(0)] * 3
         columns = [np.concatenate(each) for each in zip(*parts, strict=True)] if parts else none
         self.lower, self.upper, self.penalties = columns[0], columns[1], columns[2]
@@ -61,187 +87,244 @@ class RolloutStages:
         """(B, np)."""
         return self._begun(Z)[1]
 
-    def _begun(self, Z: Array) -> tuple[Array, Array]:
-        """First states and parameters; those that were asked for last are kept."""
-        key = Z[:, self.statics].tobytes()
+    def _begun(self, Z: Array) -> tuple[Array, Array, Array]:
+        """First states, parameters, and the starts that formulas take; those that were asked for last are kept."""
+        key = len(Z), Z[:, self.statics].tobytes()
         if self._known is None or self._known[0] != key:
             parts = [self._linearization.begun(z) for z in Z]
-            self._known = key, (np.array([x for x, _, _ in parts]), np.array([p for _, _, p in parts]))
+            states = np.array([np.append(x, np.zeros(self._sums)) for x, _, _ in parts])
+            starts = np.array([np.array(self._groups.symbols.sums.started(z)).ravel() for z in Z])
+            self._known = key, (states, np.array([p for _, _, p in parts]), starts)
         return self._known[1]
 
-    _known: tuple[bytes, tuple[Array, Array]] | None = None
+    _known: tuple[tuple[int, bytes], tuple[Array, Array, Array]] | None = None
+
+    def _constants(self, Z: Array, U: Array) -> Array:
+        """(B, c): what the terms read that is the same all along each motion; knots are those of the inputs."""
+        _, p, starts = self._begun(Z)
+        named = Z[:, self._groups.symbols.named]
+        which, places = self._knots
+        named[:, which - p.shape[1]] = U[:, places[:, 0], places[:, 1]]
+        return np.concatenate([p, named, starts], axis=1)
 
     def step(self, k: int, X: Array, U: Array, Z: Array, smoothing: float) -> Array:
         """(B, nx) after step k."""
-        return self._linearization.step.step(k, X, U, self.parameters(Z), smoothing)
+        plain = X[:, : X.shape[1] - self._sums]
+        after = self._linearization.step.step(k, plain, U[:, : self._given], self.parameters(Z), smoothing)
+        if not self._sums:
+            return after
+        after = np.concatenate([after, X[:, plain.shape[1] :]], axis=1)
+        ticks = np.broadcast_to(np.asarray(k), (len(X),))
+        _, p, starts = self._begun(Z)
+        constants = np.concatenate([p, Z[:, self._groups.symbols.named], starts], axis=1)
+        return self._groups.summed(StepRows(X, after, U[:, : self._given], constants, ticks))
 
     def roll_out(self, z: Array, smoothing: float) -> StagedMotion:
         """The motion of z."""
-        return self._linearization.motion(z, smoothing)
+        motion = self._linearization.motion(z, smoothing)
+        u = np.asarray(self.weights @ z).reshape(self.steps, self.input_size)
+        if not self._sums:
+            return StagedMotion(motion.z, motion.x, u, smoothing)
+        x = np.concatenate([motion.x, np.zeros((self.steps + 1, self._sums))], axis=1)
+        rows = StepRows(x[:-1], x[1:], motion.u, self._constants(z[None], u[None]), np.arange(self.steps))
+        x[1:, motion.x.shape[1] :] = np.cumsum(self._groups.summed(rows)[:, motion.x.shape[1] :], axis=0)
+        return StagedMotion(motion.z, x, u, smoothing)
 
     def linearize(self, motion: StagedMotion) -> Linearized:
         """Slopes of all steps."""
-        return self._linearization.linearize(motion)
+        found = self._linearization.linearize(self._plain(motion))
+        more = self.input_size - self._given
+        if more:
+            b = np.concatenate([found.b, np.zeros((*found.b.shape[:2], more))], axis=2)
+            found = Linearized(found.a, b, found.c, found.start)
+        return self._with_sums(found, motion) if self._sums else found
+
+    def _with_sums(self, found: Linearized, motion: StagedMotion) -> Linearized:
+        """The same with the sums, which look at the states before and after each step."""
+        n, total, count = self.tangent.size, self.tangent_size, self.steps
+        a = np.tile(np.eye(total), (count, 1, 1))
+        b, c = (np.zeros((count, total, each.shape[2])) for each in (found.b, found.c))
+        a[:, :n, :n], b[:, :n], c[:, :n] = found.a, found.b, found.c
+        plain = self._plain(motion)
+        p = self.parameters(motion.z[None])[0]
+        after = self._linearization.step.step(np.arange(count), plain.x[:-1], plain.u, p, motion.smoothing)
+        after = np.concatenate([after, np.zeros((count, self._sums))], axis=1)
+        for each in self._sloped(motion, after, True):
+            row, steps, weight = n + each.term.number, each.term.steps, each.term.weight
+            blocks = each.blocks
+            before = blocks.first if each.term.after else blocks.x
+            a[steps[:, None], row, before.columns] += weight * before.slopes[:, 0]
+            b[steps[:, None], row, blocks.u.columns] += weight * blocks.u.slopes[:, 0]
+            c[steps, row] += weight * each.by_s[:, 0]
+            if each.term.after:
+                x, columns = weight * blocks.x.slopes, blocks.x.columns
+                a[steps, row, :n] += (x @ found.a[steps][:, columns])[:, 0]
+                b[steps, row] += (x @ found.b[steps][:, columns])[:, 0]
+                c[steps, row] += (x @ found.c[steps][:, columns])[:, 0]
+        start = np.concatenate([found.start, np.zeros((self._sums, found.start.shape[1]))])
+        return Linearized(a, b, c, start)
 
     def retract(self, X: Array, D: Array) -> Array:
         """(B, nx)."""
-        return self.tangent.retract(X, D)
+        if not self._sums:
+            return self.tangent.retract(X, D)
+        moved = self.tangent.retract(X[:, : -self._sums], D[:, : -self._sums])
+        return np.concatenate([moved, X[:, -self._sums :] + D[:, -self._sums :]], axis=1)
 
     def difference(self, X: Array, Y: Array) -> Array:
         """(B, n)."""
-        return self.tangent.difference(X, Y)
+        if not self._sums:
+            return self.tangent.difference(X, Y)
+        apart = self.tangent.difference(X[:, : -self._sums], Y[:, : -self._sums])
+        return np.concatenate([apart, Y[:, -self._sums :] - X[:, -self._sums :]], axis=1)
 
     def measure(self, Z: Array, X: Array, U: Array) -> tuple[Array, Array]:
         """Objectives (B,) and limits (B, c)."""
-        P, objective, limits = self.parameters(Z), np.zeros(len(Z)), [np.zeros((len(Z), 0))]
-        for term in self.terms:
-            values = term.values(X, U, P, Z)
+        objective, limits = np.zeros(len(Z)), [np.zeros((len(Z), 0))]
+        values = self._groups.values(X, U[:, :, : self._given], self._constants(Z, U))
+        for term, each in values:
             if term.kind == "limit":
-                limits.append(values.reshape(len(Z), -1))
+                limits.append(each.reshape(len(Z), -1))
+            elif term.kind == "squares":
+                objective += term.weight * np.einsum("btr,btr->b", each, each)
             else:
-                objective += term.weight * np.sum(values**2 if term.kind == "squares" else values, axis=(1, 2))
+                objective += term.weight * each.sum(axis=(1, 2))
         return objective, np.concatenate(limits, axis=1)
 
     def expand(self, motion: StagedMotion, multipliers: Array, penalties: Array) -> Expansion:
         """The augmented objective to second order."""
         sizes = self.steps, self.tangent_size, self.input_size, len(self.statics)
-        sums, first = _Sums(*sizes), 0
-        for term, found, by_state in self._along(motion):
+        sums, first = ExpansionSums(sizes, self._of_constants(motion), self._knots), 0
+        for each in self._sloped(motion, motion.x[1:], False):
+            term, value = each.term, each.value
+            if term.kind == "cost":
+                sums.value += term.weight * float(np.sum(value))
+                sums.slope(term, each.blocks, each.by_s, np.full(value.shape, term.weight))
+                self._curve(sums, each, np.full(len(value), term.weight))
+                continue
+            weight = np.full(value.shape, term.weight)
             if term.kind == "limit":
-                part = slice(first, first + found.value.size)
+                part = slice(first, first + value.size)
                 first = part.stop
-                shape = found.value.shape
-                multiplier, penalty = multipliers[part].reshape(shape), penalties[part].reshape(shape)
-                lower, upper = self.lower[part].reshape(shape), self.upper[part].reshape(shape)
-                moved = found.value + multiplier / np.where(penalty > 0, penalty, 1.0)
-                beyond = moved - np.clip(moved, lower, upper)
-                sums.squares(term, found, by_state, beyond, penalty * (beyond != 0) / 2)
-            elif term.kind == "squares":
-                sums.squares(term, found, by_state, found.value, np.full(found.value.shape, term.weight))
-            else:
-                sums.cost(term, found, by_state, self._rows(motion, term))
+                multiplier, penalty = multipliers[part].reshape(value.shape), penalties[part].reshape(value.shape)
+                lower, upper = self.lower[part].reshape(value.shape), self.upper[part].reshape(value.shape)
+                moved = value + multiplier / np.where(penalty > 0, penalty, 1.0)
+                value = moved - np.clip(moved, lower, upper)
+                weight = penalty * (value != 0) / 2
+            if weight.any():
+                sums.value += float(np.sum(weight * value**2))
+                sums.slope(term, each.blocks, each.by_s, 2 * weight * value)
+                sums.curvature(term, each.blocks, each.by_s, 2 * weight)
+        if self._sums:
+            worth = sums.x[-1, -self._sums :].copy()
+            for each in self._sloped(motion, motion.x[1:], True):
+                self._curve(sums, each, np.full(len(each.value), each.term.weight * worth[each.term.number]))
         return sums.expansion()
+
+    def _curve(self, sums: ExpansionSums, each: SlopedTerm, weight: Array) -> None:
+        """Add the second derivative of weight (T,) times a number, as far as it is positive."""
+        rows = each.slopes.curvature(each.found, np.sign(weight))
+        if rows is not None:
+            share = np.broadcast_to(np.abs(weight)[:, None], rows.x.slopes.shape[:2])
+            sums.curvature(each.term, rows, sums.by_statics(rows), share)
 
     def limit_slopes(self, motion: StagedMotion) -> tuple[Array, Any, Any, Any]:
         """Limits, and their slopes by all states, inputs and static entries."""
-        found = [(t, slopes, by_state) for t, slopes, by_state in self._along(motion) if t.kind == "limit"]
-        values = np.concatenate([np.zeros(0), *(slopes.value.ravel() for _, slopes, _ in found)])
-        n, m, s = self.tangent_size, self.input_size, len(self.statics)
-        x = [_placed(by_state, t.states, self.steps + 1) for t, _, by_state in found]
-        u = [_placed(slopes.u, t.inputs, self.steps) for t, slopes, _ in found]
-        by_s = [slopes.s.reshape(-1, s) for _, slopes, _ in found]
-        return (
-            values,
-            scipy.sparse.csr_array(scipy.sparse.vstack([scipy.sparse.csr_array((0, (self.steps + 1) * n)), *x])),
-            scipy.sparse.csr_array(scipy.sparse.vstack([scipy.sparse.csr_array((0, self.steps * m)), *u])),
-            scipy.sparse.csr_array(np.concatenate([np.zeros((0, s)), *by_s])),
-        )
+        n, m, s, first = self.tangent_size, self.input_size, len(self.statics), 0
+        values, by_s = [np.zeros(0)], [np.zeros((0, s))]
+        x, u = (_Entries(), _Entries())
+        sums = ExpansionSums((0, 0, 0, 0), np.zeros((0, 0)), self._knots)
+        for each in self._sloped(motion, motion.x[1:], False):
+            if each.term.kind != "limit":
+                continue
+            term, blocks = each.term, each.blocks
+            rows = first + np.arange(each.value.size).reshape(each.value.shape)
+            first += each.value.size
+            values.append(each.value.ravel())
+            by_s.append(each.by_s.reshape(each.value.size, s))
+            x.add(rows, term.states[:, None, None] * n + blocks.x.columns, blocks.x.slopes)
+            x.add(rows, term.steps[:, None, None] * n + blocks.first.columns, blocks.first.slopes)
+            u.add(rows, term.steps[:, None, None] * m + blocks.u.columns, blocks.u.slopes)
+            knots, places = sums.knots_of(blocks.constants)
+            u.add(rows, (places[:, 0] * m + places[:, 1])[None, None], knots)
+        by_state, by_input = x.matrix(first, (self.steps + 1) * n), u.matrix(first, self.steps * m)
+        return np.concatenate(values), by_state, by_input, scipy.sparse.csr_array(np.concatenate(by_s))
 
-    def _along(self, motion: StagedMotion) -> list[tuple[StageTerm, Slopes, Array]]:
-        """Every term with its slopes, and those by the tangents of its states (T, r, n)."""
-        p = self.parameters(motion.z[None])[0]
-        _, left, of_p = self._linearization.start_slopes(motion)
-        found = []
-        for term in self.terms:
-            slopes = term.slopes(motion.x, motion.u, p, motion.z, of_p)
-            if left.any():
-                slopes.s[term.states == 0] += slopes.x[term.states == 0] @ left[term.columns]
-            if self.tangent.shifts:
-                moved = [np.array(ca.DM(self.tangent.shift(x, p)))[term.columns] for x in motion.x[term.states]]
-                slopes.s[:] += slopes.x @ (np.array(moved) @ of_p)
-            found.append((term, slopes, slopes.x @ self._rows(motion, term)))
-        return found
+    def _sloped(self, motion: StagedMotion, after: Array, sums: bool) -> list[SlopedTerm]:
+        """Sums or all other terms with their slopes, from the states of a motion to the states ``after`` (N, nx)."""
+        constants = self._constants(motion.z[None], motion.u[None])
+        rows = StepRows(motion.x[:-1], after, motion.u[:, : self._given], constants, np.arange(self.steps))
+        of_constants = self._of_constants(motion)
+        left = self._linearization.start_slopes(self._plain(motion))[1] if len(self.statics) else np.zeros(0)
+        result = []
+        for term, slopes, found in self._groups.slopes(rows, sums):
+            value, blocks = slopes.values(found)
+            by_s = blocks.constants.slopes @ of_constants[blocks.constants.columns]
+            if left.any() and term.steps[0] == 0:
+                by_s[0] += self._groups.beside(term, rows) @ left
+            result.append(SlopedTerm(term, value, blocks, by_s, slopes, found))
+        return result
 
-    def _rows(self, motion: StagedMotion, term: StageTerm) -> Array:
-        """(T, q, n): the term's columns of the state by the tangent, at its ticks."""
-        columns = tuple(term.columns.tolist())
-        if columns not in self._bases:
-            x, p = ca.SX.sym("x", self.state_size), ca.SX.sym("p", int(self.rollout.p.shape[0]))
-            rows = ca.densify(self.tangent.basis(x, p)[list(columns), :])
-            self._bases[columns] = ByColumns(ca.Function("rows", [x, p], [ca.cse(rows)]))
-        ticks, p = len(term.states), self.parameters(motion.z[None])[0]
-        (found,) = self._bases[columns](motion.x[term.states].T, np.tile(p[:, None], ticks))
-        array = found.reshape(len(columns), len(term.states), self.tangent_size)
-        return np.ascontiguousarray(array.transpose(1, 0, 2))
+    def _plain(self, motion: StagedMotion) -> StagedMotion:
+        """Without sums and knots."""
+        size = motion.x.shape[1] - self._sums
+        return StagedMotion(motion.z, motion.x[:, :size], motion.u[:, : self._given], motion.smoothing)
 
-    @cached_property
-    def _bases(self) -> dict[tuple[int, ...], ByColumns]:
-        return {}
+    def _of_constants(self, motion: StagedMotion) -> Array:
+        """(c, s): the constants of the terms by the static entries of z."""
+        if not len(self.statics):
+            return np.zeros((int(self._groups.symbols.constants.shape[0]), 0))
+        of_p = self._linearization.start_slopes(self._plain(motion))[2]
+        named = (self._groups.symbols.named[:, None] == self.statics[None, :]).astype(float)
+        starts = self._groups.symbols.sums.started_slopes(motion.z, self.statics.tolist())
+        return np.concatenate([of_p, named, starts])
 
 
-def _input_weights(rollout: Rollout) -> Any:
-    """(N * m, len(z)) scipy.sparse: u = weights @ z."""
-    u = ca.vec(rollout.given)
+class _Entries:
+    """Entries of a sparse matrix that are being gathered."""
+
+    def __init__(self) -> None:
+        self.rows, self.columns, self.values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
+
+    def add(self, rows: Indices, columns: Indices, values: Array) -> None:
+        """Blocks (T, r, c) at rows (T, r) and columns (T or 1, 1, c)."""
+        self.rows.append(np.broadcast_to(rows[:, :, None], values.shape).ravel())
+        self.columns.append(np.broadcast_to(columns, values.shape).ravel())
+        self.values.append(values.ravel())
+
+    def matrix(self, rows: int, columns: int) -> Any:
+        """(rows, columns) scipy.sparse.csr_array."""
+        places = np.concatenate(self.rows), np.concatenate(self.columns)
+        return scipy.sparse.csr_array((np.concatenate(self.values), places), shape=(rows, columns))
+
+
+def _input_weights(rollout: Rollout, named: Indices, statics: Indices) -> tuple[Any, tuple[Indices, Indices]]:
+    """(N * m, len(z)) scipy.sparse: u = weights @ z; which of ``named`` are knots, and the step and input of each.
+
+    The inputs of a step are those of the rollout, then the named knots that begin to act there.
+    """
+    u, steps = ca.vec(rollout.given), rollout.steps
     slope = ca.DM(ca.Function("u", [rollout.z], [ca.jacobian(u, rollout.z)])(0))
-    rows, columns = slope.sparsity().get_triplet()
-    shape = (int(slope.shape[0]), int(slope.shape[1]))
-    return scipy.sparse.csr_array((np.array(slope.nonzeros()), (rows, columns)), shape=shape)
+    rows, columns = (np.array(each, np.int64) for each in slope.sparsity().get_triplet())
+    m = int(rollout.given.shape[0])
+    begins = np.full(int(slope.shape[1]), steps - 1)
+    np.minimum.at(begins, columns, rows // max(m, 1))
+    which = np.flatnonzero(~np.isin(named, statics))
+    first, taken = begins[named[which]], dict[int, int]()
+    places = []
+    for step in first.tolist():
+        places.append((step, m + taken.get(step, 0)))
+        taken[step] = taken.get(step, 0) + 1
+    inputs = m + max(taken.values(), default=0)
+    at = np.array(places, np.int64).reshape(-1, 2)
+    rows = np.concatenate([rows // max(m, 1) * inputs + rows % max(m, 1), at[:, 0] * inputs + at[:, 1]])
+    columns = np.concatenate([columns, named[which]])
+    values = np.concatenate([np.array(slope.nonzeros()), np.ones(len(which))])
+    return scipy.sparse.csr_array((values, (rows, columns)), shape=(steps * inputs, int(slope.shape[1]))), (which, at)
 
 
-def _limit(limit: Constraint, term: StageTerm) -> tuple[Array, Array, Array]:
+def _limit(limit: Constraint, term: StageTerm, dt: float) -> tuple[Array, Array, Array]:
     """(T * r,) each: bounds and weights of squared violations, tick after tick."""
-    ticks = len(term.states)
+    ticks = len(term.steps)
     lower, upper = (np.tile(np.broadcast_to(end, (term.size,)), ticks) for end in (limit.lower, limit.upper))
-    return lower, upper, np.full(len(lower), term.weight)
-
-
-def _placed(blocks: Array, ticks: Indices, count: int) -> Any:
-    """(T * r, count * n) sparse: block t in the columns of its tick."""
-    _, r, n = blocks.shape
-    t, i, j = np.meshgrid(np.arange(len(ticks)), np.arange(r), np.arange(n), indexing="ij")
-    place = ((t * r + i).ravel(), (ticks[t] * n + j).ravel())
-    return scipy.sparse.csr_array((blocks.ravel(), place), shape=(len(ticks) * r, count * n))
-
-
-class _Sums:
-    """An expansion that is being added up."""
-
-    def __init__(self, steps: int, n: int, m: int, s: int) -> None:
-        self.value = 0.0
-        self.x, self.xx = np.zeros((steps + 1, n)), np.zeros((steps + 1, n, n))
-        self.u, self.uu = np.zeros((steps, m)), np.zeros((steps, m, m))
-        self.ux, self.uy = np.zeros((steps, m, n)), np.zeros((steps, m, n))
-        self.s, self.ss = np.zeros(s), np.zeros((s, s))
-        self.sx, self.su = np.zeros((steps + 1, s, n)), np.zeros((steps, s, m))
-
-    def squares(self, term: StageTerm, found: Slopes, by_state: Array, value: Array, weight: Array) -> None:
-        """Add weight * value^2, value (T, r), with the slopes of the term."""
-        self.value += float(np.sum(weight * value**2))
-        slope = 2 * weight * value
-        self._first(term, found, by_state, slope)
-        share = 2 * weight[:, :, None]
-        by_x, by_u, by_s = (each.transpose(0, 2, 1) for each in (by_state, found.u, found.s))
-        self._second(term, by_x @ (share * by_state), by_u @ (share * by_state), by_u @ (share * found.u))
-        if self.s.size:
-            self.ss += np.sum(by_s @ (share * found.s), axis=0)
-            self.sx[term.states] += by_s @ (share * by_state)
-            self.su[term.inputs] += by_s @ (share * found.u)
-
-    def cost(self, term: StageTerm, found: Slopes, by_state: Array, rows: Array) -> None:
-        """Add weight * the sum of values; ``rows`` (T, q, n): the term's columns by the tangent."""
-        self.value += term.weight * float(np.sum(found.value))
-        self._first(term, found, by_state, np.full(found.value.shape, term.weight))
-        if found.curved is not None:
-            q = rows.shape[1]
-            curved = term.weight * found.curved
-            back = rows.transpose(0, 2, 1)
-            self._second(
-                term, back @ curved[:, :q, :q] @ rows, curved[:, q:, :q] @ rows, np.ascontiguousarray(curved[:, q:, q:])
-            )
-
-    def _first(self, term: StageTerm, found: Slopes, by_state: Array, slope: Array) -> None:
-        self.x[term.states] += np.einsum("tr,trn->tn", slope, by_state)
-        self.u[term.inputs] += np.einsum("tr,trm->tm", slope, found.u)
-        self.s += np.einsum("tr,trs->s", slope, found.s)
-
-    def _second(self, term: StageTerm, xx: Array, ux: Array, uu: Array) -> None:
-        self.xx[term.states] += xx
-        self.uu[term.inputs] += uu
-        cross = self.ux if np.array_equal(term.states, term.inputs) else self.uy
-        cross[term.inputs] += ux
-
-    def expansion(self) -> Expansion:
-        """The sums."""
-        return Expansion(
-            self.value, self.x, self.xx, self.u, self.uu, self.ux, self.uy, self.s, self.ss, self.sx, self.su
-        )
+    return lower, upper, np.full(len(lower), limit.penalty * (dt if limit.at == "always" else 1.0))

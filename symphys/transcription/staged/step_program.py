@@ -27,8 +27,8 @@ Expr = Any
 class StepArguments:
     """The arguments of one step, and which of them it is differentiated by.
 
-    What varies is (d, u, p as far as z sets it, e), what is given (x, the state after, time, p). e (nx,) is what the
-    state may have beside its tangent, as initial states do.
+    What varies is (d, u, p as far as z sets it, e), what is given (x, the state after, the number of the step, p).
+    e (nx,) is what the state may have beside its tangent, as initial states do.
 
     Attributes:
         rollout, tangent: of the step.
@@ -66,6 +66,10 @@ class StepArguments:
         """Sizes of what is given."""
         nx, _, _, np_ = self.sizes
         return [nx, nx, 1, np_]
+
+    def time(self, tick: Expr, p: Expr) -> Expr:
+        """[s] of a step by its number: the duration may be among the parameters."""
+        return tick * self.rollout.parameters.step_length(self.rollout.problem.simulation, p)
 
     def shift(self, x: Expr, p: Expr, varied: Expr) -> Expr:
         """(nx,) how a state moves with its joints, when p becomes what varies."""
@@ -126,10 +130,11 @@ def _begun(arguments: StepArguments, tangent: bool) -> ca.Function:
     """(varying, given) -> state, inputs, parameters, time and smoothing of the step."""
     varying, given = ca.SX.sym("varying", sum(arguments.varying)), ca.SX.sym("given", sum(arguments.given) + 1)
     d, u, varied, e = parts(varying, arguments.varying)
-    x, _, time, p, smoothing = parts(given, [*arguments.given, 1])
+    x, _, tick, p, smoothing = parts(given, [*arguments.given, 1])
     moved = ca.mtimes(arguments.tangent.basis(x, p), d) + e + arguments.shift(x, p, varied)
     start = x + moved if tangent else x
-    results = (start, u, arguments.replaced(p, varied), time, smoothing)
+    taken = arguments.replaced(p, varied)
+    results = (start, u, taken, arguments.time(tick, taken), smoothing)
     return ca.Function("begun", [varying, given], [ca.densify(each) for each in results])
 
 
@@ -146,8 +151,9 @@ def step_functions(arguments: StepArguments) -> tuple[ca.Function, ca.Function]:
     """(varying, given with smoothing) -> after, and off: on casadi's virtual machine."""
     varying, given = ca.MX.sym("varying", sum(arguments.varying)), ca.MX.sym("given", sum(arguments.given) + 1)
     d, u, varied, e = parts(varying, arguments.varying)
-    x, aim, time, p, smoothing = parts(given, [*arguments.given, 1])
+    x, aim, tick, p, smoothing = parts(given, [*arguments.given, 1])
     closed, tangent = arguments.rollout.closed, arguments.tangent
+    time = arguments.time(tick, arguments.replaced(p, varied))
     put = u if arguments.rollout.feedback is None else ca.vertcat(u, time)
     starts = x, x + ca.mtimes(tangent.basis(x, p), d) + e + arguments.shift(x, p, varied)
     first, moved = (call(closed, start, put, arguments.replaced(p, varied), smoothing)[0] for start in starts)

@@ -2,9 +2,9 @@
 
 Of each kinematic tree its coordinates and then their rates (``tree_chart``); of each other body its position, a
 rotation vector (world frame), velocity and angular velocity; then what carries on as it is: forces of pairs, joints and
-couplings, the torque (3) with which contacts act on each body that has pairs, ``lag`` if impacts cut steps, and what
-sensors remember. All reactions of bodies follow from these. A step leaves its trees' joints closed to rounding, so that
-nothing of its state is lost; what an initial state is off them is kept.
+couplings, the torque (3) with which contacts act on each body that has pairs, ``lag`` if impacts cut steps or the time
+step varies, and what sensors remember. All reactions of bodies follow from these. A step leaves its trees' joints
+closed to rounding, so that nothing of its state is lost; what an initial state is off them is kept.
 """
 
 from __future__ import annotations
@@ -168,7 +168,7 @@ class Tangent:
         world, scheme = self.rollout.world, self.rollout.problem.simulation.scheme()
         of_bodies = {f"{body.name}.{field}" for body in world.bodies for field, _ in BODY_FIELDS}
         names = [name for name in self._layout.names() if name not in of_bodies and name != "lag"]
-        if splits_of(world, scheme):
+        if splits_of(world, scheme) or self.rollout.problem.free_duration:  # half a step, without impacts
             names.append("lag")
         parts = [(name, self._layout[name]) for name in names]
         return tuple((name, part.stop - part.start) for name, part in parts)

@@ -6,9 +6,11 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from repeats import first
 
 from symphys.errors import SymphysError
 from symphys.problem import Problem, load_problem
@@ -16,6 +18,9 @@ from symphys.shooting import StagedMotion, StagedProblem
 from symphys.solvers.ddp.backward_pass import Bounds, backward_pass
 from symphys.solvers.ddp.knots import knot_steps
 from symphys.transcription import Transcription, transcribe
+from symphys.transcription.staged import stage_functions
+from symphys.transcription.staged.tangent import Tangent
+from symphys.transcription.staged.term_groups import TermGroups
 
 Array = NDArray[np.float64]
 
@@ -136,7 +141,126 @@ name = "there"
 value = "ball.position - [0.6, 0.2, 0.3]"
 tolerance = 0.1
 """
-CASES = [(CART, 30, "constant"), (CART, 4, "constant"), (CART, 5, "linear"), (BALL, 10, "constant")]
+WHOLE = """
+[simulation]
+duration = 0.3
+dt = 0.01
+
+[[include]]
+file = "robots/cart_pendulum.toml"
+
+[[variable]]
+name = "T"
+sets = "simulation.duration"
+guess = 0.33
+spread = 0.02
+
+[[variable]]
+name = "push"
+sets = "rail.command"
+knots = {knots}
+interpolation = "{interpolation}"
+guess = 5
+spread = 2
+
+[[variable]]
+name = "shove"
+sets = "cart.velocity[0]"
+guess = 0.2
+spread = 0.1
+
+[[variable]]
+name = "gain"
+sets = "hold.k"
+guess = 3
+spread = 1
+
+[[force]]
+name = "hold"
+on = "rail.command"
+value = "-hold.k * rail.position * cos(3 * time)"
+numbers = {{ k = 3 }}
+
+[[force]]
+name = "wind"
+on = "pole.force[0]"
+value = "0.2 * sin(20 * time) - 0.05 * pole.velocity[0]"
+
+[[phase]]
+name = "first"
+share = 0.4
+
+[[phase]]
+name = "then"
+
+[[cost]]
+name = "effort"
+at = "always"
+squares = "[rail.command * time, rail.command * rail.rate]"
+weight = 0.001
+
+[[cost]]
+name = "power"
+during = "then"
+value = "0.1 * (rail.command * rail.rate)**2 + duration * push[1]**2"
+
+[[cost]]
+name = "knots"
+squares = "[push, shove]"
+weight = 1e-3
+
+[[cost]]
+name = "all knots at every instant"
+at = "always"
+squares = "sum(push) * rail.rate"
+weight = 1e-3
+
+[[cost]]
+name = "cost of transport"
+value = "integral(rail.command**2 + 5 * gain) / (end.rail.position - start.rail.position + start.cart.velocity[0])"
+
+[[cost]]
+name = "soon"
+value = "duration + 0.1 * end.time * average(rail.rate)"
+
+[[target]]
+name = "as it was, shifted"
+value = "[end.pivot.angle - start.pivot.angle, end.rail.position - start.rail.position - 0.3, start.rail.command / 10]"
+tolerance = 0.1
+
+[[target]]
+name = "halfway"
+at = "end of first"
+value = "[rail.position - end.rail.position / 2, rail.command * 0.01 - average(pivot.rate), duration - time]"
+tolerance = 0.1
+
+[[target]]
+name = "faster than at the start"
+at = "end of first"
+value = "rail.rate - 2 * start.cart.velocity[0]"
+tolerance = 0.1
+
+[[constraint]]
+name = "slow"
+during = "then"
+value = "[rail.rate, rail.command / 10 + pivot.angle]"
+lower = [-1, -0.1]
+upper = [0.35, 0.3]
+penalty = 3
+
+[[constraint]]
+name = "cheap"
+value = "integral(rail.command**2) + 0.01 * sumsqr(push)"
+upper = 5
+"""
+CASES = [
+    (WHOLE, 30, "constant"),
+    (WHOLE, 4, "linear"),
+    (CART, 30, "constant"),
+    (CART, 4, "constant"),
+    (CART, 5, "linear"),
+    (BALL, 10, "constant"),
+]
 
 
 def read(text: str) -> Problem:
@@ -175,15 +299,42 @@ def test_measures_are_those_of_the_whole(case: tuple[str, int, str]) -> None:
 @pytest.mark.parametrize("case", CASES)
 def test_the_gradient_along_the_steps_is_that_of_the_whole(case: tuple[str, int, str]) -> None:
     transcription, staged, motion = made(*case)
-    size = len(motion.z)
+    size, rollout, terms = len(motion.z), transcription.rollout, transcription.terms
     free = Bounds(np.full(size, -np.inf), np.full(size, np.inf), np.ones(size))
-    costs = staged.expand(motion, np.zeros(len(staged.lower)), 2 * staged.penalties)
-    policy = backward_pass(staged.linearize(motion), costs, knot_steps(staged), staged.statics, free, 1.0)
-    found = transcription.shooting.evaluator.gradient(motion.z[None], 0.0)
-    assert policy is not None and found.gradient is not None
-    assert costs.value == pytest.approx(found.merit[0], rel=1e-12)
-    size_of = np.abs(found.gradient[0]).max()
-    np.testing.assert_allclose(policy.gradient, found.gradient[0], atol=1e-10 * size_of)
+    merits = [(np.zeros(len(staged.lower)), terms.objective)]
+    if not transcription.problem.free_duration:  # it is part of the penalties in the merit
+        merits.append((2 * staged.penalties, terms.objective + terms.penalties))
+    for penalties, merit in merits:
+        whole = ca.Function("merit", [rollout.z, rollout.smoothing], [merit, ca.gradient(merit, rollout.z)])
+        value, gradient = (np.array(part).ravel() for part in whole(motion.z, 0.0))
+        costs = staged.expand(motion, np.zeros(len(staged.lower)), penalties)
+        policy = backward_pass(staged.linearize(motion), costs, knot_steps(staged), staged.statics, free, 1.0)
+        assert policy is not None
+        assert costs.value == pytest.approx(value[0], rel=1e-12)
+        np.testing.assert_allclose(policy.gradient, gradient, atol=1e-10 * np.abs(gradient).max())
+
+
+@first("case", CASES)
+def test_compiled_terms_are_those_of_the_virtual_machine(
+    case: tuple[str, int, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    transcription, staged, motion = made(*case)
+    monkeypatch.setattr(stage_functions, "COMPILED", 0)
+    groups = TermGroups(transcription.rollout, Tangent(transcription.rollout), "simd", 1)
+    monkeypatch.setattr(staged, "_groups", groups)
+    Z, X, U = motion.z[None], motion.x[None], motion.u[None]
+    slopes, costs = staged.limit_slopes(motion), staged.expand(motion, np.ones(len(staged.lower)), staged.penalties)
+    objective, limits = staged.measure(Z, X, U)
+    assert all(functions._kernel is not None for functions in groups._values + groups._slope_functions)
+    _, plain, _ = made.__wrapped__(*case)
+    expected, same = plain.limit_slopes(motion), plain.measure(Z, X, U)
+    np.testing.assert_allclose(objective, same[0], rtol=1e-13)
+    np.testing.assert_allclose(limits, same[1], rtol=1e-13)
+    for found, wanted in zip(slopes[1:], expected[1:], strict=True):
+        np.testing.assert_allclose(found.toarray(), wanted.toarray(), rtol=1e-12, atol=1e-13)
+    other = plain.expand(motion, np.ones(len(staged.lower)), staged.penalties)
+    for name, found in vars(costs).items():
+        np.testing.assert_allclose(found, getattr(other, name), rtol=1e-11, atol=1e-12)
 
 
 def state_slopes(staged: StagedProblem, motion: StagedMotion) -> Array:
@@ -229,16 +380,13 @@ def test_second_derivatives_are_those_of_gauss_and_newton() -> None:
     np.testing.assert_allclose(total, 2 * jacobian[0].T @ jacobian[0], atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "text"),
-    [
-        ('squares = "ball.force"', 'squares = "push"', "name what it sets, ball.force"),
-        ('value = "ball.position -', 'value = "end.ball.position -', "takes end.ball.position of the whole motion"),
-    ],
-)
-def test_formulas_of_more_than_one_state_are_refused_by_name(old: str, new: str, text: str) -> None:
-    problem = read(BALL.format(knots=5, interpolation="constant").replace(old, new))
+def test_an_integral_of_knots_is_refused_by_name() -> None:
+    problem = read(
+        WHOLE.format(knots=5, interpolation="constant").replace(
+            "integral(rail.command**2) +", "integral(sumsqr(push)) +"
+        )
+    )
     staged = transcribe(problem, backend="casadi").shooting.staged
     assert staged is not None
-    with pytest.raises(SymphysError, match=text):
+    with pytest.raises(SymphysError, match=r"cheap: integral.* integrate rail.command"):
         staged()

@@ -1,0 +1,169 @@
+"""Functions of one step for many steps at once, of the few numbers that they read: compiled, or on casadi's machine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.codegen import (
+    FunctionCall,
+    Kernel,
+    KernelUnavailable,
+    MemoryLayout,
+    Place,
+    Program,
+    ProgramError,
+    compile_program,
+)
+from symphys.codegen.backends import PRECISIONS
+from symphys.transcription.staged.columns import ByColumns
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Expr = Any
+"""casadi SX"""
+COMPILED = 30_000
+"""Operations of a horizon from which a compiler is worth its second: casadi's machine does as many in 0.2 ms."""
+
+
+class StepRows(NamedTuple):
+    """Arguments of many steps, a row a step.
+
+    Attributes:
+        before, after: (R, nx) the states before and after it.
+        u: (R, m).
+        constants: (R, c) or (1, c).
+        ticks: (R,) numbers of the states before.
+    """
+
+    before: Array
+    after: Array
+    u: Array
+    constants: Array
+    ticks: Indices
+
+
+@dataclass(frozen=True, eq=False)
+class ReadingFunction:
+    """A function of the entries of its arguments that it reads.
+
+    Attributes:
+        function: (entries of each argument) -> columns.
+        reads: which entries of each argument.
+        after: whether the first argument is the state after the step, and the last the number of that.
+    """
+
+    function: ca.Function
+    reads: tuple[tuple[int, ...], ...]
+    after: bool
+
+    @property
+    def segments(self) -> list[tuple[str, tuple[int, ...]]]:
+        """What it reads of which field of ``StepRows``."""
+        state, tick = ("after", "next") if self.after else ("before", "ticks")
+        return [*zip((state, "before", "u", "constants", tick), self.reads, strict=True)]
+
+
+def reading(results: Sequence[Expr], arguments: Sequence[Expr], after: bool) -> ReadingFunction:
+    """Results as a function of what they read of the arguments."""
+    whole = ca.Function("whole", list(arguments), [ca.densify(ca.vec(each)) for each in ca.cse(list(results))])
+    reads = []
+    for i in range(whole.n_in()):
+        columns = [whole.jac_sparsity(o, i).get_triplet()[1] for o in range(whole.n_out())]
+        reads.append(tuple(sorted(set().union(*columns))))
+    symbols = [ca.SX.sym("a", len(each)) for each in reads]
+    full = []
+    for symbol, each, argument in zip(symbols, reads, arguments, strict=True):
+        column = ca.SX.zeros(argument.shape[0])
+        if each:
+            column[list(each)] = symbol
+        full.append(column)
+    found = whole.call(full, True, False)
+    return ReadingFunction(ca.Function("stage", symbols, [ca.densify(each) for each in found]), tuple(reads), after)
+
+
+class StageFunctions:
+    """Functions that are asked for at the same steps: all in one kernel, whose lanes are steps.
+
+    What is small stays on casadi's virtual machine, as does everything where no compiler is found.
+    """
+
+    def __init__(self, functions: Sequence[ReadingFunction], steps: int, backend: str, threads: int | None) -> None:
+        """``steps``: of a horizon; ``backend``: a name of a kernel, or another for casadi's virtual machine."""
+        self.functions, self.backend, self.threads = list(functions), backend, threads
+        keys = dict.fromkeys(segment for each in self.functions for segment in each.segments)
+        order = ("before", "after", "u", "constants", "ticks", "next")
+        self._segments = sorted((key for key in keys if key[1]), key=lambda key: order.index(key[0]))
+        work = sum(each.function.n_instructions() for each in self.functions)
+        self._compiles = backend in PRECISIONS and work * steps > COMPILED
+        self._gathered = {name: self._entries(name) for name in order}
+        sizes = [int(each.function.numel_out(o)) for each in self.functions for o in range(each.function.n_out())]
+        self._ends = np.cumsum([0, *sizes])
+
+    def __call__(self, rows: StepRows) -> list[list[Array]]:
+        """Of each function its results, (R, size) each."""
+        table = self._table(rows)
+        if self._kernel is None:
+            found = [part.T for part in self._columns(np.ascontiguousarray(table.T))] if len(table) else []
+            whole = found[0] if found else np.zeros((0, int(self._ends[-1])))
+        else:
+            whole = self._kernel.forward(table)["all"]
+        parts, results = iter(zip(self._ends[:-1], self._ends[1:], strict=True)), []
+        for each in self.functions:
+            results.append([whole[:, slice(*next(parts))] for _ in range(each.function.n_out())])
+        return results
+
+    def _entries(self, name: str) -> Indices:
+        return np.array([i for source, each in self._segments if source == name for i in each], np.int64)
+
+    def _table(self, rows: StepRows) -> Array:
+        """(R, w): all segments side by side."""
+        count, parts = len(rows.ticks), []
+        for name in ("before", "after", "u", "constants"):
+            entries = self._gathered[name]
+            if len(entries):
+                part = np.take(getattr(rows, name), entries, axis=1)
+                parts.append(np.broadcast_to(part, (count, part.shape[1])))
+        for name, more in (("ticks", 0), ("next", 1)):
+            if len(self._gathered[name]):
+                parts.append((rows.ticks + more)[:, None].astype(float))
+        return np.concatenate([np.zeros((count, 0)), *parts], axis=1)
+
+    @cached_property
+    def _program(self) -> Program:
+        layout, places = MemoryLayout(), dict[tuple[str, tuple[int, ...]], Place]()
+        nothing = Place(0, 0)
+        for key in self._segments:
+            places[key] = layout.take(len(key[1]))
+        size, calls = layout.size, []
+        for each in self.functions:
+            inputs = tuple(places.get(key, nothing) for key in each.segments)
+            results = tuple(layout.take(int(each.function.numel_out(o))) for o in range(each.function.n_out()))
+            calls.append(FunctionCall(each.function, inputs, results))
+        outputs = {"all": Place(size, int(self._ends[-1]))}
+        return Program(layout.size, Place(0, size), nothing, 1, outputs, epilogue=tuple(calls))
+
+    @cached_property
+    def _kernel(self) -> Kernel | None:
+        if not self._compiles:
+            return None
+        try:
+            return compile_program(self._program, seeded=(), threads=self.threads, precision="double")
+        except (KernelUnavailable, ProgramError):
+            return None  # the step's description says why there is no compiler
+
+    @cached_property
+    def _columns(self) -> ByColumns:
+        symbols = {key: ca.SX.sym("segment", len(key[1])) for key in self._segments}
+        results = []
+        for each in self.functions:
+            arguments = [symbols.get(key, ca.SX(0, 1)) for key in each.segments]
+            results += each.function.call(arguments, True, False)
+        row = ca.vertcat(ca.SX(0, 1), *symbols.values())
+        return ByColumns(ca.Function("rows", [row], [ca.densify(ca.vertcat(ca.SX(0, 1), *results))]))
