@@ -23,6 +23,7 @@ SHIPPED = [
     "bounce_cycle",
     "bowling",
     "cart_pole",
+    "cart_pole_walls",
     "cost_of_transport",
     "fastest_move",
     "follow_swing",
