@@ -25,6 +25,7 @@ SHIPPED = [
     "cart_pole",
     "cart_pole_walls",
     "cost_of_transport",
+    "dribble",
     "fastest_move",
     "follow_swing",
     "free_kick",
