@@ -44,6 +44,7 @@ from symphys.problem.tables.contact import (
 from symphys.problem.tables.controllers import read_controllers, read_sensors
 from symphys.problem.tables.forces import force_quantities, read_forces
 from symphys.problem.tables.joints import read_joints
+from symphys.problem.tables.mpc import read_mpc
 from symphys.problem.tables.objectives import Objectives, read_objectives
 from symphys.problem.tables.scenarios import read_scenarios
 from symphys.problem.tables.simulation import read_simulation
@@ -109,6 +110,7 @@ def build(
 ) -> ProblemData:
     """The problem; each stage needs the ones before without fault."""
     simulation = read_simulation(document.simulation, faults)
+    mpc = read_mpc(document.mpc, simulation, faults)
     references, texts = read_references(document, faults)
     given = reference_values(references, ca.DM(0))
     parametric, initial = read_world(document, faults)
@@ -156,6 +158,7 @@ def build(
         solvers=None if document.solvers is None else tuple(dict.fromkeys(document.solvers)),
         termination=termination,
         scenarios=scenarios or None,
+        mpc=mpc,
         sweep=sweep,
     )
 
