@@ -19,6 +19,7 @@ from symphys.cli.finding.best import best
 from symphys.cli.finding.diff import diff
 from symphys.cli.finding.ls import ls
 from symphys.cli.finding.replay import replay
+from symphys.cli.mpc import mpc
 from symphys.cli.report import report
 from symphys.cli.robots.importing import import_robot
 from symphys.cli.schema import schema
@@ -55,6 +56,7 @@ def app() -> None:
 COMMANDS = (
     new,
     solve,
+    mpc,
     report,
     show,
     check,

@@ -28,6 +28,7 @@ class StateReader:
         sizes: what a state by name must have, and how many numbers each is: ``shoulder.angle`` and ``shoulder.rate``,
             ``rail.position``; of a body that floats ``torso.position`` [m], ``torso.orientation`` (w, x, y, z),
             ``torso.velocity`` [m/s], ``torso.angular_velocity`` [rad/s], world frame.
+        floating: names of the bodies that float.
     """
 
     def __init__(self, tangent: Tangent, nominal: Array) -> None:
@@ -51,9 +52,9 @@ class StateReader:
                     self._joints[f"{joint.name}.{key}"] = which, list(range(column, column + count)), into
                     self.sizes[f"{joint.name}.{key}"] = count
             column += count
-        self._floating = [name.removesuffix(".turn[0]") for name in tangent.names if name.endswith(".turn[0]")]
+        self.floating = [name.removesuffix(".turn[0]") for name in tangent.names if name.endswith(".turn[0]")]
         self._at = at
-        for body in self._floating:
+        for body in self.floating:
             fields = (("position", 3), ("orientation", 4), ("velocity", 3), ("angular_velocity", 3))
             self.sizes |= {f"{body}.{field}": size for field, size in fields}
         balls = sorted({found[1] for name in tangent.names if (found := re.fullmatch(r"(.*)\.coordinate\[0\]", name))})
@@ -108,7 +109,7 @@ class StateReader:
         off = np.zeros(self._tangent.size)
         for name, (which, columns, into) in self._joints.items():
             off[into] = given[name] - now[which][columns]
-        for body in self._floating:
+        for body in self.floating:
             self._float(body, given, world, off)
         return np.asarray(self._tangent.retract(expected[None], off[None], self._nominal)[0])
 

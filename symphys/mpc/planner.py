@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.codegen import processors
 from symphys.mpc.horizon_costs import HorizonCosts
 from symphys.mpc.model import horizon_of, receding_model
 from symphys.mpc.policy_rollout import AffinePolicy, PolicyRollout
@@ -67,6 +68,7 @@ class Planner:
         weights: (m, w): inputs of a step are weights @ v.
         lower, upper, scale: (w,) of the decisions.
         damping: of the next iteration.
+        threads: that share the steps of a plan.
     """
 
     def __init__(self, problem: Problem, threads: int | None = None) -> None:
@@ -92,6 +94,12 @@ class Planner:
         self._rolled = PolicyRollout(self._step, self._costs, self.weights, bounds, self.p)
         self._whole_inputs = not np.array_equal(self.weights, np.eye(len(self.weights)))
         self.damping = self.horizon.damping
+        self.threads = processors() if threads is None else threads
+
+    @property
+    def description(self) -> str:
+        """What evaluates, in words."""
+        return self._step.description
 
     def first(self, x: Array, time: float) -> Plan:
         """A plan from the guess, after the iterations that come before the first tick."""
