@@ -48,8 +48,8 @@ if TYPE_CHECKING:
     )
     from symphys.model.shapes import Box, Capsule, Convex, Cylinder, Ellipsoid, Fixture, Plane, Sphere, Terrain
     from symphys.model.state_layout import Layout, initial_state
-    from symphys.mpc.controller import Controller
     from symphys.model.world import Law, Scheme, World, make_world
+    from symphys.mpc.controller import Controller
     from symphys.problem import Problem, load_problem
     from symphys.problem.loading import load
     from symphys.report.making.batch import report

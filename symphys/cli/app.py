@@ -19,9 +19,9 @@ from symphys.cli.finding.best import best
 from symphys.cli.finding.diff import diff
 from symphys.cli.finding.ls import ls
 from symphys.cli.finding.replay import replay
-from symphys.cli.mpc import mpc
 from symphys.cli.report import report
 from symphys.cli.robots.importing import import_robot
+from symphys.cli.robots.mpc import mpc
 from symphys.cli.schema import schema
 from symphys.cli.shipped import listing, new
 from symphys.cli.show import show

@@ -2,8 +2,17 @@
 
 from symphys.mpc.closed_loop import ClosedLoop, close_loop
 from symphys.mpc.controller import Controller
+from symphys.mpc.planner import RecedingPlan
 from symphys.mpc.plant import Plant
-from symphys.mpc.planner import Plan, Planner
 from symphys.mpc.recording import record_of, write_closed_loop
 
-__all__ = ["ClosedLoop", "Controller", "Plan", "Planner", "Plant", "close_loop", "record_of", "write_closed_loop"]
+__all__ = [
+    "ClosedLoop",
+    "Controller",
+    "Planner",
+    "Plant",
+    "RecedingPlan",
+    "close_loop",
+    "record_of",
+    "write_closed_loop",
+]

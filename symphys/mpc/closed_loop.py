@@ -1,4 +1,4 @@
-"""The closed loop in simulated time: a controller measures a plant at every tick, and its plans act when they are ready.
+"""The closed loop in simulated time: a controller measures a plant at every tick, and plans act when they are ready.
 
 A plan that is asked for at t acts from t + latency on. Until then the plan before goes on. The solver works on one plan
 at a time: ticks that come while it works are missed.
@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from symphys.errors import SymphysError
 from symphys.mpc.controller import Controller
+from symphys.mpc.planner import RecedingPlan
 from symphys.mpc.plant import Plant
-from symphys.mpc.planner import Plan
 
 Array = NDArray[np.float64]
 Tell = Callable[[float], None]
@@ -60,7 +60,7 @@ class ClosedLoop:
     gained: NDArray[np.bool_]
     ticks: int
     in_time: int
-    plans: tuple[Plan, ...]
+    plans: tuple[RecedingPlan, ...]
     stopped: str = ""
 
     @property
@@ -73,7 +73,7 @@ class Loop:
     """A closed loop, tick by tick."""
 
     def __init__(self, controller: Controller, plant: Plant) -> None:
-        """Plan once from the first state, before time begins."""
+        """RecedingPlan once from the first state, before time begins."""
         self.controller, self.plant = controller, plant
         self.horizon, self.settings = controller.horizon, controller.horizon.plant
         self._rng = np.random.default_rng([self.settings.seed, 1])
@@ -84,7 +84,7 @@ class Loop:
         assert plan is not None
         self.acting, self.pending, self.ready = plan, plan, 0.0
         self.log: dict[str, list[float]] = {key: [] for key in ("asked", "latency", "work", "cost", "gained")}
-        self.in_time, self.plans = 0, list[Plan]()
+        self.in_time, self.plans = 0, list[RecedingPlan]()
         waiting = round(self.settings.delay / plant.dt)
         self._queue: deque[Array] = deque([np.zeros(len(controller.inputs))] * waiting)
         self.states, self.inputs = [self.x], list[Array]()
@@ -139,7 +139,7 @@ class Loop:
         return ClosedLoop(
             self.plant,
             self.controller,
-            np.arange(len(self.states)) * self.plant.dt,
+            np.asarray(np.arange(len(self.states)) * self.plant.dt, float),
             np.array(self.states),
             np.array(self.inputs).reshape(len(self.inputs), -1),
             **columns,

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from symphys.errors import SymphysError
 from symphys.model.state_layout import input_columns
 from symphys.mpc.measurement import StateReader
-from symphys.mpc.planner import Plan, Planner
+from symphys.mpc.planner import Planner, RecedingPlan
 from symphys.problem import Problem, RecedingHorizon
 from symphys.problem.loading import Source, load
 
@@ -61,7 +61,7 @@ class Controller:
             for name, part in columns.items()
             for k in range(part.stop - part.start)
         )
-        self.plan: Plan | None = None
+        self.plan: RecedingPlan | None = None
 
     @property
     def start(self) -> Array:
@@ -74,7 +74,7 @@ class Controller:
         return self._planner
 
     def __call__(self, state: State, time: float) -> Array:
-        """Plan from a measured state, and command.
+        """RecedingPlan from a measured state, and command.
 
         Args:
             state: (nx,) the state of this engine, or coordinates and rates by name: see ``state_names``.
@@ -96,7 +96,7 @@ class Controller:
         self.plan = made
         return self.command(time)
 
-    def command(self, time: float, state: State | None = None, plan: Plan | None = None) -> Array:
+    def command(self, time: float, state: State | None = None, plan: RecedingPlan | None = None) -> Array:
         """(m,) what a plan commands at a time, between ticks or after its own.
 
         Args:

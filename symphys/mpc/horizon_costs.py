@@ -7,6 +7,7 @@ Second derivatives are those of Gauss and Newton for squares, and made positive 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +15,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.codegen import FunctionCall, KernelUnavailable, MemoryLayout, Program, ProgramError, compile_program
+from symphys.codegen import FunctionCall, KernelUnavailable, MemoryLayout, ProcessorKernel, Program, compile_program
 from symphys.problem import Constraint
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.columns import ByColumns
@@ -65,7 +66,7 @@ class HorizonCosts:
     def expand(self, x: Array, v: Array, p: Array, clock: float) -> QuadraticCosts:
         """To second order about states (N + 1, nx) and decisions (N, w); ``clock``: [s] the time of the first state."""
         n, steps = self._n, self._steps
-        times = clock + np.arange(steps + 1) * self._dt
+        times = np.asarray(clock + np.arange(steps + 1) * self._dt, float)
         slope, curve = self._still.expand(x, np.concatenate([v, v[-1:]]), times, p)
         if self._later is None:
             return QuadraticCosts(slope, curve, None)
@@ -115,10 +116,11 @@ def _symbols(rollout: Rollout, width: int) -> list[Expr]:
 def _total(rollout: Rollout, asked: Sequence[_Asked], weights: Array) -> ca.Function:
     """(x, v, p, time) -> (1,) what these terms cost at one tick."""
     x, v, p, time = _symbols(rollout, weights.shape[1])
-    total = ca.SX(0)
+    total: Expr = ca.SX(0)
     for each in asked:
         value = each.value(x, ca.mtimes(ca.DM(weights), v), p, time)
-        total += each.term.weight * (ca.sum1(value) if each.kind == "cost" else ca.sumsqr(value))
+        cost: Expr = ca.sum1(value) if each.kind == "cost" else ca.sumsqr(value)
+        total += each.term.weight * cost
     return ca.Function("costs", [x, v, p, time], [ca.densify(ca.cse(total))])
 
 
@@ -139,18 +141,19 @@ class TermStack:
         slopes = ca.horzcat(ca.mtimes(ca.jacobian(r, x), basis), ca.jacobian(r, v))
         results = [r, _nonzeros(slopes)]
         self._slots, self._shape = _places(slopes), (int(r.shape[0]), n + width)
-        self._factors = _factors(squares)
+        self._factors = _factors(rollout.steps, squares)
         self._curved: list[tuple[Array, NDArray[np.int64]]] = []
         both = ca.vertcat(x, v)
         spread = ca.diagcat(basis, ca.SX.eye(width))
         for group in others:
             value = ca.sum1(group[0].value(x, u, p, time))
-            second, slope = ca.hessian(value, both)
+            curvature, slope = ca.hessian(value, both)
+            second: Expr = curvature
             second = ca.mtimes(ca.mtimes(spread.T, second), spread)
             used = np.unique(np.array(second.sparsity().get_triplet()[0], np.int64))
             picked = ca.densify(second[used.tolist(), used.tolist()])
             results += [ca.densify(ca.mtimes(spread.T, slope)), ca.reshape(picked, picked.numel(), 1)]
-            self._curved.append((_factors([group])[:, 0], used))
+            self._curved.append((_factors(rollout.steps, [group])[:, 0], used))
         made = ca.cse([ca.densify(each) for each in results])
         self._evaluate = _Rows(ca.Function("terms", [x, v, time, p], made))
 
@@ -160,7 +163,7 @@ class TermStack:
         ``first``: the number of the first of these states.
         """
         r, packed, *others = self._evaluate(np.concatenate([x, v, times[:, None]], axis=1), p)
-        size, (rows, columns) = self._shape[1], self._slots
+        rows, columns = self._slots
         ticks = slice(first, first + len(x))
         slopes = np.zeros((len(x), *self._shape))
         slopes[:, rows, columns] = packed
@@ -174,14 +177,16 @@ class TermStack:
             numbers, vectors = np.linalg.eigh((second + second.transpose(0, 2, 1)) / 2)
             kept = (vectors * np.maximum(numbers, 0.0)[:, None]) @ vectors.transpose(0, 2, 1)
             curve[:, used[:, None], used] += kept
-        assert slope.shape[1] == size
         return slope, curve
 
 
-def _factors(groups: Sequence[Sequence[_Asked]]) -> Array:
+def _factors(steps: int, groups: Sequence[Sequence[_Asked]]) -> Array:
     """(N + 1, rows): the weights of stacked terms at each state."""
-    columns = [np.tile(sum(each.factor for each in group)[:, None], group[0].term.size) for group in groups]
-    return np.concatenate(columns, axis=1) if columns else np.zeros((1, 0))
+    columns = [np.zeros((steps + 1, 0))]
+    for group in groups:
+        total = np.sum([each.factor for each in group], axis=0)
+        columns.append(np.tile(total[:, None], group[0].term.size))
+    return np.concatenate(columns, axis=1)
 
 
 def _nonzeros(matrix: Expr) -> Expr:
@@ -215,11 +220,10 @@ class _Rows:
             outputs={name: place for name, place in outputs.items() if place.size},
             prologue=(FunctionCall(flat, (row, shared), tuple(outputs.values())),),
         )
-        self._kernel, self._mapped = None, ByColumns(flat)
-        try:
+        self._kernel: ProcessorKernel | None = None
+        self._mapped = ByColumns(flat)
+        with suppress(KernelUnavailable):
             self._kernel = compile_program(program, threads=1)
-        except (KernelUnavailable, ProgramError):
-            pass
 
     def __call__(self, rows: Array, p: Array) -> list[Array]:
         """(T, nx + w + 1), (np,) -> each result (T, size)."""

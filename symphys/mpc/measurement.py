@@ -1,4 +1,4 @@
-"""Measured states: the whole state vector, or coordinates and rates by name, as another simulator or a robot has them."""
+"""Measured states: the whole state vector, or coordinates and rates by name, as another simulator has them."""
 
 from __future__ import annotations
 

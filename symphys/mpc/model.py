@@ -93,7 +93,7 @@ def resampled(variable: Variable, problem: ProblemData, horizon: RecedingHorizon
     else:
         columns = [np.interp(share * (knots - 1), np.arange(knots), column) for column in guess.T]
         held = np.stack(columns, axis=1)
-    alike = {
+    alike: dict[str, Any] = {
         key: np.tile(rows(variable, getattr(variable, key)).mean(axis=0), steps)
         for key in ("lower", "upper", "scale", "spread")
     }

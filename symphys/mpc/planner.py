@@ -29,7 +29,7 @@ GROWTH, SHRINK, STIFFEST = 8.0, 0.5, 1e8
 
 
 @dataclass(frozen=True)
-class Plan:
+class RecedingPlan:
     """What a controller intends.
 
     Attributes:
@@ -101,7 +101,7 @@ class Planner:
         """What evaluates, in words."""
         return self._step.description
 
-    def first(self, x: Array, time: float) -> Plan:
+    def first(self, x: Array, time: float) -> RecedingPlan:
         """A plan from the guess, after the iterations that come before the first tick."""
         self.damping = self.horizon.damping
         steps, zeros = self.rollout.steps, np.zeros_like(self._guess)
@@ -109,21 +109,21 @@ class Planner:
         policy = AffinePolicy(np.tile(x, (steps, 1)), self._guess, zeros, gains)
         return self._improved(policy, x, time, self.horizon.first_iterations)
 
-    def next(self, plan: Plan, x: Array, time: float) -> Plan:
+    def next(self, plan: RecedingPlan, x: Array, time: float) -> RecedingPlan:
         """The plan from a measured state (nx,) at a time [s]: the last one shifted to then, and improved."""
         return self._improved(shifted(plan, time), x, time, self.horizon.iterations)
 
-    def _improved(self, policy: AffinePolicy, x: Array, time: float, iterations: int) -> Plan:
+    def _improved(self, policy: AffinePolicy, x: Array, time: float, iterations: int) -> RecedingPlan:
         """Follow the policy from the state, then iterate."""
         states, decisions, costs = self._rolled(x, policy, np.zeros(1), time, self.horizon.smoothing)
-        plan = Plan(time, self.horizon.dt, states[0], decisions[0], policy.back, float(costs[0]), False)
+        plan = RecedingPlan(time, self.horizon.dt, states[0], decisions[0], policy.back, float(costs[0]), False)
         for _ in range(iterations):
             plan = self._iterate(plan)
             if self.damping >= STIFFEST:
                 break
         return plan
 
-    def _iterate(self, plan: Plan) -> Plan:
+    def _iterate(self, plan: RecedingPlan) -> RecedingPlan:
         """One iteration of iLQR: slopes, costs, backward pass, and the best of the motions of all step lengths."""
         self._step.clock = plan.time
         u = plan.v @ self.weights.T if self._whole_inputs else plan.v
@@ -142,9 +142,9 @@ class Planner:
         if not values[best] < plan.cost:
             return self._kept(plan, back)
         self.damping = max(self.horizon.damping, self.damping * SHRINK)
-        return Plan(plan.time, plan.dt, states[best], decisions[best], back, float(values[best]), True)
+        return RecedingPlan(plan.time, plan.dt, states[best], decisions[best], back, float(values[best]), True)
 
-    def _kept(self, plan: Plan, back: Array) -> Plan:
+    def _kept(self, plan: RecedingPlan, back: Array) -> RecedingPlan:
         """The plan as it was, with gains about it; the next iteration is more careful."""
         self.damping = min(self.damping * GROWTH, STIFFEST)
         return replace(plan, back=back, gained=False)
@@ -167,7 +167,7 @@ def begun(rollout: Rollout, order: NDArray[np.int64]) -> tuple[Array, Array, Arr
     return x.ravel(), p.ravel(), weights[:, order[0]]
 
 
-def shifted(plan: Plan, time: float) -> AffinePolicy:
+def shifted(plan: RecedingPlan, time: float) -> AffinePolicy:
     """What a plan says from a later time [s] on, step by step: between its steps linearly, after its end as last.
 
     States between two steps are means of both; they are only what feedback refers to.

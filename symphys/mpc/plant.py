@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import replace
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.codegen import KernelUnavailable, ProgramError, compile_program
+from symphys.codegen import KernelUnavailable, ProcessorKernel, compile_program
 from symphys.mpc.model import horizon_of, receding_model
 from symphys.problem import Problem
 from symphys.trajectory import Trajectory
@@ -46,10 +47,9 @@ class Plant:
         self._inputs = slice(n, n + m)
         self._given = np.concatenate([np.zeros(2 * nx + 1), self.p, [0.0]])
         self._state, self._time = slice(0, nx), 2 * nx
-        try:
+        self._kernel: ProcessorKernel | None = None
+        with suppress(KernelUnavailable):
             self._kernel = compile_program(step_program(arguments, True, False), threads=1)
-        except (KernelUnavailable, ProgramError):
-            self._kernel = None
 
     def step(self, x: Array, u: Array, time: float) -> Array:
         """(nx,) the state a step after x (nx,), with the inputs u (m,) at a time [s]."""
@@ -75,5 +75,3 @@ def plant_problem(problem: Problem, dt: float) -> Problem:
         changed = replace(changed, parametric=parametric, parameters=parametric.parameters())
     short = replace(horizon_of(changed), horizon=dt, dt=dt, smoothing=0.0)
     return receding_model(replace(changed, mpc=short))
-
-

@@ -13,11 +13,19 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.codegen import FunctionCall, KernelUnavailable, MemoryLayout, Place, Program, ProgramError, compile_program
+from symphys.codegen import (
+    FunctionCall,
+    KernelUnavailable,
+    MemoryLayout,
+    Place,
+    ProcessorKernel,
+    Program,
+    compile_program,
+)
+from symphys.mpc.horizon_costs import HorizonCosts
 from symphys.transcription.feedback.controller_calls import control_calls
 from symphys.transcription.program import step_calls
 from symphys.transcription.rollout import Rollout
-from symphys.mpc.horizon_costs import HorizonCosts
 from symphys.transcription.staged.linearized_step import LinearizedStep
 
 Array = NDArray[np.float64]
@@ -67,11 +75,12 @@ class PolicyRollout:
             threads: that share step lengths.
         """
         self._step, self._costs, self._weights, self._bounds, self._p = step, costs, weights, bounds, p
+        self._kernel: ProcessorKernel | None = None
         try:
             self._kernel = compile_program(policy_program(step, costs, weights), threads=threads)
             self.description = f"lanes {self._kernel.report.lanes}, threads {self._kernel.threads}"
-        except (KernelUnavailable, ProgramError) as error:
-            self._kernel, self.description = None, f"step by step; {error}"
+        except KernelUnavailable as error:
+            self.description = f"step by step; {error}"
 
     def __call__(
         self, start: Array, policy: AffinePolicy, lengths: Array, clock: float, smoothing: float

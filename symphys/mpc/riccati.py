@@ -59,9 +59,7 @@ def riccati_pass(
     return ahead, back
 
 
-def _decided(
-    hessian: Array, slope: Array, cross: Array, lower: Array, upper: Array
-) -> tuple[Array, Array] | None:
+def _decided(hessian: Array, slope: Array, cross: Array, lower: Array, upper: Array) -> tuple[Array, Array] | None:
     """The best decisions within bounds (w,), and how those that are free of the bounds answer the state (w, n)."""
     if len(slope) == 1:
         curvature = hessian[0, 0]

@@ -1,6 +1,6 @@
 """Problem files: reading, validation, and the model that everything after works with."""
 
-from symphys.problem.feedback import Controller, ForceLaw, Sensor
+from symphys.problem.feedback import FeedbackController, ForceLaw, Sensor
 from symphys.problem.load import require_solvable
 from symphys.problem.model import (
     ALIVE,
@@ -32,9 +32,9 @@ __all__ = [
     "ALIVE",
     "DURATION",
     "Constraint",
-    "Controller",
     "Cost",
     "Discretisation",
+    "FeedbackController",
     "ForceLaw",
     "Output",
     "Phase",

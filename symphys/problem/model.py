@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from symphys.expression import Formula
 from symphys.model.world import Scheme, World
-from symphys.problem.feedback import Controller, ForceLaw, Sensor
+from symphys.problem.feedback import FeedbackController, ForceLaw, Sensor
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.receding_horizon import RecedingHorizon
@@ -336,7 +336,7 @@ class ProblemData:
     stop_when_met: bool
     solver_tables: dict[str, dict[str, object]]
     sensors: tuple[Sensor, ...] = ()
-    controllers: tuple[Controller, ...] = ()
+    controllers: tuple[FeedbackController, ...] = ()
     forces: tuple[ForceLaw, ...] = ()
     references: tuple[ReferenceTrajectory, ...] = ()
     phases: tuple[Phase, ...] = ()

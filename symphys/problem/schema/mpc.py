@@ -42,7 +42,7 @@ class MpcTable(SchemaTable):
 
     rate: Positive = Field(description="measurements and new plans in a second [Hz]")
     horizon: Positive | None = Field(
-        default=None, description="how far a plan looks ahead [s], a whole number of dt; default: [simulation]'s duration"
+        default=None, description="how far a plan looks ahead [s], a whole number of dt; default: the whole duration"
     )
     dt: Positive | None = Field(default=None, description="time step of the model [s]; default: that of [simulation]")
     iterations: Iterations = Field(default=1, description="of iLQR at each tick")

@@ -8,11 +8,18 @@ from typing import Any
 from symphys.problem.model import Simulation
 from symphys.problem.reading.faults import Faults
 from symphys.problem.receding_horizon import PlantSettings, RecedingHorizon
+from symphys.problem.schema import Document
 from symphys.problem.schema.mpc import MpcTable, PlantTable
-from symphys.problem.tables.simulation import check_steps
+from symphys.problem.tables.simulation import check_steps, read_simulation
 
 FIVE = 5
 """Durations of the problem that the closed loop lasts, unless the file says otherwise."""
+
+
+def read_time(document: Document, faults: Faults) -> tuple[Simulation, RecedingHorizon | None]:
+    """How time passes, in the problem and in the horizon of its controller."""
+    simulation = read_simulation(document.simulation, faults)
+    return simulation, read_mpc(document.mpc, simulation, faults)
 
 
 def read_mpc(table: MpcTable | None, simulation: Simulation, faults: Faults) -> RecedingHorizon | None:

@@ -80,7 +80,7 @@ def draw_latencies(record: ClosedLoopRecord) -> DataFigure | None:
         style.set_log(axes, which, edges)
     left.set_title("Plans by the time they took")
     left.set_xlabel("[ms]")
-    left.set_yscale("symlog", linthresh=1)
+    style.set_symlog(left, "y", 1.0)
     style.set_linear(right, "x", 6)
     right.set_title("Time that each plan took [ms]")
     right.set_xlabel(TIME)

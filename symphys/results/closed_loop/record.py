@@ -175,11 +175,14 @@ def read_closed_loop(folder: Path) -> ClosedLoopRecord:
 
 def _record(table: Mapping[str, Any], arrays: Mapping[str, Array]) -> ClosedLoopRecord:
     numbers = files.numbers(dict(table))
-    found = {each.name: numbers[each.name] for each in fields(ClosedLoopRecord) if each.name not in ARRAYS}
+    found: dict[str, Any] = {
+        each.name: numbers[each.name] for each in fields(ClosedLoopRecord) if each.name not in ARRAYS
+    }
     found["targets"] = tuple(
         TargetRecord(values.name(each["name"]), *(float(each[key]) for key in ("error", "tolerance", "held")))
         for each in numbers["targets"]
     )
     for key in ("command_names", "value_names"):
         found[key] = values.names(found[key])
-    return ClosedLoopRecord(**found, **{name: np.asarray(arrays[name], float) for name in ARRAYS})
+    found |= {name: np.asarray(arrays[name], float) for name in ARRAYS}
+    return ClosedLoopRecord(**found)
