@@ -6,13 +6,4 @@ from symphys.mpc.planner import RecedingPlan
 from symphys.mpc.plant import Plant
 from symphys.mpc.recording import record_of, write_closed_loop
 
-__all__ = [
-    "ClosedLoop",
-    "Controller",
-    "Planner",
-    "Plant",
-    "RecedingPlan",
-    "close_loop",
-    "record_of",
-    "write_closed_loop",
-]
+__all__ = ["ClosedLoop", "Controller", "Plant", "RecedingPlan", "close_loop", "record_of", "write_closed_loop"]

@@ -42,7 +42,7 @@ class Plant:
         arguments = StepArguments(self.rollout, Tangent(self.rollout), parameters=False)
         nx, n, m, _ = arguments.sizes
         begun = ca.Function("start", [self.rollout.z], [ca.densify(self.rollout.x0), ca.densify(self.rollout.p)])
-        self.start, self.p = (np.array(part).ravel() for part in begun.call([np.zeros(m)]))
+        self.start, self.p = (np.array(part).ravel() for part in begun.call([np.zeros(int(self.rollout.z.shape[0]))]))
         self._varying = np.zeros((1, n + m + nx))
         self._inputs = slice(n, n + m)
         self._given = np.concatenate([np.zeros(2 * nx + 1), self.p, [0.0]])
