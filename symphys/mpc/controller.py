@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -80,6 +81,8 @@ class Controller:
             state: (nx,) the state of this engine, or coordinates and rates by name: see ``state_names``.
             time: [s], not before that of the last call; the first call takes longer, since it plans from the guess.
 
+        Where the model is not finite from the measured state, the plan before goes on, as far as it reaches.
+
         Returns:
             (m,) the inputs from now on, in the order of ``inputs``, in the units of their motors, or N and N m.
 
@@ -91,9 +94,12 @@ class Controller:
             raise SymphysError(f"the time {time:g} s is before that of the last plan, {plan.time:g} s; call reset()")
         x = self.reader(state, self.start if plan is None else plan.x[plan.step(time)])
         made = self._planner.first(x, time) if plan is None else self._planner.next(plan, x, time)
-        if not np.isfinite(made.v).all() or not np.isfinite(made.x).all():
+        if np.isfinite(made.v).all() and np.isfinite(made.x).all():
+            self.plan = made
+        elif plan is not None and time < plan.time + self.horizon.horizon:
+            self.plan = replace(plan, gained=False)
+        else:
             raise SymphysError(f"the plan at {time:g} s is not finite: the model does not bear the measured state")
-        self.plan = made
         return self.command(time)
 
     def command(self, time: float, state: State | None = None, plan: RecedingPlan | None = None) -> Array:

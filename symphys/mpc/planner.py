@@ -24,6 +24,8 @@ from symphys.transcription.staged.tangent import Tangent
 Array = NDArray[np.float64]
 LENGTHS = 0.5 ** np.arange(8.0)
 """Step lengths that are tried side by side."""
+SHARES = np.array([1.0, 0.5, 0.0])
+"""Of the feedback with which a shifted plan is followed: the cheapest counts. Gains may fail across an impact."""
 GROWTH, SHRINK, STIFFEST = 8.0, 0.5, 1e8
 """Factors on the damping after a tick that gained nothing and after one that did, and its largest value."""
 
@@ -115,8 +117,12 @@ class Planner:
 
     def _improved(self, policy: AffinePolicy, x: Array, time: float, iterations: int) -> RecedingPlan:
         """Follow the policy from the state, then iterate."""
-        states, decisions, costs = self._rolled(x, policy, np.zeros(1), time, self.horizon.smoothing)
-        plan = RecedingPlan(time, self.horizon.dt, states[0], decisions[0], policy.back, float(costs[0]), False)
+        none = np.zeros(len(SHARES))
+        states, decisions, costs = self._rolled(x, policy, none, time, self.horizon.smoothing, SHARES)
+        best = int(np.where(np.isfinite(costs), costs, math.inf).argmin())
+        plan = RecedingPlan(
+            time, self.horizon.dt, states[best], decisions[best], policy.back, float(costs[best]), False
+        )
         for _ in range(iterations):
             plan = self._iterate(plan)
             if self.damping >= STIFFEST:

@@ -1,8 +1,9 @@
 """Rollouts under a policy, compiled: all steps of several step lengths in one call, lanes hold step lengths.
 
-The decisions of step k are v = clip(v_k + a ahead_k + back_k d), where d is how far the state is from x_k in its
-tangent, and a is the step length. This is the forward pass of differential dynamic programming (Tassa, Mansard and
-Todorov, Control-Limited Differential Dynamic Programming, ICRA 2014, section III) without Python between the steps.
+The decisions of step k are v = clip(v_k + a ahead_k + s back_k d). There d is how far the state is from x_k in its
+tangent, a the step length, and s the share of the feedback. This is the forward pass of differential dynamic
+programming (Tassa, Mansard and Todorov, Control-Limited Differential Dynamic Programming, ICRA 2014, section III)
+without Python between the steps.
 """
 
 from __future__ import annotations
@@ -83,32 +84,45 @@ class PolicyRollout:
             self.description = f"step by step; {error}"
 
     def __call__(
-        self, start: Array, policy: AffinePolicy, lengths: Array, clock: float, smoothing: float
+        self,
+        start: Array,
+        policy: AffinePolicy,
+        lengths: Array,
+        clock: float,
+        smoothing: float,
+        shares: Array | float = 1.0,
     ) -> tuple[Array, Array, Array]:
         """From a state (nx,) with step lengths (B,): states (B, N + 1, nx), decisions (B, N, w) and costs (B,).
 
-        ``clock``: [s] the time at the start. A motion that is not finite stays so to its end.
+        ``clock``: [s] the time at the start. ``shares``: (B,) of the feedback. A motion that is not finite stays so.
         """
         if self._kernel is None:
-            return self._step_by_step(start, policy, lengths, clock, smoothing)
+            return self._step_by_step(start, policy, lengths, clock, smoothing, shares)
         parts = (policy.x, policy.v, policy.ahead, policy.back)
         shared = np.concatenate([*(each.ravel() for each in parts), *self._bounds, self._p, (clock, smoothing)])
-        first = np.empty((len(lengths), 1 + len(start)))
-        first[:, 0], first[:, 1:] = lengths, start
+        first = np.empty((len(lengths), 2 + len(start)))
+        first[:, 0], first[:, 1], first[:, 2:] = lengths, shares, start
         found = self._kernel.forward(first, shared)
         count, steps = len(lengths), len(policy.v)
         return found["x"].reshape(count, steps + 1, -1), found["v"].reshape(count, steps, -1), found["cost"][:, 0]
 
     def _step_by_step(
-        self, start: Array, policy: AffinePolicy, lengths: Array, clock: float, smoothing: float
+        self,
+        start: Array,
+        policy: AffinePolicy,
+        lengths: Array,
+        clock: float,
+        smoothing: float,
+        shares: Array | float = 1.0,
     ) -> tuple[Array, Array, Array]:
+        share = np.broadcast_to(shares, lengths.shape)[:, None]
         count, steps, dt = len(lengths), len(policy.v), self._step.rollout.dt
         x, v = np.empty((count, steps + 1, len(start))), np.empty((count, steps, policy.v.shape[1]))
         x[:, 0], cost = start, np.zeros(count)
         self._step.clock = clock
         for k in range(steps):
             off = self._step.tangent.difference(np.repeat(policy.x[None, k], count, axis=0), x[:, k], self._p)
-            wanted = policy.v[k] + lengths[:, None] * policy.ahead[k] + off @ policy.back[k].T
+            wanted = policy.v[k] + lengths[:, None] * policy.ahead[k] + share * (off @ policy.back[k].T)
             v[:, k] = np.clip(wanted, *self._bounds)
             x[:, k + 1] = self._step.step(k, x[:, k], v[:, k] @ self._weights.T, self._p, smoothing)
             for row in range(count):
@@ -122,8 +136,8 @@ class PolicyRollout:
 class PolicyPlaces:
     """Where the program keeps a rollout; see ``controller_calls.Places``.
 
-    What differs from lane to lane is (step length, first state). What all share is the policy, step after step, the
-    bounds, p, the clock and the smoothing; the body reads it where it lies.
+    What differs from lane to lane is (step length, share of the feedback, first state). What all share is the policy,
+    step after step, the bounds, p, the clock and the smoothing; the body reads it where it lies.
     """
 
     def __init__(self, step: LinearizedStep, width: int) -> None:
@@ -132,14 +146,15 @@ class PolicyPlaces:
         self.layout = layout = MemoryLayout()
         nx, n, m, np_ = step.arguments.sizes
         steps = self.rollout.steps
-        self.row = layout.take(1 + nx)
+        self.row = layout.take(2 + nx)
         begun = layout.size
         self.about, self.decided = layout.series(nx, steps), layout.series(width, steps)
         self.ahead, self.back = layout.series(width, steps), layout.series(width * n, steps)
         self.lower, self.upper = layout.take(width), layout.take(width)
         self.p, self.clock, self.smoothing = layout.take(np_), layout.take(1), layout.take(1)
         self.shared = Place(begun, layout.size - begun)
-        self.length, self.off, self.cost = layout.take(1), layout.take(n), layout.take(1)
+        self.length, self.share = layout.take(1), layout.take(1)
+        self.off, self.cost = layout.take(n), layout.take(1)
         self.x, self.v = layout.series(nx, steps + 1), layout.series(width, steps)
         self.given = layout.take(m)
         self.u = self.given if self.rollout.feedback is None else layout.take(m)
@@ -152,11 +167,12 @@ def policy_program(step: LinearizedStep, costs: HorizonCosts, weights: Array) ->
     places = PolicyPlaces(step, weights.shape[1])
     steps, width = rollout.steps, int(weights.shape[1])
     row, clock = ca.SX.sym("row", places.row.size), ca.SX.sym("clock")
-    first = ca.Function("first", [row], [row[0], row[1:]])
+    first = ca.Function("first", [row], [row[0], row[1], row[2:]])
     times = ca.Function("times", [clock], [ca.densify(clock + ca.DM(np.arange(steps + 1)) * rollout.dt)])
     x, y, p = (ca.SX.sym(name, place.size) for name, place in (("x", places.x), ("y", places.x), ("p", places.p)))
     apart = ca.Function("apart", [x, y, p], [ca.densify(tangent.distance(x, y, p))])
-    decided = (places.length, places.decided, places.ahead, places.back, places.off, places.lower, places.upper)
+    policy = (places.decided, places.ahead, places.back, places.off, places.lower, places.upper)
+    decided = (places.length, places.share, *policy)
     here = (places.x, places.v, places.p, places.time)
     there = (places.x.later(), places.v, places.p, places.time.later())
     last = (places.x.later(steps), places.v.later(steps - 1), places.p, places.time.later(steps))
@@ -179,7 +195,7 @@ def policy_program(step: LinearizedStep, costs: HorizonCosts, weights: Array) ->
             "cost": places.cost,
         },
         prologue=(
-            FunctionCall(first, (places.row,), (places.length, places.x.still())),
+            FunctionCall(first, (places.row,), (places.length, places.share, places.x.still())),
             FunctionCall(times, (places.clock,), (Place(places.time.offset, steps + 1),)),
         ),
         body=tuple(body),
@@ -189,11 +205,11 @@ def policy_program(step: LinearizedStep, costs: HorizonCosts, weights: Array) ->
 
 
 def decide(width: int, n: int, weights: Array) -> ca.Function:
-    """(length, v, ahead, back row by row, off, lower, upper) -> decisions and inputs of a step."""
-    length, off = ca.SX.sym("length"), ca.SX.sym("off", n)
+    """(length, share, v, ahead, back row by row, off, lower, upper) -> decisions and inputs of a step."""
+    length, share, off = ca.SX.sym("length"), ca.SX.sym("share"), ca.SX.sym("off", n)
     v, ahead, lower, upper = (ca.SX.sym(name, width) for name in ("v", "ahead", "lower", "upper"))
     back = ca.SX.sym("back", width * n)
     answer = ca.mtimes(ca.reshape(back, n, width).T, off)
-    chosen = ca.fmin(ca.fmax(v + length * ahead + answer, lower), upper)
+    chosen = ca.fmin(ca.fmax(v + length * ahead + share * answer, lower), upper)
     u = ca.mtimes(ca.DM(weights), chosen)
-    return ca.Function("decide", [length, v, ahead, back, off, lower, upper], [chosen, ca.densify(u)])
+    return ca.Function("decide", [length, share, v, ahead, back, off, lower, upper], [chosen, ca.densify(u)])

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 def riccati_pass(
     a: Array, b: Array, costs: QuadraticCosts, room: tuple[Array, Array], damping: Array
 ) -> tuple[Array, Array] | None:
-    """Feedforward (N, w) and gains (N, w, n); None where a Hessian is not positive definite.
+    """Feedforward (N, w) and gains (N, w, n); None where a Hessian is not positive definite, or slopes not finite.
 
     Args:
         a: (N, n, n) the next state by the state.
@@ -56,7 +56,7 @@ def riccati_pass(
         slope = q[:n] + (inputs @ first + q[n:]) @ gains + first @ cross
         curve = whole[:n, :n] + mixed + cross.T @ gains
         curve = 0.5 * (curve + curve.T)
-    return ahead, back
+    return (ahead, back) if np.isfinite(ahead).all() and np.isfinite(back).all() else None
 
 
 def _decided(hessian: Array, slope: Array, cross: Array, lower: Array, upper: Array) -> tuple[Array, Array] | None:

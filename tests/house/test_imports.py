@@ -82,7 +82,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "mpc": (
         "codegen dynamics errors files maths model problem results solvers suggest trajectory transcription",
         "casadi numpy scipy",
-        "model predictive control: plans, the controller, the closed loop with a plant",
+        "model predictive control",
     ),
     "doctor": ("codegen verbs", "casadi numpy", "what there is on this machine"),
     "api": (
