@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 QUICK := $(addprefix tests/,house model expression findings problem solvers dynamics)
 
-.PHONY: help demo demo-walk test test-quick test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-table1 bench-gpu bench-walk bench-lessons stress bench-pipelines bench-runs bench-gaits bench-imports profiles gallery clean
+.PHONY: help demo demo-walk test test-quick test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-mpc bench-table1 bench-gpu bench-walk bench-lessons stress bench-pipelines bench-runs bench-gaits bench-imports profiles gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
@@ -68,6 +68,10 @@ bench-robots: $(VENV)/.benching  ## jointed robots: what each device of joints b
 	$(BIN)/python benchmarks/robot_kernels.py
 	$(BIN)/python benchmarks/step_jacobians.py
 	$(BIN)/python benchmarks/stage_costs.py
+
+bench-mpc: $(VENV)/.installed  ## model predictive control of plants that differ from their models: rates, latencies, tasks done
+	$(BIN)/python benchmarks/mpc.py
+	$(BIN)/python benchmarks/mpc.py --faster 2
 
 bench-walk: $(VENV)/.benching  ## robots that learn to walk, three seeds each; their gaits in unseen samples of scenarios (half an hour)
 	$(BIN)/python benchmarks/trot.py

@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from symphys.model.shapes import Box, Capsule, Convex, Cylinder, Ellipsoid, Fixture, Plane, Sphere, Terrain
     from symphys.model.state_layout import Layout, initial_state
     from symphys.model.world import Law, Scheme, World, make_world
+    from symphys.mpc.controller import Controller
     from symphys.problem import Problem, load_problem
     from symphys.problem.loading import load
     from symphys.report.making.batch import report
@@ -67,6 +68,7 @@ __all__ = [
     "Checked",
     "CompiledRollout",
     "CompiledStep",
+    "Controller",
     "Convex",
     "Cylinder",
     "Ellipsoid",
@@ -156,6 +158,7 @@ _HOMES = {
         "VelocityMotor",
         "AffineMotor",
     ),
+    "mpc.controller": ("Controller",),
     "model.world": ("Law", "Scheme", "World", "make_world"),
 }
 _ROOMS = ("doctor", "export", "problems", "report", "results", "solvers")

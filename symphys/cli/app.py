@@ -21,6 +21,7 @@ from symphys.cli.finding.ls import ls
 from symphys.cli.finding.replay import replay
 from symphys.cli.report import report
 from symphys.cli.robots.importing import import_robot
+from symphys.cli.robots.mpc import mpc
 from symphys.cli.schema import schema
 from symphys.cli.shipped import listing, new
 from symphys.cli.show import show
@@ -55,6 +56,7 @@ def app() -> None:
 COMMANDS = (
     new,
     solve,
+    mpc,
     report,
     show,
     check,

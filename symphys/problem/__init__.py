@@ -1,6 +1,6 @@
 """Problem files: reading, validation, and the model that everything after works with."""
 
-from symphys.problem.feedback import Controller, ForceLaw, Sensor
+from symphys.problem.feedback import FeedbackController, ForceLaw, Sensor
 from symphys.problem.load import require_solvable
 from symphys.problem.model import (
     ALIVE,
@@ -23,6 +23,7 @@ from symphys.problem.model import (
 from symphys.problem.parametric.reposition import reposition
 from symphys.problem.problem import Problem, load_problem, problem_of_tables
 from symphys.problem.reading.solver_options import require_solvers, validate_options
+from symphys.problem.receding_horizon import PlantSettings, RecedingHorizon
 from symphys.problem.robot_alone import is_robot, robot_alone
 from symphys.problem.schema.json_schema import json_schema
 from symphys.problem.schema.reference import reference_page
@@ -31,16 +32,18 @@ __all__ = [
     "ALIVE",
     "DURATION",
     "Constraint",
-    "Controller",
     "Cost",
     "Discretisation",
+    "FeedbackController",
     "ForceLaw",
     "Output",
     "Phase",
+    "PlantSettings",
     "Problem",
     "ProblemData",
     "RandomizedPose",
     "RandomizedQuantity",
+    "RecedingHorizon",
     "Scenarios",
     "Sensor",
     "Simulation",

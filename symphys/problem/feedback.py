@@ -29,7 +29,7 @@ class Sensor:
 
 
 @dataclass(frozen=True)
-class Controller:
+class FeedbackController:
     """What drives inputs in every step.
 
     Attributes:

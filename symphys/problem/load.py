@@ -18,7 +18,7 @@ from symphys.problem.checks.memory import check_rollout
 from symphys.problem.checks.pair_limit import check_pair_limit
 from symphys.problem.checks.start import at_guess, check_joints, check_overlap, formula_names, sensor_names
 from symphys.problem.checks.start_values import StartValues
-from symphys.problem.feedback import Controller, ForceLaw, Sensor
+from symphys.problem.feedback import FeedbackController, ForceLaw, Sensor
 from symphys.problem.include.files import appendix
 from symphys.problem.model import ALIVE, Array, ProblemData, Simulation, Termination, Variable
 from symphys.problem.parametric.collision_filter import CollisionFilter
@@ -44,9 +44,10 @@ from symphys.problem.tables.contact import (
 from symphys.problem.tables.controllers import read_controllers, read_sensors
 from symphys.problem.tables.forces import force_quantities, read_forces
 from symphys.problem.tables.joints import read_joints
+from symphys.problem.tables.mpc import read_time
 from symphys.problem.tables.objectives import Objectives, read_objectives
 from symphys.problem.tables.scenarios import read_scenarios
-from symphys.problem.tables.simulation import read_phases, read_simulation
+from symphys.problem.tables.simulation import read_phases
 from symphys.problem.tables.statics import read_statics
 from symphys.problem.tables.termination import read_termination, with_termination_cost
 from symphys.problem.tables.variables import read_variables
@@ -108,7 +109,7 @@ def build(
     sweep: Sweep | None,
 ) -> ProblemData:
     """The problem; each stage needs the ones before without fault."""
-    simulation = read_simulation(document.simulation, faults)
+    simulation, mpc = read_time(document, faults)
     references, texts = read_references(document, faults)
     given = reference_values(references, ca.DM(0))
     parametric, initial = read_world(document, faults)
@@ -116,8 +117,7 @@ def build(
     nominal = parametric.world({})
     check_laws(parametric, nominal, faults)
     check_couplings(nominal, faults)
-    known = quantities(initial, parametric.parameters(), input_sizes(nominal))
-    known |= duration_quantity(simulation.duration)
+    known = quantities(initial, parametric.parameters(), input_sizes(nominal)) | duration_quantity(simulation.duration)
     sensors, controllers = read_control(document, parametric, known, functions, starts, given, faults)
     known |= weight_quantities(controllers) | force_quantities(document.force)
     variables = read_variables(document.variable, known, simulation, faults)
@@ -155,6 +155,7 @@ def build(
         solvers=None if document.solvers is None else tuple(dict.fromkeys(document.solvers)),
         termination=termination,
         scenarios=scenarios or None,
+        mpc=mpc,
         sweep=sweep,
     )
 
@@ -167,7 +168,7 @@ def read_control(
     starts: StartValues,
     given: Mapping[str, Any],
     faults: Faults,
-) -> tuple[tuple[Sensor, ...], tuple[Controller, ...]]:
+) -> tuple[tuple[Sensor, ...], tuple[FeedbackController, ...]]:
     """Sensors and controllers without fault."""
     sensors: tuple[Sensor, ...] = ()
     if document.sensor:

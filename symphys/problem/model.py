@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from symphys.expression import Formula
 from symphys.model.world import Scheme, World
-from symphys.problem.feedback import Controller, ForceLaw, Sensor
+from symphys.problem.feedback import FeedbackController, ForceLaw, Sensor
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.parametric.world import ParametricWorld
+from symphys.problem.receding_horizon import RecedingHorizon
 from symphys.problem.references import ReferenceTrajectory
 from symphys.problem.sweeps.sweep import Sweep
 
@@ -314,6 +315,7 @@ class ProblemData:
         termination: where a motion is over before its time; None: nowhere.
         scenarios: what differs from sample to sample; None: nothing.
         outputs: numbers that are reported, in the file's order.
+        mpc: what [mpc] says; None without one.
         sweep: what [sweep] says; None without one. ``text`` is without it.
     """
 
@@ -334,7 +336,7 @@ class ProblemData:
     stop_when_met: bool
     solver_tables: dict[str, dict[str, object]]
     sensors: tuple[Sensor, ...] = ()
-    controllers: tuple[Controller, ...] = ()
+    controllers: tuple[FeedbackController, ...] = ()
     forces: tuple[ForceLaw, ...] = ()
     references: tuple[ReferenceTrajectory, ...] = ()
     phases: tuple[Phase, ...] = ()
@@ -342,6 +344,7 @@ class ProblemData:
     termination: Termination | None = None
     scenarios: Scenarios | None = None
     outputs: tuple[Output, ...] = ()
+    mpc: RecedingHorizon | None = None
     sweep: Sweep | None = None
 
     @property

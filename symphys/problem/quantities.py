@@ -10,7 +10,7 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.problem.feedback import Controller
+from symphys.problem.feedback import FeedbackController
 from symphys.problem.model import DURATION, Kind, VariableSlot
 from symphys.problem.parametric.parts import VARIABLE
 from symphys.suggest import hint, quote
@@ -64,7 +64,7 @@ def duration_quantity(duration: float) -> dict[str, Quantity]:
     return {DURATION: Quantity("duration", np.array([duration]), own_scale=True)}
 
 
-def weight_quantities(controllers: Iterable[Controller]) -> dict[str, Quantity]:
+def weight_quantities(controllers: Iterable[FeedbackController]) -> dict[str, Quantity]:
     """The numbers of controllers by name, such as ``brain.weights``."""
     return {name: Quantity("weight", value) for controller in controllers for name, value in controller.weights.items()}
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -50,6 +50,19 @@ def simulate(rollout: Rollout, record: Callable[..., Any], z: Array, smoothing: 
         return Record(z, arrays, motion.require_finite())
     except NotFinite as error:
         raise NotFinite(f"{error}; {first_non_finite(rollout, arrays)}") from None
+
+
+def motion_of(rollout: Rollout, time: Array, x: Array, u: Array, p: Array) -> Trajectory:
+    """The motion of states (K + 1, nx) that were simulated step by step, with inputs (K, m), at times (K + 1,)."""
+    report, steps = rollout.remembering(rollout.built(report_function)), len(u)
+    if rollout.feedback is not None:
+        pairs = zip(x, u, time, strict=False)
+        u = np.array([np.array(rollout.feedback(state, given, p, now)).ravel() for state, given, now in pairs])
+    found = report.map(steps)(x[:-1].T, u.T, np.tile(p[:, None], steps), np.zeros((1, steps)))
+    happened = [np.array(part).T for part in found[1:]]
+    simulation = replace(rollout.problem.simulation, duration=steps * rollout.dt)
+    whole = replace(rollout, problem=replace(rollout.problem, simulation=simulation))
+    return _trajectory(whole, time, x, u, p, *happened).require_finite()
 
 
 def _trajectory(

@@ -79,6 +79,11 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "matplotlib numpy",
         "pages and figures, made from run folders alone",
     ),
+    "mpc": (
+        "codegen dynamics errors files maths model problem results solvers suggest trajectory transcription",
+        "casadi numpy scipy",
+        "model predictive control",
+    ),
     "doctor": ("codegen verbs", "casadi numpy", "what there is on this machine"),
     "api": (
         "batches codegen errors files findings importing interrupts problem problems report results runs "
@@ -90,8 +95,8 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "jax": ("api errors transcription", "jax numpy", "rollouts and steps for JAX"),
     "env": ("api errors", "gymnasium numpy", "environments for Gymnasium"),
     "cli": (
-        "api batches codegen doctor errors export files findings importing problem problems report results runs "
-        "solvers suggest threads trajectory transcription verification version",
+        "api batches codegen doctor errors export files findings importing interrupts mpc problem problems report "
+        "results runs solvers suggest threads trajectory transcription verification version",
         "click numpy rich",
         "the commands",
     ),

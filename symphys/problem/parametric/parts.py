@@ -91,8 +91,20 @@ class ParametricBody:
     def _specific(self) -> Tensor:
         return specific(self.shapes) if self.inertia is None else []
 
+    def heavier(self, factor: float) -> ParametricBody:
+        """The body with its mass and inertia times a factor."""
+        density = None if self.density is None else self.density * factor
+        return replace(self, mass=self.mass * factor, density=density, inertia=_times(self.inertia, factor))
+
     def _inertia(self, mass: Scalar, tensor: Tensor) -> Any:
         return inertia_of(tensor, mass) if self.inertia is None else self.inertia
+
+
+def _times(numbers: Any, factor: float) -> Any:
+    """Each number in nested tuples, times a factor; None stays."""
+    if isinstance(numbers, tuple):
+        return tuple(_times(each, factor) for each in numbers)
+    return None if numbers is None else numbers * factor
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,10 @@ from symphys.problem.reading.value_texts import shown
 from symphys.problem.schema import Document
 from symphys.suggest import hint, quote
 
-OPENED = ("simulation", "world", "contact", "objective", "solver")
+OPENED = ("simulation", "world", "contact", "objective", "solver", "mpc")
 """Tables that a setting may open; it adds no body, surface, variable or objective."""
+OPENED_BELOW = ("solver", "mpc")
+"""Those in which it may open tables, too."""
 
 RENAMED = {"fall": "termination", "forget": "adjoint_discount"}
 """Old names of keys; a setting may use either name, whichever the file has."""
@@ -91,7 +93,7 @@ def assign(data: dict[str, Any], path: str, value: object) -> None:
             if not (open_below or (node is data and key in OPENED)):
                 raise SettingError(unopened(node, str(key), node is data))
             node[key] = {}
-        open_below = open_below or (node is data and key == "solver")
+        open_below = open_below or (node is data and key in OPENED_BELOW)
         node, rest = node[key], remainder
 
 

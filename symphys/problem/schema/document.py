@@ -9,6 +9,7 @@ from pydantic import ConfigDict, Field
 from symphys.problem.schema.control import ControllerTable, ForceTable, ReferenceTable, SensorTable
 from symphys.problem.schema.include import MOST_INCLUDES, IncludedTable, IncludeTable
 from symphys.problem.schema.joints import CouplingTable, JointTable, SiteTable
+from symphys.problem.schema.mpc import MpcTable
 from symphys.problem.schema.objectives import (
     ConstraintTable,
     CostTable,
@@ -76,6 +77,7 @@ class Document(SchemaTable):
     solver: dict[str, dict[str, Any]] = Field(
         default={}, description="options by solver: [solver.gradient], [solver.cma], ..."
     )
+    mpc: MpcTable | None = None
     sweep: SweepTable | None = None
     set: dict[str, Any] = Field(
         default={}, description='values that replace others, such as those of included files: "body.torso.mass" = 3'

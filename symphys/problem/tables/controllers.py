@@ -15,7 +15,7 @@ from symphys.expression import Formula, FormulaError, parse
 from symphys.files import check_regular
 from symphys.model.controllers import ControlLaw, Custom, Linear, Net, Periodic
 from symphys.problem.checks.memory import check_net
-from symphys.problem.feedback import Controller, Sensor
+from symphys.problem.feedback import FeedbackController, Sensor
 from symphys.problem.quantities import Quantity, SlotError, read_slot
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.control import ControllerTable, NetTable, SensorTable
@@ -59,7 +59,7 @@ def read_controllers(
     functions: Mapping[str, ca.Function],
     faults: Faults,
     varied: Collection[str] = (),
-) -> tuple[Controller, ...]:
+) -> tuple[FeedbackController, ...]:
     """Every controller that is clear.
 
     Args:
@@ -102,7 +102,7 @@ class ControllerReader:
         """Note a fault of one key, or of a key of a table within."""
         self.faults.add((*self.place, *key.split(".")), message)
 
-    def read(self) -> Controller | None:
+    def read(self) -> FeedbackController | None:
         """The controller; None if it is unclear what it is."""
         before = len(self.faults.issues)
         drives, senses = self.drives(), self.senses()
@@ -114,7 +114,7 @@ class ControllerReader:
             return None
         numbers = {key: self.numbers(kind, key, size, law) for key, size in law.sizes.items()}
         scale = self.spread_out("scale", self.table.scale, len(drives))
-        return Controller(self.table.name, law, tuple(self.table.senses), drives, scale, numbers)
+        return FeedbackController(self.table.name, law, tuple(self.table.senses), drives, scale, numbers)
 
     def drives(self) -> tuple[tuple[str, int], ...]:
         """Every input and component."""

@@ -11,7 +11,7 @@ from symphys.codegen import FunctionCall, MemoryLayout, Place
 from symphys.model.controllers import Net
 from symphys.model.controllers.net import Activation, Layer, activated
 from symphys.model.state_layout import input_columns
-from symphys.problem import Controller
+from symphys.problem import FeedbackController
 from symphys.transcription.rollout import Rollout
 
 Expr = Any
@@ -70,7 +70,7 @@ class ControllerCalls:
         self.calls.append(FunctionCall(function, inputs, (result,)))
         return result
 
-    def outputs(self, controller: Controller, senses: Sequence[Place]) -> list[Place]:
+    def outputs(self, controller: FeedbackController, senses: Sequence[Place]) -> list[Place]:
         """What a controller gives: places that are joined one after the other."""
         law = controller.law
         if isinstance(law, Net):
@@ -83,7 +83,7 @@ class ControllerCalls:
         held = [self.numbers(controller, key) for key in numbers]
         return [self.call(function, *senses, self.places.time, *held)]
 
-    def numbers(self, controller: Controller, key: str) -> Place:
+    def numbers(self, controller: FeedbackController, key: str) -> Place:
         """Where a controller's numbers lie among the parameters."""
         return part(self.places.p, self.rollout.parameters.columns[f"{controller.name}.{key}"])
 

@@ -10,7 +10,7 @@ import casadi as ca
 
 from symphys.model.state_layout import input_columns, input_sizes, inputs_size
 from symphys.model.world import World
-from symphys.problem import Controller, Problem, Sensor
+from symphys.problem import FeedbackController, Problem, Sensor
 from symphys.transcription.feedback.force_laws import force_function
 from symphys.transcription.feedback.sensor_memory import SensorMemory
 from symphys.transcription.formula_names import Parameters, instant, namespace
@@ -38,11 +38,11 @@ class Control:
         parts = [ca.SX(formula.evaluate({name: names[name] for name in formula.names})) for formula in sensor.formulas]
         return ca.Function("sense", [at.x, at.p, at.time], [ca.densify(ca.vertcat(*parts))])
 
-    def numbers(self, controller: Controller, p: Expr) -> dict[str, Expr]:
+    def numbers(self, controller: FeedbackController, p: Expr) -> dict[str, Expr]:
         """The controller's numbers among the parameters."""
         return {key: p[self.parameters.columns[f"{controller.name}.{key}"]] for key in controller.law.sizes}
 
-    def place(self, controller: Controller) -> ca.DM:
+    def place(self, controller: FeedbackController) -> ca.DM:
         """(nu, m) sparse: which input each output is added to, scaled."""
         columns = input_columns(self.world, self.inputs)
         rows = [columns[name].start + component for name, component in controller.drives]

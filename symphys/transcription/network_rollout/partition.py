@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from symphys.errors import Issue, ProblemError
 from symphys.model.controllers import Net
-from symphys.problem import Constraint, Controller, Cost, Output, Problem, Target
+from symphys.problem import Constraint, Cost, FeedbackController, Output, Problem, Target
 from symphys.transcription.formula_names import input_names, spans
 from symphys.transcription.rollout import Rollout, symbolic_rollout
 
@@ -21,7 +21,7 @@ MOST_WEIGHTS = 4096
 """Of a net that is computed within the compiled step, where every lane holds weights of its own."""
 
 
-def is_large(controller: Controller) -> bool:
+def is_large(controller: FeedbackController) -> bool:
     """Whether a controller is a net that matrix products should compute."""
     return isinstance(controller.law, Net) and controller.law.sizes["weights"] > MOST_WEIGHTS
 
@@ -31,7 +31,7 @@ def has_large_nets(problem: Problem) -> bool:
     return bool(large_nets(problem))
 
 
-def large_nets(problem: Problem) -> tuple[Controller, ...]:
+def large_nets(problem: Problem) -> tuple[FeedbackController, ...]:
     """Those that are."""
     return tuple(controller for controller in problem.controllers if is_large(controller))
 
@@ -81,7 +81,7 @@ class Partition:
     rollout: Rollout
     small: Indices
     n: int
-    nets: tuple[Controller, ...]
+    nets: tuple[FeedbackController, ...]
     laws: tuple[Net, ...]
     places: tuple[Array, ...]
     weights: tuple[Weights, ...]
@@ -116,7 +116,7 @@ def partition(problem: Problem) -> Partition:
     )
 
 
-def _weights(problem: Problem, controller: Controller) -> Weights:
+def _weights(problem: Problem, controller: FeedbackController) -> Weights:
     name, of_z, of_net = f"{controller.name}.weights", [np.zeros(0, int)], [np.zeros(0, int)]
     for variable, (first, last) in zip(problem.variables, spans(problem.variables), strict=True):
         for slot in variable.slots:
@@ -126,7 +126,7 @@ def _weights(problem: Problem, controller: Controller) -> Weights:
     return Weights(controller.numbers["weights"], np.concatenate(of_z), np.concatenate(of_net))
 
 
-def refuse_large(problem: Problem, nets: Sequence[Controller], most: int, what: str) -> None:
+def refuse_large(problem: Problem, nets: Sequence[FeedbackController], most: int, what: str) -> None:
     """ProblemError if there are any, from what cannot deal with them."""
     issues = [
         Issue(f'controller "{net.name}".net', f"has {net.law.sizes['weights']} weights; {what} takes up to {most}")

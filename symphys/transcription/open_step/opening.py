@@ -14,7 +14,7 @@ from symphys.model.controllers import Net
 from symphys.model.joints import AffineMotor, Joint, Servo, TorqueMotor
 from symphys.model.state_layout import input_columns, input_sizes, inputs_size
 from symphys.model.world import World
-from symphys.problem import Controller, Problem, Variable
+from symphys.problem import FeedbackController, Problem, Variable
 from symphys.suggest import hint, quote
 from symphys.transcription.formula_names import input_names
 
@@ -104,7 +104,7 @@ def opened(problem: Problem, controllers: Sequence[str] | None = None, sensors: 
     return Opening(rest, tuple(actions), observed(problem, taken, sensors))
 
 
-def chosen(problem: Problem, names: Sequence[str] | None) -> tuple[Controller, ...]:
+def chosen(problem: Problem, names: Sequence[str] | None) -> tuple[FeedbackController, ...]:
     """The controllers that are taken off."""
     known = {controller.name: controller for controller in problem.controllers}
     if names is None:
@@ -114,7 +114,7 @@ def chosen(problem: Problem, names: Sequence[str] | None) -> tuple[Controller, .
     return tuple(known[known_name(name, known, "controller")] for name in names)
 
 
-def observed(problem: Problem, taken: Sequence[Controller], names: Sequence[str] | None) -> tuple[str, ...]:
+def observed(problem: Problem, taken: Sequence[FeedbackController], names: Sequence[str] | None) -> tuple[str, ...]:
     """The sensors that are observed."""
     known = [sensor.name for sensor in problem.sensors]
     if names is not None:
@@ -122,7 +122,7 @@ def observed(problem: Problem, taken: Sequence[Controller], names: Sequence[str]
     return tuple(dict.fromkeys(name for controller in taken for name in controller.senses)) or tuple(known)
 
 
-def known_name(name: str, known: Sequence[str] | dict[str, Controller], kind: str) -> str:
+def known_name(name: str, known: Sequence[str] | dict[str, FeedbackController], kind: str) -> str:
     """The name; SymphysError where nothing is called so."""
     if name not in known:
         there = hint(name, known) if known else "there is none"
@@ -130,7 +130,7 @@ def known_name(name: str, known: Sequence[str] | dict[str, Controller], kind: st
     return name
 
 
-def outputs(controller: Controller) -> list[Action]:
+def outputs(controller: FeedbackController) -> list[Action]:
     """What a controller gives, before it is scaled."""
     law = controller.law
     most = 1.0 if isinstance(law, Net) and law.output == "tanh" and not law.skip else np.inf

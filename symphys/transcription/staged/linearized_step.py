@@ -31,6 +31,7 @@ class LinearizedStep:
         threads: that share a batch; None: one for each processor.
         exact: whether it is for smoothing 0 only.
         parameters: whether there are slopes by p; without, those are 0.
+        clock: [s] the time at which step 0 begins; of a rollout whose duration does not vary.
         description: what evaluates, in words.
     """
 
@@ -40,6 +41,7 @@ class LinearizedStep:
     threads: int | None = None
     exact: bool = False
     parameters: bool = True
+    clock: float = 0.0
     description: str = field(default="", init=False)
 
     def __post_init__(self) -> None:
@@ -86,7 +88,7 @@ class LinearizedStep:
         x, aim, u, p = (np.atleast_2d(np.asarray(each, float)) for each in (X, after, U, P))
         count, (_, n, m, np_) = len(x), self.arguments.sizes
         p = np.broadcast_to(p, (count, np_))
-        tick = np.broadcast_to(np.asarray(k, float), (count,))[:, None]
+        tick = np.broadcast_to(self.clock / self.rollout.dt + np.asarray(k, float), (count,))[:, None]
         if self.exact and smoothing:
             raise ValueError(f"this step is for smoothing 0 only, not for {smoothing:g}")
         parts = [np.zeros((count, n)), u.reshape(count, m), p[:, self.arguments.varied], np.zeros_like(x)]

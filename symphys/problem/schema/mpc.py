@@ -1,0 +1,60 @@
+"""Tables of a receding horizon: how a controller plans anew at every tick, and the plant that it is tried on."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from symphys.problem.schema.types import NonNegative, Positive, SchemaTable
+
+Iterations = Annotated[int, Field(ge=1, le=1000)]
+Seed = Annotated[int, Field(ge=0)]
+Latency = NonNegative | Literal["measured", "cpu"]
+
+
+class PlantTable(SchemaTable):
+    """What `symphys mpc` simulates in place of the real robot. What is left out is as in the file."""
+
+    dt: Positive | None = Field(
+        default=None,
+        description="the longest time step [s]; a tick has a whole number of steps. Default: half of [simulation]'s dt",
+    )
+    masses: Positive = Field(default=1.0, description="factor of all masses and inertias")
+    set: dict[str, Any] = Field(
+        default={}, description='other values, by the keys of --set: { "ground.friction" = 0.6, "upper.mass" = 1.2 }'
+    )
+    noise: NonNegative = Field(
+        default=0.0, description="standard deviation of measured coordinates, positions [m] and angles [rad]"
+    )
+    rate_noise: NonNegative = Field(default=0.0, description="that of measured rates and velocities [m/s, rad/s]")
+    seed: Seed = Field(default=0, description="of the noise")
+    delay: NonNegative = Field(default=0.0, description="from a command to its effect [s], in whole steps of the plant")
+    latency: Latency = Field(
+        default="measured",
+        description='how long after its measurement a plan acts [s]; "measured": as long as the solver took; "cpu": as '
+        "much processor time as it took, for busy machines",
+    )
+
+
+class MpcTable(SchemaTable):
+    """Model predictive control: `symphys mpc FILE`, and symphys.Controller."""
+
+    rate: Positive = Field(description="measurements and new plans in a second [Hz]")
+    horizon: Positive | None = Field(
+        default=None, description="how far a plan looks ahead [s], a whole number of dt; default: the whole duration"
+    )
+    dt: Positive | None = Field(default=None, description="time step of the model [s]; default: that of [simulation]")
+    iterations: Iterations = Field(default=1, description="of iLQR at each tick")
+    first_iterations: Iterations = Field(default=50, description="of iLQR before the first tick, from the guess")
+    damping: Positive = Field(default=1e-4, description="first and least regularisation, in units of scale")
+    smoothing: NonNegative | None = Field(
+        default=None, description="of the model's contacts [m/s]; default: the last of [simulation]'s"
+    )
+    feedback: bool = Field(
+        default=False, description="between ticks, commands answer what is measured, by the gains of the plan"
+    )
+    duration: Positive | None = Field(
+        default=None, description="how long `symphys mpc` goes on [s]; default: five times [simulation]'s duration"
+    )
+    plant: PlantTable = PlantTable()

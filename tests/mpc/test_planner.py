@@ -1,0 +1,173 @@
+"""Plans agree with the staged problem and the backward pass of iLQR, which are written in other ways."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from swung import TABLES, pendulum
+
+from symphys.errors import ProblemError
+from symphys.mpc.planner import LENGTHS, Planner, RecedingPlan, shifted
+from symphys.mpc.policy_rollout import AffinePolicy
+from symphys.mpc.riccati import riccati_pass
+from symphys.problem import problem_of_tables
+from symphys.shooting import Linearized, StagedMotion
+from symphys.solvers.ddp.backward_pass import Bounds, backward_pass
+from symphys.solvers.ddp.forward_pass import forward_pass
+from symphys.solvers.ddp.knots import knot_steps
+from symphys.transcription.staged.staged_problem import RolloutStages
+
+
+@cache
+def planner() -> Planner:
+    return Planner(pendulum(), threads=1)
+
+
+@cache
+def stages() -> RolloutStages:
+    return RolloutStages(planner().rollout, threads=1, exact=True)
+
+
+@cache
+def plan() -> RecedingPlan:
+    """After three iterations: neither the guess nor the optimum; some decisions are at their bounds."""
+    made = planner()
+    made.damping = 1e-2
+    policy = AffinePolicy(
+        np.tile(made.start, (20, 1)), np.linspace(-9, 7, 20)[:, None], np.zeros((20, 1)), np.zeros((20, 1, 3))
+    )
+    policy = AffinePolicy(policy.x, policy.v, policy.ahead, np.zeros((20, 1, made.tangent.size)))
+    return made._improved(policy, made.start, 0.0, 3)
+
+
+def motion(z: np.ndarray) -> StagedMotion:
+    return stages().roll_out(z, 0.0)
+
+
+def merit(z: np.ndarray) -> float:
+    """Objective and penalties, by the staged problem."""
+    found = motion(z)
+    objective, limits = stages().measure(z[None], found.x[None], found.u[None])
+    beyond = limits - np.clip(limits, stages().lower, stages().upper)
+    return float(objective[0] + np.sum(stages().penalties * beyond**2))
+
+
+def test_a_plan_costs_what_the_staged_problem_says() -> None:
+    assert plan().cost == pytest.approx(merit(plan().v.ravel()), rel=1e-12)
+
+
+def test_a_plan_is_a_motion_of_the_model() -> None:
+    assert plan().x == pytest.approx(motion(plan().v.ravel()).x, abs=1e-10)
+
+
+def test_slopes_and_curvature_of_costs_are_those_of_the_staged_problem() -> None:
+    found = motion(plan().v.ravel())
+    wanted = stages().expand(found, np.zeros(len(stages().lower)), 2 * stages().penalties)
+    costs = planner()._costs.expand(found.x, plan().v, planner().p, 0.0)
+    n = stages().tangent_size
+    assert costs.slope[:, :n] == pytest.approx(wanted.x, abs=1e-9)
+    assert costs.slope[:-1, n:] == pytest.approx(wanted.u, abs=1e-9)
+    assert costs.curve[:, :n, :n] == pytest.approx(wanted.xx, abs=1e-9)
+    assert costs.curve[:-1, n:, n:] == pytest.approx(wanted.uu, abs=1e-9)
+
+
+def test_the_riccati_pass_is_the_backward_pass() -> None:
+    """With decisions that are held by their bounds among them."""
+    found = motion(plan().v.ravel())
+    made = planner()
+    slopes = stages().linearize(found)
+    costs = stages().expand(found, np.zeros(len(stages().lower)), 2 * stages().penalties)
+    room = -8 - plan().v, 8 - plan().v
+    bounds = Bounds(room[0].ravel(), room[1].ravel(), np.full(20, 2.0))
+    wanted = backward_pass(slopes, costs, knot_steps(stages()), stages().statics, bounds, 0.1)
+    own = made._costs.expand(found.x, plan().v, made.p, 0.0)
+    got = riccati_pass(slopes.a, slopes.b, own, room, 0.1 / made.scale**2)
+    assert wanted is not None and got is not None
+    gains = [gain for gain in wanted.gains if gain is not None]
+    assert np.array([gain.ahead for gain in gains]) == pytest.approx(got[0], rel=1e-8, abs=1e-9)
+    assert np.array([gain.back for gain in gains]) == pytest.approx(got[1], rel=1e-7, abs=1e-8)
+    held = np.array([not gain.back.any() for gain in gains])
+    assert held.any() and not held.all()
+
+
+def test_the_compiled_rollout_is_the_forward_pass() -> None:
+    """States, decisions and costs of all step lengths."""
+    made, found = planner(), motion(plan().v.ravel())
+    slopes: Linearized = stages().linearize(found)
+    costs = stages().expand(found, np.zeros(len(stages().lower)), 2 * stages().penalties)
+    bounds = Bounds(-8 - found.z, 8 - found.z, np.full(20, 2.0))
+    policy = backward_pass(slopes, costs, knot_steps(stages()), stages().statics, bounds, 1.0)
+    assert policy is not None
+    wanted = forward_pass(stages(), found, policy, knot_steps(stages()), LENGTHS, (np.full(20, -8.0), np.full(20, 8.0)))
+    ahead = np.array([gain.ahead for gain in policy.gains if gain is not None])
+    back = np.array([gain.back for gain in policy.gains if gain is not None])
+    about = AffinePolicy(found.x[:-1], plan().v, ahead, back)
+    x, v, cost = made._rolled(found.x[0], about, LENGTHS, 0.0, 0.0)
+    assert x == pytest.approx(wanted.x, abs=1e-9)
+    assert v == pytest.approx(wanted.u, abs=1e-9)
+    assert cost == pytest.approx([merit(row) for row in wanted.z], rel=1e-9)
+
+
+def test_without_a_compiler_a_rollout_is_the_same() -> None:
+    made = planner()
+    policy = AffinePolicy(plan().x[:-1], plan().v, np.full((20, 1), 0.3), plan().back)
+    lengths = np.array([1.0, 0.25])
+    compiled = made._rolled(made.start, policy, lengths, 0.5, 0.0)
+    plain = made._rolled._step_by_step(made.start, policy, lengths, 0.5, 0.0)
+    for one, other in zip(compiled, plain, strict=True):
+        assert one == pytest.approx(other, abs=1e-9)
+
+
+def test_a_shift_by_whole_steps_drops_what_is_past() -> None:
+    moved = shifted(plan(), 3 * plan().dt)
+    assert moved.v[:-3] == pytest.approx(plan().v[3:])
+    assert moved.x[:-3] == pytest.approx(plan().x[3:-1])
+    assert moved.v[-3:] == pytest.approx(np.tile(plan().v[-1:], (3, 1)))
+
+
+def test_a_shift_by_half_a_step_is_halfway() -> None:
+    moved = shifted(plan(), 0.5 * plan().dt)
+    assert moved.v[:-1] == pytest.approx((plan().v[:-1] + plan().v[1:]) / 2)
+
+
+def test_a_cost_in_time_sees_the_time_of_the_tick() -> None:
+    """A reference that moves: a plan at t tracks what is wanted from t on."""
+    tables = {**TABLES, "cost": [{"name": "track", "at": "always", "squares": "pivot.angle - 0.1 * time"}]}
+    tables |= {"target": [], "constraint": []}
+    made = Planner(problem_of_tables(tables), threads=1)
+    policy = shifted(made.first(made.start, 0.0), 0.0)
+    still = AffinePolicy(policy.x, np.zeros_like(policy.v), policy.ahead, np.zeros_like(policy.back))
+    for clock in (0.0, 2.0):
+        cost = made._rolled(made.start, still, np.zeros(1), clock, 0.0)[2][0]
+        squares = (0.1 * (clock + 0.08 * np.arange(21))) ** 2
+        assert cost == pytest.approx(0.08 * np.sum(squares[1:] + squares[:-1]) / 2, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"mpc": None}, "there is no such table"),
+        ({"variable": [{"name": "push", "sets": "bob.velocity[0]"}]}, "decides forces, torques and commands only"),
+        ({"cost": [{"name": "then", "at": 0.5, "squares": "pivot.angle"}]}, "a horizon moves on"),
+    ],
+)
+def test_what_makes_no_sense_is_named(change: dict[str, object], said: str) -> None:
+    tables = {key: value for key, value in {**TABLES, **change}.items() if value is not None}
+    with pytest.raises(ProblemError, match=said):
+        Planner(problem_of_tables(tables), threads=1)
+
+
+@pytest.mark.parametrize(
+    ("mpc", "said"),
+    [
+        ({"dt": 0.07}, "no whole number of steps"),
+        ({"rate": 0.5}, "ticks are 2 s apart"),
+        ({"plant": {"latency": "none"}}, "latency"),
+        ({"rates": 3}, "rates"),
+    ],
+)
+def test_faults_of_the_table_are_named(mpc: dict[str, object], said: str) -> None:
+    with pytest.raises(ProblemError, match=said):
+        pendulum(**mpc)
