@@ -34,6 +34,15 @@ def test_acrobot_swings_up_from_a_straight_line(backend: str, hessian: str, ever
     assert last == pytest.approx([np.pi, 0, 0, 0], abs=0.5)
 
 
+@every_backend
+def test_angles_that_are_known_but_for_whole_turns(backend: str) -> None:
+    """Nodes turn by more than half a turn from their references, and the defects do not jump there."""
+    known, wrapped = (solve(boxed(acrobot(wraps=wraps)), backend=backend) for wraps in (False, True))
+    assert wrapped.status is Status.CONVERGED
+    assert wrapped.z == pytest.approx(known.z, abs=1e-3)
+    assert len(wrapped.trace) == len(known.trace)
+
+
 @every_way
 def test_a_body_turns_by_180_degrees(backend: str, hessian: str) -> None:
     """And by 60 about another axis: tangents turn far, so the nodes get new references."""
