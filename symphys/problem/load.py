@@ -43,6 +43,7 @@ from symphys.problem.tables.contact import (
 )
 from symphys.problem.tables.controllers import read_controllers, read_sensors
 from symphys.problem.tables.forces import force_quantities, read_forces
+from symphys.problem.tables.guess import read_guess
 from symphys.problem.tables.joints import read_joints
 from symphys.problem.tables.objectives import Objectives, read_objectives
 from symphys.problem.tables.scenarios import read_scenarios
@@ -133,6 +134,7 @@ def build(
     check_joints(parametric, start, faults)
     named = {**formula_names(values, start, variables), **given}
     forces = read_forces(document.force, known, named, variables, faults)
+    guess = read_guess(document.guess, simulation, nominal, references, faults)
     termination, objectives = read_termination_and_objectives(document, simulation, nominal, named, variables, faults)
     return ProblemData(
         name=printable(path.stem),
@@ -156,6 +158,7 @@ def build(
         solvers=None if document.solvers is None else tuple(dict.fromkeys(document.solvers)),
         termination=termination,
         scenarios=scenarios or None,
+        guess=guess,
         sweep=sweep,
     )
 

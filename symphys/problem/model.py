@@ -17,7 +17,7 @@ from symphys.model.world import Scheme, World
 from symphys.problem.feedback import Controller, ForceLaw, Sensor
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.parametric.world import ParametricWorld
-from symphys.problem.references import ReferenceTrajectory
+from symphys.problem.references import GuessedMotion, ReferenceTrajectory
 from symphys.problem.sweeps.sweep import Sweep
 
 Array = NDArray[np.float64]
@@ -314,6 +314,7 @@ class ProblemData:
         termination: where a motion is over before its time; None: nowhere.
         scenarios: what differs from sample to sample; None: nothing.
         outputs: numbers that are reported, in the file's order.
+        guess: where the motion is guessed to pass; None: where the guess of the variables leads.
         sweep: what [sweep] says; None without one. ``text`` is without it.
     """
 
@@ -342,6 +343,7 @@ class ProblemData:
     termination: Termination | None = None
     scenarios: Scenarios | None = None
     outputs: tuple[Output, ...] = ()
+    guess: GuessedMotion | None = None
     sweep: Sweep | None = None
 
     @property

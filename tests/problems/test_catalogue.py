@@ -22,6 +22,7 @@ SHIPPED = [
     "basket",
     "bounce_cycle",
     "bowling",
+    "cart_double_pendulum",
     "cart_pole",
     "cost_of_transport",
     "fastest_move",

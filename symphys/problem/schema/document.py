@@ -12,6 +12,7 @@ from symphys.problem.schema.joints import CouplingTable, JointTable, SiteTable
 from symphys.problem.schema.objectives import (
     ConstraintTable,
     CostTable,
+    GuessTable,
     ObjectiveTable,
     OutputTable,
     PhaseTable,
@@ -64,6 +65,7 @@ class Document(SchemaTable):
     force: list[ForceTable] = Field(default=[])
     reference: list[ReferenceTable] = Field(default=[])
     variable: list[VariableTable] = Field(default=[])
+    guess: GuessTable | None = None
     phase: list[PhaseTable] = Field(default=[])
     cost: list[CostTable] = Field(default=[])
     target: list[TargetTable] = Field(default=[])
