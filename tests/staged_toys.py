@@ -318,7 +318,7 @@ def pendulum(steps: int = 40, h: float = 0.05, knots: int = 0, fast: float = np.
     return Chain(formulas, steps, knots or steps, limits, ([0.0], [0.0]))
 
 
-def acrobot(steps: int = 40, h: float = 0.05, wraps: bool = False) -> Chain:
+def acrobot(steps: int = 40, h: float = 0.05) -> Chain:
     """Two links of 1 m and 1 kg with a motor at the elbow; angles from hanging, the second relative to the first."""
     l1, c1, c2, i1, i2, damping, g = 1.0, 0.5, 1.0, 0.083, 0.33, 0.1, 9.81
 
@@ -345,15 +345,7 @@ def acrobot(steps: int = 40, h: float = 0.05, wraps: bool = False) -> Chain:
         residuals=lambda x, u, p: np.sqrt(h) * ca.vertcat(x - goal, np.sqrt(0.1) * u),
         final=lambda x, p: ca.DM([10, 10, 1, 1]) * (x - goal),
     )
-    if wraps:
-        formulas = replace(formulas, difference=within_half_a_turn)
     return Chain(formulas, steps, steps)
-
-
-def within_half_a_turn(x: Any, y: Any) -> Any:
-    """The difference of states whose angles are known but for whole turns."""
-    off = y - x
-    return ca.vertcat(ca.atan2(ca.sin(off[:2]), ca.cos(off[:2])), off[2:])
 
 
 def attitude(steps: int = 30, h: float = 0.1, parameter: bool = False) -> Chain:

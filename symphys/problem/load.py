@@ -117,8 +117,7 @@ def build(
     nominal = parametric.world({})
     check_laws(parametric, nominal, faults)
     check_couplings(nominal, faults)
-    known = quantities(initial, parametric.parameters(), input_sizes(nominal))
-    known |= duration_quantity(simulation.duration)
+    known = quantities(initial, parametric.parameters(), input_sizes(nominal)) | duration_quantity(simulation.duration)
     sensors, controllers = read_control(document, parametric, known, functions, starts, given, faults)
     known |= weight_quantities(controllers) | force_quantities(document.force)
     variables = read_variables(document.variable, known, simulation, faults)
@@ -134,7 +133,6 @@ def build(
     check_joints(parametric, start, faults)
     named = {**formula_names(values, start, variables), **given}
     forces = read_forces(document.force, known, named, variables, faults)
-    guess = read_guess(document.guess, simulation, nominal, references, faults)
     termination, objectives = read_termination_and_objectives(document, simulation, nominal, named, variables, faults)
     return ProblemData(
         name=printable(path.stem),
@@ -158,7 +156,7 @@ def build(
         solvers=None if document.solvers is None else tuple(dict.fromkeys(document.solvers)),
         termination=termination,
         scenarios=scenarios or None,
-        guess=guess,
+        guess=read_guess(document.guess, simulation, nominal, references, faults),
         sweep=sweep,
     )
 

@@ -77,6 +77,6 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
         stop_when_met=problem.stop_when_met,
         output_names=tuple(output.label for output in problem.outputs),
         staged=staged,
-        guessed_states=guess and (lambda *given: guessed_states(staged(), guess, *given)),
+        guessed_states=None if guess is None else lambda *given: guessed_states(staged(), guess, *given),
     )
     return Transcription(problem, rollout, asked, functions, shooting, chosen.description, built)

@@ -47,12 +47,12 @@ def read_guess(
     references: Sequence[ReferenceTrajectory],
     faults: Faults,
 ) -> GuessedMotion | None:
-    """The motion that is guessed; None without a table."""
+    """The motion that is guessed; None without a table. ProblemError for all faults that were found."""
     if table is None:
         return None
     if not (table.states or table.follows):
         faults.add(("guess",), 'names nothing; write states = [{ at = 2.0, "knee.angle" = 1.2 }], or follows')
-        return None
+        faults.stop_if_any()
     sizes, points = guessable(world), dict[str, dict[float, list[float]]]()
     for index, state in enumerate(table.states):
         _read_state(index, state, sizes, simulation.duration, points, faults)
@@ -67,6 +67,7 @@ def read_guess(
         elif _check_name(name, sizes, place, faults):
             values = _followed(text, sizes[name], simulation, references, place, faults)
             columns |= {} if values is None else {name: values}
+    faults.stop_if_any()
     return GuessedMotion(columns)
 
 

@@ -23,7 +23,7 @@ def guessed_states(stages: RolloutStages, guess: GuessedMotion, z: Array, ticks:
     of z (n,), of its first step from where on it is not finite.
     """
     moved, dt = stages.roll_out(z, smoothing).x, stages.rollout.dt
-    states, times = moved[ticks], ticks * dt
+    states, times = moved[ticks], np.asarray(ticks * dt, float)
     states[~np.isfinite(states).all(axis=1)] = moved[1]
     off, names = np.zeros((len(ticks), stages.tangent_size)), list(stages.tangent.names)
     now = _quantities(stages, guess, states, z)
