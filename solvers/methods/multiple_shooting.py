@@ -72,7 +72,7 @@ class MultipleShootingOptions(SolverOptions):
         hessian: "gauss-newton" leaves the curvature of the steps out; "exact" has it, by differences of slopes, and is
             what FATROP goes on with where it finds no step; "limited-memory" is IPOPT's own approximation.
         nodes: states between which the guess of the nodes is a straight line, at equal times from the first state to
-            the last: two, or those of another run on any grid. Empty: the rollout of the guess.
+            the last. Empty: those of the problem's [guess], or the rollout of the guess.
         options: those of IPOPT, such as {mu_strategy = "adaptive"}, or of FATROP, passed on as they are.
     """
 
@@ -132,7 +132,8 @@ def stage(
     if state.nodes.shape != (grid.intervals, problem.state_size):
         raise damaged(ValueError("other nodes"))
     point = None if saved else evaluator.value(state.z)
-    if point is not None and not point.finite and not options.nodes:
+    stated = options.nodes or evaluator.problem.guessed_states
+    if point is not None and not point.finite and not stated:
         return not_finite(point)
     layout_in_stages, exact = options.backend == "fatrop", options.hessian == "exact"
     programs = Programs(problem, grid, evaluator, state.z, state.nodes, layout_in_stages, exact)
@@ -165,7 +166,7 @@ def stage(
 
 
 def guess(problem: StagedProblem, context: StageContext, options: MultipleShootingOptions) -> MultipleShootingState:
-    """The start: nodes from the rollout of z, or between named states in the first stage of smoothing."""
+    """The start: nodes from the rollout of z, or as they are guessed, in the first stage of smoothing."""
     evaluator, z = context.evaluator, context.start
     starts = make_grid(problem, options.steps_between_nodes).starts[1:]
     if options.nodes and evaluator.smoothing == evaluator.problem.smoothing[0]:
@@ -174,6 +175,8 @@ def guess(problem: StagedProblem, context: StageContext, options: MultipleShooti
             where = f"a state of this problem has {problem.state_size} numbers, not {', '.join(map(str, set(given)))}"
             raise SymphysError(f"solver.multiple_shooting.nodes: {where}")
         nodes = interpolated(problem, np.array(options.nodes, float), starts / problem.steps)
+    elif evaluator.problem.guessed_states and evaluator.smoothing == evaluator.problem.smoothing[0]:
+        nodes = evaluator.problem.guessed_states(z, starts, evaluator.smoothing)
     else:
         nodes = problem.roll_out(z, evaluator.smoothing).x[starts]
     return MultipleShootingState(0, z, nodes, np.zeros(0), np.zeros(0), math.nan)

@@ -3,6 +3,9 @@
 The states of an interval follow from its node by the problem's own steps; the slopes of step after step are products of
 the problem's step Jacobians A, B, C. A defect is measured in the tangent of the reference of the next node:
 d[j + 1] - F[j], with F[j] = difference(reference[j + 1], end of interval j). So its slope by d[j + 1] is exactly 1.
+Differences of angles lie within half a turn, and nodes go further than that from their references. So where the two
+are turns apart, F[j] is measured from the node itself: d[j + 1] + difference(node j + 1, end of interval j). Entries of
+rotations are left out, since these get new references.
 """
 
 from __future__ import annotations
@@ -89,6 +92,10 @@ class Shots:
         self.ends = ends
         self.motion = StagedMotion(z, x, u, plan.smoothing)
         self.reached = problem.difference(plan.reference, ends)
+        from_nodes = d + problem.difference(self.nodes, ends)
+        from_nodes[:, plan.curved] = self.reached[:, plan.curved]
+        turns = ~(np.abs(from_nodes - self.reached) < 1)
+        self.reached[turns] = from_nodes[turns]
         """(M, n): F, where the intervals end in the tangents of the references."""
 
     @property

@@ -43,6 +43,7 @@ from symphys.problem.tables.contact import (
 )
 from symphys.problem.tables.controllers import read_controllers, read_sensors
 from symphys.problem.tables.forces import force_quantities, read_forces
+from symphys.problem.tables.guess import read_guess
 from symphys.problem.tables.joints import read_joints
 from symphys.problem.tables.mpc import read_time
 from symphys.problem.tables.objectives import Objectives, read_objectives
@@ -156,6 +157,7 @@ def build(
         termination=termination,
         scenarios=scenarios or None,
         mpc=mpc,
+        guess=read_guess(document.guess, simulation, nominal, references, faults),
         sweep=sweep,
     )
 

@@ -18,7 +18,7 @@ from symphys.problem.feedback import FeedbackController, ForceLaw, Sensor
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.receding_horizon import RecedingHorizon
-from symphys.problem.references import ReferenceTrajectory
+from symphys.problem.references import GuessedMotion, ReferenceTrajectory
 from symphys.problem.sweeps.sweep import Sweep
 
 Array = NDArray[np.float64]
@@ -316,6 +316,7 @@ class ProblemData:
         scenarios: what differs from sample to sample; None: nothing.
         outputs: numbers that are reported, in the file's order.
         mpc: what [mpc] says; None without one.
+        guess: where the motion is guessed to pass; None: where the guess of the variables leads.
         sweep: what [sweep] says; None without one. ``text`` is without it.
     """
 
@@ -345,6 +346,7 @@ class ProblemData:
     scenarios: Scenarios | None = None
     outputs: tuple[Output, ...] = ()
     mpc: RecedingHorizon | None = None
+    guess: GuessedMotion | None = None
     sweep: Sweep | None = None
 
     @property

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.shooting.staged_problem import StagedProblem
+from symphys.shooting.staged_problem import Indices, StagedProblem
 
 Array = NDArray[np.float64]
 Function = Any
@@ -199,6 +199,8 @@ class ShootingProblem:
         scenario: evaluates points in samples of the problem's scenarios; None: it has none.
         staged: makes the problem as a chain of steps when it is first asked for; SymphysError where formulas look at
             more than one state. None: there is none, as of problems with scenarios.
+        guessed_states: (z (n,), numbers (M,) of states from 1 on, smoothing) -> (M, nx) where the motion is guessed to
+            pass. None: where the rollout of z leads.
     """
 
     name: str
@@ -215,6 +217,7 @@ class ShootingProblem:
     output_names: tuple[str, ...] = ()
     scenario: ScenarioEvaluator | None = None
     staged: Callable[[], StagedProblem] | None = None
+    guessed_states: Callable[[Array, Indices, float], Array] | None = None
 
     @property
     def n(self) -> int:

@@ -22,6 +22,7 @@ from symphys.transcription.program import rollout_program
 from symphys.transcription.randomization import with_scenarios
 from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.shared_kernel import inputs_of, shared_backend
+from symphys.transcription.staged.guessed_states import guessed_states
 from symphys.transcription.staged.staged_problem import RolloutStages
 from symphys.transcription.transcription import Transcription
 
@@ -60,6 +61,8 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
         chosen = shared_backend(problem, inputs, functions.nlp, exact, backend, threads)
     else:
         chosen = choose(backend, BackendSource(functions, lambda: rollout_program(rollout, exact), exact), threads)
+    staged = cache(lambda: RolloutStages(rollout, backend, threads, exact or not any(problem.simulation.smoothing)))
+    guess = problem.guess
     shooting = ShootingProblem(
         name=problem.name,
         blocks=blocks(problem),
@@ -73,6 +76,7 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
         smoothing=problem.simulation.smoothing,
         stop_when_met=problem.stop_when_met,
         output_names=tuple(output.label for output in problem.outputs),
-        staged=cache(lambda: RolloutStages(rollout, backend, threads, exact or not any(problem.simulation.smoothing))),
+        staged=staged,
+        guessed_states=None if guess is None else lambda *given: guessed_states(staged(), guess, *given),
     )
     return Transcription(problem, rollout, asked, functions, shooting, chosen.description, built)

@@ -6,6 +6,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+import pytest
 from scipy.integrate import solve_ivp
 from shipped import Array, seeds, shipped, solve
 
@@ -47,9 +48,10 @@ def swung(torques: Array) -> Array:
 
 
 @seeds(20)
-def test_every_seed_finds_the_swing(seed: int) -> None:
+@pytest.mark.parametrize("solver", ["ilqr", "multiple_shooting"])
+def test_every_seed_finds_the_swing(solver: str, seed: int) -> None:
     made = shipped("acrobot")
-    found = solve("ilqr", made, seed)
+    found = solve(solver, made, seed)
     assert found.trace[-1].best < COST * (1 + 1e-5)
     assert found.trace[-1].max_violation <= 1
     motion = made.simulate(found.z)

@@ -22,6 +22,7 @@ SHIPPED = [
     "basket",
     "bounce_cycle",
     "bowling",
+    "cart_double_pendulum",
     "cart_pole",
     "cart_pole_walls",
     "cost_of_transport",

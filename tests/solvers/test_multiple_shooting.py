@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from shots_of_toys import LINE, SWING, WAYS, defect, every_backend, every_way, solve
-from staged_toys import acrobot, attitude, boxed, pendulum
+from staged_toys import Chain, acrobot, attitude, boxed, pendulum
 from toys import stop_at, through_json
 
 from symphys.solvers import Status
@@ -30,6 +31,22 @@ def test_acrobot_swings_up_from_a_straight_line(backend: str, hessian: str, ever
     assert problem.staged is not None
     last = problem.staged().roll_out(found.z, 0.0).x[-1]
     assert last == pytest.approx([np.pi, 0, 0, 0], abs=0.5)
+
+
+@every_backend
+def test_angles_that_are_known_but_for_whole_turns(backend: str) -> None:
+    """Nodes turn by more than half a turn from their references, and the defects do not jump there."""
+
+    def within_half_a_turn(x: Any, y: Any) -> Any:
+        off = y - x
+        return ca.vertcat(ca.atan2(ca.sin(off[:2]), ca.cos(off[:2])), off[2:])
+
+    plain = acrobot()
+    chains = plain, Chain(replace(plain.formulas, difference=within_half_a_turn), plain.steps, plain.steps)
+    known, wrapped = (solve(boxed(chain), backend=backend) for chain in chains)
+    assert wrapped.status is Status.CONVERGED
+    assert wrapped.z == pytest.approx(known.z, abs=1e-3)
+    assert len(wrapped.trace) == len(known.trace)
 
 
 @every_way

@@ -13,6 +13,7 @@ from symphys.problem.schema.mpc import MpcTable
 from symphys.problem.schema.objectives import (
     ConstraintTable,
     CostTable,
+    GuessTable,
     ObjectiveTable,
     OutputTable,
     PhaseTable,
@@ -65,6 +66,7 @@ class Document(SchemaTable):
     force: list[ForceTable] = Field(default=[])
     reference: list[ReferenceTable] = Field(default=[])
     variable: list[VariableTable] = Field(default=[])
+    guess: GuessTable | None = None
     phase: list[PhaseTable] = Field(default=[])
     cost: list[CostTable] = Field(default=[])
     target: list[TargetTable] = Field(default=[])

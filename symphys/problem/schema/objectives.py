@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -51,6 +51,22 @@ class VariableTable(SchemaTable):
     knots: Knots = Field(default=1, description="for forces, torques and commands: number of values over the duration")
     interpolation: Interpolation = Field(
         default="constant", description="of forces, torques and commands between knots"
+    )
+
+
+class GuessTable(SchemaTable):
+    """Where the motion is guessed to pass, for solvers whose variables are states too (multiple_shooting).
+
+    What is named moves on straight lines between the times at which it is named, and stays before and after. Its rates
+    are the slopes of these lines where they are not named themselves. Everything else moves as the guess of the
+    variables has it.
+    """
+
+    states: list[dict[str, Any]] = Field(
+        default=[], description="{ at = 2.0, knee.angle = 1.2, torso.position = [0, 0, 1] }, times [s] in any order"
+    )
+    follows: dict[str, str] = Field(
+        default={}, description='formulas of time and of references: { "knee.angle" = "walk.knee" }'
     )
 
 

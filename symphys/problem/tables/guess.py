@@ -1,0 +1,140 @@
+"""The [guess] table: where a motion is guessed to pass, as states at some times, or as formulas of time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from symphys.expression import FormulaError, parse
+from symphys.model.joints import kinematic_trees
+from symphys.model.world import World
+from symphys.problem.model import Simulation
+from symphys.problem.reading.faults import Faults, Place
+from symphys.problem.references import GuessedMotion, ReferenceTrajectory, reference_values
+from symphys.problem.schema.objectives import GuessTable
+from symphys.suggest import hint, quote
+
+AT = "at"
+MOST_SAMPLES = 200
+"""Of a formula, over the duration."""
+
+
+def guessable(world: World) -> dict[str, int]:
+    """What a guess may name, and how many numbers each has.
+
+    Of kinematic trees the coordinates of joints and their rates; position and velocity of bodies that no joint of a
+    tree holds.
+    """
+    trees = kinematic_trees(world.joints)
+    held = {link.body for tree in trees for link in tree.links if link.joint is not None}
+    found = {f"{b.name}.{f}": 3 for i, b in enumerate(world.bodies) if i not in held for f in ("position", "velocity")}
+    for link in (link for tree in trees for link in tree.links if link.joint is not None):
+        joint = world.joints[link.joint or 0]
+        if joint.kind.coordinates:
+            value = "angle" if joint.kind.coordinates[0].turns else "position"
+            found |= {f"{joint.name}.{field}": len(joint.kind.coordinates) for field in (value, "rate")}
+    return found
+
+
+def read_guess(
+    table: GuessTable | None,
+    simulation: Simulation,
+    world: World,
+    references: Sequence[ReferenceTrajectory],
+    faults: Faults,
+) -> GuessedMotion | None:
+    """The motion that is guessed; None without a table. ProblemError for all faults that were found."""
+    if table is None:
+        return None
+    if not (table.states or table.follows):
+        faults.add(("guess",), 'names nothing; write states = [{ at = 2.0, "knee.angle" = 1.2 }], or follows')
+        faults.stop_if_any()
+    sizes, points = guessable(world), dict[str, dict[float, list[float]]]()
+    for index, state in enumerate(table.states):
+        _read_state(index, state, sizes, simulation.duration, points, faults)
+    columns = {}
+    for name, known in points.items():
+        times = sorted(known)
+        columns[name] = np.array(times), np.array([known[time] for time in times])
+    for name, text in table.follows.items():
+        place: Place = ("guess", "follows", name)
+        if name in points:
+            faults.add(place, f"{name} is named in states too; leave one of the two out")
+        elif _check_name(name, sizes, place, faults):
+            values = _followed(text, sizes[name], simulation, references, place, faults)
+            columns |= {} if values is None else {name: values}
+    faults.stop_if_any()
+    return GuessedMotion(columns)
+
+
+def _read_state(
+    index: int,
+    state: Mapping[str, Any],
+    sizes: Mapping[str, int],
+    duration: float,
+    points: dict[str, dict[float, list[float]]],
+    faults: Faults,
+) -> None:
+    """Add what a state names to ``points``, by name and time."""
+    place: Place = ("guess", "states", index)
+    at = state.get(AT)
+    if not isinstance(at, int | float) or isinstance(at, bool) or not 0 <= at <= duration:
+        faults.add((*place, AT), f"must be a time [s] from 0 to the duration, {duration:g}")
+        return
+    for name, value in _flat(state):
+        if name == AT or not _check_name(name, sizes, (*place, name), faults):
+            continue
+        numbers = value if isinstance(value, list) else [value]
+        right = all(isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x) for x in numbers)
+        if not right or len(numbers) != sizes[name]:
+            faults.add((*place, name), f"must be {'a number' if sizes[name] == 1 else f'{sizes[name]} numbers'}")
+        elif float(at) in points.setdefault(name, {}):
+            faults.add((*place, name), f"another state names it at {at:g} s; leave one of the two out")
+        else:
+            points[name][float(at)] = [float(x) for x in numbers]
+
+
+def _flat(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    """Keys and values; those of tables within are dotted, as TOML reads ``knee.angle = 1``."""
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{before}{key}.")
+        else:
+            yield before + key, value
+
+
+def _check_name(name: str, sizes: Mapping[str, int], place: Place, faults: Faults) -> bool:
+    """Whether a guess may name it; a fault if not."""
+    if name not in sizes:
+        what = "coordinates and rates of joints, and position and velocity of bodies that no joint holds"
+        faults.add(place, f"a guess cannot name {quote(name)}, only {what}; {hint(name, sizes)}")
+    return name in sizes
+
+
+def _followed(
+    text: str,
+    size: int,
+    simulation: Simulation,
+    references: Sequence[ReferenceTrajectory],
+    place: Place,
+    faults: Faults,
+) -> tuple[Any, Any] | None:
+    """Times and values (K, size) of a formula; None after a fault."""
+    times, rows = np.linspace(0, simulation.duration, min(simulation.steps, MOST_SAMPLES) + 1), []
+    try:
+        formula = parse(text)
+        for time in times.tolist():
+            named = {"time": ca.DM(time), "duration": ca.DM(simulation.duration)}
+            rows.append(np.array(formula.evaluate({**named, **reference_values(references, ca.DM(time))})).ravel())
+    except FormulaError as error:
+        faults.add(place, str(error))
+        return None
+    values = np.array(rows)
+    if values.shape[1] != size or not np.isfinite(values).all():
+        faults.add(place, f"must be {size} finite number{'s' * (size > 1)} at all times from 0 to the duration")
+        return None
+    return times, values
