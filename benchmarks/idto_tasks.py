@@ -43,7 +43,8 @@ def row(name: str) -> str:
     wall, cpu = perf_counter() - began, process_time() - worked
     verdict, finer = made.judge(found.z), finer_problem(made, FINER_DT).judge(found.z)
     numbers = f"{verdict.objective:.4g} | {verdict.worst:.2f} | {finer.objective:.4g} | {finer.worst:.2f}"
-    return f"| `{name}` | {problem.simulation.steps} | {found.trace[-1].iteration} | {cpu:.1f} | {wall:.1f} | {numbers} |"
+    work = f"{problem.simulation.steps} | {found.trace[-1].iteration} | {cpu:.1f} | {wall:.1f}"
+    return f"| `{name}` | {work} | {numbers} |"
 
 
 def warm(made: Transcription) -> None:
