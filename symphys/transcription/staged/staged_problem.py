@@ -98,7 +98,8 @@ class RolloutStages:
             values = term.values(X, U, P, Z)
             if term.kind == "limit":
                 limits.append(values.reshape(len(Z), -1))
-            else:
+                continue
+            with np.errstate(over="ignore"):  # a motion that blows up costs inf
                 objective += term.weight * np.sum(values**2 if term.kind == "squares" else values, axis=(1, 2))
         return objective, np.concatenate(limits, axis=1)
 
