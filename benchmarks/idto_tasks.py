@@ -3,8 +3,8 @@
     python benchmarks/idto_tasks.py [pendulum acrobot spinner]
 
 Seconds are of the process, over all its threads, after the kernels are compiled and called once; wall seconds are
-beside them. ``worst`` is the largest error of a target in units of its tolerance. Both columns at half the step are the same
-controls, judged by the exact rollout there.
+beside them. ``worst`` is the largest error of a target in units of its tolerance. Both columns at half the step
+are the same controls, judged by the exact rollout there.
 """
 
 from __future__ import annotations
