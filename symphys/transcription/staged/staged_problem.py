@@ -185,10 +185,10 @@ class RolloutStages:
         for term, each in values:
             if term.kind == "limit":
                 limits.append(each.reshape(len(Z), -1))
-            elif term.kind == "squares":
-                objective += term.weight * np.einsum("btr,btr->b", each, each)
-            else:
-                objective += term.weight * each.sum(axis=(1, 2))
+                continue
+            with np.errstate(over="ignore"):  # a motion that blows up costs inf
+                total = np.einsum("btr,btr->b", each, each) if term.kind == "squares" else each.sum(axis=(1, 2))
+                objective += term.weight * total
         return objective, np.concatenate(limits, axis=1)
 
     def expand(self, motion: StagedMotion, multipliers: Array, penalties: Array) -> Expansion:

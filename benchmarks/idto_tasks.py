@@ -1,0 +1,58 @@
+"""The tasks of IDTO: iterations and seconds of iLQR, and the answer at half the time step.
+
+    python benchmarks/idto_tasks.py [pendulum acrobot spinner]
+
+Seconds are of the process, over all its threads, after the kernels are compiled and called once; wall seconds are
+beside them. ``worst`` is the largest error of a target in units of its tolerance. Both columns at half the step
+are the same controls, judged by the exact rollout there.
+"""
+
+from __future__ import annotations
+
+import argparse
+from time import perf_counter, process_time
+
+from symphys.problem import load_problem, validate_options
+from symphys.problems import find
+from symphys.solvers import solver
+from symphys.transcription import Transcription, transcribe
+from symphys.verification.refinement import FINER_DT, finer_problem
+
+TASKS = ("pendulum", "acrobot", "spinner")
+
+
+def main() -> None:
+    """The table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("tasks", nargs="*", default=TASKS)
+    print("| task | steps | iterations | s of CPU | s | cost | worst | cost at dt / 2 | worst at dt / 2 |")
+    print("|---|---|---|---|---|---|---|---|---|")
+    for name in parser.parse_args().tasks:
+        print(row(name), flush=True)
+
+
+def row(name: str) -> str:
+    """Of one task."""
+    problem = load_problem(find(name))
+    made = transcribe(problem)
+    warm(made)
+    chosen = solver("ilqr")
+    options = validate_options(chosen.Options, problem.solver_tables.get("ilqr", {}), problem.file, "ilqr")
+    began, worked = perf_counter(), process_time()
+    found = chosen.solve(made.shooting, made.shooting.start(0), options, 0)
+    wall, cpu = perf_counter() - began, process_time() - worked
+    verdict, finer = made.judge(found.z), finer_problem(made, FINER_DT).judge(found.z)
+    numbers = f"{verdict.objective:.4g} | {verdict.worst:.2f} | {finer.objective:.4g} | {finer.worst:.2f}"
+    work = f"{problem.simulation.steps} | {found.trace[-1].iteration} | {cpu:.1f} | {wall:.1f}"
+    return f"| `{name}` | {work} | {numbers} |"
+
+
+def warm(made: Transcription) -> None:
+    """Compile what iLQR calls."""
+    assert made.shooting.staged is not None
+    staged = made.shooting.staged()
+    staged.linearize(staged.roll_out(made.shooting.start(0), 0.0))
+
+
+if __name__ == "__main__":
+    main()
