@@ -67,6 +67,7 @@ bench-robots: $(VENV)/.benching  ## jointed robots: what each device of joints b
 	$(BIN)/python benchmarks/robot_growth.py
 	$(BIN)/python benchmarks/robot_kernels.py
 	$(BIN)/python benchmarks/step_jacobians.py
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/ilqr_iteration.py
 
 bench-walk: $(VENV)/.benching  ## robots that learn to walk, three seeds each; their gaits in unseen samples of scenarios (half an hour)
 	$(BIN)/python benchmarks/trot.py

@@ -89,7 +89,7 @@ class RolloutStages:
 
     def difference(self, X: Array, Y: Array) -> Array:
         """(B, n)."""
-        return self.tangent.difference(X, Y)
+        return self._linearization.step.difference(X, Y)
 
     def measure(self, Z: Array, X: Array, U: Array) -> tuple[Array, Array]:
         """Objectives (B,) and limits (B, c)."""
