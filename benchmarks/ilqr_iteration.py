@@ -2,9 +2,9 @@
 
     python benchmarks/ilqr_iteration.py [--turns 9] [--threads 2]
 
-The quadruped is the robot of ``quadruped_walk`` on its soft feet for 1 s of 100 steps: 16 servos, each with a knot a
-step, shall walk at 0.5 m/s, upright. Parts take turns, and the fastest turn counts. A whole iteration linearises, passes
-back, searches along eight step lengths, and evaluates the point that it takes. Linear algebra has one thread here.
+The quadruped is the robot of ``quadruped_walk`` on its soft feet for 1 s of 100 steps: 16 servos, a knot a step each,
+shall walk at 0.5 m/s, upright. Parts take turns, and the fastest turn counts. A whole iteration linearises, passes
+back, searches along eight step lengths, and evaluates the point that it takes.
 """
 
 from __future__ import annotations
