@@ -68,6 +68,7 @@ bench-robots: $(VENV)/.benching  ## jointed robots: what each device of joints b
 	$(BIN)/python benchmarks/robot_kernels.py
 	$(BIN)/python benchmarks/step_jacobians.py
 	$(BIN)/python benchmarks/stage_costs.py
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/ilqr_iteration.py
 
 bench-mpc: $(VENV)/.installed  ## model predictive control of plants that differ from their models: rates, latencies, tasks done
 	$(BIN)/python benchmarks/mpc.py

@@ -6,14 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
+from scipy.linalg import lapack
 
 from symphys.shooting import Expansion, Linearized
-from symphys.solvers.ddp.box_qp import BoxSolution, solve_box_qp
+from symphys.solvers.ddp.box_qp import solve_box_qp
 from symphys.solvers.ddp.knots import KnotStep
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,12 @@ class Policy:
 
 @dataclass
 class _Value:
-    """The cost to go: of (state, old knots, static entries), to second order."""
+    """The cost to go: of (state, old knots, static entries), to second order.
+
+    Attributes:
+        slope: less the costate, which is the slope by the state where nothing is decided any more.
+        curve: without the costs of the state itself.
+    """
 
     slope: Array
     curve: Array
@@ -63,7 +69,7 @@ def backward_pass(
     slopes: Linearized,
     costs: Expansion,
     knots: Sequence[KnotStep],
-    statics: NDArray[np.int64],
+    statics: Indices,
     bounds: Bounds,
     damping: float,
 ) -> Policy | None:
@@ -78,33 +84,31 @@ def backward_pass(
         damping: of Levenberg and Marquardt: added to the Hessian by knots, in units of their scales.
 
     Source: Tassa, Erez, Todorov, Synthesis and stabilization of complex behaviors through online trajectory
-    optimization, IROS 2012; bounds as Tassa, Mansard, Todorov, ICRA 2014.
+    optimization, IROS 2012; bounds as Tassa, Mansard, Todorov, ICRA 2014. Theirs has one slope of the cost to go; here
+    it is a costate and what decisions add to that.
     """
     n, s = slopes.a.shape[1], len(statics)
-    curve = _joined(costs.xx[-1], costs.sx[-1], np.zeros((s, s)))
-    value = _Value(np.concatenate([costs.x[-1], np.zeros(s)]), curve)
+    costate, by_inputs, by_statics = _costates(slopes, costs)
+    value = _Value(np.zeros(n + s), np.zeros((n + s, n + s)))
     gains: list[KnotGain | None] = [None] * len(knots)
     gradient, first, second = np.zeros(len(bounds.scale)), 0.0, 0.0
-    adjoint = costs.x[-1].copy()
-    by_static = costs.s.copy()
     for k in reversed(range(len(knots))):
         knot = knots[k]
-        gradient[knot.acting] += knot.weights.T @ (costs.u[k] + slopes.b[k].T @ adjoint)
-        by_static += slopes.c[k].T @ adjoint
-        adjoint = costs.x[k] + slopes.a[k].T @ adjoint
-        slope, curve = _before(slopes, costs, knot, value, k)
-        if not len(knot.new):
+        by_knots = knot.weights.T @ by_inputs[k]
+        gradient[knot.acting] += by_knots
+        value.slope[len(value.slope) - s :] += by_statics[k]
+        slope, curve = _before(slopes, costs, knot, value, by_knots, k)
+        count = len(knot.new)
+        if not count:
             value = _Value(slope, curve)
             continue
-        place = slice(n + len(knot.old), n + len(knot.old) + len(knot.new))
-        found = _decide(slope, curve, place, bounds, knot.new, damping)
+        found = _decide(slope, curve, count, bounds, knot.new, damping)
         if found is None:
             return None
         gains[k], value, falls = found
         first, second = first + falls[0], second + falls[1]
-    gradient[statics] += by_static + slopes.start.T @ adjoint
-    start = np.concatenate([slopes.start, np.eye(s)])
-    slope, curve = start.T @ value.slope + costs.s, start.T @ value.curve @ start + costs.ss
+    gradient[statics] += costs.s + by_statics.sum(axis=0) + slopes.start.T @ costate
+    slope, curve = _at_start(slopes, costs, value, costate)
     chosen = _static_step(slope, curve, bounds, statics, damping)
     if chosen is None:
         return None
@@ -112,75 +116,85 @@ def backward_pass(
     return Policy(gains, chosen, first, second, gradient)
 
 
-def _joined(xx: Array, sx: Array, ss: Array) -> Array:
-    return np.block([[xx, sx.T], [sx, ss]]) if len(ss) else xx
+def _costates(slopes: Linearized, costs: Expansion) -> tuple[Array, Array, Array]:
+    """The costate of the first state (n,), and the slopes by inputs (N, m) and static entries (N, s), step by step."""
+    costate = costs.x.copy()
+    for k in reversed(range(len(slopes.a))):
+        costate[k] += costate[k + 1] @ slopes.a[k]
+    later = costate[1:, None]
+    by_inputs, by_statics = costs.u + (later @ slopes.b)[:, 0], (later @ slopes.c)[:, 0]
+    return costate[0], by_inputs, by_statics
 
 
-def _before(slopes: Linearized, costs: Expansion, knot: KnotStep, value: _Value, k: int) -> tuple[Array, Array]:
-    """Slope and curvature of the cost to go from step k by (state, acting knots, static entries)."""
-    a, b, c = slopes.a[k], slopes.b[k], slopes.c[k]
-    n, acting, s = a.shape[1], len(knot.acting), c.shape[1]
-    size, w = n + acting + s, knot.weights
-    ahead = np.concatenate([a, b @ w, c], axis=1)
+def _before(
+    slopes: Linearized, costs: Expansion, knot: KnotStep, value: _Value, by_knots: Array, k: int
+) -> tuple[Array, Array]:
+    """Slope, less the costate, and curvature of the cost to go from step k, without the costs of its state.
+
+    Columns are (state, old knots, static entries, new knots): what is decided comes last.
+    """
+    a, b, c, w = slopes.a[k], slopes.b[k], slopes.c[k], knot.weights
+    n, o, s, acting = a.shape[1], len(knot.old), c.shape[1], w.shape[1]
+    knots = np.concatenate([np.arange(n, n + o), np.arange(n + o + s, n + s + acting)])
+    ahead = np.empty((n, n + s + acting))
+    ahead[:, :n], ahead[:, knots], ahead[:, n + o : n + o + s] = a, b @ w, c
+    through = ahead
     if len(knot.kept) or s:
-        through = np.zeros((len(value.slope), size))
+        through = np.zeros((len(value.slope), ahead.shape[1]))
         through[:n] = ahead
-        through[n + np.arange(len(knot.kept)), n + knot.kept] = 1.0
-        through[n + len(knot.kept) + np.arange(s), n + acting + np.arange(s)] = 1.0
-    else:
-        through = ahead
-    slope = through.T @ value.slope
-    curve = through.T @ (value.curve @ through)
-    at_knots, at_statics = slice(n, n + acting), slice(n + acting, size)
-    slope[:n] += costs.x[k]
-    slope[at_knots] += w.T @ costs.u[k]
-    curve[:n, :n] += costs.xx[k]
-    cross = w.T @ costs.ux[k]
-    curve[at_knots, :n] += cross
-    curve[:n, at_knots] += cross.T
-    curve[at_knots, at_knots] += w.T @ costs.uu[k] @ w
+        through[n + np.arange(len(knot.kept)), knots[knot.kept]] = 1.0
+        through[n + len(knot.kept) + np.arange(s), n + o + np.arange(s)] = 1.0
+    later = value.curve
+    later[:n, :n] += costs.xx[k + 1]
+    slope, curve = value.slope @ through, through.T @ (later @ through)
+    slope[knots] += by_knots
+    crossed = np.zeros((acting, len(curve)))
+    crossed[:, :n] = w.T @ costs.ux[k]
     if costs.uy[k].any():
-        later = w.T @ (costs.uy[k] @ ahead)
-        curve[at_knots] += later
-        curve[:, at_knots] += later.T
+        crossed += (w.T @ costs.uy[k]) @ ahead
+    crossed[:, knots] += w.T @ costs.uu[k] @ w / 2
+    curve[knots] += crossed
+    curve[:, knots] += crossed.T
     if s:
-        curve[at_statics, :n] += costs.sx[k]
-        curve[:n, at_statics] += costs.sx[k].T
-        mixed = costs.su[k] @ w
-        curve[at_statics, at_knots] += mixed
-        curve[at_knots, at_statics] += mixed.T
+        crossed, statics = costs.sx[k + 1] @ ahead, slice(n + o, n + o + s)
+        crossed[:, knots] += costs.su[k] @ w
+        curve[statics] += crossed
+        curve[:, statics] += crossed.T
     return slope, curve
 
 
+def _at_start(slopes: Linearized, costs: Expansion, value: _Value, costate: Array) -> tuple[Array, Array]:
+    """Slope and curvature by the static entries, of the whole motion."""
+    start = np.concatenate([slopes.start, np.eye(slopes.start.shape[1])])
+    crossed = costs.sx[0] @ slopes.start
+    slope = value.slope @ start + slopes.start.T @ costate + costs.s
+    own = slopes.start.T @ costs.xx[0] @ slopes.start + crossed + crossed.T + costs.ss
+    return slope, start.T @ value.curve @ start + own
+
+
 def _decide(
-    slope: Array, curve: Array, place: slice, bounds: Bounds, new: NDArray[np.int64], damping: float
+    slope: Array, curve: Array, count: int, bounds: Bounds, new: Indices, damping: float
 ) -> tuple[KnotGain, _Value, tuple[float, float]] | None:
     """The best new knots, the cost to go without them, and the expected fall."""
-    rest = np.r_[0 : place.start, place.stop : len(slope)]
-    hessian = curve[place, place]
-    damped = hessian + np.diag(damping / bounds.scale[new] ** 2)
-    found = solve_box_qp((damped + damped.T) / 2, slope[place], bounds.down[new], bounds.up[new], np.zeros(len(new)))
+    rest = len(slope) - count
+    hessian, cross = curve[rest:, rest:], curve[rest:, :rest]
+    soft = damping / bounds.scale[new] ** 2
+    damped = hessian.copy()
+    np.fill_diagonal(damped, hessian.diagonal() + soft)
+    found = solve_box_qp(damped, slope[rest:], bounds.down[new], bounds.up[new], np.zeros(count))
     if found is None:
         return None
-    cross = curve[place][:, rest]
-    ahead, back = found.step, _answers(found, cross)
-    left_slope = slope[rest] + back.T @ (hessian @ ahead + slope[place]) + cross.T @ ahead
-    left = curve[np.ix_(rest, rest)] + back.T @ hessian @ back + back.T @ cross + cross.T @ back
-    value = _Value(left_slope, (left + left.T) / 2)
-    return KnotGain(ahead, back), value, (float(slope[place] @ ahead), float(ahead @ hessian @ ahead) / 2)
-
-
-def _answers(found: BoxSolution, cross: Array) -> Array:
-    """(w, n + o + s): how the knots that are free answer to what comes."""
-    back = np.zeros(cross.shape)
+    ahead, back = found.step, np.zeros(cross.shape)
     if found.factor is not None:
-        back[found.free] = -scipy.linalg.cho_solve(found.factor, cross[found.free], check_finite=False)
-    return back
+        back[found.free] = -lapack.dpotrs(found.factor, cross[found.free], lower=1)[0]
+    along = hessian @ ahead
+    left_slope = slope[:rest] + (along + slope[rest:]) @ back + ahead @ cross
+    left = curve[:rest, :rest] + cross.T @ back - (back.T * soft) @ back
+    value = _Value(left_slope, (left + left.T) / 2)
+    return KnotGain(ahead, back), value, (float(slope[rest:] @ ahead), float(ahead @ along) / 2)
 
 
-def _static_step(
-    slope: Array, curve: Array, bounds: Bounds, statics: NDArray[np.int64], damping: float
-) -> Array | None:
+def _static_step(slope: Array, curve: Array, bounds: Bounds, statics: Indices, damping: float) -> Array | None:
     """(s,) the best change of the static entries."""
     if not len(statics):
         return np.zeros(0)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
+from scipy.linalg import lapack
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -20,11 +20,11 @@ FLAT = 1e-10
 
 
 class BoxSolution(NamedTuple):
-    """A minimum: ``step`` (m,), which entries are ``free`` of the bounds, and the Cholesky factor of these."""
+    """A minimum: ``step`` (m,), which entries are ``free`` of the bounds, and their lower Cholesky factor."""
 
     step: Array
     free: Mask
-    factor: tuple[Array, bool] | None
+    factor: Array | None
 
 
 def solve_box_qp(hessian: Array, gradient: Array, lower: Array, upper: Array, start: Array) -> BoxSolution | None:
@@ -42,6 +42,9 @@ def solve_box_qp(hessian: Array, gradient: Array, lower: Array, upper: Array, st
 
     Source: Tassa, Mansard, Todorov, Control-Limited Differential Dynamic Programming, ICRA 2014, section III.
     """
+    whole = _within(hessian, gradient, lower, upper)
+    if whole is not None:
+        return whole
     x = np.clip(start, lower, upper)
     free, factor = np.zeros(len(x), np.bool_), None
     size = 1.0 + float(np.abs(gradient).max(initial=0.0))
@@ -52,19 +55,28 @@ def solve_box_qp(hessian: Array, gradient: Array, lower: Array, upper: Array, st
             free = now
             if not free.any():
                 return BoxSolution(x, free, None)
-            try:
-                factor = scipy.linalg.cho_factor(hessian[np.ix_(free, free)], lower=True, check_finite=False)
-            except np.linalg.LinAlgError:
+            factor, failed = lapack.dpotrf(hessian[free][:, free], lower=1)
+            if failed:
                 return None
         if np.abs(slope[free]).max() <= FLAT * size:
             break
         ahead = np.zeros(len(x))
-        ahead[free] = -scipy.linalg.cho_solve(factor, slope[free], check_finite=False)
+        ahead[free] = -lapack.dpotrs(factor, slope[free], lower=1)[0]
         found = _projected(hessian, gradient, (lower, upper), x, slope, ahead)
         if found is None:
             break
         x = found
     return BoxSolution(x, free, factor)
+
+
+def _within(hessian: Array, gradient: Array, lower: Array, upper: Array) -> BoxSolution | None:
+    """The minimum without bounds, where it exists and meets them."""
+    factor, failed = lapack.dpotrf(hessian, lower=1)
+    if failed:
+        return None
+    step = -lapack.dpotrs(factor, gradient, lower=1)[0]
+    inside = np.all(step >= lower) and np.all(step <= upper)
+    return BoxSolution(step, np.ones(len(step), np.bool_), factor) if inside else None
 
 
 def _projected(

@@ -6,7 +6,7 @@ from symphys.codegen.program.interpret import interpret
 from symphys.codegen.program.layout import MemoryLayout
 from symphys.codegen.program.nan_location import Bad
 from symphys.codegen.program.program import AdjointDiscount, FunctionCall, Place, Program
-from symphys.codegen.runtime.fixed_addresses import Fixed
+from symphys.codegen.runtime.fixed_addresses import Fixed, FixedBatch
 from symphys.codegen.runtime.kernel import Kernel, ProcessorKernel
 from symphys.codegen.toolchain.build import compile_program, shared_library
 from symphys.codegen.toolchain.cache import Cache, CacheInfo, default_cache
@@ -20,6 +20,7 @@ __all__ = [
     "Cache",
     "CacheInfo",
     "Fixed",
+    "FixedBatch",
     "FunctionCall",
     "Kernel",
     "KernelUnavailable",

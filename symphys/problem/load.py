@@ -45,10 +45,9 @@ from symphys.problem.tables.controllers import read_controllers, read_sensors
 from symphys.problem.tables.forces import force_quantities, read_forces
 from symphys.problem.tables.guess import read_guess
 from symphys.problem.tables.joints import read_joints
-from symphys.problem.tables.mpc import read_time
 from symphys.problem.tables.objectives import Objectives, read_objectives
 from symphys.problem.tables.scenarios import read_scenarios
-from symphys.problem.tables.simulation import read_phases
+from symphys.problem.tables.simulation import read_phases, read_time
 from symphys.problem.tables.statics import read_statics
 from symphys.problem.tables.termination import read_termination, with_termination_cost
 from symphys.problem.tables.variables import read_variables

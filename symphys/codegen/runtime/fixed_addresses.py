@@ -1,4 +1,4 @@
-"""One evaluation with its arguments and results at fixed addresses, for callers in C."""
+"""Evaluations with arguments and results at fixed addresses: for callers in C, and for small batches in a loop."""
 
 from __future__ import annotations
 
@@ -37,3 +37,27 @@ class Fixed:
         """Of the function, the program, the batch and the memory."""
         function, data = self.loaded.addresses
         return function, data, ctypes.addressof(self.batch), int(self.memory.ctypes.data)
+
+
+@dataclass(frozen=True)
+class FixedBatch:
+    """A small batch that is evaluated again and again: ``run`` reads and writes these arrays, on one thread.
+
+    Attributes:
+        loaded: the kernel's library.
+        batch: the driver's.
+        memory: of its own.
+        z, parameters: (rows, n) and (rows, p), read; 0 at first.
+        outputs: (rows, width) all outputs in their order, written.
+    """
+
+    loaded: Loaded
+    batch: BatchData
+    memory: Memory
+    z: Array
+    parameters: Array
+    outputs: Array
+
+    def run(self) -> None:
+        """Evaluate."""
+        self.loaded.evaluate(self.batch, self.memory)

@@ -13,7 +13,7 @@ from symphys.codegen.errors import ProgramError
 from symphys.codegen.program.nan_location import Bad, first_bad
 from symphys.codegen.program.program import Place, Program
 from symphys.codegen.runtime.batch import Array, RolloutBatch
-from symphys.codegen.runtime.fixed_addresses import Fixed
+from symphys.codegen.runtime.fixed_addresses import Fixed, FixedBatch
 from symphys.codegen.runtime.library import Loaded
 from symphys.codegen.runtime.thread_pool import MemoryPool
 from symphys.codegen.toolchain.compiler import processors
@@ -127,6 +127,13 @@ class ProcessorKernel(Kernel):
         outputs = batch.outputs(self._width())
         gradient = batch.gradient(len(z)) if seeds.size else np.zeros((0, len(z)))
         return Fixed(self.loaded, batch.part(0, batch.rows), self._pool.new(), z, parameters, outputs, gradient, seeds)
+
+    def fixed_batch(self, rows: int) -> FixedBatch:
+        """An evaluation of outputs at fixed addresses, for a small batch: what each call prepares is prepared once."""
+        z, parameters = np.zeros((rows, self.program.z.size)), np.zeros((rows, self.program.parameters.size))
+        batch = self._batch(z, parameters)
+        outputs = batch.outputs(self._width())
+        return FixedBatch(self.loaded, batch.part(0, rows), self._pool.new(), z, parameters, outputs)
 
     def first_bad(self, z: ArrayLike, parameters: ArrayLike = ()) -> Bad | None:
         """The first call of one rollout that gives a value that is not finite; None if all are finite."""

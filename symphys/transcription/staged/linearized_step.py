@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -9,16 +10,23 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symphys.codegen import Kernel, KernelUnavailable, ProgramError, processors
+from symphys.codegen import FixedBatch, Kernel, KernelUnavailable, ProcessorKernel, ProgramError, processors
 from symphys.codegen.backends import BEST, PRECISIONS, build_kernel
 from symphys.codegen.slopes import SlopeKernel, compile_slopes
 from symphys.transcription.rollout import Rollout
-from symphys.transcription.staged.step_program import StepArguments, step_functions, step_program
+from symphys.transcription.staged.step_program import (
+    StepArguments,
+    difference_program,
+    step_functions,
+    step_program,
+)
 from symphys.transcription.staged.tangent import Tangent
 
 Array = NDArray[np.float64]
 Slopes = tuple[Array, Array, Array]
 """(N, n, n), (N, n, m) and (N, n, np): the next state's tangent by the state's, by inputs and by parameters."""
+FEW = 16
+"""Rows of a batch for which what a call prepares takes longer than what it computes."""
 
 
 @dataclass(eq=False)
@@ -47,12 +55,38 @@ class LinearizedStep:
     def __post_init__(self) -> None:
         """Build what evaluates."""
         self.arguments = StepArguments(self.rollout, self.tangent, self.parameters)
-        self._step, self._off = self._built()
+        self._step, self._off, self._apart = self._built()
 
     def step(self, k: int | NDArray[np.int64], X: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float) -> Array:
         """(B, nx), (B, m), (B, np) or (np,) -> (B, nx): states after step ``k``, or after steps k (B,)."""
-        varying, given = self.rows(k, X, X, U, P, smoothing)
+        states = np.asarray(X, float)
+        if isinstance(self._step, _ByKernel) and self._step.lends(len(states)):
+            return self._step.lend(len(states), lambda batch: self._few(batch, k, states, U, P, smoothing))
+        varying, given = self.rows(k, states, states, U, P, smoothing)
         return self._step.values(varying, given)
+
+    def difference(self, X: ArrayLike, Y: ArrayLike) -> Array:
+        """See ``Tangent.difference``: (B, nx), (B, nx) -> (B, n), with the parameters of the guess."""
+        first, second = np.asarray(X, float), np.asarray(Y, float)
+        if self._apart is None or not self._apart.lends(len(first)):
+            return self.tangent.difference(first, second)
+        nx, nominal = self.arguments.sizes[0], self.tangent.nominal
+
+        def put(batch: FixedBatch) -> None:
+            batch.z[:, :nx], batch.z[:, nx:], batch.parameters[:] = first, second, nominal
+
+        return self._apart.lend(len(first), put)
+
+    def _few(self, batch: FixedBatch, k: Any, X: Array, U: ArrayLike, P: ArrayLike, smoothing: float) -> None:
+        """Put the arguments of few steps where the kernel reads them; see ``rows``."""
+        nx, n, m, np_ = self.arguments.sizes
+        self._check(smoothing)
+        varying, given, p = batch.z, batch.parameters, np.asarray(P, float)
+        varying[:, n : n + m] = U
+        given[:, :nx], given[:, 2 * nx], given[:, -1] = X, self._ticks(k), smoothing
+        if np_:
+            given[:, 2 * nx + 1 : -1] = p
+            varying[:, n + m : n + m + len(self.arguments.varied)] = p[..., self.arguments.varied]
 
     def slopes(
         self, X: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float, after: ArrayLike | None = None
@@ -88,15 +122,22 @@ class LinearizedStep:
         x, aim, u, p = (np.atleast_2d(np.asarray(each, float)) for each in (X, after, U, P))
         count, (_, n, m, np_) = len(x), self.arguments.sizes
         p = np.broadcast_to(p, (count, np_))
-        tick = np.broadcast_to(self.clock / self.rollout.dt + np.asarray(k, float), (count,))[:, None]
-        if self.exact and smoothing:
-            raise ValueError(f"this step is for smoothing 0 only, not for {smoothing:g}")
+        tick = np.broadcast_to(self._ticks(k), (count,))[:, None]
+        self._check(smoothing)
         parts = [np.zeros((count, n)), u.reshape(count, m), p[:, self.arguments.varied], np.zeros_like(x)]
         varying = np.concatenate(parts, axis=1)
         return varying, np.concatenate([x, aim, tick, p, np.full((count, 1), smoothing)], axis=1)
 
-    def _built(self) -> tuple[_ByKernel | _ByCasadi, _BySlopes | _ByCasadi]:
-        """What gives states after the step, and what gives slopes."""
+    def _ticks(self, k: Any) -> Array:
+        """The numbers of the steps, from when the clock was 0."""
+        return np.asarray(self.clock / self.rollout.dt + np.asarray(k, float))
+
+    def _check(self, smoothing: float) -> None:
+        if self.exact and smoothing:
+            raise ValueError(f"this step is for smoothing 0 only, not for {smoothing:g}")
+
+    def _built(self) -> tuple[_ByKernel | _ByCasadi, _BySlopes | _ByCasadi, _ByKernel | None]:
+        """What gives states after the step, what gives slopes, and what gives differences of states."""
         note = ""
         if self.backend in PRECISIONS:
             count = processors() if self.threads is None else self.threads
@@ -105,12 +146,13 @@ class LinearizedStep:
                 kernel, slopes = build_kernel(self.backend, step, [], count), compile_slopes(off, "off", threads=count)
                 report = slopes.report
                 self.description = f"{report.precision} precision, lanes {report.lanes}, threads {slopes.threads}"
-                return _ByKernel(kernel), _BySlopes(slopes)
+                apart = build_kernel(self.backend, difference_program(self.tangent), [], count)
+                return _ByKernel(kernel), _BySlopes(slopes), _ByKernel(apart)
             except (KernelUnavailable, ProgramError) as error:
                 note = f"; {error}"
         self.description = f"casadi's virtual machine{note}"
         step_function, off_function = step_functions(self.arguments)
-        return _ByCasadi(step_function), _ByCasadi(off_function)
+        return _ByCasadi(step_function), _ByCasadi(off_function), None
 
 
 class _ByKernel:
@@ -118,9 +160,29 @@ class _ByKernel:
 
     def __init__(self, kernel: Kernel) -> None:
         self.kernel = kernel
+        self._free: dict[int, list[FixedBatch]] = {}
 
     def values(self, varying: Array, given: Array) -> Array:
         return np.array(self.kernel.forward(varying, given)["after"])
+
+    def lends(self, rows: int) -> bool:
+        """Whether a batch is so small that it is prepared once."""
+        return 0 < rows <= FEW and isinstance(self.kernel, ProcessorKernel)
+
+    def lend(self, rows: int, put: Callable[[FixedBatch], None]) -> Array:
+        """The outputs of a small batch, once ``put`` has written its arguments."""
+        assert isinstance(self.kernel, ProcessorKernel)
+        free = self._free.setdefault(rows, [])
+        try:
+            batch = free.pop()
+        except IndexError:
+            batch = self.kernel.fixed_batch(rows)
+        try:
+            put(batch)
+            batch.run()
+            return batch.outputs.copy()
+        finally:
+            free.append(batch)
 
 
 class _BySlopes:

@@ -174,8 +174,8 @@ class RolloutStages:
     def difference(self, X: Array, Y: Array) -> Array:
         """(B, n)."""
         if not self._sums:
-            return self.tangent.difference(X, Y)
-        apart = self.tangent.difference(X[:, : -self._sums], Y[:, : -self._sums])
+            return self._linearization.step.difference(X, Y)
+        apart = self._linearization.step.difference(X[:, : -self._sums], Y[:, : -self._sums])
         return np.concatenate([apart, Y[:, -self._sums :] - X[:, -self._sums :]], axis=1)
 
     def measure(self, Z: Array, X: Array, U: Array) -> tuple[Array, Array]:

@@ -147,6 +147,15 @@ def _off(arguments: StepArguments) -> ca.Function:
     return ca.Function("off", [varying, given, after], [ca.mtimes(arguments.tangent.projection(aim, p), beside)])
 
 
+def difference_program(tangent: Tangent) -> Program:
+    """The program of ``tangent.distance``: its vector is two states, its parameters are p, its output ``off`` (n,)."""
+    layout, (nx, _, np_) = MemoryLayout(), (tangent.distance.size1_in(i) for i in range(3))
+    states, p, off = layout.series(nx, 2), layout.take(np_), layout.take(tangent.size)
+    call_of = FunctionCall(tangent.distance, (states.still(), states.later().still(), p), (off,))
+    both = Place(states.offset, 2 * nx)
+    return Program(layout.size, z=both, parameters=p, steps=1, outputs={"off": off}, prologue=(call_of,))
+
+
 def step_functions(arguments: StepArguments) -> tuple[ca.Function, ca.Function]:
     """(varying, given with smoothing) -> after, and off: on casadi's virtual machine."""
     varying, given = ca.MX.sym("varying", sum(arguments.varying)), ca.MX.sym("given", sum(arguments.given) + 1)

@@ -119,6 +119,11 @@ class Tangent:
         return self._batch(self._distances, (X, Y), p)
 
     @cached_property
+    def nominal(self) -> Array:
+        """(np,) the parameters as the guess has them."""
+        return np.array(ca.DM(ca.vertcat(ca.DM(0, 1), *self.rollout.parameters.nominal))).ravel()
+
+    @cached_property
     def shifts(self) -> bool:
         """Whether parameters move joints."""
         return bool(self.shift.nnz_out(0))
@@ -133,8 +138,7 @@ class Tangent:
 
     def _batch(self, function: ByColumns, rows: tuple[ArrayLike, ArrayLike], p: ArrayLike | None) -> Array:
         first, second = (np.asarray(each, float) for each in rows)
-        nominal = ca.vertcat(ca.DM(0, 1), *self.rollout.parameters.nominal)
-        given = nominal if p is None else ca.DM(np.asarray(p, float))
+        given = ca.DM(self.nominal if p is None else np.asarray(p, float))
         if not len(first):
             return np.zeros((0, function.function.size1_out(0)))
         (found,) = function(first.T, second.T, ca.repmat(given, 1, len(first)))

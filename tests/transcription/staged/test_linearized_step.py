@@ -102,6 +102,23 @@ def test_steps_are_those_of_the_rollout_to_the_bit(tmp_path: Path) -> None:
     assert np.array_equal(motion.x, np.array(states).T)
 
 
+def test_small_batches_are_prepared_once_and_differences_compiled(tmp_path: Path) -> None:
+    """Rows of small batches, again and again with other numbers, are those of large ones, and differences are right."""
+    problem = problem_of("leg", tmp_path)
+    made = Linearization(symbolic_rollout(problem), "auto", 1)
+    motion = made.motion(guess_of(problem), 0.0)
+    _, u, p = made.begun(motion.z)
+    large = made.step.step(np.arange(len(u)), motion.x[:-1], u, p, 0.0)
+    assert len(u) > linearized_step.FEW
+    for first in (0, 3, 9):
+        few = slice(first, first + 4)
+        found = made.step.step(np.arange(first, first + 4), motion.x[few], u[few], p, 0.0)
+        np.testing.assert_array_equal(found, large[few])
+        apart = made.step.difference(motion.x[few], motion.x[few][::-1])
+        wanted = made.tangent.difference(motion.x[few], motion.x[few][::-1])
+        np.testing.assert_allclose(apart, wanted, rtol=1e-12, atol=1e-12)
+
+
 def test_states_and_threads_do_not_change_each_others_numbers(tmp_path: Path) -> None:
     problem = problem_of("loop", tmp_path)
     made = [Linearization(symbolic_rollout(problem), "auto", threads) for threads in (1, 2)]
