@@ -1,4 +1,4 @@
-"""How time passes: the [simulation] table, the [[phase]] tables that divide its duration, a horizon that moves: [mpc]."""
+"""How time passes: the [simulation] table, the [[phase]] tables that divide its duration, and [mpc]."""
 
 from __future__ import annotations
 
