@@ -28,6 +28,7 @@ SHIPPED = [
     "cost_of_transport",
     "dribble",
     "eddy_brake",
+    "fast_tray",
     "fastest_move",
     "follow_swing",
     "free_kick",
