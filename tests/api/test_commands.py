@@ -25,6 +25,7 @@ ROOM_OF_COMMAND = {
     "diff": "results",
     "replay": "Solution",
     "import": "load_robot",
+    "mpc": "Controller",
 }
 
 
