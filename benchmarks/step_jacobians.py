@@ -1,16 +1,21 @@
 """Jacobians of a step by state and inputs: milliseconds of CPU time a step, one thread; MuJoCo's, and the plain way.
 
-    python benchmarks/step_jacobians.py [--turns 9]
+    python benchmarks/step_jacobians.py [--turns 9] [--crocoddyl PYTHON]
 
 Ours are exact, of the whole step with its controllers, in the robot's coordinates: ``LinearizedStep``. The plain way is
 the gradient kernel with a lane for each row. MuJoCo's are ``mjd_transitionFD``, finite differences of the same robot by
-our exporter, by positions, velocities, activations and controls. Ways take turns; the fastest turn counts.
+our exporter, by positions, velocities, activations and controls. Crocoddyl's are analytic, of the same file, with every
+foot held to the ground as a given contact: nothing is discovered there (``given_contacts.py`` says how to install it).
+Ways take turns; the fastest turn counts.
 """
 
 from __future__ import annotations
 
 import argparse
+import subprocess
+import tempfile
 from collections.abc import Callable
+from pathlib import Path
 from time import process_time
 from typing import Any
 
@@ -38,7 +43,8 @@ def main() -> None:
     """A table for each robot."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--turns", type=int, default=TURNS)
-    turns = parser.parse_args().turns
+    parser.add_argument("--crocoddyl", type=Path, metavar="PYTHON", help="the Python of an environment that has it")
+    turns, crocoddyl = vars(parser.parse_args()).values()
     for problem in (table_problem([], STEPS), load_problem(find("quadruped_walk"))):
         calls = {**ours(problem), **theirs(problem)}
         best = dict.fromkeys(calls, np.inf)
@@ -49,6 +55,8 @@ def main() -> None:
                 best[way] = min(best[way], (process_time() - began) / STEPS)
         for way, seconds in best.items():
             print(f"{problem.name:<16} {way:<44} {1e3 * seconds:7.3f} ms a step", flush=True)
+        if crocoddyl is not None:
+            with_contacts_given(problem, crocoddyl)
 
 
 def ours(problem: Problem) -> dict[str, Call]:
@@ -93,6 +101,19 @@ def theirs(problem: Problem) -> dict[str, Call]:
         f"MuJoCo, {size} numbers of a state, one-sided": lambda: differences(False),
         "MuJoCo, centred": lambda: differences(True),
     }
+
+
+def with_contacts_given(problem: Problem, python: Path) -> None:
+    """Print Crocoddyl's; see ``given_contacts.py``."""
+    text = mjcf(problem.world(), problem.initial, problem.simulation.dt, problem.name, approximate=True)
+    elbows = [joint.name for joint in problem.world().joints if joint.name.endswith("elbow")]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "robot.xml"
+        path.write_text(text, encoding="utf-8")
+        command = [python, Path(__file__).with_name("given_contacts.py"), path, str(problem.simulation.dt)]
+        done = subprocess.run([*command, *elbows], capture_output=True, text=True, check=True)
+    way, _, seconds = done.stdout.strip().rpartition(";")
+    print(f"{problem.name:<16} {way:<44} {1e3 * float(seconds):7.3f} ms a step", flush=True)
 
 
 if __name__ == "__main__":

@@ -14,6 +14,8 @@ $state
 $inputs
    p, parameters:
 $parameters
+   t, by what states can differ, for linearize; turns are rotation vectors:
+$tangent
    smoothing [m/s] >= 0 rounds off contact; 0 is the exact law.
    errors, each error / tolerance, met where <= 1:
 $errors
@@ -31,6 +33,7 @@ $constraints
 #define ${NAME}_X $nx /* of x */
 #define ${NAME}_U $nu /* of u */
 #define ${NAME}_P $np /* of p */
+#define ${NAME}_T $nt /* of t */
 #define ${NAME}_STEPS $steps
 #define ${NAME}_ERRORS $count
 #define ${NAME}_WORK $work /* numbers of work, for every function */
@@ -53,6 +56,11 @@ void ${name}_start(const double *z, double *x, double *u, double *p, double *wor
 
 /* The state after one time step; next may be x. */
 void ${name}_step(const double *x, const double *u, const double *p, double smoothing, double *next, double *work);
+
+/* The state after one time step with its controllers, and the step's exact slopes, row by row: a (T, T) the next t by t,
+   b (T, $varied) by the inputs as variables give them, c (T, P) by p. u is $linearized. In ${name}_linearize.c. */
+void ${name}_linearize(const double *x, const double *u, const double *p, double smoothing, double *next, double *a,
+                       double *b, double *c, double *work);
 
 /* All steps. states may be 0, or takes (STEPS + 1) * X numbers: the state at the start, and after each step. */
 void ${name}_rollout(const double *z, double smoothing, ${name}_result *result, double *states, double *work);

@@ -10,8 +10,9 @@ from typing import Any
 import casadi as ca
 
 from symphys.export import words
-from symphys.export.sources import dense_step
+from symphys.export.sources import dense_step, tangent_of
 from symphys.transcription import Transcription
+from symphys.transcription.staged.slope_functions import slopes_function
 
 RESULTS = {
     "value": ("merit", "objective", "errors", "outputs"),
@@ -37,7 +38,7 @@ squares of the residuals. smoothing [m/s] >= 0 rounds off contact; 0 is the exac
 
 def casadi_files(transcription: Transcription, version: str) -> dict[str, bytes]:
     """name -> content of every file."""
-    functions = {"step": dense_step(transcription.rollout)}
+    functions = {"step": dense_step(transcription.rollout), "linearize": slopes_function(tangent_of(transcription))}
     if transcription.rollout.feedback is not None:
         functions["control"] = transcription.rollout.feedback
     for name, results in RESULTS.items():
@@ -77,6 +78,9 @@ def _readme(transcription: Transcription, functions: dict[str, ca.Function], ver
         "x, the state": words.state_lines(rollout),
         "u, forces, torques and commands, constant over a step": words.input_lines(rollout),
         "p, parameters": words.parameter_lines(rollout),
+        "A (by the state), B (by u), C (by p): slopes of the step with its controllers; their rows, and A's columns": (
+            words.tangent_lines(tangent_of(transcription).tangent)
+        ),
         "errors, each error / tolerance, met where <= 1": words.error_lines(problem),
         "outputs": words.output_lines(problem),
         "constraints, their values": words.constraint_lines(transcription),

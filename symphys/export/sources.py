@@ -13,10 +13,13 @@ import casadi as ca
 import numpy as np
 
 from symphys.codegen import MemoryLayout, Program
-from symphys.codegen.emit.plain import plain_source, table
+from symphys.codegen.emit.plain import plain_functions, plain_source, table
 from symphys.export import words
 from symphys.transcription import Transcription, rollout_program
 from symphys.transcription.rollout import Rollout
+from symphys.transcription.staged.slope_functions import directional_slope
+from symphys.transcription.staged.step_program import StepArguments
+from symphys.transcription.staged.tangent import Tangent
 
 ROOM = "symphys.export"
 
@@ -25,15 +28,21 @@ def c_files(transcription: Transcription, version: str) -> dict[str, bytes]:
     """name -> content of every file."""
     rollout, name = transcription.rollout, identifier(transcription.problem.name)
     program, step = rollout_program(rollout), dense_step(rollout)
+    arguments = tangent_of(transcription)
+    slope = directional_slope(arguments)
     plain = plain_source(program, ("merit",), {"step": step})
     outputs = sum(place.size for place in program.outputs.values())
     values = {"name": name, "NAME": name.upper(), "memory": plain.memory}
-    values |= {"work": max(plain.memory + outputs, step.nnz_in() + step.nnz_out())}
+    values |= {"work": max(plain.memory + outputs, *(each.nnz_in() + each.nnz_out() for each in (step, slope)))}
     values |= _sizes(rollout, step) | _documented(transcription, program, version)
-    values |= _data(transcription, program) | {"places": _places(step)}
+    values |= _data(transcription, program) | {"places": _places(step), "slope_places": _places(slope)}
+    values |= _linearized(arguments.tangent, slope)
     texts = {
         f"{name}.h": _filled("api.h", values),
         f"{name}.c": f'#include "{name}.h"\n\n' + plain.text + _filled("api.c", values),
+        f"{name}_linearize.c": f'#include "{name}.h"\n\n'
+        + plain_functions({"slope": slope})
+        + _filled("linearize.c", values),
         f"{name}_main.c": _filled("main.c", values),
         "Makefile": _filled("Makefile", values),
     }
@@ -54,11 +63,23 @@ def dense_step(rollout: Rollout) -> ca.Function:
     return ca.Function("step", arguments, [ca.densify(step(*arguments))], step.name_in(), step.name_out())
 
 
+def tangent_of(transcription: Transcription) -> StepArguments:
+    """The arguments of a step and its slopes."""
+    return StepArguments(transcription.rollout, Tangent(transcription.rollout))
+
+
 def _sizes(rollout: Rollout, step: ca.Function) -> dict[str, object]:
     nx, nu, np_, _ = (step.numel_in(i) for i in range(step.n_in()))
     problem = rollout.problem
     sizes = {"n": rollout.z.shape[0], "nx": nx, "nu": nu, "np": np_, "count": len(words.error_names(problem))}
     return {**sizes, "steps": rollout.steps, "dt": f"{rollout.dt:g}"}
+
+
+def _linearized(tangent: Tangent, slope: ca.Function) -> dict[str, object]:
+    given, varied = slope.numel_in("u"), slope.numel_in("du")
+    told = "that of step" if given == varied else f"these {varied}, then the time [s]"
+    sizes = {"nt": tangent.size, "given": given, "varied": varied}
+    return {**sizes, "linearized": told, "tangent": words.indented(words.tangent_lines(tangent))}
 
 
 def _documented(transcription: Transcription, program: Program, version: str) -> dict[str, object]:
@@ -98,7 +119,8 @@ def _data(transcription: Transcription, program: Program) -> dict[str, object]:
 
 def _places(step: ca.Function) -> str:
     layout = MemoryLayout()
-    return table([layout.take(step.numel_in(i)) for i in range(4)] + [layout.take(step.numel_out(0))])
+    sizes = [step.numel_in(i) for i in range(step.n_in())] + [step.numel_out(i) for i in range(step.n_out())]
+    return table([layout.take(size) for size in sizes])
 
 
 def string(text: str) -> str:

@@ -12,6 +12,7 @@ from symphys.problem import DURATION, Problem, Variable, VariableSlot
 from symphys.problem.units import quantity_unit
 from symphys.transcription import Transcription
 from symphys.transcription.rollout import Rollout
+from symphys.transcription.staged.tangent import Tangent
 
 PURE = {"orientation": "-, unit quaternion w x y z"}
 """How what has no unit is shown, where that is more than a dash."""
@@ -57,6 +58,11 @@ def input_lines(rollout: Rollout) -> list[str]:
     """One line an input of a step."""
     columns, world = input_columns(rollout.world, rollout.inputs), rollout.world
     return _placed("u", [(part.stop - part.start, name + unit(name, world)) for name, part in columns.items()])
+
+
+def tangent_lines(tangent: Tangent) -> list[str]:
+    """One line a number by which states can differ; turns are rotation vectors in the world frame."""
+    return _placed("t", [(1, name) for name in tangent.names])
 
 
 def parameter_lines(rollout: Rollout) -> list[str]:

@@ -18,6 +18,10 @@ from symphys.export.sources import identifier, string
 from symphys.problem import load_problem
 from symphys.problems import find
 from symphys.transcription import Transcription, transcribe
+from symphys.transcription.staged.linearization import Linearization
+from symphys.transcription.staged.slope_functions import slopes_function
+from symphys.transcription.staged.step_program import StepArguments
+from symphys.transcription.staged.tangent import Tangent
 
 NAME = "problem_1st_kick_u"
 STRICT = ("-O2", "-Wall", "-pedantic", "-Werror")
@@ -43,7 +47,8 @@ def folder(kick: Transcription, tmp_path_factory: pytest.TempPathFactory) -> Pat
 
 @pytest.fixture(scope="module")
 def library(folder: Path) -> Any:
-    compile_c("-std=c11", *STRICT, "-fPIC", "-shared", folder / f"{NAME}.c", "-o", folder / "library.so")
+    sources = [folder / f"{NAME}.c", folder / f"{NAME}_linearize.c"]
+    compile_c("-std=c11", *STRICT, "-fPIC", "-shared", *sources, "-o", folder / "library.so")
     return ctypes.CDLL(str(folder / "library.so"))
 
 
@@ -96,6 +101,21 @@ def test_steps_from_the_start_are_the_rollout(kick: Transcription, folder: Path,
     np.testing.assert_allclose(states[:, :3], motion.position[:, 0], rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(inputs[:, :3], motion.force[:, 0], rtol=1e-12, atol=1e-12)
     assert p[0] == z[-1]
+
+
+def test_slopes_of_a_step_are_those_of_casadi(kick: Transcription, folder: Path, library: Any) -> None:
+    define = defined(folder)
+    nt, nu, np_ = (define[key] for key in ("T", "U", "P"))
+    z = kick.shooting.start(1)
+    motion, p = Linearization(kick.rollout, backend="casadi").motion(z, 0.0), np.array([z[-1]])
+    one = slopes_function(StepArguments(kick.rollout, Tangent(kick.rollout)))
+    after, work = np.empty(define["X"]), np.full(define["WORK"], np.nan)
+    a, b, c = np.empty((nt, nt)), np.empty((nt, nu)), np.empty((nt, np_))
+    x, u = np.ascontiguousarray(motion.x[5]), np.ascontiguousarray(motion.u[5])
+    function(library, "linearize")(*pointers(x, u, p), ctypes.c_double(0.01), *pointers(after, a, b, c, work))
+    for ours, theirs in zip((after[:, None], a, b, c), one(x, u, p, 0.01), strict=True):
+        np.testing.assert_allclose(ours, np.array(theirs), rtol=1e-11, atol=1e-11)
+    assert np.abs(c).max() > 1e-3
 
 
 def test_two_threads_do_not_disturb_each_other(kick: Transcription, folder: Path, library: Any) -> None:

@@ -7,11 +7,16 @@ import subprocess
 import sys
 from pathlib import Path
 
+import casadi
 import numpy as np
+import pytest
 
 from symphys.export import casadi_files, write_folders
 from symphys.export.casadi_files import RESULTS
-from symphys.transcription import Transcription
+from symphys.problem import load_problem
+from symphys.problems import find
+from symphys.transcription import Transcription, transcribe
+from symphys.transcription.staged.linearization import Linearization
 
 LOADED = """
 import json, sys
@@ -19,12 +24,12 @@ sys.modules["symphys"] = None  # whoever imports it fails
 import casadi
 z = json.loads(sys.argv[1])
 values = {}
-for name in ("value", "gradient", "residuals", "jacobian", "nlp", "step"):
+for name in ("value", "gradient", "residuals", "jacobian", "nlp", "step", "linearize"):
     try:
         function = casadi.Function.load(name + ".casadi")
     except RuntimeError:
         continue
-    given = {"x": 0.5, "p": 0.6} if name == "step" else {"z": z, "smoothing": 0}
+    given = {"x": 0.5, "p": 0.6} if name in ("step", "linearize") else {"z": z, "smoothing": 0}
     values[name] = {key: value.full().T.tolist() for key, value in function(**given).items()}
 print(json.dumps(values))
 """
@@ -43,6 +48,7 @@ def test_plain_casadi_loads_them(kick: Transcription, tmp_path: Path) -> None:
         for result, theirs in zip(RESULTS[name], expected, strict=True):
             np.testing.assert_allclose(np.ravel(values[name][result]), np.array(theirs).ravel(), rtol=1e-12, atol=1e-12)
     assert len(values["step"]["x_next"][0]) == 23
+    assert values["linearize"]["x_next"] == values["step"]["x_next"]
 
 
 def test_the_readme_names_everything(kick: Transcription) -> None:
@@ -54,3 +60,21 @@ def test_the_readme_names_everything(kick: Transcription) -> None:
         'errors[0]          target über "there" ?',
     ):
         assert line in text
+
+
+@pytest.mark.parametrize("name", ["kick", "fastest_move", "cart_pole"])
+def test_slopes_of_a_step_are_those_of_linearize(name: str, kick: Transcription, tmp_path: Path) -> None:
+    one = kick if name == "kick" else transcribe(load_problem(find(name)), backend="casadi")
+    write_folders({tmp_path: casadi_files(one, "1.2")})
+    linearize = casadi.Function.load(str(tmp_path / "linearize.casadi"))
+    made = Linearization(one.rollout, backend="casadi")
+    z = one.shooting.start(1)
+    motion, p = made.motion(z, 0.0), made.begun(z)[2]
+    slopes = made.step.slopes(motion.x[:-1], motion.u, p, 0.0)
+    for k in (0, len(motion.u) // 2):
+        u = motion.u[k] if one.rollout.feedback is None else np.append(motion.u[k], k * one.rollout.dt)
+        after, *found = (np.array(each) for each in linearize(motion.x[k], u, p, 0))
+        np.testing.assert_allclose(after.ravel(), motion.x[k + 1], rtol=1e-13, atol=1e-13)
+        for ours, theirs in zip(found, slopes, strict=True):
+            scale = np.abs(theirs[k]).max(initial=1e-9)
+            np.testing.assert_allclose(ours.reshape(theirs[k].shape), theirs[k], rtol=0, atol=1e-11 * scale)

@@ -56,6 +56,15 @@ def plain_source(program: Program, seeded: Sequence[str], further: Mapping[str, 
     return PlainSource(text, 2 * program.size + planned.tape)
 
 
+def plain_functions(functions: Mapping[str, Function]) -> str:
+    """Functions ``name(m, b, t, k)`` alone, in a C file of their own."""
+    texts = [
+        write(name, graph_of(function), Form(primal=function.n_in(), adds=False), NUMBERS)
+        for name, function in functions.items()
+    ]
+    return "\n".join([resource("plain.h"), *texts])
+
+
 def table(places: Iterable[Place]) -> str:
     """The places of a call as C numbers: offset and stride of each."""
     return ", ".join(f"{place.offset}, {place.stride}" for place in places)
