@@ -110,14 +110,14 @@ def parts_of(method: Ilqr, first: Iteration[Any]) -> dict[str, Call]:
     slopes = staged.linearize(motion)
     costs = staged.expand(motion, state.multipliers, state.penalties)
     bounds, ends = method._room(state.z), (method.evaluator.lower, method.evaluator.upper)
-    policy = backward_pass(slopes, costs, knots, staged.statics, bounds, state.damping)
+    policy = backward_pass([slopes], costs, knots, staged.statics, bounds, state.damping)
     assert policy is not None
     motions = forward_pass(staged, motion, policy, knots, LENGTHS, ends)
     return {
         "motion": lambda: staged.roll_out(state.z, 0.0),
         "slopes": lambda: staged.linearize(motion),
         "costs": lambda: staged.expand(motion, state.multipliers, state.penalties),
-        "backward pass": lambda: backward_pass(slopes, costs, knots, staged.statics, bounds, state.damping),
+        "backward pass": lambda: backward_pass([slopes], costs, knots, staged.statics, bounds, state.damping),
         "forward pass of 8": lambda: forward_pass(staged, motion, policy, knots, LENGTHS, ends),
         "their costs": lambda: staged.measure(*motions),
         "one rollout of the evaluator": lambda: method.evaluator.value(state.z),

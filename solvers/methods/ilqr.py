@@ -134,7 +134,7 @@ class Ilqr(Method[IlqrState]):
         self.evaluator.counter.add(Counts.of_slopes(self.staged.tangent_size))
         damping, growth = state.damping, state.growth
         while damping <= STIFFEST:
-            policy = backward_pass(slopes, costs, self.knots, self.staged.statics, self._room(state.z), damping)
+            policy = backward_pass([slopes], costs, self.knots, self.staged.statics, self._room(state.z), damping)
             if policy is not None:
                 if -policy.first <= self.options.tolerance * (1 + abs(state.value)):
                     return self._settle(state, policy)

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.codegen import processors
-from symphys.mpc.horizon_costs import HorizonCosts
+from symphys.mpc.horizon_costs import HorizonCosts, QuadraticCosts
 from symphys.mpc.model import horizon_of, receding_model
 from symphys.mpc.policy_rollout import AffinePolicy, PolicyRollout
-from symphys.mpc.riccati import riccati_pass
 from symphys.problem import Problem
+from symphys.solvers.ddp.riccati import CostToGo, LinearStep, riccati_recursion
 from symphys.transcription.rollout import Rollout, symbolic_rollout
 from symphys.transcription.staged.linearized_step import LinearizedStep
 from symphys.transcription.staged.stage_terms import StageSymbols, motion_sums, stage_terms
@@ -136,7 +136,7 @@ class Planner:
         costs = self._costs.expand(plan.x, plan.v, self.p, plan.time)
         b = b @ self.weights if self._whole_inputs else b
         room = self.lower - plan.v, self.upper - plan.v
-        found = riccati_pass(a, b, costs, room, self.damping / self.scale**2)
+        found = plan_feedback(a, b, costs, room, self.damping / self.scale**2)
         if found is None:
             return self._kept(plan, plan.back)
         ahead, back = found
@@ -153,6 +153,35 @@ class Planner:
         """The plan as it was, with gains about it; the next iteration is more careful."""
         self.damping = min(self.damping * GROWTH, STIFFEST)
         return replace(plan, back=back, gained=False)
+
+
+def plan_feedback(
+    a: Array, b: Array, costs: QuadraticCosts, room: tuple[Array, Array], damping: Array
+) -> tuple[Array, Array] | None:
+    """Feedforward (N, w) and gains (N, w, n); None where a Hessian is not positive definite, or slopes not finite.
+
+    Args:
+        a: (N, n, n) the next state by the state.
+        b: (N, n, w) the next state by the decisions.
+        costs: about the motion.
+        room: (N, w) each, how far decisions may go down and up.
+        damping: (w,) added to the diagonal of the Hessian by decisions.
+    """
+    n = a.shape[1]
+    through, curves = np.concatenate([a, b], axis=2), costs.curve[:-1]
+    if costs.ahead is not None:
+        curves = curves.copy()
+        later = costs.ahead @ through
+        curves[:, n:] += later
+        curves[:, :, n:] += later.transpose(0, 2, 1)
+    parts = through, costs.slope[:-1], curves, *room
+    steps = (LinearStep(*each, damping) for each in zip(*(part[::-1] for part in parts), strict=True))
+    found = riccati_recursion(steps, CostToGo(costs.slope[-1, :n], costs.curve[-1, :n, :n]))
+    if found is None:
+        return None
+    feedback = [each for each in reversed(found.feedback) if each is not None]
+    ahead, back = np.array([each.ahead for each in feedback]), np.array([each.back for each in feedback])
+    return (ahead, back) if np.isfinite(ahead).all() and np.isfinite(back).all() else None
 
 
 def decision_order(model: Problem) -> NDArray[np.int64]:

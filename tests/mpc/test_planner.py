@@ -9,9 +9,8 @@ import pytest
 from swung import TABLES, pendulum
 
 from symphys.errors import ProblemError
-from symphys.mpc.planner import LENGTHS, Planner, RecedingPlan, shifted
+from symphys.mpc.planner import LENGTHS, Planner, RecedingPlan, plan_feedback, shifted
 from symphys.mpc.policy_rollout import AffinePolicy
-from symphys.mpc.riccati import riccati_pass
 from symphys.problem import problem_of_tables
 from symphys.shooting import Linearized, StagedMotion
 from symphys.solvers.ddp.backward_pass import Bounds, backward_pass
@@ -73,7 +72,7 @@ def test_slopes_and_curvature_of_costs_are_those_of_the_staged_problem() -> None
     assert costs.curve[:-1, n:, n:] == pytest.approx(wanted.uu, abs=1e-9)
 
 
-def test_the_riccati_pass_is_the_backward_pass() -> None:
+def test_the_feedback_of_a_plan_is_that_of_the_backward_pass() -> None:
     """With decisions that are held by their bounds among them."""
     found = motion(plan().v.ravel())
     made = planner()
@@ -81,9 +80,9 @@ def test_the_riccati_pass_is_the_backward_pass() -> None:
     costs = stages().expand(found, np.zeros(len(stages().lower)), 2 * stages().penalties)
     room = -8 - plan().v, 8 - plan().v
     bounds = Bounds(room[0].ravel(), room[1].ravel(), np.full(20, 2.0))
-    wanted = backward_pass(slopes, costs, knot_steps(stages()), stages().statics, bounds, 0.1)
+    wanted = backward_pass([slopes], costs, knot_steps(stages()), stages().statics, bounds, 0.1)
     own = made._costs.expand(found.x, plan().v, made.p, 0.0)
-    got = riccati_pass(slopes.a, slopes.b, own, room, 0.1 / made.scale**2)
+    got = plan_feedback(slopes.a, slopes.b, own, room, 0.1 / made.scale**2)
     assert wanted is not None and got is not None
     gains = [gain for gain in wanted.gains if gain is not None]
     assert np.array([gain.ahead for gain in gains]) == pytest.approx(got[0], rel=1e-8, abs=1e-9)
@@ -98,7 +97,7 @@ def test_the_compiled_rollout_is_the_forward_pass() -> None:
     slopes: Linearized = stages().linearize(found)
     costs = stages().expand(found, np.zeros(len(stages().lower)), 2 * stages().penalties)
     bounds = Bounds(-8 - found.z, 8 - found.z, np.full(20, 2.0))
-    policy = backward_pass(slopes, costs, knot_steps(stages()), stages().statics, bounds, 1.0)
+    policy = backward_pass([slopes], costs, knot_steps(stages()), stages().statics, bounds, 1.0)
     assert policy is not None
     wanted = forward_pass(stages(), found, policy, knot_steps(stages()), LENGTHS, (np.full(20, -8.0), np.full(20, 8.0)))
     ahead = np.array([gain.ahead for gain in policy.gains if gain is not None])

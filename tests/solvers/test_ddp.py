@@ -114,7 +114,7 @@ def test_one_step_reaches_the_minimum_of_a_linear_chain(kind: str) -> None:
     z = np.random.default_rng(2).normal(size=size)
     free = Bounds(np.full(size, -np.inf), np.full(size, np.inf), np.ones(size))
     motion, knots = problem.roll_out(z, 0.0), knot_steps(problem)
-    arguments = problem.linearize(motion), problem.expand(motion), knots, problem.statics, free
+    arguments = [problem.linearize(motion)], problem.expand(motion), knots, problem.statics, free
     policy = backward_pass(*arguments, 0.0)
     assert policy is not None
     eye, h = np.eye(size), 1.0
@@ -140,7 +140,7 @@ def test_bounds_hold_and_their_knots_do_not_answer() -> None:
     motion, knots = problem.roll_out(z, 0.0), knot_steps(problem)
     bounds = Bounds(lower, upper, np.ones(size))
     for _ in range(30):
-        arguments = problem.linearize(motion), problem.expand(motion), knots, problem.statics
+        arguments = [problem.linearize(motion)], problem.expand(motion), knots, problem.statics
         policy = backward_pass(*arguments, Bounds(lower - motion.z, upper - motion.z, bounds.scale), 1e-9)
         assert policy is not None
         motion = forward_pass(problem, motion, policy, knots, np.ones(1), (lower, upper)).motion(0, 0.0)
