@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -108,7 +109,8 @@ class _Steps:
         self._asked[:-1] |= costs.ux.any(axis=1)
         self._asked[1:] |= costs.uy.any(axis=1)
         self._mixed = bool(costs.ux.any()), bool(costs.uy.any())
-        self._lives: list[Selection] = [slice(0, 0)] * len(knots) + [_selection(self._asked[-1])]
+        last = _selection(self._asked[-1])
+        self._lives = [last] * (len(knots) + 1)
         self._start = np.zeros((costs.x.shape[1], len(statics)))
 
     def last(self) -> CostToGo:

@@ -1,8 +1,8 @@
 """The Riccati recursion: from the last step to the first, the best decisions as functions of the state, within bounds.
 
 A step leads from a state r to the state after it by r' = through @ (r, v), where v are its decisions, and costs
-slope . (r, v) + (r, v) . curve . (r, v) / 2. What a state is, and how many numbers it and the decisions have, may differ
-from step to step.
+slope . (r, v) + (r, v) . curve . (r, v) / 2. What a state is, and how many numbers it and the decisions have, may
+differ from step to step.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class RiccatiSolution(NamedTuple):
 
 
 def riccati_recursion(steps: Iterable[LinearStep], last: CostToGo) -> RiccatiSolution | None:
-    """The best decisions of all steps, the last one first; None where a Hessian is not positive definite, or not finite.
+    """The best decisions of all steps, the last one first; None where a Hessian is not positive definite.
 
     Args:
         steps: from the last to the first.
