@@ -107,18 +107,21 @@ def parts_of(method: Ilqr, first: Iteration[Any]) -> dict[str, Call]:
     """What an iteration does, call by call."""
     state, staged, knots = first.state, method.staged, method.knots
     motion = staged.roll_out(state.z, 0.0)
-    slopes = staged.linearize(motion)
+    slopes = [*staged.linearize_from_end(motion)]
     costs = staged.expand(motion, state.multipliers, state.penalties)
-    bounds, ends = method._room(state.z), (method.evaluator.lower, method.evaluator.upper)
+    bounds = method._room(state.z)
     policy = backward_pass(slopes, costs, knots, staged.statics, bounds, state.damping)
     assert policy is not None
-    motions = forward_pass(staged, motion, policy, knots, LENGTHS, ends)
+    motions = forward_pass(staged, motion, policy, method.padded, LENGTHS)
     return {
         "motion": lambda: staged.roll_out(state.z, 0.0),
-        "slopes": lambda: staged.linearize(motion),
+        "slopes": lambda: [*staged.linearize_from_end(motion)],
         "costs": lambda: staged.expand(motion, state.multipliers, state.penalties),
         "backward pass": lambda: backward_pass(slopes, costs, knots, staged.statics, bounds, state.damping),
-        "forward pass of 8": lambda: forward_pass(staged, motion, policy, knots, LENGTHS, ends),
+        "slopes and backward pass": lambda: backward_pass(
+            staged.linearize_from_end(motion), costs, knots, staged.statics, bounds, state.damping
+        ),
+        "forward pass of 8": lambda: forward_pass(staged, motion, policy, method.padded, LENGTHS),
         "their costs": lambda: staged.measure(*motions),
         "one rollout of the evaluator": lambda: method.evaluator.value(state.z),
         "whole iteration": lambda: method.step(replace(state)),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import astuple, dataclass, field
 from enum import Enum
 
@@ -145,6 +145,7 @@ class Outcome:
         counts: total work.
         checkpoint: what the solver needs to go on exactly here; JSON-able numbers, strings and lists of numbers.
         stages: those of smoothing that were begun, in their order; of an interrupted solve the last one is halfway.
+        gains: feedback about the best point, as named arrays; empty of solvers without, and of interrupted solves.
     """
 
     status: Status
@@ -154,3 +155,4 @@ class Outcome:
     counts: Counts
     checkpoint: dict[str, object] = field(default_factory=dict)
     stages: tuple[StageResult, ...] = ()
+    gains: Mapping[str, Array] = field(default_factory=dict)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from symphys import threads as linear_algebra
 from symphys.api.solution import Solution
 from symphys.api.transcriptions import transcribed
 from symphys.errors import SymphysError
@@ -96,7 +97,7 @@ def kept(folder: str | Path | None) -> Iterator[Path]:
 
 def run(job: Job, problem: Problem, backend: str, threads: int | None, progress: Progress | None) -> Result:
     """Do what is asked for into its folder; options of a solver do not change what is compiled for the problem."""
-    with Interrupts().listening() as stop:
+    with linear_algebra.limited(), Interrupts().listening() as stop:
 
         def monitor(row: TraceRow) -> None:
             if stop():

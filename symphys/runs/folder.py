@@ -9,10 +9,10 @@ from pathlib import Path
 from symphys import files
 from symphys.results.case_name import case_name
 from symphys.results.config import Config
-from symphys.results.file_names import CHECKPOINT, CONFIG, GUESS, LOG, PROBLEM, RESULT, SCENE, TRACE, TRAJECTORY
+from symphys.results.file_names import CHECKPOINT, CONFIG, GAINS, GUESS, LOG, PROBLEM, RESULT, SCENE, TRACE, TRAJECTORY
 from symphys.results.trace import trace_text
 
-WRITTEN = (RESULT, CHECKPOINT, CONFIG, TRAJECTORY, GUESS, SCENE, TRACE, LOG)
+WRITTEN = (RESULT, CHECKPOINT, CONFIG, TRAJECTORY, GUESS, GAINS, SCENE, TRACE, LOG)
 """What a run writes beside the problem; the result first, since nothing counts without it."""
 
 

@@ -11,7 +11,7 @@ from symphys import verification as trust
 from symphys.errors import SymphysError
 from symphys.findings.examination import Examination
 from symphys.findings.obstacles import capital, obstacles
-from symphys.results.file_names import CHECKPOINT, GUESS, SCENE, TRAJECTORY
+from symphys.results.file_names import CHECKPOINT, GAINS, GUESS, SCENE, TRAJECTORY
 from symphys.results.result import Result
 from symphys.results.scene_of_problem import make_scene
 from symphys.runs.job import Job
@@ -133,8 +133,10 @@ def write(
     price: Mapping[str, float],
     at_once: bool,
 ) -> None:
-    """Write trace, motion and checkpoint."""
+    """Write trace, gains, motion and checkpoint."""
     job.folder.write_trace([trace_row(row, price) for row in outcome.trace], at_once)
+    if outcome.gains:
+        files.write_npz(job.folder.path / GAINS, outcome.gains, at_once)
     if judgement.trajectory is not None:
         files.write_npz(job.folder.path / TRAJECTORY, judgement.trajectory.arrays(), at_once)
         z = transcription.shooting.by_block(outcome.z)

@@ -12,12 +12,14 @@ from symphys.shooting.shooting_problem import (
     VariableBlock,
     WithoutResiduals,
 )
-from symphys.shooting.staged_problem import Expansion, Linearized, StagedMotion, StagedProblem
+from symphys.shooting.staged_problem import AffinePolicy, Expansion, Followed, Linearized, StagedMotion, StagedProblem
 
 __all__ = [
+    "AffinePolicy",
     "Array",
     "Evaluator",
     "Expansion",
+    "Followed",
     "Function",
     "Linearized",
     "Nlp",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,7 +15,7 @@ from symphys.shooting import Expansion, Linearized, StagedMotion
 from symphys.solvers.ddp.backward_pass import Bounds, backward_pass
 from symphys.solvers.ddp.box_qp import solve_box_qp
 from symphys.solvers.ddp.forward_pass import forward_pass
-from symphys.solvers.ddp.knots import knot_steps
+from symphys.solvers.ddp.knots import PaddedKnots, knot_steps
 
 Array = NDArray[np.float64]
 
@@ -72,9 +73,20 @@ class LinearChain:
         end = motion.x[-1] @ self.H[:3, :3] @ motion.x[-1] / 2
         return float(np.einsum("ki,ij,kj->", both, self.H, both) / 2 + cross + end + z[self.statics] @ z[self.statics])
 
+    def follow(self, *arguments: Any) -> None:
+        """Not at once."""
+        return None
+
     def linearize(self, motion: StagedMotion) -> Linearized:
         """The matrices, at every step."""
         return Linearized(*(np.repeat(each[None], self.steps, axis=0) for each in (self.A, self.B, self.C)), self.S)
+
+    def linearize_from_end(self, motion: StagedMotion) -> Iterator[Linearized]:
+        """Step by step."""
+        found = self.linearize(motion)
+        parts = found.a, found.b, found.c
+        for k in reversed(range(self.steps)):
+            yield Linearized(*(part[k : k + 1] for part in parts), found.start)
 
     def expand(self, motion: StagedMotion) -> Expansion:
         """The cost is its own expansion."""
@@ -114,7 +126,7 @@ def test_one_step_reaches_the_minimum_of_a_linear_chain(kind: str) -> None:
     z = np.random.default_rng(2).normal(size=size)
     free = Bounds(np.full(size, -np.inf), np.full(size, np.inf), np.ones(size))
     motion, knots = problem.roll_out(z, 0.0), knot_steps(problem)
-    arguments = problem.linearize(motion), problem.expand(motion), knots, problem.statics, free
+    arguments = problem.linearize_from_end(motion), problem.expand(motion), knots, problem.statics, free
     policy = backward_pass(*arguments, 0.0)
     assert policy is not None
     eye, h = np.eye(size), 1.0
@@ -123,8 +135,9 @@ def test_one_step_reaches_the_minimum_of_a_linear_chain(kind: str) -> None:
     hessian = (table[:-1, :-1] - table[:-1, -1:] - table[-1:, :-1] + here) / h**2
     slope = np.array([(problem.objective(z + e) - problem.objective(z - e)) / 2 for e in eye])
     np.testing.assert_allclose(policy.gradient, slope, rtol=1e-9, atol=1e-9)
+    padded = PaddedKnots.of(knots, z + free.down, z + free.up)
     best = z - np.linalg.solve(hessian, slope)
-    found = forward_pass(problem, motion, policy, knots, np.array([1.0, 0.5]), (z + free.down, z + free.up))
+    found = forward_pass(problem, motion, policy, padded, np.array([1.0, 0.5]))
     np.testing.assert_allclose(found.z[0], best, rtol=1e-7, atol=1e-8)
     fall = here - problem.objective(found.z[0])
     assert fall == pytest.approx(-(policy.first + policy.second), rel=1e-9)
@@ -138,12 +151,12 @@ def test_bounds_hold_and_their_knots_do_not_answer() -> None:
     z = np.zeros(size)
     lower, upper = np.full(size, -0.05), np.full(size, 0.05)
     motion, knots = problem.roll_out(z, 0.0), knot_steps(problem)
-    bounds = Bounds(lower, upper, np.ones(size))
+    bounds, padded = Bounds(lower, upper, np.ones(size)), PaddedKnots.of(knots, lower, upper)
     for _ in range(30):
-        arguments = problem.linearize(motion), problem.expand(motion), knots, problem.statics
+        arguments = problem.linearize_from_end(motion), problem.expand(motion), knots, problem.statics
         policy = backward_pass(*arguments, Bounds(lower - motion.z, upper - motion.z, bounds.scale), 1e-9)
         assert policy is not None
-        motion = forward_pass(problem, motion, policy, knots, np.ones(1), (lower, upper)).motion(0, 0.0)
+        motion = forward_pass(problem, motion, policy, padded, np.ones(1)).motion(0, 0.0)
     assert np.all(motion.z >= lower) and np.all(motion.z <= upper)
     pushed = np.clip(motion.z - policy.gradient, lower, upper) - motion.z
     np.testing.assert_allclose(pushed, 0.0, atol=1e-8)
