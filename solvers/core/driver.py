@@ -6,7 +6,7 @@ solve, the errors of foreign code, the trace and continuation are here, the same
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
@@ -169,6 +169,7 @@ class Driver:
         self._last: Array | None = None
         self._stages: tuple[StageResult, ...] = ()
         self._checkpoint: Checkpoint | None = None
+        self._multipliers: Mapping[str, Array] = {}
 
     def run(self) -> Outcome:
         """Run every stage; whatever happens becomes a status with advice. SymphysError alone passes through."""
@@ -180,9 +181,9 @@ class Driver:
         self._request.log(str(reason))
         if reason.status is Status.INTERRUPTED and self._checkpoint is not None:
             return self._interrupted(reason, self._checkpoint)
-        return Outcome(
-            reason.status, reason.advice, z, self._trace.rows, self._evaluator.counter.counts, {}, self._stages
-        )
+        multipliers = self._multipliers if reason.status in (Status.MET, Status.CONVERGED) else {}
+        counts = self._evaluator.counter.counts
+        return Outcome(reason.status, reason.advice, z, self._trace.rows, counts, {}, self._stages, multipliers)
 
     def commit(self, iteration: Iteration[Any]) -> None:
         """See ``IterationRecorder``."""
@@ -215,6 +216,10 @@ class Driver:
         if self._checkpoint:
             last = self._trace.rows[self._checkpoint.rows - 1]
             self._checkpoint = replace(self._checkpoint, counts=counts_of(last))
+
+    def multipliers(self, found: Mapping[str, Array]) -> None:
+        """See ``IterationRecorder``."""
+        self._multipliers = found
 
     @property
     def rows(self) -> int:

@@ -92,8 +92,7 @@ def along(problem: Problem) -> bool:
 
 def limited(problem: Problem) -> bool:
     """Whether states are constrained along the way, or the file has a guess of them."""
-    nodes = problem.solver_tables.get("multiple_shooting", {}).get("nodes")
-    return bool(nodes) or any(each.at == ALWAYS for each in problem.constraints)
+    return problem.guess is not None or any(each.at == ALWAYS for each in problem.constraints)
 
 
 SITUATIONS = (

@@ -201,6 +201,8 @@ class ShootingProblem:
             more than one state. None: there is none, as of problems with scenarios.
         guessed_states: (z (n,), numbers (M,) of states from 1 on, smoothing) -> (M, nx) where the motion is guessed to
             pass. None: where the rollout of z leads.
+        multipliers: those that a solve of this or a like problem ended with where its guess is, see
+            ``Outcome.multipliers``; empty where none are known.
     """
 
     name: str
@@ -218,6 +220,7 @@ class ShootingProblem:
     scenario: ScenarioEvaluator | None = None
     staged: Callable[[], StagedProblem] | None = None
     guessed_states: Callable[[Array, Indices, float], Array] | None = None
+    multipliers: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def n(self) -> int:

@@ -60,7 +60,7 @@ def made(tmp_path: Path, sets: str, *more: str) -> Problem:
         (CONTROL, SHARE, ["ilqr", "ipopt"]),
         (CONTROL, ALONG, ["ilqr", "ipopt"]),
         (CONTROL, ALONG + WALL, ["ilqr", "multiple_shooting"]),
-        (CONTROL, ALONG + "\n[solver.multiple_shooting]\nnodes = [[1, 2], [3, 4]]\n", ["ilqr", "multiple_shooting"]),
+        (CONTROL, ALONG + "\n[guess]\nstates = [{ at = 0, ball.position = [0, 0, 1] }]\n", ["ilqr", "multiple_shooting"]),
         (CONTROL, WHOLE, ["ipopt", "gradient"]),
     ],
 )
