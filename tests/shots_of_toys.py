@@ -27,7 +27,7 @@ every_backend = pytest.mark.parametrize("backend", ["ipopt", "fatrop"])
 
 
 def solve(problem: ShootingProblem, start: Any = None, **options: Any) -> Outcome:
-    """The rest of the arguments of a solve are among the options; ``nodes``: states between which the guess is lines."""
+    """The rest of the arguments of a solve are among the options; ``nodes``: states that lines of the guess join."""
     if "nodes" in options:
         problem = replace(problem, guessed_states=lines(problem, options.pop("nodes")))
     more = {name: options.pop(name) for name in ("monitor", "checkpoint", "keep", "log") if name in options}

@@ -100,7 +100,7 @@ class IterationRecorder(Protocol):
         ...
 
     def multipliers(self, found: Mapping[str, Array]) -> None:
-        """Note the multipliers of the present iterate, which are part of the outcome where the solve ends well there."""
+        """Note the multipliers of the present iterate: they are part of the outcome if the solve ends well there."""
         ...
 
     @property

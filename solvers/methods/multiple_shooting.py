@@ -178,7 +178,7 @@ def guess(problem: StagedProblem, context: StageContext, options: MultipleShooti
 def warm_started(
     context: StageContext, nlp: MultipleShootingNlp, state: MultipleShootingState
 ) -> MultipleShootingState:
-    """The start with the multipliers that are known for the guess, in the first stage and if the guess is unperturbed."""
+    """The start with the multipliers of the guess, in the first stage and where the seed leaves the guess as it is."""
     problem, smoothing = context.evaluator.problem, context.evaluator.smoothing
     if not problem.multipliers or context.seed or smoothing != problem.smoothing[0]:
         return state
@@ -247,7 +247,8 @@ class ShootingWatch:
         z, shots = self.evaluator.clip(nlp.unpack(w)[0]), nlp.shots(w)
         turns = shots.turns
         known = multipliers_at(nlp, self.evaluator, w, bound_duals, row_duals)
-        self.state = MultipleShootingState(before.iteration + 1, z, shots.nodes, known.bounds, known.rows, known.barrier)
+        duals = known.bounds, known.rows, known.barrier
+        self.state = MultipleShootingState(before.iteration + 1, z, shots.nodes, *duals)
         self.recorder.multipliers(known.by_name(nlp))
         defect = float(np.abs(shots.defects).max())
         step = float(np.linalg.norm(z - before.z))

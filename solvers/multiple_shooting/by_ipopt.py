@@ -13,7 +13,14 @@ from typing import Any
 import casadi as ca
 
 from symphys.solvers.methods.ipopt_options import SILENT
-from symphys.solvers.multiple_shooting.library import POINT, IterateWatch, LibraryRequest, LibraryResult, NlpPart, called
+from symphys.solvers.multiple_shooting.library import (
+    POINT,
+    IterateWatch,
+    LibraryRequest,
+    LibraryResult,
+    NlpPart,
+    called,
+)
 from symphys.solvers.multiple_shooting.nlp import MultipleShootingNlp
 
 

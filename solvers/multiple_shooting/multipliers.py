@@ -84,11 +84,7 @@ def at_nodes(nlp: MultipleShootingNlp, w: Array, rows: Array) -> Array:
 def barrier_at(nlp: MultipleShootingNlp, lower: Array, upper: Array, w: Array, bounds: Array, rows: Array) -> float:
     """The mean product of multipliers and distances from their bounds, within what IPOPT may start from.
 
-    Args:
-        nlp: the program.
-        lower, upper: (len(z),) bounds of z.
-        w: (size,) the iterate.
-        bounds, rows: its multipliers.
+    Bounds (len(z),) are those of z; w (size,) is the iterate, ``bounds`` (size,) and ``rows`` its multipliers.
     """
     products = []
     limits = (nlp.bounds(lower, upper), nlp.row_bounds())

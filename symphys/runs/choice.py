@@ -110,7 +110,7 @@ SITUATIONS = (
         (ChosenSolver("stochastic", "samples of its scenarios differ, and it has too many numbers to search in"),),
     ),
     Situation(
-        "controls over time, limits along the way",
+        "controls over time, states limited or guessed",
         lambda problem: staged(problem) and limited(problem),
         (
             ChosenSolver("ilqr", "its controls act over time, and what it asks for is summed step by step"),

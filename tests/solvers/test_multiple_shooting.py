@@ -153,7 +153,7 @@ def test_multipliers_are_those_of_the_program() -> None:
     slopes = ca.DM(nlp.jacobian_pattern.sparsity, nlp.jacobian(w))
     residual = nlp.gradient(w) + (slopes.T @ known.rows).full().ravel() + known.bounds
     assert np.abs(residual).max() < 1e-4 * np.abs(nlp.gradient(w)).max()  # z's rollout is off the nodes
-    assert np.abs(known.bounds).max() > 0.1 and np.abs(known.bounds[np.abs(w) < 7]).max(initial=0.0) < 1e-6
+    assert np.abs(known.bounds).max() > 0.05 and np.abs(known.bounds[np.abs(w) < 7]).max(initial=0.0) < 1e-6
 
 
 def test_a_motion_on_another_grid_is_a_guess() -> None:
