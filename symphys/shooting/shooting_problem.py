@@ -15,6 +15,8 @@ from symphys.shooting.staged_problem import Indices, StagedProblem
 Array = NDArray[np.float64]
 Function = Any
 """casadi.Function"""
+GuessedStates = Callable[[Array, Indices, float], Array]
+"""See ``ShootingProblem.guessed_states``."""
 
 
 @dataclass(frozen=True)
@@ -219,7 +221,7 @@ class ShootingProblem:
     output_names: tuple[str, ...] = ()
     scenario: ScenarioEvaluator | None = None
     staged: Callable[[], StagedProblem] | None = None
-    guessed_states: Callable[[Array, Indices, float], Array] | None = None
+    guessed_states: GuessedStates | None = None
     multipliers: Mapping[str, Array] = field(default_factory=dict)
 
     @property
