@@ -182,6 +182,7 @@ class Driver:
         self._last: Array | None = None
         self._stages: tuple[StageResult, ...] = ()
         self._checkpoint: Checkpoint | None = None
+        self._multipliers: Mapping[str, Array] = {}
 
     def run(self) -> Outcome:
         """Run every stage; whatever happens becomes a status with advice. SymphysError alone passes through."""
@@ -193,6 +194,7 @@ class Driver:
         self._request.log(str(reason))
         if reason.status is Status.INTERRUPTED and self._checkpoint is not None:
             return self._interrupted(reason, self._checkpoint)
+        multipliers = self._multipliers if reason.status in (Status.MET, Status.CONVERGED) else {}
         return Outcome(
             reason.status,
             reason.advice,
@@ -202,6 +204,7 @@ class Driver:
             {},
             self._stages,
             self._gains(reason.status, z),
+            multipliers,
         )
 
     def _gains(self, status: Status, z: Array) -> Mapping[str, Array]:
@@ -244,6 +247,10 @@ class Driver:
         if self._checkpoint:
             last = self._trace.rows[self._checkpoint.rows - 1]
             self._checkpoint = replace(self._checkpoint, counts=counts_of(last))
+
+    def multipliers(self, found: Mapping[str, Array]) -> None:
+        """See ``IterationRecorder``."""
+        self._multipliers = found
 
     @property
     def rows(self) -> int:

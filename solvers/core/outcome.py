@@ -146,6 +146,8 @@ class Outcome:
         checkpoint: what the solver needs to go on exactly here; JSON-able numbers, strings and lists of numbers.
         stages: those of smoothing that were begun, in their order; of an interrupted solve the last one is halfway.
         gains: feedback about the best point, as named arrays; empty of solvers without, and of interrupted solves.
+        multipliers: those of a solve that ended well, by names of the solver's own, from which another may start; empty
+            where the solver has none.
     """
 
     status: Status
@@ -156,3 +158,4 @@ class Outcome:
     checkpoint: dict[str, object] = field(default_factory=dict)
     stages: tuple[StageResult, ...] = ()
     gains: Mapping[str, Array] = field(default_factory=dict)
+    multipliers: Mapping[str, Array] = field(default_factory=dict)

@@ -19,6 +19,7 @@ from symphys.problem.checks.pair_limit import check_pair_limit
 from symphys.problem.checks.start import at_guess, check_joints, check_overlap, formula_names, sensor_names
 from symphys.problem.checks.start_values import StartValues
 from symphys.problem.feedback import FeedbackController, ForceLaw, Sensor
+from symphys.problem.guess.table import read_guess
 from symphys.problem.include.files import appendix
 from symphys.problem.model import ALIVE, Array, ProblemData, Simulation, Termination, Variable
 from symphys.problem.parametric.collision_filter import CollisionFilter
@@ -43,7 +44,6 @@ from symphys.problem.tables.contact import (
 )
 from symphys.problem.tables.controllers import read_controllers, read_sensors
 from symphys.problem.tables.forces import force_quantities, read_forces
-from symphys.problem.tables.guess import read_guess
 from symphys.problem.tables.joints import read_joints
 from symphys.problem.tables.objectives import Objectives, read_objectives
 from symphys.problem.tables.scenarios import read_scenarios

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from symphys.expression import Formula
 from symphys.model.world import Scheme, World
 from symphys.problem.feedback import FeedbackController, ForceLaw, Sensor
+from symphys.problem.guess.motion import GuessedMotion
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.receding_horizon import RecedingHorizon
-from symphys.problem.references import GuessedMotion, ReferenceTrajectory
+from symphys.problem.references import ReferenceTrajectory
 from symphys.problem.sweeps.sweep import Sweep
 
 Array = NDArray[np.float64]
