@@ -213,7 +213,8 @@ class Driver:
             return {}
         try:
             return self._request.feedback(self._request.problem, z, self._request.problem.smoothing[-1])
-        except (RuntimeError, ArithmeticError, np.linalg.LinAlgError, MemoryError):
+        except (RuntimeError, ArithmeticError, np.linalg.LinAlgError, MemoryError) as error:
+            self._request.log(f"no feedback gains: {str(error).strip() or type(error).__name__}")
             return {}
 
     def commit(self, iteration: Iteration[Any]) -> None:
