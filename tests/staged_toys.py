@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from single_steps import SingleSteps
 
 from symphys.shooting import (
     Expansion,
@@ -54,7 +55,7 @@ class Formulas:
     difference: Callable[[Any, Any], Any] = lambda x, y: y - x
 
 
-class Chain:
+class Chain(SingleSteps):
     """A ``StagedProblem`` of formulas; knots are linear between steps, or constant where there is one for each step."""
 
     def __init__(
@@ -124,21 +125,11 @@ class Chain:
             x.append(self.step(k, x[-1][None], u[k][None], z[None], smoothing)[0])
         return StagedMotion(z, np.array(x), u, smoothing)
 
-    def follow(self, *arguments: Any) -> None:
-        """Not at once."""
-        return None
-
     def linearize(self, motion: StagedMotion) -> Linearized:
         p, x, u = self.p(motion.z), motion.x, motion.u
         P = np.tile(p, (self.steps, 1))
         a, b, c = blocks(self.f_slopes, x[:-1], batch(self.f_step, x[:-1], u, P), u, P)
         return Linearized(a, b, c, self.f_first(p, self.f_start(p)).full())
-
-    def linearize_from_end(self, motion: StagedMotion) -> Iterator[Linearized]:
-        found = self.linearize(motion)
-        parts = found.a, found.b, found.c
-        for k in reversed(range(self.steps)):
-            yield Linearized(*(part[k : k + 1] for part in parts), found.start)
 
     def retract(self, X: Array, D: Array) -> Array:
         return batch(self.f_retract, X, D)

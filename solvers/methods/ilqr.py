@@ -45,7 +45,7 @@ class IlqrOptions(SolverOptions):
 
     Attributes:
         iterations: linearisations at most, in each stage of smoothing.
-        damping: first lambda, as a share of the mean curvature of the first step's knots.
+        damping: first lambda, added to the curvature of the objective by each knot, in units of its scale.
         tolerance: converged where the expected fall is below tolerance * (1 + |objective|).
         patience: stalled where the objective has not fallen by 1e-5 of itself in so many iterations; 0 goes on.
         penalty: first penalty of the constraints, as a factor on their own.

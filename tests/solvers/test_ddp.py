@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 import pytest
 import scipy.sparse
 from numpy.typing import NDArray
+from single_steps import SingleSteps
 
 from symphys.shooting import Expansion, Linearized, StagedMotion
 from symphys.solvers.ddp.backward_pass import Bounds, backward_pass
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass
-class LinearChain:
+class LinearChain(SingleSteps):
     """x' = A x + B u + C s and x0 = offset + S s, with a quadratic cost of (x, u) and of (x', u) in every step."""
 
     weights: Any
@@ -73,20 +73,9 @@ class LinearChain:
         end = motion.x[-1] @ self.H[:3, :3] @ motion.x[-1] / 2
         return float(np.einsum("ki,ij,kj->", both, self.H, both) / 2 + cross + end + z[self.statics] @ z[self.statics])
 
-    def follow(self, *arguments: Any) -> None:
-        """Not at once."""
-        return None
-
     def linearize(self, motion: StagedMotion) -> Linearized:
         """The matrices, at every step."""
         return Linearized(*(np.repeat(each[None], self.steps, axis=0) for each in (self.A, self.B, self.C)), self.S)
-
-    def linearize_from_end(self, motion: StagedMotion) -> Iterator[Linearized]:
-        """Step by step."""
-        found = self.linearize(motion)
-        parts = found.a, found.b, found.c
-        for k in reversed(range(self.steps)):
-            yield Linearized(*(part[k : k + 1] for part in parts), found.start)
 
     def expand(self, motion: StagedMotion) -> Expansion:
         """The cost is its own expansion."""

@@ -16,11 +16,9 @@ from symphys.errors import SymphysError
 from symphys.problem import Problem, load_problem
 from symphys.shooting import StagedMotion, StagedProblem
 from symphys.solvers.ddp.backward_pass import Bounds, backward_pass
-from symphys.solvers.ddp.forward_pass import affine, forward_pass
-from symphys.solvers.ddp.knots import PaddedKnots, knot_steps
+from symphys.solvers.ddp.knots import knot_steps
 from symphys.transcription import Transcription, transcribe
 from symphys.transcription.staged import stage_functions
-from symphys.transcription.staged.staged_problem import RolloutStages
 from symphys.transcription.staged.tangent import Tangent
 from symphys.transcription.staged.term_groups import TermGroups
 
@@ -314,28 +312,6 @@ def test_the_gradient_along_the_steps_is_that_of_the_whole(case: tuple[str, int,
         assert policy is not None
         assert costs.value == pytest.approx(value[0], rel=1e-12)
         np.testing.assert_allclose(policy.gradient, gradient, atol=1e-10 * np.abs(gradient).max())
-
-
-@pytest.mark.parametrize("case", [CASES[4], CASES[5]])
-def test_motions_under_a_policy_are_those_of_single_steps(
-    case: tuple[str, int, str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """With knots that act in several steps, static entries, and bounds that hold some knots."""
-    transcription, _, motion = made(*case)
-    staged = RolloutStages(transcription.rollout, threads=1)
-    size, knots = len(motion.z), knot_steps(staged)
-    free = Bounds(np.full(size, -np.inf), np.full(size, np.inf), np.ones(size))
-    costs = staged.expand(motion, np.zeros(len(staged.lower)), 2 * staged.penalties)
-    policy = backward_pass(staged.linearize_from_end(motion), costs, knots, staged.statics, free, 1.0)
-    assert policy is not None
-    padded = PaddedKnots.of(knots, motion.z - 0.02, motion.z + np.linspace(0.01, 0.03, size))
-    lengths = np.array([1.0, 0.25, 1e-3])
-    found = forward_pass(staged, motion, policy, padded, lengths)
-    assert staged.follow(affine(motion, policy, padded), motion.z, found.z, lengths, 0.0) is not None
-    monkeypatch.setattr(staged, "follow", lambda *_: None)
-    wanted = forward_pass(staged, motion, policy, padded, lengths)
-    for one, other in zip(found, wanted, strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9)
 
 
 @first("case", CASES)
