@@ -10,8 +10,9 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.model.state_layout import input_sizes
 from symphys.problem.feedback import FeedbackController
-from symphys.problem.model import DURATION, Kind, VariableSlot
+from symphys.problem.model import DURATION, Kind, ProblemData, Variable, VariableSlot
 from symphys.problem.parametric.parts import VARIABLE
 from symphys.suggest import hint, quote
 
@@ -103,6 +104,21 @@ def unknown(name: str, known: Mapping[str, Quantity]) -> str:
     same_owner = [other for other in known if owner and other.startswith(f"{owner}.")]
     stated = f"; what states no {key} has none to vary" if key in VARIABLE else ""
     return hint(name, same_owner or known) + stated
+
+
+def set_quantities(problem: ProblemData, variable: Variable) -> str:
+    """What a variable sets, as a file writes it; all that a list names gets the same values, which may not be meant."""
+    values = {**problem.initial, **problem.parameters, **problem.weights}
+    sizes = {DURATION: 1, **{name: value.size for name, value in values.items()}, **input_sizes(problem.world())}
+
+    def text(slot: VariableSlot) -> str:
+        first, count = slot.components[0], len(slot.components)
+        if count == sizes[slot.name]:
+            return slot.name
+        return f"{slot.name}[{first}]" if count == 1 else f"{slot.name}[{first}:{first + count}]"
+
+    *others, last = map(text, variable.slots)
+    return f"{', '.join(others)} and {last} to the same values" if others else last
 
 
 def physical(name: str, kind: Kind) -> tuple[float, float]:
