@@ -161,5 +161,7 @@ def given(problem: Problem) -> list[str]:
     steps, dt = problem.simulation.steps, problem.simulation.dt
     for phase in problem.phases:
         first, last = phase.ticks(steps)
-        lines.append(f"  phase        {phase.name}: {first * dt:g} s to {last * dt:g} s")
+        numbers = (f"{name} = {row[0] if len(row) == 1 else list(row)}" for name, row in phase.sets.items())
+        own = f", with {listed(numbers)}" if phase.sets else ""
+        lines.append(f"  phase        {phase.name}: {first * dt:g} s to {last * dt:g} s{own}")
     return lines

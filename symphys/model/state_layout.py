@@ -123,7 +123,8 @@ def initial_state(world: World, values: Mapping[str, Any] = NOTHING) -> Any:
 def input_sizes(world: World) -> dict[str, int]:
     """What may act on a world from outside, and how many numbers each has: forces and torques, commands of motors."""
     forces = {f"{body.name}.{field}": 3 for body in world.bodies for field in INPUT_FIELDS}
-    return forces | {f"{joint.name}.command": len(joint.kind.coordinates) for joint in world.joints if joint.driven}
+    commands = {f"{joint.name}.command": len(joint.kind.coordinates) for joint in world.joints if joint.driven}
+    return forces | commands | {name: 1 for name, _ in world.scheduled}
 
 
 def input_names(world: World) -> list[str]:
@@ -146,6 +147,13 @@ def input_columns(world: World, inputs: Sequence[str]) -> dict[str, slice]:
         stop = start + (sizes[name] if name in sizes else input_size(world, name))
         columns[name], start = slice(start, stop), stop
     return columns
+
+
+def input_symbols(world: World, inputs: Sequence[str]) -> Any:
+    """U as symbols (SX); what is scheduled are those of the world."""
+    scheduled, sizes = dict(world.scheduled), input_sizes(world)
+    sizes |= {name: input_size(world, name) for name in inputs if name not in sizes}
+    return ca.vertcat(ca.SX(0, 1), *(scheduled.get(name, ca.SX.sym(name, sizes[name])) for name in inputs))
 
 
 def inputs_size(world: World, inputs: Sequence[str]) -> int:

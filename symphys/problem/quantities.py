@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from math import inf
 
@@ -43,12 +43,14 @@ class SlotError(ValueError):
 class Quantity:
     """Something that a variable can set: (components,) as the file has it.
 
-    ``own_scale``: whether it typically changes by its own size, as parameters do.
+    ``own_scale``: whether it typically changes by its own size, as parameters do. ``like``: the parameter in whose
+    place it stands; None for what stands for itself.
     """
 
     kind: Kind
     nominal: Array
     own_scale: bool = False
+    like: str | None = None
 
 
 def quantities(
@@ -95,7 +97,7 @@ def read_slot(text: str, known: Mapping[str, Quantity]) -> VariableSlot:
     return VariableSlot(name, tuple(chosen))
 
 
-def unknown(name: str, known: Mapping[str, Quantity]) -> str:
+def unknown(name: str, known: Collection[str]) -> str:
     """The nearest quantities; for a coefficient that no table states, how to state it."""
     owner, _, key = name.rpartition(".")
     owners = dict.fromkeys(other.rpartition(".")[0] for other in known)
@@ -130,7 +132,9 @@ def physical(name: str, kind: Kind) -> tuple[float, float]:
 def limits(slot: VariableSlot, known: Mapping[str, Quantity]) -> tuple[Array, Array]:
     """(components,) twice: the bounds that hold where the file states none."""
     key = slot.name.rpartition(".")[2]
-    low, high = (np.full(len(slot.components), limit) for limit in physical(slot.name, known[slot.name].kind))
+    like, kind = known[slot.name].like, known[slot.name].kind
+    ends = physical(slot.name, kind) if like is None else physical(like, "parameter")
+    low, high = (np.full(len(slot.components), limit) for limit in ends)
     if key in OPEN:
         low = LEAST_SHARE * known[slot.name].nominal[list(slot.components)]
     return low, high

@@ -40,7 +40,8 @@ def start_of(problem: Problem, world: World, inputs: Sequence[str], parameters: 
     """The rollout's start as a function of z."""
     initial = {name: ca.MX(ca.DM(value)) for name, value in problem.initial.items()}
     physical = {name: ca.MX(value) for name, value in zip(parameters.names, parameters.nominal, strict=True)}
-    u = ca.MX.zeros(inputs_size(world, inputs), problem.simulation.steps)
+    steps, scheduled = problem.simulation.steps, parameters.phases.at(ca.DM(np.arange(problem.simulation.steps)).T)
+    u = ca.vertcat(ca.MX.zeros(inputs_size(world, inputs) - scheduled.shape[0], steps), scheduled)
     for variable, (first, last) in zip(problem.variables, spans(problem.variables), strict=True):
         part = z[first:last]
         if variable.kind == "control":

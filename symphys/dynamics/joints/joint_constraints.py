@@ -227,8 +227,8 @@ def _affine(
         given = held(given, end, settings.smoothing) if isfinite(end) else given
     drive, ends = gear * (motor.gain * given + motor.offset), _force_ends(motor)
     if motor.passive:
-        for end, held in zip(ends, (at_least, at_most), strict=True):
-            drive = drive if end is None else held(drive, end, width / kick)
+        for force, held in zip(ends, (at_least, at_most), strict=True):
+            drive = drive if force is None else held(drive, force, width / kick)
         return _driven(at, drive, command, substep)
     pull, slope = _spring(settings, at, substep, Spring(gear**2 * motor.kp, gear**2 * motor.kv))
     law = by_law(pull - _impulse(drive, command, substep), slope, at.mobility)
