@@ -23,6 +23,7 @@ from symphys.problem.model import (
 )
 from symphys.problem.parametric.reposition import reposition
 from symphys.problem.problem import Problem, load_problem, problem_of_tables
+from symphys.problem.quantities import set_quantities
 from symphys.problem.reading.solver_options import require_solvers, validate_options
 from symphys.problem.receding_horizon import PlantSettings, RecedingHorizon
 from symphys.problem.robot_alone import is_robot, robot_alone
@@ -62,5 +63,6 @@ __all__ = [
     "require_solvable",
     "require_solvers",
     "robot_alone",
+    "set_quantities",
     "validate_options",
 ]

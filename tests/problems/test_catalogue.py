@@ -38,6 +38,7 @@ SHIPPED = [
     "half_cheetah_run",
     "hopper_jump",
     "hopper_run",
+    "ice_and_asphalt",
     "juggle",
     "knock",
     "parcel",

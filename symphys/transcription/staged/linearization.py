@@ -86,9 +86,9 @@ class Linearization:
         return start, np.where(np.abs(left) > ROUNDING * np.abs(first).max(initial=0.0), left, 0.0), parameters
 
     def begun(self, z: Array) -> tuple[Array, Array, Array]:
-        """First state (nx,), inputs (N, m) and p (np,)."""
+        """First state (nx,), inputs (N, m) without shares of phases, and p (np,)."""
         x0, u, p = (np.array(part) for part in self._start.call([z]))
-        return x0.ravel(), np.ascontiguousarray(u.T), p.ravel()
+        return x0.ravel(), np.ascontiguousarray(u[: self.rollout.controls].T), p.ravel()
 
     @cached_property
     def _start(self) -> ca.Function:

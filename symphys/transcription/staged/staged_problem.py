@@ -69,7 +69,7 @@ class RolloutStages:
         self._groups = TermGroups(rollout, self.tangent, backend, threads)
         self.terms = self._groups.terms
         self._sums = len(self._groups.symbols.sums.sums)
-        self._given = int(rollout.given.shape[0])
+        self._given = rollout.controls
         self.state_size, self.tangent_size = int(rollout.x0.shape[0]) + self._sums, self.tangent.size + self._sums
         self.weights, (which, places) = _input_weights(rollout, self._groups.symbols.named, self.statics)
         self._knots = int(rollout.p.shape[0]) + which, places
@@ -331,10 +331,10 @@ def _input_weights(rollout: Rollout, named: Indices, statics: Indices) -> tuple[
 
     The inputs of a step are those of the rollout, then the named knots that begin to act there.
     """
-    u, steps = ca.vec(rollout.given), rollout.steps
+    m, steps = rollout.controls, rollout.steps
+    u = ca.vec(rollout.given[:m, :])
     slope = ca.DM(ca.Function("u", [rollout.z], [ca.jacobian(u, rollout.z)])(0))
     rows, columns = (np.array(each, np.int64) for each in slope.sparsity().get_triplet())
-    m = int(rollout.given.shape[0])
     begins = np.full(int(slope.shape[1]), steps - 1)
     np.minimum.at(begins, columns, rows // max(m, 1))
     which = np.flatnonzero(~np.isin(named, statics))
