@@ -1,6 +1,6 @@
 """The tasks of IDTO: iterations and seconds of iLQR, and the answer at half the time step.
 
-    python benchmarks/idto_tasks.py [pendulum acrobot spinner]
+    python benchmarks/idto_tasks.py [pendulum acrobot spinner hopper air_hockey]
 
 Seconds are of the process, over all its threads, after the kernels are compiled and called once; wall seconds are
 beside them. ``worst`` is the largest error of a target in units of its tolerance. Both columns at half the step
@@ -18,7 +18,7 @@ from symphys.solvers import solver
 from symphys.transcription import Transcription, transcribe
 from symphys.verification.refinement import FINER_DT, finer_problem
 
-TASKS = ("pendulum", "acrobot", "spinner")
+TASKS = ("pendulum", "acrobot", "spinner", "hopper", "air_hockey")
 
 
 def main() -> None:

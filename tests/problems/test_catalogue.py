@@ -15,6 +15,7 @@ from symphys.problem import load_problem
 
 SHIPPED = [
     "acrobot",
+    "air_hockey",
     "ant_walk",
     "arm_reach",
     "ball_throw",
@@ -36,6 +37,7 @@ SHIPPED = [
     "gait_robot_fast",
     "gait_robot_trot",
     "half_cheetah_run",
+    "hopper",
     "hopper_jump",
     "hopper_run",
     "ice_and_asphalt",
