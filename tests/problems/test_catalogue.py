@@ -51,6 +51,7 @@ SHIPPED = [
     "sled",
     "spinner",
     "stairs",
+    "three_hops",
     "two_balls",
     "walker2d_walk",
 ]
