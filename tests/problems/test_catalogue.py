@@ -38,6 +38,7 @@ SHIPPED = [
     "gait_robot_trot",
     "half_cheetah_run",
     "hopper",
+    "hopper_gait",
     "hopper_jump",
     "hopper_run",
     "ice_and_asphalt",
@@ -54,6 +55,7 @@ SHIPPED = [
     "sled",
     "spinner",
     "stairs",
+    "three_hops",
     "two_balls",
     "walker2d_walk",
 ]
