@@ -16,6 +16,7 @@ from symphys.problem import load_problem
 SHIPPED = [
     "acrobot",
     "ant_walk",
+    "arm_ball",
     "arm_reach",
     "ball_throw",
     "bank_shot",
@@ -40,6 +41,7 @@ SHIPPED = [
     "hopper_run",
     "juggle",
     "knock",
+    "mini_cheetah",
     "parcel",
     "pendulum",
     "push_and_fly",
