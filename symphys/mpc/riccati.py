@@ -81,6 +81,6 @@ def _decided(hessian: Array, slope: Array, cross: Array, lower: Array, upper: Ar
         return None
     gains = np.zeros_like(cross)
     if found.factor is not None:
-        answer, _ = scipy.linalg.lapack.dpotrs(found.factor[0], cross[found.free], lower=1)
+        answer, _ = scipy.linalg.lapack.dpotrs(found.factor, cross[found.free], lower=1)
         gains[found.free] = -answer
     return found.step, gains
