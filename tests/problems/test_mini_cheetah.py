@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shipped import short_descent, shipped, solve
+from shipped import shipped, short_descent, solve
 
 from symphys.verification.refinement import FINER_DT, finer_problem
 
