@@ -1,6 +1,6 @@
 """The tasks of IDTO: iterations and seconds of iLQR, and the answer at half the time step.
 
-    python benchmarks/idto_tasks.py [pendulum acrobot spinner hopper air_hockey]
+    python benchmarks/idto_tasks.py [pendulum acrobot spinner hopper air_hockey arm_ball mini_cheetah]
 
 Seconds are of the process, over all its threads, after the kernels are compiled and called once; wall seconds are
 beside them. ``worst`` is the largest error of a target in units of its tolerance. Both columns at half the step
@@ -12,13 +12,17 @@ from __future__ import annotations
 import argparse
 from time import perf_counter, process_time
 
-from symphys.problem import load_problem, validate_options
-from symphys.problems import find
-from symphys.solvers import solver
-from symphys.transcription import Transcription, transcribe
-from symphys.verification.refinement import FINER_DT, finer_problem
+from symphys import threads
 
-TASKS = ("pendulum", "acrobot", "spinner", "hopper", "air_hockey")
+threads.limit()  # before numpy is loaded, as the command line does
+
+from symphys.problem import load_problem, validate_options  # noqa: E402
+from symphys.problems import find  # noqa: E402
+from symphys.solvers import solver  # noqa: E402
+from symphys.transcription import Transcription, transcribe  # noqa: E402
+from symphys.verification.refinement import FINER_DT, finer_problem  # noqa: E402
+
+TASKS = ("pendulum", "acrobot", "spinner", "hopper", "air_hockey", "arm_ball", "mini_cheetah")
 
 
 def main() -> None:
