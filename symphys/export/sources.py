@@ -15,9 +15,9 @@ import numpy as np
 from symphys.codegen import MemoryLayout, Program
 from symphys.codegen.emit.plain import plain_functions, plain_source, table
 from symphys.export import words
+from symphys.export.slopes import directional_slope
 from symphys.transcription import Transcription, rollout_program
 from symphys.transcription.rollout import Rollout
-from symphys.transcription.staged.slope_functions import directional_slope
 from symphys.transcription.staged.step_program import StepArguments
 from symphys.transcription.staged.tangent import Tangent
 

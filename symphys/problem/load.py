@@ -136,9 +136,7 @@ def build(
     scenarios = read_scenarios(document.scenario, sampled, parametric, simulation, variables, faults)
     faults.stop_if_any()
     values = at_guess(parametric, known, variables)
-    start = starts.of(parametric, values)
-    check_overlap(parametric, start, faults)
-    check_joints(parametric, start, faults)
+    start = checked_start(starts, parametric, values, faults)
     named = {**formula_names(values, start, variables), **given}
     forces, termination, objectives = read_laws(document, simulation, sets, nominal, known, named, variables, faults)
     check_read_at_start(objectives.phases, sensors, (document.ending[0], termination), faults)
@@ -168,6 +166,14 @@ def build(
         guess=read_guess(document.guess, simulation, nominal, references, faults),
         sweep=sweep,
     )
+
+
+def checked_start(starts: StartValues, parametric: ParametricWorld, values: Mapping[str, Any], faults: Faults) -> Any:
+    """The state at the guess; what overlaps there, and joints that do not fit, are faults."""
+    start = starts.of(parametric, values)
+    check_overlap(parametric, start, faults)
+    check_joints(parametric, start, faults)
+    return start
 
 
 def read_control(
