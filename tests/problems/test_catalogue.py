@@ -41,7 +41,7 @@ SHIPPED = [
     "hopper_run",
     "juggle",
     "knock",
-    "mini_cheetah",
+    "mini_cheetah_ahead",
     "parcel",
     "pendulum",
     "push_and_fly",
