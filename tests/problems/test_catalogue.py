@@ -45,7 +45,7 @@ SHIPPED = [
     "ice_and_asphalt",
     "juggle",
     "knock",
-    "mini_cheetah",
+    "mini_cheetah_ahead",
     "parcel",
     "pendulum",
     "push_and_fly",

@@ -28,7 +28,7 @@ def energy(height: float, ahead: float) -> float:
 
 def test_it_is_as_published() -> None:
     """8.25 kg, at a height of 0.29 m on legs (0, -0.8, 1.6)."""
-    problem = shipped("mini_cheetah", "casadi").problem
+    problem = shipped("mini_cheetah_ahead", "casadi").problem
     assert sum(float(body.mass) for body in problem.world().bodies) == pytest.approx(8.25, abs=0.005)
     assert (THIGH + SHANK) * np.cos(0.8) + FOOT == pytest.approx(problem.initial["body.position"][2], abs=1e-6)
     assert [variable.guess[0] for variable in problem.variables] == [0, -0.8, 1.6] * 4
@@ -40,7 +40,7 @@ def test_the_guess_stands_by_statics() -> None:
 
     Feet that pull at each other by friction do no work then, so that however they do it, the law holds.
     """
-    made = shipped("mini_cheetah", "casadi")
+    made = shipped("mini_cheetah_ahead", "casadi")
     motion = made.simulate(made.shooting.start(0))
     hip, knee = (np.mean([motion[f"{each}_{joint}.angle"][-1] for each in LEGS]) for joint in ("hip", "knee"))
     height = THIGH * np.cos(hip) + SHANK * np.cos(hip + knee)
@@ -56,13 +56,13 @@ def test_the_guess_stands_by_statics() -> None:
 
 
 def test_a_short_descent_lowers_the_cost() -> None:
-    before, after = short_descent("mini_cheetah", 4)
+    before, after = short_descent("mini_cheetah_ahead", 4)
     assert after < before - 0.05
 
 
 @pytest.mark.thorough
 def test_it_walks_ahead_and_half_the_step_agrees() -> None:
-    made = shipped("mini_cheetah")
+    made = shipped("mini_cheetah_ahead")
     found = solve("ilqr", made)
     verdict, finer = made.judge(found.z), finer_problem(made, FINER_DT).judge(found.z)
     assert verdict.solved
