@@ -89,7 +89,7 @@ def riccati_recursion(steps: Iterable[LinearStep], last: CostToGo) -> RiccatiSol
             continue
         rest = len(total) - len(damping)
         by_decisions, hessian, cross = total[rest:], whole[rest:, rest:], whole[rest:, :rest]
-        made = _decided(hessian + np.diag(damping), by_decisions, cross, lower, upper)
+        made = _decided(hessian, damping, by_decisions, cross, lower, upper)
         if made is None:
             return None
         ahead, back = made
@@ -98,28 +98,33 @@ def riccati_recursion(steps: Iterable[LinearStep], last: CostToGo) -> RiccatiSol
         slope = total[:rest] + (along + by_decisions) @ back + ahead @ cross
         # back' hessian back = -back' cross - back' damping back, since back solves the damped system
         curve = whole[:rest, :rest] + (cross - damping[:, None] * back).T @ back
-        curve = (curve + curve.T) / 2
+        curve = 0.5 * (curve + curve.T)
         found.append(made)
     return RiccatiSolution(found, first, second, CostToGo(slope, curve))
 
 
-def _decided(hessian: Array, slope: Array, cross: Array, lower: Array, upper: Array) -> Feedback | None:
+def _decided(hessian: Array, damping: Array, slope: Array, cross: Array, lower: Array, upper: Array) -> Feedback | None:
     """The best decisions within bounds, and how those that no bound holds answer the state."""
     if len(slope) == 1:
-        curvature = hessian[0, 0]
+        curvature = hessian[0, 0] + damping[0]
         if not curvature > 0:
             return None
         wanted = -slope[0] / curvature
         if lower[0] <= wanted <= upper[0]:
             return Feedback(np.array([wanted]), cross / -curvature)
         return Feedback(np.array([min(max(wanted, lower[0]), upper[0])]), np.zeros_like(cross))
-    found = solve_box_qp(hessian, slope, lower, upper, np.zeros_like(slope))
+    damped = hessian + np.diag(damping)
+    factor, fault = lapack.dpotrf(damped, lower=1, clean=0)
+    if fault:
+        return None
+    both = lapack.dpotrs(factor, np.column_stack([slope, cross]), lower=1)[0]
+    ahead = -both[:, 0]
+    if (ahead >= lower).all() and (ahead <= upper).all():
+        return Feedback(ahead, -both[:, 1:])
+    found = solve_box_qp(damped, slope, lower, upper, np.zeros_like(slope))
     if found is None:
         return None
-    if found.factor is None:
-        return Feedback(found.step, np.zeros_like(cross))
-    if found.free.all():
-        return Feedback(found.step, -lapack.dpotrs(found.factor, cross, lower=1)[0])
     back = np.zeros_like(cross)
-    back[found.free] = -lapack.dpotrs(found.factor, cross[found.free], lower=1)[0]
+    if found.factor is not None:
+        back[found.free] = -lapack.dpotrs(found.factor, cross[found.free], lower=1)[0]
     return Feedback(found.step, back)

@@ -114,12 +114,15 @@ class PolicyRollout:
         """
         count, steps, nx = len(lengths), len(policy.new), policy.x.shape[1]
         sizes = 1, 1, self.sizes.statics, self.step.arguments.sizes[3], nx
-        columns = (lengths[:, None], np.reshape(shares, (-1, 1)), statics, p, start)
-        parts = [np.broadcast_to(each, (count, size)) for each, size in zip(columns, sizes, strict=True)]
+        row, parts, first = np.empty((count, sum(sizes))), list[Array](), 0
+        for size, each in zip(sizes, (lengths[:, None], np.reshape(shares, (-1, 1)), statics, p, start), strict=True):
+            parts.append(row[:, first : first + size])
+            parts[-1][:] = each
+            first += size
         if self.kernel is None:
             return self._step_by_step(parts, policy, smoothing, clock)
-        shared = [policy.old[0], *(np.ravel(getattr(policy, name)) for name in SERIES), self.step.tangent.nominal]
-        found = self.kernel.forward(np.concatenate(parts, axis=1), np.concatenate([*shared, (clock, smoothing)]))
+        shared = [policy.old[0], *(getattr(policy, name).ravel() for name in SERIES), self.step.tangent.nominal]
+        found = self.kernel.forward(row, np.concatenate([*shared, (clock, smoothing)]))
         x, u, new = (
             found[name].reshape(count, more, -1) if name in found else np.zeros((count, more, 0))
             for name, more in (("x", steps + 1), ("u", steps), ("new", steps))
