@@ -11,6 +11,7 @@ import pytest
 
 import symphys
 from symphys import Problem, Solution, SymphysError
+from symphys.report import write_light_report
 from symphys.results.file_names import LOG, MULTIPLIERS, TRAJECTORY
 from symphys.runs import make_jobs, read_guess_run
 from symphys.runs.guess import with_guess
@@ -156,6 +157,14 @@ def test_every_solver_starts_there(solver: str, cart: Problem, found: Solution, 
     assert again.run.guess["objective"] == pytest.approx(found.objective, rel=1e-9)
     assert again.folder.parent.name.startswith("cart@solver.") and ",guess=" in again.folder.parent.name
     assert again.run.provenance["guess"] == str(found.folder)
+
+
+def test_the_page_says_where_it_starts(cart: Problem, found: Solution, tmp_path: Path) -> None:
+    """And says nothing of the kind where the guess is the file's."""
+    again = symphys.solve(cart, "gradient", backend="casadi", folder=tmp_path, guess=found, iterations=1)
+    for solution, told in ((again, True), (found, False)):
+        page = write_light_report(solution.folder).read_text(encoding="utf-8")
+        assert (f"It starts from what {found.folder} found" in page) == told
 
 
 def test_multipliers_are_kept_and_taken(cart: Problem, found: Solution, tmp_path: Path) -> None:

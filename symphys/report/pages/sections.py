@@ -65,12 +65,13 @@ def header(run: Run, cards: Sequence[Html]) -> Html:
     there = [(anchor, title) for anchor, title in CHAPTERS if any(f'id="{anchor}"' in card[:80] for card in cards)]
     links = [tag("a", title, href=f"#{anchor}") for anchor, title in there]
     unread = () if run.readable else run.faults
-    why = values.name(run.provenance.get("chosen"))
+    why, guess = (values.name(run.provenance.get(key)) for key in ("chosen", "guess"))
     return join(
         [
             tag("p", f"Run report · {run.problem} · {run.solver} · seed {run.seed}", class_="kicker"),
             tag("p", f"With {settings_words(run.settings)}.", class_="note") if run.settings else "",
             tag("p", f"No solver was named: {run.solver}, since {why}.", class_="note") if why else "",
+            tag("p", f"It starts from what {guess} found.", class_="note") if guess else "",
             tag("h1", run.title),
             *(tag("p", part, class_="lead") for part in re.split(r"\n\s*\n", run.description.strip()) if part),
             banner(words.level(run), words.headline(run), words.verdict(run), run.advice, *unread),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,8 @@ import pytest
 import symphys
 from symphys import Problem
 from symphys.model.state_layout import Layout
+from symphys.problem.guess.recorded import recorded_guess
+from symphys.transcription import guessed
 from symphys.transcription.staged.staged_problem import RolloutStages
 
 TICKS = np.array([1, 10, 50, 100])
@@ -212,6 +215,31 @@ def test_a_ball_joint_turns_on_the_geodesic(tmp_path: Path) -> None:
     x = spun(TOP + ARM, tmp_path, states=[{"at": 0.0, "ball.angular_velocity": [1, 2, 3]}])
     spin = x["arm.angular_velocity"] - x["top.angular_velocity"]
     assert rotated(inverse(x["top.orientation"]), spin) == pytest.approx([1, 2, 3], abs=1e-8)
+
+
+def test_a_recorded_motion_is_met(tmp_path: Path) -> None:
+    """Of a body on its own and of one that hangs on its ball joint, from another start: all places and velocities."""
+    (tmp_path / "top.toml").write_text(TOP + ARM, encoding="utf-8")
+    problem = symphys.load_problem(tmp_path / "top.toml")
+    motion = symphys.simulate(problem, spin=[1.0, -2.0, 3.0])
+    recorded = {name: motion[name] for name in motion.units if len(motion[name]) == len(motion.time)}
+    there = replace(problem, guess=recorded_guess(problem.world(), motion.time, recorded))
+    shooting = guessed(symphys.transcribe(problem, backend="casadi"), there).shooting
+    assert shooting.guessed_states is not None
+    ticks, layout = np.array([1, 4, 10]), Layout(problem.world())
+    for x, tick in zip(shooting.guessed_states(shooting.start(0), ticks, 0.0), ticks.tolist(), strict=True):
+        for body in ("top", "arm"):
+            same_turn(x[layout[f"{body}.orientation"]], motion[f"{body}.orientation"][tick])
+            for field in ("position", "velocity", "angular_velocity"):
+                assert x[layout[f"{body}.{field}"]] == pytest.approx(motion[f"{body}.{field}"][tick], abs=1e-6)
+
+
+def test_a_recording_is_followed(tmp_path: Path) -> None:
+    """By the columns of a file that a [[reference]] names."""
+    (tmp_path / "walk.csv").write_text("time,x,z\n0,0,1\n0.8,1.6,2\n", encoding="utf-8")
+    text = TOP + '\n[[reference]]\nname = "walk"\nfile = "walk.csv"\n'
+    x = spun(text, tmp_path, follows={"top.position": "[walk.x, 0.1, walk.z]"})
+    assert x["top.position"] == pytest.approx([0.8, 0.1, 1.5]) and x["top.velocity"] == pytest.approx([2, 0, 1.25])
 
 
 def test_slopes_are_those_of_the_duration_that_is_guessed(tmp_path: Path) -> None:
