@@ -39,7 +39,6 @@ SHIPPED = [
     "gait_robot_trot",
     "half_cheetah_run",
     "hopper",
-    "hopper_gait",
     "hopper_jump",
     "hopper_run",
     "ice_and_asphalt",

@@ -17,8 +17,7 @@ def flights(motion: Trajectory) -> list[tuple[float, float]]:
     """Seconds without contact, and the rise of the foot [m], of each flight of 0.1 s at least that has ended."""
     touches = np.flatnonzero(motion["foot-ground.force"][:, 2] > 0)
     height: Array = motion["foot.position"][:, 2]
-    parts = pairwise(touches.tolist())
-    long = [(a, b) for a, b in parts if motion.time[b] - motion.time[a] >= 0.1]
+    long = [(a, b) for a, b in pairwise(touches) if motion.time[b] - motion.time[a] >= 0.1]
     return [(float(motion.time[b] - motion.time[a]), float(height[a:b].max() - RADIUS)) for a, b in long]
 
 
