@@ -126,10 +126,8 @@ def build(
     check_couplings(nominal, faults)
     known = quantities(initial, parametric.parameters(), input_sizes(nominal)) | duration_quantity(simulation.duration)
     sensors, controllers = read_control(document, parametric, known, functions, starts, given, faults)
-    known |= weight_quantities(controllers) | force_quantities(document.force)
     sets = read_sets(document.phase, parametric, faults)
-    faults.stop_if_any()
-    known |= phase_quantities(sets)
+    known |= weight_quantities(controllers) | force_quantities(document.force) | phase_quantities(sets)
     variables = read_variables(document.variable, known, simulation, faults)
     check_variables(document, simulation, parametric, nominal, variables, faults)
     sampled = {name: quantity for name, quantity in known.items() if quantity.kind != "duration"}

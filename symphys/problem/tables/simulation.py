@@ -96,6 +96,7 @@ def read_sets(
                 faults.add(place, f"{name} must lie in [{low:g}, {high:g}], not {value!r}")
             else:
                 found[table.name][name] = numbers
+    faults.stop_if_any()
     return found
 
 
