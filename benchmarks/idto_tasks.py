@@ -1,6 +1,6 @@
 """The tasks of IDTO: iterations and seconds of iLQR, and the answer at half the time step.
 
-    python benchmarks/idto_tasks.py [pendulum acrobot spinner hopper air_hockey arm_ball mini_cheetah_ahead]
+    python benchmarks/idto_tasks.py [pendulum acrobot spinner planar_hopper air_hockey arm_ball mini_cheetah_ahead]
 
 Seconds are of the process, over all its threads, after the kernels are compiled and called once; wall seconds are
 beside them. ``worst`` is the largest error of a target in units of its tolerance. Both columns at half the step
@@ -23,7 +23,7 @@ from symphys.solvers import solver  # noqa: E402
 from symphys.transcription import transcribe  # noqa: E402
 from symphys.verification.refinement import FINER_DT, finer_problem  # noqa: E402
 
-TASKS = ("pendulum", "acrobot", "spinner", "hopper", "air_hockey", "arm_ball", "mini_cheetah_ahead")
+TASKS = ("pendulum", "acrobot", "spinner", "planar_hopper", "air_hockey", "arm_ball", "mini_cheetah_ahead")
 
 
 def main() -> None:

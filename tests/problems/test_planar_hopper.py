@@ -29,7 +29,7 @@ def clearance(motion: Trajectory) -> np.ndarray:
 
 def test_springs_hold_it_up_in_the_guess() -> None:
     """It stays within 3 cm of its pose, on its foot, and the ground carries its weight."""
-    made = shipped("hopper", "casadi")
+    made = shipped("planar_hopper", "casadi")
     motion = made.simulate(made.shooting.start(0))
     assert np.abs(motion["torso.position"][:, [0, 2]] - motion["torso.position"][0, [0, 2]]).max() < 0.03
     assert np.abs(clearance(motion)).max() < 2e-3
@@ -40,7 +40,7 @@ def test_springs_hold_it_up_in_the_guess() -> None:
 @pytest.mark.slow
 def test_it_hops_half_a_metre() -> None:
     """From one of three seeds, as rounding has it: to its place, with a flight that is one of Galilei's parabolas."""
-    made = shipped("hopper")
+    made = shipped("planar_hopper")
     found = (solve("ilqr", made, seed) for seed in range(3))
     z = next(outcome.z for outcome in found if made.judge(outcome.z).solved)
     motion = made.simulate(z)
