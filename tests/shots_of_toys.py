@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from symphys.solvers import SOLVERS, MultipleShootingOptions, Outcome
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.point import Incumbent
 from symphys.solvers.methods.multiple_shooting import DEFECT
+from symphys.solvers.multiple_shooting.chart import interpolated
 from symphys.solvers.multiple_shooting.grid import make_grid
 from symphys.solvers.multiple_shooting.nlp import MultipleShootingNlp
 from symphys.solvers.multiple_shooting.programs import Programs
@@ -25,10 +27,19 @@ every_backend = pytest.mark.parametrize("backend", ["ipopt", "fatrop"])
 
 
 def solve(problem: ShootingProblem, start: Any = None, **options: Any) -> Outcome:
-    """The rest of the arguments of a solve are among the options."""
+    """The rest of the arguments of a solve are among the options; ``nodes``: states that lines of the guess join."""
+    if "nodes" in options:
+        problem = replace(problem, guessed_states=lines(problem, options.pop("nodes")))
     more = {name: options.pop(name) for name in ("monitor", "checkpoint", "keep", "log") if name in options}
     z = problem.start(0) if start is None else start
     return SOLVERS["multiple_shooting"].solve(problem, z, MultipleShootingOptions(**options), **more)
+
+
+def lines(problem: ShootingProblem, corners: Any) -> Any:
+    """The guess of the states on lines between some at equal times, from the first state to the last."""
+    assert problem.staged is not None
+    chain = problem.staged()
+    return lambda z, ticks, smoothing: interpolated(chain, np.array(corners, float), ticks / chain.steps)
 
 
 def program(problem: ShootingProblem, z: Any, nodes: Any = None, **options: Any) -> MultipleShootingNlp:

@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from single_steps import SingleSteps
 
 from symphys.shooting import (
     Expansion,
@@ -54,7 +55,7 @@ class Formulas:
     difference: Callable[[Any, Any], Any] = lambda x, y: y - x
 
 
-class Chain:
+class Chain(SingleSteps):
     """A ``StagedProblem`` of formulas; knots are linear between steps, or constant where there is one for each step."""
 
     def __init__(

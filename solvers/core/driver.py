@@ -6,7 +6,7 @@ solve, the errors of foreign code, the trace and continuation are here, the same
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
@@ -77,6 +77,15 @@ def iterate(method: Method[StateT], saved: dict[str, object] | None, recorder: I
         state = following.state
 
 
+MakeGains = Callable[[ShootingProblem, Array, float], Mapping[str, Array]]
+"""(problem, z (n,), smoothing) -> the gains of an outcome."""
+
+
+def without_feedback(problem: ShootingProblem, z: Array, smoothing: float) -> Mapping[str, Array]:
+    """Of solvers that find no feedback."""
+    return {}
+
+
 def make_solver(
     name: str,
     summary: str,
@@ -90,13 +99,14 @@ def make_solver(
     prepare: Callable[[], None] = nothing,
     threaded: bool = False,
     scenarios: bool | None = False,
+    feedback: MakeGains = without_feedback,
 ) -> Solver[O_inv]:
     """A solver of its parts; those that are not named here are the fields of ``Solver``.
 
     ``stage`` runs one stage of smoothing, see ``iterating``. ``check`` raises SymphysError for options that cannot be
     passed to a library. ``refusal`` returns why the solver is not for a problem, or nothing. ``rate`` makes, from
     options and seed, what compares the points of several stages. ``constraints``: whether violated constraints come
-    before the merit in the comparison of points.
+    before the merit in the comparison of points. ``feedback`` makes the gains of the outcome.
     """
 
     def solve(
@@ -120,7 +130,9 @@ def make_solver(
                 return StopReason(Status.NOT_APPLICABLE, refused)
             return stage(context, options, saved, recorder)
 
-        request = Request(name, problem, start, options, seed, monitor, checkpoint, log or silent, constraints, keep)
+        request = Request(
+            name, problem, start, options, seed, monitor, checkpoint, log or silent, constraints, keep, feedback
+        )
         return Driver(request, run_stage, rate(options, seed)).run()
 
     return Solver(name, summary, Options, solve, prepare, threaded, scenarios)
@@ -134,7 +146,7 @@ class Request:
         solver: its name.
         problem, start, seed, monitor, checkpoint, log, keep: of the call.
         options: of the call; of these the driver knows the limits.
-        constraints: see ``make_solver``.
+        constraints, feedback: see ``make_solver``.
     """
 
     solver: str
@@ -147,6 +159,7 @@ class Request:
     log: Log
     constraints: bool
     keep: Keep | None = None
+    feedback: MakeGains = without_feedback
 
 
 class Driver:
@@ -169,6 +182,7 @@ class Driver:
         self._last: Array | None = None
         self._stages: tuple[StageResult, ...] = ()
         self._checkpoint: Checkpoint | None = None
+        self._multipliers: Mapping[str, Array] = {}
 
     def run(self) -> Outcome:
         """Run every stage; whatever happens becomes a status with advice. SymphysError alone passes through."""
@@ -180,9 +194,28 @@ class Driver:
         self._request.log(str(reason))
         if reason.status is Status.INTERRUPTED and self._checkpoint is not None:
             return self._interrupted(reason, self._checkpoint)
+        multipliers = self._multipliers if reason.status in (Status.MET, Status.CONVERGED) else {}
         return Outcome(
-            reason.status, reason.advice, z, self._trace.rows, self._evaluator.counter.counts, {}, self._stages
+            reason.status,
+            reason.advice,
+            z,
+            self._trace.rows,
+            self._evaluator.counter.counts,
+            {},
+            self._stages,
+            self._gains(reason.status, z),
+            multipliers,
         )
+
+    def _gains(self, status: Status, z: Array) -> Mapping[str, Array]:
+        """Feedback about the solution z (n,); none where the solve or foreign code failed."""
+        if status.fatal or status is Status.INTERRUPTED:
+            return {}
+        try:
+            return self._request.feedback(self._request.problem, z, self._request.problem.smoothing[-1])
+        except (RuntimeError, ArithmeticError, np.linalg.LinAlgError, MemoryError) as error:
+            self._request.log(f"no feedback gains: {str(error).strip() or type(error).__name__}")
+            return {}
 
     def commit(self, iteration: Iteration[Any]) -> None:
         """See ``IterationRecorder``."""
@@ -215,6 +248,10 @@ class Driver:
         if self._checkpoint:
             last = self._trace.rows[self._checkpoint.rows - 1]
             self._checkpoint = replace(self._checkpoint, counts=counts_of(last))
+
+    def multipliers(self, found: Mapping[str, Array]) -> None:
+        """See ``IterationRecorder``."""
+        self._multipliers = found
 
     @property
     def rows(self) -> int:

@@ -99,6 +99,10 @@ class IterationRecorder(Protocol):
         """Count work that a library reports at its end only, evenly over the rows from ``first`` on."""
         ...
 
+    def multipliers(self, found: Mapping[str, Array]) -> None:
+        """Note the multipliers of the present iterate: they are part of the outcome if the solve ends well there."""
+        ...
+
     @property
     def rows(self) -> int:
         """The number of rows so far."""

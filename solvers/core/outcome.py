@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import astuple, dataclass, field
 from enum import Enum
 
@@ -145,6 +145,9 @@ class Outcome:
         counts: total work.
         checkpoint: what the solver needs to go on exactly here; JSON-able numbers, strings and lists of numbers.
         stages: those of smoothing that were begun, in their order; of an interrupted solve the last one is halfway.
+        gains: feedback about the best point, as named arrays; empty of solvers without, and of interrupted solves.
+        multipliers: those of a solve that ended well, by names of the solver's own, from which another may start; empty
+            where the solver has none.
     """
 
     status: Status
@@ -154,3 +157,5 @@ class Outcome:
     counts: Counts
     checkpoint: dict[str, object] = field(default_factory=dict)
     stages: tuple[StageResult, ...] = ()
+    gains: Mapping[str, Array] = field(default_factory=dict)
+    multipliers: Mapping[str, Array] = field(default_factory=dict)

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lapack
 
 from symphys.shooting import Expansion, Linearized
 from symphys.solvers.ddp.box_qp import solve_box_qp
 from symphys.solvers.ddp.knots import KnotStep
+from symphys.solvers.ddp.riccati import CostToGo, Feedback, LinearStep, riccati_recursion
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+Selection = slice | Indices
 
 
 @dataclass(frozen=True)
@@ -52,21 +53,8 @@ class Policy:
     gradient: Array
 
 
-@dataclass
-class _Value:
-    """The cost to go: of (state, old knots, static entries), to second order.
-
-    Attributes:
-        slope: less the costate, which is the slope by the state where nothing is decided any more.
-        curve: without the costs of the state itself.
-    """
-
-    slope: Array
-    curve: Array
-
-
 def backward_pass(
-    slopes: Linearized,
+    slopes: Iterable[Linearized],
     costs: Expansion,
     knots: Sequence[KnotStep],
     statics: Indices,
@@ -76,7 +64,7 @@ def backward_pass(
     """The policy about a motion; None where a Hessian is not positive definite.
 
     Args:
-        slopes: of the steps.
+        slopes: of runs of steps, the last run first: a run is asked for when those after it are done.
         costs: of the augmented objective.
         knots: of the steps.
         statics: (s,) entries of z.
@@ -84,114 +72,141 @@ def backward_pass(
         damping: of Levenberg and Marquardt: added to the Hessian by knots, in units of their scales.
 
     Source: Tassa, Erez, Todorov, Synthesis and stabilization of complex behaviors through online trajectory
-    optimization, IROS 2012; bounds as Tassa, Mansard, Todorov, ICRA 2014. Theirs has one slope of the cost to go; here
-    it is a costate and what decisions add to that.
+    optimization, IROS 2012. Theirs has one slope of the cost to go; here it is a costate and what decisions add to
+    that. Numbers of the state on which nothing later depends are left out of the recursion.
     """
-    n, s = slopes.a.shape[1], len(statics)
-    costate, by_inputs, by_statics = _costates(slopes, costs)
-    value = _Value(np.zeros(n + s), np.zeros((n + s, n + s)))
-    gains: list[KnotGain | None] = [None] * len(knots)
-    gradient, first, second = np.zeros(len(bounds.scale)), 0.0, 0.0
-    for k in reversed(range(len(knots))):
-        knot = knots[k]
-        by_knots = knot.weights.T @ by_inputs[k]
-        gradient[knot.acting] += by_knots
-        value.slope[len(value.slope) - s :] += by_statics[k]
-        slope, curve = _before(slopes, costs, knot, value, by_knots, k)
-        count = len(knot.new)
-        if not count:
-            value = _Value(slope, curve)
-            continue
-        found = _decide(slope, curve, count, bounds, knot.new, damping)
-        if found is None:
-            return None
-        gains[k], value, falls = found
-        first, second = first + falls[0], second + falls[1]
-    gradient[statics] += costs.s + by_statics.sum(axis=0) + slopes.start.T @ costate
-    slope, curve = _at_start(slopes, costs, value, costate)
+    made = _Steps(costs, knots, statics, bounds, damping)
+    found = riccati_recursion(made.from_end(slopes), made.last())
+    if found is None:
+        return None
+    slope, curve = made.at_start(found.cost)
     chosen = _static_step(slope, curve, bounds, statics, damping)
     if chosen is None:
         return None
-    first, second = first + float(slope @ chosen), second + float(chosen @ curve @ chosen) / 2
-    return Policy(gains, chosen, first, second, gradient)
+    first, second = found.first + float(slope @ chosen), found.second + float(chosen @ curve @ chosen) / 2
+    gains = [made.gain(k, each) for k, each in enumerate(reversed(found.feedback))]
+    return Policy(gains, chosen, first, second, made.gradient)
 
 
-def _costates(slopes: Linearized, costs: Expansion) -> tuple[Array, Array, Array]:
-    """The costate of the first state (n,), and the slopes by inputs (N, m) and static entries (N, s), step by step."""
-    costate = costs.x.copy()
-    for k in reversed(range(len(slopes.a))):
-        costate[k] += costate[k + 1] @ slopes.a[k]
-    later = costate[1:, None]
-    by_inputs, by_statics = costs.u + (later @ slopes.b)[:, 0], (later @ slopes.c)[:, 0]
-    return costate[0], by_inputs, by_statics
+class _Steps:
+    """The steps of a motion for the Riccati recursion; its states are (live tangent, old knots, static entries).
 
+    The numbers of a tangent are live where the step, or a cost, depends on them.
 
-def _before(
-    slopes: Linearized, costs: Expansion, knot: KnotStep, value: _Value, by_knots: Array, k: int
-) -> tuple[Array, Array]:
-    """Slope, less the costate, and curvature of the cost to go from step k, without the costs of its state.
-
-    Columns are (state, old knots, static entries, new knots): what is decided comes last.
+    Attributes:
+        gradient: (len(z),) of the objective, once all steps were made.
     """
-    a, b, c, w = slopes.a[k], slopes.b[k], slopes.c[k], knot.weights
-    n, o, s, acting = a.shape[1], len(knot.old), c.shape[1], w.shape[1]
-    knots = np.concatenate([np.arange(n, n + o), np.arange(n + o + s, n + s + acting)])
-    ahead = np.empty((n, n + s + acting))
-    ahead[:, :n], ahead[:, knots], ahead[:, n + o : n + o + s] = a, b @ w, c
-    through = ahead
-    if len(knot.kept) or s:
-        through = np.zeros((len(value.slope), ahead.shape[1]))
-        through[:n] = ahead
-        through[n + np.arange(len(knot.kept)), knots[knot.kept]] = 1.0
-        through[n + len(knot.kept) + np.arange(s), n + o + np.arange(s)] = 1.0
-    later = value.curve
-    later[:n, :n] += costs.xx[k + 1]
-    slope, curve = value.slope @ through, through.T @ (later @ through)
-    slope[knots] += by_knots
-    crossed = np.zeros((acting, len(curve)))
-    crossed[:, :n] = w.T @ costs.ux[k]
-    if costs.uy[k].any():
-        crossed += (w.T @ costs.uy[k]) @ ahead
-    crossed[:, knots] += w.T @ costs.uu[k] @ w / 2
-    curve[knots] += crossed
-    curve[:, knots] += crossed.T
-    if s:
-        crossed, statics = costs.sx[k + 1] @ ahead, slice(n + o, n + o + s)
-        crossed[:, knots] += costs.su[k] @ w
-        curve[statics] += crossed
-        curve[:, statics] += crossed.T
-    return slope, curve
+
+    def __init__(
+        self, costs: Expansion, knots: Sequence[KnotStep], statics: Indices, bounds: Bounds, damping: float
+    ) -> None:
+        self.costs, self.knots, self.statics, self.bounds = costs, knots, statics, bounds
+        self.gradient = np.zeros(len(bounds.scale))
+        self._damping = damping / bounds.scale**2
+        self._costate = costs.x[-1]
+        self._asked = np.diagonal(costs.xx, axis1=1, axis2=2) != 0  # others are 0 with it: xx is positive semidefinite
+        self._asked |= costs.sx.any(axis=1)
+        self._asked[:-1] |= costs.ux.any(axis=1)
+        self._asked[1:] |= costs.uy.any(axis=1)
+        self._mixed = bool(costs.ux.any()), bool(costs.uy.any())
+        last = _selection(self._asked[-1])
+        self._lives = [last] * (len(knots) + 1)
+        self._start = np.zeros((costs.x.shape[1], len(statics)))
+
+    def last(self) -> CostToGo:
+        """Of the state after the last step, less its costate."""
+        live, s = self._lives[-1], len(self.statics)
+        curve, by_statics = self.costs.xx[-1][live][:, live], self.costs.sx[-1][:, live]
+        whole = np.block([[curve, by_statics.T], [by_statics, np.zeros((s, s))]])
+        return CostToGo(np.zeros(len(whole)), whole)
+
+    def from_end(self, slopes: Iterable[Linearized]) -> Iterator[LinearStep]:
+        """The steps, the last one first."""
+        end = len(self.knots)
+        for run in slopes:
+            first = end - len(run.a)
+            live = _selection((run.a != 0).any(axis=(0, 1)) | self._asked[first:end].any(axis=0))
+            self._lives[first:end] = [live] * len(run.a)
+            for k in reversed(range(first, end)):
+                yield self._step(k, run.a[k - first], run.b[k - first], run.c[k - first])
+            end, self._start = first, run.start
+        self.gradient[self.statics] += self.costs.s + self._start.T @ self._costate
+
+    def at_start(self, cost: CostToGo) -> tuple[Array, Array]:
+        """Slope (s,) and curvature (s, s) by the static entries, of the whole motion; once all steps were made."""
+        start = np.concatenate([self._start[self._lives[0]], np.eye(len(self.statics))])
+        slope = cost.slope @ start + self._start.T @ self._costate + self.costs.s
+        return slope, start.T @ cost.curve @ start + self.costs.ss
+
+    def gain(self, k: int, feedback: Feedback | None) -> KnotGain | None:
+        """The feedback of step k by the whole tangent."""
+        if feedback is None:
+            return None
+        n, beside = self.costs.x.shape[1], len(self.knots[k].old) + len(self.statics)
+        back = np.zeros((len(feedback.ahead), n + beside))
+        live = feedback.back.shape[1] - beside
+        back[:, :n][:, self._lives[k]], back[:, n:] = feedback.back[:, :live], feedback.back[:, live:]
+        return KnotGain(feedback.ahead, back)
+
+    def _step(self, k: int, a: Array, b: Array, c: Array) -> LinearStep:
+        """The step, and the costs of the state and the inputs before it; columns are (state, old, statics, new)."""
+        costs, knot, costate, live = self.costs, self.knots[k], self._costate, self._lives[k]
+        self._costate = costs.x[k] + costate @ a
+        by_inputs, by_statics = costs.u[k] + costate @ b, costate @ c
+        by_knots = knot.weights.T @ by_inputs
+        self.gradient[knot.acting] += by_knots
+        self.gradient[self.statics] += by_statics
+        rows = self._lives[k + 1]
+        a, b, c = a[rows][:, live], b[rows] @ knot.weights, c[rows]
+        n, o, s, new = a.shape[1], len(knot.old), len(self.statics), knot.new
+        after = np.concatenate([a, b[:, :o], c, b[:, o:]], axis=1)
+        acting, statics = _places(n, o, s, len(new)), slice(n + o, n + o + s)
+        slope = np.zeros(after.shape[1])
+        slope[acting], slope[statics] = by_knots, by_statics
+        curve = self._curve(k, after, acting)
+        through = after
+        if s or len(knot.kept):
+            through = np.zeros((len(a) + len(knot.kept) + s, after.shape[1]))
+            through[: len(a)] = after
+            beside = np.concatenate([np.arange(n + o + s + len(new))[acting][knot.kept], np.arange(n + o, n + o + s)])
+            through[len(a) + np.arange(len(beside)), beside] = 1.0
+        return LinearStep(through, slope, curve, self.bounds.down[new], self.bounds.up[new], self._damping[new])
+
+    def _curve(self, k: int, after: Array, acting: Selection) -> Array:
+        """Of the costs of step k; ``after``: the state after it by all that this is the curvature by."""
+        costs, knot, live, s = self.costs, self.knots[k], self._lives[k], len(self.statics)
+        size, w = after.shape[1], knot.weights
+        own = costs.xx[k][live][:, live]
+        n, statics = len(own), slice(size - len(knot.new) - s, size - len(knot.new))
+        curve = np.zeros((size, size))
+        curve[:n, :n] = own
+        crossed = np.zeros((w.shape[1], size))
+        crossed[:, acting] = w.T @ costs.uu[k] @ w / 2
+        if self._mixed[0]:
+            crossed[:, :n] += w.T @ costs.ux[k][:, live]
+        if self._mixed[1]:
+            crossed += (w.T @ costs.uy[k][:, self._lives[k + 1]]) @ after
+        if s:
+            crossed[:, statics] += (costs.su[k] @ w).T
+            curve[statics, :n] = costs.sx[k][:, live]
+            curve[:n, statics] = curve[statics, :n].T
+        curve[acting] += crossed
+        curve[:, acting] += crossed.T
+        return curve
 
 
-def _at_start(slopes: Linearized, costs: Expansion, value: _Value, costate: Array) -> tuple[Array, Array]:
-    """Slope and curvature by the static entries, of the whole motion."""
-    start = np.concatenate([slopes.start, np.eye(slopes.start.shape[1])])
-    crossed = costs.sx[0] @ slopes.start
-    slope = value.slope @ start + slopes.start.T @ costate + costs.s
-    own = slopes.start.T @ costs.xx[0] @ slopes.start + crossed + crossed.T + costs.ss
-    return slope, start.T @ value.curve @ start + own
+def _selection(chosen: NDArray[np.bool_]) -> Selection:
+    """Of these numbers; a slice, which copies nothing, where they follow each other."""
+    numbers = np.flatnonzero(chosen)
+    if not len(numbers):
+        return slice(0, 0)
+    first, last = int(numbers[0]), int(numbers[-1])
+    return slice(first, last + 1) if last - first + 1 == len(numbers) else numbers
 
 
-def _decide(
-    slope: Array, curve: Array, count: int, bounds: Bounds, new: Indices, damping: float
-) -> tuple[KnotGain, _Value, tuple[float, float]] | None:
-    """The best new knots, the cost to go without them, and the expected fall."""
-    rest = len(slope) - count
-    hessian, cross = curve[rest:, rest:], curve[rest:, :rest]
-    soft = damping / bounds.scale[new] ** 2
-    damped = hessian.copy()
-    np.fill_diagonal(damped, hessian.diagonal() + soft)
-    found = solve_box_qp(damped, slope[rest:], bounds.down[new], bounds.up[new], np.zeros(count))
-    if found is None:
-        return None
-    ahead, back = found.step, np.zeros(cross.shape)
-    if found.factor is not None:
-        back[found.free] = -lapack.dpotrs(found.factor, cross[found.free], lower=1)[0]
-    along = hessian @ ahead
-    left_slope = slope[:rest] + (along + slope[rest:]) @ back + ahead @ cross
-    left = curve[:rest, :rest] + cross.T @ back - (back.T * soft) @ back
-    value = _Value(left_slope, (left + left.T) / 2)
-    return KnotGain(ahead, back), value, (float(slope[rest:] @ ahead), float(ahead @ along) / 2)
+def _places(n: int, o: int, s: int, new: int) -> Selection:
+    """Of the knots among (state, old knots, static entries, new knots)."""
+    return np.concatenate([np.arange(n, n + o), np.arange(n + o + s, n + o + s + new)]) if s else slice(n, n + o + new)
 
 
 def _static_step(slope: Array, curve: Array, bounds: Bounds, statics: Indices, damping: float) -> Array | None:

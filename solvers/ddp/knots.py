@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +34,41 @@ class KnotStep:
     def acting(self) -> Indices:
         """(o + w,)."""
         return np.concatenate([self.old, self.new])
+
+
+@dataclass(frozen=True)
+class PaddedKnots:
+    """The knots of all steps in arrays: o old ones at most and w new ones, with zeros where a step has fewer.
+
+    Attributes:
+        steps: N of them.
+        old, new: (N, o) and (N, w) entries of z; one past its end where there is none.
+        weights: (N, m, o + w): u = weights @ (old, new).
+        keep: (N, o, o + w): the old ones of the next step.
+        lower, upper: (len(z) + 1,) bounds; the last is of what is none.
+    """
+
+    steps: Sequence[KnotStep]
+    old: Indices
+    new: Indices
+    weights: Array
+    keep: Array
+    lower: Array
+    upper: Array
+
+    @staticmethod
+    def of(steps: Sequence[KnotStep], lower: Array, upper: Array) -> PaddedKnots:
+        """Of steps, with bounds of z (len(z),)."""
+        count, none = len(steps), len(lower)
+        o, w = (max(len(getattr(each, name)) for each in steps) for name in ("old", "new"))
+        old, new = np.full((count, o), none), np.full((count, w), none)
+        weights, keep = np.zeros((count, steps[0].weights.shape[0], o + w)), np.zeros((count, o, o + w))
+        for k, step in enumerate(steps):
+            places = np.concatenate([np.arange(len(step.old)), o + np.arange(len(step.new))])
+            old[k, : len(step.old)], new[k, : len(step.new)] = step.old, step.new
+            weights[k][:, places] = step.weights
+            keep[k, np.arange(len(step.kept)), places[step.kept]] = 1.0
+        return PaddedKnots(steps, old, new, weights, keep, np.append(lower, 0.0), np.append(upper, 0.0))
 
 
 def knot_steps(problem: StagedProblem) -> list[KnotStep]:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import tee
 from typing import Any
 
 import numpy as np
 
-from symphys.shooting import ShootingProblem, StagedMotion, StagedProblem
+from symphys.shooting import Linearized, ShootingProblem, StagedMotion, StagedProblem
 from symphys.solvers.core.checkpoint import revive
 from symphys.solvers.core.convergence import Progress, converged, not_finite, stationary
 from symphys.solvers.core.driver import iterating, make_solver
@@ -20,7 +22,8 @@ from symphys.solvers.core.outcome import Array, Counts, Status, StopReason
 from symphys.solvers.core.point import Point
 from symphys.solvers.ddp.backward_pass import Bounds, Policy, backward_pass
 from symphys.solvers.ddp.forward_pass import MotionBatch, forward_pass
-from symphys.solvers.ddp.knots import KnotStep, knot_steps
+from symphys.solvers.ddp.gains import gains_about
+from symphys.solvers.ddp.knots import KnotStep, PaddedKnots, knot_steps
 
 LENGTHS = 0.5 ** np.arange(8.0)
 """Step lengths that are tried side by side."""
@@ -42,7 +45,7 @@ class IlqrOptions(SolverOptions):
 
     Attributes:
         iterations: linearisations at most, in each stage of smoothing.
-        damping: first lambda, as a share of the mean curvature of the first step's knots.
+        damping: first lambda, added to the curvature of the objective by each knot, in units of its scale.
         tolerance: converged where the expected fall is below tolerance * (1 + |objective|).
         patience: stalled where the objective has not fallen by 1e-5 of itself in so many iterations; 0 goes on.
         penalty: first penalty of the constraints, as a factor on their own.
@@ -112,6 +115,11 @@ class Ilqr(Method[IlqrState]):
         """Of the steps."""
         return knot_steps(self.staged)
 
+    @cached_property
+    def padded(self) -> PaddedKnots:
+        """The same with the bounds of z."""
+        return PaddedKnots.of(self.knots, self.evaluator.lower, self.evaluator.upper)
+
     def init(self) -> Iteration[IlqrState] | StopReason:
         """Roll the guess out."""
         point = self.evaluator.value(self.start)
@@ -129,12 +137,14 @@ class Ilqr(Method[IlqrState]):
     def step(self, state: IlqrState) -> Iteration[IlqrState] | StopReason:
         """Linearise, then make the best of the steps that the policy suggests; lambda grows until there is one."""
         motion = self._motion(state.z)
-        slopes = self.staged.linearize(motion)
+        self._runs(motion)
         costs = self.staged.expand(motion, state.multipliers, state.penalties)
         self.evaluator.counter.add(Counts.of_slopes(self.staged.tangent_size))
         damping, growth = state.damping, state.growth
         while damping <= STIFFEST:
-            policy = backward_pass(slopes, costs, self.knots, self.staged.statics, self._room(state.z), damping)
+            policy = backward_pass(
+                self._runs(motion), costs, self.knots, self.staged.statics, self._room(state.z), damping
+            )
             if policy is not None:
                 if -policy.first <= self.options.tolerance * (1 + abs(state.value)):
                     return self._settle(state, policy)
@@ -165,7 +175,9 @@ class Ilqr(Method[IlqrState]):
         return revive(IlqrState, saved, Progress)
 
     def _advance(self, before: IlqrState, after: IlqrState, policy: Policy) -> Iteration[IlqrState] | StopReason:
-        """The state after a step, with its point."""
+        """The state after a step, with its point; the slopes about it are begun meanwhile."""
+        if before.iteration + 1 < self.options.iterations:
+            self._runs(self._motion(after.z))
         point = self.evaluator.value(after.z)
         if not point.finite:
             return not_finite(point)
@@ -195,8 +207,7 @@ class Ilqr(Method[IlqrState]):
 
     def _search(self, state: IlqrState, motion: StagedMotion, policy: Policy) -> tuple[Array, float, float] | None:
         """The lowest of the motions of all step lengths: z, value and length; None where none is low enough."""
-        bounds = self.evaluator.lower, self.evaluator.upper
-        motions = forward_pass(self.staged, motion, policy, self.knots, LENGTHS, bounds)
+        motions = forward_pass(self.staged, motion, policy, self.padded, LENGTHS)
         self.evaluator.counter.add(Counts(rollouts=len(LENGTHS)))
         values = self._values(state, motions)
         values[~np.isfinite(values)] = math.inf
@@ -214,6 +225,16 @@ class Ilqr(Method[IlqrState]):
         return self._kept
 
     _kept: StagedMotion | None = None
+
+    def _runs(self, motion: StagedMotion) -> Iterator[Linearized]:
+        """The slopes of a motion from its end; those of the last one that was asked for are known, or begun."""
+        if self._begun is None or self._begun[0] is not motion:
+            self._begun = motion, self.staged.linearize_from_end(motion)
+        runs, kept = tee(self._begun[1])
+        self._begun = motion, kept
+        return runs
+
+    _begun: tuple[StagedMotion, Iterator[Linearized]] | None = None
 
     def _single(self, z: Array) -> MotionBatch:
         motion = self._motion(z)
@@ -254,4 +275,5 @@ ILQR = make_solver(
     iterating(Ilqr),
     refusal=refusal,
     constraints=True,
+    feedback=gains_about,
 )

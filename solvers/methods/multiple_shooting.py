@@ -12,7 +12,7 @@ of the trace has.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import casadi as ca
@@ -38,9 +38,9 @@ from symphys.solvers.multiple_shooting.by_fatrop import (
     solve_by_fatrop,
 )
 from symphys.solvers.multiple_shooting.by_ipopt import solve_by_ipopt
-from symphys.solvers.multiple_shooting.chart import interpolated
 from symphys.solvers.multiple_shooting.grid import make_grid
-from symphys.solvers.multiple_shooting.library import ITERATIONS_USED, LibraryRequest
+from symphys.solvers.multiple_shooting.library import ITERATIONS_USED, LibraryRequest, LibraryResult
+from symphys.solvers.multiple_shooting.multipliers import NlpMultipliers, at_nodes, barrier_at, fitted
 from symphys.solvers.multiple_shooting.nlp import MultipleShootingNlp
 from symphys.solvers.multiple_shooting.programs import Programs
 
@@ -54,7 +54,7 @@ APART = (
     "that what is left of the defects grows along it (a lower `tolerance`, or a feedback controller)"
 )
 STUCK = (
-    "FATROP found no step that leads on: try backend = 'ipopt', another guess of the `nodes`, or a larger `tolerance`"
+    "FATROP found no step that leads on: try backend = 'ipopt', another [guess] of the motion, or a larger `tolerance`"
 )
 TURN = 0.5
 """A node whose tangent's slope is so far from the unit matrix has turned by about a radian: it gets a new reference."""
@@ -71,8 +71,6 @@ class MultipleShootingOptions(SolverOptions):
         backend: "ipopt" or "fatrop", which factorises stage after stage.
         hessian: "gauss-newton" leaves the curvature of the steps out; "exact" has it, by differences of slopes, and is
             what FATROP goes on with where it finds no step; "limited-memory" is IPOPT's own approximation.
-        nodes: states between which the guess of the nodes is a straight line, at equal times from the first state to
-            the last. Empty: those of the problem's [guess], or the rollout of the guess.
         options: those of IPOPT, such as {mu_strategy = "adaptive"}, or of FATROP, passed on as they are.
     """
 
@@ -81,7 +79,6 @@ class MultipleShootingOptions(SolverOptions):
     steps_between_nodes: int = 0
     backend: Literal["ipopt", "fatrop"] = "ipopt"
     hessian: Literal["gauss-newton", "exact", "limited-memory"] = "gauss-newton"
-    nodes: tuple[tuple[float, ...], ...] = ()
     options: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -94,7 +91,6 @@ class MultipleShootingOptions(SolverOptions):
         require(self.hessian in known, "hessian", "gauss-newton, exact or limited-memory")
         taken = self.backend == "ipopt" or self.hessian != "limited-memory"
         require(taken, "hessian", "gauss-newton or exact with backend = fatrop")
-        require(len(self.nodes) != 1, "nodes", "two states or more, or none")
 
 
 @dataclass(frozen=True)
@@ -132,12 +128,12 @@ def stage(
     if state.nodes.shape != (grid.intervals, problem.state_size):
         raise damaged(ValueError("other nodes"))
     point = None if saved else evaluator.value(state.z)
-    stated = options.nodes or evaluator.problem.guessed_states
-    if point is not None and not point.finite and not stated:
+    if point is not None and not point.finite and not evaluator.problem.guessed_states:
         return not_finite(point)
     layout_in_stages, exact = options.backend == "fatrop", options.hessian == "exact"
     programs = Programs(problem, grid, evaluator, state.z, state.nodes, layout_in_stages, exact)
     if point is not None:
+        state = warm_started(context, programs.at(state.nodes), state)
         recorder.commit(Iteration(state, point, outputs={DEFECT: programs.at(state.nodes).largest_defect(state.z)}))
     while True:
         spent = recorder.spent()
@@ -147,7 +143,7 @@ def stage(
             return StopReason(*ENDS[ITERATIONS_USED])
         nlp = programs.at(state.nodes)
         watch, first = ShootingWatch(evaluator, recorder, nlp, state), recorder.rows
-        ending, w = run(nlp, evaluator, options, state, watch, context)
+        ending, result = run(nlp, evaluator, options, state, watch, context)
         recorder.distribute(nlp.work, first)
         if isinstance(watch.error, SlopesNotFinite):
             return StopReason(*ENDS["Invalid_Number_Detected"])
@@ -162,24 +158,35 @@ def stage(
             programs.exact = True
             context.log("FATROP found no step that leads on: exact Hessians from here")
         else:
-            return reason(context, nlp, ending, w)
+            if np.isfinite(result.w).all():
+                known = multipliers_at(nlp, evaluator, result.w, result.bound_duals, result.row_duals)
+                recorder.multipliers(known.by_name(nlp))
+            return reason(context, nlp, ending, result.w)
 
 
 def guess(problem: StagedProblem, context: StageContext, options: MultipleShootingOptions) -> MultipleShootingState:
     """The start: nodes from the rollout of z, or as they are guessed, in the first stage of smoothing."""
     evaluator, z = context.evaluator, context.start
     starts = make_grid(problem, options.steps_between_nodes).starts[1:]
-    if options.nodes and evaluator.smoothing == evaluator.problem.smoothing[0]:
-        given = [len(each) for each in options.nodes]
-        if set(given) != {problem.state_size}:
-            where = f"a state of this problem has {problem.state_size} numbers, not {', '.join(map(str, set(given)))}"
-            raise SymphysError(f"solver.multiple_shooting.nodes: {where}")
-        nodes = interpolated(problem, np.array(options.nodes, float), starts / problem.steps)
-    elif evaluator.problem.guessed_states and evaluator.smoothing == evaluator.problem.smoothing[0]:
+    if evaluator.problem.guessed_states and evaluator.smoothing == evaluator.problem.smoothing[0]:
         nodes = evaluator.problem.guessed_states(z, starts, evaluator.smoothing)
     else:
         nodes = problem.roll_out(z, evaluator.smoothing).x[starts]
     return MultipleShootingState(0, z, nodes, np.zeros(0), np.zeros(0), math.nan)
+
+
+def warm_started(
+    context: StageContext, nlp: MultipleShootingNlp, state: MultipleShootingState
+) -> MultipleShootingState:
+    """The start with the multipliers of the guess, in the first stage and where the seed leaves the guess as it is."""
+    problem, smoothing = context.evaluator.problem, context.evaluator.smoothing
+    if not problem.multipliers or context.seed or smoothing != problem.smoothing[0]:
+        return state
+    known = fitted(nlp, problem.multipliers)
+    context.log("multipliers of the guess: " + ("none fit, of other nodes or limits" if known is None else "taken"))
+    if known is None:
+        return state
+    return replace(state, bound_duals=known.bounds, row_duals=known.rows, barrier=known.barrier)
 
 
 def run(
@@ -189,8 +196,8 @@ def run(
     state: MultipleShootingState,
     watch: ShootingWatch,
     context: StageContext,
-) -> tuple[str, Array]:
-    """One call of the library: how it ended in IPOPT's words, and its last w (size,)."""
+) -> tuple[str, LibraryResult]:
+    """One call of the library: how it ended in IPOPT's words, and what it returned."""
     acting = np.zeros(len(state.z), bool)
     for entries in (*nlp.plan.grid.knots, nlp.plan.grid.statics):
         acting[entries] = True
@@ -239,12 +246,10 @@ class ShootingWatch:
         nlp, before = self.nlp, self.state
         z, shots = self.evaluator.clip(nlp.unpack(w)[0]), nlp.shots(w)
         turns = shots.turns
-        duals = row_duals.copy()
-        if duals.size:
-            rows = nlp.layout.defects
-            duals[rows] = np.linalg.solve(turns.transpose(0, 2, 1), duals[rows][:, :, None])[:, :, 0]
-        mu = barrier(nlp, self.evaluator, w, bound_duals, row_duals)
-        self.state = MultipleShootingState(before.iteration + 1, z, shots.nodes, bound_duals, duals, mu)
+        known = multipliers_at(nlp, self.evaluator, w, bound_duals, row_duals)
+        duals = known.bounds, known.rows, known.barrier
+        self.state = MultipleShootingState(before.iteration + 1, z, shots.nodes, *duals)
+        self.recorder.multipliers(known.by_name(nlp))
         defect = float(np.abs(shots.defects).max())
         step = float(np.linalg.norm(z - before.z))
         self.recorder.commit(Iteration(self.state, self.evaluator.value(z), step=step, outputs={DEFECT: defect}))
@@ -253,18 +258,12 @@ class ShootingWatch:
         return self.ended
 
 
-def barrier(
+def multipliers_at(
     nlp: MultipleShootingNlp, evaluator: CountingEvaluator, w: Array, bound_duals: Array, row_duals: Array
-) -> float:
-    """The mean product of multipliers and distances from their bounds, within what IPOPT may start from."""
-    products = []
-    bounds = (nlp.bounds(evaluator.lower, evaluator.upper), nlp.row_bounds())
-    for at, duals, (low, high) in zip((w, nlp.constraints(w)), (bound_duals, row_duals), bounds, strict=True):
-        bounded = (low < high) & (np.isfinite(low) | np.isfinite(high))
-        if duals.size and bounded.any():
-            distance = np.minimum((at - low)[bounded], (high - at)[bounded])
-            products.append(np.abs(duals[bounded]) * distance.clip(min=0))
-    return float(np.clip(np.mean(np.concatenate(products)), 1e-9, 0.1)) if products else 1e-2
+) -> NlpMultipliers:
+    """Multipliers that a library has for w, as another call may start from them with references at w's nodes."""
+    mu = barrier_at(nlp, evaluator.lower, evaluator.upper, w, bound_duals, row_duals)
+    return NlpMultipliers(bound_duals, at_nodes(nlp, w, row_duals), mu)
 
 
 def reason(context: StageContext, nlp: MultipleShootingNlp, ending: str, w: Array) -> StopReason:

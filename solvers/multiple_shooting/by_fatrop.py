@@ -2,7 +2,8 @@
 
 FATROP (Vanroye, Sathya, De Schutter and Decre 2023, arXiv 2303.16746) takes no derivatives as options: they go into the
 cache of the solver's functions, where casadi looks before it derives them. An iterate is a point where it asks for the
-slopes of the constraints. It takes no multipliers to start from.
+slopes of the constraints. It takes no multipliers to start from, but finds those of the rows by least squares; where
+multipliers are known it begins with a barrier that fits them.
 
 It does not stop at nan. Where the solve is to end it gets a quadratic program that the present point solves, and has
 converged a few iterations later. Values that are not finite reach it as large ones, so that it shortens its step.
@@ -21,6 +22,7 @@ from symphys.solvers.multiple_shooting.library import (
     Array,
     IterateWatch,
     LibraryRequest,
+    LibraryResult,
     NlpPart,
     called,
 )
@@ -28,6 +30,8 @@ from symphys.solvers.multiple_shooting.library import (
 SUCCEEDED, NO_STEP = "Solve_Succeeded", "Fatrop_No_Step"
 """How FATROP ends, beside a budget that is used up."""
 LARGE = 1e20
+PUSH = 1e-9
+"""How far a start with multipliers is moved from its bounds, by FATROP's measure."""
 RESERVED_OF_FATROP = {"tolerance": "use tolerance beside backend"}
 """Beside those of IPOPT."""
 
@@ -55,15 +59,16 @@ def finite(nonzeros: Array) -> Array:
     return nonzeros
 
 
-def solve_by_fatrop(request: LibraryRequest, watch: IterateWatch) -> tuple[str, Array]:
-    """How FATROP ended in IPOPT's words, and the last w (size,)."""
+def solve_by_fatrop(request: LibraryRequest, watch: IterateWatch) -> tuple[str, LibraryResult]:
+    """How FATROP ended in IPOPT's words, and what it returned."""
     parts = FatropParts(request, watch)
     most = max(request.iterations - 1, 0)  # it makes one more than it is told
-    own = {"print_level": 0, "max_iter": most, "tolerance": request.tolerance, **request.options}
+    warm = {"mu_init": request.barrier, "bound_push": PUSH, "bound_frac": PUSH} if request.row_duals.size else {}
+    own = {"print_level": 0, "max_iter": most, "tolerance": request.tolerance, **warm, **request.options}
     structure = {"structure_detection": "manual", **request.nlp.layout.structure}
     settings = {**structure, "cache": parts.cache, "fatrop": own}
-    result, stats = called("fatrop", (parts.value, parts.constraints), settings, request)
-    iterations, status = int(stats["iter_count"]), int(stats["return_status"])
+    result = called("fatrop", (parts.value, parts.constraints), settings, request)
+    iterations, status = int(result.statistics["iter_count"]), int(result.statistics["return_status"])
     request.log(f"FATROP: {iterations} iterations, ended with {status}")
     if status == 0:
         return SUCCEEDED, result

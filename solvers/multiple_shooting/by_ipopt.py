@@ -13,7 +13,14 @@ from typing import Any
 import casadi as ca
 
 from symphys.solvers.methods.ipopt_options import SILENT
-from symphys.solvers.multiple_shooting.library import POINT, Array, IterateWatch, LibraryRequest, NlpPart, called
+from symphys.solvers.multiple_shooting.library import (
+    POINT,
+    IterateWatch,
+    LibraryRequest,
+    LibraryResult,
+    NlpPart,
+    called,
+)
 from symphys.solvers.multiple_shooting.nlp import MultipleShootingNlp
 
 
@@ -53,8 +60,8 @@ class IpoptIterates(ca.Callback):
             return [1.0]
 
 
-def solve_by_ipopt(request: LibraryRequest, watch: IterateWatch) -> tuple[str, Array]:
-    """IPOPT's name for how it ended, and the last w (size,)."""
+def solve_by_ipopt(request: LibraryRequest, watch: IterateWatch) -> tuple[str, LibraryResult]:
+    """IPOPT's name for how it ended, and what it returned."""
     nlp, size, rows = request.nlp, request.nlp.layout.size, request.nlp.layout.rows
     w, g = ca.Sparsity.dense(size, 1), ca.Sparsity.dense(rows, 1)
     value, constraints = values(nlp, watch)
@@ -99,10 +106,10 @@ def solve_by_ipopt(request: LibraryRequest, watch: IterateWatch) -> tuple[str, A
             **request.options,
         }
         settings = {**parts, "ipopt": own, "iteration_callback": iterates, "no_nlp_grad": True, "calc_lam_p": False}
-        result, stats = called("ipopt", (value, constraints), settings, request)
+        result = called("ipopt", (value, constraints), settings, request)
         for line in text.read_text(errors="replace").splitlines():
             request.log(line)
-    return str(stats["return_status"]), result
+    return str(result.statistics["return_status"]), result
 
 
 def values(nlp: MultipleShootingNlp, watch: IterateWatch) -> tuple[NlpPart, NlpPart]:

@@ -73,6 +73,22 @@ class LibraryRequest:
     log: Callable[[str], None]
 
 
+@dataclass(frozen=True)
+class LibraryResult:
+    """What a library returned.
+
+    Attributes:
+        w: (size,) where it ended.
+        bound_duals, row_duals: multipliers there.
+        statistics: casadi's.
+    """
+
+    w: Array
+    bound_duals: Array
+    row_duals: Array
+    statistics: dict[str, Any]
+
+
 class NlpPart(ca.Callback):
     """One of the program's functions for casadi."""
 
@@ -142,8 +158,8 @@ def kept_interruptions(watch: IterateWatch) -> Iterator[None]:
 
 def called(
     library: str, parts: tuple[NlpPart, NlpPart], settings: dict[str, Any], request: LibraryRequest
-) -> tuple[Array, dict[str, Any]]:
-    """Call nlpsol: the last w, and its statistics. ``parts`` and ``settings`` keep the callbacks alive."""
+) -> LibraryResult:
+    """Call nlpsol; ``parts`` and ``settings`` keep the callbacks alive."""
     x, p = ca.MX.sym("x", request.nlp.layout.size), ca.MX.sym("p")
     program = {"x": x, "p": p, "f": parts[0](x, p), "g": parts[1](x, p)}
     quiet = {"print_time": False, "show_eval_warnings": False}
@@ -161,4 +177,5 @@ def called(
         given |= {"lam_x0": request.bound_duals, "lam_g0": request.row_duals}
     with kept_interruptions(parts[0].watch):
         result = solver(**given)
-    return result["x"].full().ravel(), solver.stats()
+    w, bound_duals, row_duals = (result[name].full().ravel() for name in ("x", "lam_x", "lam_g"))
+    return LibraryResult(w, bound_duals, row_duals, solver.stats())

@@ -1,15 +1,21 @@
-"""One motion."""
+"""One motion: of given values, or by the feedback of a solution."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from symphys.api.transcriptions import transcribed
 from symphys.api.values import vector
+from symphys.problem import Problem
 from symphys.problem.loading import Source, load
+from symphys.solvers.ddp.gains import Gains
+from symphys.solvers.ddp.gains import follow as gains_motion
 from symphys.trajectory import Trajectory
+from symphys.transcription.feedback.state_reader import StateReader
+from symphys.transcription.staged.tangent import Tangent
 
 
 def simulate(
@@ -38,3 +44,21 @@ def simulate(
     """
     made = transcribed(load(problem), smoothing == 0, "casadi")
     return made.simulate(vector(made.shooting, {**(values or {}), **variables}), smoothing)
+
+
+def follow(
+    problem: Problem, gains: Gains, start: ArrayLike | Mapping[str, ArrayLike] | None, feedback: bool
+) -> Trajectory:
+    """The motion from a start, by the gains of a solution; see ``Solution.rollout``."""
+    made = transcribed(problem, True, "casadi")
+    assert made.shooting.staged is not None, "there are gains"
+    staged, z = made.shooting.staged(), gains["z"]
+    x = staged.start(z[None])[0]
+    if start is not None:
+        size = made.rollout.memory.size
+        reader = StateReader(Tangent(made.rollout), np.array(made.rollout.parameters.nominal, float).ravel())
+        whole = {**reader.values(x[:size]), **start} if isinstance(start, Mapping) else start
+        x = np.concatenate([reader(whole, x[:size]), x[size:]])
+    bounds = made.shooting.stacked("lower"), made.shooting.stacked("upper")
+    found = gains_motion(staged, gains, x, bounds, feedback)
+    return made.motion(found.z, found.x[:, : made.rollout.memory.size], found.u[:, : made.rollout.given.shape[0]])

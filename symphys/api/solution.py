@@ -9,14 +9,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from symphys.api import figures, notebook, tables
 from symphys.errors import SymphysError
 from symphys.problem import Problem, load_problem
+from symphys.results.archives import read_archive
 from symphys.results.config import read_config
 from symphys.results.discovery import is_run
-from symphys.results.file_names import CONFIG, PROBLEM, TRAJECTORY
+from symphys.results.file_names import CONFIG, GAINS, PROBLEM, TRAJECTORY
 from symphys.results.result import CheckRecord
 from symphys.results.run import Run, read_run
 from symphys.results.text_files import ReportError
@@ -94,6 +95,31 @@ class Solution:
     def trajectory(self) -> Trajectory:
         """The motion, exactly: arrays over time, such as ``trajectory["ball.position"]`` (N + 1, 3)."""
         return read_trajectory(self.folder / TRAJECTORY)
+
+    @cached_property
+    def gains(self) -> dict[str, Array]:
+        """Feedback about the motion, of solvers that find it (``ilqr``): the arrays of gains.npz; of others none."""
+        path = self.folder / GAINS
+        return read_archive(path) if path.exists() else {}
+
+    def rollout(self, start: ArrayLike | Mapping[str, ArrayLike] | None = None, feedback: bool = True) -> Trajectory:
+        """The motion from another start, with controls that answer what the state is off by the gains.
+
+        Args:
+            start: what differs from the problem's first state, by name as ``Controller`` takes it: ``shoulder.angle``,
+                ``rail.rate``, ``ball.position``; or the whole state (nx,). None: nothing does.
+            feedback: whether the gains act; else the controls are as they were found.
+
+        Raises:
+            SymphysError: the solver found no gains, or there is no such name.
+            NotFinite: as ``simulate``.
+        """
+        from symphys.api.simulation import follow  # late: most read, and roll nothing out
+
+        if not self.gains:
+            text = f"{self.folder}: there is no {GAINS}; ilqr finds gains, where its solve was not interrupted"
+            raise SymphysError(text)
+        return follow(self.problem, self.gains, start, feedback)
 
     @property
     def trace(self) -> Trace:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from symphys import threads as linear_algebra
 from symphys.api.solution import Solution
 from symphys.api.transcriptions import transcribed
 from symphys.errors import SymphysError
@@ -16,11 +17,14 @@ from symphys.interrupts import Interrupts
 from symphys.problem import Problem
 from symphys.problem.loading import Source, load
 from symphys.results.run import read_run
-from symphys.runs import Job, Result, execute, make_jobs
+from symphys.runs import Job, Result, RunGuess, execute, make_jobs, read_guess_run
 from symphys.runs.choice import chosen
 from symphys.solvers import TraceRow
+from symphys.transcription import Transcription, guessed
 
 Progress = Callable[[TraceRow], None]
+Guess = Solution | str | Path
+"""What names a run whose solution is a guess."""
 
 
 def solve(
@@ -28,6 +32,7 @@ def solve(
     solver: str | None = None,
     seed: int = 0,
     *,
+    guess: Guess | None = None,
     folder: str | Path | None = None,
     examine: bool = False,
     backend: str = "auto",
@@ -42,6 +47,9 @@ def solve(
         solver: its name; None: the first that the problem names, else the one that fits it best, see
             ``symphys.runs.choice``; then ``solution.run.provenance["chosen"]`` says why.
         seed: 0 starts from the guess; others from one perturbed by the ``spread`` of each variable.
+        guess: another run from which to start, a solution or the path of its folder: its variables by name, on any grid
+            of knots, step or duration, and with ``multiple_shooting`` its motion and multipliers. The log in the run
+            folder says what did not fit.
         folder: where run folders are kept, as by ``symphys solve --out``: what is done already is not done again, what
             was interrupted goes on. None: nothing is kept.
         examine: whether to examine how far the solution can be trusted, which may take longer than the solve.
@@ -55,7 +63,7 @@ def solve(
 
     Raises:
         ProblemError: the problem or an option cannot be used; says what would be valid.
-        SymphysError: there is no such solver, or the run failed.
+        SymphysError: there is no such solver, the run failed, or nothing of the guess fits.
         KeyboardInterrupt: after Ctrl-C; with a ``folder``, the same call goes on from there.
 
     Example:
@@ -66,10 +74,11 @@ def solve(
     """
     read_in = load(problem)
     name = solver or (read_in.solvers or [each.solver for each in chosen(read_in)])[0]
+    taken = guess_of(guess)
     asked = read_in.set({f"solver.{name}.{key}": value for key, value in options.items()}) if options else read_in
     with kept(folder) as out:
-        jobs = make_jobs([asked], [solver] if solver else None, [seed], dict(asked.settings), out, "", backend, examine)
-        job = jobs[0]
+        solvers, settings = [solver] if solver else None, dict(asked.settings)
+        job = make_jobs([asked], solvers, [seed], settings, out, "", backend, examine, taken)[0]
         if run(job, read_in, backend, threads, progress).interrupted:
             later = "with a folder, the same call would go on" if folder is None else "the same call goes on from there"
             raise KeyboardInterrupt(f"interrupted in {job.folder.path}; {later}")
@@ -78,6 +87,13 @@ def solve(
     if folder is None:
         weakref.finalize(solution, shutil.rmtree, out, ignore_errors=True)
     return solution
+
+
+def guess_of(source: Guess | None) -> RunGuess | None:
+    """What a run found, if one is named; SymphysError if there is nothing."""
+    if source is None:
+        return None
+    return read_guess_run(source.folder if isinstance(source, Solution) else source)
 
 
 @contextmanager
@@ -96,7 +112,7 @@ def kept(folder: str | Path | None) -> Iterator[Path]:
 
 def run(job: Job, problem: Problem, backend: str, threads: int | None, progress: Progress | None) -> Result:
     """Do what is asked for into its folder; options of a solver do not change what is compiled for the problem."""
-    with Interrupts().listening() as stop:
+    with linear_algebra.limited(), Interrupts().listening() as stop:
 
         def monitor(row: TraceRow) -> None:
             if stop():
@@ -104,7 +120,11 @@ def run(job: Job, problem: Problem, backend: str, threads: int | None, progress:
             if progress:
                 progress(row)
 
-        result = execute(job, monitor, lambda job: transcribed(problem, not job.smooth, backend, threads))
+        def made(job: Job) -> Transcription:
+            found = transcribed(problem, not job.smooth, backend, threads)
+            return guessed(found, job.problem) if job.guess.digest else found
+
+        result = execute(job, monitor, made)
     if result.status == "failed":
         raise SymphysError(result.advice)
     return result

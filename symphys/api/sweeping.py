@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
 from symphys.api.solution import Solution
-from symphys.api.solving import kept
+from symphys.api.solving import Guess, guess_of, kept
 from symphys.batches import ENGINES, BatchLimits, BatchResult, run_batch, run_on
 from symphys.errors import SymphysError
 from symphys.problem import Problem
@@ -42,12 +42,14 @@ class How(TypedDict, total=False):
         timeout: [s] of a run; with a folder, the same call goes on with what it stops.
         budget: [s] of all; likewise.
         rerun: what is done again although it is over: "failed", "changed" (by another version of symphys) or "all".
+        guess: another run from which all start, as in ``solve``.
     """
 
     retries: int
     timeout: float | None
     budget: float | None
     rerun: str | None
+    guess: Guess | None
 
 
 def solve_all(
@@ -81,7 +83,7 @@ def solve_all(
         on: ``"dask"`` or ``"slurm"``: ``jobs`` drivers do the runs elsewhere; needs a ``folder`` that all machines see.
         scheduler: as ``symphys solve --scheduler``; None: dask workers here, Slurm with its defaults.
         sweep: a table like [sweep] in a problem file, in its place; None: the file's; ``{}``: nothing is swept.
-        how: ``retries``, ``timeout``, ``budget`` and ``rerun``, see ``How``.
+        how: ``retries``, ``timeout``, ``budget``, ``rerun`` and ``guess``, see ``How``.
 
     Returns:
         Problems times points times solvers times seeds, in this order; ``run.status`` may be "failed".
@@ -100,8 +102,9 @@ def solve_all(
     limits, rerun = limits_of(how), how.get("rerun") or ""
     asked, counted = list(numbered(map(load, problems))), range(seeds) if isinstance(seeds, int) else tuple(seeds)
     with kept(folder) as out:
+        common = (out, "", backend, examine, guess_of(how.get("guess")))
         points = chain.from_iterable(points_of(problem, sweep) for problem in asked)
-        made = (make_jobs([each], solvers, counted, dict(each.settings), out, "", backend, examine) for each in points)
+        made = (make_jobs([each], solvers, counted, dict(each.settings), *common) for each in points)
         todo = list(chain.from_iterable(made))
         way = (jobs, ProgressObserver(progress), transcriber(backend, jobs > 1 or on is not None))
         if on:

@@ -91,6 +91,8 @@ def found(folder: Path, transcription: Transcription) -> NDArray[Any]:
 
 def describe(problem: Problem) -> list[str]:
     """What the file contains, in lines."""
+    from symphys.problem import set_quantities
+
     world, simulation = problem.world(), problem.simulation
     free = ", before a variable sets it" if problem.free_duration else ""
     lines = [
@@ -104,10 +106,8 @@ def describe(problem: Problem) -> list[str]:
         lines.append(f"  joints       {listed(f'{joint.name} ({joint.kind.name})' for joint in world.joints)}")
     lines += given(problem)
     for variable in problem.variables:
-        alike = " alike" if len(variable.slots) > 1 else ""
-        sets = listed(slot.name for slot in variable.slots)
         numbers = several(variable.guess.size, "number")
-        lines.append(f"  variable     {variable.name}: {numbers}, sets {sets}{alike}")
+        lines.append(f"  variable     {variable.name}: {numbers}, sets {set_quantities(problem, variable)}")
     for kind, things in (("cost", problem.costs), ("target", problem.targets), ("constraint", problem.constraints)):
         for thing in things:
             formula = " ".join(thing.formula.text.split())
@@ -161,5 +161,7 @@ def given(problem: Problem) -> list[str]:
     steps, dt = problem.simulation.steps, problem.simulation.dt
     for phase in problem.phases:
         first, last = phase.ticks(steps)
-        lines.append(f"  phase        {phase.name}: {first * dt:g} s to {last * dt:g} s")
+        numbers = (f"{name} = {row[0] if len(row) == 1 else list(row)}" for name, row in phase.sets.items())
+        own = f", with {listed(numbers)}" if phase.sets else ""
+        lines.append(f"  phase        {phase.name}: {first * dt:g} s to {last * dt:g} s{own}")
     return lines

@@ -35,6 +35,7 @@ from symphys.cli.wording import duration, many_pairs
 if TYPE_CHECKING:
     from symphys.batches import BatchResult
     from symphys.cli.watching.choice import Shown
+    from symphys.problem import Problem
     from symphys.report.making.batch import MadePages
     from symphys.runs import Job
 
@@ -58,6 +59,14 @@ INTERRUPTED = 130
     default=1,
     show_default=True,
     help="How many seeds; seed 0 starts from the guess as it is, the others from one perturbed by its spread.",
+)
+@click.option(
+    "--guess",
+    "guess_from",
+    metavar="RUN_FOLDER",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Start from what another run has found: its variables by name, on any grid of knots, step or duration; with "
+    "multiple_shooting its motion and multipliers too.",
 )
 @settings_option
 @sweep_options
@@ -91,6 +100,7 @@ def solve(
     sources: tuple[str, ...],
     names: str | None,
     seeds: int,
+    guess_from: Path | None,
     assignments: tuple[str, ...],
     sweeps: tuple[str, ...],
     samples: str | None,
@@ -112,25 +122,21 @@ def solve(
     threads.limit()
     from symphys.batches import BatchLimits, run_batch, run_on
     from symphys.cli.watching import watch, working
-    from symphys.runs import make_jobs
-    from symphys.runs.choice import chosen_lines
+    from symphys.runs import make_jobs, read_guess_run
     from symphys.transcription import transcribe
 
     solvers, backend = read_solvers(names), read_backend(backend)
     problems = read_problems(sources, read_settings(assignments))
-    command = shlex.join(["symphys", *sys.argv[1:]])
+    command, guess = shlex.join(["symphys", *sys.argv[1:]]), read_guess_run(guess_from) if guess_from else None
+    common = (out, command, backend, not unexamined, guess)
     asked = [
         job
         for each in points_of(read_sweeps(problems, sweeps, samples), working)
-        for job in make_jobs([each], solvers, range(seeds), dict(each.settings), out, command, backend, not unexamined)
+        for job in make_jobs([each], solvers, range(seeds), dict(each.settings), *common)
     ]
     if how.dry_run:
         return print_previews(asked, how.rerun)
-    for problem in problems:
-        if not (how.quiet or how.json):
-            click.echo("".join(f"{line}\n" for line in chosen_lines(problem, solvers)), err=True, nl=False)
-        if note := many_pairs(problem.name, len(problem.world().pairs)):
-            click.echo(note, err=True)
+    print_notes(problems, solvers, asked, how.quiet or how.json)
     require_folder(out)
     made = partial(transcribe, backend=backend, threads=1 if jobs > 1 or how.on else None)
     limits = BatchLimits(how.retries, how.timeout, how.budget)
@@ -145,6 +151,19 @@ def solve(
         return conclude_silently(batch, observer, write)
     parts = observer.notes.seconds if jobs == 1 and not (multi_start or how.on) else {}
     return conclude(asked, batch, out, began, parts, write)
+
+
+def print_notes(problems: list[Problem], solvers: tuple[str, ...] | None, jobs: list[Job], silent: bool) -> None:
+    """Say which solvers were chosen, and what of a guess was not taken as it is; many pairs also where ``silent``."""
+    from symphys.runs.choice import chosen_lines
+
+    for problem in problems:
+        if not silent:
+            click.echo("".join(f"{line}\n" for line in chosen_lines(problem, solvers)), err=True, nl=False)
+        if note := many_pairs(problem.name, len(problem.world().pairs)):
+            click.echo(note, err=True)
+    for note in () if silent else dict.fromkeys(f"{job.case}: {note}" for job in jobs for note in job.guess.notes):
+        click.echo(note, err=True)
 
 
 def require_folder(out: Path) -> None:

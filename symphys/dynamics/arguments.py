@@ -9,7 +9,7 @@ import casadi as ca
 
 from symphys.dynamics.context import State, StepContext, make_context
 from symphys.dynamics.tracing.trace import InlineTracer
-from symphys.model.state_layout import Layout, inputs_size
+from symphys.model.state_layout import Layout, input_symbols
 from symphys.model.world import Scheme, World
 
 Expr = Any
@@ -37,5 +37,4 @@ def parts_of(layout: Layout, x: Expr) -> State:
 def arguments_of(world: World, inputs: Sequence[str], parameters: Sequence[Any]) -> list[Expr]:
     """Symbols for x, u, p and smoothing."""
     x = ca.SX.sym("x", Layout(world).size)
-    u = ca.SX.sym("u", inputs_size(world, inputs))
-    return [x, u, ca.vertcat(ca.SX(0, 1), *parameters), ca.SX.sym("smoothing")]
+    return [x, input_symbols(world, inputs), ca.vertcat(ca.SX(0, 1), *parameters), ca.SX.sym("smoothing")]

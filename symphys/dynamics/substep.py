@@ -27,6 +27,7 @@ from symphys.dynamics.joints.loop_closure import TreeDisplacement
 from symphys.dynamics.joints.warm_start import (
     Rotors,
     add_joint_forces,
+    commanded,
     keep_momentum,
     keep_rotors,
     lasting_forces,
@@ -101,7 +102,7 @@ def advance(
         conditions = Conditions(off, plastic, x[f"{pair.name}.force"], trees.same(bodies), may_couple(world, pair))
         constraint = prepare(context.settings, pair.law, contact, moving, duration, conditions)
         constraints.append(trees.placed(bodies, constraint))
-    joints, fitted = joint_constraints(context, trees, paths, duration, kick)
+    joints, fitted = joint_constraints(context, x, trees, paths, duration, kick)
 
     # 5-6. velocities: warm start (16), then projections (14, 15, 17)
     given = distribute_loads(context, constraints, _warm_start(context, constraints, x, kick))
@@ -125,6 +126,7 @@ def advance(
         momenta = keep_momentum(context, momenta, closed.made, struck, duration)
         rotors = keep_rotors(context, trees.coordinates, solved.momenta, closed.turned, struck, duration)
         values |= forces if scheme.warm_start else {name: ca.SX.zeros(*force.shape) for name, force in forces.items()}
+        values |= commanded(context, joints, forces)
     values |= _moving_bodies(context, motions, momenta, reactions, poses, rotors)
     changes = tuple(zip(solved.impulses, solved.last, strict=True))
     return Substep(values, tuple(constraints), tuple(contacts), impulses, changes)

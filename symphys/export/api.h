@@ -58,7 +58,7 @@ void ${name}_start(const double *z, double *x, double *u, double *p, double *wor
 void ${name}_step(const double *x, const double *u, const double *p, double smoothing, double *next, double *work);
 
 /* The state after one time step with its controllers, and the step's exact slopes, row by row: a (T, T) the next t by t,
-   b (T, $varied) by the inputs as variables give them, c (T, P) by p. u is $linearized. In ${name}_linearize.c. */
+   b (T, $varied) by the first numbers of u, c (T, P) by p. u is $linearized. In ${name}_linearize.c. */
 void ${name}_linearize(const double *x, const double *u, const double *p, double smoothing, double *next, double *a,
                        double *b, double *c, double *work);
 

@@ -10,9 +10,9 @@ from typing import Any
 import casadi as ca
 
 from symphys.export import words
+from symphys.export.slopes import slopes_function
 from symphys.export.sources import dense_step, tangent_of
 from symphys.transcription import Transcription
-from symphys.transcription.staged.slope_functions import slopes_function
 
 RESULTS = {
     "value": ("merit", "objective", "errors", "outputs"),

@@ -71,6 +71,8 @@ def problem_model(problem: Problem, approximate: bool = False) -> MjcfModel:
     """The model of a problem's world; see ``mjcf_model``."""
     dt, name = problem.simulation.dt, problem.name
     laws = [Departure("left out", (law.name,), "a force law; MuJoCo has no formulas") for law in problem.forces]
+    text = "numbers that hold in a phase alone; a model of MuJoCo has one of each"
+    laws += [Departure("left out", (phase.name,), text) for phase in problem.phases if phase.sets]
     return mjcf_model(problem.world(), problem.initial, dt, name, problem.sensors, laws, approximate=approximate)
 
 

@@ -15,9 +15,9 @@ import numpy as np
 from symphys.codegen import MemoryLayout, Program
 from symphys.codegen.emit.plain import plain_functions, plain_source, table
 from symphys.export import words
+from symphys.export.slopes import directional_slope
 from symphys.transcription import Transcription, rollout_program
 from symphys.transcription.rollout import Rollout
-from symphys.transcription.staged.slope_functions import directional_slope
 from symphys.transcription.staged.step_program import StepArguments
 from symphys.transcription.staged.tangent import Tangent
 
@@ -36,7 +36,7 @@ def c_files(transcription: Transcription, version: str) -> dict[str, bytes]:
     values |= {"work": max(plain.memory + outputs, *(each.nnz_in() + each.nnz_out() for each in (step, slope)))}
     values |= _sizes(rollout, step) | _documented(transcription, program, version)
     values |= _data(transcription, program) | {"places": _places(step), "slope_places": _places(slope)}
-    values |= _linearized(arguments.tangent, slope)
+    values |= _linearized(arguments, slope)
     texts = {
         f"{name}.h": _filled("api.h", values),
         f"{name}.c": f'#include "{name}.h"\n\n' + plain.text + _filled("api.c", values),
@@ -75,10 +75,10 @@ def _sizes(rollout: Rollout, step: ca.Function) -> dict[str, object]:
     return {**sizes, "steps": rollout.steps, "dt": f"{rollout.dt:g}"}
 
 
-def _linearized(tangent: Tangent, slope: ca.Function) -> dict[str, object]:
-    given, varied = slope.numel_in("u"), slope.numel_in("du")
-    told = "that of step" if given == varied else f"these {varied}, then the time [s]"
-    sizes = {"nt": tangent.size, "given": given, "varied": varied}
+def _linearized(arguments: StepArguments, slope: ca.Function) -> dict[str, object]:
+    tangent, closed = arguments.tangent, arguments.rollout.feedback is not None
+    sizes = {"nt": tangent.size, "given": slope.numel_in("u"), "varied": slope.numel_in("du")}
+    told = "as variables give it, then the time [s]" if closed else "that of step"
     return {**sizes, "linearized": told, "tangent": words.indented(words.tangent_lines(tangent))}
 
 

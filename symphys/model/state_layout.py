@@ -4,7 +4,8 @@ For each body: position (3) [m], orientation (4) [-] quaternion w x y z, velocit
 [rad/s] at t_k, world frame, and the force (3) [N] and torque (3) [N m] with which constraints act on it persistently.
 For each pair: force (3) [N] on its first body, and torque (3) [N m] if its law resists spinning. For each joint: if
 it closes a loop or is soft lock, the forces and torques of what it locks; and a number per coordinate for its motor,
-lower and upper limit, spring and dry friction. For each coupling what it gives. Last ``lag`` [s].
+lower and upper limit, spring and dry friction; also what the last command gave, where the motor gives more than that.
+For each coupling what it gives. Last ``lag`` [s].
 
 The velocities are the true ones at t_k: 0 at rest. The step needs them without the persistent forces of the last
 half step: v - lag force / m. ``lag`` is 0 at the start and dt/2 after the first step, so that no step is special.
@@ -18,6 +19,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.model.joints import tree_joints
+from symphys.model.joints.joint import DRIVE
 from symphys.model.world import NOTHING, World
 
 BODY_FIELDS = (
@@ -55,6 +57,8 @@ class Layout:
                 self._add(f"{joint.name}.lock", joint.locked)
             for part in joint.acting:
                 self._add(f"{joint.name}.{part}", len(joint.kind.coordinates))
+            if joint.drive == DRIVE:
+                self._add(f"{joint.name}.{DRIVE}", len(joint.kind.coordinates))
         for coupling in world.couplings:
             self._add(f"{coupling.name}.{COUPLED}", 1)
         self._add("lag", 1)
@@ -119,7 +123,8 @@ def initial_state(world: World, values: Mapping[str, Any] = NOTHING) -> Any:
 def input_sizes(world: World) -> dict[str, int]:
     """What may act on a world from outside, and how many numbers each has: forces and torques, commands of motors."""
     forces = {f"{body.name}.{field}": 3 for body in world.bodies for field in INPUT_FIELDS}
-    return forces | {f"{joint.name}.command": len(joint.kind.coordinates) for joint in world.joints if joint.driven}
+    commands = {f"{joint.name}.command": len(joint.kind.coordinates) for joint in world.joints if joint.driven}
+    return forces | commands | {name: 1 for name, _ in world.scheduled}
 
 
 def input_names(world: World) -> list[str]:
@@ -142,6 +147,13 @@ def input_columns(world: World, inputs: Sequence[str]) -> dict[str, slice]:
         stop = start + (sizes[name] if name in sizes else input_size(world, name))
         columns[name], start = slice(start, stop), stop
     return columns
+
+
+def input_symbols(world: World, inputs: Sequence[str]) -> Any:
+    """U as symbols (SX); what is scheduled are those of the world."""
+    scheduled, sizes = dict(world.scheduled), input_sizes(world)
+    sizes |= {name: input_size(world, name) for name in inputs if name not in sizes}
+    return ca.vertcat(ca.SX(0, 1), *(scheduled.get(name, ca.SX.sym(name, sizes[name])) for name in inputs))
 
 
 def inputs_size(world: World, inputs: Sequence[str]) -> int:

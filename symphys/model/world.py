@@ -105,6 +105,8 @@ class World:
         joints: what holds bodies together.
         couplings: coordinates that follow others.
         sites: named points.
+        scheduled: inputs of one number each on which other numbers of the world depend, as symbols by name: those of
+            the contacts, motors, springs and gravity that change from step to step.
     """
 
     bodies: tuple[Body, ...]
@@ -114,6 +116,7 @@ class World:
     joints: tuple[Joint, ...] = ()
     couplings: tuple[JointCoupling, ...] = ()
     sites: tuple[Site, ...] = ()
+    scheduled: tuple[tuple[str, Any], ...] = ()
 
     def body_index(self, name: str) -> int:
         """The index of the body called ``name``; KeyError if there is none."""

@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from symphys.errors import SymphysError
 from symphys.model.state_layout import input_columns
-from symphys.mpc.measurement import StateReader
 from symphys.mpc.planner import Planner, RecedingPlan
 from symphys.problem import Problem, RecedingHorizon
 from symphys.problem.loading import Source, load
+from symphys.transcription.feedback.state_reader import StateReader
 
 Array = NDArray[np.float64]
 State = ArrayLike | Mapping[str, ArrayLike]

@@ -46,7 +46,9 @@ def receding_model(problem: Problem) -> Problem:
 def fixed_times(problem: ProblemData) -> list[Issue]:
     """Costs, targets and constraints that are bound to a time of the problem's own."""
     moving = 'a horizon moves on; take "always" or "end", or name `time` in the formula'
-    found = []
+    found = [
+        Issue(f'phase "{phase.name}".sets', f"holds in a phase, but {moving}") for phase in problem.phases if phase.sets
+    ]
     kinds: tuple[tuple[str, Any], ...] = (
         ("cost", problem.costs),
         ("target", problem.targets),

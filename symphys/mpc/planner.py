@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from symphys.codegen import processors
-from symphys.mpc.horizon_costs import HorizonCosts
+from symphys.mpc.horizon_costs import HorizonCosts, QuadraticCosts
 from symphys.mpc.model import horizon_of, receding_model
-from symphys.mpc.policy_rollout import AffinePolicy, PolicyRollout
-from symphys.mpc.riccati import riccati_pass
 from symphys.problem import Problem
+from symphys.shooting import AffinePolicy
+from symphys.solvers.ddp.riccati import CostToGo, LinearStep, riccati_recursion
 from symphys.transcription.rollout import Rollout, symbolic_rollout
 from symphys.transcription.staged.linearized_step import LinearizedStep
+from symphys.transcription.staged.policy_rollout import PolicyRollout, PolicySizes
 from symphys.transcription.staged.stage_terms import StageSymbols, motion_sums, stage_terms
 from symphys.transcription.staged.tangent import Tangent
 
@@ -27,6 +29,22 @@ SHARES = np.array([1.0, 0.5, 0.0])
 """Of the feedback with which a shifted plan is followed: the cheapest counts. Gains may fail across an impact."""
 GROWTH, SHRINK, STIFFEST = 8.0, 0.5, 1e8
 """Factors on the damping after a tick that gained nothing and after one that did, and its largest value."""
+
+
+class PlanPolicy(NamedTuple):
+    """The decisions of a plan as affine functions of the state.
+
+    Attributes:
+        x: (N, nx) states about which it is.
+        v: (N, w) decisions there.
+        ahead: (N, w) what a whole step adds.
+        back: (N, w, n) by the tangent of the state.
+    """
+
+    x: Array
+    v: Array
+    ahead: Array
+    back: Array
 
 
 @dataclass(frozen=True)
@@ -70,6 +88,7 @@ class Planner:
         lower, upper, scale: (w,) of the decisions.
         damping: of the next iteration.
         threads: that share the steps of a plan.
+        description: what evaluates, in words.
     """
 
     def __init__(self, problem: Problem, threads: int | None = None) -> None:
@@ -91,33 +110,43 @@ class Planner:
         self.lower, self.upper, self.scale = (stacked[key][0] for key in ("lower", "upper", "scale"))
         self.start, self.p, self.weights = begun(self.rollout, self._order)
         self._costs = HorizonCosts(symbols, self.tangent, stage_terms(symbols), self.weights)
-        bounds = self.lower, self.upper
-        self._rolled = PolicyRollout(self._step, self._costs, self.weights, bounds, self.p)
+        steps, (inputs, width) = self.rollout.steps, self.weights.shape
+        self._rolled = PolicyRollout(self._step, PolicySizes(0, width, inputs), self._costs)
+        self._bounds = np.tile(self.lower, (steps, 1)), np.tile(self.upper, (steps, 1))
+        self._same = np.tile(self.weights, (steps, 1, 1)), np.zeros((steps, 0, width))
+        self.description = self._step.description
         self._whole_inputs = not np.array_equal(self.weights, np.eye(len(self.weights)))
         self.damping = self.horizon.damping
         self.threads = processors() if threads is None else threads
-
-    @property
-    def description(self) -> str:
-        """What evaluates, in words."""
-        return self._step.description
 
     def first(self, x: Array, time: float) -> RecedingPlan:
         """A plan from the guess, after the iterations that come before the first tick."""
         self.damping = self.horizon.damping
         steps, zeros = self.rollout.steps, np.zeros_like(self._guess)
         gains = np.zeros((*zeros.shape, self.tangent.size))
-        policy = AffinePolicy(np.tile(x, (steps, 1)), self._guess, zeros, gains)
+        policy = PlanPolicy(np.tile(x, (steps, 1)), self._guess, zeros, gains)
         return self._improved(policy, x, time, self.horizon.first_iterations)
 
     def next(self, plan: RecedingPlan, x: Array, time: float) -> RecedingPlan:
         """The plan from a measured state (nx,) at a time [s]: the last one shifted to then, and improved."""
         return self._improved(shifted(plan, time), x, time, self.horizon.iterations)
 
-    def _improved(self, policy: AffinePolicy, x: Array, time: float, iterations: int) -> RecedingPlan:
+    def follow(
+        self, x: Array, policy: PlanPolicy, lengths: Array, time: float, shares: Array | float = 1.0
+    ) -> tuple[Array, Array, Array]:
+        """From a state (nx,) at a time [s]: states (B, N + 1, nx), decisions (B, N, w) and costs (B,).
+
+        ``lengths``, ``shares``: (B,) of the steps and of the feedback.
+        """
+        none = np.zeros((len(policy.v), 0))
+        about = AffinePolicy(policy.x, none, *policy[1:], *self._same, *self._bounds)
+        found = self._rolled(x, self.p, about, lengths, self.horizon.smoothing, time, shares=shares)
+        return found.x, found.new, found.cost
+
+    def _improved(self, policy: PlanPolicy, x: Array, time: float, iterations: int) -> RecedingPlan:
         """Follow the policy from the state, then iterate."""
         none = np.zeros(len(SHARES))
-        states, decisions, costs = self._rolled(x, policy, none, time, self.horizon.smoothing, SHARES)
+        states, decisions, costs = self.follow(x, policy, none, time, SHARES)
         best = int(np.where(np.isfinite(costs), costs, math.inf).argmin())
         plan = RecedingPlan(
             time, self.horizon.dt, states[best], decisions[best], policy.back, float(costs[best]), False
@@ -136,12 +165,12 @@ class Planner:
         costs = self._costs.expand(plan.x, plan.v, self.p, plan.time)
         b = b @ self.weights if self._whole_inputs else b
         room = self.lower - plan.v, self.upper - plan.v
-        found = riccati_pass(a, b, costs, room, self.damping / self.scale**2)
+        found = plan_feedback(a, b, costs, room, self.damping / self.scale**2)
         if found is None:
             return self._kept(plan, plan.back)
         ahead, back = found
-        about = AffinePolicy(plan.x[:-1], plan.v, ahead, back)
-        states, decisions, values = self._rolled(plan.x[0], about, LENGTHS, plan.time, self.horizon.smoothing)
+        about = PlanPolicy(plan.x[:-1], plan.v, ahead, back)
+        states, decisions, values = self.follow(plan.x[0], about, LENGTHS, plan.time)
         values = np.where(np.isfinite(values), values, math.inf)
         best = int(values.argmin())
         if not values[best] < plan.cost:
@@ -153,6 +182,35 @@ class Planner:
         """The plan as it was, with gains about it; the next iteration is more careful."""
         self.damping = min(self.damping * GROWTH, STIFFEST)
         return replace(plan, back=back, gained=False)
+
+
+def plan_feedback(
+    a: Array, b: Array, costs: QuadraticCosts, room: tuple[Array, Array], damping: Array
+) -> tuple[Array, Array] | None:
+    """Feedforward (N, w) and gains (N, w, n); None where a Hessian is not positive definite, or slopes not finite.
+
+    Args:
+        a: (N, n, n) the next state by the state.
+        b: (N, n, w) the next state by the decisions.
+        costs: about the motion.
+        room: (N, w) each, how far decisions may go down and up.
+        damping: (w,) added to the diagonal of the Hessian by decisions.
+    """
+    n = a.shape[1]
+    through, curves = np.concatenate([a, b], axis=2), costs.curve[:-1]
+    if costs.ahead is not None:
+        curves = curves.copy()
+        later = costs.ahead @ through
+        curves[:, n:] += later
+        curves[:, :, n:] += later.transpose(0, 2, 1)
+    parts = (part[::-1] for part in (through, costs.slope[:-1], curves, *room))
+    steps = (LinearStep(t, q, c, low, high, damping) for t, q, c, low, high in zip(*parts, strict=True))
+    found = riccati_recursion(steps, CostToGo(costs.slope[-1, :n], costs.curve[-1, :n, :n]))
+    if found is None:
+        return None
+    feedback = [each for each in reversed(found.feedback) if each is not None]
+    ahead, back = np.array([each.ahead for each in feedback]), np.array([each.back for each in feedback])
+    return (ahead, back) if np.isfinite(ahead).all() and np.isfinite(back).all() else None
 
 
 def decision_order(model: Problem) -> NDArray[np.int64]:
@@ -172,7 +230,7 @@ def begun(rollout: Rollout, order: NDArray[np.int64]) -> tuple[Array, Array, Arr
     return x.ravel(), p.ravel(), weights[:, order[0]]
 
 
-def shifted(plan: RecedingPlan, time: float) -> AffinePolicy:
+def shifted(plan: RecedingPlan, time: float) -> PlanPolicy:
     """What a plan says from a later time [s] on, step by step: between its steps linearly, after its end as last.
 
     States between two steps are means of both; they are only what feedback refers to.
@@ -185,4 +243,4 @@ def shifted(plan: RecedingPlan, time: float) -> AffinePolicy:
     there = np.minimum(here + 1, last)
     x = (1 - share) * plan.x[here] + share * plan.x[here + 1]
     v = (1 - share) * plan.v[here] + share * plan.v[there]
-    return AffinePolicy(x, v, np.zeros_like(v), plan.back[here])
+    return PlanPolicy(x, v, np.zeros_like(v), plan.back[here])

@@ -1,6 +1,7 @@
 """Problem files: reading, validation, and the model that everything after works with."""
 
 from symphys.problem.feedback import FeedbackController, ForceLaw, Sensor
+from symphys.problem.guess.motion import GuessedMotion
 from symphys.problem.load import require_solvable
 from symphys.problem.model import (
     ALIVE,
@@ -22,9 +23,9 @@ from symphys.problem.model import (
 )
 from symphys.problem.parametric.reposition import reposition
 from symphys.problem.problem import Problem, load_problem, problem_of_tables
+from symphys.problem.quantities import set_quantities
 from symphys.problem.reading.solver_options import require_solvers, validate_options
 from symphys.problem.receding_horizon import PlantSettings, RecedingHorizon
-from symphys.problem.references import GuessedMotion
 from symphys.problem.robot_alone import is_robot, robot_alone
 from symphys.problem.schema.json_schema import json_schema
 from symphys.problem.schema.reference import reference_page
@@ -62,5 +63,6 @@ __all__ = [
     "require_solvable",
     "require_solvers",
     "robot_alone",
+    "set_quantities",
     "validate_options",
 ]

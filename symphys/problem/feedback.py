@@ -83,11 +83,6 @@ class ForceLaw:
         return ((self.on, self.components, 1), *opposite)
 
     @property
-    def commands(self) -> bool:
-        """Whether it commands a motor, which gives its impulse at the start of a step; other forces act over it."""
-        return self.on.endswith(".command")
-
-    @property
     def weights(self) -> dict[str, Array]:
         """The numbers by the names that variables and formulas use: ``drag.c``."""
         return {f"{self.name}.{key}": value for key, value in self.numbers.items()}

@@ -19,6 +19,7 @@ from symphys.problem.checks.pair_limit import check_pair_limit
 from symphys.problem.checks.start import at_guess, check_joints, check_overlap, formula_names, sensor_names
 from symphys.problem.checks.start_values import StartValues
 from symphys.problem.feedback import FeedbackController, ForceLaw, Sensor
+from symphys.problem.guess.table import read_guess
 from symphys.problem.include.files import appendix
 from symphys.problem.model import ALIVE, Array, ProblemData, Simulation, Termination, Variable
 from symphys.problem.parametric.collision_filter import CollisionFilter
@@ -43,11 +44,17 @@ from symphys.problem.tables.contact import (
 )
 from symphys.problem.tables.controllers import read_controllers, read_sensors
 from symphys.problem.tables.forces import force_quantities, read_forces
-from symphys.problem.tables.guess import read_guess
 from symphys.problem.tables.joints import read_joints
 from symphys.problem.tables.objectives import Objectives, read_objectives
 from symphys.problem.tables.scenarios import read_scenarios
-from symphys.problem.tables.simulation import read_phases, read_time
+from symphys.problem.tables.simulation import (
+    check_read_at_start,
+    dotted,
+    phase_quantities,
+    read_phases,
+    read_sets,
+    read_time,
+)
 from symphys.problem.tables.statics import read_statics
 from symphys.problem.tables.termination import read_termination, with_termination_cost
 from symphys.problem.tables.variables import read_variables
@@ -119,20 +126,18 @@ def build(
     check_couplings(nominal, faults)
     known = quantities(initial, parametric.parameters(), input_sizes(nominal)) | duration_quantity(simulation.duration)
     sensors, controllers = read_control(document, parametric, known, functions, starts, given, faults)
-    known |= weight_quantities(controllers) | force_quantities(document.force)
+    sets = read_sets(document.phase, parametric, faults)
+    known |= weight_quantities(controllers) | force_quantities(document.force) | phase_quantities(sets)
     variables = read_variables(document.variable, known, simulation, faults)
-    check_rollout(nominal, simulation, variables, faults)
-    check_varied(parametric, nominal, variables, faults)
-    check_anchors(parametric, variables, faults)
+    check_variables(document, simulation, parametric, nominal, variables, faults)
     sampled = {name: quantity for name, quantity in known.items() if quantity.kind != "duration"}
     scenarios = read_scenarios(document.scenario, sampled, parametric, simulation, variables, faults)
     faults.stop_if_any()
     values = at_guess(parametric, known, variables)
-    start = starts.of(parametric, values)
-    check_overlap(parametric, start, faults)
-    check_joints(parametric, start, faults)
+    start = checked_start(starts, parametric, values, faults)
     named = {**formula_names(values, start, variables), **given}
-    forces, termination, objectives = read_laws(document, simulation, nominal, known, named, variables, faults)
+    forces, termination, objectives = read_laws(document, simulation, sets, nominal, known, named, variables, faults)
+    check_read_at_start(objectives.phases, sensors, (document.ending[0], termination), faults)
     return ProblemData(
         name=printable(path.stem),
         title=document.title or printable(path.stem),
@@ -161,6 +166,14 @@ def build(
     )
 
 
+def checked_start(starts: StartValues, parametric: ParametricWorld, values: Mapping[str, Any], faults: Faults) -> Any:
+    """The state at the guess; what overlaps there, and joints that do not fit, are faults."""
+    start = starts.of(parametric, values)
+    check_overlap(parametric, start, faults)
+    check_joints(parametric, start, faults)
+    return start
+
+
 def read_control(
     document: Document,
     parametric: ParametricWorld,
@@ -183,9 +196,34 @@ def read_control(
     return sensors, controllers
 
 
+def check_variables(
+    document: Document,
+    simulation: Simulation,
+    parametric: ParametricWorld,
+    nominal: World,
+    variables: Sequence[Variable],
+    faults: Faults,
+) -> None:
+    """What variables and phases set must fit the world, and the rollout into memory."""
+    check_rollout(nominal, simulation, variables, faults)
+    check_varied(parametric, nominal, varied_names(document, variables), faults)
+    check_anchors(parametric, variables, faults)
+
+
+def varied_names(document: Document, variables: Sequence[Variable | None]) -> list[tuple[Place, str]]:
+    """What variables and phases set, and where they say so."""
+    found: list[tuple[Place, str]] = [
+        (("phase", k, "sets"), name) for k, table in enumerate(document.phase) for name, _ in dotted(table.sets)
+    ]
+    for k, variable in enumerate(variables):
+        found += [(("variable", k, "sets"), slot.name) for slot in (variable.slots if variable else ())]
+    return found
+
+
 def read_laws(
     document: Document,
     simulation: Simulation,
+    sets: Mapping[str, Mapping[str, tuple[float, ...]]],
     nominal: World,
     known: Mapping[str, Quantity],
     named: Mapping[str, Any],
@@ -194,7 +232,7 @@ def read_laws(
 ) -> tuple[tuple[ForceLaw, ...], Termination | None, Objectives]:
     """Force laws, termination and objectives; ``named`` has a value for each name in formulas, as the guess has it."""
     free = any(variable.kind == "duration" for variable in variables)
-    phases = read_phases(document.phase, simulation, free, faults)
+    phases = read_phases(document.phase, sets, simulation, free, faults)
     forces = read_forces(document.force, known, named, variables, phases, faults)
     others = {each.name for each in variables} | {each.name for each in document.reference}
     sensed = {name: value for name, value in named.items() if name.partition(".")[0] not in others}

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from symphys.expression import Formula
 from symphys.model.world import Scheme, World
 from symphys.problem.feedback import FeedbackController, ForceLaw, Sensor
+from symphys.problem.guess.motion import GuessedMotion
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.receding_horizon import RecedingHorizon
-from symphys.problem.references import GuessedMotion, ReferenceTrajectory
+from symphys.problem.references import ReferenceTrajectory
 from symphys.problem.sweeps.sweep import Sweep
 
 Array = NDArray[np.float64]
@@ -62,11 +63,18 @@ class Phase:
     Attributes:
         name: as in the file.
         start, end: shares of the duration.
+        sets: physical parameters by name, with the numbers that hold in it alone.
     """
 
     name: str
     start: float
     end: float
+    sets: Mapping[str, tuple[float, ...]] = field(default_factory=dict, hash=False)
+
+    @property
+    def weights(self) -> dict[str, Array]:
+        """What it sets by the names that variables and formulas use: ``ice.ground.friction``."""
+        return {f"{self.name}.{key}": np.array(numbers) for key, numbers in self.sets.items()}
 
     def ticks(self, steps: int) -> tuple[int, int]:
         """The numbers of its first and last state, of ``steps`` time steps."""
@@ -356,8 +364,9 @@ class ProblemData:
 
     @property
     def weights(self) -> dict[str, Array]:
-        """The numbers of all controllers and force laws as the file has them, by names such as ``brain.weights``."""
-        own = [*(controller.weights for controller in self.controllers), *(law.weights for law in self.forces)]
+        """The numbers of all controllers, force laws and phases as the file has them, by names as ``brain.weights``."""
+        own = [each.weights for each in self.controllers]
+        own += [*(law.weights for law in self.forces), *(phase.weights for phase in self.phases)]
         return {name: value for weights in own for name, value in weights.items()}
 
     @property

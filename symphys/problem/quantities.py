@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.model.state_layout import input_sizes
 from symphys.problem.feedback import FeedbackController
-from symphys.problem.model import DURATION, Kind, VariableSlot
+from symphys.problem.model import DURATION, Kind, ProblemData, Variable, VariableSlot
 from symphys.problem.parametric.parts import VARIABLE
 from symphys.suggest import hint, quote
 
@@ -42,12 +43,14 @@ class SlotError(ValueError):
 class Quantity:
     """Something that a variable can set: (components,) as the file has it.
 
-    ``own_scale``: whether it typically changes by its own size, as parameters do.
+    ``own_scale``: whether it typically changes by its own size, as parameters do. ``like``: the parameter in whose
+    place it stands; None for what stands for itself.
     """
 
     kind: Kind
     nominal: Array
     own_scale: bool = False
+    like: str | None = None
 
 
 def quantities(
@@ -94,7 +97,7 @@ def read_slot(text: str, known: Mapping[str, Quantity]) -> VariableSlot:
     return VariableSlot(name, tuple(chosen))
 
 
-def unknown(name: str, known: Mapping[str, Quantity]) -> str:
+def unknown(name: str, known: Collection[str]) -> str:
     """The nearest quantities; for a coefficient that no table states, how to state it."""
     owner, _, key = name.rpartition(".")
     owners = dict.fromkeys(other.rpartition(".")[0] for other in known)
@@ -103,6 +106,21 @@ def unknown(name: str, known: Mapping[str, Quantity]) -> str:
     same_owner = [other for other in known if owner and other.startswith(f"{owner}.")]
     stated = f"; what states no {key} has none to vary" if key in VARIABLE else ""
     return hint(name, same_owner or known) + stated
+
+
+def set_quantities(problem: ProblemData, variable: Variable) -> str:
+    """What a variable sets, as a file writes it; all that a list names gets the same values, which may not be meant."""
+    values = {**problem.initial, **problem.parameters, **problem.weights}
+    sizes = {DURATION: 1, **{name: value.size for name, value in values.items()}, **input_sizes(problem.world())}
+
+    def text(slot: VariableSlot) -> str:
+        first, count = slot.components[0], len(slot.components)
+        if count == sizes[slot.name]:
+            return slot.name
+        return f"{slot.name}[{first}]" if count == 1 else f"{slot.name}[{first}:{first + count}]"
+
+    *others, last = map(text, variable.slots)
+    return f"{', '.join(others)} and {last} to the same values" if others else last
 
 
 def physical(name: str, kind: Kind) -> tuple[float, float]:
@@ -114,7 +132,9 @@ def physical(name: str, kind: Kind) -> tuple[float, float]:
 def limits(slot: VariableSlot, known: Mapping[str, Quantity]) -> tuple[Array, Array]:
     """(components,) twice: the bounds that hold where the file states none."""
     key = slot.name.rpartition(".")[2]
-    low, high = (np.full(len(slot.components), limit) for limit in physical(slot.name, known[slot.name].kind))
+    like, kind = known[slot.name].like, known[slot.name].kind
+    ends = physical(slot.name, kind) if like is None else physical(like, "parameter")
+    low, high = (np.full(len(slot.components), limit) for limit in ends)
     if key in OPEN:
         low = LEAST_SHARE * known[slot.name].nominal[list(slot.components)]
     return low, high

@@ -70,31 +70,6 @@ class ReferenceTrajectory:
         return found
 
 
-@dataclass(frozen=True)
-class GuessedMotion:
-    """Where a motion is guessed to pass: quantities over time, on straight lines between what is known of each.
-
-    Attributes:
-        columns: times (K,) [s], ascending, and values (K, components) there, by names such as ``knee.angle``,
-            ``knee.rate``, ``torso.position``.
-    """
-
-    columns: Mapping[str, tuple[Array, Array]]
-
-    def at(self, name: str, times: Array) -> Array:
-        """(M, components) at times (M,) [s]; before the first and after the last it stays."""
-        known, values = self.columns[name]
-        return np.stack([np.interp(times, known, column) for column in values.T], axis=1)
-
-    def rate(self, name: str, times: Array, dt: float) -> Array:
-        """(M, components) the slope over dt [s] about the times, as far as something is known there."""
-        known = self.columns[name][0]
-        before, after = (np.clip(times + side * dt / 2, known[0], known[-1]) for side in (-1, 1))
-        apart = after - before
-        rise = self.at(name, after) - self.at(name, before)
-        return np.where(apart[:, None] > 0, rise / np.where(apart > 0, apart, 1.0)[:, None], 0.0)
-
-
 def read_references(document: Document, faults: Faults) -> tuple[tuple[ReferenceTrajectory, ...], dict[str, str]]:
     """All of the [[reference]] tables, and the texts of their files by the names that they have there."""
     kept = {table.file: table.text for table in document.included}

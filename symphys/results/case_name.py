@@ -13,12 +13,15 @@ LONGEST = 80
 """Characters of the settings in a folder name before they are cut."""
 
 
-def case_name(problem: str, settings: Mapping[str, object]) -> str:
+def case_name(problem: str, settings: Mapping[str, object], guess: str = "") -> str:
     """``ball_throw``, or ``ball_throw@ground.friction=0.6`` under settings, whatever order they were given in.
 
     Settings that are too long for a name, or have characters that not every file system keeps apart, are shortened
-    and end in a digest of the whole.
+    and end in a digest of the whole. ``guess`` is a last word for a guess from elsewhere, ``guess=1a2b3c4d``.
     """
+    if guess:
+        before = case_name(problem, settings)
+        return f"{before}{',' if settings else '@'}{guess}"
     if not settings:
         return problem
     words = settings_words(settings, ",")

@@ -25,6 +25,7 @@ class Config:
         settings: what the command line changed in the file, by dotted key.
         options: the solver's options, all of them.
         backend: what was to evaluate; "auto" is the best that the machine has.
+        guess: the "run" folder that it was taken from, and the "digest" of what was taken, which counts; else empty.
         key: of the problem's text and all the above; two runs with one key are the same run.
     """
 
@@ -34,6 +35,7 @@ class Config:
     settings: Mapping[str, Any] = field(default_factory=dict)
     options: Mapping[str, Any] = field(default_factory=dict)
     backend: str = "auto"
+    guess: Mapping[str, str] = field(default_factory=dict)
     key: str = ""
 
     def to_json(self) -> dict[str, Any]:
@@ -59,9 +61,11 @@ def make_config(
     settings: dict[str, object],
     options: dict[str, object],
     backend: str,
+    guess: Mapping[str, str] | None = None,
 ) -> Config:
     """The configuration with its key; ``text`` is the problem's ``identity``."""
-    parts = [text, settings, solver, options, seed, backend]
+    guess = guess or {}
+    parts = [text, settings, solver, options, seed, backend, *([guess["digest"]] if guess else [])]
     canonical = json.dumps(files.strict(parts), sort_keys=True, allow_nan=False)
     key = hashlib.sha256(canonical.encode()).hexdigest()
-    return Config(problem, solver, seed, settings, options, backend, key)
+    return Config(problem, solver, seed, settings, options, backend, guess, key)

@@ -196,8 +196,8 @@ class Result:
             of another or the guess is better exactly.
         versions: of everything that took part.
         provenance: the machine, the process and the working copy, with the keys of ``symphys.runs.provenance``,
-            "flags", those of the compiler, where something was compiled, and "chosen", why the solver was taken where
-            none was named.
+            "flags", those of the compiler, where something was compiled, "chosen", why the solver was taken where none
+            was named, and "guess", the run from which it starts.
         when: UTC time of the end, ISO 8601.
         command: what was typed.
         backend: what evaluated the functions.

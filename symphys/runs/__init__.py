@@ -6,6 +6,7 @@ from symphys.results.scene_of_problem import make_scene
 from symphys.runs.claim import FolderBusy
 from symphys.runs.execute import execute
 from symphys.runs.folder import RunFolder
+from symphys.runs.guess import RunGuess, read_guess_run
 from symphys.runs.job import Job, check_tables, make_jobs
 
 __all__ = [
@@ -16,9 +17,11 @@ __all__ = [
     "Job",
     "Result",
     "RunFolder",
+    "RunGuess",
     "check_tables",
     "execute",
     "make_jobs",
     "make_scene",
+    "read_guess_run",
     "read_result",
 ]

@@ -92,8 +92,7 @@ def along(problem: Problem) -> bool:
 
 def limited(problem: Problem) -> bool:
     """Whether states are constrained along the way, or the file has a guess of them."""
-    nodes = problem.solver_tables.get("multiple_shooting", {}).get("nodes")
-    return bool(nodes) or any(each.at == ALWAYS for each in problem.constraints)
+    return problem.guess is not None or any(each.at == ALWAYS for each in problem.constraints)
 
 
 SITUATIONS = (
@@ -111,7 +110,7 @@ SITUATIONS = (
         (ChosenSolver("stochastic", "samples of its scenarios differ, and it has too many numbers to search in"),),
     ),
     Situation(
-        "controls over time, limits along the way",
+        "controls over time, states limited or guessed",
         lambda problem: staged(problem) and limited(problem),
         (
             ChosenSolver("ilqr", "its controls act over time, and what it asks for is summed step by step"),

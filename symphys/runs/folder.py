@@ -9,10 +9,22 @@ from pathlib import Path
 from symphys import files
 from symphys.results.case_name import case_name
 from symphys.results.config import Config
-from symphys.results.file_names import CHECKPOINT, CONFIG, GUESS, LOG, PROBLEM, RESULT, SCENE, TRACE, TRAJECTORY
+from symphys.results.file_names import (
+    CHECKPOINT,
+    CONFIG,
+    GAINS,
+    GUESS,
+    LOG,
+    MULTIPLIERS,
+    PROBLEM,
+    RESULT,
+    SCENE,
+    TRACE,
+    TRAJECTORY,
+)
 from symphys.results.trace import trace_text
 
-WRITTEN = (RESULT, CHECKPOINT, CONFIG, TRAJECTORY, GUESS, SCENE, TRACE, LOG)
+WRITTEN = (RESULT, CHECKPOINT, CONFIG, TRAJECTORY, GUESS, GAINS, MULTIPLIERS, SCENE, TRACE, LOG)
 """What a run writes beside the problem; the result first, since nothing counts without it."""
 
 
@@ -24,12 +36,18 @@ class RunFolder:
 
     @classmethod
     def of(
-        cls, out: Path, problem: str, solver: str, seed: int, settings: Mapping[str, object] | None = None
+        cls,
+        out: Path,
+        problem: str,
+        solver: str,
+        seed: int,
+        settings: Mapping[str, object] | None = None,
+        guess: str = "",
     ) -> RunFolder:
         """OUT/<case>/<solver>-seed<k>; FileError for a problem whose name would lead out of OUT."""
         if problem in {"", ".", ".."}:
             raise files.FileError(f"a problem called {problem!r} can have no folder: rename its file")
-        return cls(out / case_name(problem, settings or {}) / f"{solver}-seed{seed}")
+        return cls(out / case_name(problem, settings or {}, guess) / f"{solver}-seed{seed}")
 
     def checkpoint(self) -> dict[str, object] | None:
         """Where an interrupted run stopped; None if that is not known."""

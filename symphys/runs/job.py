@@ -13,6 +13,7 @@ from symphys.results.case_name import case_name
 from symphys.results.config import Config, make_config
 from symphys.runs.choice import chosen
 from symphys.runs.folder import RunFolder
+from symphys.runs.guess import OWN_GUESS, GuessOrigin, RunGuess, with_guess
 from symphys.solvers import SOLVERS, recorded_options, solver
 
 
@@ -29,6 +30,7 @@ class Job:
         examine: whether the solution is examined.
         outdated: the stamp, see ``standing``, of a result that is to be made again although it is there.
         chosen: why it has its solver, where none was named.
+        guess: where the guess of the problem was taken from, if from a run.
     """
 
     problem: Problem
@@ -39,6 +41,7 @@ class Job:
     examine: bool = True
     outdated: str = ""
     chosen: str = ""
+    guess: GuessOrigin = OWN_GUESS
 
     @property
     def name(self) -> str:
@@ -48,7 +51,7 @@ class Job:
     @property
     def case(self) -> str:
         """The problem with its settings, as its folder is called: ``ball_throw@ground.friction=0.6``."""
-        return case_name(self.config.problem, self.config.settings)
+        return case_name(self.config.problem, self.config.settings, self.guess.word)
 
     @property
     def subject(self) -> Hashable:
@@ -75,27 +78,33 @@ def make_jobs(
     command: str = "",
     backend: str = BEST,
     examine: bool = True,
+    guess: RunGuess | None = None,
 ) -> list[Job]:
     """Every problem with every solver and seed, below the folder ``out``; other settings, another folder.
 
     ``solvers`` None: those that each problem names, or those that are chosen for it, see ``choice``.
 
-    ProblemError for a problem without variables or objectives, and for bad solver options.
+    ``guess``: what a run found, from which all start.
+
+    ProblemError for a problem without variables or objectives, and for bad solver options; SymphysError where
+    nothing of the guess fits.
     """
     seeds = tuple(seeds)
     jobs = []
     for problem in problems:
         require_solvable(problem)
         check_tables(problem)
+        problem, origin = with_guess(problem, guess) if guess else (problem, OWN_GUESS)
+        taken = {"run": origin.folder, "digest": origin.digest} if guess else {}
         reasons = {} if solvers or problem.solvers else {each.solver: each.reason for each in chosen(problem)}
         for name in solvers or problem.solvers or reasons:
             options = solver_options(problem, name)
             plain = recorded_options(options)
             for seed in seeds:
-                config = make_config(problem.name, problem.identity, name, seed, settings, plain, backend)
-                folder = RunFolder.of(out, problem.name, name, seed, settings)
+                config = make_config(problem.name, problem.identity, name, seed, settings, plain, backend, taken)
+                folder = RunFolder.of(out, problem.name, name, seed, settings, origin.word)
                 why = reasons.get(name, "")
-                jobs.append(Job(problem, config, options, folder, command, examine, chosen=why))
+                jobs.append(Job(problem, config, options, folder, command, examine, chosen=why, guess=origin))
     return jobs
 
 

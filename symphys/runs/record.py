@@ -171,7 +171,7 @@ def provenance(job: Job, flags: Sequence[str] = ()) -> dict[str, Any]:
 
     ``flags``: with which a compiler made what evaluated; none where nothing was compiled.
     """
-    told = {"flags": " ".join(flags), "chosen": job.chosen}
+    told = {"flags": " ".join(flags), "chosen": job.chosen, "guess": job.guess.folder}
     return {
         "problem": job.config.problem,
         "title": job.problem.title,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from symphys import files
@@ -11,7 +12,7 @@ from symphys import verification as trust
 from symphys.errors import SymphysError
 from symphys.findings.examination import Examination
 from symphys.findings.obstacles import capital, obstacles
-from symphys.results.file_names import CHECKPOINT, GUESS, SCENE, TRAJECTORY
+from symphys.results.file_names import CHECKPOINT, GAINS, GUESS, MULTIPLIERS, SCENE, TRAJECTORY
 from symphys.results.result import Result
 from symphys.results.scene_of_problem import make_scene
 from symphys.runs.job import Job
@@ -49,8 +50,10 @@ def solve(
     ``solved``: what was found already, side by side with other seeds; its seconds are those of the group. ``tell``: is
     called with a few words before each part of judging what was found.
     """
-    shooting = transcription.shooting
+    shooting = replace(transcription.shooting, multipliers=job.guess.multipliers)
     log(f"evaluated by {transcription.backend}")
+    for note in job.guess.notes:
+        log(f"guess from {job.guess.folder}: {note}")
     start = shooting.start(job.config.seed)
     at_once = found.result is not None  # else nothing counts before the result is written
     files.write_npz(job.folder.path / GUESS, transcription.simulate(start).arrays(), at_once)
@@ -133,12 +136,16 @@ def write(
     price: Mapping[str, float],
     at_once: bool,
 ) -> None:
-    """Write trace, motion and checkpoint."""
+    """Write trace, gains, motion and checkpoint."""
     job.folder.write_trace([trace_row(row, price) for row in outcome.trace], at_once)
+    if outcome.gains:
+        files.write_npz(job.folder.path / GAINS, outcome.gains, at_once)
     if judgement.trajectory is not None:
         files.write_npz(job.folder.path / TRAJECTORY, judgement.trajectory.arrays(), at_once)
         z = transcription.shooting.by_block(outcome.z)
         scene = make_scene(job.problem, z, judgement.trajectory)
         files.write_json(job.folder.path / SCENE, scene.to_json(), at_once)
+    if outcome.multipliers:
+        files.write_npz(job.folder.path / MULTIPLIERS, outcome.multipliers, at_once)
     if outcome.status is Status.INTERRUPTED:
         files.write_json(job.folder.path / CHECKPOINT, outcome.checkpoint)

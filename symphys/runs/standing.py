@@ -117,6 +117,8 @@ def difference(job: Job, earlier: Config) -> str:
     for name in ("backend", "solver", "seed"):
         if getattr(earlier, name) != getattr(asked, name):
             return f"the {name} was {getattr(earlier, name)}"
+    if earlier.guess.get("digest") != asked.guess.get("digest"):
+        return f"its guess was {earlier.guess.get('run') or 'that of the problem'}"
     for table in ("options", "settings"):
         before, plain = getattr(earlier, table), files.strict(getattr(asked, table))
         for key in sorted({*before, *plain}):

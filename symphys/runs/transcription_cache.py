@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from symphys.problem import Problem
 from symphys.runs.job import Job
-from symphys.transcription import Transcription
+from symphys.transcription import Transcription, guessed
 
 Transcribe = Callable[[Problem, bool], Transcription]
 """(problem, whether smoothing 0 is all that will be asked for) -> its transcription."""
@@ -23,8 +23,8 @@ class TranscriptionCache:
         self.made: tuple[object, Transcription] | None = None
 
     def __call__(self, job: Job) -> Transcription:
-        """The job's problem as a shooting problem."""
+        """The job's problem as a shooting problem, with the job's guess."""
         if self.made is None or self.made[0] != job.subject:
             self.made = None
             self.made = (job.subject, self.transcribe(job.problem, not job.smooth))
-        return self.made[1]
+        return guessed(self.made[1], job.problem) if job.guess.digest else self.made[1]

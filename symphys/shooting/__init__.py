@@ -4,6 +4,7 @@ from symphys.shooting.shooting_problem import (
     Array,
     Evaluator,
     Function,
+    GuessedStates,
     Nlp,
     ScenarioEvaluator,
     ScenarioSamples,
@@ -12,13 +13,16 @@ from symphys.shooting.shooting_problem import (
     VariableBlock,
     WithoutResiduals,
 )
-from symphys.shooting.staged_problem import Expansion, Linearized, StagedMotion, StagedProblem
+from symphys.shooting.staged_problem import AffinePolicy, Expansion, Followed, Linearized, StagedMotion, StagedProblem
 
 __all__ = [
+    "AffinePolicy",
     "Array",
     "Evaluator",
     "Expansion",
+    "Followed",
     "Function",
+    "GuessedStates",
     "Linearized",
     "Nlp",
     "ScenarioEvaluator",

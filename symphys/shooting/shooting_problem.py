@@ -15,6 +15,8 @@ from symphys.shooting.staged_problem import Indices, StagedProblem
 Array = NDArray[np.float64]
 Function = Any
 """casadi.Function"""
+GuessedStates = Callable[[Array, Indices, float], Array]
+"""See ``ShootingProblem.guessed_states``."""
 
 
 @dataclass(frozen=True)
@@ -201,6 +203,8 @@ class ShootingProblem:
             more than one state. None: there is none, as of problems with scenarios.
         guessed_states: (z (n,), numbers (M,) of states from 1 on, smoothing) -> (M, nx) where the motion is guessed to
             pass. None: where the rollout of z leads.
+        multipliers: those that a solve of this or a like problem ended with where its guess is, see
+            ``Outcome.multipliers``; empty where none are known.
     """
 
     name: str
@@ -217,7 +221,8 @@ class ShootingProblem:
     output_names: tuple[str, ...] = ()
     scenario: ScenarioEvaluator | None = None
     staged: Callable[[], StagedProblem] | None = None
-    guessed_states: Callable[[Array, Indices, float], Array] | None = None
+    guessed_states: GuessedStates | None = None
+    multipliers: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def n(self) -> int:

@@ -8,6 +8,7 @@ next step's sweeps begin. So a linearisation is that of the real step.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -18,6 +19,8 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Sparse = Any
 """scipy.sparse.csr_array"""
+Followed = tuple[Array, Array, Array]
+"""States (B, N + 1, nx), inputs (B, N, m) and new knots (B, N, w) of motions under a policy."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,34 @@ class Expansion:
     su: Array
 
 
+@dataclass(frozen=True)
+class AffinePolicy:
+    """Knots of controls as affine functions of the state, step by step.
+
+    In each step at most o knots are old: they were decided before and still act. At most w are new. Where there are
+    fewer, the numbers of the others are 0.
+
+    Attributes:
+        x: (N, nx) states about which it is.
+        old, new: (N, o) and (N, w) the knots there.
+        ahead: (N, w) what a whole step adds to the new ones.
+        back: (N, w, n + o + s) how they answer the state's tangent, old knots and static entries.
+        weights: (N, m, o + w) the inputs of a step by its knots.
+        keep: (N, o, o + w) the old knots of the next step by those of this one.
+        lower, upper: (N, w) bounds of the new ones.
+    """
+
+    x: Array
+    old: Array
+    new: Array
+    ahead: Array
+    back: Array
+    weights: Array
+    keep: Array
+    lower: Array
+    upper: Array
+
+
 class StagedProblem(Protocol):
     """A problem whose horizon is a chain of N equal steps.
 
@@ -121,8 +152,22 @@ class StagedProblem(Protocol):
         """The motion of (len(z),)."""
         ...
 
+    def follow(self, policy: AffinePolicy, about: Array, Z: Array, lengths: Array, smoothing: float) -> Followed | None:
+        """The motions of step lengths (B,) under a policy, all steps at once; None where steps are to be taken singly.
+
+        ``about``: (len(z),) where the policy was made; ``Z``: (B, len(z)) whose static entries hold.
+        """
+        ...
+
     def linearize(self, motion: StagedMotion) -> Linearized:
         """Slopes of all steps."""
+        ...
+
+    def linearize_from_end(self, motion: StagedMotion) -> Iterator[Linearized]:
+        """The same in runs of steps, the last run first, each as soon as it is known.
+
+        Slopes are computed in the background from the call on, where there are threads for it.
+        """
         ...
 
     def retract(self, X: Array, D: Array) -> Array:

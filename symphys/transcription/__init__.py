@@ -7,7 +7,7 @@ from symphys.transcription.objective import Terms, terms
 from symphys.transcription.program import rollout_program
 from symphys.transcription.rollout import Rollout, symbolic_rollout
 from symphys.transcription.simulation import Record, plain
-from symphys.transcription.transcribe import transcribe
+from symphys.transcription.transcribe import guessed, transcribe
 from symphys.transcription.transcription import Transcription
 
 __all__ = [
@@ -20,6 +20,7 @@ __all__ = [
     "Transcription",
     "first_non_finite",
     "first_non_finite_derivative",
+    "guessed",
     "plain",
     "rollout_program",
     "symbolic_rollout",

@@ -19,10 +19,6 @@ Expr = Any
 """casadi MX"""
 
 
-MIDDLE, START = 0.5, 0.0
-"""When a linear control is sampled in a step: forces act over it, motors as an impulse at its start (leapfrog)."""
-
-
 @dataclass(frozen=True)
 class RolloutStart:
     """x0 (nx,) without memory, u (nu, N) as variables give it and p (np,), as expressions of z."""
@@ -44,7 +40,8 @@ def start_of(problem: Problem, world: World, inputs: Sequence[str], parameters: 
     """The rollout's start as a function of z."""
     initial = {name: ca.MX(ca.DM(value)) for name, value in problem.initial.items()}
     physical = {name: ca.MX(value) for name, value in zip(parameters.names, parameters.nominal, strict=True)}
-    u = ca.MX.zeros(inputs_size(world, inputs), problem.simulation.steps)
+    steps, scheduled = problem.simulation.steps, parameters.phases.at(ca.DM(np.arange(problem.simulation.steps)).T)
+    u = ca.vertcat(ca.MX.zeros(inputs_size(world, inputs) - scheduled.shape[0], steps), scheduled)
     for variable, (first, last) in zip(problem.variables, spans(problem.variables), strict=True):
         part = z[first:last]
         if variable.kind == "control":
@@ -83,23 +80,22 @@ def _spread_inputs(problem: Problem, variable: Variable, columns: Mapping[str, s
         for k, component in enumerate(slot.components):
             place[columns[slot.name].start + component, k] = 1
     knots = ca.reshape(part, count, variable.knots)
-    when = START if all(slot.name.endswith(".command") for slot in variable.slots) else MIDDLE
-    weights = knot_weights(variable.knots, problem.simulation.steps, variable.interpolation, when)
+    weights = knot_weights(variable.knots, problem.simulation.steps, variable.interpolation)
     return ca.mtimes(ca.mtimes(place, knots), weights)
 
 
-def knot_weights(knots: int, steps: int, interpolation: str, when: float = MIDDLE) -> Expr:
-    """(knots, steps) sparse: the share of each knot in each step, at this part of it.
+def knot_weights(knots: int, steps: int, interpolation: str) -> Expr:
+    """(knots, steps) sparse: the share of each knot in each step, at its middle, since inputs act all over it.
 
     "constant": the horizon is cut into equal parts, one a knot. "linear": knots lie at equal distances from the
     start to the end of the horizon, values between them are interpolated.
     """
-    middle, at = ((np.arange(steps) + part) / steps for part in (MIDDLE, when))
+    middle = (np.arange(steps) + 0.5) / steps
     columns = np.arange(steps)
     if interpolation == "constant" or knots == 1:
         rows = np.minimum((middle * knots).astype(int), knots - 1)
         return ca.DM.triplet(rows.tolist(), columns.tolist(), ca.DM.ones(steps), knots, steps)
-    place = at * (knots - 1)
+    place = middle * (knots - 1)
     left = np.minimum(place.astype(int), knots - 2)
     share = place - left
     rows = np.concatenate([left, left + 1])

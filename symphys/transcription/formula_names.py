@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -21,11 +21,12 @@ from symphys.dynamics.observation import (
     site_quantity_names,
 )
 from symphys.expression import Formula
-from symphys.model.state_layout import GIVEN, Layout, input_columns, input_sizes, inputs_size
+from symphys.model.state_layout import GIVEN, Layout, input_columns, input_sizes, input_symbols
 from symphys.model.world import Scheme, World
 from symphys.problem import ALIVE, DURATION, Problem, Simulation, Variable
 from symphys.problem.references import reference_values
 from symphys.transcription.feedback.sensor_memory import SensorMemory
+from symphys.transcription.formulas.phase_numbers import PhaseNumbers, phase_numbers
 
 Expr = Any
 """casadi SX or MX"""
@@ -55,12 +56,14 @@ class Parameters:
         symbols: SX, one column each.
         nominal: their values in the file.
         physical: how many of them are physical.
+        phases: which of the world's numbers change from step to step, and how.
     """
 
     names: tuple[str, ...]
     symbols: tuple[Expr, ...]
     nominal: tuple[Expr, ...]
     physical: int
+    phases: PhaseNumbers = field(default_factory=PhaseNumbers)
 
     @cached_property
     def columns(self) -> dict[str, slice]:
@@ -69,8 +72,9 @@ class Parameters:
         return {name: slice(*part) for name, part in zip(self.names, pairwise(ends), strict=True)}
 
     def overrides(self) -> dict[str, Expr]:
-        """The physical ones, by name."""
-        return dict(zip(self.names[: self.physical], self.symbols, strict=False))
+        """What physical parameters are in a step, by name: symbols, and what phases make of them."""
+        found = dict(zip(self.names, self.symbols, strict=True))
+        return {name: found[name] for name in self.names[: self.physical]} | self.phases.values(found)
 
     def step_length(self, simulation: Simulation, p: Expr) -> Expr:
         """[s]: a number, or an entry of ``p`` (np,) over the number of steps where a variable sets the duration."""
@@ -84,8 +88,8 @@ class Parameters:
 def varied_parameters(problem: Problem) -> Parameters:
     """The parameters that some variable sets, in the order of first mention, and all numbers of feedback.
 
-    Feedback is controllers and force laws. Of a problem of a sweep also those in which it differs from others, so that
-    they share what is built.
+    Feedback is controllers, force laws and phases. Of a problem of a sweep also those in which it differs from others,
+    so that they share what is built.
     """
     own = dict.fromkeys(slot.name for v in problem.variables if v.kind == "parameter" for slot in v.slots)
     names = (*own, *(name for name in swept_parameters(problem) if name not in own))
@@ -93,7 +97,7 @@ def varied_parameters(problem: Problem) -> Parameters:
     values |= {DURATION: np.array([problem.simulation.duration])} if problem.free_duration else {}
     nominal = tuple(ca.DM(value) for value in values.values())
     symbols = tuple(ca.SX.sym(name, value.shape[0]) for name, value in zip(values, nominal, strict=True))
-    return Parameters(tuple(values), symbols, nominal, len(names))
+    return Parameters(tuple(values), symbols, nominal, len(names), phase_numbers(problem))
 
 
 def swept_parameters(problem: Problem) -> list[str]:
@@ -113,7 +117,7 @@ def instant(world: World, inputs: Sequence[str], parameters: Parameters, memory:
     """Symbols for all that a formula may depend on; ``n``: length of z."""
     return Instant(
         ca.SX.sym("x", memory.size),
-        ca.SX.sym("u", inputs_size(world, inputs)),
+        input_symbols(world, inputs),
         ca.vertcat(ca.SX(0, 1), *parameters.symbols),
         ca.SX.sym("time"),
         ca.SX.sym("z", n),
@@ -166,6 +170,7 @@ def namespace(
     names.update({name: at.u[part] for name, part in input_columns(world, inputs).items()})
     names.update({name: ca.DM(value) for name, value in problem.parameters.items()})
     names.update(zip(parameters.names, parameters.symbols, strict=True))
+    names.update(parameters.overrides())
     names.update(reference_values([each for each in problem.references if not wanted.isdisjoint(each.names)], at.time))
     if not wanted.isdisjoint(joint_quantity_names(world)):
         names.update(joint_quantities(world, at.x))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -47,7 +47,7 @@ class Rollout:
         z: (n,) decision vector.
         smoothing: scalar.
         x0: (nx,) initial state.
-        given: (nu, N) inputs as variables give them; controllers add to them.
+        given: (nu, N) inputs as variables give them; controllers add to them. Shares of phases are last.
         p: (np,).
     """
 
@@ -62,6 +62,15 @@ class Rollout:
     given: Expr
     p: Expr
 
+    @property
+    def controls(self) -> int:
+        """How many of the inputs variables, controllers and laws may set: all but the shares of phases."""
+        return int(self.given.shape[0]) - len(self.world.scheduled)
+
+    def with_shares(self, u: Expr, tick: Expr) -> Expr:
+        """(nu,): the inputs of a step by its number, from those that may be set."""
+        return ca.vertcat(u, self.parameters.phases.at(tick)) if self.world.scheduled else u
+
     @cached_property
     def step(self) -> ca.Function:
         """One step (x, u, p, smoothing) -> x_next; built when first asked for, since one expression takes its time."""
@@ -71,7 +80,7 @@ class Rollout:
         """What a function makes of the world; problems of a sweep share it, as far as their worlds are equal."""
         scheme = self.parameters.scheme(self.problem.simulation)
         arguments = (self.world, scheme, self.inputs, self.parameters.symbols)
-        shared = self.problem.varied and not self.problem.free_duration
+        shared = self.problem.varied and not self.problem.free_duration and not self.world.scheduled
         return kept(make, *arguments, *more) if shared else make(*arguments, *more)
 
     def remembering(self, step: ca.Function) -> ca.Function:
@@ -207,8 +216,9 @@ class Rollout:
 def symbolic_rollout(problem: Problem, inputs: tuple[str, ...] | None = None) -> Rollout:
     """The rollout of a problem over its horizon; ``inputs`` may name more than the problem itself makes use of."""
     parameters = varied_parameters(problem)
-    inputs = input_names(problem) if inputs is None else inputs
-    world = problem.world(parameters.overrides())
+    scheduled = tuple((share.name, share.symbol) for share in parameters.phases.shares)
+    inputs = (*(input_names(problem) if inputs is None else inputs), *(name for name, _ in scheduled))
+    world = replace(problem.world(parameters.overrides()), scheduled=scheduled)
     z = ca.MX.sym("z", sum(v.guess.size for v in problem.variables))
     smoothing = ca.MX.sym("smoothing")
     start, memory = start_of(problem, world, inputs, parameters, z), memory_of(problem, world)

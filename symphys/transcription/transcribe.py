@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from time import perf_counter
 
 from symphys.codegen.backends import BEST, BackendSource, choose
-from symphys.problem import Problem
-from symphys.shooting import ShootingProblem
+from symphys.problem import GuessedMotion, Problem
+from symphys.shooting import GuessedStates, ShootingProblem, StagedProblem
 from symphys.transcription.decision_variables import blocks
 from symphys.transcription.functions import ExpressionFunctions
 from symphys.transcription.network_rollout import (
@@ -62,7 +63,6 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
     else:
         chosen = choose(backend, BackendSource(functions, lambda: rollout_program(rollout, exact), exact), threads)
     staged = cache(lambda: RolloutStages(rollout, backend, threads, exact or not any(problem.simulation.smoothing)))
-    guess = problem.guess
     shooting = ShootingProblem(
         name=problem.name,
         blocks=blocks(problem),
@@ -77,6 +77,21 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
         stop_when_met=problem.stop_when_met,
         output_names=tuple(output.label for output in problem.outputs),
         staged=staged,
-        guessed_states=None if guess is None else lambda *given: guessed_states(staged(), guess, *given),
+        guessed_states=states_of(staged, problem.guess),
     )
     return Transcription(problem, rollout, asked, functions, shooting, chosen.description, built)
+
+
+def states_of(staged: Callable[[], StagedProblem] | None, guess: GuessedMotion | None) -> GuessedStates | None:
+    """The states of a guessed motion, where there is one and the problem can be taken step by step."""
+    if staged is None or guess is None:
+        return None
+    return lambda z, ticks, smoothing: guessed_states(staged(), guess, z, ticks, smoothing)  # type: ignore[arg-type]
+
+
+def guessed(made: Transcription, problem: Problem) -> Transcription:
+    """The transcription of a problem that differs in nothing but its guess; what is compiled is that of ``made``."""
+    states = states_of(made.shooting.staged, problem.guess)
+    return replace(
+        made, problem=problem, shooting=replace(made.shooting, blocks=blocks(problem), guessed_states=states)
+    )

@@ -20,7 +20,7 @@ from symphys.transcription.gradient_probe import ExpressionProbe, Probe
 from symphys.transcription.judge import Assessment, assessment
 from symphys.transcription.objective import Terms
 from symphys.transcription.rollout import Rollout
-from symphys.transcription.simulation import Record, recorder, simulate
+from symphys.transcription.simulation import Record, motion_of, recorder, simulate
 
 Array = NDArray[np.float64]
 Judge = Callable[..., Assessment]
@@ -57,6 +57,12 @@ class Transcription:
     def record(self, z: Array, smoothing: float = 0.0) -> Record:
         """The motion and the states and arguments that it is made from; NotFinite if there is none."""
         return simulate(self.rollout, self._recorder, z, smoothing)
+
+    def motion(self, z: Array, x: Array, u: Array) -> Trajectory:
+        """The motion of states (N + 1, nx) with inputs (N, m), as variables give them, and the parameters of z (n,)."""
+        p = np.array(self._start(z)[2]).ravel()
+        dt = self.rollout.parameters.step_length(self.problem.simulation, p)
+        return motion_of(self.rollout, np.arange(len(x), dtype=np.float64) * float(dt), x, u, p)
 
     def timed(self, record: Record) -> Transcription:
         """The same with the duration of a motion in place of that of the file; itself if no variable sets it."""

@@ -36,8 +36,8 @@ def balance(rollout: Rollout, record: Record) -> dict[str, Any]:
 
     Returns:
         "energy": at some 400 instants "time" [s], "kinetic" and "potential" [J] (0 at the origin), and up to then
-        "applied", the work of applied forces and torques, motors and springs, and "contact", what contacts, limits of
-        joints and joints that give way gave (negative: took) [J].
+        "applied", the work of applied forces and torques, motors, springs and changes of gravity, and "contact", what
+        contacts, limits of joints and joints that give way gave (negative: took) [J].
         "gains": the steps in which rigid contacts gave most, each with "step", "time" [s], "energy" [J], "contacts";
         steps in which a soft contact acts are left out, since it gives back what it has stored. "gained" [J]: the sum
         of all such steps. "drift" [J]: the largest change in a step that neither forces nor contacts account for.
@@ -83,7 +83,7 @@ def momentum_gap(rollout: Rollout, record: Record) -> float:
     layout, x = Layout(rollout.world), record.arrays.x
     memory = np.stack([x[:, layout[f"{name}.reaction_force"]] for name in motion.body_names], axis=1)
     held = numbers.mass[:, None] * motion.velocity - x[:, layout["lag"], None] * memory
-    impulses = dt * (numbers.mass[:, None] * numbers.gravity + motion.force + contact_forces(rollout, motion))
+    impulses = dt * (numbers.mass[:, None] * numbers.gravity[:, None] + motion.force + contact_forces(rollout, motion))
     groups = floating(rollout)
     held, impulses = (
         np.stack([of[:, g].sum(axis=1) for g in groups], axis=1) if groups else of[:, :0] for of in (held, impulses)
@@ -108,25 +108,33 @@ def _energies(rollout: Rollout, record: Record) -> tuple[Array, Array, Array]:
     world, layout, p = rollout.world, Layout(rollout.world), parameters(rollout)
     x, after = ca.SX.sym("x", layout.size), ca.SX.sym("after", layout.size)
     u = ca.SX.sym("u", inputs_size(world, rollout.inputs))
-    kinetic, potential, work = ca.SX(0), ca.SX(0), ca.SX(0)
+    kinetic, work = ca.SX(0), ca.SX(0)
     given = {name: u[part] for name, part in input_columns(world, rollout.inputs).items()}
     for body in world.bodies:
         at = {field: x[layout[f"{body.name}.{field}"]] for field in ("position", "orientation", "velocity")}
         spin = x[layout[f"{body.name}.angular_velocity"]]
         turning = momentum(body.inertia, at["orientation"], spin)
         kinetic += (body.mass * ca.sumsqr(at["velocity"]) + ca.dot(spin, turning)) / 2
-        potential -= body.mass * ca.dot(ca.vertcat(*world.gravity), at["position"])
         moved = after[layout[f"{body.name}.position"]] - at["position"]
         turned = rotation.between(at["orientation"], after[layout[f"{body.name}.orientation"]])
         for field, way in (("force", moved), ("torque", turned)):
             work += ca.dot(given.get(f"{body.name}.{field}", ca.SX.zeros(3)), way)
     kinetic += rotor_energy(world, x)
-    states, arrays = ca.Function("energies", [x, p], [kinetic, potential]), record.arrays
+    states, arrays = ca.Function("energies", [x, p], [kinetic]), record.arrays
     x_k = plain(rollout, arrays.x)
-    both = states.map(len(x_k))(x_k.T, np.tile(arrays.p[:, None], len(arrays.x)))
+    moving = states.map(len(x_k))(x_k.T, np.tile(arrays.p[:, None], len(arrays.x)))
     works = ca.Function("work", [x, after, u], [work]).map(rollout.steps)
     done = works(x_k[:-1].T, x_k[1:].T, arrays.u.T)
-    return np.array(both[0]).ravel(), np.array(both[1]).ravel(), np.array(done).ravel()
+    potential, lifted = _potential(rollout, record)
+    return np.array(moving).ravel(), potential, np.array(done).ravel() + lifted
+
+
+def _potential(rollout: Rollout, record: Record) -> tuple[Array, Array]:
+    """(N + 1,) [J] the potential energy; and (N,) what it gains after each step as the next phase changes gravity."""
+    numbers = bodies(rollout, record)
+    moments = np.einsum("b,kbi->ki", numbers.mass, record.motion.position)
+    gravity = np.concatenate([numbers.gravity, numbers.gravity[-1:]])
+    return -(gravity * moments).sum(axis=1), -(np.diff(gravity, axis=0) * moments[1:]).sum(axis=1)
 
 
 def _rigid_alone(rollout: Rollout, motion: Trajectory) -> NDArray[np.bool_]:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from symphys.dynamics.joints.warm_start import components
 from symphys.dynamics.observation import readings
-from symphys.model.joints import AffineMotor, Joint, Motor, TorqueMotor
+from symphys.model.joints import Joint, given_torque
+from symphys.model.joints.joint import DRIVE
 from symphys.model.scalar import is_zero
 from symphys.model.state_layout import Layout
 from symphys.model.world import World
@@ -29,9 +30,10 @@ AT_LIMIT = 1e-6
 def joint_work(rollout: Rollout, record: Record) -> tuple[Array, Array]:
     """(N,) [J]: the work of motors, springs and dry friction in each step, and the sum of its sizes, joint by joint.
 
-    Leapfrog: velocities at the ends of a step hold the persistent forces half a stretch ahead. Of a step that is cut
-    only the last force is known: torque motors act with it all along, others are taken to get there in even steps. Of
-    a servo that goes from one bound to the other within a step that is wrong by up to twice its work.
+    What a command gives acts from the start of its step to the end. Leapfrog has others' forces half a substep ahead in
+    the velocities at the ends of a step; of a step that is cut only the last force is known, and they are taken to get
+    there in even steps. Of a servo that goes from one bound to the other within a step that is wrong by up to twice its
+    work.
     """
     layout, x = Layout(rollout.world), record.arrays.x
     total, gross, lag = np.zeros(rollout.steps), np.zeros(rollout.steps), x[:, layout["lag"]]
@@ -39,17 +41,14 @@ def joint_work(rollout: Rollout, record: Record) -> tuple[Array, Array]:
         for part in (part for part in WORKING if part in joint.acting):
             force = x[:, layout[f"{joint.name}.{part}"]]
             is_torque = part == "motor" and given_torque(joint.motor)
-            ahead = lag[:-1] + (rollout.dt if is_torque else rollout.dt / 2 + lag[1:])
+            ahead = rollout.dt if is_torque else rollout.dt / 2 + lag[:-1] + lag[1:]
             impulse = rollout.dt * force[:-1] + ahead * (force[1:] - force[:-1])
+            if part == "motor" and joint.drive == DRIVE:
+                impulse -= lag[:-1] * np.diff(x[:, layout[f"{joint.name}.{DRIVE}"]], axis=0)
             work = impulse * (rate[:-1] + rate[1:]) / 2
             total += work.sum(axis=1)
             gross += 0 if is_torque else np.abs(work).sum(axis=1)
     return total, gross
-
-
-def given_torque(motor: Motor | None) -> bool:
-    """Whether a motor gives what its command says, whatever its joint does."""
-    return isinstance(motor, TorqueMotor) or (isinstance(motor, AffineMotor) and motor.passive)
 
 
 def rotor_energy(world: World, x: Any) -> Any:

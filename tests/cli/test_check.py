@@ -18,6 +18,17 @@ def test_check_describes_the_file_and_compares_gradients(run: Run, throw: Path) 
     assert "is at half a metre: ball.position[0:2] - [0.5, 0] (end, in m)" in out
 
 
+def test_check_says_that_a_list_gets_the_same_values(run: Run, throw: Path) -> None:
+    more = '[[variable]]\nname = "both"\nsets = ["ball.force[0]", "ball.force[1:3]"]\nknots = 5\n'
+    text = throw.read_text(encoding="utf-8")
+    throw.write_text(text + more, encoding="utf-8")
+    assert "sets quantities with different numbers of components" in run("check", throw)[2]
+    throw.write_text(text + more.replace("1:3", "2"), encoding="utf-8")
+    out = run("check", throw)[1]
+    assert "  variable     both: 5 numbers, sets ball.force[0] and ball.force[2] to the same values\n" in out
+    assert out.count("to the same values") == 1
+
+
 def test_check_and_solve_say_which_solvers_are_taken_and_why(run: Run, throw: Path) -> None:
     """Where none is named; a list in the file is only repeated, and events and silence stay clean."""
     since = "least_squares, since a few numbers set what is squared"

@@ -14,12 +14,12 @@ import pytest
 from symphys.codegen import KernelUnavailable
 from symphys.codegen.toolchain.compiler import find_compiler
 from symphys.export import c_files, write_folders
+from symphys.export.slopes import slopes_function
 from symphys.export.sources import identifier, string
 from symphys.problem import load_problem
 from symphys.problems import find
 from symphys.transcription import Transcription, transcribe
 from symphys.transcription.staged.linearization import Linearization
-from symphys.transcription.staged.slope_functions import slopes_function
 from symphys.transcription.staged.step_program import StepArguments
 from symphys.transcription.staged.tangent import Tangent
 

@@ -62,7 +62,7 @@ def test_the_readme_names_everything(kick: Transcription) -> None:
         assert line in text
 
 
-@pytest.mark.parametrize("name", ["kick", "fastest_move", "cart_pole"])
+@pytest.mark.parametrize("name", ["kick", "fastest_move", "cart_pole", "ice_and_asphalt"])
 def test_slopes_of_a_step_are_those_of_linearize(name: str, kick: Transcription, tmp_path: Path) -> None:
     one = kick if name == "kick" else transcribe(load_problem(find(name)), backend="casadi")
     write_folders({tmp_path: casadi_files(one, "1.2")})
@@ -72,9 +72,11 @@ def test_slopes_of_a_step_are_those_of_linearize(name: str, kick: Transcription,
     motion, p = made.motion(z, 0.0), made.begun(z)[2]
     slopes = made.step.slopes(motion.x[:-1], motion.u, p, 0.0)
     for k in (0, len(motion.u) // 2):
-        u = motion.u[k] if one.rollout.feedback is None else np.append(motion.u[k], k * one.rollout.dt)
+        u = np.array(one.rollout.with_shares(casadi.DM(motion.u[k]), casadi.DM(k))).ravel()
+        u = u if one.rollout.feedback is None else np.append(u, k * one.rollout.dt)
         after, *found = (np.array(each) for each in linearize(motion.x[k], u, p, 0))
         np.testing.assert_allclose(after.ravel(), motion.x[k + 1], rtol=1e-13, atol=1e-13)
-        for ours, theirs in zip(found, slopes, strict=True):
+        found[2] = found[2].reshape(len(found[0]), -1)[:, made.step.arguments.varied]
+        for ours, theirs in zip(found, (*slopes[:2], slopes[2][:, :, made.step.arguments.varied]), strict=True):
             scale = np.abs(theirs[k]).max(initial=1e-9)
             np.testing.assert_allclose(ours.reshape(theirs[k].shape), theirs[k], rtol=0, atol=1e-11 * scale)

@@ -80,14 +80,14 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "pages and figures, made from run folders alone",
     ),
     "mpc": (
-        "codegen dynamics errors files maths model problem results solvers suggest trajectory transcription",
-        "casadi numpy scipy",
+        "codegen dynamics errors files model problem results shooting solvers suggest trajectory transcription",
+        "casadi numpy",
         "model predictive control",
     ),
     "doctor": ("codegen verbs", "casadi numpy", "what there is on this machine"),
     "api": (
         "batches codegen errors files findings importing interrupts problem problems report results runs "
-        "shooting solvers suggest trajectory transcription verification",
+        "shooting solvers suggest threads trajectory transcription verification",
         "matplotlib numpy",
         "what Python calls",
     ),

@@ -9,14 +9,12 @@ import pytest
 from swung import TABLES, pendulum
 
 from symphys.errors import ProblemError
-from symphys.mpc.planner import LENGTHS, Planner, RecedingPlan, shifted
-from symphys.mpc.policy_rollout import AffinePolicy
-from symphys.mpc.riccati import riccati_pass
+from symphys.mpc.planner import LENGTHS, Planner, PlanPolicy, RecedingPlan, plan_feedback, shifted
 from symphys.problem import problem_of_tables
 from symphys.shooting import Linearized, StagedMotion
 from symphys.solvers.ddp.backward_pass import Bounds, backward_pass
 from symphys.solvers.ddp.forward_pass import forward_pass
-from symphys.solvers.ddp.knots import knot_steps
+from symphys.solvers.ddp.knots import PaddedKnots, knot_steps
 from symphys.transcription.staged.staged_problem import RolloutStages
 
 
@@ -35,10 +33,10 @@ def plan() -> RecedingPlan:
     """After three iterations: neither the guess nor the optimum; some decisions are at their bounds."""
     made = planner()
     made.damping = 1e-2
-    policy = AffinePolicy(
+    policy = PlanPolicy(
         np.tile(made.start, (20, 1)), np.linspace(-9, 7, 20)[:, None], np.zeros((20, 1)), np.zeros((20, 1, 3))
     )
-    policy = AffinePolicy(policy.x, policy.v, policy.ahead, np.zeros((20, 1, made.tangent.size)))
+    policy = PlanPolicy(policy.x, policy.v, policy.ahead, np.zeros((20, 1, made.tangent.size)))
     return made._improved(policy, made.start, 0.0, 3)
 
 
@@ -73,7 +71,7 @@ def test_slopes_and_curvature_of_costs_are_those_of_the_staged_problem() -> None
     assert costs.curve[:-1, n:, n:] == pytest.approx(wanted.uu, abs=1e-9)
 
 
-def test_the_riccati_pass_is_the_backward_pass() -> None:
+def test_the_feedback_of_a_plan_is_that_of_the_backward_pass() -> None:
     """With decisions that are held by their bounds among them."""
     found = motion(plan().v.ravel())
     made = planner()
@@ -81,9 +79,9 @@ def test_the_riccati_pass_is_the_backward_pass() -> None:
     costs = stages().expand(found, np.zeros(len(stages().lower)), 2 * stages().penalties)
     room = -8 - plan().v, 8 - plan().v
     bounds = Bounds(room[0].ravel(), room[1].ravel(), np.full(20, 2.0))
-    wanted = backward_pass(slopes, costs, knot_steps(stages()), stages().statics, bounds, 0.1)
+    wanted = backward_pass([slopes], costs, knot_steps(stages()), stages().statics, bounds, 0.1)
     own = made._costs.expand(found.x, plan().v, made.p, 0.0)
-    got = riccati_pass(slopes.a, slopes.b, own, room, 0.1 / made.scale**2)
+    got = plan_feedback(slopes.a, slopes.b, own, room, 0.1 / made.scale**2)
     assert wanted is not None and got is not None
     gains = [gain for gain in wanted.gains if gain is not None]
     assert np.array([gain.ahead for gain in gains]) == pytest.approx(got[0], rel=1e-8, abs=1e-9)
@@ -92,31 +90,33 @@ def test_the_riccati_pass_is_the_backward_pass() -> None:
     assert held.any() and not held.all()
 
 
-def test_the_compiled_rollout_is_the_forward_pass() -> None:
+def test_the_compiled_rollout_is_the_forward_pass(monkeypatch: pytest.MonkeyPatch) -> None:
     """States, decisions and costs of all step lengths."""
     made, found = planner(), motion(plan().v.ravel())
     slopes: Linearized = stages().linearize(found)
     costs = stages().expand(found, np.zeros(len(stages().lower)), 2 * stages().penalties)
     bounds = Bounds(-8 - found.z, 8 - found.z, np.full(20, 2.0))
-    policy = backward_pass(slopes, costs, knot_steps(stages()), stages().statics, bounds, 1.0)
+    policy = backward_pass([slopes], costs, knot_steps(stages()), stages().statics, bounds, 1.0)
     assert policy is not None
-    wanted = forward_pass(stages(), found, policy, knot_steps(stages()), LENGTHS, (np.full(20, -8.0), np.full(20, 8.0)))
+    padded = PaddedKnots.of(knot_steps(stages()), np.full(20, -8.0), np.full(20, 8.0))
+    monkeypatch.setattr(stages(), "follow", lambda *_: None)
+    wanted = forward_pass(stages(), found, policy, padded, LENGTHS)
     ahead = np.array([gain.ahead for gain in policy.gains if gain is not None])
     back = np.array([gain.back for gain in policy.gains if gain is not None])
-    about = AffinePolicy(found.x[:-1], plan().v, ahead, back)
-    x, v, cost = made._rolled(found.x[0], about, LENGTHS, 0.0, 0.0)
+    about = PlanPolicy(found.x[:-1], plan().v, ahead, back)
+    x, v, cost = made.follow(found.x[0], about, LENGTHS, 0.0)
     assert x == pytest.approx(wanted.x, abs=1e-9)
     assert v == pytest.approx(wanted.u, abs=1e-9)
     assert cost == pytest.approx([merit(row) for row in wanted.z], rel=1e-9)
 
 
-def test_without_a_compiler_a_rollout_is_the_same() -> None:
+def test_without_a_compiler_a_rollout_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     made = planner()
-    policy = AffinePolicy(plan().x[:-1], plan().v, np.full((20, 1), 0.3), plan().back)
+    policy = PlanPolicy(plan().x[:-1], plan().v, np.full((20, 1), 0.3), plan().back)
     lengths = np.array([1.0, 0.25])
-    compiled = made._rolled(made.start, policy, lengths, 0.5, 0.0)
-    plain = made._rolled._step_by_step(made.start, policy, lengths, 0.5, 0.0)
-    for one, other in zip(compiled, plain, strict=True):
+    compiled = made.follow(made.start, policy, lengths, 0.5)
+    monkeypatch.setitem(vars(made._rolled), "kernel", None)
+    for one, other in zip(compiled, made.follow(made.start, policy, lengths, 0.5), strict=True):
         assert one == pytest.approx(other, abs=1e-9)
 
 
@@ -138,9 +138,9 @@ def test_a_cost_in_time_sees_the_time_of_the_tick() -> None:
     tables |= {"target": [], "constraint": []}
     made = Planner(problem_of_tables(tables), threads=1)
     policy = shifted(made.first(made.start, 0.0), 0.0)
-    still = AffinePolicy(policy.x, np.zeros_like(policy.v), policy.ahead, np.zeros_like(policy.back))
+    still = PlanPolicy(policy.x, np.zeros_like(policy.v), policy.ahead, np.zeros_like(policy.back))
     for clock in (0.0, 2.0):
-        cost = made._rolled(made.start, still, np.zeros(1), clock, 0.0)[2][0]
+        cost = made.follow(made.start, still, np.zeros(1), clock)[2][0]
         squares = (0.1 * (clock + 0.08 * np.arange(21))) ** 2
         assert cost == pytest.approx(0.08 * np.sum(squares[1:] + squares[:-1]) / 2, rel=1e-9)
 

@@ -15,7 +15,9 @@ from symphys.problem import load_problem
 
 SHIPPED = [
     "acrobot",
+    "air_hockey",
     "ant_walk",
+    "arm_ball",
     "arm_reach",
     "ball_throw",
     "bank_shot",
@@ -38,10 +40,13 @@ SHIPPED = [
     "half_cheetah_run",
     "hopper_jump",
     "hopper_run",
+    "ice_and_asphalt",
     "juggle",
     "knock",
+    "mini_cheetah_ahead",
     "parcel",
     "pendulum",
+    "planar_hopper",
     "push_and_fly",
     "putt",
     "quadruped_shift",
@@ -51,6 +56,7 @@ SHIPPED = [
     "sled",
     "spinner",
     "stairs",
+    "three_hops",
     "two_balls",
     "walker2d_walk",
 ]

@@ -25,6 +25,7 @@ def bounces(motion: Trajectory) -> list[int]:
     return turned.tolist()
 
 
+@pytest.mark.thorough
 def test_a_descent_finds_three_dribbles() -> None:
     made = shipped("dribble")
     (found,) = met("gradient", made, of=2, wanted=1)

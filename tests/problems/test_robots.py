@@ -20,7 +20,7 @@ from symphys.problem import Problem, load_problem
 Array = NDArray[np.float64]
 Robot = Callable[..., Problem]
 Simulated = Callable[[str, dict[str, float]], Array]
-ROBOTS = ["arm", "cart_pendulum", "gait_robot", "hopper", "table_robot"]
+ROBOTS = ["arm", "cart_pendulum", "gait_robot", "hopper", "mini_cheetah", "table_robot"]
 LEGS = ("fl", "fr", "hl", "hr")
 SECONDS, DT = 1.0, 0.01
 
@@ -81,6 +81,7 @@ def test_all_are_listed_here() -> None:
         ("cart_pendulum", 2, {"slider": 1, "hinge": 1}, 0, 1.3),
         ("gait_robot", 9, {"hinge": 8}, 8, 28.69),
         ("hopper", 5, {"slider": 3, "hinge": 2}, 1, 6.2),
+        ("mini_cheetah", 13, {"hinge": 12}, 12, 8.252),
         ("table_robot", 17, {"hinge": 16}, 16, 24.4),
     ],
 )
@@ -163,6 +164,7 @@ def test_friction_of_the_gait_robot(robot: Robot, ground: str, friction: float) 
     [
         ("gait_robot", [f"{leg}_tibia-ground" for leg in LEGS]),
         ("hopper", ["foot-ground"]),
+        ("mini_cheetah", [f"{leg}_shank-ground" for leg in LEGS]),
         ("table_robot", [f"{leg}_lower-ground" for leg in LEGS]),
     ],
 )
@@ -200,6 +202,10 @@ STANDING = {
     "arm": ("hand", {}),
     "cart_pendulum": ("pole", {}),
     "gait_robot": ("spine", {}),
+    "mini_cheetah": (
+        "body",
+        {f"{leg}_{joint}": np.rad2deg(angle) for leg in LEGS for joint, angle in (("hip", -0.8), ("knee", 1.6))},
+    ),
     "table_robot": (
         "torso",
         {f"{leg}_{joint}": angle for leg in LEGS for joint, angle in (("pitch", 25), ("elbow", -50))},

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 from shipped import shipped, solve
 
+from symphys.mpc import Controller, Plant, close_loop, record_of
+from symphys.problem import load_problem
+from symphys.problems import find
 from symphys.verification.refinement import FINER_DT, finer_problem
 
 
@@ -28,3 +31,12 @@ def test_smoothing_finds_the_contact() -> None:
     assert verdict.solved
     assert verdict.objective < 2.0
     assert finer.checks[0].error < 0.2
+
+
+@pytest.mark.thorough
+def test_a_controller_turns_a_heavier_spinner_and_lets_it_rest() -> None:
+    """With half the step and masses 10 % off: more flicks than one, and it stays within the tolerance for a second."""
+    off = {"mpc.plant.masses": 1.1, "mpc.plant.latency": 0.004, "mpc.duration": 4.0}
+    problem = load_problem(find("spinner"), off)
+    record = record_of(close_loop(Controller(problem, threads=1), Plant(problem)))
+    assert record.done and record.held > 1.0

@@ -56,3 +56,15 @@ def test_the_brake_takes_what_two_velocities_and_the_way_ask_for(solver: str) ->
     mean = (speed - 0.5) / np.log(speed / 0.5)
     assert 0.4 * speed + 0.4 * mean + 0.2 * 0.5 == pytest.approx(1.5, abs=2e-4)
     assert strength == pytest.approx(2 * np.log(speed / 0.5) / 0.4, rel=1e-3)
+
+
+@first("solver", ["least_squares", "ilqr"])
+def test_a_sled_stops_where_friction_of_ice_and_asphalt_lets_it(solver: str) -> None:
+    """v - mu g t / 2 on ice, then w^2 / 2 mu' g."""
+    made = shipped("ice_and_asphalt", "casadi")
+    found = solve(solver, made)
+    speed, roughness = found.z
+    edge = made.judge(found.z).outputs["speed at the edge [m/s]"]
+    assert speed == pytest.approx(2 + 0.05 * 9.81 / 2, abs=2e-4)
+    assert edge == pytest.approx(speed - 0.05 * 9.81, rel=1e-9)
+    assert roughness == pytest.approx((2 - 0.05 * 9.81 / 2) ** 2 / 9.81, abs=2e-4)

@@ -271,6 +271,9 @@ def test_components_are_named_as_in_the_problem_file(run_dir: Path, edit: Callab
     (run_dir / "problem.toml").write_text('[[variable]]\nname = "throw"\nsets = ["ball.velocity[1:]"]\n')
     text = re.sub(r"\s+", " ", Page(write_run_report(run_dir).read_text(encoding="utf-8")).text)
     assert "throw y ball.velocity[1:]" in text
+    (run_dir / "problem.toml").write_text('[[variable]]\nname = "throw"\nsets = ["a.velocity[1:]", "b.velocity[1:]"]\n')
+    text = re.sub(r"\s+", " ", Page(write_run_report(run_dir).read_text(encoding="utf-8")).text)
+    assert "throw y a.velocity[1:] and b.velocity[1:], to the same values" in text
 
 
 def test_energy_is_drawn_where_it_was_recorded(run_dir: Path, edit: Callable[..., None]) -> None:

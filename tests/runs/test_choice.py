@@ -38,6 +38,7 @@ tolerance = 0.1
 CONTROL = 'sets = "ball.force"\nknots = 5'
 ALONG = '\n[[cost]]\nname = "effort"\nat = "always"\nsquares = "ball.force"\n'
 WALL = '\n[[constraint]]\nname = "below"\nat = "always"\nvalue = "ball.position[0]"\nupper = 2\n'
+GUESSED = "\n[guess]\nstates = [{ at = 0, ball.position = [0, 0, 1] }]\n"
 WHOLE = '\n[[cost]]\nname = "way"\nvalue = "integral(ball.velocity[0])"\n'
 SHARE = '\n[[cost]]\nname = "low"\nvalue = "ball.position[2]"\n'
 SCENARIO = '\n[[scenario]]\nname = "heavy"\nsets = "ball.mass"\nfactor = 0.2\n'
@@ -60,7 +61,7 @@ def made(tmp_path: Path, sets: str, *more: str) -> Problem:
         (CONTROL, SHARE, ["ilqr", "ipopt"]),
         (CONTROL, ALONG, ["ilqr", "ipopt"]),
         (CONTROL, ALONG + WALL, ["ilqr", "multiple_shooting"]),
-        (CONTROL, ALONG + "\n[solver.multiple_shooting]\nnodes = [[1, 2], [3, 4]]\n", ["ilqr", "multiple_shooting"]),
+        (CONTROL, ALONG + GUESSED, ["ilqr", "multiple_shooting"]),
         (CONTROL, WHOLE, ["ipopt", "gradient"]),
     ],
 )
@@ -89,7 +90,8 @@ def test_solvers_that_are_chosen_are_for_such_problems() -> None:
     for name, path in catalogue().items():
         if not name.endswith(("_run", "_walk")):  # some include models of another package
             found[name] = situation(load_problem(path)).name
-    assert found["acrobot"] == found["cart_pole"] == "controls over time, step by step"
+    assert found["acrobot"] == "controls over time, states limited or guessed"
+    assert found["cart_pole"] == "controls over time, step by step"
     assert found["juggle"] == found["sled"] == "controls over time, squares at instants"
     assert found["fastest_move"] == found["cost_of_transport"] == "controls over time, seen as a whole"
     assert found["ball_throw"] == found["putt"] == "few numbers, squares"

@@ -159,13 +159,13 @@ def test_what_a_solver_loads_is_no_part_of_its_time(make_job: MakeJob, monkeypat
     prepared = []
 
     def prepare() -> None:
-        time.sleep(0.5)
+        time.sleep(1.5)
         prepared.append(time.perf_counter())
 
     monkeypatch.setitem(solvers.SOLVERS, "told", replace(solvers.SOLVERS["told"], prepare=prepare))
     result = run(make_job())
     assert len(prepared) == 1
-    assert sum(result.seconds.values()) < 0.5
+    assert sum(result.seconds.values()) < 1.5
 
 
 def test_a_run_that_misses_is_not_solved(make_job: MakeJob) -> None:

@@ -9,18 +9,19 @@ import numpy as np
 import pytest
 import scipy.sparse
 from numpy.typing import NDArray
+from single_steps import SingleSteps
 
 from symphys.shooting import Expansion, Linearized, StagedMotion
 from symphys.solvers.ddp.backward_pass import Bounds, backward_pass
 from symphys.solvers.ddp.box_qp import solve_box_qp
 from symphys.solvers.ddp.forward_pass import forward_pass
-from symphys.solvers.ddp.knots import knot_steps
+from symphys.solvers.ddp.knots import PaddedKnots, knot_steps
 
 Array = NDArray[np.float64]
 
 
 @dataclass
-class LinearChain:
+class LinearChain(SingleSteps):
     """x' = A x + B u + C s and x0 = offset + S s, with a quadratic cost of (x, u) and of (x', u) in every step."""
 
     weights: Any
@@ -114,7 +115,7 @@ def test_one_step_reaches_the_minimum_of_a_linear_chain(kind: str) -> None:
     z = np.random.default_rng(2).normal(size=size)
     free = Bounds(np.full(size, -np.inf), np.full(size, np.inf), np.ones(size))
     motion, knots = problem.roll_out(z, 0.0), knot_steps(problem)
-    arguments = problem.linearize(motion), problem.expand(motion), knots, problem.statics, free
+    arguments = problem.linearize_from_end(motion), problem.expand(motion), knots, problem.statics, free
     policy = backward_pass(*arguments, 0.0)
     assert policy is not None
     eye, h = np.eye(size), 1.0
@@ -123,8 +124,9 @@ def test_one_step_reaches_the_minimum_of_a_linear_chain(kind: str) -> None:
     hessian = (table[:-1, :-1] - table[:-1, -1:] - table[-1:, :-1] + here) / h**2
     slope = np.array([(problem.objective(z + e) - problem.objective(z - e)) / 2 for e in eye])
     np.testing.assert_allclose(policy.gradient, slope, rtol=1e-9, atol=1e-9)
+    padded = PaddedKnots.of(knots, z + free.down, z + free.up)
     best = z - np.linalg.solve(hessian, slope)
-    found = forward_pass(problem, motion, policy, knots, np.array([1.0, 0.5]), (z + free.down, z + free.up))
+    found = forward_pass(problem, motion, policy, padded, np.array([1.0, 0.5]))
     np.testing.assert_allclose(found.z[0], best, rtol=1e-7, atol=1e-8)
     fall = here - problem.objective(found.z[0])
     assert fall == pytest.approx(-(policy.first + policy.second), rel=1e-9)
@@ -138,12 +140,12 @@ def test_bounds_hold_and_their_knots_do_not_answer() -> None:
     z = np.zeros(size)
     lower, upper = np.full(size, -0.05), np.full(size, 0.05)
     motion, knots = problem.roll_out(z, 0.0), knot_steps(problem)
-    bounds = Bounds(lower, upper, np.ones(size))
+    bounds, padded = Bounds(lower, upper, np.ones(size)), PaddedKnots.of(knots, lower, upper)
     for _ in range(30):
-        arguments = problem.linearize(motion), problem.expand(motion), knots, problem.statics
+        arguments = problem.linearize_from_end(motion), problem.expand(motion), knots, problem.statics
         policy = backward_pass(*arguments, Bounds(lower - motion.z, upper - motion.z, bounds.scale), 1e-9)
         assert policy is not None
-        motion = forward_pass(problem, motion, policy, knots, np.ones(1), (lower, upper)).motion(0, 0.0)
+        motion = forward_pass(problem, motion, policy, padded, np.ones(1)).motion(0, 0.0)
     assert np.all(motion.z >= lower) and np.all(motion.z <= upper)
     pushed = np.clip(motion.z - policy.gradient, lower, upper) - motion.z
     np.testing.assert_allclose(pushed, 0.0, atol=1e-8)

@@ -11,6 +11,7 @@ from toys import quadratic, stop_at, through_json
 
 from symphys.shooting import ShootingProblem
 from symphys.solvers import Outcome, Status, solver
+from symphys.solvers.ddp.gains import follow
 
 SWING = 98.637754
 """The least objective of the acrobot's swing-up that is known; multiple shooting finds it too."""
@@ -66,10 +67,25 @@ def test_what_was_interrupted_comes_to_the_same_answer(stop: int) -> None:
     problem = boxed(pendulum(), 9.0)
     whole = solve(problem)
     part = solve(problem, monitor=stop_at(stop))
-    assert part.status is Status.INTERRUPTED and len(part.trace) == stop + 1
+    assert part.status is Status.INTERRUPTED and len(part.trace) == stop + 1 and not part.gains
     rest = solve(problem, checkpoint=through_json(part.checkpoint))
     assert rest.status is whole.status and len(rest.trace) == len(whole.trace)
     np.testing.assert_array_equal(rest.z, whole.z)
+
+
+def test_gains_bring_a_disturbed_motion_back() -> None:
+    """From a start that is off, the swing-up ends far away with the same torques, and upright with the gains."""
+    problem = boxed(acrobot())
+    found = solve(problem)
+    assert problem.staged is not None and found.gains
+    staged, bounds, off = problem.staged(), (problem.stacked("lower"), problem.stacked("upper")), {}
+    start, last = staged.start(found.z[None])[0], found.gains["states"][-1][None]
+    for feedback in (False, True):
+        motion = follow(staged, found.gains, start + np.array([0.02, -0.02, 0, 0]), bounds, feedback)
+        off[feedback] = float(np.abs(staged.difference(last, motion.x[-1:])).max())
+    assert off[True] < 0.2 * off[False], off
+    assert off[False] > 0.2
+    np.testing.assert_allclose(follow(staged, found.gains, start, bounds).z, found.z, atol=1e-9)
 
 
 def test_budgets_seeds_and_refusals() -> None:

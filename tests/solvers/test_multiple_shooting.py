@@ -9,12 +9,13 @@ import casadi as ca
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from shots_of_toys import LINE, SWING, WAYS, defect, every_backend, every_way, solve
+from shots_of_toys import LINE, SWING, WAYS, defect, every_backend, every_way, program, solve
 from staged_toys import Chain, acrobot, attitude, boxed, pendulum
 from toys import stop_at, through_json
 
 from symphys.solvers import Status
 from symphys.solvers.methods.multiple_shooting import DEFECT
+from symphys.solvers.multiple_shooting.multipliers import fitted
 
 
 @pytest.mark.parametrize(
@@ -119,6 +120,40 @@ def test_multipliers_of_a_checkpoint_shorten_the_rest() -> None:
     assert rest.status is Status.CONVERGED
     assert rest.z == pytest.approx(whole.z, abs=1e-3)
     assert len(rest.trace) < len(whole.trace) + 8
+
+
+@every_backend
+@pytest.mark.parametrize("first", ["ipopt", "fatrop"])
+def test_multipliers_of_a_solution_shorten_a_solve_from_there(first: str, backend: str) -> None:
+    """Of limits that bind; whichever library found them. Twice as many steps between the same nodes take them too."""
+    chain = pendulum(fast=4.0, knots=11)
+    problem = boxed(chain, 8.0)
+    found = solve(problem, backend=first)
+    there = replace(problem, guessed_states=lambda z, ticks, smoothing: chain.roll_out(found.z, 0.0).x[ticks])
+    known = replace(there, multipliers=found.multipliers)
+    cold, warm = (solve(each, found.z, backend=backend) for each in (there, known))
+    assert warm.status is Status.CONVERGED
+    assert warm.z == pytest.approx(found.z, abs=1e-2)
+    assert len(warm.trace) <= len(cold.trace) // 2
+    fine = boxed(pendulum(80, 0.025, knots=11, fast=4.0), 8.0)
+    lines: list[str] = []
+    solve(replace(fine, multipliers=found.multipliers), backend=backend, iterations=1, log=lines.append)
+    assert any("none fit" in line for line in lines)  # there are more limits
+
+
+def test_multipliers_are_those_of_the_program() -> None:
+    """The slope of the Lagrangian by z is zero where they hold, and so are their products with what has room."""
+    problem = boxed(pendulum(fast=4.0, knots=11), 8.0)
+    found = solve(problem, tolerance=1e-9)
+    assert problem.staged is not None
+    nlp = program(problem, found.z)
+    known = fitted(nlp, found.multipliers)
+    assert known is not None
+    w = nlp.pack(found.z, np.zeros(nlp.layout.nodes.shape))
+    slopes = ca.DM(nlp.jacobian_pattern.sparsity, nlp.jacobian(w))
+    residual = nlp.gradient(w) + (slopes.T @ known.rows).full().ravel() + known.bounds
+    assert np.abs(residual).max() < 1e-4 * np.abs(nlp.gradient(w)).max()  # z's rollout is off the nodes
+    assert np.abs(known.bounds).max() > 0.05 and np.abs(known.bounds[np.abs(w) < 7]).max(initial=0.0) < 1e-6
 
 
 def test_a_motion_on_another_grid_is_a_guess() -> None:

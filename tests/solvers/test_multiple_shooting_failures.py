@@ -155,7 +155,6 @@ def test_fatrop_takes_no_constraint_across_intervals() -> None:
         ({"backend": "snopt"}, "backend must be ipopt or fatrop"),
         ({"hessian": "none"}, "hessian must be gauss-newton, exact or limited-memory"),
         ({"hessian": "limited-memory", "backend": "fatrop"}, "hessian must be gauss-newton or exact with"),
-        ({"nodes": ((0.0, 1.0),)}, "nodes must be two states or more"),
         ({"steps_between_nodes": -1}, "steps_between_nodes must be at least 0"),
         ({"tolerance": 0.0}, "tolerance must be above 0"),
     ],
@@ -173,7 +172,6 @@ def test_what_cannot_be_passed_on() -> None:
         ({"backend": "fatrop", "options": {"nonsense": 1}}, "options.nonsense: FATROP .*no such option"),
         ({"backend": "fatrop", "options": {"mu_init": "x"}}, "options.mu_init: FATROP"),
         ({"backend": "fatrop", "options": {"tolerance": 1}}, "options.tolerance: FATROP"),
-        ({"nodes": ((0.0,), (1.0,))}, "nodes: a state of this problem has 2 numbers, not 1"),
     ):
         with pytest.raises(SymphysError, match=f"solver.multiple_shooting.{message}"):
             solve(problem, **options)

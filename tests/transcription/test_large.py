@@ -162,6 +162,7 @@ table = { time = [0, 0.1, 0.2], z = [0, 1, 0.5] }
 [[phase]]
 name = "first"
 share = 0.3
+sets = { gravity = [0, 0, -5], "rail.gain" = 10, "rail.torque" = 30 }
 
 [[cost]]
 name = "in the first"

@@ -149,7 +149,7 @@ def test_motors_and_springs_account_for_energy(make: Make) -> None:
         motion, energy = record.motion, told["energy"]
         angle, rate = motion.joint_value[:, 0, 0], motion.joint_rate[:, 0, 0]
         spring = np.trapezoid((-2 * (angle - 0.1) - 0.05 * rate) * rate, motion.time)
-        motor = np.trapezoid(np.append(motion.joint_torque[:, 0, 0], 0) * rate, motion.time)
+        motor = np.sum(motion.joint_torque[:, 0, 0] * np.diff(angle))
         assert energy["applied"][-1] == pytest.approx(spring + motor, abs=0.01)
         assert gained(energy) == pytest.approx(energy["applied"][-1], abs=2e-3)
         assert abs(gained(energy)) > 0.1

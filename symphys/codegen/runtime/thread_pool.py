@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
+from functools import cache, partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -32,6 +32,15 @@ class MemoryPool:
                 self.lend(task)
         else:
             list(_executor(os.getpid(), threads).map(self.lend, tasks))
+
+    def begin(self, tasks: Sequence[Callable[[Memory], None]], threads: int) -> list[Callable[[], None]]:
+        """Begin all tasks in their order, at most ``threads`` at once. What is returned waits for one each.
+
+        With one thread a task is run when it is waited for.
+        """
+        if threads == 1:
+            return [partial(self.lend, task) for task in tasks]
+        return [_executor(os.getpid(), threads).submit(self.lend, task).result for task in tasks]
 
     def lend(self, task: Callable[[Memory], T]) -> T:
         """Run one task here, in a memory of its own."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -78,12 +78,7 @@ class SlopeKernel:
 
     def jacobians(self, Z: ArrayLike, parameters: ArrayLike, columns: int | None = None) -> Array:
         """(B, n) and (B, p), or (p,) for all points -> (B, outputs, columns): by the first of z; None: by all."""
-        z, given = (np.ascontiguousarray(each, float) for each in (Z, parameters))
-        self._check("Z", z, (2,), self.program.z.size)
-        self._check("parameters", given, (1, 2), self.program.parameters.size)
-        if given.ndim == 2 and len(given) != len(z):
-            raise ProgramError(f"the batch sizes {len(z)} of Z and {len(given)} of parameters differ")
-        found = np.empty((len(z), self._data.height, self._data.width if columns is None else columns))
+        z, given, found = self._arguments(Z, parameters, columns)
         lanes = self.report.lanes
         blocks = -(-len(z) // lanes)
         parts = 1 if self.threads == 1 else min(blocks, PARTS * self.threads)
@@ -91,6 +86,23 @@ class SlopeKernel:
         tasks = [partial(self._run, z, given, found, a, b) for a, b in pairwise(ends)]
         self._pool.run(tasks, self.threads)
         return found
+
+    def jacobians_from_end(self, Z: ArrayLike, parameters: ArrayLike, columns: int | None = None) -> Iterator[Array]:
+        """The same in runs of few points, the last run first, each as soon as it is known; they are begun at once."""
+        z, given, found = self._arguments(Z, parameters, columns)
+        ends = [*range(0, len(z), self.report.lanes), len(z)]
+        runs = [*pairwise(ends)][::-1]
+        waits = self._pool.begin([partial(self._run, z, given, found, a, b) for a, b in runs], self.threads)
+        return (found[a:b] for (a, b), wait in zip(runs, waits, strict=True) if wait() is None)
+
+    def _arguments(self, Z: ArrayLike, parameters: ArrayLike, columns: int | None) -> tuple[Array, Array, Array]:
+        """Both checked, and where the Jacobians go."""
+        z, given = (np.ascontiguousarray(each, float) for each in (Z, parameters))
+        self._check("Z", z, (2,), self.program.z.size)
+        self._check("parameters", given, (1, 2), self.program.parameters.size)
+        if given.ndim == 2 and len(given) != len(z):
+            raise ProgramError(f"the batch sizes {len(z)} of Z and {len(given)} of parameters differ")
+        return z, given, np.empty((len(z), self._data.height, self._data.width if columns is None else columns))
 
     def _run(self, z: Array, given: Array, found: Array, first: int, last: int, memory: Any) -> None:
         shared = given.ndim == 1

@@ -17,6 +17,7 @@ from symphys.dynamics.context import State, StepContext
 from symphys.dynamics.joints.coordinate_constraint import CoordinateConstraint
 from symphys.dynamics.joints.joint_constraints import (
     CONSTRAINTS,
+    Command,
     CoordinateTerms,
     SubstepTimes,
     coordinate_terms,
@@ -126,9 +127,9 @@ class JointConstraint:
 
 
 def joint_constraints(
-    context: StepContext, trees: KinematicTrees, paths: Sequence[PredictedMotion], duration: Expr, kick: Expr
+    context: StepContext, x: State, trees: KinematicTrees, paths: Sequence[PredictedMotion], duration: Expr, kick: Expr
 ) -> tuple[list[JointConstraint], list[PlacedConstraint]]:
-    """(what the sweeps project, what the position pass closes) of all joints over a substep."""
+    """(what the sweeps project, what the position pass closes) of all joints over a substep from x."""
     settings, substep = context.settings, SubstepTimes(duration, kick)
     projected, fitted = list[JointConstraint](), list[PlacedConstraint]()
     places = _places(context.world, trees)
@@ -143,8 +144,7 @@ def joint_constraints(
         for k in range(len(joint.kind.coordinates)) if joint.acting else ():
             states = tuple(trees.states[trees.carriers[i]] for i in joint.bodies)
             at = coordinate_terms(frames, k, moving, states, duration, places.get(index, same))
-            command = context.input(f"{joint.name}.command")
-            command = ca.SX(0) if command is None else command[k]
+            command = _command(context, joint, k, x)
             for part in joint.acting:
                 constraint = trees.placed(joint.bodies, CONSTRAINTS[part](settings, joint, at, command, substep))
                 projected.append(JointConstraint(constraint, f"{joint.name}.{part}", k))
@@ -154,6 +154,13 @@ def joint_constraints(
         projected.append(JointConstraint(constraint, f"{coupling.name}.{COUPLED}", 0))
         fitted.append(constraint)
     return projected, fitted
+
+
+def _command(context: StepContext, joint: Joint, k: int, x: State) -> Command:
+    """Of coordinate ``k`` of a joint; 0 if it has none."""
+    given = context.input(f"{joint.name}.command")
+    before = ca.SX(0) if joint.drive is None else x[f"{joint.name}.{joint.drive}"][k]
+    return Command(ca.SX(0) if given is None else given[k], before)
 
 
 def _coupled(

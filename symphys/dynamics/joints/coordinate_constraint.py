@@ -44,6 +44,8 @@ class CoordinateConstraint:
         left: how far a limit is away at the start, or a coupling is off [rad], [m]; None for what is neither.
         inverse_mobility: effective mass.
         landing: 1 for a limit that is struck: its impulse is an impact, not a force.
+        drive: what a motor's command gives by itself [N m], [N]; None for what aims at a velocity.
+        jump: by how much that differs from the step before; None for a motor that gives nothing else.
     """
 
     terms: tuple[BodyTerm, ...]
@@ -60,6 +62,8 @@ class CoordinateConstraint:
     left: Expr | None
     inverse_mobility: Expr
     landing: Expr
+    drive: Expr | None = None
+    jump: Expr | None = None
 
     def fitting(self, moved: Expr) -> Expr:
         """(1,): the impulse times a time that takes a limit back to where it is kept, a coupling to where it holds.
@@ -90,11 +94,16 @@ class CoordinateConstraint:
         """See ``VelocityConstraint``."""
         rate = self.rate(momenta)
         new = self.keep * old.numbers - self.slope * rate - self.offset
-        if self.low is not None:
-            new = at_least(new, self.low, self.width)
-        if self.high is not None:
-            new = at_most(new, self.high, self.width)
+        new = self.bounded(new)
         return self.apply(momenta, JointImpulse(new - old.numbers)), JointImpulse(new)
+
+    def bounded(self, impulse: Expr) -> Expr:
+        """Held within the bounds."""
+        if self.low is not None:
+            impulse = at_least(impulse, self.low, self.width)
+        if self.high is not None:
+            impulse = at_most(impulse, self.high, self.width)
+        return impulse
 
     def apply(self, momenta: tuple[Any, ...], impulse: JointImpulse) -> tuple[Any, ...]:
         """See ``VelocityConstraint``."""

@@ -43,6 +43,24 @@ class SubstepTimes:
     duration: Expr
     kick: Expr
 
+    @property
+    def lag(self) -> Expr:
+        """How much of ``kick`` lies before the substep."""
+        return self.kick - self.duration / 2
+
+
+@dataclass(frozen=True)
+class Command:
+    """Of a motor.
+
+    Attributes:
+        given: in the step.
+        before: what the command of the step before gave by itself [N m], [N]; it acts until this step begins.
+    """
+
+    given: Expr
+    before: Expr
+
 
 @dataclass(frozen=True)
 class CoordinateTerms:
@@ -173,33 +191,49 @@ def coordinate_terms(
 
 @traced
 def motor_constraint(
-    settings: StepSettings, joint: Joint, at: CoordinateTerms, command: Expr, substep: SubstepTimes
+    settings: StepSettings, joint: Joint, at: CoordinateTerms, command: Command, substep: SubstepTimes
 ) -> CoordinateConstraint:
     """A motor; the bounds of its torque are rounded off over what the smoothing makes of an effective mass."""
     motor, width = joint.motor, settings.smoothing / at.mobility
     if isinstance(motor, AffineMotor):
         return _affine(settings, motor, at, command, substep)
     if isinstance(motor, TorqueMotor):
-        torque = clip(command, -motor.torque, motor.torque, settings.smoothing)
-        return _constraint(at, by_law(-torque * substep.kick, ca.SX(0), at.mobility), None, None, width)
+        return _driven(at, clip(command.given, -motor.torque, motor.torque, settings.smoothing), command, substep)
     assert isinstance(motor, Servo | VelocityMotor)
-    wanted = servo_velocity(motor, command, at.value, settings.smoothing) if isinstance(motor, Servo) else command
+    aim = command.given
+    wanted = servo_velocity(motor, aim, at.value, settings.smoothing) if isinstance(motor, Servo) else aim
     target = clip(wanted, -motor.velocity, motor.velocity, settings.smoothing)
     most = motor.torque * substep.kick
     return _constraint(at, towards(target, at.mobility), -most, most, width)
 
 
+def _driven(at: CoordinateTerms, drive: Expr, command: Command, substep: SubstepTimes) -> CoordinateConstraint:
+    """A motor that gives what its command says: ``drive`` [N m] in the substep, over the lag what it was before."""
+    law = by_law(-_impulse(drive, command, substep), ca.SX(0), at.mobility)
+    return _constraint(at, law, None, None, ca.SX(0), drive=drive)
+
+
+def _impulse(drive: Expr, command: Command, substep: SubstepTimes) -> Expr:
+    """Of what commands give by themselves: each acts from the start of its step to the end."""
+    return substep.lag * command.before + substep.duration / 2 * drive
+
+
 def _affine(
-    settings: StepSettings, motor: AffineMotor, at: CoordinateTerms, command: Expr, substep: SubstepTimes
+    settings: StepSettings, motor: AffineMotor, at: CoordinateTerms, command: Command, substep: SubstepTimes
 ) -> CoordinateConstraint:
     """A torque that is affine in command, coordinate and rate; what depends on these acts as a spring and damper do."""
-    gear, kick = motor.gear, substep.kick
+    gear, kick, given, width = motor.gear, substep.kick, command.given, settings.smoothing / at.mobility
     for end, held in zip(motor.command_range or (), (at_least, at_most), strict=False):
-        command = held(command, end, settings.smoothing) if isfinite(end) else command
+        given = held(given, end, settings.smoothing) if isfinite(end) else given
+    drive, ends = gear * (motor.gain * given + motor.offset), _force_ends(motor)
+    if motor.passive:
+        for force, held in zip(ends, (at_least, at_most), strict=True):
+            drive = drive if force is None else held(drive, force, width / kick)
+        return _driven(at, drive, command, substep)
     pull, slope = _spring(settings, at, substep, Spring(gear**2 * motor.kp, gear**2 * motor.kv))
-    law = by_law(pull - kick * gear * (motor.gain * command + motor.offset), slope, at.mobility)
-    low, high = (None if end is None else kick * end for end in _force_ends(motor))
-    return _constraint(at, law, low, high, settings.smoothing / at.mobility)
+    law = by_law(pull - _impulse(drive, command, substep), slope, at.mobility)
+    low, high = (None if end is None else kick * end for end in ends)
+    return _constraint(at, law, low, high, width, drive=drive, jump=drive - command.before)
 
 
 def _force_ends(motor: AffineMotor) -> tuple[Expr | None, Expr | None]:
@@ -221,7 +255,7 @@ def servo_velocity(servo: Servo, command: Expr, value: Expr, smoothing: Expr) ->
 
 @traced
 def lower_limit(
-    settings: StepSettings, joint: Joint, at: CoordinateTerms, command: Expr, substep: SubstepTimes
+    settings: StepSettings, joint: Joint, at: CoordinateTerms, command: Command, substep: SubstepTimes
 ) -> CoordinateConstraint:
     """A limit from below: it may be reached within the substep, not passed, and pushes only.
 
@@ -234,7 +268,7 @@ def lower_limit(
 
 @traced
 def upper_limit(
-    settings: StepSettings, joint: Joint, at: CoordinateTerms, command: Expr, substep: SubstepTimes
+    settings: StepSettings, joint: Joint, at: CoordinateTerms, command: Command, substep: SubstepTimes
 ) -> CoordinateConstraint:
     """A limit from above."""
     left, strikes = joint.limits.upper - at.value, _strikes(settings, at, at.rate_now)
@@ -254,7 +288,7 @@ def _strikes(settings: StepSettings, at: CoordinateTerms, closing: Expr) -> Expr
 
 @traced
 def spring_constraint(
-    settings: StepSettings, joint: Joint, at: CoordinateTerms, command: Expr, substep: SubstepTimes
+    settings: StepSettings, joint: Joint, at: CoordinateTerms, command: Command, substep: SubstepTimes
 ) -> CoordinateConstraint:
     """A spring and damper."""
     assert joint.spring is not None
@@ -264,7 +298,7 @@ def spring_constraint(
 
 @traced
 def friction_constraint(
-    settings: StepSettings, joint: Joint, at: CoordinateTerms, command: Expr, substep: SubstepTimes
+    settings: StepSettings, joint: Joint, at: CoordinateTerms, command: Command, substep: SubstepTimes
 ) -> CoordinateConstraint:
     """Dry friction: it stops the coordinate with at most so much."""
     most = joint.friction * substep.kick
@@ -327,8 +361,10 @@ def _constraint(
     width: Expr,
     left: Expr | None = None,
     landing: Expr = NEVER,
+    drive: Expr | None = None,
+    jump: Expr | None = None,
 ) -> CoordinateConstraint:
-    bounds = {"low": low, "high": high, "width": width, "left": left, "landing": landing}
+    bounds = {"low": low, "high": high, "width": width, "left": left, "landing": landing, "drive": drive, "jump": jump}
     return CoordinateConstraint(
         at.terms, at.seen, at.given, **law, **bounds, same=at.same, of_tree=at.of_tree, inverse_mobility=1 / at.mobility
     )

@@ -101,7 +101,7 @@ def _lasting_forces(
     forces = dict[str, list[Expr]]()
     for each, impulse in zip(constraints, given, strict=True):
         constraint, impact, old = each.placed.constraint, of_body(struck, each.placed.bodies[0]), x[each.name]
-        force = _lasting(constraint, impulse, old, each.k, impact, kick, context.shortest_kick)
+        force = _lasting(constraint, impulse, own(old, each.k), impact, (kick, x["lag"], context.shortest_kick))
         forces.setdefault(each.name, []).append(force)
     return {name: _stacked(tuple(parts)) for name, parts in forces.items()}
 
@@ -116,12 +116,32 @@ def _lasting(
     constraint: LockConstraint | CoordinateConstraint,
     impulse: JointImpulse,
     old: Expr,
-    k: int | None,
     struck: Expr,
-    kick: Expr,
-    shortest: Expr,
+    times: tuple[Expr, Expr, Expr],
 ) -> Expr:
-    return ca.if_else(struck, own(old, k), constraint.carried(impulse) / ca.fmax(kick, shortest))
+    """The force; of what a command gives the last one, although its impulse began with that of the step before."""
+    kick, lag, shortest = times
+    given = constraint.carried(impulse)
+    if isinstance(constraint, CoordinateConstraint) and constraint.drive is not None:
+        if constraint.jump is None:
+            return constraint.drive
+        given = constraint.bounded(given + lag * constraint.jump)
+        old = constraint.bounded(kick * (old + constraint.jump)) / kick
+    return ca.if_else(struck, old, given / ca.fmax(kick, shortest))
+
+
+def commanded(context: StepContext, joints: Sequence[JointConstraint], forces: State) -> State:
+    """What commands give by themselves, which acts until the next step begins, whatever the sweeps start from."""
+    found, owner = State(), {joint.name: joint for joint in context.world.joints}
+    drives = dict[str, list[Expr]]()
+    for each in joints:
+        drive = getattr(each.placed.constraint, "drive", None)
+        if drive is not None:
+            drives.setdefault(each.name, []).append(drive)
+    for name, parts in drives.items():
+        joint = owner[name.rpartition(".")[0]]
+        found[f"{joint.name}.{joint.drive}"] = forces[name] if joint.drive == "motor" else _stacked(tuple(parts))
+    return found
 
 
 @traced

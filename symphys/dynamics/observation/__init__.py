@@ -1,5 +1,6 @@
 """What can be computed from a state without taking a step: sensors, coordinates of joints, queries."""
 
+from symphys.dynamics.observation.ball_turns import joint_turn
 from symphys.dynamics.observation.body_sensors import (
     accelerometer_bodies,
     accelerometers,
@@ -25,6 +26,7 @@ __all__ = [
     "half_step_function",
     "joint_quantities",
     "joint_quantity_names",
+    "joint_turn",
     "reading_function",
     "readings",
     "site_quantities",

@@ -7,7 +7,7 @@ from symphys.model.joints.hinge import HINGE
 from symphys.model.joints.joint import Joint, JointFrame, Limits, Spring
 from symphys.model.joints.kind import Coordinate, Kind, PlacedFrames
 from symphys.model.joints.kinematic_tree import KinematicTree, Link, carriers, kinematic_trees, tree_joints
-from symphys.model.joints.motor import AffineMotor, Motor, Servo, TorqueMotor, VelocityMotor
+from symphys.model.joints.motor import AffineMotor, Motor, Servo, TorqueMotor, VelocityMotor, given_torque
 from symphys.model.joints.slider import SLIDER
 from symphys.model.joints.specs import BallJoint, FixedJoint, Hinge, JointSpec, MovingJoint, Slider, UniversalJoint
 from symphys.model.joints.universal import UNIVERSAL
@@ -45,6 +45,7 @@ __all__ = [
     "UniversalJoint",
     "VelocityMotor",
     "carriers",
+    "given_torque",
     "kinematic_trees",
     "tree_joints",
 ]

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from symphys.model.joints.kind import Kind, PlacedFrames
-from symphys.model.joints.motor import Motor
+from symphys.model.joints.motor import AffineMotor, Motor, given_torque
 from symphys.model.joints.turn import told
 from symphys.model.scalar import Scalar, is_zero
 
 PARTS = ("motor", "lower", "upper", "spring", "friction")
+DRIVE = "drive"
+"""What a command alone gives, where the state's ``motor`` does not tell it; see ``Joint.drive``."""
 Vector = Sequence[Any]
 """three of them"""
 
@@ -105,6 +107,18 @@ class Joint:
         dry = None if is_zero(self.friction) else self.friction
         present = (self.motor, self.limits.lower, self.limits.upper, self.spring, dry)
         return tuple(part for part, what in zip(PARTS, present, strict=True) if what is not None)
+
+    @property
+    def drive(self) -> str | None:
+        """Where the state keeps what the command of a step alone gives, which acts until the next step begins.
+
+        None for a motor that aims at a velocity, whose commands act through what it aims at.
+        """
+        if not self.driven:
+            return None
+        if given_torque(self.motor):
+            return "motor"
+        return DRIVE if isinstance(self.motor, AffineMotor) else None
 
     @property
     def locked(self) -> int:

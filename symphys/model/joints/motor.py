@@ -81,3 +81,8 @@ class AffineMotor:
 
 
 Motor = Servo | VelocityMotor | TorqueMotor | AffineMotor
+
+
+def given_torque(motor: Motor | None) -> bool:
+    """Whether a motor gives what its command says, whatever its joint does."""
+    return isinstance(motor, TorqueMotor) or (isinstance(motor, AffineMotor) and motor.passive)

@@ -92,7 +92,7 @@ class ForceTable(SchemaTable):
     )
     value: str = Field(
         description='formula in N or N m, world frame: "-drag.c * norm(ball.velocity) * ball.velocity"; it is '
-        "evaluated in the middle of each step, that of a command at its start"
+        "evaluated in the middle of each step"
     )
     during: str | None = Field(default=None, min_length=1, description="the phase in which alone it acts; else always")
     numbers: dict[Identifier, Numbers] = Field(

@@ -80,6 +80,11 @@ class PhaseTable(SchemaTable):
         le=1,
         description="when it ends, as a share of the duration, at the nearest step",
     )
+    sets: dict[str, Any] = Field(
+        default={},
+        description='numbers that hold in it alone: { "ground.friction" = 0.05, gravity = [0, 0, -1.6] }; of contacts, '
+        'motors and springs, and gravity. Variables may set them: "ice.ground.friction"',
+    )
 
 
 class CostTable(SchemaTable):

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from symphys.model.world import Law, World
-from symphys.problem.model import Variable
 from symphys.problem.parametric.parts import LAW, PairRule
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.reading.faults import Faults, Place
@@ -127,17 +126,15 @@ def check_laws(parametric: ParametricWorld, nominal: World, faults: Faults) -> N
 
 
 def check_varied(
-    parametric: ParametricWorld, nominal: World, variables: Sequence[Variable | None], faults: Faults
+    parametric: ParametricWorld, nominal: World, varied: Iterable[tuple[Place, str]], faults: Faults
 ) -> None:
-    """A variable must not give restitution to soft contacts."""
+    """Variables and phases must not give restitution to soft contacts; ``varied``: names, and where they are."""
     soft = {name for pair in nominal.pairs if pair.law.soft for name in parametric.owners(pair)}
     soft |= {pair.name for pair in parametric.pairs if pair.states.get("frequency", parametric.contact.frequency)}
-    for index, variable in enumerate(variables):
-        for slot in variable.slots if variable else ():
-            owner, _, key = slot.name.rpartition(".")
-            if key == "restitution" and owner in soft:
-                text = f"{slot.name} cannot vary: {owner} has soft contacts, which have no restitution"
-                faults.add(("variable", index, "sets"), text)
+    for place, name in varied:
+        owner, _, key = name.rpartition(".")
+        if key == "restitution" and owner in soft:
+            faults.add(place, f"{name} cannot vary: {owner} has soft contacts, which have no restitution")
 
 
 def either(law: Law) -> str:

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from math import ceil, floor
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from math import ceil, floor, isfinite
 from typing import Any
 
-from symphys.problem.model import Phase, Simulation
+import numpy as np
+
+from symphys.expression import Formula
+from symphys.problem.feedback import Sensor
+from symphys.problem.model import Phase, Simulation, Termination
+from symphys.problem.parametric.by_phase import changing
+from symphys.problem.parametric.world import ParametricWorld
+from symphys.problem.quantities import Quantity, physical, unknown
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.receding_horizon import PlantSettings, RecedingHorizon
 from symphys.problem.schema import Document
@@ -69,8 +76,78 @@ def find_phase(name: str, phases: Mapping[str, Phase], place: Place, faults: Fau
     return phases.get(name)
 
 
-def read_phases(tables: Sequence[PhaseTable], simulation: Simulation, free: bool, faults: Faults) -> dict[str, Phase]:
-    """The phases by name; ``free``: whether a variable sets the duration, so that times are not known."""
+def read_sets(
+    tables: Sequence[PhaseTable], parametric: ParametricWorld, faults: Faults
+) -> dict[str, dict[str, tuple[float, ...]]]:
+    """By the name of a phase, the numbers that hold in it alone; notes what cannot change from step to step."""
+    nominal, able = parametric.parameters(), changing(parametric)
+    found: dict[str, dict[str, tuple[float, ...]]] = {table.name: {} for table in tables}
+    for index, table in enumerate(tables):
+        for name, value in dotted(table.sets):
+            numbers, (low, high), place = row_of(value), physical(name, "parameter"), ("phase", index, "sets")
+            if name not in nominal:
+                faults.add(place, f"there is no parameter {quote(name)}; {unknown(name, nominal)}")
+            elif name not in able:
+                faults.add(place, f"{name} is the same all along; a phase may set {', '.join(able)}")
+            elif numbers is None or len(numbers) != nominal[name].size:
+                count = nominal[name].size
+                faults.add(place, f"{name} takes {'a number' if count == 1 else f'{count} numbers'}, not {value!r}")
+            elif not all(low <= number <= high for number in numbers):
+                faults.add(place, f"{name} must lie in [{low:g}, {high:g}], not {value!r}")
+            else:
+                found[table.name][name] = numbers
+    faults.stop_if_any()
+    return found
+
+
+def row_of(value: object) -> tuple[float, ...] | None:
+    """A number or a list of numbers as numbers; None for anything else."""
+    row = value if isinstance(value, list) else [value]
+    plain = all(isinstance(each, int | float) and not isinstance(each, bool) and isfinite(each) for each in row)
+    return tuple(map(float, row)) if plain else None
+
+
+def phase_quantities(sets: Mapping[str, Mapping[str, tuple[float, ...]]]) -> dict[str, Quantity]:
+    """The numbers of all phases by the names that variables and formulas use, such as ``ice.ground.friction``."""
+    return {
+        f"{phase}.{name}": Quantity("weight", np.array(numbers), own_scale=True, like=name)
+        for phase, own in sets.items()
+        for name, numbers in own.items()
+    }
+
+
+def check_read_at_start(
+    phases: Iterable[Phase], sensors: Sequence[Sensor], ending: tuple[str, Termination | None], faults: Faults
+) -> None:
+    """Sensors and [termination] look at a state alone, which does not say in which phase it is."""
+    names = {name for phase in phases for name in phase.sets}
+    read: list[tuple[Place, Formula]] = []
+    for k, sensor in enumerate(sensors):
+        read += [(("sensor", k, "reads"), formula) for formula in sensor.formulas]
+    read += [] if ending[1] is None else [((ending[0], "margin"), ending[1].margin)]
+    for place, formula in read:
+        felt = {name for name in formula.names if name.endswith(".accelerometer")} if "gravity" in names else set()
+        for name in sorted(formula.names & names | felt):
+            faults.add(place, f"looks at {name}, which a phase changes; a state does not tell its phase")
+    faults.stop_if_any()
+
+
+def read_phases(
+    tables: Sequence[PhaseTable],
+    sets: Mapping[str, Mapping[str, tuple[float, ...]]],
+    simulation: Simulation,
+    free: bool,
+    faults: Faults,
+) -> dict[str, Phase]:
+    """The phases by name.
+
+    Args:
+        tables: as they are in the file.
+        sets: see ``read_sets``.
+        simulation: how time passes.
+        free: whether a variable sets the duration, so that times are not known.
+        faults: gets what is wrong.
+    """
     found, start = dict[str, Phase](), 0.0
     for index, table in enumerate(tables):
         place = ("phase", index)
@@ -84,7 +161,7 @@ def read_phases(tables: Sequence[PhaseTable], simulation: Simulation, free: bool
         elif table.share is None and index + 1 < len(tables):
             faults.add((*place, "until"), "is needed, or share: only the last phase goes on until the end")
         end = 1.0 if table.until is None else table.until / simulation.duration
-        phase = Phase(table.name, start, end if table.share is None else table.share)
+        phase = Phase(table.name, start, end if table.share is None else table.share, sets[table.name])
         first, last = phase.ticks(simulation.steps)
         if last <= first:
             ended = f"{first * simulation.dt:g} s" if key == "until" else f"{start:g}"

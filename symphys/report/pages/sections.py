@@ -65,12 +65,13 @@ def header(run: Run, cards: Sequence[Html]) -> Html:
     there = [(anchor, title) for anchor, title in CHAPTERS if any(f'id="{anchor}"' in card[:80] for card in cards)]
     links = [tag("a", title, href=f"#{anchor}") for anchor, title in there]
     unread = () if run.readable else run.faults
-    why = values.name(run.provenance.get("chosen"))
+    why, guess = (values.name(run.provenance.get(key)) for key in ("chosen", "guess"))
     return join(
         [
             tag("p", f"Run report · {run.problem} · {run.solver} · seed {run.seed}", class_="kicker"),
             tag("p", f"With {settings_words(run.settings)}.", class_="note") if run.settings else "",
             tag("p", f"No solver was named: {run.solver}, since {why}.", class_="note") if why else "",
+            tag("p", f"It starts from what {guess} found.", class_="note") if guess else "",
             tag("h1", run.title),
             *(tag("p", part, class_="lead") for part in re.split(r"\n\s*\n", run.description.strip()) if part),
             banner(words.level(run), words.headline(run), words.verdict(run), run.advice, *unread),
@@ -179,6 +180,7 @@ def found(run: Run, pictures: Mapping[str, Drawn]) -> Html:
     header = ["variable", "guess", "found", "lower bound", "upper bound", "between bounds"]
     curves = [
         f"{v.name}: {writing.several(v.value.shape[1], 'knot')} of {writing.several(v.value.shape[0], 'component')}"
+        + (f" (sets {sets_of(v)})" if len(v.sets) > 1 else "")
         for v in knotted(run)
     ]
     return card(
@@ -198,17 +200,23 @@ def variable_rows(variable: VariableRecord) -> list[list[str]]:
     for index, name in enumerate(component_names(variable)):
         value, guess = variable.value[index, 0], variable.guess[index, 0]
         low, high = variable.lower[index, 0], variable.upper[index, 0]
-        sets = tag("small", ", ".join(variable.sets)) if index == 0 else Html("")
+        sets = tag("small", sets_of(variable)) if index == 0 else Html("")
         label = join([tag("b", variable.name) if index == 0 else "", f" {name} " if name else " ", sets])
         numbers = [show(guess), tag("b", show(value, 4)), show(low), show(high)]
         rows.append([label, *numbers, between(value, guess, low, high)])
     return rows
 
 
+def sets_of(variable: VariableRecord) -> str:
+    """What it sets, in words."""
+    *others, last = variable.sets or ("",)
+    return f"{', '.join(others)} and {last}, to the same values" if others else last
+
+
 def many_row(variable: VariableRecord) -> list[str]:
     """The range of very many components, and how far they are from the guess."""
     guess, value = variable.guess[:, 0], variable.value[:, 0]
-    label = join([tag("b", variable.name), f" {len(value)} numbers ", tag("small", ", ".join(variable.sets))])
+    label = join([tag("b", variable.name), f" {len(value)} numbers ", tag("small", sets_of(variable))])
     ranges = [f"{show(float(of.min()))} to {show(float(of.max()))}" for of in (guess, value)]
     bounds = [show(float(variable.lower[:, 0].min())), show(float(variable.upper[:, 0].max()))]
     change = root_mean_square(value / 2 - guess / 2) * 2

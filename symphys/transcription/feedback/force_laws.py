@@ -2,8 +2,7 @@
 
 Inputs are constant over a step. A force of the state at t_k would therefore be of first order. The laws are evaluated
 at t_k + dt/2 instead, see ``half_step_function``, which makes them of second order. Velocities there need
-accelerations, which depend on the laws. For them the laws are evaluated at t_k first. Motors give their impulse at the
-start of a step, so that laws of commands are of second order if they are evaluated there.
+accelerations, which depend on the laws. For them the laws are evaluated at t_k first.
 """
 
 from __future__ import annotations
@@ -38,12 +37,9 @@ def force_function(
     def added(laws: Sequence[ForceLaw], x: Expr, time: Expr) -> Expr:
         return _added(problem, world, inputs, parameters, memory, laws, Instant(x, at.u, at.p, time, at.z))
 
-    forces = [law for law in problem.forces if not law.commands]
-    total = at.u + added([law for law in problem.forces if law.commands], at.x, at.time)
-    if forces:
-        first = total + added(forces, at.x, at.time)
-        half = ca.vertcat(ahead(at.x[:plain], first, at.p), at.x[plain:])
-        total = total + added(forces, half, at.time + scheme.dt / 2)
+    first = at.u + added(problem.forces, at.x, at.time)
+    half = ca.vertcat(ahead(at.x[:plain], first, at.p), at.x[plain:])
+    total = at.u + added(problem.forces, half, at.time + scheme.dt / 2)
     return ca.Function("forces", [at.x, at.u, at.p, at.time], [ca.densify(total)])
 
 

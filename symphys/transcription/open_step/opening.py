@@ -195,6 +195,11 @@ def refuse_motion_parts(problem: Problem) -> None:
         if cost.during is not None
     ]
     issues += [
+        Issue(f'phase "{phase.name}".sets', "holds in a phase of a whole motion; this is one step")
+        for phase in problem.phases
+        if phase.sets
+    ]
+    issues += [
         Issue(f'force "{law.name}".during', "is a phase of a whole motion; this is one step")
         for law in problem.forces
         if law.during is not None

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.dynamics.observation import joint_quantities
+from symphys.dynamics.observation import joint_quantities, joint_turn
 from symphys.model.state_layout import Layout
-from symphys.problem import GuessedMotion
+from symphys.problem import DURATION, GuessedMotion
+from symphys.problem.guess.motion import is_orientation, turn_between
+from symphys.problem.guess.names import ball_joints, guessable, rate_of
 from symphys.transcription.staged.columns import ByColumns
 from symphys.transcription.staged.staged_problem import RolloutStages
 
@@ -26,32 +30,54 @@ def guessed_states(stages: RolloutStages, guess: GuessedMotion, z: Array, ticks:
     states, times = moved[ticks], np.asarray(ticks * dt, float)
     states[~np.isfinite(states).all(axis=1)] = moved[1]
     off, names = np.zeros((len(ticks), stages.tangent_size)), list(stages.tangent.names)
-    now = _quantities(stages, guess, states, z)
+    now, stretch = _quantities(stages, guess, states, z), _stretch(stages, z)
+
+    def move(name: str, ahead: Array) -> None:
+        for entry, column in zip(_entries(name, names), ahead.T, strict=True):
+            off[:, entry] = column
+
+    sizes = guessable(stages.rollout.world)
     for name in guess.columns:
-        owner, _, field = name.rpartition(".")
-        ahead = guess.at(name, times) - now[name]
-        for k, column in enumerate(ahead.T):
-            off[:, names.index(f"{owner}.{_field(field, names, owner)}[{k}]")] = column
-        rate = f"{owner}.{'velocity' if field == 'position' and f'{owner}.velocity' in now else 'rate'}"
-        if field in ("angle", "position") and rate not in guess.columns:
-            for k, column in enumerate((guess.rate(name, times, dt) - now[rate]).T):
-                off[:, names.index(f"{rate}[{k}]")] = column
+        there = guess.at(name, times)
+        move(name, turn_between(now[name], there) if is_orientation(name) else there - now[name])
+        rate = rate_of(name, sizes)
+        if rate and rate not in guess.columns:
+            move(rate, guess.rate(name, times, dt) / stretch - now[rate])
     return stages.retract(states, off)
 
 
-def _field(field: str, names: list[str], owner: str) -> str:
-    """What the tangent calls a quantity."""
-    return "coordinate" if field in ("angle", "position") and f"{owner}.coordinate[0]" in names else field
+def _entries(name: str, names: list[str]) -> Iterator[int]:
+    """Where a quantity is in the tangent, which calls places and rates of joints the same for all kinds."""
+    owner, _, field = name.rpartition(".")
+    jointed = f"{owner}.coordinate[0]" in names
+    words = {"angle": "coordinate", "position": "coordinate", "orientation": "coordinate", "angular_velocity": "rate"}
+    field = words.get(field, field) if jointed else "turn" if field == "orientation" else field
+    count = sum(each.startswith(f"{owner}.{field}[") for each in names)
+    return (names.index(f"{owner}.{field}[{k}]") for k in range(count))
+
+
+def _stretch(stages: RolloutStages, z: Array) -> float:
+    """How many times as long as the file has it the motion of z takes."""
+    problem, columns = stages.rollout.problem, stages.rollout.parameters.columns
+    if not problem.free_duration:
+        return 1.0
+    return float(stages.parameters(z[None])[0][columns[DURATION]][0]) / problem.simulation.duration
 
 
 def _quantities(stages: RolloutStages, guess: GuessedMotion, states: Array, z: Array) -> dict[str, Array]:
     """(M, components) of all quantities of the owners of what is guessed."""
     rollout = stages.rollout
-    layout = Layout(rollout.world)
+    world, layout = rollout.world, Layout(rollout.world)
     x, p = ca.SX.sym("x", layout.size), ca.SX.sym("p", int(rollout.p.shape[0]))
     owners = {name.rpartition(".")[0] for name in guess.columns}
     found = {name: x[layout[name]] for name in layout.names() if name.rpartition(".")[0] in owners}
-    found |= {n: v for n, v in joint_quantities(rollout.world, x).items() if n.rpartition(".")[0] in owners}
+    found |= {n: v for n, v in joint_quantities(world, x).items() if n.rpartition(".")[0] in owners}
+    for joint in ball_joints(world):
+        if joint.name in owners:
+            bodies = [world.bodies[i].name for i in joint.bodies]
+            fields = ("orientation", "angular_velocity")
+            parts = (tuple(x[layout[f"{body}.{field}"]] for body in bodies) for field in fields)
+            found |= dict(zip((f"{joint.name}.{field}" for field in fields), joint_turn(joint, *parts), strict=True))
     symbols = ca.vertcat(ca.SX(0, 1), *rollout.parameters.symbols)
     values = [ca.densify(ca.substitute(ca.SX(value), symbols, p)) for value in found.values()]
     function = ByColumns(ca.Function("named", [x, p], values))

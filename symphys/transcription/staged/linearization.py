@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property
 
 import casadi as ca
@@ -12,7 +13,7 @@ from symphys.codegen.backends import BEST
 from symphys.shooting import Linearized, StagedMotion
 from symphys.transcription.formula_names import spans
 from symphys.transcription.rollout import Rollout
-from symphys.transcription.staged.linearized_step import LinearizedStep
+from symphys.transcription.staged.linearized_step import LinearizedStep, Slopes
 from symphys.transcription.staged.tangent import Tangent
 
 Array = NDArray[np.float64]
@@ -53,15 +54,30 @@ class Linearization:
         is part of the first of ``c``: with it sums over the steps are exact.
         """
         p = self.begun(motion.z)[2]
-        a, b, by_p = self.step.slopes(motion.x[:-1], motion.u, p, motion.smoothing)
+        slopes = self.step.slopes(motion.x[:-1], motion.u, p, motion.smoothing)
+        return next(self._by_statics(motion, p, iter([slopes])))
+
+    def linearize_from_end(self, motion: StagedMotion) -> Iterator[Linearized]:
+        """The same in runs of steps, the last run first, each as soon as it is known; they are begun at once."""
+        p = self.begun(motion.z)[2]
+        return self._by_statics(motion, p, self.step.slopes_from_end(motion.x[:-1], motion.u, p, motion.smoothing))
+
+    def _by_statics(self, motion: StagedMotion, p: Array, runs: Iterator[Slopes]) -> Iterator[Linearized]:
+        """Slopes of runs of steps, the last run first, with those by parameters made those by static entries."""
         start, left, parameters = self.start_slopes(motion)
-        c = by_p[:, :, self.step.arguments.varied] @ parameters[self.step.arguments.varied]
-        if len(c) and left.any():
-            c[0] += self.step.beside(motion.x[0], motion.u[0], p, motion.smoothing) @ left
-        return Linearized(a, b, c, start)
+        varied, end = self.step.arguments.varied, len(motion.u)
+        for a, b, by_p in runs:
+            c = by_p[:, :, varied] @ parameters[varied]
+            end -= len(a)
+            if not end and len(c) and left.any():
+                c[0] += self.step.beside(motion.x[0], motion.u[0], p, motion.smoothing) @ left
+            yield Linearized(a, b, c, start)
 
     def start_slopes(self, motion: StagedMotion) -> tuple[Array, Array, Array]:
         """By the static entries: the first state in its tangent (n, s), what lies beside that (nx, s), p (np, s)."""
+        if not len(self.statics):
+            nx, n, _, np_ = self.step.arguments.sizes
+            return np.zeros((n, 0)), np.zeros((nx, 0)), np.zeros((np_, 0))
         x0, p = motion.x[0], self.begun(motion.z)[2]
         first, parameters = (np.array(ca.DM(part)) for part in self._start_slopes(motion.z))
         first = first - self._sparse(self.tangent.shift, x0, p) @ parameters
@@ -70,9 +86,9 @@ class Linearization:
         return start, np.where(np.abs(left) > ROUNDING * np.abs(first).max(initial=0.0), left, 0.0), parameters
 
     def begun(self, z: Array) -> tuple[Array, Array, Array]:
-        """First state (nx,), inputs (N, m) and p (np,)."""
+        """First state (nx,), inputs (N, m) without shares of phases, and p (np,)."""
         x0, u, p = (np.array(part) for part in self._start.call([z]))
-        return x0.ravel(), np.ascontiguousarray(u.T), p.ravel()
+        return x0.ravel(), np.ascontiguousarray(u[: self.rollout.controls].T), p.ravel()
 
     @cached_property
     def _start(self) -> ca.Function:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symphys.codegen import FixedBatch, Kernel, KernelUnavailable, ProcessorKernel, ProgramError, processors
+from symphys.codegen import FixedBatch, Kernel, KernelUnavailable, ProcessorKernel, Program, ProgramError, processors
 from symphys.codegen.backends import BEST, PRECISIONS, build_kernel
 from symphys.codegen.slopes import SlopeKernel, compile_slopes
 from symphys.transcription.rollout import Rollout
@@ -33,6 +34,8 @@ FEW = 16
 class LinearizedStep:
     """One step of a rollout, its controllers in it, for batches of states: values, and slopes in tangents.
 
+    What evaluates is built when it is first asked for.
+
     Attributes:
         rollout, tangent: whose step it is, and in what its slopes are.
         backend: the name of a backend that is a kernel; other names mean casadi's virtual machine.
@@ -40,7 +43,6 @@ class LinearizedStep:
         exact: whether it is for smoothing 0 only.
         parameters: whether there are slopes by p; without, those are 0.
         clock: [s] the time at which step 0 begins; of a rollout whose duration does not vary.
-        description: what evaluates, in words.
     """
 
     rollout: Rollout
@@ -50,12 +52,12 @@ class LinearizedStep:
     exact: bool = False
     parameters: bool = True
     clock: float = 0.0
-    description: str = field(default="", init=False)
+    _note: str = field(default="", init=False)
 
-    def __post_init__(self) -> None:
-        """Build what evaluates."""
-        self.arguments = StepArguments(self.rollout, self.tangent, self.parameters)
-        self._step, self._off, self._apart = self._built()
+    @cached_property
+    def arguments(self) -> StepArguments:
+        """Of the step."""
+        return StepArguments(self.rollout, self.tangent, self.parameters)
 
     def step(self, k: int | NDArray[np.int64], X: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float) -> Array:
         """(B, nx), (B, m), (B, np) or (np,) -> (B, nx): states after step ``k``, or after steps k (B,)."""
@@ -101,11 +103,26 @@ class LinearizedStep:
         if after is None:
             after = self.step(k, states, U, P, smoothing)
         varying, given = self.rows(k, states, after, U, P, smoothing)
+        return self._cut(self._off.jacobians(varying, given, self._columns))
+
+    def slopes_from_end(self, X: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float) -> Iterator[Slopes]:
+        """The same of runs of steps, the last run first, each as soon as it is known; they are begun at once."""
+        k = np.arange(len(np.asarray(X)))
+        varying, given = self.rows(k, X, self.step(k, X, U, P, smoothing), U, P, smoothing)
+        return map(self._cut, self._off.jacobians_from_end(varying, given, self._columns))
+
+    @property
+    def _columns(self) -> int:
+        """By how many numbers a step is differentiated: d, u, and p as far as z sets it."""
+        return sum(self.arguments.varying[:3])
+
+    def _cut(self, jacobians: Array) -> Slopes:
+        """By states, inputs and parameters."""
         _, n, m, np_ = self.arguments.sizes
-        a, b, varied = np.split(self._off.jacobians(varying, given, n + m + len(self.arguments.varied)), [n, n + m], 2)
+        a, b, varied = np.split(jacobians, [n, n + m], 2)
         if not varied.shape[2]:
-            return a, b, np.broadcast_to(0.0, (len(states), n, np_))
-        c = np.zeros((len(states), n, np_))
+            return a, b, np.broadcast_to(0.0, (len(jacobians), n, np_))
+        c = np.zeros((len(jacobians), n, np_))
         c[:, :, self.arguments.varied] = varied
         return a, b, c
 
@@ -136,23 +153,52 @@ class LinearizedStep:
         if self.exact and smoothing:
             raise ValueError(f"this step is for smoothing 0 only, not for {smoothing:g}")
 
-    def _built(self) -> tuple[_ByKernel | _ByCasadi, _BySlopes | _ByCasadi, _ByKernel | None]:
-        """What gives states after the step, what gives slopes, and what gives differences of states."""
-        note = ""
-        if self.backend in PRECISIONS:
-            count = processors() if self.threads is None else self.threads
-            try:
-                step, off = (step_program(self.arguments, self.exact, tangent) for tangent in (False, True))
-                kernel, slopes = build_kernel(self.backend, step, [], count), compile_slopes(off, "off", threads=count)
-                report = slopes.report
-                self.description = f"{report.precision} precision, lanes {report.lanes}, threads {slopes.threads}"
-                apart = build_kernel(self.backend, difference_program(self.tangent), [], count)
-                return _ByKernel(kernel), _BySlopes(slopes), _ByKernel(apart)
-            except (KernelUnavailable, ProgramError) as error:
-                note = f"; {error}"
-        self.description = f"casadi's virtual machine{note}"
-        step_function, off_function = step_functions(self.arguments)
-        return _ByCasadi(step_function), _ByCasadi(off_function), None
+    @cached_property
+    def description(self) -> str:
+        """What evaluates slopes, in words."""
+        if isinstance(self._off, _ByCasadi):
+            return f"casadi's virtual machine{self._note}"
+        report = self._off.kernel.report
+        return f"{report.precision} precision, lanes {report.lanes}, threads {self._off.kernel.threads}"
+
+    @cached_property
+    def _count(self) -> int:
+        return processors() if self.threads is None else self.threads
+
+    @cached_property
+    def _step(self) -> _ByKernel | _ByCasadi:
+        """What gives states after the step."""
+        try:
+            return _ByKernel(self._kernel(step_program(self.arguments, self.exact, False)))
+        except (KernelUnavailable, ProgramError):
+            return _ByCasadi(step_functions(self.arguments)[0])
+
+    @cached_property
+    def _off(self) -> _BySlopes | _ByCasadi:
+        """What gives slopes."""
+        try:
+            self._refuse()
+            return _BySlopes(compile_slopes(step_program(self.arguments, self.exact, True), "off", threads=self._count))
+        except (KernelUnavailable, ProgramError) as error:
+            self._note = f"; {error}" if self.backend in PRECISIONS else ""
+            return _ByCasadi(step_functions(self.arguments)[1])
+
+    @cached_property
+    def _apart(self) -> _ByKernel | None:
+        """What gives differences of states."""
+        try:
+            return _ByKernel(self._kernel(difference_program(self.tangent)))
+        except (KernelUnavailable, ProgramError):
+            return None
+
+    def _kernel(self, program: Program) -> Kernel:
+        self._refuse()
+        return build_kernel(self.backend, program, [], self._count)
+
+    def _refuse(self) -> None:
+        """KernelUnavailable where the backend is no kernel."""
+        if self.backend not in PRECISIONS:
+            raise KernelUnavailable("the backend is no kernel")
 
 
 class _ByKernel:
@@ -194,6 +240,9 @@ class _BySlopes:
     def jacobians(self, varying: Array, given: Array, columns: int) -> Array:
         return self.kernel.jacobians(varying, given, columns)
 
+    def jacobians_from_end(self, varying: Array, given: Array, columns: int) -> Iterator[Array]:
+        return self.kernel.jacobians_from_end(varying, given, columns)
+
 
 class _ByCasadi:
     """One state after the other, on casadi's virtual machine: for machines without a compiler."""
@@ -215,3 +264,7 @@ class _ByCasadi:
         cut = (np.split(row, [columns]) for row in varying)
         rows = [np.array(ca.DM(self._jacobian[columns](*row, more))) for row, more in zip(cut, given, strict=True)]
         return np.array(rows).reshape(len(varying), -1, columns)
+
+    def jacobians_from_end(self, varying: Array, given: Array, columns: int) -> Iterator[Array]:
+        rows = zip(varying[::-1], given[::-1], strict=True)
+        return (self.jacobians(row[None], more[None], columns) for row, more in rows)

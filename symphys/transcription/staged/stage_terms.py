@@ -85,7 +85,7 @@ class StageSymbols:
         starts = int(sums.started.size1_out(0))
         self.x = ca.SX.sym("x", self.state_size + len(sums.sums))
         self.first = ca.SX.sym("first", self.state_size)
-        self.u = ca.SX.sym("u", int(rollout.given.shape[0]))
+        self.u = ca.SX.sym("u", rollout.controls)
         self.constants = ca.SX.sym("constants", self.parameter_size + len(self.named) + starts)
         self.tick = ca.SX.sym("tick")
         self.p = self.constants[: self.parameter_size]
@@ -97,6 +97,7 @@ class StageSymbols:
         self.interval = rollout.parameters.step_length(rollout.problem.simulation, self.p)
         driven = {law_on for law in rollout.problem.forces for law_on, _, _ in law.acts_on}
         self.driven = driven | {name for c in rollout.problem.controllers for name, _ in c.drives}
+        self.of_step = self.driven | rollout.parameters.phases.sets.keys()
 
     @property
     def arguments(self) -> tuple[Expr, ...]:
@@ -125,7 +126,8 @@ class StageSymbols:
 
     def _call(self, formula: Formula, after: bool, parts: list[Expr]) -> Expr:
         x, time = self.x[: self.state_size], self.tick * self.interval
-        u = self._inputs(after) if self.driven & formula.names else self.u
+        tick = self.tick - 1 if after else self.tick
+        u = self._inputs(after) if self.driven & formula.names else self.rollout.with_shares(self.u, tick)
         more = [ca.vertcat(*parts)] if parts else []
         return self.rollout.compiled(formula)(x, u, self.p, time, self.z, *more)
 
@@ -135,7 +137,8 @@ class StageSymbols:
             feedback = self.rollout.feedback
             assert feedback is not None, "nothing else drives inputs"
             x, tick = (self.first, self.tick - 1) if after else (self.x[: self.state_size], self.tick)
-            self._driven_inputs[after] = feedback(x, self.u, self.p, tick * self.interval)
+            u = self.rollout.with_shares(self.u, tick)
+            self._driven_inputs[after] = feedback(x, u, self.p, tick * self.interval)
         return self._driven_inputs[after]
 
     @cached_property
@@ -231,7 +234,7 @@ class _Terms:
         return StageTerm(name, kind, weight, np.array([min(tick, last - 1)]), tick == last, value, key)
 
     def _key(self, formula: Formula, kind: Kind, after: bool) -> tuple[object, ...]:
-        return formula.text, kind, after and not self.symbols.driven.isdisjoint(formula.names)
+        return formula.text, kind, after and not self.symbols.of_step.isdisjoint(formula.names)
 
 
 def _sums(symbols: StageSymbols) -> Iterator[StageTerm]:
@@ -240,5 +243,5 @@ def _sums(symbols: StageSymbols) -> Iterator[StageTerm]:
             if weights.any():
                 value = symbols.value(each.formula, after)[each.component]
                 steps = np.flatnonzero(weights)
-                key = number, after and not symbols.driven.isdisjoint(each.formula.names)
+                key = number, after and not symbols.of_step.isdisjoint(each.formula.names)
                 yield StageTerm("sum", "sum", float(weights[steps[0]]), steps, after, value, key, number)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -11,10 +12,11 @@ from numpy.typing import NDArray
 
 from symphys.codegen.backends import BEST
 from symphys.problem import Constraint
-from symphys.shooting import Expansion, Linearized, StagedMotion
+from symphys.shooting import AffinePolicy, Expansion, Followed, Linearized, StagedMotion
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.expansion_sums import ExpansionSums
 from symphys.transcription.staged.linearization import Linearization, statics_of
+from symphys.transcription.staged.policy_rollout import PolicyRollout, PolicySizes
 from symphys.transcription.staged.stage_functions import StepRows
 from symphys.transcription.staged.stage_terms import StageTerm
 from symphys.transcription.staged.term_groups import TermGroups
@@ -67,7 +69,7 @@ class RolloutStages:
         self._groups = TermGroups(rollout, self.tangent, backend, threads)
         self.terms = self._groups.terms
         self._sums = len(self._groups.symbols.sums.sums)
-        self._given = int(rollout.given.shape[0])
+        self._given = rollout.controls
         self.state_size, self.tangent_size = int(rollout.x0.shape[0]) + self._sums, self.tangent.size + self._sums
         self.weights, (which, places) = _input_weights(rollout, self._groups.symbols.named, self.statics)
         self._knots = int(rollout.p.shape[0]) + which, places
@@ -130,14 +132,40 @@ class RolloutStages:
         x[1:, motion.x.shape[1] :] = np.cumsum(self._groups.summed(rows)[:, motion.x.shape[1] :], axis=0)
         return StagedMotion(motion.z, x, u, smoothing)
 
+    def follow(self, policy: AffinePolicy, about: Array, Z: Array, lengths: Array, smoothing: float) -> Followed | None:
+        """The motions of step lengths (B,); None with sums, and without a compiler."""
+        if self._sums:
+            return None
+        sizes = PolicySizes(policy.old.shape[1], policy.new.shape[1], self.input_size, len(self.statics))
+        if self._rolled is None or self._rolled.sizes != sizes:
+            self._rolled = PolicyRollout(self._linearization.step, sizes, threads=self._linearization.step.threads)
+        if self._rolled.kernel is None:
+            return None
+        x, p, _ = self._begun(Z)
+        off = Z[:, self.statics] - about[self.statics]
+        motions = self._rolled(x, p, policy, lengths, smoothing, statics=off)
+        return motions.x, motions.u, motions.new
+
+    _rolled: PolicyRollout | None = None
+
     def linearize(self, motion: StagedMotion) -> Linearized:
         """Slopes of all steps."""
-        found = self._linearization.linearize(self._plain(motion))
-        more = self.input_size - self._given
-        if more:
-            b = np.concatenate([found.b, np.zeros((*found.b.shape[:2], more))], axis=2)
-            found = Linearized(found.a, b, found.c, found.start)
+        found = self._with_knots(self._linearization.linearize(self._plain(motion)))
         return self._with_sums(found, motion) if self._sums else found
+
+    def linearize_from_end(self, motion: StagedMotion) -> Iterator[Linearized]:
+        """The same in runs of steps, the last run first; with sums all steps are one run."""
+        if self._sums:
+            return iter([self.linearize(motion)])
+        return map(self._with_knots, self._linearization.linearize_from_end(self._plain(motion)))
+
+    def _with_knots(self, found: Linearized) -> Linearized:
+        """With a column for each named knot, on which no step depends."""
+        more = self.input_size - self._given
+        if not more:
+            return found
+        b = np.concatenate([found.b, np.zeros((*found.b.shape[:2], more))], axis=2)
+        return Linearized(found.a, b, found.c, found.start)
 
     def _with_sums(self, found: Linearized, motion: StagedMotion) -> Linearized:
         """The same with the sums, which look at the states before and after each step."""
@@ -303,10 +331,10 @@ def _input_weights(rollout: Rollout, named: Indices, statics: Indices) -> tuple[
 
     The inputs of a step are those of the rollout, then the named knots that begin to act there.
     """
-    u, steps = ca.vec(rollout.given), rollout.steps
+    m, steps = rollout.controls, rollout.steps
+    u = ca.vec(rollout.given[:m, :])
     slope = ca.DM(ca.Function("u", [rollout.z], [ca.jacobian(u, rollout.z)])(0))
     rows, columns = (np.array(each, np.int64) for each in slope.sparsity().get_triplet())
-    m = int(rollout.given.shape[0])
     begins = np.full(int(slope.shape[1]), steps - 1)
     np.minimum.at(begins, columns, rows // max(m, 1))
     which = np.flatnonzero(~np.isin(named, statics))

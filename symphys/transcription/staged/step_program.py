@@ -41,9 +41,9 @@ class StepArguments:
 
     @cached_property
     def sizes(self) -> tuple[int, int, int, int]:
-        """Of x, d, u and p."""
+        """Of x, d, u without shares of phases, and p."""
         rollout = self.rollout
-        return rollout.memory.size, self.tangent.size, int(rollout.given.shape[0]), int(rollout.p.shape[0])
+        return rollout.memory.size, self.tangent.size, rollout.controls, int(rollout.p.shape[0])
 
     @cached_property
     def varied(self) -> Indices:
@@ -92,7 +92,7 @@ class TangentStepPlaces:
     def __init__(self, arguments: StepArguments) -> None:
         """Places for what varies, what is given and the smoothing, and for what comes of these."""
         self.rollout, self.layout = arguments.rollout, MemoryLayout()
-        nx, _, m, np_ = arguments.sizes
+        nx, np_, m = arguments.sizes[0], arguments.sizes[3], int(arguments.rollout.given.shape[0])
         self.varying = self.layout.take(sum(arguments.varying))
         self.given_row = self.layout.take(sum(arguments.given) + 1)
         self.x, self.given = self.layout.series(nx, 2), self.layout.take(m)
@@ -134,7 +134,8 @@ def _begun(arguments: StepArguments, tangent: bool) -> ca.Function:
     moved = ca.mtimes(arguments.tangent.basis(x, p), d) + e + arguments.shift(x, p, varied)
     start = x + moved if tangent else x
     taken = arguments.replaced(p, varied)
-    results = (start, u, taken, arguments.time(tick, taken), smoothing)
+    put = arguments.rollout.with_shares(u, tick)
+    results = (start, put, taken, arguments.time(tick, taken), smoothing)
     return ca.Function("begun", [varying, given], [ca.densify(each) for each in results])
 
 
@@ -163,6 +164,7 @@ def step_functions(arguments: StepArguments) -> tuple[ca.Function, ca.Function]:
     x, aim, tick, p, smoothing = parts(given, [*arguments.given, 1])
     closed, tangent = arguments.rollout.closed, arguments.tangent
     time = arguments.time(tick, arguments.replaced(p, varied))
+    u = arguments.rollout.with_shares(u, tick)
     put = u if arguments.rollout.feedback is None else ca.vertcat(u, time)
     starts = x, x + ca.mtimes(tangent.basis(x, p), d) + e + arguments.shift(x, p, varied)
     first, moved = (call(closed, start, put, arguments.replaced(p, varied), smoothing)[0] for start in starts)

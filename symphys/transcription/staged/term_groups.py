@@ -16,6 +16,8 @@ from symphys.transcription.staged.tangent import Tangent
 from symphys.transcription.staged.term_slopes import TermSlopes, raw_slopes, term_slopes
 
 Array = NDArray[np.float64]
+MOTIONS = 8
+"""Whose values are asked for at once, as a line search does with its step lengths."""
 
 
 class _Group(NamedTuple):
@@ -101,7 +103,7 @@ class TermGroups:
         for term in self.terms:
             made = known.setdefault(term.key, reading([term.value], self.symbols.arguments, term.after))
             functions.append(ReadingFunction(made.function, made.reads, term.after))
-        return self._grouped(functions)
+        return self._grouped(functions, MOTIONS)
 
     @cached_property
     def _slopes(self) -> list[TermSlopes]:
@@ -110,12 +112,13 @@ class TermGroups:
 
     @cached_property
     def _slope_functions(self) -> list[StageFunctions]:
-        return self._grouped([each.function for each in self._slopes])
+        return self._grouped([each.function for each in self._slopes], 1)
 
-    def _grouped(self, functions: Sequence[ReadingFunction]) -> list[StageFunctions]:
+    def _grouped(self, functions: Sequence[ReadingFunction], motions: int) -> list[StageFunctions]:
+        """Those of each group together, for so many motions at once."""
         made = []
         for group in self._groups:
-            steps = len(self.terms[group.numbers[0]].steps)
+            steps = motions * len(self.terms[group.numbers[0]].steps)
             made.append(StageFunctions([functions[i] for i in group.numbers], steps, self._backend, self._threads))
         return made
 

@@ -85,10 +85,10 @@ def test_a_start_beside_the_tangent_counts(tmp_path: Path) -> None:
 
 
 def test_without_a_compiler_casadi_evaluates(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*arguments: object) -> None:
+    def refuse(*arguments: object, **more: object) -> None:
         raise KernelUnavailable("there is no compiler")
 
-    monkeypatch.setattr(linearized_step, "build_kernel", refuse)
+    monkeypatch.setattr(linearized_step, "compile_slopes", refuse)
     made = Linearization(symbolic_rollout(problem_of("ball_throw", tmp_path)))
     assert "there is no compiler" in made.step.description
 

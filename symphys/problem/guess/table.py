@@ -10,34 +10,20 @@ import casadi as ca
 import numpy as np
 
 from symphys.expression import FormulaError, parse
-from symphys.model.joints import kinematic_trees
+from symphys.model.orientation import ANGLES, unit_quaternion
 from symphys.model.world import World
+from symphys.problem.guess.motion import GuessedMotion, is_orientation
+from symphys.problem.guess.names import guessable
 from symphys.problem.model import Simulation
 from symphys.problem.reading.faults import Faults, Place
-from symphys.problem.references import GuessedMotion, ReferenceTrajectory, reference_values
+from symphys.problem.references import ReferenceTrajectory, reference_values
 from symphys.problem.schema.objectives import GuessTable
 from symphys.suggest import hint, quote
 
 AT = "at"
 MOST_SAMPLES = 200
 """Of a formula, over the duration."""
-
-
-def guessable(world: World) -> dict[str, int]:
-    """What a guess may name, and how many numbers each has.
-
-    Of kinematic trees the coordinates of joints and their rates; position and velocity of bodies that no joint of a
-    tree holds.
-    """
-    trees = kinematic_trees(world.joints)
-    held = {link.body for tree in trees for link in tree.links if link.joint is not None}
-    found = {f"{b.name}.{f}": 3 for i, b in enumerate(world.bodies) if i not in held for f in ("position", "velocity")}
-    for link in (link for tree in trees for link in tree.links if link.joint is not None):
-        joint = world.joints[link.joint or 0]
-        if joint.kind.coordinates:
-            value = "angle" if joint.kind.coordinates[0].turns else "position"
-            found |= {f"{joint.name}.{field}": len(joint.kind.coordinates) for field in (value, "rate")}
-    return found
+TURNED = f"a unit quaternion w x y z, or turns about fixed axes such as {{ yaw_deg = 90 }}; valid: {', '.join(ANGLES)}"
 
 
 def read_guess(
@@ -65,7 +51,7 @@ def read_guess(
         if name in points:
             faults.add(place, f"{name} is named in states too; leave one of the two out")
         elif _check_name(name, sizes, place, faults):
-            values = _followed(text, sizes[name], simulation, references, place, faults)
+            values = _followed(name, text, sizes[name], simulation, references, place, faults)
             columns |= {} if values is None else {name: values}
     faults.stop_if_any()
     return GuessedMotion(columns)
@@ -88,20 +74,33 @@ def _read_state(
     for name, value in _flat(state):
         if name == AT or not _check_name(name, sizes, (*place, name), faults):
             continue
-        numbers = value if isinstance(value, list) else [value]
-        right = all(isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x) for x in numbers)
-        if not right or len(numbers) != sizes[name]:
-            faults.add((*place, name), f"must be {'a number' if sizes[name] == 1 else f'{sizes[name]} numbers'}")
-        elif float(at) in points.setdefault(name, {}):
+        try:
+            numbers = _numbers(name, value, sizes[name])
+        except ValueError as fault:
+            faults.add((*place, name), str(fault))
+            continue
+        if float(at) in points.setdefault(name, {}):
             faults.add((*place, name), f"another state names it at {at:g} s; leave one of the two out")
         else:
-            points[name][float(at)] = [float(x) for x in numbers]
+            points[name][float(at)] = numbers
+
+
+def _numbers(name: str, value: Any, size: int) -> list[float]:
+    """What a state has for a quantity; ValueError where that cannot be."""
+    turns = isinstance(value, Mapping)
+    numbers = list(value.values()) if turns else value if isinstance(value, list) else [value]
+    right = all(isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x) for x in numbers)
+    if not right or (not turns and len(numbers) != size):
+        raise ValueError(
+            f"must be {TURNED if is_orientation(name) else 'a number' if size == 1 else f'{size} numbers'}"
+        )
+    return unit_quaternion(value).tolist() if is_orientation(name) else [float(x) for x in numbers]
 
 
 def _flat(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
-    """Keys and values; those of tables within are dotted, as TOML reads ``knee.angle = 1``."""
+    """Keys and values; those of tables within are dotted, as TOML reads ``knee.angle = 1``, but for orientations."""
     for key, value in table.items():
-        if isinstance(value, Mapping):
+        if isinstance(value, Mapping) and not is_orientation(before + key):
             yield from _flat(value, f"{before}{key}.")
         else:
             yield before + key, value
@@ -110,12 +109,16 @@ def _flat(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any
 def _check_name(name: str, sizes: Mapping[str, int], place: Place, faults: Faults) -> bool:
     """Whether a guess may name it; a fault if not."""
     if name not in sizes:
-        what = "coordinates and rates of joints, and position and velocity of bodies that no joint holds"
+        what = (
+            "coordinates and rates of joints, orientation and angular_velocity of ball joints and of bodies that no "
+            "joint holds, and the position and velocity of such bodies"
+        )
         faults.add(place, f"a guess cannot name {quote(name)}, only {what}; {hint(name, sizes)}")
     return name in sizes
 
 
 def _followed(
+    name: str,
     text: str,
     size: int,
     simulation: Simulation,
@@ -137,4 +140,10 @@ def _followed(
     if values.shape[1] != size or not np.isfinite(values).all():
         faults.add(place, f"must be {size} finite number{'s' * (size > 1)} at all times from 0 to the duration")
         return None
-    return times, values
+    if not is_orientation(name):
+        return times, values
+    lengths = np.linalg.norm(values, axis=1, keepdims=True)
+    if not lengths.all():
+        faults.add(place, f"must be {TURNED} at all times")
+        return None
+    return times, values / lengths

@@ -81,6 +81,13 @@ class StateReader:
             raise SymphysError("the measured state has numbers that are not finite")
         return whole
 
+    def values(self, x: Array) -> dict[str, Array]:
+        """What a state (nx,) is by the names of ``sizes``."""
+        world = x[: self._layout.size]
+        now = [np.array(part).ravel() for part in self._reading(world, self._nominal)[:2]]
+        found = {name: now[which][columns] for name, (which, columns, _) in self._joints.items()}
+        return found | {name: world[self._layout[name]] for name in self.sizes if name not in found}
+
     def noisy(self, x: Array, noise: float, rate_noise: float, rng: np.random.Generator) -> Array:
         """The state (nx,) with noise on coordinates and positions, and on rates and velocities."""
         off = np.zeros(self._tangent.size)

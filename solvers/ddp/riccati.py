@@ -1,0 +1,130 @@
+"""The Riccati recursion: from the last step to the first, the best decisions as functions of the state, within bounds.
+
+A step leads from a state r to the state after it by r' = through @ (r, v), where v are its decisions, and costs
+slope . (r, v) + (r, v) . curve . (r, v) / 2. What a state is, and how many numbers it and the decisions have, may
+differ from step to step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lapack
+
+from symphys.solvers.ddp.box_qp import solve_box_qp
+
+Array = NDArray[np.float64]
+
+
+class LinearStep(NamedTuple):
+    """One step about a motion.
+
+    Attributes:
+        through: (r', r + w) the state after it by (state, decisions).
+        slope: (r + w,) of its costs.
+        curve: (r + w, r + w) of its costs, symmetric.
+        lower, upper: (w,) of the decisions.
+        damping: (w,) added to the diagonal of the Hessian by decisions.
+    """
+
+    through: Array
+    slope: Array
+    curve: Array
+    lower: Array
+    upper: Array
+    damping: Array
+
+
+class CostToGo(NamedTuple):
+    """Of a state: ``slope`` (r,) and ``curve`` (r, r)."""
+
+    slope: Array
+    curve: Array
+
+
+class Feedback(NamedTuple):
+    """The decisions of a step: ``ahead`` (w,), and ``back`` (w, r) by the state; 0 where a bound holds a decision."""
+
+    ahead: Array
+    back: Array
+
+
+class RiccatiSolution(NamedTuple):
+    """What a recursion comes to.
+
+    Attributes:
+        feedback: of the steps, from the last to the first; None for those without decisions.
+        first, second: the fall of the costs that is expected of a step of length a: a first + a^2 second.
+        cost: to go, of the first state.
+    """
+
+    feedback: list[Feedback | None]
+    first: float
+    second: float
+    cost: CostToGo
+
+
+def riccati_recursion(steps: Iterable[LinearStep], last: CostToGo) -> RiccatiSolution | None:
+    """The best decisions of all steps, the last one first; None where a Hessian is not positive definite.
+
+    Args:
+        steps: from the last to the first.
+        last: the cost of the last state.
+
+    Source: Tassa, Mansard, Todorov, Control-Limited Differential Dynamic Programming, ICRA 2014, section III. The
+    damping, of Levenberg and Marquardt, acts on decisions alone: cost to go is what they cost without it.
+    """
+    slope, curve = last
+    found: list[Feedback | None] = []
+    first = second = 0.0
+    for through, own_slope, own_curve, lower, upper, damping in steps:
+        total = own_slope + slope @ through
+        whole = own_curve + through.T @ (curve @ through)
+        if not len(damping):
+            slope, curve = total, whole
+            found.append(None)
+            continue
+        rest = len(total) - len(damping)
+        by_decisions, hessian, cross = total[rest:], whole[rest:, rest:], whole[rest:, :rest]
+        made = _decided(hessian, damping, by_decisions, cross, lower, upper)
+        if made is None:
+            return None
+        ahead, back = made
+        along = hessian @ ahead
+        first, second = first + float(by_decisions @ ahead), second + float(ahead @ along) / 2
+        slope = total[:rest] + (along + by_decisions) @ back + ahead @ cross
+        # back' hessian back = -back' cross - back' damping back, since back solves the damped system
+        curve = whole[:rest, :rest] + (cross - damping[:, None] * back).T @ back
+        curve = 0.5 * (curve + curve.T)
+        found.append(made)
+    return RiccatiSolution(found, first, second, CostToGo(slope, curve))
+
+
+def _decided(hessian: Array, damping: Array, slope: Array, cross: Array, lower: Array, upper: Array) -> Feedback | None:
+    """The best decisions within bounds, and how those that no bound holds answer the state."""
+    if len(slope) == 1:
+        curvature = hessian[0, 0] + damping[0]
+        if not curvature > 0:
+            return None
+        wanted = -slope[0] / curvature
+        if lower[0] <= wanted <= upper[0]:
+            return Feedback(np.array([wanted]), cross / -curvature)
+        return Feedback(np.array([min(max(wanted, lower[0]), upper[0])]), np.zeros_like(cross))
+    damped = hessian + np.diag(damping)
+    factor, fault = lapack.dpotrf(damped, lower=1, clean=0)
+    if fault:
+        return None
+    both = lapack.dpotrs(factor, np.column_stack([slope, cross]), lower=1)[0]
+    ahead = -both[:, 0]
+    if (ahead >= lower).all() and (ahead <= upper).all():
+        return Feedback(ahead, -both[:, 1:])
+    found = solve_box_qp(damped, slope, lower, upper, np.zeros_like(slope))
+    if found is None:
+        return None
+    back = np.zeros_like(cross)
+    if found.factor is not None:
+        back[found.free] = -lapack.dpotrs(found.factor, cross[found.free], lower=1)[0]
+    return Feedback(found.step, back)

@@ -1,0 +1,277 @@
+"""Rollouts under a policy, compiled: all steps of several step lengths in one call, lanes hold step lengths.
+
+The new knots of step k are v = clip(v_k + a ahead_k + b back_k d). There d is how far the state is from x_k in its
+tangent, how far knots are that were decided before and still act, and how far static entries are; a is the step length,
+and b the share of the feedback. This is the forward pass of differential dynamic programming (Tassa, Mansard and
+Todorov, Control-Limited Differential Dynamic Programming, ICRA 2014, section III) without Python between the steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any, NamedTuple, Protocol
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from symphys.codegen import (
+    FunctionCall,
+    KernelUnavailable,
+    MemoryLayout,
+    Place,
+    ProcessorKernel,
+    Program,
+    ProgramError,
+    compile_program,
+)
+from symphys.codegen.backends import PRECISIONS
+from symphys.shooting import AffinePolicy
+from symphys.transcription.feedback.controller_calls import control_calls
+from symphys.transcription.program import step_calls
+from symphys.transcription.rollout import Rollout
+from symphys.transcription.staged.linearized_step import LinearizedStep
+
+Array = NDArray[np.float64]
+
+
+class RunningCosts(Protocol):
+    """What a motion costs at the start and the end of each step, and at its end: (x, new knots, p, time) -> (1,)."""
+
+    before: ca.Function
+    after: ca.Function
+    end: ca.Function
+
+
+class PolicySizes(NamedTuple):
+    """How many knots are at most ``old`` and ``new`` in a step, how many ``inputs`` it has, how many static entries."""
+
+    old: int
+    new: int
+    inputs: int
+    statics: int = 0
+
+
+class PolicyMotions(NamedTuple):
+    """Motions side by side: ``x`` (B, N + 1, nx), ``u`` (B, N, m), new knots (B, N, w), and their ``cost`` (B,)."""
+
+    x: Array
+    u: Array
+    new: Array
+    cost: Array
+
+
+@dataclass(frozen=True, eq=False)
+class PolicyRollout:
+    """Motions under policies of one size.
+
+    Attributes:
+        step: which is taken.
+        sizes: of the policies.
+        costs: of the motion; without, it costs 0.
+        threads: that share step lengths.
+    """
+
+    step: LinearizedStep
+    sizes: PolicySizes
+    costs: RunningCosts | None = None
+    threads: int | None = 1
+
+    @cached_property
+    def kernel(self) -> ProcessorKernel | None:
+        """What evaluates; None without a compiler."""
+        if self.step.backend not in PRECISIONS:
+            return None
+        try:
+            return compile_program(policy_program(self.step, self.sizes, self.costs), threads=self.threads)
+        except (KernelUnavailable, ProgramError):
+            return None
+
+    def __call__(
+        self,
+        start: ArrayLike,
+        p: ArrayLike,
+        policy: AffinePolicy,
+        lengths: Array,
+        smoothing: float,
+        clock: float = 0.0,
+        statics: ArrayLike = 0.0,
+        shares: ArrayLike = 1.0,
+    ) -> PolicyMotions:
+        """The motions of step lengths (B,); one that is not finite stays so.
+
+        Args:
+            start: (nx,) or (B, nx) first states.
+            p: (np,) or (B, np) parameters.
+            policy: that they follow.
+            lengths: (B,).
+            smoothing: of the steps.
+            clock: [s] the time at the start.
+            statics: (B, s) how far static entries are from where the policy was made.
+            shares: (B,) of the feedback.
+        """
+        count, steps, nx = len(lengths), len(policy.new), policy.x.shape[1]
+        sizes = 1, 1, self.sizes.statics, self.step.arguments.sizes[3], nx
+        row, parts, first = np.empty((count, sum(sizes))), list[Array](), 0
+        for size, each in zip(sizes, (lengths[:, None], np.reshape(shares, (-1, 1)), statics, p, start), strict=True):
+            parts.append(row[:, first : first + size])
+            parts[-1][:] = each
+            first += size
+        if self.kernel is None:
+            return self._step_by_step(parts, policy, smoothing, clock)
+        shared = [policy.old[0], *(getattr(policy, name).ravel() for name in SERIES), self.step.tangent.nominal]
+        found = self.kernel.forward(row, np.concatenate([*shared, (clock, smoothing)]))
+        x, u, new = (
+            found[name].reshape(count, more, -1) if name in found else np.zeros((count, more, 0))
+            for name, more in (("x", steps + 1), ("u", steps), ("new", steps))
+        )
+        return PolicyMotions(x, u, new, found["cost"][:, 0])
+
+    def _step_by_step(self, parts: list[Array], policy: AffinePolicy, smoothing: float, clock: float) -> PolicyMotions:
+        lengths, shares, statics, p, start = parts
+        count, steps, given = len(lengths), len(policy.new), self.step.arguments.sizes[2]
+        x, u = np.empty((count, steps + 1, start.shape[1])), np.empty((count, steps, self.sizes.inputs))
+        new, held = np.empty((count, steps, self.sizes.new)), np.tile(policy.old[0], (count, 1))
+        x[:, 0], cost = start, np.zeros(count)
+        self.step.clock, dt = clock, self.step.rollout.dt
+        for k in range(steps):
+            off = self.step.tangent.difference(np.repeat(policy.x[None, k], count, axis=0), x[:, k])
+            answer = np.concatenate([off, held - policy.old[k], statics], axis=1) @ policy.back[k].T
+            wanted = policy.new[k] + lengths * policy.ahead[k] + shares * answer
+            new[:, k] = np.clip(wanted, policy.lower[k], policy.upper[k])
+            acting = np.concatenate([held, new[:, k]], axis=1)
+            u[:, k], held = acting @ policy.weights[k].T, acting @ policy.keep[k].T
+            x[:, k + 1] = self.step.step(k, x[:, k], u[:, k, :given], p, smoothing)
+            for row in range(count) if self.costs else ():
+                assert self.costs is not None
+                cost[row] += float(self.costs.before(x[row, k], new[row, k], p[row], clock + k * dt))
+                cost[row] += float(self.costs.after(x[row, k + 1], new[row, k], p[row], clock + (k + 1) * dt))
+        if self.costs:
+            ends = [self.costs.end(x[row, -1], new[row, -1], p[row], clock + steps * dt) for row in range(count)]
+            cost += np.array([float(each) for each in ends])
+        return PolicyMotions(x, u, new, cost)
+
+
+SERIES = ("x", "old", "new", "ahead", "back", "weights", "keep", "lower", "upper")
+"""Of ``AffinePolicy``, in the order in which the program has them."""
+
+
+class PolicyPlaces:
+    """Where the program keeps a rollout; see ``controller_calls.Places``.
+
+    What differs from lane to lane is (step length, share of the feedback, change of static entries, p, first state).
+    What all share is the policy, step after step, then the nominal p, the clock and the smoothing; the body reads it
+    where it lies.
+    """
+
+    def __init__(self, step: LinearizedStep, sizes: PolicySizes) -> None:
+        """Places for policies of these sizes."""
+        self.rollout: Rollout = step.rollout
+        self.layout = layout = MemoryLayout()
+        nx, n, m, np_ = step.arguments.sizes
+        old, new, inputs, s = sizes
+        steps, acting = self.rollout.steps, old + new
+        self.row = layout.take(2 + s + np_ + nx)
+        begun = layout.size
+        self.first_held = layout.take(old)
+        counts = (nx, old, new, new, new * (n + old + s), inputs * acting, old * acting, new, new)
+        self.policy = {name: layout.series(size, steps) for name, size in zip(SERIES, counts, strict=True)}
+        self.nominal, self.clock, self.smoothing = layout.take(np_), layout.take(1), layout.take(1)
+        self.shared = Place(begun, layout.size - begun)
+        self.length, self.share, self.statics, self.p = (layout.take(size) for size in (1, 1, s, np_))
+        self.off, self.cost = layout.take(n), layout.take(1)
+        self.x, self.held, self.v = (
+            layout.series(nx, steps + 1),
+            layout.series(old, steps + 1),
+            layout.series(new, steps),
+        )
+        self.inputs = layout.series(inputs, steps)
+        self.given = Place(self.inputs.offset, m, self.inputs.stride)
+        self.u = self.given if self.rollout.feedback is None else layout.take(m)
+        self.time = layout.series(1, steps + 1)
+
+    def outputs(self) -> dict[str, Place]:
+        """All steps of each series, one after the other; those of no size are left out."""
+        steps = self.rollout.steps
+        series = {"x": (self.x, steps + 1), "u": (self.inputs, steps), "new": (self.v, steps)}
+        whole = {name: Place(place.offset, place.size * count) for name, (place, count) in series.items()}
+        return {name: place for name, place in (whole | {"cost": self.cost}).items() if place.size}
+
+
+def policy_program(step: LinearizedStep, sizes: PolicySizes, costs: RunningCosts | None) -> Program:
+    """The program of a rollout under a policy, with the outputs ``x``, ``u``, ``new`` and ``cost``."""
+    places = PolicyPlaces(step, sizes)
+    steps, tangent, policy = step.rollout.steps, step.tangent, places.policy
+    decided = (places.length, places.share, places.statics, places.off, places.held)
+    body = [
+        FunctionCall(tangent.distance, (policy["x"], places.x, places.nominal), (places.off,)),
+        FunctionCall(
+            decide(sizes, tangent.size),
+            (*decided, *(policy[name] for name in SERIES[1:])),
+            (places.v, places.inputs, places.held.later()),
+        ),
+        *control_calls(step.rollout, places),
+        *step_calls(places, step.exact),
+    ]
+    epilogue: tuple[FunctionCall, ...] = ()
+    if costs is not None:
+        here = (places.x, places.v, places.p, places.time)
+        there = (places.x.later(), places.v, places.p, places.time.later())
+        last = (places.x.later(steps), places.v.later(steps - 1), places.p, places.time.later(steps))
+        body.append(FunctionCall(costs.before, here, (places.cost,), accumulate=True))
+        body.append(FunctionCall(costs.after, there, (places.cost,), accumulate=True))
+        still = tuple(each.still() for each in last)
+        epilogue = (FunctionCall(costs.end, still, (places.cost,), accumulate=True),)
+    return Program(
+        size=places.layout.size,
+        z=places.row,
+        parameters=places.shared,
+        steps=steps,
+        outputs=places.outputs(),
+        prologue=_prologue(step, places),
+        body=tuple(body),
+        epilogue=epilogue,
+        zeroed=(places.cost,),
+    )
+
+
+def _prologue(step: LinearizedStep, places: PolicyPlaces) -> tuple[FunctionCall, ...]:
+    """What a lane starts from, and the times of all states."""
+    row, clock, steps = ca.SX.sym("row", places.row.size), ca.SX.sym("clock"), step.rollout.steps
+    held, p = ca.SX.sym("held", places.first_held.size), ca.SX.sym("p", places.p.size)
+    taken = (places.length, places.share, places.statics, places.p, places.x.still())
+    ends = np.cumsum([0, *(each.size for each in taken)]).tolist()
+    cut = [row[a:b] for a, b in pairwise(ends)]
+    first = ca.Function("first", [row, held], [*cut, held])
+    ticks: Any = clock / step.rollout.dt + ca.DM(np.arange(steps + 1))
+    times = ca.Function("times", [clock, p], [ca.densify(step.arguments.time(ticks, p))])
+    return (
+        FunctionCall(first, (places.row, places.first_held), (*taken, places.held.still())),
+        FunctionCall(times, (places.clock, places.p), (Place(places.time.offset, steps + 1),)),
+    )
+
+
+def decide(sizes: PolicySizes, n: int) -> ca.Function:
+    """(length, share, statics, off, held, then ``SERIES`` but x) -> new knots, inputs, and what is held after it.
+
+    Matrices are row by row.
+    """
+    old, new, inputs, s = sizes
+    acting, beside = old + new, n + old + s
+    length, share = ca.SX.sym("length"), ca.SX.sym("share")
+    statics, off, held = ca.SX.sym("statics", s), ca.SX.sym("off", n), ca.SX.sym("held", old)
+    about, v, ahead, lower, upper = (ca.SX.sym("a", size) for size in (old, new, new, new, new))
+    back, weights, keep = (ca.SX.sym("m", size) for size in (new * beside, inputs * acting, old * acting))
+    answer = _product(back, new, ca.vertcat(off, held - about, statics))
+    chosen = ca.fmin(ca.fmax(v + length * ahead + share * answer, lower), upper)
+    both = ca.vertcat(held, chosen)
+    results = [chosen, _product(weights, inputs, both), _product(keep, old, both)]
+    arguments = [length, share, statics, off, held, about, v, ahead, back, weights, keep, lower, upper]
+    return ca.Function("decide", arguments, [ca.densify(each) for each in results])
+
+
+def _product(matrix: Any, rows: int, column: Any) -> Any:
+    """A matrix that is given row by row, times a column."""
+    return ca.mtimes(ca.reshape(matrix, column.shape[0], rows).T, column) if rows else ca.SX(0, 1)
