@@ -35,7 +35,7 @@ def test_gravity_acts_on_the_ball_alone() -> None:
     assert np.abs(motion["shoulder.rate"]).max() > 1.0
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_stages_roll_the_ball_and_half_the_step_agrees() -> None:
     made = shipped("arm_ball")
     found = solve("ilqr", made)

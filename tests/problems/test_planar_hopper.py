@@ -37,7 +37,7 @@ def test_springs_hold_it_up_in_the_guess() -> None:
     np.testing.assert_allclose(carried, [0, 0, sum(MASSES.values()) * GRAVITY], atol=0.05)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_it_hops_half_a_metre() -> None:
     """From one of three seeds, as rounding has it: to its place, with a flight that is one of Galilei's parabolas."""
     made = shipped("planar_hopper")
