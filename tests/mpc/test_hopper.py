@@ -16,7 +16,7 @@ OFF = {"mpc.plant.masses": 1.1, "mpc.plant.latency": 0.004}
 @pytest.mark.slow
 def test_it_follows_its_way_without_a_fall() -> None:
     """In the first 0.4 s, in which the line goes 5 cm: within 5 cm of it, in its pose to 0.3 rad."""
-    problem = load_problem(find("planar_hopper"), {**OFF, "mpc.duration": 0.4})
+    problem = load_problem(find("planar_hopper_mpc"), {**OFF, "mpc.duration": 0.4})
     controller = Controller(problem, threads=1)
     plant = Plant(problem)
     loop = close_loop(controller, plant)
@@ -32,7 +32,7 @@ def test_it_follows_its_way_without_a_fall() -> None:
 @pytest.mark.thorough
 def test_it_hops_to_its_goal_and_stands_there() -> None:
     """Half a metre ahead in its pose for the last second, in flight on the way."""
-    problem = load_problem(find("planar_hopper"), OFF)
+    problem = load_problem(find("planar_hopper_mpc"), OFF)
     plant = Plant(problem)
     loop = close_loop(Controller(problem, threads=1), plant)
     record = record_of(loop)
