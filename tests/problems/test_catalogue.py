@@ -47,6 +47,7 @@ SHIPPED = [
     "parcel",
     "pendulum",
     "planar_hopper",
+    "planar_hopper_mpc",
     "push_and_fly",
     "putt",
     "quadruped_shift",
