@@ -57,6 +57,7 @@ SHIPPED = [
     "spinner",
     "stairs",
     "three_hops",
+    "transport",
     "two_balls",
     "walker2d_walk",
 ]
