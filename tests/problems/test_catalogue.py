@@ -48,6 +48,7 @@ SHIPPED = [
     "pendulum",
     "planar_hopper",
     "push_and_fly",
+    "push_box",
     "putt",
     "quadruped_shift",
     "quadruped_walk",
