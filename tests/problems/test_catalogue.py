@@ -27,6 +27,7 @@ SHIPPED = [
     "cart_double_pendulum",
     "cart_pole",
     "cart_pole_walls",
+    "catch",
     "cost_of_transport",
     "dribble",
     "eddy_brake",
