@@ -27,6 +27,7 @@ SHIPPED = [
     "cart_double_pendulum",
     "cart_pole",
     "cart_pole_walls",
+    "catch",
     "cost_of_transport",
     "dribble",
     "eddy_brake",
@@ -49,6 +50,7 @@ SHIPPED = [
     "planar_hopper",
     "planar_hopper_mpc",
     "push_and_fly",
+    "push_box",
     "putt",
     "quadruped_shift",
     "quadruped_walk",
@@ -58,6 +60,7 @@ SHIPPED = [
     "spinner",
     "stairs",
     "three_hops",
+    "transport",
     "two_balls",
     "walker2d_walk",
 ]
