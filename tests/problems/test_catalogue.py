@@ -45,6 +45,7 @@ SHIPPED = [
     "juggle",
     "knock",
     "mini_cheetah_ahead",
+    "mini_cheetah_mpc",
     "parcel",
     "pendulum",
     "planar_hopper",
