@@ -72,6 +72,12 @@ def weight_quantities(controllers: Iterable[FeedbackController]) -> dict[str, Qu
     return {name: Quantity("weight", value) for controller in controllers for name, value in controller.weights.items()}
 
 
+def recording_quantities(names: Iterable[str]) -> dict[str, Quantity]:
+    """Of each [[recording]] what is added to its times [s], and the factor of its lengths."""
+    found = {f"{name}.offset": Quantity("recording", np.zeros(1)) for name in names}
+    return found | {f"{name}.scale": Quantity("recording", np.ones(1), own_scale=True) for name in names}
+
+
 def read_slot(text: str, known: Mapping[str, Quantity]) -> VariableSlot:
     """The slot that ``ball.force[0:2]`` means; SlotError says why it means none."""
     match = SLOT.fullmatch(text)
@@ -126,6 +132,8 @@ def set_quantities(problem: ProblemData, variable: Variable) -> str:
 def physical(name: str, kind: Kind) -> tuple[float, float]:
     """Least and largest value of a quantity that is physical."""
     key = name.rpartition(".")[2]
+    if kind == "recording":
+        return (0.0, inf) if key == "scale" else (-inf, inf)
     return (0.0, inf) if kind == "parameter" and key in ACTING else LIMITS.get(key, (-inf, inf))
 
 
