@@ -74,8 +74,11 @@ def weight_quantities(controllers: Iterable[FeedbackController]) -> dict[str, Qu
 
 def recording_quantities(names: Iterable[str]) -> dict[str, Quantity]:
     """Of each [[recording]] what is added to its times [s], and the factor of its lengths."""
-    found = {f"{name}.offset": Quantity("recording", np.zeros(1)) for name in names}
-    return found | {f"{name}.scale": Quantity("recording", np.ones(1), own_scale=True) for name in names}
+    found = dict[str, Quantity]()
+    for name in names:
+        found[f"{name}.offset"] = Quantity("recording", np.zeros(1))
+        found[f"{name}.scale"] = Quantity("recording", np.ones(1), own_scale=True)
+    return found
 
 
 def read_slot(text: str, known: Mapping[str, Quantity]) -> VariableSlot:
@@ -117,6 +120,8 @@ def unknown(name: str, known: Collection[str]) -> str:
 def set_quantities(problem: ProblemData, variable: Variable) -> str:
     """What a variable sets, as a file writes it; all that a list names gets the same values, which may not be meant."""
     values = {**problem.initial, **problem.parameters, **problem.weights}
+    tables = {recording.table for recording in problem.recordings}
+    values |= {name: each.nominal for name, each in recording_quantities(sorted(tables)).items()}
     sizes = {DURATION: 1, **{name: value.size for name, value in values.items()}, **input_sizes(problem.world())}
 
     def text(slot: VariableSlot) -> str:
