@@ -72,6 +72,15 @@ def weight_quantities(controllers: Iterable[FeedbackController]) -> dict[str, Qu
     return {name: Quantity("weight", value) for controller in controllers for name, value in controller.weights.items()}
 
 
+def recording_quantities(names: Iterable[str]) -> dict[str, Quantity]:
+    """Of each [[recording]] what is added to its times [s], and the factor of its lengths."""
+    found = dict[str, Quantity]()
+    for name in names:
+        found[f"{name}.offset"] = Quantity("recording", np.zeros(1))
+        found[f"{name}.scale"] = Quantity("recording", np.ones(1), own_scale=True)
+    return found
+
+
 def read_slot(text: str, known: Mapping[str, Quantity]) -> VariableSlot:
     """The slot that ``ball.force[0:2]`` means; SlotError says why it means none."""
     match = SLOT.fullmatch(text)
@@ -111,6 +120,8 @@ def unknown(name: str, known: Collection[str]) -> str:
 def set_quantities(problem: ProblemData, variable: Variable) -> str:
     """What a variable sets, as a file writes it; all that a list names gets the same values, which may not be meant."""
     values = {**problem.initial, **problem.parameters, **problem.weights}
+    tables = {recording.table for recording in problem.recordings}
+    values |= {name: each.nominal for name, each in recording_quantities(sorted(tables)).items()}
     sizes = {DURATION: 1, **{name: value.size for name, value in values.items()}, **input_sizes(problem.world())}
 
     def text(slot: VariableSlot) -> str:
@@ -126,6 +137,8 @@ def set_quantities(problem: ProblemData, variable: Variable) -> str:
 def physical(name: str, kind: Kind) -> tuple[float, float]:
     """Least and largest value of a quantity that is physical."""
     key = name.rpartition(".")[2]
+    if kind == "recording":
+        return (0.0, inf) if key == "scale" else (-inf, inf)
     return (0.0, inf) if kind == "parameter" and key in ACTING else LIMITS.get(key, (-inf, inf))
 
 

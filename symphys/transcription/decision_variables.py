@@ -44,6 +44,8 @@ def start_of(problem: Problem, world: World, inputs: Sequence[str], parameters: 
     u = ca.vertcat(ca.MX.zeros(inputs_size(world, inputs) - scheduled.shape[0], steps), scheduled)
     for variable, (first, last) in zip(problem.variables, spans(problem.variables), strict=True):
         part = z[first:last]
+        if variable.kind == "recording":  # of how a motion was measured, not of how it goes
+            continue
         if variable.kind == "control":
             u = u + _spread_inputs(problem, variable, input_columns(world, inputs), part)
             continue

@@ -18,6 +18,7 @@ import numpy as np
 from symphys.problem.model import Array, Simulation
 from symphys.problem.problem import Problem
 from symphys.problem.reader import ProblemReader
+from symphys.problem.recordings.kept import without_places
 
 KEPT = (
     "name",
@@ -148,7 +149,8 @@ class LazyProblem(Problem):
     def identity(self) -> str:
         """As that of the problem, which need not be read for it."""
         digest: str = vars(self)["_digest"]
-        return f"{self.text}\n{digest}" if digest else self.text
+        text = without_places(self.text)
+        return f"{text}\n{digest}" if digest else text
 
 
 def arrived(state: dict[str, Any]) -> LazyProblem:

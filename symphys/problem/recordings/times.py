@@ -1,0 +1,81 @@
+"""The times of a recording: from a column or a rate, on the clock of the simulation."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.problem.recordings.columns import Columns
+from symphys.problem.recordings.faults import RecordingFault
+from symphys.problem.schema.recording import RecordingTable
+
+Array = NDArray[np.float64]
+TIME = "time"
+LEAST = 2
+"""Samples of a recording."""
+SLACK = 1e-9
+"""Relative, of the end of the simulation."""
+
+
+def time_column(table: RecordingTable) -> str | None:
+    """The name of the column of times; None where a rate says them."""
+    return table.time if table.rate is not None else table.time or TIME
+
+
+def read_times(columns: Columns, first: int, last: int, table: RecordingTable, duration: float) -> tuple[Array, int]:
+    """(n,) [s] the times of the rows from ``first`` to before ``last``, and how many rows at the end are left out.
+
+    Raises:
+        RecordingFault: names the row of a time that is missing, does not come after the one before, or lies outside
+            the simulation.
+    """
+    where = columns.where(first)
+    if last - first < LEAST:
+        raise RecordingFault("files" if table.table is None else "table", f"{where}: a recording has {LEAST} rows or more; this has one")
+    name = time_column(table)
+    if name is None:
+        time = np.arange(last - first) / (table.rate or 1.0)
+    else:
+        time = columns.numbers(name, "time" if table.table is None else ("table", name))[first:last] * table.time_factor
+        check_order(time, columns, first, name)
+    time = time - (time[0] if from_first_row(table) else 0.0) + table.offset
+    if time[0] < -SLACK * duration:
+        text = f"{where}: the time {time[0]:g} s is before the start of the simulation"
+        raise RecordingFault("offset", f'{text}; add offset = {-time[0]:g}, or clock = "first row"')
+    time = np.maximum(time, 0.0)
+    kept = len(time) if table.until is None else int(np.searchsorted(time, table.until * (1 + SLACK), "right"))
+    if kept < LEAST:
+        raise RecordingFault("until", f"{where}: only {kept} samples of this recording are before {table.until:g} s")
+    end = time[kept - 1]
+    if end > duration * (1 + SLACK):
+        late = columns.where(first + int(np.searchsorted(time, duration * (1 + SLACK), "right")))
+        clock = ', take clock = "first row"' if time[0] > duration else ""
+        text = f"{late}: samples go on to {end:.6g} s, and the simulation ends at {duration:g} s"
+        raise RecordingFault("until", f"{text}; make [simulation] duration at least {end:.6g}{clock}, or leave later ones out with until = {duration:g}")
+    return np.minimum(time[:kept], duration), len(time) - kept
+
+
+def from_first_row(table: RecordingTable) -> bool:
+    """Whether the first row of each recording is at 0 s, before the offset."""
+    if table.clock is not None:
+        return table.clock == "first row"
+    return bool(table.start) or table.rows is not None or table.split is not None
+
+
+def check_order(time: Array, columns: Columns, first: int, name: str) -> None:
+    """Times are numbers, each after the one before."""
+    missing = np.flatnonzero(np.isnan(time))
+    if missing.size:
+        raise RecordingFault("time", f"{columns.where(first + int(missing[0]), name)}: the time is missing")
+    wrong = np.flatnonzero(np.diff(time) <= 0)
+    if wrong.size:
+        row = int(wrong[0]) + 1
+        same = time[row] == time[row - 1]
+        text = f"the time {time[row]:.9g} s " + ("occurs twice" if same else f"comes after {time[row - 1]:.9g} s")
+        advice = "delete the row" if same else "sort the rows, or split them into recordings (split, rows)"
+        raise RecordingFault("time", f"{columns.where(first + row, name)}: {text}; {advice}")
+
+
+def steps_apart(time: Array, dt: float) -> float:
+    """How many time steps lie between samples, in the median."""
+    return float(np.median(np.diff(time))) / dt
