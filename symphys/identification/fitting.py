@@ -1,0 +1,91 @@
+"""The fit of all recordings, with noise that is not given estimated beside it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from symphys.identification.interface import Ints, RecordedResiduals
+from symphys.identification.levenberg_marquardt import (
+    FitOptions,
+    FitOutcome,
+    FitState,
+    FitStatus,
+    FitStep,
+    RecordingFit,
+)
+from symphys.identification.noise import RescaledResiduals, noise_factors
+from symphys.identification.robust_loss import RobustLoss
+from symphys.identification.uncertainty import Uncertainty, uncertainty
+
+ROUNDS = 20
+"""Turns of fit and noise at most."""
+STANDS = 1e-3
+"""The noise stands where its deviations change by less than this share."""
+COARSE = 1e-2
+"""Standard errors that a fit may leave while the noise still changes."""
+
+Monitor = Callable[[FitStep, FitState], None]
+
+
+@dataclass(frozen=True, eq=False)
+class FittedRecordings:
+    """A fit with the noise that goes with it.
+
+    Attributes:
+        problem: residuals divided by the noise, as given or estimated.
+        outcome: where the fit ended.
+        uncertainty: there; None where the fit ended without finite residuals.
+    """
+
+    problem: RecordedResiduals
+    outcome: FitOutcome
+    uncertainty: Uncertainty | None
+
+
+def fit(
+    problem: RecordedResiduals,
+    options: FitOptions,
+    which: Ints | None = None,
+    start: FitState | None = None,
+    monitor: Monitor | None = None,
+    stop: Callable[[], bool] | None = None,
+) -> FittedRecordings:
+    """Fit the recordings in ``which``, those not held back by default, and estimate noise that is not given.
+
+    ``start`` goes on from an interrupted fit.
+    """
+    which = np.flatnonzero(~problem.held_back) if which is None else which
+    known = bool(problem.noise_known.all())
+    if known:
+        outcome = RecordingFit(problem, options, which).run(start, monitor, stop)
+        return FittedRecordings(problem, outcome, described(problem, outcome, which, options.loss, known))
+    coarse = replace(options, tolerance=max(COARSE, options.tolerance))
+    factors = np.array(start.noise) if start and start.noise else np.ones(len(problem.quantities))
+    for _ in range(ROUNDS):
+        scaled = RescaledResiduals(problem, factors)
+        outcome = RecordingFit(scaled, coarse, which).run(start, monitor, stop)
+        found = described(scaled, outcome, which, options.loss, known)
+        if found is None or outcome.status is FitStatus.INTERRUPTED:
+            return FittedRecordings(scaled, outcome, found)
+        start = replace(outcome.state, noise=tuple(map(float, factors)))
+        change = noise_factors(scaled, start.shared, start.own, which, options.loss, found.information)
+        if np.all(np.abs(change - 1) < STANDS):
+            break
+        factors = factors * change
+        start = replace(start, damping=math.nan, growth=2.0, quiet=0, noise=tuple(map(float, factors)))
+    scaled = RescaledResiduals(problem, factors)
+    outcome = RecordingFit(scaled, options, which).run(start, monitor, stop)
+    return FittedRecordings(scaled, outcome, described(scaled, outcome, which, options.loss, known))
+
+
+def described(
+    problem: RecordedResiduals, outcome: FitOutcome, which: Ints, loss: RobustLoss, known: bool
+) -> Uncertainty | None:
+    """The uncertainty where a fit ended; None where residuals are not finite there."""
+    if not outcome.system.finite:
+        return None
+    return uncertainty(problem, outcome.state.shared, outcome.state.own, which, loss, known)
