@@ -64,6 +64,11 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "what a run folder holds",
     ),
     "identification": ("errors results", "cma numpy scipy", "estimates from recordings, no physics"),
+    "prediction": (
+        "expression identification model problem transcription",
+        "numpy",
+        "what problems predict for their recordings",
+    ),
     "runs": (
         "codegen errors files findings json_values problem results shooting solvers trajectory transcription "
         "verification version",
