@@ -23,7 +23,7 @@ SCALED = ("position", "velocity")
 
 
 @dataclass(frozen=True)
-class Sampled:
+class PredictedSamples:
     """A recording as it is predicted.
 
     Attributes:
@@ -67,14 +67,14 @@ class Predictor:
         guess = np.concatenate([variable.guess for variable in whole.variables])
         self.starts = np.array([self._start(each, guess) for each in self.recordings])
 
-    def values(self, shared: Array, own: Array, which: Sequence[int]) -> Iterator[Sampled]:
+    def values(self, shared: Array, own: Array, which: Sequence[int]) -> Iterator[PredictedSamples]:
         """The recordings at shared (s,) and own (K, o) numbers."""
         set_ = [self._set(shared, own[k], k) for k in which]
         lasts = [each.last(self._motion.steps) for each in set_]
         for each, samples in zip(set_, self._motion.values(np.array([e.z for e in set_]), lasts), strict=True):
-            yield Sampled(interpolated(samples, each.at)[0], None, each.scale, each.by_scale)
+            yield PredictedSamples(interpolated(samples, each.at)[0], None, each.scale, each.by_scale)
 
-    def slopes(self, shared: Array, own: Array, which: Sequence[int]) -> Iterator[Sampled]:
+    def slopes(self, shared: Array, own: Array, which: Sequence[int]) -> Iterator[PredictedSamples]:
         """The same with derivatives."""
         set_ = [self._set(shared, own[k], k) for k in which]
         lasts = [each.last(self._motion.steps) for each in set_]
@@ -82,7 +82,7 @@ class Predictor:
         for each, (samples, slopes) in zip(set_, self._motion.slopes(z, along, lasts), strict=True):
             values, rates = interpolated(samples, each.at)
             by = interpolated(slopes, each.at)[0] + rates[:, :, None] * (each.by_offset / self.dt)
-            yield Sampled(values, by, each.scale, each.by_scale)
+            yield PredictedSamples(values, by, each.scale, each.by_scale)
 
     def _set(self, shared: Array, own: Array, k: int) -> _Set:
         """What the simulation of a recording gets."""

@@ -12,7 +12,7 @@ from symphys.expression.units import unit_of
 from symphys.identification import FitParameters, IdentificationError, ResidualRows
 from symphys.model.world import World
 from symphys.prediction.parameters import fit_numbers
-from symphys.prediction.predictor import Predictor, Sampled
+from symphys.prediction.predictor import Predictor, PredictedSamples
 from symphys.prediction.rotations import rotation_slopes, rotation_vectors
 from symphys.problem import Measured, Problem, Recording
 from symphys.problem.units import quantity_unit
@@ -89,7 +89,7 @@ class RecordingResiduals:
             found.append((self._residuals(int(k), sampled), by[:, : len(shared)], by[:, len(shared) :]))
         return found
 
-    def _residuals(self, k: int, sampled: Sampled) -> Array:
+    def _residuals(self, k: int, sampled: PredictedSamples) -> Array:
         taken, parts = self.predictor.recordings[k], []
         for each, kept, place, columns in self._parts(k):
             off = difference(each, sampled.values[:, columns] / self._scale(place, sampled)) / self.noise[place]
@@ -97,7 +97,7 @@ class RecordingResiduals:
         joined = np.sqrt(taken.weight) * np.concatenate(parts)
         return joined if np.isfinite(joined).all() else np.full(joined.shape, np.inf)
 
-    def _slopes(self, k: int, sampled: Sampled) -> Array:
+    def _slopes(self, k: int, sampled: PredictedSamples) -> Array:
         assert sampled.slopes is not None, "slopes were asked for"
         taken, parts = self.predictor.recordings[k], []
         for each, kept, place, columns in self._parts(k):
@@ -120,7 +120,7 @@ class RecordingResiduals:
         for each, kept in zip(taken.measured, self._present[k], strict=True):
             yield each, kept, self._places[_key(taken, each)], columns[each.value.text]
 
-    def _scale(self, place: int, sampled: Sampled) -> float:
+    def _scale(self, place: int, sampled: PredictedSamples) -> float:
         return sampled.scale if self._units[place] in LENGTHS else 1.0
 
 
