@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from symphys.model.state_layout import input_sizes
 from symphys.problem.feedback import FeedbackController
 from symphys.problem.model import DURATION, Kind, ProblemData, Variable, VariableSlot
-from symphys.problem.parametric.parts import VARIABLE
+from symphys.problem.parametric.parts import COMBINE, STRUCTURAL, VARIABLE
+from symphys.problem.parametric.world import CONTACT
 from symphys.suggest import hint, quote
 
 Array = NDArray[np.float64]
@@ -27,12 +28,12 @@ LIMITS: dict[str, tuple[float, float]] = {
     "duration": (0.0, inf),
     **VARIABLE,
 }
-"""What is physical; masses and sizes must exceed their limit."""
-ACTING = ("gain", "torque", "velocity", "range", "stiffness", "damping")
-"""Parameters of motors and springs, which must not be negative."""
-OPEN = ("mass", "radius", "size", "length", "duration")
+"""What is physical; masses, sizes and frequencies must exceed their limit."""
+ACTING = ("gain", "torque", "velocity", "range", "stiffness", "damping", "armature")
+"""Parameters of joints, motors and springs, which must not be negative."""
+OPEN = ("mass", "radius", "size", "length", "duration", "frequency")
 LEAST_SHARE = 1e-3
-"""Masses and sizes are not varied below this share of their value in the file, unless ``lower`` says so."""
+"""Masses, sizes and frequencies stay above this share of their value in the file, unless ``lower`` says otherwise."""
 
 
 class SlotError(ValueError):
@@ -101,10 +102,12 @@ def unknown(name: str, known: Collection[str]) -> str:
     """The nearest quantities; for a coefficient that no table states, how to state it."""
     owner, _, key = name.rpartition(".")
     owners = dict.fromkeys(other.rpartition(".")[0] for other in known)
-    if key in VARIABLE and owner in owners:
-        return f"{owner} states no {key}: give it a value there first, so that this variable has something to change"
+    if key in VARIABLE and owner in owners and (key in COMBINE or owner == CONTACT or "-" in owner):
+        what = "a value above 0" if key in STRUCTURAL else "a value"
+        return f"{owner} states no {key}: give it {what} there first, so that this variable has something to change"
     same_owner = [other for other in known if owner and other.startswith(f"{owner}.")]
-    stated = f"; what states no {key} has none to vary" if key in VARIABLE else ""
+    tables = "" if key in COMBINE else ": [contact] and [[pair]] may state it"
+    stated = f"; what states no {key} has none to vary{tables}" if key in VARIABLE else ""
     return hint(name, same_owner or known) + stated
 
 
@@ -126,15 +129,21 @@ def set_quantities(problem: ProblemData, variable: Variable) -> str:
 def physical(name: str, kind: Kind) -> tuple[float, float]:
     """Least and largest value of a quantity that is physical."""
     key = name.rpartition(".")[2]
+    if kind == "weight":
+        return -inf, inf
     return (0.0, inf) if kind == "parameter" and key in ACTING else LIMITS.get(key, (-inf, inf))
+
+
+def extremes(name: str, quantity: Quantity) -> tuple[float, float, bool]:
+    """Least and largest physical value of a quantity, and whether it must exceed the least."""
+    name, kind = (name, quantity.kind) if quantity.like is None else (quantity.like, "parameter")
+    return *physical(name, kind), kind != "weight" and name.rpartition(".")[2] in OPEN
 
 
 def limits(slot: VariableSlot, known: Mapping[str, Quantity]) -> tuple[Array, Array]:
     """(components,) twice: the bounds that hold where the file states none."""
-    key = slot.name.rpartition(".")[2]
-    like, kind = known[slot.name].like, known[slot.name].kind
-    ends = physical(slot.name, kind) if like is None else physical(like, "parameter")
-    low, high = (np.full(len(slot.components), limit) for limit in ends)
-    if key in OPEN:
+    least, most, above = extremes(slot.name, known[slot.name])
+    low, high = (np.full(len(slot.components), limit) for limit in (least, most))
+    if above:
         low = LEAST_SHARE * known[slot.name].nominal[list(slot.components)]
     return low, high

@@ -22,15 +22,15 @@ COMBINE: dict[str, Callable[[list[Scalar]], Scalar]] = {
     name: about["combine"] for name, about in LAW.items() if "combine" in about
 }
 """Those that surfaces state."""
-VARIABLE: dict[str, tuple[float, float]] = {
-    name: about["physical"] for name, about in LAW.items() if "physical" in about
-}
-"""Those that are parameters where stated, with the least and the largest value that is physical."""
+VARIABLE: dict[str, tuple[float, float]] = {name: about["physical"] for name, about in LAW.items()}
+"""All of them are parameters where stated: the least and the largest value that is physical."""
+STRUCTURAL = tuple(name for name, about in LAW.items() if "structural" in about)
+"""Those whose 0 leaves equations out of the step, so that they are parameters only where they are not 0."""
 
 
 def stated(states: Mapping[str, float]) -> dict[str, Numbers]:
     """Those of the coefficients that may be varied."""
-    return {key: number for key, number in states.items() if key in VARIABLE}
+    return {key: number for key, number in states.items() if number or key not in STRUCTURAL}
 
 
 @dataclass(frozen=True)
