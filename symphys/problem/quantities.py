@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
-from math import inf
+from math import inf, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,14 +26,20 @@ LIMITS: dict[str, tuple[float, float]] = {
     "size": (0.0, inf),
     "length": (0.0, inf),
     "duration": (0.0, inf),
+    "second_moments": (0.0, inf),
+    "correlations": (-1.0, 1.0),
+    "tilt": (-pi / 2, pi / 2),
     **VARIABLE,
 }
 """What is physical; masses, sizes and frequencies must exceed their limit."""
 ACTING = ("gain", "torque", "velocity", "range", "stiffness", "damping", "armature")
 """Parameters of joints, motors and springs, which must not be negative."""
 OPEN = ("mass", "radius", "size", "length", "duration", "frequency")
+SMALL = ("second_moments",)
+SCALES = {"centre_of_mass": 0.01, "correlations": 0.1, "tilt": 0.01}
+"""How much what is usually 0 typically changes: [m], [-] and [rad]."""
 LEAST_SHARE = 1e-3
-"""Masses, sizes and frequencies stay above this share of their value in the file, unless ``lower`` says otherwise."""
+"""Masses, moments, sizes and frequencies stay above this share of their value in the file, unless ``lower`` is less."""
 
 
 class SlotError(ValueError):
@@ -144,6 +150,6 @@ def limits(slot: VariableSlot, known: Mapping[str, Quantity]) -> tuple[Array, Ar
     """(components,) twice: the bounds that hold where the file states none."""
     least, most, above = extremes(slot.name, known[slot.name])
     low, high = (np.full(len(slot.components), limit) for limit in (least, most))
-    if above:
+    if above or slot.name.rpartition(".")[2] in SMALL:
         low = LEAST_SHARE * known[slot.name].nominal[list(slot.components)]
     return low, high

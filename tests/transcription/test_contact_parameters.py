@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from parameter_slopes import slopes
 
 from symphys.errors import ProblemError
 from symphys.problem import load_problem
-from symphys.transcription import transcribe
 
 BALL = """
 [simulation]
@@ -38,17 +38,6 @@ def ball(
     text = BALL.replace("VALUE", value).replace("VELOCITY", velocity).replace("SPIN", spin)
     file.write_text(f'{text}{tables}\n[[variable]]\nname = "a"\nsets = "{sets}"\n')
     return file
-
-
-def slopes(file: Path) -> tuple[float, float, float]:
-    """The cost at the guess, its exact derivative, and that by central differences."""
-    made = transcribe(load_problem(file), backend="casadi")
-    z = made.shooting.blocks[0].guess
-    evaluator, step = made.shooting.evaluator, 1e-6 * abs(z)
-    gradient = evaluator.gradient(z[None], 0.0).gradient
-    assert gradient is not None
-    low, value, high = (float(evaluator.value((z + sign * step)[None], 0.0).merit[0]) for sign in (-1, 0, 1))
-    return value, float(gradient[0, 0]), (high - low) / (2 * float(step[0]))
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,8 @@ A [[pair]] of two surfaces goes before one of a surface and a group, and that on
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.model.body import Body
+from symphys.model.joints import Joint
 from symphys.model.joints.coupling import CouplingSpec, placed_couplings
 from symphys.model.shapes import Scalar, Static
 from symphys.model.site import Site
@@ -31,6 +32,7 @@ from symphys.problem.parametric.parts import (
     ParametricStatic,
     Part,
     Value,
+    less,
     stated,
 )
 
@@ -91,7 +93,7 @@ class ParametricWorld:
         bodies = tuple(body.valued(overrides, value) for body in self.bodies)
         statics = tuple(static.valued(value) for static in self.statics)
         places = {body.name: index for index, body in enumerate(bodies)}
-        joints = tuple(joint.valued(places, value) for joint in self.joints)
+        joints = tuple(self._joint(joint, places, value) for joint in self.joints)
         return World(
             bodies,
             statics,
@@ -100,10 +102,22 @@ class ParametricWorld:
             joints,
             placed_couplings(self.couplings, joints),
             tuple(
-                Site(site.name, None if site.body is None else places[site.body], site.position, site.orientation)
+                Site(site.name, places.get(site.body), self._shifted(site.position, site.body, value), site.orientation)
                 for site in self.sites
             ),
         )
+
+    def _joint(self, joint: ParametricJoint, places: Mapping[str, int], value: Value) -> Joint:
+        """A joint with its parameters' values, and its frames from the centres of mass."""
+        made = joint.valued(places, value)
+        ends = zip(made.frames, (joint.first, joint.second), strict=True)
+        first, second = (replace(frame, point=self._shifted(frame.point, body, value)) for frame, body in ends)
+        return replace(made, frames=(first, second))
+
+    def _shifted(self, point: Sequence[Scalar], body: str | None, value: Value) -> tuple[Scalar, ...]:
+        """(3,) from a body's centre of mass, where the file has it from the origin of the body's frame."""
+        part = None if body is None else self._named[body]
+        return less(point, part.centre(value)) if isinstance(part, ParametricBody) else tuple(point)
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from symphys.problem.checks.magnitude import check_mass
 from symphys.problem.model import Kind, Simulation, Variable, VariableSlot
-from symphys.problem.quantities import Quantity, SlotError, extremes, limits, read_slot
+from symphys.problem.quantities import SCALES, Quantity, SlotError, extremes, limits, read_slot
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.objectives import VariableTable
 from symphys.problem.schema.types import NestedList
@@ -106,7 +106,9 @@ class VariableReader:
 
     def usual_scale(self, slots: Sequence[VariableSlot], kind: Kind) -> Array | float:
         """Parameters vary by their own size, numbers of controllers by WEIGHTS, everything else by 1."""
-        value = self.nominal(slots)
+        value, key = self.nominal(slots), slots[0].name.rpartition(".")[2]
+        if kind == "parameter" and key in SCALES:
+            return SCALES[key]
         if not all(self.known[slot.name].own_scale for slot in slots):
             return WEIGHTS if kind == "weight" else 1.0
         if value is None:
