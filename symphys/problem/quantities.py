@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from symphys.model.state_layout import input_sizes
 from symphys.problem.feedback import FeedbackController
 from symphys.problem.model import DURATION, Kind, ProblemData, Variable, VariableSlot
+from symphys.problem.parametric.joints import OWN
 from symphys.problem.parametric.parts import COMBINE, STRUCTURAL, VARIABLE
 from symphys.problem.parametric.world import CONTACT
 from symphys.suggest import hint, quote
@@ -108,8 +109,10 @@ def unknown(name: str, known: Collection[str]) -> str:
     """The nearest quantities; for a coefficient that no table states, how to state it."""
     owner, _, key = name.rpartition(".")
     owners = dict.fromkeys(other.rpartition(".")[0] for other in known)
-    if key in VARIABLE and owner in owners and (key in COMBINE or owner == CONTACT or "-" in owner):
-        what = "a value above 0" if key in STRUCTURAL else "a value"
+    of_contact = key in VARIABLE and (key in COMBINE or owner == CONTACT or "-" in owner)
+    if owner in owners and (of_contact or key in OWN):
+        joint = f"{owner}.anchor" in known
+        what = "a value above 0" if key in STRUCTURAL or joint else "a value"
         return f"{owner} states no {key}: give it {what} there first, so that this variable has something to change"
     same_owner = [other for other in known if owner and other.startswith(f"{owner}.")]
     tables = "" if key in COMBINE else ": [contact] and [[pair]] may state it"

@@ -101,10 +101,7 @@ class ParametricWorld:
             value("gravity"),
             joints,
             placed_couplings(self.couplings, joints),
-            tuple(
-                Site(site.name, places.get(site.body), self._shifted(site.position, site.body, value), site.orientation)
-                for site in self.sites
-            ),
+            tuple(self._site(site, places, value) for site in self.sites),
         )
 
     def _joint(self, joint: ParametricJoint, places: Mapping[str, int], value: Value) -> Joint:
@@ -113,6 +110,11 @@ class ParametricWorld:
         ends = zip(made.frames, (joint.first, joint.second), strict=True)
         first, second = (replace(frame, point=self._shifted(frame.point, body, value)) for frame, body in ends)
         return replace(made, frames=(first, second))
+
+    def _site(self, site: ParametricSite, places: Mapping[str, int], value: Value) -> Site:
+        """A site on its body, from the centre of mass."""
+        place = None if site.body is None else places[site.body]
+        return Site(site.name, place, self._shifted(site.position, site.body, value), site.orientation)
 
     def _shifted(self, point: Sequence[Scalar], body: str | None, value: Value) -> tuple[Scalar, ...]:
         """(3,) from a body's centre of mass, where the file has it from the origin of the body's frame."""
