@@ -21,11 +21,13 @@ from symphys.suggest import hint, quote
 Array = NDArray[np.float64]
 
 SLOT = re.compile(r"\s*([^\[\]\s]+)\s*(?:\[\s*(-?\d{1,9})?\s*(:)?\s*(-?\d{1,9})?\s*\])?\s*")
+EDGE = "edge"
 LIMITS: dict[str, tuple[float, float]] = {
     "mass": (0.0, inf),
     "radius": (0.0, inf),
     "size": (0.0, inf),
     "length": (0.0, inf),
+    EDGE: (0.0, inf),
     "duration": (0.0, inf),
     "second_moments": (0.0, inf),
     "correlations": (-1.0, 1.0),
@@ -39,6 +41,8 @@ OPEN = ("mass", "radius", "size", "length", "duration", "frequency")
 SMALL = ("second_moments",)
 SCALES = {"centre_of_mass": 0.01, "correlations": 0.1, "tilt": 0.01}
 """How much what is usually 0 typically changes: [m], [-] and [rad]."""
+MOST_ROUND = 0.99
+"""Of half of a box's smallest edge: the largest radius of its edges, unless ``upper`` says otherwise."""
 LEAST_SHARE = 1e-3
 """Masses, moments, sizes and frequencies stay above this share of their value in the file, unless ``lower`` is less."""
 
@@ -110,9 +114,9 @@ def unknown(name: str, known: Collection[str]) -> str:
     owner, _, key = name.rpartition(".")
     owners = dict.fromkeys(other.rpartition(".")[0] for other in known)
     of_contact = key in VARIABLE and (key in COMBINE or owner == CONTACT or "-" in owner)
-    if owner in owners and (of_contact or key in OWN):
-        joint = f"{owner}.anchor" in known
-        what = "a value above 0" if key in STRUCTURAL or joint else "a value"
+    if owner in owners and (of_contact or key in OWN or (f"{owner}.size" in known and key == EDGE)):
+        above = key in STRUCTURAL or key == EDGE or f"{owner}.anchor" in known
+        what = "a value above 0" if above else "a value"
         return f"{owner} states no {key}: give it {what} there first, so that this variable has something to change"
     same_owner = [other for other in known if owner and other.startswith(f"{owner}.")]
     tables = "" if key in COMBINE else ": [contact] and [[pair]] may state it"
@@ -155,4 +159,7 @@ def limits(slot: VariableSlot, known: Mapping[str, Quantity]) -> tuple[Array, Ar
     low, high = (np.full(len(slot.components), limit) for limit in (least, most))
     if above or slot.name.rpartition(".")[2] in SMALL:
         low = LEAST_SHARE * known[slot.name].nominal[list(slot.components)]
+    owner, _, key = slot.name.rpartition(".")
+    if key == EDGE and known[slot.name].kind == "parameter":
+        high = np.full(1, MOST_ROUND * known[f"{owner}.size"].nominal.min() / 2)
     return low, high
