@@ -12,7 +12,7 @@ from symphys.expression.units import unit_of
 from symphys.identification import FitParameters, IdentificationError, ResidualRows
 from symphys.model.world import World
 from symphys.prediction.parameters import fit_numbers
-from symphys.prediction.predictor import Predictor, PredictedSamples
+from symphys.prediction.predictor import PredictedSamples, Predictor
 from symphys.prediction.rotations import rotation_slopes, rotation_vectors
 from symphys.problem import Measured, Problem, Recording
 from symphys.problem.units import quantity_unit

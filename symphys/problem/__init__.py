@@ -21,7 +21,7 @@ from symphys.problem.model import (
     Variable,
     VariableSlot,
 )
-from symphys.problem.parametric.reposition import reposition
+from symphys.problem.parametric.reposition import placing, reposition
 from symphys.problem.problem import Problem, load_problem, problem_of_tables
 from symphys.problem.quantities import set_quantities
 from symphys.problem.reading.solver_options import require_solvers, validate_options
@@ -62,6 +62,7 @@ __all__ = [
     "is_robot",
     "json_schema",
     "load_problem",
+    "placing",
     "problem_of_tables",
     "reference_page",
     "reposition",

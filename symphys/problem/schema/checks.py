@@ -14,7 +14,7 @@ from symphys.expression import CONSTANTS, FUNCTIONS, OVER_TIME
 from symphys.problem.reading.value_texts import shown
 from symphys.suggest import quote
 
-RESERVED = frozenset({*FUNCTIONS, *CONSTANTS, *keyword.kwlist, *OVER_TIME, "time", "gravity", "ground"})
+RESERVED = frozenset({*FUNCTIONS, *CONSTANTS, *keyword.kwlist, *OVER_TIME, "time", "gravity", "ground", "contact"})
 IDENTIFIER = "[A-Za-z][A-Za-z0-9_]*"
 MAX_IDENTIFIER = 64
 MAX_LABEL = 100

@@ -69,10 +69,11 @@ def solid(
     """The shape of this kind that a table has; notes one that is too flat."""
     cls, own = SHAPES[kind], getattr(table, kind)
     keys = [key.name for key in cls.size_keys]
-    shape = cls.from_sizes({key: getattr(own, key) for key in keys}, centre, orientation)
+    given = [*keys, *(key.name for key in cls.optional_keys)]
+    shape = cls.from_sizes({key: getattr(own, key) for key in given}, centre, orientation)
     reason = shape.flatness
     if reason:
-        faults.add((*place, kind, *(keys if len(keys) == 1 else [])), reason)
+        faults.add((*place, kind, *(keys if len(given) == 1 else [])), reason)
     return shape
 
 

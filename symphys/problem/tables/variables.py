@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from symphys.problem.checks.magnitude import check_mass
 from symphys.problem.model import Kind, Simulation, Variable, VariableSlot
-from symphys.problem.quantities import OPEN, Quantity, SlotError, limits, physical, read_slot
+from symphys.problem.quantities import SCALES, Quantity, SlotError, extremes, limits, read_slot
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.objectives import VariableTable
 from symphys.problem.schema.types import NestedList
@@ -112,7 +112,9 @@ class VariableReader:
 
     def usual_scale(self, slots: Sequence[VariableSlot], kind: Kind) -> Array | float:
         """Parameters vary by their own size, numbers of controllers by WEIGHTS, clocks by CLOCK, everything else by 1."""
-        value = self.nominal(slots)
+        value, key = self.nominal(slots), slots[0].name.rpartition(".")[2]
+        if kind == "parameter" and key in SCALES:
+            return SCALES[key]
         if not all(self.known[slot.name].own_scale for slot in slots):
             return {"weight": WEIGHTS, "recording": CLOCK}.get(kind, 1.0)
         if value is None:
@@ -165,9 +167,9 @@ class VariableReader:
         """Bounds must not allow a negative mass, and the like; a quaternion must not be zero."""
         for slot in variable.slots:
             name = slot.name.rpartition(".")[2]
-            low, high = physical(slot.name, variable.kind)
-            if np.any(variable.lower < low) or (name in OPEN and np.any(variable.lower <= low)):
-                self.add("lower", f"{slot.name} must {'be greater than' if name in OPEN else 'be at least'} {low:g}")
+            low, high, above = extremes(slot.name, self.known[slot.name])
+            if np.any(variable.lower < low) or (above and np.any(variable.lower <= low)):
+                self.add("lower", f"{slot.name} must {'be greater than' if above else 'be at least'} {low:g}")
             if np.any(variable.upper > high):
                 self.add("upper", f"{slot.name} must be at most {high:g}")
             if name == "mass":
