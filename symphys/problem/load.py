@@ -69,7 +69,18 @@ from symphys.problem.tables.variables import read_variables
 from symphys.problem.units import formula_units
 
 MEMBERS = ("body", "plane", "block", "terrain")
-SHARED_NAMES = (*MEMBERS, "joint", "coupling", "site", "sensor", "controller", "force", "reference", "variable", "recording")
+SHARED_NAMES = (
+    *MEMBERS,
+    "joint",
+    "coupling",
+    "site",
+    "sensor",
+    "controller",
+    "force",
+    "reference",
+    "variable",
+    "recording",
+)
 OWN_NAMES = ("phase", "cost", "target", "constraint", "output", "scenario")
 
 
@@ -136,7 +147,8 @@ def build(
     sensors, controllers = read_control(document, parametric, known, functions, starts, given, faults)
     sets = read_sets(document.phase, parametric, faults)
     known |= weight_quantities(controllers) | force_quantities(document.force) | phase_quantities(sets)
-    known |= recording_quantities(table.name for table in document.recording)
+    clocks = recording_quantities(table.name for table in document.recording)
+    known |= clocks
     variables = read_variables(document.variable, known, simulation, faults)
     check_variables(document, simulation, parametric, nominal, variables, faults)
     sampled = {name: quantity for name, quantity in known.items() if quantity.kind not in ("duration", "recording")}
@@ -145,6 +157,7 @@ def build(
     values = at_guess(parametric, known, variables)
     start = checked_start(starts, parametric, values, faults)
     named = {**formula_names(values, start, variables), **given}
+    named = {name: value for name, value in named.items() if name not in clocks}
     forces, termination, objectives = read_laws(document, simulation, sets, nominal, known, named, variables, faults)
     measured = read_identification(document, parametric, nominal, initial, simulation, named, variables, faults)
     check_read_at_start(objectives.phases, sensors, (document.ending[0], termination), faults)

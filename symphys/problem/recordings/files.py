@@ -93,7 +93,7 @@ class FileFinder:
     def _absent(self, name: str, folder: Path, kept: RecordedFile | None, changed: bool) -> str:
         """Why a file cannot be opened."""
         if changed:
-            return f"{name} has changed since this problem was kept (its SHA-256 was {kept.sha256[:12] if kept else ''}...)"
+            return f"{name} has changed since this problem was kept: its SHA-256 is another"
         if kept is not None:
             return f"{name} is no longer at {kept.path}"
         path = folder / name
@@ -128,7 +128,9 @@ def globbed(pattern: str, folder: Path) -> list[str]:
         there: list[str] = []
         with suppress(OSError, ValueError):
             there = sorted(each.name for each in parent.iterdir() if each.is_file())
-        has = f"{parent} has {', '.join(there[:5])}{', ...' if there[5:] else ''}" if there else f"{parent} has no files"
+        has = (
+            f"{parent} has {', '.join(there[:5])}{', ...' if there[5:] else ''}" if there else f"{parent} has no files"
+        )
         raise RecordingFault("files", f"no file matches {quote(pattern)}; {has}")
     return found
 

@@ -37,8 +37,19 @@ def read_npz(stream: BinaryIO, label: str, wanted: set[str], rows: str | None) -
             starts = None if rows is None or rows not in names else numbers(file[rows], rows, label)
     except RecordingFault:
         raise
-    except (OSError, ValueError, EOFError, KeyError, MemoryError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
-        reason = "its arrays do not fit into memory" if isinstance(error, MemoryError) else "it is no NPZ file of numbers"
+    except (
+        OSError,
+        ValueError,
+        EOFError,
+        KeyError,
+        MemoryError,
+        RuntimeError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ) as error:
+        reason = (
+            "its arrays do not fit into memory" if isinstance(error, MemoryError) else "it is no NPZ file of numbers"
+        )
         raise RecordingFault("files", f"{label} cannot be read: {reason}") from None
     counts = {name: len(values) for name, values in found.items()}
     if len(set(counts.values())) > 1:

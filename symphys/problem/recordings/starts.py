@@ -121,7 +121,9 @@ def follow(body: str, base: str, before: State, state: State) -> None:
     spin = state[f"{base}.angular_velocity"]
     own = before[f"{body}.angular_velocity"] - before[f"{base}.angular_velocity"]
     slide = before[f"{body}.velocity"] - before[f"{base}.velocity"]
-    slide = slide - np.cross(before[f"{base}.angular_velocity"], before[f"{body}.position"] - before[f"{base}.position"])
+    slide = slide - np.cross(
+        before[f"{base}.angular_velocity"], before[f"{body}.position"] - before[f"{base}.position"]
+    )
     state[f"{body}.angular_velocity"] = spin + axes @ own
     state[f"{body}.velocity"] = state[f"{base}.velocity"] + np.cross(spin, arm) + axes @ slide
 
@@ -153,7 +155,7 @@ def motion_of(name: str, state: State) -> tuple[Array, Array, Array]:
 
 def conjugate(q: Array) -> Array:
     """(4,): the quaternion that turns back."""
-    return q * np.array([1.0, -1.0, -1.0, -1.0])
+    return np.array([q[0], -q[1], -q[2], -q[3]])
 
 
 def quaternion_product(p: Array, q: Array) -> Array:

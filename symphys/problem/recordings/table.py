@@ -100,7 +100,12 @@ class RecordingReader:
     """Reads one table; a RecordingFault ends that."""
 
     def __init__(
-        self, table: RecordingTable, world: RecordedWorld, finder: FileFinder, folder: Path, frame: MeasurementFrame | None
+        self,
+        table: RecordingTable,
+        world: RecordedWorld,
+        finder: FileFinder,
+        folder: Path,
+        frame: MeasurementFrame | None,
     ) -> None:
         """``folder``: in which files are looked for; ``frame``: of the measurement system."""
         self.table, self.world, self.finder, self.folder, self.frame = table, world, finder, folder, frame
@@ -202,9 +207,7 @@ class RecordingReader:
         with self.finder.open(name, self.folder) as stream:
             return read_npz(stream, name, wanted, self.table.rows) if arrays else (read_csv(stream, name, wanted), None)
 
-    def _recording(
-        self, piece: Piece, measured: Sequence[MeasuredColumns], start: Sequence[StartColumns]
-    ) -> Recording:
+    def _recording(self, piece: Piece, measured: Sequence[MeasuredColumns], start: Sequence[StartColumns]) -> Recording:
         """One recording, in the units of the engine."""
         columns, first, last = piece.columns, piece.first, piece.last
         time, cut = read_times(columns, first, last, self.table, self.world.duration)

@@ -31,12 +31,14 @@ def read_times(columns: Columns, first: int, last: int, table: RecordingTable, d
     """
     where = columns.where(first)
     if last - first < LEAST:
-        raise RecordingFault("files" if table.table is None else "table", f"{where}: a recording has {LEAST} rows or more; this has one")
+        key = "files" if table.table is None else "table"
+        raise RecordingFault(key, f"{where}: a recording has {LEAST} rows or more; this has one")
     name = time_column(table)
     if name is None:
         time = np.arange(last - first) / (table.rate or 1.0)
     else:
-        time = columns.numbers(name, "time" if table.table is None else ("table", name))[first:last] * table.time_factor
+        with np.errstate(over="ignore"):
+            time = columns.numbers(name, "time")[first:last] * table.time_factor
         check_order(time, columns, first, name)
     time = time - (time[0] if from_first_row(table) else 0.0) + table.offset
     if time[0] < -SLACK * duration:
@@ -51,8 +53,13 @@ def read_times(columns: Columns, first: int, last: int, table: RecordingTable, d
         late = columns.where(first + int(np.searchsorted(time, duration * (1 + SLACK), "right")))
         clock = ', take clock = "first row"' if time[0] > duration else ""
         text = f"{late}: samples go on to {end:.6g} s, and the simulation ends at {duration:g} s"
-        raise RecordingFault("until", f"{text}; make [simulation] duration at least {end:.6g}{clock}, or leave later ones out with until = {duration:g}")
-    return np.minimum(time[:kept], duration), len(time) - kept
+        advice = f"make [simulation] duration at least {end:.6g}{clock}"
+        raise RecordingFault("until", f"{text}; {advice}, or leave later ones out with until = {duration:g}")
+    found = np.minimum(time[:kept], duration)
+    if np.any(np.diff(found) <= 0):
+        text = f"{where}: the differences of times are lost in their size"
+        raise RecordingFault("offset", f'{text}; take clock = "first row", or look at time_factor and rate')
+    return found, len(time) - kept
 
 
 def from_first_row(table: RecordingTable) -> bool:
@@ -64,9 +71,11 @@ def from_first_row(table: RecordingTable) -> bool:
 
 def check_order(time: Array, columns: Columns, first: int, name: str) -> None:
     """Times are numbers, each after the one before."""
-    missing = np.flatnonzero(np.isnan(time))
-    if missing.size:
-        raise RecordingFault("time", f"{columns.where(first + int(missing[0]), name)}: the time is missing")
+    unknown = np.flatnonzero(~np.isfinite(time))
+    if unknown.size:
+        row = int(unknown[0])
+        text = "missing" if np.isnan(time[row]) else "not finite, after time_factor"
+        raise RecordingFault("time", f"{columns.where(first + row, name)}: the time is {text}")
     wrong = np.flatnonzero(np.diff(time) <= 0)
     if wrong.size:
         row = int(wrong[0]) + 1

@@ -111,7 +111,7 @@ class VariableReader:
         return values[0] if same else None
 
     def usual_scale(self, slots: Sequence[VariableSlot], kind: Kind) -> Array | float:
-        """Parameters vary by their own size, numbers of controllers by WEIGHTS, clocks by CLOCK, everything else by 1."""
+        """Parameters vary by their own size, numbers of controllers by WEIGHTS, clocks by CLOCK, others by 1."""
         value = self.nominal(slots)
         if not all(self.known[slot.name].own_scale for slot in slots):
             return {"weight": WEIGHTS, "recording": CLOCK}.get(kind, 1.0)

@@ -29,7 +29,9 @@ def read(content: str | bytes, *wanted: str) -> Array:
 
 @settings(max_examples=60, deadline=None)
 @given(
-    values=st.integers(1, 4).flatmap(lambda m: st.lists(st.lists(CELLS, min_size=m, max_size=m), min_size=1, max_size=30)),
+    values=st.integers(1, 4).flatmap(
+        lambda m: st.lists(st.lists(CELLS, min_size=m, max_size=m), min_size=1, max_size=30)
+    ),
     missing=st.sampled_from(sorted(MISSING)),
     end=st.sampled_from(["\n", "\r\n"]),
     mark=st.sampled_from([",", ";", "\t"]),
@@ -96,7 +98,10 @@ def test_a_fault_far_down_is_found_there(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 @settings(max_examples=200, deadline=None)
-@given(st.binary(max_size=200) | st.text("0123456789.,;-+eEnaif \n\r\t\"'x_", max_size=200).map(lambda t: f"a,b\n{t}".encode()))
+@given(
+    st.binary(max_size=200)
+    | st.text("0123456789.,;-+eEnaif \n\r\t\"'x_", max_size=200).map(lambda t: f"a,b\n{t}".encode())
+)
 def test_any_content_is_numbers_or_a_fault(content: bytes) -> None:
     try:
         found = read(content, "a", "b")
