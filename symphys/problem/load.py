@@ -146,9 +146,7 @@ def build(
     known = quantities(initial, parametric.parameters(), input_sizes(nominal)) | duration_quantity(simulation.duration)
     sensors, controllers = read_control(document, parametric, known, functions, starts, given, faults)
     sets = read_sets(document.phase, parametric, faults)
-    known |= weight_quantities(controllers) | force_quantities(document.force) | phase_quantities(sets)
-    clocks = recording_quantities(table.name for table in document.recording)
-    known |= clocks
+    known |= named_quantities(document, controllers, sets)
     variables = read_variables(document.variable, known, simulation, faults)
     check_variables(document, simulation, parametric, nominal, variables, faults)
     sampled = {name: quantity for name, quantity in known.items() if quantity.kind not in ("duration", "recording")}
@@ -157,7 +155,6 @@ def build(
     values = at_guess(parametric, known, variables)
     start = checked_start(starts, parametric, values, faults)
     named = {**formula_names(values, start, variables), **given}
-    named = {name: value for name, value in named.items() if name not in clocks}
     forces, termination, objectives = read_laws(document, simulation, sets, nominal, known, named, variables, faults)
     measured = read_identification(document, parametric, nominal, initial, simulation, named, variables, faults)
     check_read_at_start(objectives.phases, sensors, (document.ending[0], termination), faults)
@@ -184,12 +181,20 @@ def build(
         termination=termination,
         scenarios=scenarios or None,
         mpc=mpc,
-        recordings=measured.recordings,
-        recorded_files=measured.files,
-        identify=measured.settings,
+        **measured.fields(),
         guess=read_guess(document.guess, simulation, nominal, references, faults),
         sweep=sweep,
     )
+
+
+def named_quantities(
+    document: Document,
+    controllers: Sequence[FeedbackController],
+    sets: Mapping[str, Mapping[str, tuple[float, ...]]],
+) -> dict[str, Quantity]:
+    """What variables may set beside the world: numbers of controllers, force laws and phases, clocks of recordings."""
+    clocks = recording_quantities(table.name for table in document.recording)
+    return weight_quantities(controllers) | force_quantities(document.force) | phase_quantities(sets) | clocks
 
 
 def checked_start(starts: StartValues, parametric: ParametricWorld, values: Mapping[str, Any], faults: Faults) -> Any:

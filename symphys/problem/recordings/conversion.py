@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.maths import rotation
-from symphys.problem.recordings.columns import Columns
-from symphys.problem.recordings.faults import RecordingFault
+from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
 from symphys.problem.schema.recording import CONVERSIONS, ColumnsTable
 from symphys.suggest import quote
 
@@ -36,7 +35,7 @@ class MeasurementFrame:
 
 
 def convert(
-    columns: Columns,
+    columns: RecordedColumns,
     names: Sequence[str],
     table: ColumnsTable,
     quantity: str,
@@ -78,7 +77,9 @@ def convert(
     return values
 
 
-def unit_quaternions(values: Array, table: ColumnsTable, columns: Columns, names: Sequence[str], key: Key) -> Array:
+def unit_quaternions(
+    values: Array, table: ColumnsTable, columns: RecordedColumns, names: Sequence[str], key: Key
+) -> Array:
     """(n, 4): w x y z of length 1; a row with a missing number is missing whole."""
     if table.quaternion == "xyzw":
         values = values[:, [3, 0, 1, 2]]

@@ -15,8 +15,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.problem.recordings.columns import Columns
-from symphys.problem.recordings.faults import RecordingFault
+from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
 from symphys.suggest import quote
 
 Array = NDArray[np.float64]
@@ -37,7 +36,7 @@ class Header:
     names: tuple[str, ...]
 
 
-def read_csv(stream: BinaryIO, label: str, wanted: set[str]) -> Columns:
+def read_csv(stream: BinaryIO, label: str, wanted: set[str]) -> RecordedColumns:
     """The columns of a CSV file with a header.
 
     Args:
@@ -50,7 +49,7 @@ def read_csv(stream: BinaryIO, label: str, wanted: set[str]) -> Columns:
     """
     header = read_header(stream, label)
     if not wanted <= set(header.names):
-        return Columns(label, {}, header.names, 2)
+        return RecordedColumns(label, {}, header.names, 2)
     places = [k for k, name in enumerate(header.names) if name in wanted]
     begins = stream.tell()
     most = sum(part.count(b"\n") for part in iter(lambda: stream.read(CHUNK), b"")) + 1
@@ -63,7 +62,7 @@ def read_csv(stream: BinaryIO, label: str, wanted: set[str]) -> Columns:
     if not filled:
         raise RecordingFault("files", f"{label} has a header, but no row of numbers")
     found = {header.names[k]: values[:filled, column] for column, k in enumerate(places)}
-    return Columns(label, found, header.names, 2)
+    return RecordedColumns(label, found, header.names, 2)
 
 
 def read_header(stream: BinaryIO, label: str) -> Header:

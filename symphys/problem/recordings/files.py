@@ -12,7 +12,7 @@ from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
 from symphys.files import check_regular
-from symphys.problem.recordings.faults import RecordingFault
+from symphys.problem.recordings.columns import RecordingFault
 from symphys.problem.recordings.kept import plain_text
 from symphys.problem.recordings.types import RecordedFile
 from symphys.problem.schema.recording import RecordedFileTable

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.problem.parametric.world import ParametricWorld
-from symphys.problem.recordings.faults import RecordingFault
+from symphys.problem.recordings.columns import RecordingFault
 
 Array = NDArray[np.float64]
 TOO_LARGE = 30.0

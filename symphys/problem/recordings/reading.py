@@ -33,15 +33,19 @@ class Identified:
 
     Attributes:
         recordings: of all tables.
-        files: that they were read from.
+        recorded_files: that they were read from.
         new_files: those of them that the problem's text does not keep yet.
-        settings: of [identify].
+        identify: the settings of [identify].
     """
 
     recordings: tuple[Recording, ...] = ()
-    files: tuple[RecordedFile, ...] = ()
+    recorded_files: tuple[RecordedFile, ...] = ()
     new_files: tuple[RecordedFile, ...] = ()
-    settings: IdentifySettings = field(default_factory=IdentifySettings)
+    identify: IdentifySettings = field(default_factory=IdentifySettings)
+
+    def fields(self) -> dict[str, Any]:
+        """Those of the problem."""
+        return {"recordings": self.recordings, "recorded_files": self.recorded_files, "identify": self.identify}
 
 
 def read_identification(

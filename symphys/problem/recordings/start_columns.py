@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from symphys.problem.recordings.columns import Columns
+from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
 from symphys.problem.recordings.conversion import MeasurementFrame, check_table, convert
-from symphys.problem.recordings.faults import RecordingFault
 from symphys.problem.recordings.starts import Starts
 from symphys.problem.schema.recording import ColumnsTable, RecordingTable
 from symphys.suggest import hint, quote
@@ -28,7 +27,7 @@ class StartColumns:
     table: ColumnsTable
     size: int
 
-    def first_row(self, rows: Columns, frame: MeasurementFrame | None) -> Array:
+    def first_row(self, rows: RecordedColumns, frame: MeasurementFrame | None) -> Array:
         """(size,): what the first row of a recording has; RecordingFault where a number is missing."""
         key = ("start", self.quantity)
         rows.require(self.table.columns, key)

@@ -19,21 +19,21 @@ FIELDS = ("position", "orientation", "velocity", "angular_velocity")
 
 
 @dataclass(frozen=True)
-class JointStart:
+class RecordedJoint:
     """What a recording may set of a joint: a coordinate and its rate, ``hinge.angle`` and ``hinge.rate``."""
 
     joint: ParametricJoint
     rate: bool
 
 
-def joint_starts(joints: Sequence[ParametricJoint]) -> dict[str, JointStart]:
+def joint_starts(joints: Sequence[ParametricJoint]) -> dict[str, RecordedJoint]:
     """By name what recordings may set of rigid joints with one coordinate that close no loop."""
-    tree, found = spanning_tree(joints), dict[str, JointStart]()
+    tree, found = spanning_tree(joints), dict[str, RecordedJoint]()
     for joint in joints:
         if joint.name in tree[joint.first] and len(joint.kind.coordinates) == 1:
             value = "angle" if joint.kind.coordinates[0].turns else "position"
-            found[f"{joint.name}.{value}"] = JointStart(joint, rate=False)
-            found[f"{joint.name}.rate"] = JointStart(joint, rate=True)
+            found[f"{joint.name}.{value}"] = RecordedJoint(joint, rate=False)
+            found[f"{joint.name}.rate"] = RecordedJoint(joint, rate=True)
     return found
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from symphys.expression import Formula, FormulaError, parse
 from symphys.expression.units import unit_of
 from symphys.problem.reading.faults import Faults
-from symphys.problem.recordings.columns import Columns
+from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
 from symphys.problem.recordings.conversion import (
     LENGTH,
     ORIENTATION,
@@ -24,7 +24,6 @@ from symphys.problem.recordings.conversion import (
     convert,
 )
 from symphys.problem.recordings.csv_file import read_csv
-from symphys.problem.recordings.faults import RecordingFault
 from symphys.problem.recordings.files import ARRAYS, FileFinder
 from symphys.problem.recordings.magnitude import check_lengths
 from symphys.problem.recordings.npz_file import read_npz
@@ -91,7 +90,7 @@ class Piece:
 
     name: str
     aliases: tuple[str, ...]
-    columns: Columns
+    columns: RecordedColumns
     first: int
     last: int
 
@@ -186,7 +185,7 @@ class RecordingReader:
                 aliases = (file, stem, *(numbered if not own else ()))
                 yield Piece(name, aliases, columns, first, last)
 
-    def _check_columns(self, columns: Columns) -> None:
+    def _check_columns(self, columns: RecordedColumns) -> None:
         """Every column that is named must be there."""
         name = time_column(self.table)
         if name is not None and name not in columns.names and self.table.time is None:
@@ -197,7 +196,7 @@ class RecordingReader:
         for k, each in enumerate(self.table.measured):
             columns.require(each.columns, ("measured", k, "columns"))
 
-    def _columns(self, name: str, wanted: set[str]) -> tuple[Columns, Array | None]:
+    def _columns(self, name: str, wanted: set[str]) -> tuple[RecordedColumns, Array | None]:
         """Columns and first rows of a file, or of the table."""
         if self.table.table is not None:
             return table_columns(self.table.table), None
@@ -223,7 +222,7 @@ class RecordingReader:
             weight=self.table.weight,
         )
 
-    def _values(self, k: int, each: MeasuredColumns, rows: Columns, time: Array, count: int) -> Measured:
+    def _values(self, k: int, each: MeasuredColumns, rows: RecordedColumns, time: Array, count: int) -> Measured:
         """The samples of one quantity."""
         key, table = ("measured", k, "columns"), each.table
         values = convert(rows, table.columns, table, each.quantity, each.value.size, self.frame, key)[:count]
@@ -236,14 +235,14 @@ class RecordingReader:
         return Measured(name, each.formula, tuple(table.columns), values, each.noise, each.orientation)
 
 
-def table_columns(table: Mapping[str, Sequence[Any]]) -> Columns:
+def table_columns(table: Mapping[str, Sequence[Any]]) -> RecordedColumns:
     """The columns of a table in the problem file."""
     found = {name: np.array(values, float) for name, values in table.items()}
     counts = {name: len(values) for name, values in found.items()}
     if len(set(counts.values())) > 1:
         sizes = ", ".join(f"{name} {count}" for name, count in counts.items())
         raise RecordingFault("table", f"all columns need as many numbers; there are: {sizes}")
-    return Columns("table", found, tuple(found), 0, from_zero=True)
+    return RecordedColumns("table", found, tuple(found), 0, from_zero=True)
 
 
 def read_recordings(

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.problem.recordings.columns import Columns
-from symphys.problem.recordings.faults import RecordingFault
+from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
 from symphys.problem.schema.recording import RecordingTable
 
 Array = NDArray[np.float64]
@@ -22,7 +21,9 @@ def time_column(table: RecordingTable) -> str | None:
     return table.time if table.rate is not None else table.time or TIME
 
 
-def read_times(columns: Columns, first: int, last: int, table: RecordingTable, duration: float) -> tuple[Array, int]:
+def read_times(
+    columns: RecordedColumns, first: int, last: int, table: RecordingTable, duration: float
+) -> tuple[Array, int]:
     """(n,) [s] the times of the rows from ``first`` to before ``last``, and how many rows at the end are left out.
 
     Raises:
@@ -69,7 +70,7 @@ def from_first_row(table: RecordingTable) -> bool:
     return bool(table.start) or table.rows is not None or table.split is not None
 
 
-def check_order(time: Array, columns: Columns, first: int, name: str) -> None:
+def check_order(time: Array, columns: RecordedColumns, first: int, name: str) -> None:
     """Times are numbers, each after the one before."""
     unknown = np.flatnonzero(~np.isfinite(time))
     if unknown.size:

@@ -117,8 +117,8 @@ class RecordingTable(SchemaTable):
     """Measured motions: from files, or from a table of numbers in this file."""
 
     name: Identifier = Field(
-        description="of the recordings: toss/0017. Variables may set its clock, toss.offset [s], and the scale of its "
-        "lengths, toss.scale"
+        description="of the recordings: toss/0017. Variables may set toss.offset, what is added to its times in "
+        "seconds, and toss.scale, a factor of its lengths"
     )
     files: Texts | None = Field(
         default=None,

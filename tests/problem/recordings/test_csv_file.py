@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from symphys.problem.recordings import csv_file
+from symphys.problem.recordings.columns import RecordingFault
 from symphys.problem.recordings.csv_file import MISSING, read_csv
-from symphys.problem.recordings.faults import RecordingFault
 
 Array = NDArray[np.float64]
 CELLS = st.one_of(st.floats(allow_infinity=False, width=64), st.integers(-(10**6), 10**6).map(float))
