@@ -77,6 +77,7 @@ def read_identification(
         sample,
         formula_units(nominal, sample, variables),
         simulation.duration,
+        simulation.dt,
         longest(parametric, initial, simulation.duration),
         Starts(parametric.joints, initial),
         frozenset(slot.name for variable in variables for slot in variable.slots if variable.kind == "initial"),

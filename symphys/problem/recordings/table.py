@@ -30,7 +30,7 @@ from symphys.problem.recordings.npz_file import read_npz
 from symphys.problem.recordings.splits import held_back, pieces
 from symphys.problem.recordings.start_columns import StartColumns, read_start_columns
 from symphys.problem.recordings.starts import Starts
-from symphys.problem.recordings.times import read_times, time_column
+from symphys.problem.recordings.times import check_ends, read_times, time_column
 from symphys.problem.recordings.types import Measured, Recording
 from symphys.problem.schema.recording import MeasuredTable, RecordingTable
 
@@ -45,6 +45,7 @@ class RecordedWorld:
         sample: a value for each name in formulas, as the guess has it.
         units: of these, where they are known.
         duration: [s] of the simulation.
+        dt: [s] its time step.
         length: [m] that nothing exceeds by far; see ``longest``.
         starts: of bodies and joints.
         moved: names of initial quantities that variables set.
@@ -53,6 +54,7 @@ class RecordedWorld:
     sample: Mapping[str, Any]
     units: Mapping[str, str]
     duration: float
+    dt: float
     length: float
     starts: Starts
     moved: frozenset[str]
@@ -118,6 +120,7 @@ class RecordingReader:
         for piece in self._pieces(self._wanted(start)):
             found.append(self._recording(piece, measured, start))
             known.append((piece.name, *piece.aliases))
+        check_ends(found, self.world.duration, self.world.dt)
         held = held_back(self.table.held_back, known)
         for k, each in enumerate(measured):
             if all(np.isnan(recording.measured[k].values).all() for recording in found):

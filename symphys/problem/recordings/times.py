@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from math import ceil
+
 import numpy as np
 from numpy.typing import NDArray
 
 from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
+from symphys.problem.recordings.types import Recording
 from symphys.problem.schema.recording import RecordingTable
 
 Array = NDArray[np.float64]
@@ -27,7 +31,7 @@ def read_times(
     """(n,) [s] the times of the rows from ``first`` to before ``last``, and how many rows at the end are left out.
 
     Raises:
-        RecordingFault: names the row of a time that is missing, does not come after the one before, or lies outside
+        RecordingFault: names the row of a time that is missing, does not come after the one before, or lies before
             the simulation.
     """
     where = columns.where(first)
@@ -49,14 +53,7 @@ def read_times(
     kept = len(time) if table.until is None else int(np.searchsorted(time, table.until * (1 + SLACK), "right"))
     if kept < LEAST:
         raise RecordingFault("until", f"{where}: only {kept} samples of this recording are before {table.until:g} s")
-    end = time[kept - 1]
-    if end > duration * (1 + SLACK):
-        late = columns.where(first + int(np.searchsorted(time, duration * (1 + SLACK), "right")))
-        clock = ', take clock = "first row"' if time[0] > duration else ""
-        text = f"{late}: samples go on to {end:.6g} s, and the simulation ends at {duration:g} s"
-        advice = f"make [simulation] duration at least {end:.6g}{clock}"
-        raise RecordingFault("until", f"{text}; {advice}, or leave later ones out with until = {duration:g}")
-    found = np.minimum(time[:kept], duration)
+    found = np.where(within(time[:kept], duration), np.minimum(time[:kept], duration), time[:kept])
     if np.any(np.diff(found) <= 0):
         text = f"{where}: the differences of times are lost in their size"
         raise RecordingFault("offset", f'{text}; take clock = "first row", or look at time_factor and rate')
@@ -84,6 +81,29 @@ def check_order(time: Array, columns: RecordedColumns, first: int, name: str) ->
         text = f"the time {time[row]:.9g} s " + ("occurs twice" if same else f"comes after {time[row - 1]:.9g} s")
         advice = "delete the row" if same else "sort the rows, or split them into recordings (split, rows)"
         raise RecordingFault("time", f"{columns.where(first + row, name)}: {text}; {advice}")
+
+
+def within(time: Array, duration: float) -> NDArray[np.bool_]:
+    """(n,): whether times are not after the end of the simulation, but for rounding."""
+    return np.asarray(time <= duration * (1 + SLACK))
+
+
+def check_ends(recordings: Sequence[Recording], duration: float, dt: float) -> None:
+    """RecordingFault with the duration that is needed, where a recording goes on after the end of the simulation."""
+    longest = max(recordings, key=lambda each: float(each.time[-1]))
+    end = float(longest.time[-1])
+    if within(longest.time[-1:], duration).all():
+        return
+    late = sum(not within(each.time[-1:], duration).all() for each in recordings)
+    others = f" (as do {late - 1} others)" if late > 1 else ""
+    text = f"{longest.source}: samples go on to {end:.6g} s{others}, and the simulation ends at {duration:g} s"
+    if min(float(each.time[0]) for each in recordings) > duration:
+        raise RecordingFault("clock", f'{text}; take clock = "first row", by which each recording begins at 0 s')
+    needed = ceil(end / dt * (1 - SLACK)) * dt
+    raise RecordingFault(
+        "until",
+        f"{text}; [simulation] needs duration = {needed:.10g}, or leave later ones out with until = {duration:g}",
+    )
 
 
 def steps_apart(time: Array, dt: float) -> float:

@@ -43,9 +43,9 @@ def message(*tables: dict[str, Any], **others: Any) -> str:
         ({"table": {**TABLE, "time": [-0.1, 0, 0.1]}}, "is before the start of the simulation; add offset = 0.1"),
         (
             {"table": {**TABLE, "time": [0, 0.1, 1.1]}},
-            "row 2 (from 0): samples go on to 1.1 s, and the simulation ends at 1 s",
+            ".until: table, rows 0 to 2: samples go on to 1.1 s, and the simulation ends at 1 s; [simulation] needs",
         ),
-        ({"table": {**TABLE, "time": [9, 9.1, 9.2]}}, 'take clock = "first row"'),
+        ({"table": {**TABLE, "time": [9, 9.1, 9.2]}}, ".clock: table, rows 0 to 2: samples go on to 9.2 s"),
         ({"table": {"t": [0, 0.1], "z": [1.0, 1.0]}}, 'has no column "time"; name it with time = "...", or give rate'),
         ({"table": TABLE, "time": "tme"}, '.time: table has no column "tme"; did you mean "time"'),
         ({"table": TABLE, "rate": 10.0, "time": "time"}, ".rate: stands instead of time"),
@@ -132,6 +132,16 @@ def test_one_start_for_all_is_no_start_of_each() -> None:
     table = {"table": {**TABLE, "x": [0.0] * 3}, "start": {"ball.velocity": ["x", "x", "x"]}}
     text = message(table, variable=[{"name": "v", "sets": "ball.velocity[0]"}])
     assert 'variable "v".sets: recording drop sets ball.velocity at the start; with each = "recording"' in text
+
+
+def test_the_duration_that_the_longest_recording_needs() -> None:
+    """In whole steps; with it, the problem is one."""
+    table = {"time": [0, 1.2, 0, 1.404, 0, 0.5], "z": [1.0] * 6, "k": [0.0, 0, 1, 1, 2, 2]}
+    text = message({"table": table, "split": "k"})
+    assert "rows 2 to 3: samples go on to 1.404 s (as do 1 others)" in text
+    assert "needs duration = 1.41, or leave later ones out with until = 1" in text
+    found = loaded({"table": table, "split": "k"}, simulation={"duration": 1.41, "dt": 0.01}).recordings
+    assert max(each.time[-1] for each in found) == 1.404
 
 
 @pytest.mark.parametrize(("factor", "unit"), [(1000, "mm"), (100, "cm")])
