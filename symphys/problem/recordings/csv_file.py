@@ -69,7 +69,7 @@ def read_header(stream: BinaryIO, label: str) -> Header:
     """The first line, of names that differ; the stream then stands at the second."""
     line = stream.readline(LONGEST_LINE)
     try:
-        text = line.decode("utf-8-sig").strip("\r\n")
+        text = line.decode("utf-8-sig").strip("\r\n").removeprefix("#")  # numpy.savetxt writes one
     except UnicodeDecodeError:
         raise RecordingFault(
             "files", f"{label}, row 1: this is no UTF-8 text; a CSV file with a header is wanted"

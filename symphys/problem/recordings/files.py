@@ -23,8 +23,8 @@ TEXTS = (".csv", ".tsv", ".txt", ".dat")
 WILD = re.compile(r"[*?\[]")
 MOST_FILES = 10_000
 """Of one pattern."""
-SMALL, SMALL_TOGETHER = 100_000, 1_000_000
-"""Bytes of a CSV file that is kept in the problem's text, and of all of them."""
+SMALL, SMALL_TOGETHER = 100_000, 200_000
+"""Bytes of a CSV file that is kept in the text of the problem, and of all of them: each run folder has that text."""
 
 
 class FileFinder:
@@ -45,8 +45,8 @@ class FileFinder:
         names = dict[str, None]()
         for pattern in patterns:
             wild = WILD.search(pattern) is not None
-            matching = [name for name in self.kept if name == pattern or (wild and matches(name, pattern))]
-            matching = matching or (globbed(pattern, folder) if wild else [pattern])
+            matching = [name for name in self.kept if matches(name, pattern)] if wild else [pattern]
+            matching = matching or globbed(pattern, folder)
             names |= dict.fromkeys(sorted(matching, key=natural))
         for name in names:
             suffix = PurePosixPath(name).suffix.lower()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
@@ -177,11 +178,12 @@ class RecordingReader:
         table = self.table
         files = [""] if table.table is not None else self.finder.names(table.files or [], self.folder)
         stems = [PurePosixPath(file).stem for file in files]
+        times = Counter(stems)
         for file, stem in zip(files, stems, strict=True):
             columns, starts = self._columns(file, wanted)
             self._check_columns(columns)
             parts = pieces(columns, starts, table.split)
-            own = [] if len(files) == 1 else [stem if stems.count(stem) == 1 else file]
+            own = [] if len(files) == 1 else [stem if times[stem] == 1 else file]
             for k, (first, last) in enumerate(parts):
                 numbered = [] if table.rows is None and table.split is None else [f"{k:04d}"]
                 name = "/".join([table.name, *own, *numbered])

@@ -55,12 +55,13 @@ def test_what_was_written_is_read(values: list[list[float]], missing: str, end: 
         ("a,b\n1,2\n\n3,4\n\n", [[1, 2], [3, 4]]),
         ('a,b\n"1","2"\n', [[1, 2]]),
         ("\ufeffa,b\n 1 , 2\n", [[1, 2]]),
+        ("# a,b\n1,2\n", [[1, 2]]),
         ("a,b\n1,\n,2\n,\n", [[1, np.nan], [np.nan, 2], [np.nan, np.nan]]),
         ("b,a,note\n2,1,left\n4,3,\n", [[1, 2], [3, 4]]),
     ],
 )
 def test_what_programs_write(content: str, rows: list[list[float]]) -> None:
-    """Empty lines, quotes, a byte order mark, spaces, empty cells, columns of texts that are not used."""
+    """Empty lines, quotes, byte order marks, the mark of numpy.savetxt, spaces, empty cells, texts that are not used."""
     np.testing.assert_array_equal(read(content, "a", "b"), np.array(rows))
 
 
