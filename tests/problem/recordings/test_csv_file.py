@@ -61,7 +61,7 @@ def test_what_was_written_is_read(values: list[list[float]], missing: str, end: 
     ],
 )
 def test_what_programs_write(content: str, rows: list[list[float]]) -> None:
-    """Empty lines, quotes, byte order marks, the mark of numpy.savetxt, spaces, empty cells, texts that are not used."""
+    """Empty lines, quotes, byte order marks, the mark of savetxt, spaces, empty cells, texts that are not used."""
     np.testing.assert_array_equal(read(content, "a", "b"), np.array(rows))
 
 
