@@ -9,7 +9,7 @@ Array = NDArray[np.float64]
 
 
 def bouncing_height(time: Array, height: float, radius: float, restitution: float, gravity: float = 9.81) -> Array:
-    """(n,) [m]: of the centre of a ball that is let go at ``height`` at 0 s; each bounce leaves a share of its speed."""
+    """(n,) [m]: of the centre of a ball let go at ``height`` at 0 s; each bounce leaves a share of its speed."""
     found = height - gravity * time**2 / 2
     touch = np.sqrt(2 * (height - radius) / gravity)
     speed = restitution * gravity * touch

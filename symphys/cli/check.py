@@ -112,7 +112,7 @@ def describe(problem: Problem) -> list[str]:
     for variable in problem.variables:
         numbers = several(variable.guess.size, "number") + " for each recording" * variable.each
         lines.append(f"  variable     {variable.name}: {numbers}, sets {set_quantities(problem, variable)}")
-    for line in recording_lines(problem.recordings, problem.simulation.dt):
+    for line in recording_lines(problem):
         lines.append(f"               {line}" if line.startswith(" ") else f"  recording    {line}")
     for kind, things in (("cost", problem.costs), ("target", problem.targets), ("constraint", problem.constraints)):
         for thing in things:

@@ -69,7 +69,18 @@ from symphys.problem.tables.variables import read_variables
 from symphys.problem.units import formula_units
 
 MEMBERS = ("body", "plane", "block", "terrain")
-SHARED_NAMES = (*MEMBERS, "joint", "coupling", "site", "sensor", "controller", "force", "reference", "variable", "recording")
+SHARED_NAMES = (
+    *MEMBERS,
+    "joint",
+    "coupling",
+    "site",
+    "sensor",
+    "controller",
+    "force",
+    "reference",
+    "variable",
+    "recording",
+)
 OWN_NAMES = ("phase", "cost", "target", "constraint", "output", "scenario")
 
 
@@ -135,8 +146,7 @@ def build(
     known = quantities(initial, parametric.parameters(), input_sizes(nominal)) | duration_quantity(simulation.duration)
     sensors, controllers = read_control(document, parametric, known, functions, starts, given, faults)
     sets = read_sets(document.phase, parametric, faults)
-    known |= weight_quantities(controllers) | force_quantities(document.force) | phase_quantities(sets)
-    known |= recording_quantities(table.name for table in document.recording)
+    known |= named_quantities(document, controllers, sets)
     variables = read_variables(document.variable, known, simulation, faults)
     check_variables(document, simulation, parametric, nominal, variables, faults)
     sampled = {name: quantity for name, quantity in known.items() if quantity.kind not in ("duration", "recording")}
@@ -171,12 +181,20 @@ def build(
         termination=termination,
         scenarios=scenarios or None,
         mpc=mpc,
-        recordings=measured.recordings,
-        recorded_files=measured.files,
-        identify=measured.settings,
+        **measured.fields(),
         guess=read_guess(document.guess, simulation, nominal, references, faults),
         sweep=sweep,
     )
+
+
+def named_quantities(
+    document: Document,
+    controllers: Sequence[FeedbackController],
+    sets: Mapping[str, Mapping[str, tuple[float, ...]]],
+) -> dict[str, Quantity]:
+    """What variables may set beside the world: numbers of controllers, force laws and phases, clocks of recordings."""
+    clocks = recording_quantities(table.name for table in document.recording)
+    return weight_quantities(controllers) | force_quantities(document.force) | phase_quantities(sets) | clocks
 
 
 def checked_start(starts: StartValues, parametric: ParametricWorld, values: Mapping[str, Any], faults: Faults) -> Any:

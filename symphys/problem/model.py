@@ -364,7 +364,7 @@ class ProblemData:
     mpc: RecedingHorizon | None = None
     recordings: tuple[Recording, ...] = field(default=(), repr=False)
     recorded_files: tuple[RecordedFile, ...] = ()
-    identify: IdentifySettings = IdentifySettings()
+    identify: IdentifySettings = field(default_factory=IdentifySettings)
     guess: GuessedMotion | None = None
     sweep: Sweep | None = None
 

@@ -26,9 +26,9 @@ def at_guess(
     parametric: ParametricWorld, known: Mapping[str, Quantity], variables: Sequence[Variable]
 ) -> dict[str, Array]:
     """Every quantity's value at t = 0, with the first knot of every guess put in."""
-    values = {name: quantity.nominal.copy() for name, quantity in known.items()}
+    values = {name: quantity.nominal.copy() for name, quantity in known.items() if quantity.kind != "recording"}
     for variable in variables:
-        for slot in variable.slots:
+        for slot in variable.slots if variable.kind != "recording" else ():
             values[slot.name][list(slot.components)] = variable.guess[: variable.components]
     for name, value in values.items():
         if name.endswith(".orientation"):

@@ -8,14 +8,26 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.problem.recordings.faults import RecordingFault
 from symphys.suggest import hint, quote
 
 Array = NDArray[np.float64]
 
 
+class RecordingFault(ValueError):
+    """Why numbers are no recording.
+
+    Attributes:
+        key: of the [[recording]] table that it concerns, or the place below that table.
+    """
+
+    def __init__(self, key: str | tuple[str | int, ...], message: str) -> None:
+        """Keep the key, and the message for the user."""
+        self.key = (key,) if isinstance(key, str) else key
+        super().__init__(message)
+
+
 @dataclass(frozen=True, eq=False)
-class Columns:
+class RecordedColumns:
     """Columns of n numbers, NaN where one is missing.
 
     Attributes:
@@ -37,10 +49,10 @@ class Columns:
         """n."""
         return next((len(values) for values in self.values.values()), 0)
 
-    def part(self, first: int, last: int) -> Columns:
+    def part(self, first: int, last: int) -> RecordedColumns:
         """The rows from ``first`` to before ``last``."""
         values = {name: column[first:last] for name, column in self.values.items()}
-        return Columns(self.label, values, self.names, self.first + first, self.from_zero)
+        return RecordedColumns(self.label, values, self.names, self.first + first, self.from_zero)
 
     def where(self, row: int, name: str = "") -> str:
         """``a.csv, row 17, column "x"``: a row, counted here from 0, as a message names it."""

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.maths import rotation
-from symphys.problem.recordings.columns import Columns
-from symphys.problem.recordings.faults import RecordingFault
+from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
 from symphys.problem.schema.recording import CONVERSIONS, ColumnsTable
 from symphys.suggest import quote
 
@@ -36,7 +35,7 @@ class MeasurementFrame:
 
 
 def convert(
-    columns: Columns,
+    columns: RecordedColumns,
     names: Sequence[str],
     table: ColumnsTable,
     quantity: str,
@@ -64,15 +63,23 @@ def convert(
     if field == ORIENTATION and size == 4:
         values = unit_quaternions(values, table, columns, names, key)
         return values if frame is None else turned_quaternions(frame.orientation, values)
-    values *= table.factor if table.unit is None else CONVERSIONS[table.unit][0]
-    values += table.offset
+    with np.errstate(over="ignore"):
+        values *= table.factor if table.unit is None else CONVERSIONS[table.unit][0]
+        values += table.offset
+    infinite = np.argwhere(np.isinf(values))
+    if infinite.size:
+        raise RecordingFault(
+            key, f"{columns.where(int(infinite[0][0]))}: the number is not finite, after factor and offset"
+        )
     if frame is not None and size == 3 and field in (PLACED, *TURNED):
         values = values @ np.array(rotation.matrix(frame.orientation), float).T
         values += frame.position if field == PLACED else 0.0
     return values
 
 
-def unit_quaternions(values: Array, table: ColumnsTable, columns: Columns, names: Sequence[str], key: Key) -> Array:
+def unit_quaternions(
+    values: Array, table: ColumnsTable, columns: RecordedColumns, names: Sequence[str], key: Key
+) -> Array:
     """(n, 4): w x y z of length 1; a row with a missing number is missing whole."""
     if table.quaternion == "xyzw":
         values = values[:, [3, 0, 1, 2]]
@@ -83,14 +90,14 @@ def unit_quaternions(values: Array, table: ColumnsTable, columns: Columns, names
         numbers = ", ".join(f"{value:g}" for value in columns.side_by_side(names, key)[row])
         text = f"{columns.where(row)}: [{numbers}] is no unit quaternion, its length is {length[row]:.4g}"
         raise RecordingFault(key, f"{text}; four numbers w, x, y, z of length 1 are wanted")
-    return values / length[:, None]
+    return np.asarray(values / length[:, None])
 
 
 def turned_quaternions(turn: Array, values: Array) -> Array:
     """(n, 4): the products of a quaternion and those of each row, which act first."""
     w, x, y, z = turn
     product = np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])
-    return values @ product.T
+    return np.asarray(values @ product.T)
 
 
 def check_table(table: ColumnsTable, unit: str, quantity: str, key: Key) -> None:

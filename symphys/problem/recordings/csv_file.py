@@ -15,8 +15,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.problem.recordings.columns import Columns
-from symphys.problem.recordings.faults import RecordingFault
+from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
 from symphys.suggest import quote
 
 Array = NDArray[np.float64]
@@ -37,7 +36,7 @@ class Header:
     names: tuple[str, ...]
 
 
-def read_csv(stream: BinaryIO, label: str, wanted: set[str]) -> Columns:
+def read_csv(stream: BinaryIO, label: str, wanted: set[str]) -> RecordedColumns:
     """The columns of a CSV file with a header.
 
     Args:
@@ -50,7 +49,7 @@ def read_csv(stream: BinaryIO, label: str, wanted: set[str]) -> Columns:
     """
     header = read_header(stream, label)
     if not wanted <= set(header.names):
-        return Columns(label, {}, header.names, 2)
+        return RecordedColumns(label, {}, header.names, 2)
     places = [k for k, name in enumerate(header.names) if name in wanted]
     begins = stream.tell()
     most = sum(part.count(b"\n") for part in iter(lambda: stream.read(CHUNK), b"")) + 1
@@ -63,16 +62,18 @@ def read_csv(stream: BinaryIO, label: str, wanted: set[str]) -> Columns:
     if not filled:
         raise RecordingFault("files", f"{label} has a header, but no row of numbers")
     found = {header.names[k]: values[:filled, column] for column, k in enumerate(places)}
-    return Columns(label, found, header.names, 2)
+    return RecordedColumns(label, found, header.names, 2)
 
 
 def read_header(stream: BinaryIO, label: str) -> Header:
     """The first line, of names that differ; the stream then stands at the second."""
     line = stream.readline(LONGEST_LINE)
     try:
-        text = line.decode("utf-8-sig").strip("\r\n")
+        text = line.decode("utf-8-sig").strip("\r\n").removeprefix("#")  # numpy.savetxt writes one
     except UnicodeDecodeError:
-        raise RecordingFault("files", f"{label}, row 1: this is no UTF-8 text; a CSV file with a header is wanted") from None
+        raise RecordingFault(
+            "files", f"{label}, row 1: this is no UTF-8 text; a CSV file with a header is wanted"
+        ) from None
     if not text.strip():
         what = "is empty" if not line else "begins with an empty line"
         raise RecordingFault("files", f"{label} {what}; the first row must name the columns: time,x,y,z")
@@ -123,7 +124,11 @@ def parsed(chunk: bytes, header: Header, places: Sequence[int], label: str, befo
         try:
             with np.errstate(all="ignore"):
                 rows = np.loadtxt(
-                    io.BytesIO(filled_in(plain, mark)), delimiter=header.delimiter, comments=None, usecols=places, ndmin=2
+                    io.BytesIO(filled_in(plain, mark)),
+                    delimiter=header.delimiter,
+                    comments=None,
+                    usecols=places,
+                    ndmin=2,
                 )
         except ValueError:
             rows = None
@@ -166,12 +171,12 @@ def cell_by_cell(chunk: bytes, header: Header, places: Sequence[int], label: str
         for cells in csv.reader(io.StringIO(text, newline=""), delimiter=header.delimiter):
             if not any(cell.strip() for cell in cells) and len(cells) <= 1:
                 continue
-            row = f"{label}, row {before + len(found) + 2}"
+            where = f"{label}, row {before + len(found) + 2}"
             if len(cells) != len(header.names):
                 advice = "; numbers are written 0.5, not 0,5" if header.delimiter == "," else ""
                 text = f"has {len(cells)} cells, but the header has {len(header.names)}{advice}"
-                raise RecordingFault("files", f"{row} {text}")
-            found.append([number(cells[k], f"{row}, column {quote(header.names[k])}") for k in places])
+                raise RecordingFault("files", f"{where} {text}")
+            found.append([number(cells[k], f"{where}, column {quote(header.names[k])}") for k in places])
     except csv.Error as error:
         raise RecordingFault("files", f"{label}, row {before + len(found) + 2}: {error}") from None
     return np.array(found, float).reshape(len(found), len(places))
@@ -191,5 +196,7 @@ def number(cell: str, where: str) -> float:
         advice = f"write {point}" if point != text and is_number(point) else "leave the cell empty where one is missing"
         raise RecordingFault("files", f"{where}: {quote(text)} is no number; {advice}")
     if np.isinf(value):
-        raise RecordingFault("files", f"{where}: {quote(text)} is not finite; leave the cell empty where one is missing")
+        raise RecordingFault(
+            "files", f"{where}: {quote(text)} is not finite; leave the cell empty where one is missing"
+        )
     return value

@@ -12,7 +12,7 @@ from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
 from symphys.files import check_regular
-from symphys.problem.recordings.faults import RecordingFault
+from symphys.problem.recordings.columns import RecordingFault
 from symphys.problem.recordings.kept import plain_text
 from symphys.problem.recordings.types import RecordedFile
 from symphys.problem.schema.recording import RecordedFileTable
@@ -23,8 +23,8 @@ TEXTS = (".csv", ".tsv", ".txt", ".dat")
 WILD = re.compile(r"[*?\[]")
 MOST_FILES = 10_000
 """Of one pattern."""
-SMALL, SMALL_TOGETHER = 100_000, 1_000_000
-"""Bytes of a CSV file that is kept in the problem's text, and of all of them."""
+SMALL, SMALL_TOGETHER = 100_000, 200_000
+"""Bytes of a CSV file that is kept in the text of the problem, and of all of them: each run folder has that text."""
 
 
 class FileFinder:
@@ -45,8 +45,8 @@ class FileFinder:
         names = dict[str, None]()
         for pattern in patterns:
             wild = WILD.search(pattern) is not None
-            matching = [name for name in self.kept if name == pattern or (wild and matches(name, pattern))]
-            matching = matching or (globbed(pattern, folder) if wild else [pattern])
+            matching = [name for name in self.kept if matches(name, pattern)] if wild else [pattern]
+            matching = matching or globbed(pattern, folder)
             names |= dict.fromkeys(sorted(matching, key=natural))
         for name in names:
             suffix = PurePosixPath(name).suffix.lower()
@@ -93,7 +93,7 @@ class FileFinder:
     def _absent(self, name: str, folder: Path, kept: RecordedFile | None, changed: bool) -> str:
         """Why a file cannot be opened."""
         if changed:
-            return f"{name} has changed since this problem was kept (its SHA-256 was {kept.sha256[:12] if kept else ''}...)"
+            return f"{name} has changed since this problem was kept: its SHA-256 is another"
         if kept is not None:
             return f"{name} is no longer at {kept.path}"
         path = folder / name
@@ -128,7 +128,9 @@ def globbed(pattern: str, folder: Path) -> list[str]:
         there: list[str] = []
         with suppress(OSError, ValueError):
             there = sorted(each.name for each in parent.iterdir() if each.is_file())
-        has = f"{parent} has {', '.join(there[:5])}{', ...' if there[5:] else ''}" if there else f"{parent} has no files"
+        has = (
+            f"{parent} has {', '.join(there[:5])}{', ...' if there[5:] else ''}" if there else f"{parent} has no files"
+        )
         raise RecordingFault("files", f"no file matches {quote(pattern)}; {has}")
     return found
 

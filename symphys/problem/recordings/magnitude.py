@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.problem.parametric.world import ParametricWorld
-from symphys.problem.recordings.faults import RecordingFault
+from symphys.problem.recordings.columns import RecordingFault
 
 Array = NDArray[np.float64]
 TOO_LARGE = 30.0
 """Lengths that exceed what the world has by this factor are in another unit."""
 NEAR = 3.0
-"""How far a ratio of lengths may be off 100 or 1000."""
+"""How far a ratio of lengths may be off 100 or 1000. That to an upper bound is less than the factor of the unit."""
 SOON = 0.05
 """Share of the recording in which its first sample is compared with the start of the simulation."""
 LEAST = 1e-3
@@ -48,14 +48,15 @@ def check_lengths(
     known = size[np.isfinite(size)]
     if not known.size:
         return
-    ratio, compared = float(np.median(known)) / world_length, f"lengths in this world, up to about {world_length:.3g} m"
+    ratio, limit = float(np.median(known)) / world_length, 100.0
+    compared = f"lengths in this world, up to about {world_length:.3g} m"
     if at_start is not None and np.isfinite(size[0]) and time[0] <= SOON * time[-1]:
         begin = float(np.linalg.norm(at_start))
         if begin > LEAST and size[0] / begin > TOO_LARGE:
-            ratio, compared = size[0] / begin, f"the start of the simulation, {begin:.3g} m"
+            ratio, limit, compared = size[0] / begin, 100 * NEAR, f"the start of the simulation, {begin:.3g} m"
     if ratio <= TOO_LARGE:
         return
-    factor, unit = (0.001, "mm") if ratio > 100 * NEAR else (0.01, "cm")
+    factor, unit = (0.001, "mm") if ratio > limit else (0.01, "cm")
     name = "millimetres" if unit == "mm" else "centimetres"
-    text = f"{where}: the numbers are {ratio:.3g} times {compared}; metres are wanted"
+    text = f"{where}: the numbers are {ratio:.0f} times {compared}; metres are wanted"
     raise RecordingFault(key, f'{text}; are these {name}? unit = "{unit}", or factor = {factor:g}')

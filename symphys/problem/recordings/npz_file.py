@@ -9,14 +9,13 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.problem.recordings.columns import Columns
-from symphys.problem.recordings.faults import RecordingFault
+from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
 from symphys.suggest import quote
 
 Array = NDArray[np.float64]
 
 
-def read_npz(stream: BinaryIO, label: str, wanted: set[str], rows: str | None) -> tuple[Columns, Array | None]:
+def read_npz(stream: BinaryIO, label: str, wanted: set[str], rows: str | None) -> tuple[RecordedColumns, Array | None]:
     """The columns, and (K + 1,) the first rows of recordings that follow each other, and the number of all rows.
 
     Args:
@@ -37,8 +36,19 @@ def read_npz(stream: BinaryIO, label: str, wanted: set[str], rows: str | None) -
             starts = None if rows is None or rows not in names else numbers(file[rows], rows, label)
     except RecordingFault:
         raise
-    except (OSError, ValueError, EOFError, KeyError, MemoryError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
-        reason = "its arrays do not fit into memory" if isinstance(error, MemoryError) else "it is no NPZ file of numbers"
+    except (
+        OSError,
+        ValueError,
+        EOFError,
+        KeyError,
+        MemoryError,
+        RuntimeError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ) as error:
+        reason = (
+            "its arrays do not fit into memory" if isinstance(error, MemoryError) else "it is no NPZ file of numbers"
+        )
         raise RecordingFault("files", f"{label} cannot be read: {reason}") from None
     counts = {name: len(values) for name, values in found.items()}
     if len(set(counts.values())) > 1:
@@ -46,7 +56,7 @@ def read_npz(stream: BinaryIO, label: str, wanted: set[str], rows: str | None) -
         raise RecordingFault("files", f"{label}: all arrays need as many rows; there are: {sizes}")
     if 0 in counts.values():
         raise RecordingFault("files", f"{label} has no row of numbers")
-    columns = Columns(label, found, names, 0, from_zero=True)
+    columns = RecordedColumns(label, found, names, 0, from_zero=True)
     if rows is not None:
         columns.require([rows], "rows")
     return columns, starts

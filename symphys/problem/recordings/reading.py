@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -33,15 +33,19 @@ class Identified:
 
     Attributes:
         recordings: of all tables.
-        files: that they were read from.
+        recorded_files: that they were read from.
         new_files: those of them that the problem's text does not keep yet.
-        settings: of [identify].
+        identify: the settings of [identify].
     """
 
     recordings: tuple[Recording, ...] = ()
-    files: tuple[RecordedFile, ...] = ()
+    recorded_files: tuple[RecordedFile, ...] = ()
     new_files: tuple[RecordedFile, ...] = ()
-    settings: IdentifySettings = IdentifySettings()
+    identify: IdentifySettings = field(default_factory=IdentifySettings)
+
+    def fields(self) -> dict[str, Any]:
+        """Those of the problem."""
+        return {"recordings": self.recordings, "recorded_files": self.recorded_files, "identify": self.identify}
 
 
 def read_identification(
@@ -58,7 +62,8 @@ def read_identification(
 
     Args:
         document: the tables.
-        parametric, nominal: the world, and the same with its numbers.
+        parametric: the world.
+        nominal: the same with its numbers.
         initial: the start in the file.
         simulation: how time passes.
         sample: a value for each name in formulas, as the guess has it.
@@ -68,11 +73,11 @@ def read_identification(
     if not document.recording:
         check_unused(document, faults)
         return Identified()
-    names = {name: value for name, value in sample.items() if not of_recordings(name, document.recording)}
     world = RecordedWorld(
-        names,
-        formula_units(nominal, names, variables),
+        sample,
+        formula_units(nominal, sample, variables),
         simulation.duration,
+        simulation.dt,
         longest(parametric, initial, simulation.duration),
         Starts(parametric.joints, initial),
         frozenset(slot.name for variable in variables for slot in variable.slots if variable.kind == "initial"),
@@ -85,11 +90,6 @@ def read_identification(
     settings = IdentifySettings() if document.identify is None else IdentifySettings(**document.identify.model_dump())
     new = tuple(finder.found.values())
     return Identified(recordings, (*finder.kept.values(), *new), new, settings)
-
-
-def of_recordings(name: str, tables: Sequence[RecordingTable]) -> bool:
-    """Whether a name is that of a recording's clock or scale, which no simulated motion has."""
-    return name.rpartition(".")[0] in {table.name for table in tables}
 
 
 def read_frame(index: int, table: RecordingTable, faults: Faults) -> MeasurementFrame | None:

@@ -8,8 +8,7 @@ from math import floor
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.problem.recordings.columns import Columns
-from symphys.problem.recordings.faults import RecordingFault
+from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
 from symphys.suggest import hint, quote
 
 Array = NDArray[np.float64]
@@ -17,7 +16,7 @@ MOST = 100_000
 """Recordings of one table."""
 
 
-def pieces(columns: Columns, starts: Array | None, split: str | None) -> list[tuple[int, int]]:
+def pieces(columns: RecordedColumns, starts: Array | None, split: str | None) -> list[tuple[int, int]]:
     """The first row of each recording and that after its last one.
 
     Args:
@@ -41,7 +40,7 @@ def pieces(columns: Columns, starts: Array | None, split: str | None) -> list[tu
     return list(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True))
 
 
-def first_rows(columns: Columns, starts: Array) -> NDArray[np.intp]:
+def first_rows(columns: RecordedColumns, starts: Array) -> NDArray[np.intp]:
     """(K + 1,): the rows as integers, in order, and within the file."""
     label, n = columns.label, columns.count
     if starts.ndim != 1 or starts.size < 2 or not np.all(starts == np.round(starts)):

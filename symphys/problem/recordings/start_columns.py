@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from symphys.problem.recordings.columns import Columns
+from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
 from symphys.problem.recordings.conversion import MeasurementFrame, check_table, convert
-from symphys.problem.recordings.faults import RecordingFault
 from symphys.problem.recordings.starts import Starts
 from symphys.problem.schema.recording import ColumnsTable, RecordingTable
 from symphys.suggest import hint, quote
@@ -28,11 +27,11 @@ class StartColumns:
     table: ColumnsTable
     size: int
 
-    def first_row(self, rows: Columns, frame: MeasurementFrame | None) -> Array:
+    def first_row(self, rows: RecordedColumns, frame: MeasurementFrame | None) -> Array:
         """(size,): what the first row of a recording has; RecordingFault where a number is missing."""
         key = ("start", self.quantity)
         rows.require(self.table.columns, key)
-        value = convert(rows.part(0, 1), self.table.columns, self.table, self.quantity, self.size, frame, key)[0]
+        value: Array = convert(rows.part(0, 1), self.table.columns, self.table, self.quantity, self.size, frame, key)[0]
         if not np.isfinite(value).all():
             raise RecordingFault(key, f"{rows.where(0)}: the first row lacks a number of {self.quantity}")
         return value
@@ -43,7 +42,7 @@ def read_start_columns(
 ) -> list[StartColumns]:
     """What ``start`` says, with the units that the same columns have in ``measured``."""
     known = {name: value.size for name, value in starts.initial.items()}
-    known |= {name: 1 for name in starts.of_joints}
+    known |= dict.fromkeys(starts.of_joints, 1)
     found = list[StartColumns]()
     for quantity, given in leaves(table.start):
         key = ("start", quantity)
@@ -54,7 +53,9 @@ def read_start_columns(
             columns = ColumnsTable.model_validate(given if isinstance(given, Mapping) else {"columns": given})
         except ValidationError as error:
             text = str(error.errors(include_url=False)[0]["msg"])
-            raise RecordingFault(key, f'{text}; write "position", ["x", "y", "z"] or {{ columns = "x", unit = "mm" }}') from None
+            raise RecordingFault(
+                key, f'{text}; write "position", ["x", "y", "z"] or {{ columns = "x", unit = "mm" }}'
+            ) from None
         if not isinstance(given, Mapping):
             columns = next((as_columns(each) for each in table.measured if each.columns == columns.columns), columns)
         check_table(columns, units.get(quantity, ""), quantity, key)

@@ -19,21 +19,21 @@ FIELDS = ("position", "orientation", "velocity", "angular_velocity")
 
 
 @dataclass(frozen=True)
-class JointStart:
+class RecordedJoint:
     """What a recording may set of a joint: a coordinate and its rate, ``hinge.angle`` and ``hinge.rate``."""
 
     joint: ParametricJoint
     rate: bool
 
 
-def joint_starts(joints: Sequence[ParametricJoint]) -> dict[str, JointStart]:
+def joint_starts(joints: Sequence[ParametricJoint]) -> dict[str, RecordedJoint]:
     """By name what recordings may set of rigid joints with one coordinate that close no loop."""
-    tree, found = spanning_tree(joints), dict[str, JointStart]()
+    tree, found = spanning_tree(joints), dict[str, RecordedJoint]()
     for joint in joints:
         if joint.name in tree[joint.first] and len(joint.kind.coordinates) == 1:
             value = "angle" if joint.kind.coordinates[0].turns else "position"
-            found[f"{joint.name}.{value}"] = JointStart(joint, rate=False)
-            found[f"{joint.name}.rate"] = JointStart(joint, rate=True)
+            found[f"{joint.name}.{value}"] = RecordedJoint(joint, rate=False)
+            found[f"{joint.name}.rate"] = RecordedJoint(joint, rate=True)
     return found
 
 
@@ -121,7 +121,9 @@ def follow(body: str, base: str, before: State, state: State) -> None:
     spin = state[f"{base}.angular_velocity"]
     own = before[f"{body}.angular_velocity"] - before[f"{base}.angular_velocity"]
     slide = before[f"{body}.velocity"] - before[f"{base}.velocity"]
-    slide = slide - np.cross(before[f"{base}.angular_velocity"], before[f"{body}.position"] - before[f"{base}.position"])
+    slide = slide - np.cross(
+        before[f"{base}.angular_velocity"], before[f"{body}.position"] - before[f"{base}.position"]
+    )
     state[f"{body}.angular_velocity"] = spin + axes @ own
     state[f"{body}.velocity"] = state[f"{base}.velocity"] + np.cross(spin, arm) + axes @ slide
 
@@ -153,7 +155,7 @@ def motion_of(name: str, state: State) -> tuple[Array, Array, Array]:
 
 def conjugate(q: Array) -> Array:
     """(4,): the quaternion that turns back."""
-    return q * np.array([1.0, -1.0, -1.0, -1.0])
+    return np.array([q[0], -q[1], -q[2], -q[3]])
 
 
 def quaternion_product(p: Array, q: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from symphys.expression import Formula, FormulaError, parse
 from symphys.expression.units import unit_of
 from symphys.problem.reading.faults import Faults
-from symphys.problem.recordings.columns import Columns
+from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
 from symphys.problem.recordings.conversion import (
     LENGTH,
     ORIENTATION,
@@ -24,14 +25,13 @@ from symphys.problem.recordings.conversion import (
     convert,
 )
 from symphys.problem.recordings.csv_file import read_csv
-from symphys.problem.recordings.faults import RecordingFault
 from symphys.problem.recordings.files import ARRAYS, FileFinder
 from symphys.problem.recordings.magnitude import check_lengths
 from symphys.problem.recordings.npz_file import read_npz
 from symphys.problem.recordings.splits import held_back, pieces
 from symphys.problem.recordings.start_columns import StartColumns, read_start_columns
 from symphys.problem.recordings.starts import Starts
-from symphys.problem.recordings.times import read_times, time_column
+from symphys.problem.recordings.times import check_ends, read_times, time_column
 from symphys.problem.recordings.types import Measured, Recording
 from symphys.problem.schema.recording import MeasuredTable, RecordingTable
 
@@ -46,6 +46,7 @@ class RecordedWorld:
         sample: a value for each name in formulas, as the guess has it.
         units: of these, where they are known.
         duration: [s] of the simulation.
+        dt: [s] its time step.
         length: [m] that nothing exceeds by far; see ``longest``.
         starts: of bodies and joints.
         moved: names of initial quantities that variables set.
@@ -54,6 +55,7 @@ class RecordedWorld:
     sample: Mapping[str, Any]
     units: Mapping[str, str]
     duration: float
+    dt: float
     length: float
     starts: Starts
     moved: frozenset[str]
@@ -91,7 +93,7 @@ class Piece:
 
     name: str
     aliases: tuple[str, ...]
-    columns: Columns
+    columns: RecordedColumns
     first: int
     last: int
 
@@ -100,7 +102,12 @@ class RecordingReader:
     """Reads one table; a RecordingFault ends that."""
 
     def __init__(
-        self, table: RecordingTable, world: RecordedWorld, finder: FileFinder, folder: Path, frame: MeasurementFrame | None
+        self,
+        table: RecordingTable,
+        world: RecordedWorld,
+        finder: FileFinder,
+        folder: Path,
+        frame: MeasurementFrame | None,
     ) -> None:
         """``folder``: in which files are looked for; ``frame``: of the measurement system."""
         self.table, self.world, self.finder, self.folder, self.frame = table, world, finder, folder, frame
@@ -114,6 +121,7 @@ class RecordingReader:
         for piece in self._pieces(self._wanted(start)):
             found.append(self._recording(piece, measured, start))
             known.append((piece.name, *piece.aliases))
+        check_ends(found, self.world.duration, self.world.dt)
         held = held_back(self.table.held_back, known)
         for k, each in enumerate(measured):
             if all(np.isnan(recording.measured[k].values).all() for recording in found):
@@ -170,18 +178,19 @@ class RecordingReader:
         table = self.table
         files = [""] if table.table is not None else self.finder.names(table.files or [], self.folder)
         stems = [PurePosixPath(file).stem for file in files]
+        times = Counter(stems)
         for file, stem in zip(files, stems, strict=True):
             columns, starts = self._columns(file, wanted)
             self._check_columns(columns)
             parts = pieces(columns, starts, table.split)
-            own = [] if len(files) == 1 else [stem if stems.count(stem) == 1 else file]
+            own = [] if len(files) == 1 else [stem if times[stem] == 1 else file]
             for k, (first, last) in enumerate(parts):
                 numbered = [] if table.rows is None and table.split is None else [f"{k:04d}"]
                 name = "/".join([table.name, *own, *numbered])
                 aliases = (file, stem, *(numbered if not own else ()))
                 yield Piece(name, aliases, columns, first, last)
 
-    def _check_columns(self, columns: Columns) -> None:
+    def _check_columns(self, columns: RecordedColumns) -> None:
         """Every column that is named must be there."""
         name = time_column(self.table)
         if name is not None and name not in columns.names and self.table.time is None:
@@ -192,7 +201,7 @@ class RecordingReader:
         for k, each in enumerate(self.table.measured):
             columns.require(each.columns, ("measured", k, "columns"))
 
-    def _columns(self, name: str, wanted: set[str]) -> tuple[Columns, Array | None]:
+    def _columns(self, name: str, wanted: set[str]) -> tuple[RecordedColumns, Array | None]:
         """Columns and first rows of a file, or of the table."""
         if self.table.table is not None:
             return table_columns(self.table.table), None
@@ -202,9 +211,7 @@ class RecordingReader:
         with self.finder.open(name, self.folder) as stream:
             return read_npz(stream, name, wanted, self.table.rows) if arrays else (read_csv(stream, name, wanted), None)
 
-    def _recording(
-        self, piece: Piece, measured: Sequence[MeasuredColumns], start: Sequence[StartColumns]
-    ) -> Recording:
+    def _recording(self, piece: Piece, measured: Sequence[MeasuredColumns], start: Sequence[StartColumns]) -> Recording:
         """One recording, in the units of the engine."""
         columns, first, last = piece.columns, piece.first, piece.last
         time, cut = read_times(columns, first, last, self.table, self.world.duration)
@@ -220,7 +227,7 @@ class RecordingReader:
             weight=self.table.weight,
         )
 
-    def _values(self, k: int, each: MeasuredColumns, rows: Columns, time: Array, count: int) -> Measured:
+    def _values(self, k: int, each: MeasuredColumns, rows: RecordedColumns, time: Array, count: int) -> Measured:
         """The samples of one quantity."""
         key, table = ("measured", k, "columns"), each.table
         values = convert(rows, table.columns, table, each.quantity, each.value.size, self.frame, key)[:count]
@@ -233,14 +240,14 @@ class RecordingReader:
         return Measured(name, each.formula, tuple(table.columns), values, each.noise, each.orientation)
 
 
-def table_columns(table: Mapping[str, Sequence[Any]]) -> Columns:
+def table_columns(table: Mapping[str, Sequence[Any]]) -> RecordedColumns:
     """The columns of a table in the problem file."""
     found = {name: np.array(values, float) for name, values in table.items()}
     counts = {name: len(values) for name, values in found.items()}
     if len(set(counts.values())) > 1:
         sizes = ", ".join(f"{name} {count}" for name, count in counts.items())
         raise RecordingFault("table", f"all columns need as many numbers; there are: {sizes}")
-    return Columns("table", found, tuple(found), 0, from_zero=True)
+    return RecordedColumns("table", found, tuple(found), 0, from_zero=True)
 
 
 def read_recordings(

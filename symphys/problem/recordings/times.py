@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from math import ceil
+
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.problem.recordings.columns import Columns
-from symphys.problem.recordings.faults import RecordingFault
+from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
+from symphys.problem.recordings.types import Recording
 from symphys.problem.schema.recording import RecordingTable
 
 Array = NDArray[np.float64]
@@ -22,21 +25,25 @@ def time_column(table: RecordingTable) -> str | None:
     return table.time if table.rate is not None else table.time or TIME
 
 
-def read_times(columns: Columns, first: int, last: int, table: RecordingTable, duration: float) -> tuple[Array, int]:
+def read_times(
+    columns: RecordedColumns, first: int, last: int, table: RecordingTable, duration: float
+) -> tuple[Array, int]:
     """(n,) [s] the times of the rows from ``first`` to before ``last``, and how many rows at the end are left out.
 
     Raises:
-        RecordingFault: names the row of a time that is missing, does not come after the one before, or lies outside
+        RecordingFault: names the row of a time that is missing, does not come after the one before, or lies before
             the simulation.
     """
     where = columns.where(first)
     if last - first < LEAST:
-        raise RecordingFault("files" if table.table is None else "table", f"{where}: a recording has {LEAST} rows or more; this has one")
+        key = "files" if table.table is None else "table"
+        raise RecordingFault(key, f"{where}: a recording has {LEAST} rows or more; this has one")
     name = time_column(table)
     if name is None:
         time = np.arange(last - first) / (table.rate or 1.0)
     else:
-        time = columns.numbers(name, "time" if table.table is None else ("table", name))[first:last] * table.time_factor
+        with np.errstate(over="ignore"):
+            time = columns.numbers(name, "time")[first:last] * table.time_factor
         check_order(time, columns, first, name)
     time = time - (time[0] if from_first_row(table) else 0.0) + table.offset
     if time[0] < -SLACK * duration:
@@ -46,13 +53,11 @@ def read_times(columns: Columns, first: int, last: int, table: RecordingTable, d
     kept = len(time) if table.until is None else int(np.searchsorted(time, table.until * (1 + SLACK), "right"))
     if kept < LEAST:
         raise RecordingFault("until", f"{where}: only {kept} samples of this recording are before {table.until:g} s")
-    end = time[kept - 1]
-    if end > duration * (1 + SLACK):
-        late = columns.where(first + int(np.searchsorted(time, duration * (1 + SLACK), "right")))
-        clock = ', take clock = "first row"' if time[0] > duration else ""
-        text = f"{late}: samples go on to {end:.6g} s, and the simulation ends at {duration:g} s"
-        raise RecordingFault("until", f"{text}; make [simulation] duration at least {end:.6g}{clock}, or leave later ones out with until = {duration:g}")
-    return np.minimum(time[:kept], duration), len(time) - kept
+    found = np.where(within(time[:kept], duration), np.minimum(time[:kept], duration), time[:kept])
+    if np.any(np.diff(found) <= 0):
+        text = f"{where}: the differences of times are lost in their size"
+        raise RecordingFault("offset", f'{text}; take clock = "first row", or look at time_factor and rate')
+    return found, len(time) - kept
 
 
 def from_first_row(table: RecordingTable) -> bool:
@@ -62,11 +67,13 @@ def from_first_row(table: RecordingTable) -> bool:
     return bool(table.start) or table.rows is not None or table.split is not None
 
 
-def check_order(time: Array, columns: Columns, first: int, name: str) -> None:
+def check_order(time: Array, columns: RecordedColumns, first: int, name: str) -> None:
     """Times are numbers, each after the one before."""
-    missing = np.flatnonzero(np.isnan(time))
-    if missing.size:
-        raise RecordingFault("time", f"{columns.where(first + int(missing[0]), name)}: the time is missing")
+    unknown = np.flatnonzero(~np.isfinite(time))
+    if unknown.size:
+        row = int(unknown[0])
+        text = "missing" if np.isnan(time[row]) else "not finite, after time_factor"
+        raise RecordingFault("time", f"{columns.where(first + row, name)}: the time is {text}")
     wrong = np.flatnonzero(np.diff(time) <= 0)
     if wrong.size:
         row = int(wrong[0]) + 1
@@ -74,6 +81,29 @@ def check_order(time: Array, columns: Columns, first: int, name: str) -> None:
         text = f"the time {time[row]:.9g} s " + ("occurs twice" if same else f"comes after {time[row - 1]:.9g} s")
         advice = "delete the row" if same else "sort the rows, or split them into recordings (split, rows)"
         raise RecordingFault("time", f"{columns.where(first + row, name)}: {text}; {advice}")
+
+
+def within(time: Array, duration: float) -> NDArray[np.bool_]:
+    """(n,): whether times are not after the end of the simulation, but for rounding."""
+    return np.asarray(time <= duration * (1 + SLACK))
+
+
+def check_ends(recordings: Sequence[Recording], duration: float, dt: float) -> None:
+    """RecordingFault with the duration that is needed, where a recording goes on after the end of the simulation."""
+    longest = max(recordings, key=lambda each: float(each.time[-1]))
+    end = float(longest.time[-1])
+    if within(longest.time[-1:], duration).all():
+        return
+    late = sum(not within(each.time[-1:], duration).all() for each in recordings)
+    others = f" (as do {late - 1} others)" if late > 1 else ""
+    text = f"{longest.source}: samples go on to {end:.6g} s{others}, and the simulation ends at {duration:g} s"
+    if min(float(each.time[0]) for each in recordings) > duration:
+        raise RecordingFault("clock", f'{text}; take clock = "first row", by which each recording begins at 0 s')
+    needed = ceil(end / dt * (1 - SLACK)) * dt
+    raise RecordingFault(
+        "until",
+        f"{text}; [simulation] needs duration = {needed:.10g}, or leave later ones out with until = {duration:g}",
+    )
 
 
 def steps_apart(time: Array, dt: float) -> float:

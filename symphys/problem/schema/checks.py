@@ -273,11 +273,14 @@ def held_back(value: object) -> bool | float | list[int | str]:
         return value
     if is_number(value) and 0 <= value <= 1:
         return float(value)
-    whole = [item for item in value if not isinstance(item, bool)] if isinstance(value, list) else []
-    if whole and isinstance(value, list) and len(whole) == len(value):
-        if all(isinstance(item, str) or (isinstance(item, int) and item >= 0) for item in whole):
-            return whole
+    if isinstance(value, list) and value and all(isinstance(item, str) or is_index(item) for item in value):
+        return list(value)
     raise fault(f"must be true, a share from 0 to 1, or a list of numbers from 0 or names, not {shown(value)}")
+
+
+def is_index(value: object) -> bool:
+    """Whether the value is a whole number of at least 0."""
+    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
 
 
 def prior(value: object) -> list[list[float]]:

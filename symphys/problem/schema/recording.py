@@ -41,7 +41,7 @@ CONVERSIONS: dict[str, tuple[float, str]] = {
     "N m": (1.0, "N m"),
     "N mm": (0.001, "N m"),
 }
-"""By units of columns the factors to units of the engine, and these. ``g`` is the standard acceleration of free fall, no gram."""
+"""By units of columns the factors to units of the engine, and these. ``g`` is that of free fall, no gram."""
 Unit = Annotated[
     str, PlainValidator(checks.one_of(CONVERSIONS)), WithJsonSchema({"type": "string", "enum": [*CONVERSIONS]})
 ]
@@ -117,8 +117,8 @@ class RecordingTable(SchemaTable):
     """Measured motions: from files, or from a table of numbers in this file."""
 
     name: Identifier = Field(
-        description="of the recordings: toss/0017. Variables may set its clock, toss.offset [s], and the scale of its "
-        "lengths, toss.scale"
+        description="of the recordings: toss/0017. Variables may set toss.offset, what is added to its times in "
+        "seconds, and toss.scale, a factor of its lengths"
     )
     files: Texts | None = Field(
         default=None,
@@ -142,7 +142,7 @@ class RecordingTable(SchemaTable):
     rate: Positive | None = Field(default=None, description="samples in a second [Hz], where no column has the time")
     clock: Literal["file", "first row"] | None = Field(
         default=None,
-        description='whether times are those of the file, or begin with 0 at the first row of each recording; '
+        description="whether times are those of the file, or begin with 0 at the first row of each recording; "
         'default: "first row" with start, rows or split, otherwise "file"',
     )
     offset: Finite = Field(default=0.0, description="added to the times [s], after time_factor and clock")
@@ -196,4 +196,3 @@ class IdentifyTable(SchemaTable):
         default=1000, description="of the whole residuals by CMA-ES"
     )
     seed: Annotated[int, Field(ge=0)] = Field(default=0, description="of the random numbers of both")
-

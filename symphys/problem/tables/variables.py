@@ -111,7 +111,7 @@ class VariableReader:
         return values[0] if same else None
 
     def usual_scale(self, slots: Sequence[VariableSlot], kind: Kind) -> Array | float:
-        """Parameters vary by their own size, numbers of controllers by WEIGHTS, clocks by CLOCK, everything else by 1."""
+        """Parameters vary by their own size, numbers of controllers by WEIGHTS, clocks by CLOCK, others by 1."""
         value, key = self.nominal(slots), slots[0].name.rpartition(".")[2]
         if kind == "parameter" and key in SCALES:
             return SCALES[key]

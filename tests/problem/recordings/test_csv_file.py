@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from symphys.problem.recordings import csv_file
+from symphys.problem.recordings.columns import RecordingFault
 from symphys.problem.recordings.csv_file import MISSING, read_csv
-from symphys.problem.recordings.faults import RecordingFault
 
 Array = NDArray[np.float64]
 CELLS = st.one_of(st.floats(allow_infinity=False, width=64), st.integers(-(10**6), 10**6).map(float))
@@ -29,7 +29,9 @@ def read(content: str | bytes, *wanted: str) -> Array:
 
 @settings(max_examples=60, deadline=None)
 @given(
-    values=st.integers(1, 4).flatmap(lambda m: st.lists(st.lists(CELLS, min_size=m, max_size=m), min_size=1, max_size=30)),
+    values=st.integers(1, 4).flatmap(
+        lambda m: st.lists(st.lists(CELLS, min_size=m, max_size=m), min_size=1, max_size=30)
+    ),
     missing=st.sampled_from(sorted(MISSING)),
     end=st.sampled_from(["\n", "\r\n"]),
     mark=st.sampled_from([",", ";", "\t"]),
@@ -53,12 +55,13 @@ def test_what_was_written_is_read(values: list[list[float]], missing: str, end: 
         ("a,b\n1,2\n\n3,4\n\n", [[1, 2], [3, 4]]),
         ('a,b\n"1","2"\n', [[1, 2]]),
         ("\ufeffa,b\n 1 , 2\n", [[1, 2]]),
+        ("# a,b\n1,2\n", [[1, 2]]),
         ("a,b\n1,\n,2\n,\n", [[1, np.nan], [np.nan, 2], [np.nan, np.nan]]),
         ("b,a,note\n2,1,left\n4,3,\n", [[1, 2], [3, 4]]),
     ],
 )
 def test_what_programs_write(content: str, rows: list[list[float]]) -> None:
-    """Empty lines, quotes, a byte order mark, spaces, empty cells, columns of texts that are not used."""
+    """Empty lines, quotes, byte order marks, the mark of savetxt, spaces, empty cells, texts that are not used."""
     np.testing.assert_array_equal(read(content, "a", "b"), np.array(rows))
 
 
@@ -96,7 +99,10 @@ def test_a_fault_far_down_is_found_there(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 @settings(max_examples=200, deadline=None)
-@given(st.binary(max_size=200) | st.text("0123456789.,;-+eEnaif \n\r\t\"'x_", max_size=200).map(lambda t: f"a,b\n{t}".encode()))
+@given(
+    st.binary(max_size=200)
+    | st.text("0123456789.,;-+eEnaif \n\r\t\"'x_", max_size=200).map(lambda t: f"a,b\n{t}".encode())
+)
 def test_any_content_is_numbers_or_a_fault(content: bytes) -> None:
     try:
         found = read(content, "a", "b")

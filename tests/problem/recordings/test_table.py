@@ -28,7 +28,9 @@ def values(recording: Recording, which: int = 0) -> list[list[float]]:
 
 
 def test_a_table_in_the_file() -> None:
-    (found,) = loaded({"table": {**TABLE, "z": [1.0, float("nan"), 0.8]}, "measured": [{**HEIGHT, "noise": 0.01}]}).recordings
+    (found,) = loaded(
+        {"table": {**TABLE, "z": [1.0, float("nan"), 0.8]}, "measured": [{**HEIGHT, "noise": 0.01}]}
+    ).recordings
     (height,) = found.measured
     assert (found.name, found.time.tolist(), found.held_back, found.weight) == ("drop", [0, 0.1, 0.2], False, 1)
     assert (height.name, height.columns, height.missing, height.orientation) == ("ball.position[2]", ("z",), 1, False)
@@ -99,7 +101,11 @@ def test_many_recordings(way: str, tmp_path: Path) -> None:
     for each, first, last in zip(found, (0, 3, 5), (3, 5, 8), strict=True):
         np.testing.assert_allclose(each.time, np.arange(last - first) * 0.1, atol=1e-12)
         assert each.measured[0].values.ravel().tolist() == z[first:last].tolist()
-    assert "rows 3 to 4" in found[1].source if way == "rows" else "t9.csv, rows 2 to 3" in found[1].source or way == "split"
+    assert (
+        "rows 3 to 4" in found[1].source
+        if way == "rows"
+        else "t9.csv, rows 2 to 3" in found[1].source or way == "split"
+    )
 
 
 def test_times_from_a_rate_and_a_shifted_clock() -> None:
