@@ -32,7 +32,8 @@ def advice(quantities: Iterable[str]) -> str:
     found = []
     for quantity in quantities:
         last = quantity.split(".")[-1].split("[")[0].strip().lower()
-        said = next((text for text, words in ADVICE.items() if matches(last, words)), GENERAL)
+        fitting = [(len(word), text) for text, words in ADVICE.items() for word in words if is_kind(last, word)]
+        said = max(fitting, default=(0, GENERAL))[1]
         if said not in found:
             found.append(said)
     specific = [text for text in found if text != GENERAL] or found
@@ -40,6 +41,6 @@ def advice(quantities: Iterable[str]) -> str:
     return joined[0].upper() + joined[1:]
 
 
-def matches(name: str, words: tuple[str, ...]) -> bool:
-    """Whether a name is one of the words, or ends or begins with one of them as a word of its own."""
-    return any(name == word or name.endswith(("_" + word, " " + word)) or name.startswith(word + "_") for word in words)
+def is_kind(name: str, word: str) -> bool:
+    """Whether a name is the word, or ends or begins with it as a word of its own."""
+    return name == word or name.endswith(("_" + word, " " + word)) or name.startswith(word + "_")

@@ -96,7 +96,7 @@ def steps(
     s, free = len(shared), np.flatnonzero(information.free_shared)
     sides = system.gradients[:, :s] + np.einsum("kos,ko->ks", information.gain, system.own_gradient)
     prior, slope = np.diag(system.prior_block)[np.ix_(free, free)], system.prior_gradient[free]
-    unit = np.sqrt(np.maximum(np.diagonal(information.shared)[free], np.finfo(float).tiny))
+    unit = np.sqrt(np.maximum(information.reference[free], np.finfo(float).tiny))
     shares, sides = information.shares[:, free][:, :, free], sides[:, free]
     moved = np.zeros((len(weights), s))
     for start in range(0, len(weights), CHUNK):

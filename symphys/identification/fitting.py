@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symphys.identification.interface import Ints, RecordedResiduals
+from symphys.identification.interface import Ints, RecordedResiduals, Rows
 from symphys.identification.levenberg_marquardt import (
     FitOptions,
     FitOutcome,
@@ -38,11 +38,13 @@ class FittedRecordings:
     Attributes:
         problem: residuals divided by the noise, as given or estimated.
         outcome: where the fit ended.
+        evaluated: the Jacobian there, of the recordings that were fitted to.
         uncertainty: there; None where the fit ended without finite residuals.
     """
 
     problem: RecordedResiduals
     outcome: FitOutcome
+    evaluated: Rows
     uncertainty: Uncertainty | None
 
 
@@ -62,30 +64,31 @@ def fit(
     known = bool(problem.noise_known.all())
     if known:
         outcome = RecordingFit(problem, options, which).run(start, monitor, stop)
-        return FittedRecordings(problem, outcome, described(problem, outcome, which, options.loss, known))
+        return described(problem, outcome, which, options.loss)
     coarse = replace(options, tolerance=max(COARSE, options.tolerance))
     factors = np.array(start.noise) if start and start.noise else np.ones(len(problem.quantities))
     for _ in range(ROUNDS):
         scaled = RescaledResiduals(problem, factors)
         outcome = RecordingFit(scaled, coarse, which).run(start, monitor, stop)
-        found = described(scaled, outcome, which, options.loss, known)
-        if found is None or outcome.status is FitStatus.INTERRUPTED:
-            return FittedRecordings(scaled, outcome, found)
+        found = described(scaled, outcome, which, options.loss)
+        if found.uncertainty is None or outcome.status is FitStatus.INTERRUPTED:
+            return found
         start = replace(outcome.state, noise=tuple(map(float, factors)))
-        change = noise_factors(scaled, start.shared, start.own, which, options.loss, found.information)
+        change = noise_factors(scaled, found.evaluated, which, options.loss, found.uncertainty.information)
         if np.all(np.abs(change - 1) < STANDS):
             break
         factors = factors * change
         start = replace(start, damping=math.nan, growth=2.0, quiet=0, noise=tuple(map(float, factors)))
     scaled = RescaledResiduals(problem, factors)
     outcome = RecordingFit(scaled, options, which).run(start, monitor, stop)
-    return FittedRecordings(scaled, outcome, described(scaled, outcome, which, options.loss, known))
+    return described(scaled, outcome, which, options.loss)
 
 
-def described(
-    problem: RecordedResiduals, outcome: FitOutcome, which: Ints, loss: RobustLoss, known: bool
-) -> Uncertainty | None:
-    """The uncertainty where a fit ended; None where residuals are not finite there."""
+def described(problem: RecordedResiduals, outcome: FitOutcome, which: Ints, loss: RobustLoss) -> FittedRecordings:
+    """With the uncertainty where a fit ended."""
+    shared, own = outcome.state.shared, outcome.state.own
+    evaluated = problem.jacobian(shared, own, which)
     if not outcome.system.finite:
-        return None
-    return uncertainty(problem, outcome.state.shared, outcome.state.own, which, loss, known)
+        return FittedRecordings(problem, outcome, evaluated, None)
+    found = uncertainty(problem, evaluated, shared, own, which, loss, bool(problem.noise_known.all()))
+    return FittedRecordings(problem, outcome, evaluated, found)

@@ -107,7 +107,7 @@ def assessed(
     assert known is not None
     shared, own = outcome.state.shared, outcome.state.own
     with clock.of("uncertainty"):
-        opened = open_directions(problem, shared, own, which, options.fit.loss, known.information)
+        opened = open_directions(problem, fitted.evaluated, shared, own, which, options.fit.loss, known.information)
     with clock.of("bootstrap"):
         drawn = resampled(fitted, which, options, stop)
     with clock.of("study"):

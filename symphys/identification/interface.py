@@ -18,6 +18,8 @@ from symphys.errors import SymphysError
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+Rows = list[tuple[Array, Array, Array]]
+"""Of each recording: (m,) residuals, (m, s) and (m, o) their derivatives by the shared and by the own numbers."""
 
 
 class IdentificationError(SymphysError):
@@ -153,5 +155,5 @@ class RecordedResiduals(Protocol):
     def residuals(self, shared: Array, own: Array, which: Ints) -> list[Array]:
         """(m_k,) residuals of each recording in ``which``; shared (s,), own (K, o)."""
 
-    def jacobian(self, shared: Array, own: Array, which: Ints) -> list[tuple[Array, Array, Array]]:
-        """(m_k,) residuals, (m_k, s) and (m_k, o) their derivatives by the shared and by the own numbers."""
+    def jacobian(self, shared: Array, own: Array, which: Ints) -> Rows:
+        """Residuals and derivatives of each recording in ``which``."""

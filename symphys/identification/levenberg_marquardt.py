@@ -256,7 +256,8 @@ class RecordingFit:
 
     def _system(self, shared: Array, own: Array) -> ArrowSystem:
         self.jacobians += len(self.which)
-        return assemble(self.problem, shared, own, self.which, self.loss, self.weights)
+        evaluated = self.problem.jacobian(shared, own, self.which)
+        return assemble(self.problem, evaluated, shared, own, self.which, self.loss, self.weights)
 
     def _first(self, begun: FitState, system: ArrowSystem, began: float) -> FitState:
         """The first iteration sets lambda."""
