@@ -14,6 +14,8 @@ from symphys.results.identification import ParameterEstimate, QuantityResiduals
 
 NARROW = 1.5
 """Ratio of residuals to a given noise, or of both intervals, above which those of the Jacobian are doubted."""
+NEAR = 0.1
+"""Standard errors that a fit which stalls at a kink may leave without a doubt."""
 BENT = 0.5
 """Difference of a refitted draw from its step, in standard deviations of the draws, above which steps are doubted."""
 
@@ -52,7 +54,8 @@ def doubts(
     drawn: Bootstrap,
 ) -> tuple[str, ...]:
     """A sentence for each reason not to rely on the estimates or on their intervals."""
-    found = [] if outcome.status is FitStatus.CONVERGED else [f"the fit has not converged: {outcome.reason}"]
+    near = outcome.status is FitStatus.STALLED and outcome.state.history[-1].left <= NEAR
+    found = [] if near or outcome.status is FitStatus.CONVERGED else [f"the fit has not converged: {outcome.reason}"]
     found += [f"{each.name} is at its {each.at_bound} bound, {each.value:.6g}" for each in parameters if each.at_bound]
     for quantity in quantities:
         if quantity.verdict == "missing effect":
