@@ -9,21 +9,21 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from symphys.identification.assessment import doubts, estimates
-from symphys.identification.bootstrap import Bootstrap, bootstrap, no_bootstrap, refitted
-from symphys.identification.fitting import FittedRecordings, Monitor, fit
-from symphys.identification.identifiability import open_directions
-from symphys.identification.interface import Array, IdentificationError, Ints, RecordedResiduals
-from symphys.identification.levenberg_marquardt import FitOptions, FitState, begin
-from symphys.identification.multistart import SearchOptions, search
-from symphys.identification.residual_study import (
+from symphys.identification.fitting.fit import FittedRecordings, Monitor, fit
+from symphys.identification.fitting.multistart import SearchOptions, search
+from symphys.identification.fitting.state import FitOptions, FitState, begin
+from symphys.identification.inference.assessment import doubts, estimates
+from symphys.identification.inference.bootstrap import Bootstrap, bootstrap, no_bootstrap, refitted
+from symphys.identification.inference.identifiability import open_directions
+from symphys.identification.inference.residual_study import (
     ResidualSamples,
     prediction_errors,
     recording_errors,
     samples,
     study,
 )
-from symphys.identification.uncertainty import Uncertainty
+from symphys.identification.inference.uncertainty import Uncertainty
+from symphys.identification.interface import Array, IdentificationError, Ints, RecordedResiduals
 from symphys.results.identification import HISTORY, GlobalSearch, Identification
 
 
@@ -88,7 +88,8 @@ def identify(
         with clock.of("search"):
             searched, best = search(fitted.problem, fitted.outcome, which, options.fit, options.search, stop)
             if best is not fitted.outcome:
-                fitted = fit(problem, options.fit, which, begin(best.state.shared, best.state.own), monitor, stop)
+                again = replace(begin(best.state.shared, best.state.own), horizon=1.0)
+                fitted = fit(problem, options.fit, which, again, monitor, stop)
     return assessed(fitted, which, options, clock, searched, stop, name, title)
 
 

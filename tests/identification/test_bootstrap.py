@@ -9,7 +9,7 @@ import pytest
 from analytic_recordings import TRUTHS, AnalyticRecordings, Array, recordings
 
 from symphys.identification import FitOptions, IdentificationError, IdentificationOptions, fit, identify
-from symphys.identification.bootstrap import Bootstrap, bootstrap, refitted
+from symphys.identification.inference.bootstrap import Bootstrap, bootstrap, refitted
 
 
 def many(name: str, seed: int, count: int = 20) -> AnalyticRecordings:

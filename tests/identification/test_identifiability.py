@@ -9,8 +9,8 @@ import pytest
 from analytic_recordings import TRUTHS, Array, Truth, recordings, slide
 
 from symphys.identification import FitOptions, IdentificationOptions, fit_parameters, identify
-from symphys.identification.advice import GENERAL, advice
-from symphys.identification.identifiability import components, echelon, monomial, whole_powers
+from symphys.identification.inference.advice import GENERAL, advice
+from symphys.identification.inference.identifiability import components, echelon, monomial, whole_powers
 from symphys.results.identification import Identification
 
 SEEDS = range(20)

@@ -9,7 +9,7 @@ import pytest
 from analytic_recordings import TRUTHS, AnalyticRecordings, Array, Truth, oscillator, recordings
 
 from symphys.identification import IdentificationOptions, fit_parameters, identify
-from symphys.identification.residual_study import explained, ljung_box
+from symphys.identification.inference.residual_study import explained, ljung_box
 from symphys.results.identification import Identification
 
 QUIET = IdentificationOptions(draws=0)

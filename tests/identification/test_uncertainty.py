@@ -11,7 +11,7 @@ from analytic_recordings import TRUTHS, AnalyticRecordings, Array, Truth, record
 from repeats import thorough
 
 from symphys.identification import FitOptions, IdentificationOptions, fit, fit_parameters, identify
-from symphys.identification.uncertainty import Uncertainty
+from symphys.identification.inference.uncertainty import Uncertainty
 
 DRAWS = 100
 UNKNOWN = np.array([False])

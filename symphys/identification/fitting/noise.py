@@ -11,9 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from symphys.identification.fitting.robust_loss import RobustLoss
+from symphys.identification.inference.uncertainty import Information, pseudo_inverse
 from symphys.identification.interface import Array, Ints, RecordedResiduals, ResidualRows, Rows
-from symphys.identification.robust_loss import RobustLoss
-from symphys.identification.uncertainty import Information, pseudo_inverse
 
 LEAST = 1e-12
 """A factor on the guess of a noise is at least so large: recordings that are met exactly have none."""

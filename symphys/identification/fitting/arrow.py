@@ -17,8 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from symphys.identification.fitting.robust_loss import RobustLoss
 from symphys.identification.interface import Array, Bools, FitParameters, Ints, RecordedResiduals, Rows
-from symphys.identification.robust_loss import RobustLoss
 
 EPS = float(np.finfo(float).eps)
 NO_INFORMATION = 1e-10

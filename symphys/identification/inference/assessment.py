@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from symphys.identification.bootstrap import Bootstrap
+from symphys.identification.fitting.state import FitOutcome, FitStatus
+from symphys.identification.inference.bootstrap import Bootstrap
+from symphys.identification.inference.uncertainty import Uncertainty
 from symphys.identification.interface import Array, RecordedResiduals
-from symphys.identification.levenberg_marquardt import FitOutcome, FitStatus
-from symphys.identification.uncertainty import Uncertainty
 from symphys.results.identification import ParameterEstimate, QuantityResiduals
 
 NARROW = 1.5

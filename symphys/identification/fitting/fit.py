@@ -8,23 +8,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from symphys.identification.fitting.horizons import TruncatedRecordings
+from symphys.identification.fitting.levenberg_marquardt import RecordingFit
+from symphys.identification.fitting.noise import RescaledResiduals, noise_factors
+from symphys.identification.fitting.robust_loss import RobustLoss
+from symphys.identification.fitting.state import FitOptions, FitOutcome, FitState, FitStatus, FitStep, begin
+from symphys.identification.inference.uncertainty import Uncertainty, uncertainty
 from symphys.identification.interface import Ints, RecordedResiduals, Rows
-from symphys.identification.levenberg_marquardt import (
-    FitOptions,
-    FitOutcome,
-    FitState,
-    FitStatus,
-    FitStep,
-    RecordingFit,
-)
-from symphys.identification.noise import RescaledResiduals, noise_factors
-from symphys.identification.robust_loss import RobustLoss
-from symphys.identification.uncertainty import Uncertainty, uncertainty
 
 ROUNDS = 20
 """Turns of fit and noise at most."""
 STANDS = 1e-3
 """The noise stands where its deviations change by less than this share."""
+EARLY = 0.1
+"""Standard errors that a fit may leave of a share of the recordings that is the start of another."""
 COARSE = 1e-2
 """Standard errors that a fit may leave while the noise still changes."""
 
@@ -58,15 +55,41 @@ def fit(
 ) -> FittedRecordings:
     """Fit the recordings in ``which``, those not held back by default, and estimate noise that is not given.
 
-    ``start`` goes on from an interrupted fit.
+    Each share in ``options.horizons`` of the recordings is the start of the next. ``start`` goes on from an interrupted
+    fit.
     """
     which = np.flatnonzero(~problem.held_back) if which is None else which
+    early = replace(options, tolerance=max(EARLY, options.tolerance))
+    for share in options.horizons:
+        if start is not None and start.horizon > share:
+            continue
+        last = share == options.horizons[-1]
+        part = problem if share == 1 else TruncatedRecordings(problem, share)
+        if start is not None and start.horizon < share:
+            start = replace(start, damping=math.nan, growth=2.0, quiet=0)
+        start = replace(start or begin(problem.shared.guess, problem.own.guess), horizon=share)
+        found = fit_part(part, options if last else early, which, start, monitor, stop)
+        if last or found.uncertainty is None or found.outcome.status is FitStatus.INTERRUPTED:
+            break
+        start = found.outcome.state
+    return found
+
+
+def fit_part(
+    problem: RecordedResiduals,
+    options: FitOptions,
+    which: Ints,
+    start: FitState,
+    monitor: Monitor | None,
+    stop: Callable[[], bool] | None,
+) -> FittedRecordings:
+    """Fit one share of the recordings; fit and noise take turns."""
     known = bool(problem.noise_known.all())
     if known:
         outcome = RecordingFit(problem, options, which).run(start, monitor, stop)
         return described(problem, outcome, which, options.loss)
     coarse = replace(options, tolerance=max(COARSE, options.tolerance))
-    factors = np.array(start.noise) if start and start.noise else np.ones(len(problem.quantities))
+    factors = np.array(start.noise) if start.noise else np.ones(len(problem.quantities))
     for _ in range(ROUNDS):
         scaled = RescaledResiduals(problem, factors)
         outcome = RecordingFit(scaled, coarse, which).run(start, monitor, stop)

@@ -17,10 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.stats
 
-from symphys.identification.arrow import NO_INFORMATION, ArrowSystem
+from symphys.identification.fitting.arrow import NO_INFORMATION, ArrowSystem
+from symphys.identification.fitting.levenberg_marquardt import RecordingFit
+from symphys.identification.fitting.state import FitOptions, FitState, begin
+from symphys.identification.inference.uncertainty import LEVEL, Information
 from symphys.identification.interface import Array, IdentificationError, Ints, RecordedResiduals
-from symphys.identification.levenberg_marquardt import FitOptions, FitState, RecordingFit, begin
-from symphys.identification.uncertainty import LEVEL, Information
 
 FEWEST = 5
 """Recordings that a bootstrap needs."""

@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.stats
 
-from symphys.identification.arrow import NO_INFORMATION, ArrowSystem, assemble
+from symphys.identification.fitting.arrow import NO_INFORMATION, ArrowSystem, assemble
+from symphys.identification.fitting.levenberg_marquardt import movable
+from symphys.identification.fitting.robust_loss import RobustLoss
 from symphys.identification.interface import Array, Bools, FitParameters, Ints, RecordedResiduals, Rows
-from symphys.identification.levenberg_marquardt import movable
-from symphys.identification.robust_loss import RobustLoss
 
 LEVEL = 0.95
 TOUCHED = 1e-3

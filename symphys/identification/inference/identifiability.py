@@ -14,10 +14,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from symphys.identification.advice import advice
+from symphys.identification.fitting.robust_loss import RobustLoss
+from symphys.identification.inference.advice import advice
+from symphys.identification.inference.uncertainty import Information
 from symphys.identification.interface import Array, Ints, RecordedResiduals, Rows
-from symphys.identification.robust_loss import RobustLoss
-from symphys.identification.uncertainty import Information
 from symphys.results.identification.parts import OpenDirection
 
 WIDE = 1.0
