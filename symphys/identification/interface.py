@@ -150,7 +150,7 @@ class RecordedResiduals(Protocol):
     """Of the quantities: False where ``noise`` is a guess, whose scale is estimated."""
 
     def rows(self, recording: int) -> ResidualRows:
-        """What the residuals of a recording are of."""
+        """What the residuals of a recording are of; asked often, so worth keeping."""
 
     def residuals(self, shared: Array, own: Array, which: Ints) -> list[Array]:
         """(m_k,) residuals of each recording in ``which``; shared (s,), own (K, o)."""

@@ -137,7 +137,7 @@ def test_powers_are_recognised_where_they_are_whole() -> None:
 
 
 def test_advice_depends_on_the_kind_of_quantity() -> None:
-    assert "known mass" in advice(["cube.mass"])
+    assert "known mass" in advice(["cube.mass"]) and "spin freely" in advice(["cube.center_of_mass[0]"])
     assert "slide" in advice(["ground.friction"]) and "known mass" in advice(["ground.friction", "cube.mass"])
     assert advice(["cube.colour"])[1:] == GENERAL[1:]
     assert "dry friction" in advice(["hinge.dry_friction"]) and "roll" in advice(["ball.rolling_friction"])

@@ -133,3 +133,17 @@ def test_held_back_recordings_that_are_not_finite_are_inf() -> None:
     found = identify(problem, IdentificationOptions(draws=0))
     assert found.status == "converged" and found.worst(1) == (("toss/0011", np.inf),)
     assert np.isinf(found.held_back_errors[0].rmse)
+
+
+def test_a_recording_without_a_sample_changes_nothing() -> None:
+    """Its own number is not determined, and that is said."""
+    problem = bounces()
+    problem.measured[4][:] = np.nan
+    found = identify(problem)
+    without = bounces()
+    without.held_back[4] = True
+    expected = identify(without)
+    assert found["restitution"].value == pytest.approx(expected["restitution"].value, rel=1e-9)
+    assert found["restitution"].error == pytest.approx(expected["restitution"].error, rel=1e-2)
+    assert np.isinf(found.own_error[4, 0]) and np.isnan(found.recording_ratio[4])
+    assert "own 0 is not determined in 1 of 12 recordings, toss/0004 the first" in summary(found)
