@@ -137,7 +137,7 @@ def assessed(
         recordings=problem.recordings,
         search=searched,
         bootstrap_note=drawn.note,
-        doubts=doubts(outcome, parameters, quantities, drawn),
+        doubts=doubts(outcome, parameters, quantities, drawn, known.freedom),
         seconds=clock.seconds,
         evaluations={"simulations": float(last.simulations), "jacobians": float(last.jacobians)},
         own=own,

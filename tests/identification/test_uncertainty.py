@@ -149,3 +149,8 @@ def test_gross_errors_widen_little_under_hubers_loss() -> None:
     robust, squares = found[1.345], found[math.inf]
     assert robust.error < 0.5 * squares.error
     assert abs(robust.value - 9.81) < 4 * robust.error
+
+
+def test_more_numbers_than_residuals_are_a_doubt() -> None:
+    problem = recordings(replace(TRUTHS["projectile"], samples=1, own=TRUTHS["projectile"].own[:2]), 0)
+    assert any("are 3 too many for the residuals" in doubt for doubt in identify(problem).doubts)

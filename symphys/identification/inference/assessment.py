@@ -52,11 +52,17 @@ def doubts(
     parameters: Sequence[ParameterEstimate],
     quantities: Sequence[QuantityResiduals],
     drawn: Bootstrap,
+    freedom: int,
 ) -> tuple[str, ...]:
-    """A sentence for each reason not to rely on the estimates or on their intervals."""
+    """A sentence for each reason not to rely on the estimates or on their intervals.
+
+    ``freedom``: residuals less numbers that were estimated.
+    """
     near = outcome.status is FitStatus.STALLED and outcome.state.history[-1].left <= NEAR
     found = [] if near or outcome.status is FitStatus.CONVERGED else [f"the fit has not converged: {outcome.reason}"]
     found += [f"{each.name} is at its {each.at_bound} bound, {each.value:.6g}" for each in parameters if each.at_bound]
+    if freedom < 1:
+        found.append(f"numbers are {1 - freedom} too many for the residuals: nothing is left to judge the fit by")
     for quantity in quantities:
         if quantity.verdict == "missing effect":
             found.append(f"the model misses an effect on {quantity.name}: {quantity.text}")

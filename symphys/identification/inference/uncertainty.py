@@ -151,9 +151,10 @@ def uncertainty(
     bread = make_information(system, free_shared, free_own)
     covariance, own_variance, open_shared = covariances(bread, squares)
     size = sum(len(r) for r, _, _ in evaluated)
-    freedom = max(1, size - int(free_shared.sum()) - int(free_own.sum()))
+    freedom = size - int(free_shared.sum()) - int(free_own.sum())
     if loss.robust:
-        covariance, own_variance = covariance * size / freedom, own_variance * size / freedom
+        correction = size / max(freedom, 1)
+        covariance, own_variance = covariance * correction, own_variance * correction
     covariance = covariance * np.outer(problem.shared.scale, problem.shared.scale)
     covariance[open_shared, open_shared] = np.inf
     covariance[~free_shared, :] = covariance[:, ~free_shared] = np.nan
@@ -166,7 +167,7 @@ def uncertainty(
     some = np.ix_(known, known)
     correlation[some] = covariance[some] / np.outer(error[known], error[known])
     tail = (1 + LEVEL) / 2
-    quantile = float(scipy.stats.norm.ppf(tail) if noise_known else scipy.stats.t.ppf(tail, freedom))
+    quantile = float(scipy.stats.norm.ppf(tail) if noise_known else scipy.stats.t.ppf(tail, max(freedom, 1)))
     own_free = np.ones(own.shape, bool)
     own_free[which] = free_own
     sides = (at_bound(problem.shared, shared, free_shared), at_bound(problem.own, own, own_free))
