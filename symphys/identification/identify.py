@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from symphys.identification.fitting.fit import FittedRecordings, Monitor, fit
+from symphys.identification.fitting.fit import FittedRecordings, Monitor, fit, starts_before_impact
 from symphys.identification.fitting.multistart import SearchOptions, search
 from symphys.identification.fitting.state import FitOptions, FitState, begin
 from symphys.identification.inference.assessment import doubts, estimates
@@ -25,6 +25,10 @@ from symphys.identification.inference.residual_study import (
 from symphys.identification.inference.uncertainty import Uncertainty
 from symphys.identification.interface import Array, IdentificationError, Ints, RecordedResiduals
 from symphys.results.identification import HISTORY, GlobalSearch, Identification
+from symphys.suggest import hint
+
+STARTS = ("guess", "before impact")
+"""Where own numbers of recordings that are held back come from."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,8 @@ class IdentificationOptions:
         draws: of the bootstrap; 0: none.
         refits: draws of it that are fitted in full, to check the steps.
         search: the check against local minima; None: none.
+        held_back_starts: own numbers of recordings held back: "guess" keeps them, "before impact" fits them to what was
+            measured before the first impact.
         seed: of the bootstrap.
     """
 
@@ -43,7 +49,15 @@ class IdentificationOptions:
     draws: int = 2000
     refits: int = 0
     search: SearchOptions | None = None
+    held_back_starts: str = "guess"
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        """IdentificationError names the option and what would be valid."""
+        if self.held_back_starts not in STARTS:
+            raise IdentificationError(
+                f"held_back_starts is {self.held_back_starts!r}: {hint(self.held_back_starts, STARTS)}"
+            )
 
 
 class Clock:
@@ -70,7 +84,7 @@ def identify(
     name: str = "",
     title: str = "",
 ) -> Identification:
-    """All that the recordings say: see ``Identification``. Own numbers of recordings held back stay at their guess.
+    """All that the recordings say: see ``Identification``.
 
     ``start`` goes on from an interrupted fit; ``stop`` is asked after each iteration, ``monitor`` told of each.
 
@@ -107,6 +121,10 @@ def assessed(
     problem, outcome, known = fitted.problem, fitted.outcome, fitted.uncertainty
     assert known is not None
     shared, own = outcome.state.shared, outcome.state.own
+    others = np.setdiff1d(np.arange(len(own)), which)
+    if options.held_back_starts == STARTS[1] and others.size:
+        with clock.of("starts"):
+            own = starts_before_impact(problem, shared, own, others, options.fit)
     with clock.of("uncertainty"):
         opened = open_directions(problem, fitted.evaluated, shared, own, which, options.fit.loss, known.information)
     with clock.of("bootstrap"):

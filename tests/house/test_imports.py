@@ -63,7 +63,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "casadi numpy pandas pyarrow scipy",
         "what a run folder holds",
     ),
-    "identification": ("errors results", "cma numpy scipy", "estimates from recordings, no physics"),
+    "identification": ("errors results suggest", "cma numpy scipy", "estimates from recordings, no physics"),
     "runs": (
         "codegen errors files findings json_values problem results shooting solvers trajectory transcription "
         "verification version",

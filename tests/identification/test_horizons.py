@@ -9,8 +9,18 @@ import numpy as np
 import pytest
 from analytic_recordings import TRUTHS, AnalyticRecordings, Truth, recordings, tumble
 
-from symphys.identification import FitOptions, FitState, FitStatus, FitStep, IdentificationError, fit, revive_state
-from symphys.identification.fitting.horizons import TruncatedRecordings
+from symphys.identification import (
+    FitOptions,
+    FitState,
+    FitStatus,
+    FitStep,
+    IdentificationError,
+    IdentificationOptions,
+    fit,
+    identify,
+    revive_state,
+)
+from symphys.identification.fitting.horizons import PartialRecordings, before_impact, first_share
 
 GROWING = (0.3, 0.5, 0.7, 0.85, 1.0)
 
@@ -46,7 +56,7 @@ def test_they_end_where_the_whole_does_where_there_is_one_minimum() -> None:
 
 def test_a_share_has_the_rows_of_its_time() -> None:
     problem = recordings(TRUTHS["bounce"], 3, impacts=[0.4, 0.3, 0.5])
-    part, which = TruncatedRecordings(problem, 0.5), np.array([2, 0])
+    part, which = PartialRecordings(problem, first_share(0.5)), np.array([2, 0])
     at = problem.shared.guess, problem.own.guess, which
     for k, r, (_, by_shared, by_own), whole in zip(
         which, part.residuals(*at), part.jacobian(*at), problem.residuals(*at), strict=True
@@ -81,3 +91,29 @@ def test_an_interruption_in_any_of_them_loses_nothing(known: bool, after: int) -
 def test_horizons_rise_to_one(wrong: tuple[float, ...]) -> None:
     with pytest.raises(IdentificationError, match="rise to 1"):
         FitOptions(horizons=wrong)
+
+
+def test_starts_of_recordings_held_back_come_from_before_the_impact() -> None:
+    """The prediction then is as good as that of the exact start, and what happens later has no part in the start."""
+    truth = TRUTHS["bounce"]
+    problem = recordings(truth, 5, off=1.0, impacts=[float(np.sqrt(2 * own[0] / 9.81)) for own in truth.own])
+    problem.held_back[2] = True
+    problem.own.guess[2] = 1.5
+    late = problem.times[2] > 0.6
+    errors = {}
+    for starts in ("guess", "before impact"):
+        found = identify(problem, IdentificationOptions(draws=0, held_back_starts=starts))
+        errors[starts] = found.held_back_errors[0].ratio
+    assert errors["guess"] > 10 and errors["before impact"] < 2
+    assert found.own[2, 0] == pytest.approx(1.4, abs=0.01)
+    problem.measured[2][late] += 1.0
+    later = identify(problem, IdentificationOptions(draws=0, held_back_starts="before impact"))
+    assert later.own[2, 0] == found.own[2, 0] and later.held_back_errors[0].ratio > 10
+    with pytest.raises(IdentificationError, match='did you mean "before impact"'):
+        IdentificationOptions(held_back_starts="before impacts")
+
+
+def test_before_the_impact_is_before_the_first() -> None:
+    rows = recordings(TRUTHS["bounce"], 0, impacts=[0.5, 0.5, 0.5]).rows(0)
+    assert np.array_equal(before_impact(rows), rows.time < 0.5)
+    assert before_impact(replace(rows, impact=np.full(40, np.nan))).all()

@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symphys.identification.fitting.horizons import TruncatedRecordings
+from symphys.identification.fitting.horizons import PartialRecordings, before_impact, first_share
 from symphys.identification.fitting.levenberg_marquardt import RecordingFit
 from symphys.identification.fitting.noise import RescaledResiduals, noise_factors
 from symphys.identification.fitting.robust_loss import RobustLoss
 from symphys.identification.fitting.state import FitOptions, FitOutcome, FitState, FitStatus, FitStep, begin
 from symphys.identification.inference.uncertainty import Uncertainty, uncertainty
-from symphys.identification.interface import Ints, RecordedResiduals, Rows
+from symphys.identification.interface import Array, Ints, RecordedResiduals, Rows
 
 ROUNDS = 20
 """Turns of fit and noise at most."""
@@ -64,7 +64,7 @@ def fit(
         if start is not None and start.horizon > share:
             continue
         last = share == options.horizons[-1]
-        part = problem if share == 1 else TruncatedRecordings(problem, share)
+        part = problem if share == 1 else PartialRecordings(problem, first_share(share))
         if start is not None and start.horizon < share:
             start = replace(start, damping=math.nan, growth=2.0, quiet=0)
         start = replace(start or begin(problem.shared.guess, problem.own.guess), horizon=share)
@@ -105,6 +105,21 @@ def fit_part(
     scaled = RescaledResiduals(problem, factors)
     outcome = RecordingFit(scaled, options, which).run(start, monitor, stop)
     return described(scaled, outcome, which, options.loss)
+
+
+def starts_before_impact(
+    problem: RecordedResiduals, shared: Array, own: Array, which: Ints, options: FitOptions
+) -> Array:
+    """(K, o) own numbers, of the recordings in ``which`` fitted to what was measured before the first impact.
+
+    Shared numbers stay. A recording whose simulation is not finite there keeps its own numbers.
+    """
+    part = PartialRecordings(problem, before_impact)
+    finite = [bool(np.isfinite(r).all()) for r in part.residuals(shared, own, which)]
+    some = which[np.array(finite, bool)]
+    if not some.size or not own.shape[1]:
+        return own
+    return RecordingFit(part, options, some, hold_shared=True).run(begin(shared, own)).state.own
 
 
 def described(problem: RecordedResiduals, outcome: FitOutcome, which: Ints, loss: RobustLoss) -> FittedRecordings:

@@ -1,4 +1,4 @@
-"""Recordings cut off after a share of their time, so that fits may begin with what happens first.
+"""Recordings of which only a part counts: a first share of their time, or what is before the first impact.
 
 After an impact a motion depends on its start more and more steeply, and where it leads to other impacts the merit has a
 minimum for each. A fit of the first third of each recording has few of them. It is the start of a fit of the first
@@ -7,17 +7,34 @@ half, and so on to the whole.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+
+import numpy as np
 
 from symphys.identification.interface import Array, Bools, Ints, RecordedResiduals, ResidualRows, Rows
 
+Selection = Callable[[ResidualRows], Bools]
+"""Of the m rows of a recording: (m,) which count."""
 
-class TruncatedRecordings:
-    """A problem without what was measured after a share of the time of each recording."""
 
-    def __init__(self, problem: RecordedResiduals, share: float) -> None:
-        """``share`` of the last measured time, above 0 and at most 1."""
-        self.problem, self.share = problem, share
+def first_share(share: float) -> Selection:
+    """What was measured in the first ``share`` of the time of a recording, above 0 and at most 1."""
+    return lambda rows: rows.time <= share * rows.time.max(initial=0.0)
+
+
+def before_impact(rows: ResidualRows) -> Bools:
+    """What was measured before the first impact."""
+    after = rows.time[~np.isnan(rows.impact)]
+    return np.asarray(rows.time < after.min(initial=np.inf))
+
+
+class PartialRecordings:
+    """A problem of which only some rows of each recording count."""
+
+    def __init__(self, problem: RecordedResiduals, selection: Selection) -> None:
+        """``selection`` is asked once for each recording."""
+        self.problem, self.selection = problem, selection
         self.recordings, self.held_back = problem.recordings, problem.held_back
         self.shared, self.own = problem.shared, problem.own
         self.quantities, self.units, self.noise_known = problem.quantities, problem.units, problem.noise_known
@@ -26,8 +43,7 @@ class TruncatedRecordings:
     def kept(self, recording: int) -> Bools:
         """(m,) which residuals of the problem are kept."""
         if recording not in self._kept:
-            time = self.problem.rows(recording).time
-            self._kept[recording] = time <= self.share * time.max(initial=0.0)
+            self._kept[recording] = self.selection(self.problem.rows(recording))
         return self._kept[recording]
 
     def rows(self, recording: int) -> ResidualRows:
