@@ -117,6 +117,26 @@ def slide(shared: Array, own: Array, time: Array) -> Array:
     return np.where(moving, own[0] * time - slowing * time**2 / 2, own[0] ** 2 / (2 * slowing))[:, None]
 
 
+def tumble(shared: Array, own: Array, time: Array) -> Array:
+    """A ball on a floor of bumps: own height [m] and speed [m/s], shared gravity and restitution; places (n, 2).
+
+    A bump turns the speed along the floor by its slope where the ball lands: chaos, in closed form between impacts.
+    """
+    g, e = shared
+    since = np.sqrt(2 * own[0] / g)
+    x, along, up = own[1] * since, own[1], g * since
+    falling = time < since.real
+    height, place = np.where(falling, own[0] - g * time**2 / 2, 0 * g), np.where(falling, own[1] * time, 0 * g)
+    for _ in range(8):
+        up = e * up
+        along, flight = along + 0.25 * np.sin(40 * x) * up, 2 * up / g
+        there, left = (time >= since.real) & (time < (since + flight).real), time - since
+        height = np.where(there, up * left - g * left**2 / 2, height)
+        place = np.where(there, x + along * left, place)
+        x, since = x + along * flight, since + flight
+    return np.stack([place, height], axis=1)
+
+
 @dataclass(frozen=True)
 class Truth:
     """A model with its true numbers: shared (s,), own (K, o), where the fit starts, and samples of each recording."""

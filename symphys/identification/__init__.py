@@ -3,7 +3,9 @@
 ``interface`` has the problem, ``identify`` the way through.
 """
 
-from symphys.identification.fitting import FittedRecordings, fit
+from symphys.identification.fitting.fit import FittedRecordings, fit
+from symphys.identification.fitting.multistart import SearchOptions
+from symphys.identification.fitting.state import FitOptions, FitOutcome, FitState, FitStatus, FitStep, revive_state
 from symphys.identification.identify import IdentificationOptions, identify
 from symphys.identification.interface import (
     FitParameters,
@@ -12,15 +14,6 @@ from symphys.identification.interface import (
     ResidualRows,
     fit_parameters,
 )
-from symphys.identification.levenberg_marquardt import (
-    FitOptions,
-    FitOutcome,
-    FitState,
-    FitStatus,
-    FitStep,
-    revive_state,
-)
-from symphys.identification.multistart import SearchOptions
 
 __all__ = [
     "FitOptions",

@@ -9,22 +9,26 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from symphys.identification.assessment import doubts, estimates
-from symphys.identification.bootstrap import Bootstrap, bootstrap, no_bootstrap, refitted
-from symphys.identification.fitting import FittedRecordings, Monitor, fit
-from symphys.identification.identifiability import open_directions
-from symphys.identification.interface import Array, IdentificationError, Ints, RecordedResiduals
-from symphys.identification.levenberg_marquardt import FitOptions, FitState, begin
-from symphys.identification.multistart import SearchOptions, search
-from symphys.identification.residual_study import (
+from symphys.identification.fitting.fit import FittedRecordings, Monitor, fit, starts_before_impact
+from symphys.identification.fitting.multistart import SearchOptions, search
+from symphys.identification.fitting.state import FitOptions, FitState, begin
+from symphys.identification.inference.assessment import doubts, estimates
+from symphys.identification.inference.bootstrap import Bootstrap, bootstrap, no_bootstrap, refitted
+from symphys.identification.inference.identifiability import open_directions
+from symphys.identification.inference.residual_study import (
     ResidualSamples,
     prediction_errors,
     recording_errors,
     samples,
     study,
 )
-from symphys.identification.uncertainty import Uncertainty
+from symphys.identification.inference.uncertainty import Uncertainty
+from symphys.identification.interface import Array, IdentificationError, Ints, RecordedResiduals
 from symphys.results.identification import HISTORY, GlobalSearch, Identification
+from symphys.suggest import hint
+
+STARTS = ("guess", "before impact")
+"""Where own numbers of recordings that are held back come from."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,8 @@ class IdentificationOptions:
         draws: of the bootstrap; 0: none.
         refits: draws of it that are fitted in full, to check the steps.
         search: the check against local minima; None: none.
+        held_back_starts: own numbers of recordings held back: "guess" keeps them, "before impact" fits them to what was
+            measured before the first impact.
         seed: of the bootstrap.
     """
 
@@ -43,7 +49,15 @@ class IdentificationOptions:
     draws: int = 2000
     refits: int = 0
     search: SearchOptions | None = None
+    held_back_starts: str = "guess"
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        """IdentificationError names the option and what would be valid."""
+        if self.held_back_starts not in STARTS:
+            raise IdentificationError(
+                f"held_back_starts is {self.held_back_starts!r}: {hint(self.held_back_starts, STARTS)}"
+            )
 
 
 class Clock:
@@ -70,7 +84,7 @@ def identify(
     name: str = "",
     title: str = "",
 ) -> Identification:
-    """All that the recordings say: see ``Identification``. Own numbers of recordings held back stay at their guess.
+    """All that the recordings say: see ``Identification``.
 
     ``start`` goes on from an interrupted fit; ``stop`` is asked after each iteration, ``monitor`` told of each.
 
@@ -88,7 +102,8 @@ def identify(
         with clock.of("search"):
             searched, best = search(fitted.problem, fitted.outcome, which, options.fit, options.search, stop)
             if best is not fitted.outcome:
-                fitted = fit(problem, options.fit, which, begin(best.state.shared, best.state.own), monitor, stop)
+                again = replace(begin(best.state.shared, best.state.own), horizon=1.0)
+                fitted = fit(problem, options.fit, which, again, monitor, stop)
     return assessed(fitted, which, options, clock, searched, stop, name, title)
 
 
@@ -106,8 +121,12 @@ def assessed(
     problem, outcome, known = fitted.problem, fitted.outcome, fitted.uncertainty
     assert known is not None
     shared, own = outcome.state.shared, outcome.state.own
+    others = np.setdiff1d(np.arange(len(own)), which)
+    if options.held_back_starts == STARTS[1] and others.size:
+        with clock.of("starts"):
+            own = starts_before_impact(problem, shared, own, others, options.fit)
     with clock.of("uncertainty"):
-        opened = open_directions(problem, shared, own, which, options.fit.loss, known.information)
+        opened = open_directions(problem, fitted.evaluated, shared, own, which, options.fit.loss, known.information)
     with clock.of("bootstrap"):
         drawn = resampled(fitted, which, options, stop)
     with clock.of("study"):
@@ -136,7 +155,7 @@ def assessed(
         recordings=problem.recordings,
         search=searched,
         bootstrap_note=drawn.note,
-        doubts=doubts(outcome, parameters, quantities, drawn),
+        doubts=doubts(outcome, parameters, quantities, drawn, known.freedom),
         seconds=clock.seconds,
         evaluations={"simulations": float(last.simulations), "jacobians": float(last.jacobians)},
         own=own,

@@ -18,6 +18,8 @@ from symphys.errors import SymphysError
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+Rows = list[tuple[Array, Array, Array]]
+"""Of each recording: (m,) residuals, (m, s) and (m, o) their derivatives by the shared and by the own numbers."""
 
 
 class IdentificationError(SymphysError):
@@ -148,10 +150,10 @@ class RecordedResiduals(Protocol):
     """Of the quantities: False where ``noise`` is a guess, whose scale is estimated."""
 
     def rows(self, recording: int) -> ResidualRows:
-        """What the residuals of a recording are of."""
+        """What the residuals of a recording are of; asked often, so worth keeping."""
 
     def residuals(self, shared: Array, own: Array, which: Ints) -> list[Array]:
         """(m_k,) residuals of each recording in ``which``; shared (s,), own (K, o)."""
 
-    def jacobian(self, shared: Array, own: Array, which: Ints) -> list[tuple[Array, Array, Array]]:
-        """(m_k,) residuals, (m_k, s) and (m_k, o) their derivatives by the shared and by the own numbers."""
+    def jacobian(self, shared: Array, own: Array, which: Ints) -> Rows:
+        """Residuals and derivatives of each recording in ``which``."""

@@ -63,9 +63,9 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "casadi numpy pandas pyarrow scipy",
         "what a run folder holds",
     ),
-    "identification": ("errors results", "cma numpy scipy", "estimates from recordings, no physics"),
+    "identification": ("errors results suggest", "cma numpy scipy", "estimates from recordings, no physics"),
     "prediction": (
-        "expression identification model problem transcription",
+        "errors expression files identification model problem results suggest threads transcription",
         "numpy",
         "what problems predict for their recordings",
     ),

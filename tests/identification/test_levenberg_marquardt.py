@@ -14,7 +14,8 @@ from analytic_recordings import TRUTHS, AnalyticRecordings, Array, recordings
 from repeats import first
 
 from symphys.identification import FitOptions, FitStatus, IdentificationError, fit_parameters, revive_state
-from symphys.identification.levenberg_marquardt import FitState, FitStep, RecordingFit
+from symphys.identification.fitting.levenberg_marquardt import RecordingFit
+from symphys.identification.fitting.state import FitState, FitStep
 
 TIGHT = FitOptions(tolerance=1e-9, iterations=300, patience=0)
 

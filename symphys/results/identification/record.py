@@ -112,6 +112,16 @@ class Identification:
             raise KeyError(f"no shared number {name}: there are {', '.join(found)}")
         return found[name]
 
+    def own_numbers(self, recording: str) -> dict[str, tuple[float, float]]:
+        """Own numbers of a recording by name, each with its standard error; KeyError without such a recording."""
+        if recording not in self.recordings:
+            raise KeyError(
+                f"no recording {recording}: there are {len(self.recordings)}, the first {self.recordings[:1]}"
+            )
+        k = self.recordings.index(recording)
+        pairs = zip(self.own_names, self.own[k], self.own_error[k], strict=True)
+        return {name: (float(value), float(error)) for name, value, error in pairs}
+
     def worst(self, count: int = 5) -> tuple[tuple[str, float], ...]:
         """The recordings whose residuals are largest, and their root mean square by noise."""
         order = np.argsort(np.where(np.isnan(self.recording_ratio), -np.inf, -self.recording_ratio))

@@ -25,8 +25,13 @@ FEWEST = 20
 BINS = 8
 """Means over a time."""
 CORRELATED, UNLIKELY, COURSE = 0.2, 1e-3, 0.1
-"""An effect is missing where the correlation is above the first and its probability below the second, or where means
-explain more than the third."""
+"""An effect is missing where the correlation is above the first, or where means explain more than the third, and the
+probability of that under noise is below the second."""
+COURSES = {
+    "by_time": "the time in the recording",
+    "by_impact": "the time since the impact",
+    "by_recording": "which recording it is",
+}
 FARTHER, NEARER = 1.25, 0.8
 """Root mean squares by noise beyond which the given noise is called too small, or too large."""
 
@@ -82,6 +87,11 @@ def quantity_residuals(name: str, unit: str, known: bool, part: ResidualSamples)
     correlation, probability, lags = ljung_box(series(part))
     since = ~np.isnan(rows.impact)
     groups = part.recording * (int(rows.component.max()) + 1) + rows.component
+    shares = {
+        "by_time": explained(r, binned(rows.time, rows.component)),
+        "by_impact": explained(r[since], binned(rows.impact[since], rows.component[since])),
+        "by_recording": explained(r, np.unique(groups, return_inverse=True)[1]),
+    }
     measured = QuantityResiduals(
         name=name,
         unit=unit,
@@ -94,25 +104,18 @@ def quantity_residuals(name: str, unit: str, known: bool, part: ResidualSamples)
         autocorrelation=correlation,
         ljung_box=probability,
         lags=lags,
-        by_time=explained(r, binned(rows.time, rows.component)),
-        by_impact=explained(r[since], binned(rows.impact[since], rows.component[since])),
-        by_recording=explained(r, np.unique(groups, return_inverse=True)[1]),
         verdict="",
         text="",
+        **{name: share for name, (share, _) in shares.items()},
     )
-    return judged(measured)
+    return judged(measured, [name for name, (share, chance) in shares.items() if share > COURSE and chance < UNLIKELY])
 
 
-def judged(found: QuantityResiduals) -> QuantityResiduals:
-    """With its verdict, in words."""
+def judged(found: QuantityResiduals, courses: Sequence[str]) -> QuantityResiduals:
+    """With its verdict, in words; ``courses``: the shares that count."""
     if found.count < FEWEST:
         return replace(found, verdict="too few", text=f"{found.count} residuals are too few for a verdict")
-    shares = {
-        "the time in the recording": found.by_time,
-        "the time since the impact": found.by_impact,
-        "which recording it is": found.by_recording,
-    }
-    reasons = [f"{share:.0%} depends on {what}" for what, share in shares.items() if share > COURSE]
+    reasons = [f"{getattr(found, name):.0%} depends on {COURSES[name]}" for name in courses]
     if abs(found.autocorrelation) > CORRELATED and found.ljung_box < UNLIKELY:
         reasons.insert(0, f"one sample is like the next (correlation {found.autocorrelation:.2f})")
     missing = bool(reasons)
@@ -157,18 +160,22 @@ def binned(time: Array, component: Ints) -> Ints:
     return np.asarray(np.searchsorted(edges, time, side="right") * (int(component.max()) + 1) + component)
 
 
-def explained(r: Array, group: Ints) -> float:
-    """Share of the squares that the means of groups explain, adjusted for their number, from 0; nan where too few."""
+def explained(r: Array, group: Ints) -> tuple[float, float]:
+    """Share of the squares that the means of groups explain, adjusted for their number; its probability under noise.
+
+    The share is 0 at least, and nan where there are too few; the probability is that of the F test.
+    """
     if r.size < FEWEST:
-        return np.nan
+        return np.nan, np.nan
     _, index, sizes = np.unique(group, return_inverse=True, return_counts=True)
     count, freedom = len(sizes), r.size - len(sizes)
     power = float(r @ r)
     if freedom < count or not power > 0:
-        return np.nan
+        return np.nan, np.nan
     means = np.bincount(index, r) / sizes
-    left = power - float(sizes @ means**2)
-    return max(0.0, 1 - left / freedom * r.size / power)
+    left = max(power - float(sizes @ means**2), np.finfo(float).tiny)
+    probability = float(scipy.stats.f.sf((power - left) / count / (left / freedom), count, freedom))
+    return max(0.0, 1 - left / freedom * r.size / power), probability
 
 
 def rms(values: Array) -> float:
@@ -188,7 +195,8 @@ def prediction_errors(problem: RecordedResiduals, found: ResidualSamples) -> tup
         lengths = np.sqrt(np.bincount(index_of.ravel(), (part.residual * part.rows.noise) ** 2))
         recordings = np.unique(which[:, 0])
         means = np.array([lengths[which[:, 0] == k].mean() for k in recordings])
-        spread = float(means.std(ddof=1)) if len(means) > 1 else np.nan
+        finite = bool(np.isfinite(means).all())
+        spread = (float(means.std(ddof=1)) if finite else np.inf) if len(means) > 1 else np.nan
         size = (float(means.mean()), spread, rms(lengths), rms(part.residual))
         entries.append(PredictionErrors(name, unit, len(recordings), *size))
     return tuple(entries)

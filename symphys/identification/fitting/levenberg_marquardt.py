@@ -13,23 +13,14 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from enum import Enum
-from typing import Any
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from symphys.identification.arrow import ArrowSystem, assemble, costs
-from symphys.identification.interface import (
-    Array,
-    Bools,
-    FitParameters,
-    IdentificationError,
-    Ints,
-    RecordedResiduals,
-)
-from symphys.identification.robust_loss import RobustLoss
+from symphys.identification.fitting.arrow import ArrowSystem, assemble, costs
+from symphys.identification.fitting.state import FitOptions, FitOutcome, FitState, FitStatus, FitStep, begin
+from symphys.identification.interface import Array, Bools, FitParameters, IdentificationError, Ints, RecordedResiduals
 
 LOOSEST = 1 / 3
 """lambda falls at most to this share after a step that went as foreseen."""
@@ -53,155 +44,6 @@ STALLED = (
 SLOW = "the merit hardly falls any more; the Jacobian puts its minimum {left:.2g} standard errors away"
 START = "the simulation of {names} is not finite at the guess: look at its start, or bound the numbers"
 TRIALS = "the simulation of {names} is not finite at any step from the best point: bound the numbers"
-
-
-class FitStatus(Enum):
-    """How a fit ended."""
-
-    CONVERGED = "converged"
-    STALLED = "stalled"
-    BUDGET = "budget"
-    NOT_FINITE = "not_finite"
-    INTERRUPTED = "interrupted"
-
-
-@dataclass(frozen=True)
-class FitOptions:
-    """Options of Levenberg-Marquardt.
-
-    Attributes:
-        iterations: steps at most.
-        damping: first lambda, as a share of the largest diagonal of the first blocks.
-        tolerance: converged where so many standard errors are left.
-        patience: stalled where the merit has fallen by less than a tenth of a standard error makes in so many steps;
-            0 goes on regardless.
-        threshold: of Huber's loss, in units of the noise; inf: least squares.
-    """
-
-    iterations: int = 100
-    damping: float = 1e-3
-    tolerance: float = 1e-4
-    patience: int = 10
-    threshold: float = math.inf
-
-    def __post_init__(self) -> None:
-        """IdentificationError names the option and what would be valid."""
-        for name in ("iterations", "tolerance", "patience"):
-            if not getattr(self, name) >= 0:
-                raise IdentificationError(f"{name} is {getattr(self, name)}: it must be at least 0")
-        for name in ("damping", "threshold"):
-            if not getattr(self, name) > 0:
-                raise IdentificationError(f"{name} is {getattr(self, name)}: it must be above 0")
-
-    @property
-    def loss(self) -> RobustLoss:
-        """The loss."""
-        return RobustLoss(self.threshold)
-
-
-@dataclass(frozen=True)
-class FitStep:
-    """An iteration; 0 is the start.
-
-    Attributes:
-        iteration: its number.
-        merit: sum rho, with priors.
-        left: standard errors between the point and where the Jacobian puts the minimum.
-        damping: lambda.
-        step: length, in scales.
-        simulations, jacobians: of single recordings, so far.
-        seconds: so far.
-    """
-
-    iteration: int
-    merit: float
-    left: float
-    damping: float
-    step: float
-    simulations: int
-    jacobians: int
-    seconds: float
-
-
-@dataclass(frozen=True, eq=False)
-class FitState:
-    """Between two iterations: all that the fit needs to go on.
-
-    Attributes:
-        shared, own: (s,) and (K, o).
-        damping, growth: lambda, and the factor on it after a step that is refused; nan: the next iteration sets lambda.
-        stiffest: a lambda beyond which the search for a step is given up.
-        mark, quiet: the merit at the last progress, and iterations since.
-        history: the iterations so far.
-        noise: (q,) factors on the noise of each quantity under which the merit is computed; empty: none.
-    """
-
-    shared: Array
-    own: Array
-    damping: float
-    growth: float
-    stiffest: float
-    mark: float
-    quiet: int
-    history: tuple[FitStep, ...]
-    noise: tuple[float, ...] = ()
-
-    def plain(self) -> dict[str, Any]:
-        """As JSON-able lists and numbers, from which ``revive_state`` makes the same state to the last bit."""
-        found = {name: getattr(self, name) for name in ("damping", "growth", "stiffest", "mark", "quiet")}
-        rows = [list(vars(row).values()) for row in self.history]
-        return {
-            "shared": self.shared.tolist(),
-            "own": self.own.tolist(),
-            **found,
-            "history": rows,
-            "noise": list(self.noise),
-        }
-
-
-@dataclass(frozen=True, eq=False)
-class FitOutcome:
-    """How a fit ended, and where.
-
-    Attributes:
-        status, reason: what ended it, and what that means.
-        state: there; ``fit`` goes on from it.
-        system: the arrow there, of the recordings that were fitted.
-    """
-
-    status: FitStatus
-    reason: str
-    state: FitState
-    system: ArrowSystem
-
-    @property
-    def merit(self) -> float:
-        """Sum of rho there, with priors."""
-        return self.system.cost
-
-
-def begin(shared: Array, own: Array) -> FitState:
-    """The state before the first iteration, at shared (s,) and own (K, o) within the bounds."""
-    return FitState(shared, own, math.nan, 2.0, math.nan, math.inf, 0, ())
-
-
-def revive_state(saved: Mapping[str, Any], problem: RecordedResiduals) -> FitState:
-    """The state in ``FitState.plain``; IdentificationError if it is damaged or of other parameters."""
-    try:
-        shared, own = np.array(saved["shared"], float), np.array(saved["own"], float).reshape(problem.own.guess.shape)
-        damping, growth, stiffest, mark = (float(saved[name]) for name in ("damping", "growth", "stiffest", "mark"))
-        history = tuple(FitStep(*row) for row in saved["history"])
-        noise = tuple(map(float, saved["noise"]))
-        state = FitState(shared, own, damping, growth, stiffest, mark, int(saved["quiet"]), history, noise)
-    except (KeyError, TypeError, ValueError) as error:
-        raise IdentificationError(
-            f"the saved fit is damaged or of other recordings ({error!r}): start afresh"
-        ) from error
-    if shared.shape != problem.shared.guess.shape:
-        raise IdentificationError(
-            f"the saved fit has {shared.size} shared numbers, the problem {len(problem.shared.names)}"
-        )
-    return state
 
 
 class RecordingFit:
@@ -256,13 +98,15 @@ class RecordingFit:
 
     def _system(self, shared: Array, own: Array) -> ArrowSystem:
         self.jacobians += len(self.which)
-        return assemble(self.problem, shared, own, self.which, self.loss, self.weights)
+        evaluated = self.problem.jacobian(shared, own, self.which)
+        return assemble(self.problem, evaluated, shared, own, self.which, self.loss, self.weights)
 
     def _first(self, begun: FitState, system: ArrowSystem, began: float) -> FitState:
         """The first iteration sets lambda."""
         diagonals = np.diagonal(system.blocks, axis1=1, axis2=2)
         size = float(np.max(diagonals, initial=0.0)) or 1.0
         state = replace(begun, damping=self.options.damping * size, stiffest=STIFFEST * size, mark=system.cost)
+        state = replace(state, first=len(state.history))
         return self._recorded(state, system, 0.0, began)
 
     def _recorded(self, state: FitState, system: ArrowSystem, step: float, began: float) -> FitState:
@@ -298,7 +142,7 @@ class RecordingFit:
             return FitStatus.CONVERGED, EXACTLY
         if last.left <= self.options.tolerance:
             return FitStatus.CONVERGED, f"{last.left:.1g} standard errors are left"
-        if last.iteration >= self.options.iterations:
+        if last.iteration - state.first >= self.options.iterations:
             return FitStatus.BUDGET, BUDGET
         if state.quiet >= (self.options.patience or math.inf):
             return FitStatus.STALLED, SLOW.format(left=last.left)

@@ -11,12 +11,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from symphys.identification.interface import Array, Ints, RecordedResiduals, ResidualRows
-from symphys.identification.robust_loss import RobustLoss
-from symphys.identification.uncertainty import Information, pseudo_inverse
+from symphys.identification.fitting.robust_loss import RobustLoss
+from symphys.identification.inference.uncertainty import Information, pseudo_inverse
+from symphys.identification.interface import Array, Ints, RecordedResiduals, ResidualRows, Rows
 
 LEAST = 1e-12
 """A factor on the guess of a noise is at least so large: recordings that are met exactly have none."""
+ENOUGH = 0.5
+"""Residuals less their leverage that an estimate needs."""
+TURNS, LEAST_CHANGE = 50, 1e-4
+"""Turns of Huber's proposal 2 on the same residuals, at most, and the change at which they end."""
 
 
 class RescaledResiduals:
@@ -45,7 +49,7 @@ class RescaledResiduals:
         found = self.problem.residuals(shared, own, which)
         return [r / self._divisor(int(k)) for k, r in zip(which, found, strict=True)]
 
-    def jacobian(self, shared: Array, own: Array, which: Ints) -> list[tuple[Array, Array, Array]]:
+    def jacobian(self, shared: Array, own: Array, which: Ints) -> Rows:
         """See ``RecordedResiduals``."""
         found = []
         for k, (r, by_shared, by_own) in zip(which, self.problem.jacobian(shared, own, which), strict=True):
@@ -55,21 +59,28 @@ class RescaledResiduals:
 
 
 def noise_factors(
-    problem: RecordedResiduals, shared: Array, own: Array, which: Ints, loss: RobustLoss, information: Information
+    problem: RecordedResiduals, evaluated: Rows, which: Ints, loss: RobustLoss, information: Information
 ) -> Array:
     """(q,) noise of each quantity by what its residuals are divided by; 1 where it is given."""
     count = len(problem.quantities)
-    squares, freedom = np.zeros(count), np.zeros(count)
-    inverse, _ = pseudo_inverse(information.shared)
-    for at, (k, (r, by_shared, by_own)) in enumerate(zip(which, problem.jacobian(shared, own, which), strict=True)):
-        quantity = problem.rows(int(k)).quantity
-        scaled = by_shared * problem.shared.scale * information.free_shared
+    inverse, _ = pseudo_inverse(information.shared, information.reference)
+    quantities, leverages = [], []
+    for at, (k, (_, by_shared, by_own)) in enumerate(zip(which, evaluated, strict=True)):
+        quantities.append(problem.rows(int(k)).quantity)
         own_rows = by_own * problem.own.scale[k] * information.free_own[at]
-        ahead = scaled + own_rows @ information.gain[at]
-        leverage = np.einsum("ma,ab,mb->m", ahead, inverse, ahead)
-        leverage += np.einsum("ma,ab,mb->m", own_rows, information.own_inverse[at], own_rows)
-        squares += np.bincount(quantity, loss.influence(r) ** 2, minlength=count)
-        freedom += np.bincount(quantity, 1 - leverage * loss.inside(r), minlength=count)
-    enough = (freedom > 0.5) & ~problem.noise_known
-    factors = np.sqrt(squares / (loss.normal_square * np.where(enough, freedom, 1.0)))
-    return np.where(enough, np.maximum(factors, LEAST), 1.0)
+        ahead = by_shared * problem.shared.scale * information.free_shared + own_rows @ information.gain[at]
+        alone = np.einsum("ma,ab,mb->m", own_rows, information.own_inverse[at], own_rows)
+        leverages.append(np.einsum("ma,ab,mb->m", ahead, inverse, ahead) + alone)
+    r, quantity, leverage = (np.concatenate(each) for each in ([r for r, _, _ in evaluated], quantities, leverages))
+    factors = np.ones(count)
+    for _ in range(TURNS):
+        scaled = r / factors[quantity]
+        squares = np.bincount(quantity, loss.influence(scaled) ** 2, minlength=count)
+        freedom = np.bincount(quantity, 1 - leverage * loss.inside(scaled), minlength=count)
+        enough = (freedom > ENOUGH) & ~problem.noise_known
+        change = np.sqrt(squares / (loss.normal_square * np.where(enough, freedom, 1.0)))
+        change = np.where(enough, np.maximum(change, LEAST), 1.0)
+        factors = factors * change
+        if np.all(np.abs(change - 1) < LEAST_CHANGE):
+            break
+    return factors

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symphys.identification.interface import Array, Bools, FitParameters, Ints, RecordedResiduals
-from symphys.identification.robust_loss import RobustLoss
+from symphys.identification.fitting.robust_loss import RobustLoss
+from symphys.identification.interface import Array, Bools, FitParameters, Ints, RecordedResiduals, Rows
 
 EPS = float(np.finfo(float).eps)
 NO_INFORMATION = 1e-10
@@ -61,6 +61,11 @@ class ArrowSystem:
         return all(bool(np.isfinite(each).all()) for each in (self.costs, self.blocks, self.gradients))
 
     @property
+    def reference(self) -> Array:
+        """(s,) diagonal of A: what rounding in the Schur complement S is small against."""
+        return np.asarray(np.einsum("kii->i", self.blocks[:, : self.s, : self.s]) + self.prior_block)
+
+    @property
     def shared_gradient(self) -> Array:
         """(s,) half the derivative of the cost by the shared numbers."""
         return np.asarray(self.gradients[:, : self.s].sum(axis=0) + self.prior_gradient)
@@ -100,7 +105,8 @@ class ArrowSystem:
         shared = np.zeros(self.s)
         if free_shared.any():
             square, side = square[np.ix_(free_shared, free_shared)], side[free_shared]
-            shared[free_shared] = -damped_solution(square, side, damping)
+            size = np.sqrt(self.reference[free_shared])
+            shared[free_shared] = -damped_solution(square, side, damping, np.ones_like(size) if damping else size)
         return shared, -(solved[:, :, self.s] + solved[:, :, : self.s] @ shared)
 
     def expected_fall(self, shared: Array, own: Array) -> float:
@@ -110,9 +116,11 @@ class ArrowSystem:
         return -2 * float(np.sum(both * self.gradients)) - 2 * float(shared @ self.prior_gradient) - bent
 
 
-def damped_solution(square: Array, side: Array, damping: float) -> Array:
-    """(n,) (S + damping I)^-1 side of a symmetric S (n, n); directions without information have no part in it."""
-    size = np.sqrt(np.maximum(np.diagonal(square), 0)) if not damping else np.ones(len(side))
+def damped_solution(square: Array, side: Array, damping: float, size: Array) -> Array:
+    """(n,) (S + damping I)^-1 side of a symmetric S (n, n); directions without information have no part in it.
+
+    ``size``: (n,) units of rows and columns, in which an eigenvalue is rounding or not.
+    """
     unit = np.where(size > 0, size, 1.0)
     values, vectors = np.linalg.eigh(square / np.outer(unit, unit))
     some = values > NO_INFORMATION * values[-1]
@@ -123,23 +131,23 @@ def damped_solution(square: Array, side: Array, damping: float) -> Array:
 
 def assemble(
     problem: RecordedResiduals,
+    evaluated: Rows,
     shared: Array,
     own: Array,
     which: Ints,
     loss: RobustLoss,
     weights: Array,
     curvature: Weighting | None = None,
-    priors: bool = True,
 ) -> ArrowSystem:
     """The system at shared (s,), own (K, o) of the recordings in ``which``, whose costs count ``weights`` times.
 
-    ``curvature``: weights C of the rows in the blocks, the loss's own without.
+    ``evaluated`` is their Jacobian there, ``curvature`` the weights C of its rows in the blocks, by default the loss's.
     """
     s, n = len(shared), len(shared) + own.shape[1]
     costs, blocks, gradients = np.zeros(len(which)), np.zeros((len(which), n, n)), np.zeros((len(which), n))
     plain = curvature is None and not loss.robust
     weighting = curvature or loss.weight
-    for k, (r, by_shared, by_own) in enumerate(problem.jacobian(shared, own, which)):
+    for k, (r, by_shared, by_own) in enumerate(evaluated):
         if not (np.isfinite(r).all() and np.isfinite(by_shared).all() and np.isfinite(by_own).all()):
             costs[k] = np.inf
             continue
@@ -148,8 +156,6 @@ def assemble(
         costs[k] = weights[k] * loss.value(r)
         blocks[k] = weights[k] * (rows.T @ rows if plain else (rows.T * weighting(r)) @ rows)
         gradients[k] = weights[k] * (rows.T @ loss.influence(r))
-    if not priors:
-        return ArrowSystem(costs, blocks, gradients, 0.0, np.zeros(s), np.zeros(s))
     square, slope, cost = prior_terms(problem.own, own)
     inside = np.arange(s, n)
     blocks[:, inside, inside] += square[which]

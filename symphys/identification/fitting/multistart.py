@@ -15,8 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from symphys.identification.fitting.levenberg_marquardt import RecordingFit
+from symphys.identification.fitting.state import FitOptions, FitOutcome, begin
 from symphys.identification.interface import Array, IdentificationError, Ints, RecordedResiduals
-from symphys.identification.levenberg_marquardt import FitOptions, FitOutcome, RecordingFit, begin
 from symphys.results.identification.parts import GlobalSearch
 
 FAR = 0.5

@@ -17,10 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.stats
 
-from symphys.identification.arrow import NO_INFORMATION, ArrowSystem
+from symphys.identification.fitting.arrow import NO_INFORMATION, ArrowSystem
+from symphys.identification.fitting.levenberg_marquardt import RecordingFit
+from symphys.identification.fitting.state import FitOptions, FitState, begin
+from symphys.identification.inference.uncertainty import LEVEL, Information
 from symphys.identification.interface import Array, IdentificationError, Ints, RecordedResiduals
-from symphys.identification.levenberg_marquardt import FitOptions, FitState, RecordingFit, begin
-from symphys.identification.uncertainty import LEVEL, Information
 
 FEWEST = 5
 """Recordings that a bootstrap needs."""
@@ -96,7 +97,7 @@ def steps(
     s, free = len(shared), np.flatnonzero(information.free_shared)
     sides = system.gradients[:, :s] + np.einsum("kos,ko->ks", information.gain, system.own_gradient)
     prior, slope = np.diag(system.prior_block)[np.ix_(free, free)], system.prior_gradient[free]
-    unit = np.sqrt(np.maximum(np.diagonal(information.shared)[free], np.finfo(float).tiny))
+    unit = np.sqrt(np.maximum(information.reference[free], np.finfo(float).tiny))
     shares, sides = information.shares[:, free][:, :, free], sides[:, free]
     moved = np.zeros((len(weights), s))
     for start in range(0, len(weights), CHUNK):

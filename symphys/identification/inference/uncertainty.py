@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.stats
 
-from symphys.identification.arrow import NO_INFORMATION, ArrowSystem, assemble
-from symphys.identification.interface import Array, Bools, FitParameters, Ints, RecordedResiduals
-from symphys.identification.levenberg_marquardt import movable
-from symphys.identification.robust_loss import RobustLoss
+from symphys.identification.fitting.arrow import NO_INFORMATION, ArrowSystem, assemble
+from symphys.identification.fitting.levenberg_marquardt import movable
+from symphys.identification.fitting.robust_loss import RobustLoss
+from symphys.identification.interface import Array, Bools, FitParameters, Ints, RecordedResiduals, Rows
 
 LEVEL = 0.95
 TOUCHED = 1e-3
@@ -32,6 +32,7 @@ class Information:
 
     Attributes:
         shared: (s, s) the Schur complement S.
+        reference: (s,) the diagonal before the elimination.
         shares: (k, s, s) what each recording adds to it.
         own_inverse: (k, o, o) D^-1, without the directions that have no information.
         own_open: (k, o) numbers that take part in such a direction.
@@ -40,6 +41,7 @@ class Information:
     """
 
     shared: Array
+    reference: Array
     shares: Array
     own_inverse: Array
     own_open: Bools
@@ -78,10 +80,12 @@ class Uncertainty:
         return np.stack([value - half, value + half], axis=1)
 
 
-def pseudo_inverse(matrices: Array) -> tuple[Array, Bools]:
-    """Inverses of symmetric (..., n, n) without what has no information, and (..., n) which numbers that concerns."""
-    size = np.sqrt(np.diagonal(matrices, axis1=-2, axis2=-1))
-    unit = np.where(size > 0, size, 1.0)
+def pseudo_inverse(matrices: Array, size: Array) -> tuple[Array, Bools]:
+    """Inverses of symmetric (..., n, n) without what has no information, and (..., n) which numbers that concerns.
+
+    ``size``: (..., n) what rounding of the diagonal is small against.
+    """
+    unit = np.where(size > 0, np.sqrt(size), 1.0)
     values, vectors = np.linalg.eigh(matrices / unit[..., :, None] / unit[..., None, :])
     none = values <= NO_INFORMATION * np.max(values, axis=-1, initial=0.0, keepdims=True)
     inverse = np.where(none, 0.0, 1 / np.where(none, 1.0, values))
@@ -97,17 +101,19 @@ def make_information(system: ArrowSystem, free_shared: Bools, free_own: Bools) -
         system.blocks * np.concatenate([np.broadcast_to(free_shared, (len(free_own), s)), free_own], axis=1)[:, None]
     )
     masked = masked * np.concatenate([np.broadcast_to(free_shared, (len(free_own), s)), free_own], axis=1)[:, :, None]
-    inverse, touched = pseudo_inverse(masked[:, s:, s:])
+    inverse, touched = pseudo_inverse(masked[:, s:, s:], np.diagonal(masked[:, s:, s:], axis1=1, axis2=2))
     coupling = masked[:, :s, s:]
     gain = -inverse @ coupling.transpose(0, 2, 1)
     shares = masked[:, :s, :s] + coupling @ gain
     whole = shares.sum(axis=0) + np.diag(system.prior_block * free_shared)
-    return Information(whole, shares, inverse, touched & free_own, gain, free_shared, free_own)
+    return Information(
+        whole, system.reference * free_shared, shares, inverse, touched & free_own, gain, free_shared, free_own
+    )
 
 
 def covariances(bread: Information, meat: ArrowSystem) -> tuple[Array, Array, Bools]:
     """Scaled covariances H^-1 M H^-1: (s, s), and (k, o) variances of own numbers; (s,) shared ones left open."""
-    inverse, open_shared = pseudo_inverse(bread.shared)
+    inverse, open_shared = pseudo_inverse(bread.shared, bread.reference)
     s = len(inverse)
     scores = meat.blocks
     ahead = np.concatenate([np.broadcast_to(np.eye(s), (len(scores), s, s)), bread.gain.transpose(0, 2, 1)], axis=2)
@@ -121,27 +127,34 @@ def covariances(bread: Information, meat: ArrowSystem) -> tuple[Array, Array, Bo
 
 
 def uncertainty(
-    problem: RecordedResiduals, shared: Array, own: Array, which: Ints, loss: RobustLoss, noise_known: bool
+    problem: RecordedResiduals,
+    evaluated: Rows,
+    shared: Array,
+    own: Array,
+    which: Ints,
+    loss: RobustLoss,
+    noise_known: bool,
 ) -> Uncertainty:
-    """Of the estimates shared (s,) and own (K, o), from the recordings in ``which``.
+    """Of the estimates shared (s,) and own (K, o), from the recordings in ``which`` and their Jacobian there.
 
     The quantile is Student's where the noise is estimated, else the normal one.
     """
-    weights = np.ones(len(which))
-    slopes = assemble(problem, shared, own, which, loss, weights)
+    given = (problem, evaluated, shared, own, which, loss, np.ones(len(which)))
+    slopes = assemble(*given)
     free_shared = movable(problem.shared, shared, slopes.shared_gradient)
     free_own = movable(problem.own, own, slopes.own_gradient, which)
     system = squares = slopes
     if loss.robust:
-        share = inside_share(problem, shared, own, which, loss)
-        system = assemble(problem, shared, own, which, loss, weights, lambda r: np.full(r.shape, share))
-        squares = assemble(problem, shared, own, which, loss, weights, lambda r: loss.influence(r) ** 2)
+        share = float(np.mean(np.concatenate([loss.inside(r) for r, _, _ in evaluated])))
+        system = assemble(*given, lambda r: np.full(r.shape, share))
+        squares = assemble(*given, lambda r: loss.influence(r) ** 2)
     bread = make_information(system, free_shared, free_own)
     covariance, own_variance, open_shared = covariances(bread, squares)
-    size = sum(len(problem.rows(int(k)).time) for k in which)
-    freedom = max(1, size - int(free_shared.sum()) - int(free_own.sum()))
+    size = sum(len(r) for r, _, _ in evaluated)
+    freedom = size - int(free_shared.sum()) - int(free_own.sum())
     if loss.robust:
-        covariance, own_variance = covariance * size / freedom, own_variance * size / freedom
+        correction = size / max(freedom, 1)
+        covariance, own_variance = covariance * correction, own_variance * correction
     covariance = covariance * np.outer(problem.shared.scale, problem.shared.scale)
     covariance[open_shared, open_shared] = np.inf
     covariance[~free_shared, :] = covariance[:, ~free_shared] = np.nan
@@ -150,20 +163,15 @@ def uncertainty(
     open_own = bread.own_open | np.any((np.abs(bread.gain) > TOUCHED) & open_shared, axis=2)
     fitted = np.where(open_own, np.inf, np.sqrt(np.maximum(own_variance, 0))) * problem.own.scale[which]
     own_error[which] = np.where(free_own, fitted, np.nan)
-    known = np.isfinite(error) & (error > 0)
-    correlation = np.full(covariance.shape, np.nan)
-    correlation[np.ix_(known, known)] = (covariance / np.outer(error, error))[np.ix_(known, known)]
+    correlation, known = np.full(covariance.shape, np.nan), np.flatnonzero(np.isfinite(error) & (error > 0))
+    some = np.ix_(known, known)
+    correlation[some] = covariance[some] / np.outer(error[known], error[known])
     tail = (1 + LEVEL) / 2
-    quantile = float(scipy.stats.norm.ppf(tail) if noise_known else scipy.stats.t.ppf(tail, freedom))
+    quantile = float(scipy.stats.norm.ppf(tail) if noise_known else scipy.stats.t.ppf(tail, max(freedom, 1)))
     own_free = np.ones(own.shape, bool)
     own_free[which] = free_own
     sides = (at_bound(problem.shared, shared, free_shared), at_bound(problem.own, own, own_free))
     return Uncertainty(covariance, error, own_error, correlation, quantile, freedom, *sides, bread)
-
-
-def inside_share(problem: RecordedResiduals, shared: Array, own: Array, which: Ints, loss: RobustLoss) -> float:
-    """Of residuals up to the threshold: the mean of psi'."""
-    return float(np.mean(np.concatenate([loss.inside(r) for r in problem.residuals(shared, own, which)])))
 
 
 def at_bound(parameters: FitParameters, values: Array, free: Bools) -> Ints:

@@ -6,14 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from symphys.identification.bootstrap import Bootstrap
+from symphys.identification.fitting.state import FitOutcome, FitStatus
+from symphys.identification.inference.bootstrap import Bootstrap
+from symphys.identification.inference.uncertainty import Uncertainty
 from symphys.identification.interface import Array, RecordedResiduals
-from symphys.identification.levenberg_marquardt import FitOutcome, FitStatus
-from symphys.identification.uncertainty import Uncertainty
 from symphys.results.identification import ParameterEstimate, QuantityResiduals
 
 NARROW = 1.5
 """Ratio of residuals to a given noise, or of both intervals, above which those of the Jacobian are doubted."""
+NEAR = 0.1
+"""Standard errors that a fit which stalls at a kink may leave without a doubt."""
 BENT = 0.5
 """Difference of a refitted draw from its step, in standard deviations of the draws, above which steps are doubted."""
 
@@ -50,10 +52,17 @@ def doubts(
     parameters: Sequence[ParameterEstimate],
     quantities: Sequence[QuantityResiduals],
     drawn: Bootstrap,
+    freedom: int,
 ) -> tuple[str, ...]:
-    """A sentence for each reason not to rely on the estimates or on their intervals."""
-    found = [] if outcome.status is FitStatus.CONVERGED else [f"the fit has not converged: {outcome.reason}"]
+    """A sentence for each reason not to rely on the estimates or on their intervals.
+
+    ``freedom``: residuals less numbers that were estimated.
+    """
+    near = outcome.status is FitStatus.STALLED and outcome.state.history[-1].left <= NEAR
+    found = [] if near or outcome.status is FitStatus.CONVERGED else [f"the fit has not converged: {outcome.reason}"]
     found += [f"{each.name} is at its {each.at_bound} bound, {each.value:.6g}" for each in parameters if each.at_bound]
+    if freedom < 1:
+        found.append(f"numbers are {1 - freedom} too many for the residuals: nothing is left to judge the fit by")
     for quantity in quantities:
         if quantity.verdict == "missing effect":
             found.append(f"the model misses an effect on {quantity.name}: {quantity.text}")

@@ -14,10 +14,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from symphys.identification.advice import advice
-from symphys.identification.interface import Array, Ints, RecordedResiduals
-from symphys.identification.robust_loss import RobustLoss
-from symphys.identification.uncertainty import Information
+from symphys.identification.fitting.robust_loss import RobustLoss
+from symphys.identification.inference.advice import advice
+from symphys.identification.inference.uncertainty import Information
+from symphys.identification.interface import Array, Ints, RecordedResiduals, Rows
 from symphys.results.identification.parts import OpenDirection
 
 WIDE = 1.0
@@ -39,15 +39,21 @@ CLOSE = 0.03
 
 
 def open_directions(
-    problem: RecordedResiduals, shared: Array, own: Array, which: Ints, loss: RobustLoss, information: Information
+    problem: RecordedResiduals,
+    evaluated: Rows,
+    shared: Array,
+    own: Array,
+    which: Ints,
+    loss: RobustLoss,
+    information: Information,
 ) -> tuple[OpenDirection, ...]:
-    """Those among the shared numbers that no bound holds, from the recordings in ``which``, without shared priors."""
+    """Those among the shared numbers that no bound holds, from the recordings in ``which`` without shared priors."""
     free = np.flatnonzero(information.free_shared)
     if not free.size:
         return ()
     parameters = problem.shared
     units = np.maximum(np.abs(shared), parameters.scale)[free]
-    rows = reduced_rows(problem, shared, own, which, loss, information)[:, free] * units
+    rows = reduced_rows(problem, evaluated, which, loss, information)[:, free] * units
     _, sizes, basis = np.linalg.svd(rows)
     wanted = sizes < 1 / WIDE
     if not wanted.any():
@@ -68,16 +74,17 @@ def open_directions(
 
 
 def reduced_rows(
-    problem: RecordedResiduals, shared: Array, own: Array, which: Ints, loss: RobustLoss, information: Information
+    problem: RecordedResiduals, evaluated: Rows, which: Ints, loss: RobustLoss, information: Information
 ) -> Array:
     """(s, s) triangle R with R'R the Schur complement, by orthogonal elimination: no squares lose digits."""
-    s, stacked = len(shared), [np.zeros((len(shared), len(shared)))]
+    s, o = len(problem.shared.names), len(problem.own.names)
+    stacked = [np.zeros((s, s))]
     prior = 1 / problem.own.prior_deviation
-    for at, (k, (r, by_shared, by_own)) in enumerate(zip(which, problem.jacobian(shared, own, which), strict=True)):
+    for at, (k, (r, by_shared, by_own)) in enumerate(zip(which, evaluated, strict=True)):
         weight = np.sqrt(loss.weight(r))[:, None]
         free = information.free_own[at]
         own_rows = np.concatenate([weight * by_own, np.diag(prior[k])])[:, free] * problem.own.scale[k][free]
-        shared_rows = np.concatenate([weight * by_shared, np.zeros((own.shape[1], s))])
+        shared_rows = np.concatenate([weight * by_shared, np.zeros((o, s))])
         lengths = np.linalg.norm(own_rows, axis=0)
         left, sizes, _ = np.linalg.svd(own_rows / np.where(lengths > 0, lengths, 1.0), full_matrices=False)
         range_of_own = left[:, sizes > ROUNDING * np.max(sizes, initial=0.0)]
@@ -149,6 +156,8 @@ def describe(
     if np.all(shared[named] != 0):
         powers = whole_powers(kernel(rows / shared[named]))
         exponents = rows / shared[named]
+        if powers is not None:
+            exponents = exponents - np.outer(exponents @ powers, powers) / (powers @ powers)
         far = shared[named] * np.exp(FAR * exponents / np.max(np.abs(exponents), axis=1, keepdims=True))
         if powers is not None and unchanged(problem, shared, own, which, named, far):
             kind = "their product" if np.all(powers == 1) else "the ratio" if ratio(powers) else "the combination"

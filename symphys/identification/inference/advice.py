@@ -8,15 +8,29 @@ ADVICE: dict[str, tuple[str, ...]] = {
     "record a collision with a body of known mass, or a motion under a known force or a motor's torque: under gravity "
     "and contact with fixed surfaces alone, masses cancel": ("mass", "density"),
     "record spins about several axes that a known torque or an off-centre collision changes": ("inertia", "moments"),
-    "record tosses that spin freely about two axes, or let the body rest in several poses": ("center", "com", "centre"),
+    "record tosses that spin freely about two axes, or let the body rest in several poses": (
+        "center",
+        "centre",
+        "com",
+        "center_of_mass",
+        "centre_of_mass",
+    ),
     "record a long slide, or a toss that lands with speed along the ground and little spin": ("friction", "mu"),
     "record bounces from several heights, up to the second impact": ("restitution", "bounce"),
     "record a long roll without sliding": ("rolling", "rolling_friction"),
     "record a spin about the vertical on one contact": ("torsional", "torsion", "torsional_friction", "spinning"),
     "record free flight, with lengths that are measured by a ruler": ("gravity",),
     "record a fall of known height, or measure a length by a ruler: without gravity or a known length, scales are "
-    "free": ("scale", "length_scale", "size", "radius", "half_size", "length", "width", "height"),
-    "record the body at rest in two places, one of them known": ("position", "offset", "tilt", "z", "x", "y"),
+    "free": ("scale", "length_scale", "size", "radius", "half_size", "length", "width", "thickness"),
+    "record the body at rest in two places, one of them known": (
+        "position",
+        "offset",
+        "height",
+        "tilt",
+        "x",
+        "y",
+        "z",
+    ),
     "let the joint swing out freely from several speeds": ("damping", "drag", "viscosity"),
     "let the joint swing out to rest: its last swings show the dry friction": ("dry_friction", "coulomb", "armature"),
     "record a deflection under a known force, or the period of free swings with a known mass": ("stiffness", "spring"),
@@ -32,7 +46,8 @@ def advice(quantities: Iterable[str]) -> str:
     found = []
     for quantity in quantities:
         last = quantity.split(".")[-1].split("[")[0].strip().lower()
-        said = next((text for text, words in ADVICE.items() if matches(last, words)), GENERAL)
+        fitting = [(len(word), text) for text, words in ADVICE.items() for word in words if is_kind(last, word)]
+        said = max(fitting, default=(0, GENERAL))[1]
         if said not in found:
             found.append(said)
     specific = [text for text in found if text != GENERAL] or found
@@ -40,6 +55,6 @@ def advice(quantities: Iterable[str]) -> str:
     return joined[0].upper() + joined[1:]
 
 
-def matches(name: str, words: tuple[str, ...]) -> bool:
-    """Whether a name is one of the words, or ends or begins with one of them as a word of its own."""
-    return any(name == word or name.endswith(("_" + word, " " + word)) or name.startswith(word + "_") for word in words)
+def is_kind(name: str, word: str) -> bool:
+    """Whether a name is the word, or ends or begins with it as a word of its own."""
+    return name == word or name.endswith(("_" + word, " " + word)) or name.startswith(word + "_")
