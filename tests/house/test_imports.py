@@ -101,8 +101,8 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "jax": ("api errors transcription", "jax numpy", "rollouts and steps for JAX"),
     "env": ("api errors", "gymnasium numpy", "environments for Gymnasium"),
     "cli": (
-        "api batches codegen doctor errors export files findings importing interrupts mpc problem problems report "
-        "results runs solvers suggest threads trajectory transcription verification version",
+        "api batches codegen doctor errors export files findings identification importing interrupts mpc prediction "
+        "problem problems report results runs solvers suggest threads trajectory transcription verification version",
         "click numpy rich",
         "the commands",
     ),
