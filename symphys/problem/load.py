@@ -27,7 +27,7 @@ from symphys.problem.parametric.forward_kinematics import forward_kinematics
 from symphys.problem.parametric.parts import Part
 from symphys.problem.parametric.reposition import check_anchors
 from symphys.problem.parametric.world import ParametricWorld
-from symphys.problem.quantities import Quantity, duration_quantity, quantities, weight_quantities
+from symphys.problem.quantities import Quantity, delay_quantities, duration_quantity, quantities, weight_quantities
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.reading.messages import report
 from symphys.problem.references import read_references, reference_values
@@ -128,6 +128,7 @@ def build(
     sensors, controllers = read_control(document, parametric, known, functions, starts, given, faults)
     sets = read_sets(document.phase, parametric, faults)
     known |= weight_quantities(controllers) | force_quantities(document.force) | phase_quantities(sets)
+    known |= delay_quantities(references)
     variables = read_variables(document.variable, known, simulation, faults)
     check_variables(document, simulation, parametric, nominal, variables, faults)
     sampled = {name: quantity for name, quantity in known.items() if quantity.kind != "duration"}

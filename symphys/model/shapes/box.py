@@ -68,7 +68,7 @@ class Box(SolidShape):
     @property
     def extent(self) -> float:
         """From the centre to the farthest point [m]."""
-        return hypot(*(half - self.edge for half in self.half_sizes)) + self.edge
+        return hypot(*(half - self.edge for half in self.half_sizes)) + float(self.edge)
 
     @property
     def rounded_hull(self) -> RoundedHull:
