@@ -366,7 +366,8 @@ class ProblemData:
     def weights(self) -> dict[str, Array]:
         """The numbers of controllers, force laws, phases and references in the file, by names as ``brain.weights``."""
         own = [each.weights for each in self.controllers]
-        own += [each.weights for each in (*self.forces, *self.phases, *self.references)]
+        own += [*(law.weights for law in self.forces), *(phase.weights for phase in self.phases)]
+        own += [each.weights for each in self.references]
         return {name: value for weights in own for name, value in weights.items()}
 
     @property
