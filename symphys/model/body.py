@@ -209,6 +209,8 @@ def _solid(name: str, kind: type[Shape], **sizes: Any) -> Shape:
     shape = kind.from_sizes(sizes, (0.0, 0.0, 0.0), UPRIGHT)
     if _plain(shape.volume) and shape.flatness:
         raise _refused(name, shape.flatness)
+    if shape.optional_fault:
+        raise _refused(name, shape.optional_fault)
     return shape
 
 

@@ -29,6 +29,7 @@ from symphys.problem.parametric.reposition import check_anchors
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.quantities import (
     Quantity,
+    delay_quantities,
     duration_quantity,
     quantities,
     recording_quantities,
@@ -147,6 +148,7 @@ def build(
     sensors, controllers = read_control(document, parametric, known, functions, starts, given, faults)
     sets = read_sets(document.phase, parametric, faults)
     known |= named_quantities(document, controllers, sets)
+    known |= delay_quantities(references)
     variables = read_variables(document.variable, known, simulation, faults)
     check_variables(document, simulation, parametric, nominal, variables, faults)
     sampled = {name: quantity for name, quantity in known.items() if quantity.kind not in ("duration", "recording")}

@@ -375,9 +375,10 @@ class ProblemData:
 
     @property
     def weights(self) -> dict[str, Array]:
-        """The numbers of all controllers, force laws and phases as the file has them, by names as ``brain.weights``."""
+        """The numbers of controllers, force laws, phases and references in the file, by names as ``brain.weights``."""
         own = [each.weights for each in self.controllers]
         own += [*(law.weights for law in self.forces), *(phase.weights for phase in self.phases)]
+        own += [each.weights for each in self.references]
         return {name: value for weights in own for name, value in weights.items()}
 
     @property

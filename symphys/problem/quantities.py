@@ -16,6 +16,7 @@ from symphys.problem.model import DURATION, Kind, ProblemData, Variable, Variabl
 from symphys.problem.parametric.joints import OWN
 from symphys.problem.parametric.parts import COMBINE, STRUCTURAL, VARIABLE
 from symphys.problem.parametric.world import CONTACT
+from symphys.problem.references import DELAY, ReferenceTrajectory
 from symphys.suggest import hint, quote
 
 Array = NDArray[np.float64]
@@ -39,8 +40,8 @@ ACTING = ("gain", "torque", "velocity", "range", "stiffness", "damping", "armatu
 """Parameters of joints, motors and springs, which must not be negative."""
 OPEN = ("mass", "radius", "size", "length", "duration", "frequency")
 SMALL = ("second_moments",)
-SCALES = {"centre_of_mass": 0.01, "correlations": 0.1, "tilt": 0.01}
-"""How much what is usually 0 typically changes: [m], [-] and [rad]."""
+SCALES = {"centre_of_mass": 0.01, "correlations": 0.1, "tilt": 0.01, DELAY: 0.01}
+"""How much what is usually 0 typically changes: [m], [-], [rad] and [s]."""
 MOST_ROUND = 0.99
 """Of half of a box's smallest edge: the largest radius of its edges, unless ``upper`` says otherwise."""
 LEAST_SHARE = 1e-3
@@ -93,6 +94,13 @@ def recording_quantities(names: Iterable[str]) -> dict[str, Quantity]:
     return found
 
 
+def delay_quantities(references: Iterable[ReferenceTrajectory]) -> dict[str, Quantity]:
+    """The delays of references by name, such as ``walk.delay`` [s]."""
+    return {
+        name: Quantity("weight", value, own_scale=True) for each in references for name, value in each.weights.items()
+    }
+
+
 def read_slot(text: str, known: Mapping[str, Quantity]) -> VariableSlot:
     """The slot that ``ball.force[0:2]`` means; SlotError says why it means none."""
     match = SLOT.fullmatch(text)
@@ -130,6 +138,7 @@ def unknown(name: str, known: Collection[str]) -> str:
     same_owner = [other for other in known if owner and other.startswith(f"{owner}.")]
     tables = "" if key in COMBINE else ": [contact] and [[pair]] may state it"
     stated = f"; what states no {key} has none to vary{tables}" if key in VARIABLE else ""
+    stated += "; a [[reference]] must state its delay, 0 too, for a variable to set it" if key == DELAY else ""
     return hint(name, same_owner or known) + stated
 
 

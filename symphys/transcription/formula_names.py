@@ -172,7 +172,8 @@ def namespace(
     names.update({name: ca.DM(value) for name, value in problem.parameters.items()})
     names.update(zip(parameters.names, parameters.symbols, strict=True))
     names.update(parameters.overrides())
-    names.update(reference_values([each for each in problem.references if not wanted.isdisjoint(each.names)], at.time))
+    followed = [each for each in problem.references if not wanted.isdisjoint(each.names)]
+    names.update(reference_values(followed, at.time, names))
     if not wanted.isdisjoint(joint_quantity_names(world)):
         names.update(joint_quantities(world, at.x))
     if not wanted.isdisjoint(body_quantity_names(world)):

@@ -68,7 +68,7 @@ class Box(SolidShape):
     @property
     def extent(self) -> float:
         """From the centre to the farthest point [m]."""
-        return hypot(*(half - self.edge for half in self.half_sizes)) + self.edge
+        return hypot(*(half - self.edge for half in self.half_sizes)) + float(self.edge)
 
     @property
     def rounded_hull(self) -> RoundedHull:
@@ -85,11 +85,18 @@ class Box(SolidShape):
     def flatness(self) -> str:
         """See ``SolidShape``."""
         least, most = 2 * min(self.half_sizes), 2 * max(self.half_sizes)
-        if isinstance(self.edge, int | float) and not 0 <= 2 * self.edge < least:
-            return f"the radius of its edges must be less than half the smallest, {least / 2:g} m, not {self.edge:g} m"
         if least >= FLATTEST * most:
             return ""
         return (
             f"the smallest edge, {least:g} m, is less than {FLATTEST:g} of the largest, {most:g} m: that is no solid; "
             f"make it {FLATTEST * most:g} m or more, or use a [[plane]] for a wall"
         )
+
+    @property
+    def optional_fault(self) -> str:
+        """See ``SolidShape``."""
+        sizes = (*self.half_sizes, self.edge)
+        if not all(isinstance(size, int | float) for size in sizes) or 0 <= self.edge < min(self.half_sizes):
+            return ""
+        most = min(self.half_sizes)
+        return f"the radius of its edges must be less than half the smallest, {most:g} m, not {self.edge:g} m"

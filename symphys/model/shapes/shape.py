@@ -133,6 +133,11 @@ class SolidShape(ABC):
         return ""
 
     @property
+    def optional_fault(self) -> str:
+        """Why one of the ``optional_keys`` is impossible; empty if none is."""
+        return ""
+
+    @property
     def orientation(self) -> tuple[Scalar, ...]:
         """(4,): unit quaternion w x y z; no rotation where a turn changes nothing."""
         return UPRIGHT

@@ -73,7 +73,9 @@ def solid(
     shape = cls.from_sizes({key: getattr(own, key) for key in given}, centre, orientation)
     reason = shape.flatness
     if reason:
-        faults.add((*place, kind, *(keys if len(given) == 1 else [])), reason)
+        faults.add((*place, kind, *(keys if len(keys) == 1 else [])), reason)
+    elif shape.optional_fault:
+        faults.add((*place, kind, cls.optional_keys[0].name), shape.optional_fault)
     return shape
 
 

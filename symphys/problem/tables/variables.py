@@ -113,7 +113,7 @@ class VariableReader:
     def usual_scale(self, slots: Sequence[VariableSlot], kind: Kind) -> Array | float:
         """Parameters vary by their own size, numbers of controllers by WEIGHTS, clocks by CLOCK, others by 1."""
         value, key = self.nominal(slots), slots[0].name.rpartition(".")[2]
-        if kind == "parameter" and key in SCALES:
+        if key in SCALES and all(self.known[slot.name].own_scale for slot in slots):
             return SCALES[key]
         if not all(self.known[slot.name].own_scale for slot in slots):
             return {"weight": WEIGHTS, "recording": CLOCK}.get(kind, 1.0)
