@@ -65,6 +65,8 @@ def formula_units(world: World, names: Iterable[str], variables: Iterable[Variab
     known = {name: quantity_unit(name, world) for name in names if name.rpartition(".")[0] not in mixed}
     for variable in variables:
         units = {quantity_unit(slot.name, world) for slot in variable.slots}
+        if variable.kind == "recording":
+            units = {"s" if slot.name.endswith(".offset") else "" for slot in variable.slots}
         known[variable.name] = units.pop() if len(units) == 1 else None
     known = {"duration": "s"} | known | {"time": "s", ALIVE: ""}
     return {name: unit for name, unit in known.items() if unit is not None}

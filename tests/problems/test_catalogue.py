@@ -23,6 +23,7 @@ SHIPPED = [
     "bank_shot",
     "basket",
     "bounce_cycle",
+    "bounce_recorded",
     "bowling",
     "cart_double_pendulum",
     "cart_pole",
@@ -78,7 +79,7 @@ def test_shipped_problems_are_valid(name: str) -> None:
     assert problem.title != name
     assert problem.description
     assert problem.variables
-    assert problem.costs or problem.targets
+    assert problem.costs or problem.targets or problem.recordings
     assert problem.world().bodies
 
 

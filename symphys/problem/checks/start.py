@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from symphys.model.joints.frames import MEET, WORLD
 from symphys.problem.checks.start_values import Start
 from symphys.problem.model import DURATION, Variable
-from symphys.problem.parametric.reposition import reposition
+from symphys.problem.parametric.reposition import placing, reposition
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.quantities import Quantity
 from symphys.problem.reading.faults import Faults
@@ -26,16 +26,16 @@ def at_guess(
     parametric: ParametricWorld, known: Mapping[str, Quantity], variables: Sequence[Variable]
 ) -> dict[str, Array]:
     """Every quantity's value at t = 0, with the first knot of every guess put in."""
-    values = {name: quantity.nominal.copy() for name, quantity in known.items()}
+    values = {name: quantity.nominal.copy() for name, quantity in known.items() if quantity.kind != "recording"}
     for variable in variables:
-        for slot in variable.slots:
+        for slot in variable.slots if variable.kind != "recording" else ():
             values[slot.name][list(slot.components)] = variable.guess[: variable.components]
     for name, value in values.items():
         if name.endswith(".orientation"):
             values[name] = value / max(float(np.linalg.norm(value)), 1e-12)
-    anchors = {name: ca.DM(values[name]) for name in varied(variables) if name.endswith(".anchor")}
+    places = {name: ca.DM(values[name]) for name in placing(varied(variables))}
     moved = reposition(
-        parametric, anchors, {name: ca.DM(values[name]) for name, q in known.items() if q.kind == "initial"}
+        parametric, places, {name: ca.DM(values[name]) for name, q in known.items() if q.kind == "initial"}
     )
     return values | {name: np.array(value).ravel() for name, value in moved.items()}
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -17,6 +17,7 @@ from symphys.problem.schema.types import (
     NonNegative,
     Numbers,
     Positive,
+    Prior,
     SchemaTable,
     Stop,
     Texts,
@@ -51,6 +52,15 @@ class VariableTable(SchemaTable):
     knots: Knots = Field(default=1, description="for forces, torques and commands: number of values over the duration")
     interpolation: Interpolation = Field(
         default="constant", description="of forces, torques and commands between knots"
+    )
+    each: Literal["recording"] | None = Field(
+        default=None,
+        description='"recording": a value of its own for every recording, such as a start or the offset of a clock',
+    )
+    prior: Prior | None = Field(
+        default=None,
+        description="what `symphys identify` knows beforehand: [mean, standard deviation], each a number or a list "
+        "with one for each component",
     )
 
 
