@@ -26,8 +26,9 @@ from symphys.problem.parametric.collision_filter import CollisionFilter
 from symphys.problem.parametric.forward_kinematics import forward_kinematics
 from symphys.problem.parametric.parts import Part
 from symphys.problem.parametric.reposition import check_anchors
+from symphys.problem.parametric.starts import check_starts
 from symphys.problem.parametric.world import ParametricWorld
-from symphys.problem.quantities import Quantity, duration_quantity, quantities, weight_quantities
+from symphys.problem.quantities import Quantity, duration_quantity, quantities, start_quantities, weight_quantities
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.reading.messages import report
 from symphys.problem.references import read_references, reference_values
@@ -128,6 +129,7 @@ def build(
     sensors, controllers = read_control(document, parametric, known, functions, starts, given, faults)
     sets = read_sets(document.phase, parametric, faults)
     known |= weight_quantities(controllers) | force_quantities(document.force) | phase_quantities(sets)
+    known |= start_quantities(parametric)
     variables = read_variables(document.variable, known, simulation, faults)
     check_variables(document, simulation, parametric, nominal, variables, faults)
     sampled = {name: quantity for name, quantity in known.items() if quantity.kind != "duration"}
@@ -208,6 +210,7 @@ def check_variables(
     check_rollout(nominal, simulation, variables, faults)
     check_varied(parametric, nominal, varied_names(document, variables), faults)
     check_anchors(parametric, variables, faults)
+    check_starts(parametric, varied_names(document, variables), faults)
 
 
 def varied_names(document: Document, variables: Sequence[Variable | None]) -> list[tuple[Place, str]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
@@ -14,6 +14,7 @@ from symphys.model.state_layout import input_sizes
 from symphys.problem.feedback import FeedbackController
 from symphys.problem.model import DURATION, Kind, ProblemData, Variable, VariableSlot
 from symphys.problem.parametric.parts import VARIABLE
+from symphys.problem.parametric.world import ParametricWorld
 from symphys.suggest import hint, quote
 
 Array = NDArray[np.float64]
@@ -44,13 +45,14 @@ class Quantity:
     """Something that a variable can set: (components,) as the file has it.
 
     ``own_scale``: whether it typically changes by its own size, as parameters do. ``like``: the parameter in whose
-    place it stands; None for what stands for itself.
+    place it stands; None for what stands for itself. ``ends``: least and largest value, where its name does not say.
     """
 
     kind: Kind
     nominal: Array
     own_scale: bool = False
     like: str | None = None
+    ends: tuple[float, float] | None = None
 
 
 def quantities(
@@ -60,6 +62,16 @@ def quantities(
     found = {name: Quantity("initial", value) for name, value in initial.items()}
     found |= {name: Quantity("control", np.zeros(size)) for name, size in inputs.items()}
     return found | {name: Quantity("parameter", value, own_scale=True) for name, value in parameters.items()}
+
+
+def start_quantities(parametric: ParametricWorld) -> dict[str, Quantity]:
+    """Coordinates of joints at the start, within the limits of the joints, and their rates."""
+    found = {name: Quantity("initial", value) for name, value in parametric.starts().items()}
+    for joint in parametric.joints:
+        name, low, high = f"{joint.name}.start", joint.limits.lower, joint.limits.upper
+        if name in found:
+            found[name] = replace(found[name], ends=(-inf if low is None else low, inf if high is None else high))
+    return found
 
 
 def duration_quantity(duration: float) -> dict[str, Quantity]:
@@ -110,7 +122,7 @@ def unknown(name: str, known: Collection[str]) -> str:
 
 def set_quantities(problem: ProblemData, variable: Variable) -> str:
     """What a variable sets, as a file writes it; all that a list names gets the same values, which may not be meant."""
-    values = {**problem.initial, **problem.parameters, **problem.weights}
+    values = {**problem.initial, **problem.parametric.starts(), **problem.parameters, **problem.weights}
     sizes = {DURATION: 1, **{name: value.size for name, value in values.items()}, **input_sizes(problem.world())}
 
     def text(slot: VariableSlot) -> str:
@@ -129,11 +141,17 @@ def physical(name: str, kind: Kind) -> tuple[float, float]:
     return (0.0, inf) if kind == "parameter" and key in ACTING else LIMITS.get(key, (-inf, inf))
 
 
+def allowed(name: str, quantity: Quantity) -> tuple[float, float]:
+    """Least and largest value that a quantity may have."""
+    if quantity.ends is not None:
+        return quantity.ends
+    return physical(name, quantity.kind) if quantity.like is None else physical(quantity.like, "parameter")
+
+
 def limits(slot: VariableSlot, known: Mapping[str, Quantity]) -> tuple[Array, Array]:
     """(components,) twice: the bounds that hold where the file states none."""
     key = slot.name.rpartition(".")[2]
-    like, kind = known[slot.name].like, known[slot.name].kind
-    ends = physical(slot.name, kind) if like is None else physical(like, "parameter")
+    ends = allowed(slot.name, known[slot.name])
     low, high = (np.full(len(slot.components), limit) for limit in ends)
     if key in OPEN:
         low = LEAST_SHARE * known[slot.name].nominal[list(slot.components)]

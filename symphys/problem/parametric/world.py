@@ -66,6 +66,20 @@ class ParametricWorld:
             found |= {name: np.atleast_1d(np.array(numbers, float)) for name, numbers in part.parameters().items()}
         return found
 
+    def starts(self) -> dict[str, Array]:
+        """What variables may set of joints at the start, as the file has it, (coordinates,) each.
+
+        ``hip.start`` are the coordinates [rad] or [m]. ``hip.start_rate`` are rates [rad/s] or [m/s] that come on top
+        of those that the velocities of the bodies give: 0, as no file states them.
+        """
+        found = {}
+        for joint in self.joints:
+            count = len(joint.kind.coordinates)
+            if count:
+                found[f"{joint.name}.start"] = np.array(joint.start or (0.0,) * count)
+                found[f"{joint.name}.start_rate"] = np.zeros(count)
+        return found
+
     def world(self, overrides: Mapping[str, Any]) -> World:
         """The world with some parameters replaced; KeyError for a name that is none."""
         nominal = self.parameters()

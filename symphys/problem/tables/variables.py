@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from symphys.problem.checks.magnitude import check_mass
 from symphys.problem.model import Kind, Simulation, Variable, VariableSlot
-from symphys.problem.quantities import OPEN, Quantity, SlotError, limits, physical, read_slot
+from symphys.problem.quantities import OPEN, Quantity, SlotError, allowed, limits, read_slot
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.objectives import VariableTable
 from symphys.problem.schema.types import NestedList
@@ -147,7 +147,7 @@ class VariableReader:
         """Bounds must not allow a negative mass, and the like; a quaternion must not be zero."""
         for slot in variable.slots:
             name = slot.name.rpartition(".")[2]
-            low, high = physical(slot.name, variable.kind)
+            low, high = allowed(slot.name, self.known[slot.name])
             if np.any(variable.lower < low) or (name in OPEN and np.any(variable.lower <= low)):
                 self.add("lower", f"{slot.name} must {'be greater than' if name in OPEN else 'be at least'} {low:g}")
             if np.any(variable.upper > high):
