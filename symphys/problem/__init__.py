@@ -22,6 +22,7 @@ from symphys.problem.model import (
     VariableSlot,
 )
 from symphys.problem.parametric.reposition import placing, reposition
+from symphys.problem.parametric.starts import begin
 from symphys.problem.problem import Problem, load_problem, problem_of_tables
 from symphys.problem.quantities import set_quantities
 from symphys.problem.reading.solver_options import require_solvers, validate_options
@@ -59,6 +60,7 @@ __all__ = [
     "Termination",
     "Variable",
     "VariableSlot",
+    "begin",
     "is_robot",
     "json_schema",
     "load_problem",

@@ -26,6 +26,7 @@ from symphys.problem.parametric.collision_filter import CollisionFilter
 from symphys.problem.parametric.forward_kinematics import forward_kinematics
 from symphys.problem.parametric.parts import Part
 from symphys.problem.parametric.reposition import check_anchors
+from symphys.problem.parametric.starts import check_starts
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.quantities import (
     Quantity,
@@ -33,6 +34,7 @@ from symphys.problem.quantities import (
     duration_quantity,
     quantities,
     recording_quantities,
+    start_quantities,
     weight_quantities,
 )
 from symphys.problem.reading.faults import Faults, Place
@@ -148,7 +150,7 @@ def build(
     sensors, controllers = read_control(document, parametric, known, functions, starts, given, faults)
     sets = read_sets(document.phase, parametric, faults)
     known |= named_quantities(document, controllers, sets)
-    known |= delay_quantities(references)
+    known |= delay_quantities(references) | start_quantities(parametric)
     variables = read_variables(document.variable, known, simulation, faults)
     check_variables(document, simulation, parametric, nominal, variables, faults)
     sampled = {name: quantity for name, quantity in known.items() if quantity.kind not in ("duration", "recording")}
@@ -241,6 +243,7 @@ def check_variables(
     check_rollout(nominal, simulation, variables, faults)
     check_varied(parametric, nominal, varied_names(document, variables), faults)
     check_anchors(parametric, variables, faults)
+    check_starts(parametric, varied_names(document, variables), faults)
 
 
 def varied_names(document: Document, variables: Sequence[Variable | None]) -> list[tuple[Place, str]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, pi
 
 import numpy as np
@@ -15,7 +15,7 @@ from symphys.problem.feedback import FeedbackController
 from symphys.problem.model import DURATION, Kind, ProblemData, Variable, VariableSlot
 from symphys.problem.parametric.joints import OWN
 from symphys.problem.parametric.parts import COMBINE, STRUCTURAL, VARIABLE
-from symphys.problem.parametric.world import CONTACT
+from symphys.problem.parametric.world import CONTACT, ParametricWorld
 from symphys.problem.references import DELAY, ReferenceTrajectory
 from symphys.suggest import hint, quote
 
@@ -57,13 +57,14 @@ class Quantity:
     """Something that a variable can set: (components,) as the file has it.
 
     ``own_scale``: whether it typically changes by its own size, as parameters do. ``like``: the parameter in whose
-    place it stands; None for what stands for itself.
+    place it stands; None for what stands for itself. ``ends``: least and largest value, where its name does not say.
     """
 
     kind: Kind
     nominal: Array
     own_scale: bool = False
     like: str | None = None
+    ends: tuple[float, float] | None = None
 
 
 def quantities(
@@ -73,6 +74,16 @@ def quantities(
     found = {name: Quantity("initial", value) for name, value in initial.items()}
     found |= {name: Quantity("control", np.zeros(size)) for name, size in inputs.items()}
     return found | {name: Quantity("parameter", value, own_scale=True) for name, value in parameters.items()}
+
+
+def start_quantities(parametric: ParametricWorld) -> dict[str, Quantity]:
+    """Coordinates of joints at the start, within the limits of the joints, and their rates."""
+    found = {name: Quantity("initial", value) for name, value in parametric.starts().items()}
+    for joint in parametric.joints:
+        name, low, high = f"{joint.name}.start", joint.limits.lower, joint.limits.upper
+        if name in found:
+            found[name] = replace(found[name], ends=(-inf if low is None else low, inf if high is None else high))
+    return found
 
 
 def duration_quantity(duration: float) -> dict[str, Quantity]:
@@ -144,7 +155,7 @@ def unknown(name: str, known: Collection[str]) -> str:
 
 def set_quantities(problem: ProblemData, variable: Variable) -> str:
     """What a variable sets, as a file writes it; all that a list names gets the same values, which may not be meant."""
-    values = {**problem.initial, **problem.parameters, **problem.weights}
+    values = {**problem.initial, **problem.parametric.starts(), **problem.parameters, **problem.weights}
     tables = {recording.table for recording in problem.recordings}
     values |= {name: each.nominal for name, each in recording_quantities(sorted(tables)).items()}
     sizes = {DURATION: 1, **{name: value.size for name, value in values.items()}, **input_sizes(problem.world())}
@@ -170,7 +181,9 @@ def physical(name: str, kind: Kind) -> tuple[float, float]:
 
 
 def extremes(name: str, quantity: Quantity) -> tuple[float, float, bool]:
-    """Least and largest physical value of a quantity, and whether it must exceed the least."""
+    """Least and largest value that a quantity may have, and whether it must exceed the least."""
+    if quantity.ends is not None:
+        return *quantity.ends, False
     name, kind = (name, quantity.kind) if quantity.like is None else (quantity.like, "parameter")
     return *physical(name, kind), kind != "weight" and name.rpartition(".")[2] in OPEN
 

@@ -34,11 +34,13 @@ TURNING = {
     **dict.fromkeys(("motor", "lower", "upper", "spring", "torque"), "N m"),
     **{"lock": "N, then N m", "gain": "1/s", "angle": "rad", "rate": "rad/s", "velocity": "rad/s", "rest": "rad"},
     **{"stiffness": "N m/rad", "damping": "N m s/rad", "armature": "kg m^2", "friction": "N m"},
+    **{"start": "rad", "start_rate": "rad/s"},
 }
 SLIDING = {
     **dict.fromkeys(("motor", "lower", "upper", "spring", "torque"), "N"),
     **{"lock": "N, then N m", "gain": "1/s", "position": "m", "rate": "m/s", "velocity": "m/s", "rest": "m"},
     **{"stiffness": "N/m", "damping": "N s/m", "armature": "kg", "friction": "N"},
+    **{"start": "m", "start_rate": "m/s"},
 }
 """Of what belongs to joints, likewise."""
 

@@ -13,6 +13,7 @@ from symphys.model.joints.frames import MEET, WORLD
 from symphys.problem.checks.start_values import Start
 from symphys.problem.model import DURATION, Variable
 from symphys.problem.parametric.reposition import placing, reposition
+from symphys.problem.parametric.starts import begin
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.quantities import Quantity
 from symphys.problem.reading.faults import Faults
@@ -33,10 +34,14 @@ def at_guess(
     for name, value in values.items():
         if name.endswith(".orientation"):
             values[name] = value / max(float(np.linalg.norm(value)), 1e-12)
-    places = {name: ca.DM(values[name]) for name in placing(varied(variables))}
-    moved = reposition(
-        parametric, places, {name: ca.DM(values[name]) for name, q in known.items() if q.kind == "initial"}
+    varying, starts = varied(variables), {name: values.pop(name) for name in parametric.starts() if name in values}
+    begun = begin(
+        parametric,
+        {name: ca.DM(value) for name, value in starts.items() if name in varying},
+        {name: ca.DM(values[name]) for name, q in known.items() if q.kind == "initial" and name in values},
     )
+    places = {name: ca.DM(values[name]) for name in placing(varying)}
+    moved = reposition(parametric, places, begun)
     return values | {name: np.array(value).ravel() for name, value in moved.items()}
 
 

@@ -77,6 +77,20 @@ class ParametricWorld:
         known = stated(vars(self.contact))
         return {f"{CONTACT}.{key}": number for key, number in known.items() if soft or key != "damping"}
 
+    def starts(self) -> dict[str, Array]:
+        """What variables may set of joints at the start, as the file has it, (coordinates,) each.
+
+        ``hip.start`` are the coordinates [rad] or [m]. ``hip.start_rate`` are rates [rad/s] or [m/s] that come on top
+        of those that the velocities of the bodies give: 0, as no file states them.
+        """
+        found = {}
+        for joint in self.joints:
+            count = len(joint.kind.coordinates)
+            if count:
+                found[f"{joint.name}.start"] = np.array(joint.start or (0.0,) * count)
+                found[f"{joint.name}.start_rate"] = np.zeros(count)
+        return found
+
     def world(self, overrides: Mapping[str, Any]) -> World:
         """The world with some parameters replaced; KeyError for a name that is none."""
         nominal = self.parameters()

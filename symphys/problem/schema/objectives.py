@@ -32,8 +32,8 @@ class VariableTable(SchemaTable):
 
     name: Identifier = Field(description="how formulas and results refer to it")
     sets: Texts = Field(
-        description='what it sets: "ball.velocity", "ball.force[0:2]", "knee.command", "ground.friction", or a list; '
-        "an orientation (w, x, y, z) is normalised"
+        description='what it sets: "ball.velocity", "ball.force[0:2]", "knee.command", "knee.start", '
+        '"ground.friction", or a list; an orientation (w, x, y, z) is normalised'
     )
     guess: Numbers | None = Field(
         default=None, description="where solvers start; default: what the file says (forces and commands: 0)"
