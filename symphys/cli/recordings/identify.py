@@ -27,8 +27,8 @@ INTERRUPTED = 130
 def identify(source: str, assignments: tuple[str, ...], threads: int | None, out: Path, **options: Any) -> int:
     """Estimate the variables of a problem from its recordings, and say what one may believe of them.
 
-    Levenberg-Marquardt over all [[recording]] tables at once. The estimates with their intervals, what the recordings do
-    not determine, and how well those that were held back are predicted go to the terminal and into the run folder.
+    Levenberg-Marquardt over all [[recording]] tables at once. The estimates with their intervals, what the recordings
+    do not determine, and how well those that were held back are predicted go to the terminal and into the run folder.
     Ctrl-C stops after an iteration; the same command goes on.
 
     Exit code 0: it has converged. Exit code 1: it has not, or its results are doubted.
