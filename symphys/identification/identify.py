@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from symphys.identification.fitting.fit import FittedRecordings, Monitor, fit, starts_before_impact
+from symphys.identification.fitting.fit import FittedRecordings, Monitor, fit, own_numbers
 from symphys.identification.fitting.multistart import SearchOptions, search
 from symphys.identification.fitting.state import FitOptions, FitState, begin
 from symphys.identification.inference.assessment import doubts, estimates
@@ -27,7 +27,7 @@ from symphys.identification.interface import Array, IdentificationError, Ints, R
 from symphys.results.identification import HISTORY, GlobalSearch, Identification
 from symphys.suggest import hint
 
-STARTS = ("guess", "before impact")
+STARTS = ("guess", "before impact", "whole")
 """Where own numbers of recordings that are held back come from."""
 
 
@@ -41,7 +41,7 @@ class IdentificationOptions:
         refits: draws of it that are fitted in full, to check the steps.
         search: the check against local minima; None: none.
         held_back_starts: own numbers of recordings held back: "guess" keeps them, "before impact" fits them to what was
-            measured before the first impact.
+            measured before the first impact, "whole" to all of the recording, shared numbers held.
         seed: of the bootstrap.
     """
 
@@ -122,9 +122,9 @@ def assessed(
     assert known is not None
     shared, own = outcome.state.shared, outcome.state.own
     others = np.setdiff1d(np.arange(len(own)), which)
-    if options.held_back_starts == STARTS[1] and others.size:
+    if options.held_back_starts != STARTS[0] and others.size:
         with clock.of("starts"):
-            own = starts_before_impact(problem, shared, own, others, options.fit)
+            own = own_numbers(problem, shared, own, others, options.fit, options.held_back_starts == STARTS[1])
     with clock.of("uncertainty"):
         opened = open_directions(problem, fitted.evaluated, shared, own, which, options.fit.loss, known.information)
     with clock.of("bootstrap"):

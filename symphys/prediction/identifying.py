@@ -45,7 +45,8 @@ def identify(
         settings: in place of those in [identify]: ``loss="huber"``, ``bootstrap=200``, ``check="cma"``.
 
     Returns:
-        Estimates with intervals, what is not determined, what is left; see ``Identification``.
+        Estimates with intervals, what is not determined, what is left; see ``Identification``. Own numbers of
+        recordings that are held back are fitted to them, with the shared numbers held.
 
     Raises:
         ProblemError: the problem file is wrong.
@@ -94,7 +95,8 @@ def options_of(settings: IdentifySettings) -> IdentificationOptions:
     threshold = settings.threshold if settings.loss == "huber" else math.inf
     search = SearchOptions(settings.check_evaluations, seed=settings.seed) if settings.check == "cma" else None
     fit = FitOptions(settings.iterations, tolerance=settings.tolerance, threshold=threshold)
-    return IdentificationOptions(fit, draws=settings.bootstrap, search=search, seed=settings.seed)
+    draws, seed = settings.bootstrap, settings.seed
+    return IdentificationOptions(fit, draws=draws, search=search, held_back_starts="whole", seed=seed)
 
 
 def state_key(problem: Problem, settings: IdentifySettings) -> str:

@@ -101,10 +101,10 @@ def test_starts_of_recordings_held_back_come_from_before_the_impact() -> None:
     problem.own.guess[2] = 1.5
     late = problem.times[2] > 0.6
     errors = {}
-    for starts in ("guess", "before impact"):
+    for starts in ("guess", "whole", "before impact"):
         found = identify(problem, IdentificationOptions(draws=0, held_back_starts=starts))
         errors[starts] = found.held_back_errors[0].ratio
-    assert errors["guess"] > 10 and errors["before impact"] < 2
+    assert errors["guess"] > 10 and errors["whole"] < 2 and errors["before impact"] < 2
     assert found.own[2, 0] == pytest.approx(1.4, abs=0.01)
     problem.measured[2][late] += 1.0
     later = identify(problem, IdentificationOptions(draws=0, held_back_starts="before impact"))

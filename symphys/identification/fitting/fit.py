@@ -107,14 +107,14 @@ def fit_part(
     return described(scaled, outcome, which, options.loss)
 
 
-def starts_before_impact(
-    problem: RecordedResiduals, shared: Array, own: Array, which: Ints, options: FitOptions
+def own_numbers(
+    problem: RecordedResiduals, shared: Array, own: Array, which: Ints, options: FitOptions, early: bool
 ) -> Array:
-    """(K, o) own numbers, of the recordings in ``which`` fitted to what was measured before the first impact.
+    """(K, o) own numbers, those of the recordings in ``which`` fitted to them; ``early``: before their first impact.
 
     Shared numbers stay. A recording whose simulation is not finite there keeps its own numbers.
     """
-    part = PartialRecordings(problem, before_impact)
+    part = PartialRecordings(problem, before_impact) if early else problem
     finite = [bool(np.isfinite(r).all()) for r in part.residuals(shared, own, which)]
     some = which[np.array(finite, bool)]
     if not some.size or not own.shape[1]:
