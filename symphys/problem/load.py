@@ -149,8 +149,7 @@ def build(
     known = quantities(initial, parametric.parameters(), input_sizes(nominal)) | duration_quantity(simulation.duration)
     sensors, controllers = read_control(document, parametric, known, functions, starts, given, faults)
     sets = read_sets(document.phase, parametric, faults)
-    known |= named_quantities(document, controllers, sets)
-    known |= delay_quantities(references) | start_quantities(parametric)
+    known |= named_quantities(document, controllers, sets) | delay_quantities(references) | start_quantities(parametric)
     variables = read_variables(document.variable, known, simulation, faults)
     check_variables(document, simulation, parametric, nominal, variables, faults)
     sampled = {name: quantity for name, quantity in known.items() if quantity.kind not in ("duration", "recording")}

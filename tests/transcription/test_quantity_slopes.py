@@ -19,8 +19,8 @@ BASE = np.array([0.2, 0.0, 0.0, 0.3, 0.8, 0.1, -1.0, 4.0, 3.0, 2.0, 0.3])
 
 @pytest.fixture(scope="module")
 def rollout() -> Rollout:
-    """A crate falls onto one of its corners and tumbles."""
-    crate = {"name": "crate", "mass": 1, "shape": {"box": {"size": [0.2, 0.3, 0.25]}}, "friction": 0.5}
+    """A round crate falls onto one of its ends and tumbles."""
+    crate = {"name": "crate", "mass": 1, "shape": {"capsule": {"radius": 0.1, "length": 0.2}}, "friction": 0.5}
     sets = ["position", "velocity", "angular_velocity", "mass", "friction"]
     return symbolic_rollout(
         problem_of_tables(
