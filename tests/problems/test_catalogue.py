@@ -40,6 +40,7 @@ SHIPPED = [
     "gait_robot_fast",
     "gait_robot_trot",
     "half_cheetah_run",
+    "hopper_gait",
     "hopper_jump",
     "hopper_run",
     "ice_and_asphalt",
