@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from symphys.model.state_layout import Layout, initial_state
     from symphys.model.world import Law, Scheme, World, make_world
     from symphys.mpc.controller import Controller
+    from symphys.prediction.identifying import identify
     from symphys.problem import Problem, load_problem
     from symphys.problem.loading import load
     from symphys.report.making.batch import report
@@ -104,6 +105,7 @@ __all__ = [
     "compile_step",
     "doctor",
     "export",
+    "identify",
     "initial_state",
     "load",
     "load_problem",
@@ -130,6 +132,7 @@ _HOMES = {
     "api.tools": ("cache", "new", "schema"),
     "api.compiled": ("CompiledRollout", "compile"),
     "api.robots.robot": ("Robot", "load_robot"),
+    "prediction.identifying": ("identify",),
     "problem.loading": ("load",),
     "api.simulation": ("simulate",),
     "api.solution": ("Solution", "read"),

@@ -19,6 +19,7 @@ from symphys.cli.finding.best import best
 from symphys.cli.finding.diff import diff
 from symphys.cli.finding.ls import ls
 from symphys.cli.finding.replay import replay
+from symphys.cli.recordings.identify import identify
 from symphys.cli.report import report
 from symphys.cli.robots.importing import import_robot
 from symphys.cli.robots.mpc import mpc
@@ -57,6 +58,7 @@ COMMANDS = (
     new,
     solve,
     mpc,
+    identify,
     report,
     show,
     check,

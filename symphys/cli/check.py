@@ -48,6 +48,9 @@ def check(source: str, assignments: tuple[str, ...], folder: Path | None) -> int
     (problem,) = read_problems([source], read_settings(assignments))
     check_tables(problem)
     click.echo("\n".join(describe(problem)))
+    if problem.recordings and not (problem.costs or problem.targets or problem.constraints):
+        click.echo("\nThere is no objective but the recordings, so there is nothing else to examine.")
+        return 0
     require_solvable(problem)
     try:
         with working(f"check {problem.name}", {BUILDING: BUILDING_TAKES, **PARTS}) as tell:
@@ -92,6 +95,7 @@ def found(folder: Path, transcription: Transcription) -> NDArray[Any]:
 def describe(problem: Problem) -> list[str]:
     """What the file contains, in lines."""
     from symphys.problem import set_quantities
+    from symphys.problem.recordings.summary import recording_lines
 
     world, simulation = problem.world(), problem.simulation
     free = ", before a variable sets it" if problem.free_duration else ""
@@ -106,8 +110,10 @@ def describe(problem: Problem) -> list[str]:
         lines.append(f"  joints       {listed(f'{joint.name} ({joint.kind.name})' for joint in world.joints)}")
     lines += given(problem)
     for variable in problem.variables:
-        numbers = several(variable.guess.size, "number")
+        numbers = several(variable.guess.size, "number") + " for each recording" * variable.each
         lines.append(f"  variable     {variable.name}: {numbers}, sets {set_quantities(problem, variable)}")
+    for line in recording_lines(problem):
+        lines.append(f"               {line}" if line.startswith(" ") else f"  recording    {line}")
     for kind, things in (("cost", problem.costs), ("target", problem.targets), ("constraint", problem.constraints)):
         for thing in things:
             formula = " ".join(thing.formula.text.split())
@@ -127,7 +133,8 @@ def solvers_of(problem: Problem) -> list[str]:
 
     if problem.solvers:
         return [f"  solvers      {listed(problem.solvers)}, as the file says"]
-    return [f"  solver       {each}" for each in chosen(problem)] if problem.variables else []
+    aims = problem.costs or problem.targets or problem.constraints
+    return [f"  solver       {each}" for each in chosen(problem)] if problem.variables and aims else []
 
 
 def listed(names: Any) -> str:

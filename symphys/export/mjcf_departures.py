@@ -57,7 +57,15 @@ def require_expressible(departures: Iterable[Departure], name: str, approximate:
 
 def departures(start: StartState) -> list[Departure]:
     """All of a world at its start, those with most consequence first; sensors are not among them."""
-    found = [*joint_departures(start), *contact_departures(start), *terrain_departures(start), *soft_departures(start)]
+    rounded = [body.name for body in start.world.bodies if any("edge" in shape.sizes for shape in body.shapes)]
+    edges = Departure("approximated", tuple(rounded), "a box with round edges, which are sharp in MuJoCo")
+    found = [
+        edges,
+        *joint_departures(start),
+        *contact_departures(start),
+        *terrain_departures(start),
+        *soft_departures(start),
+    ]
     order = ("refused", "left out", "approximated")
     return sorted((each for each in found if each.what), key=lambda each: order.index(each.kind))
 

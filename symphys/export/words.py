@@ -41,7 +41,8 @@ def _sets(problem: Problem, world: World, variable: Variable) -> str:
 
 def _slot(problem: Problem, world: World, slot: VariableSlot) -> str:
     """What a slot sets."""
-    known = {**problem.initial, **problem.parameters, **problem.weights, DURATION: np.zeros(1)}
+    known = {**problem.initial, **problem.parametric.starts(), **problem.parameters, **problem.weights}
+    known[DURATION] = np.zeros(1)
     whole = len(known[slot.name]) if slot.name in known else input_size(world, slot.name)
     return slot.name if len(slot.components) == whole else f"{slot.name}[{','.join(map(str, slot.components))}]"
 

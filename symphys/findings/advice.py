@@ -47,7 +47,7 @@ def findings(trust: Examination, judged: Judged) -> list[Finding]:
     lines += smoothed_findings(trust.smoothed, judged)
     numbers = ((trust.gained, gains_finding), (trust.momentum, balance_finding))
     lines += [find(trust) for number, find in numbers if not math.isnan(number)]
-    return lines + contact_findings(trust)
+    return lines + contact_findings(trust, judged)
 
 
 def slopes(trust: Examination) -> tuple[list[str], list[list[str]]]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from symphys.findings.examination import Examination, Miss
-from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Finding, graded
+from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Finding, Judged, graded
+from symphys.findings.numerics import refined_finding
 from symphys.findings.writing import listed, several, show
 
 CONTACTS = "contacts"
@@ -43,30 +44,63 @@ IN_TIME = "Every impact was resolved in time."
 NOT_SOUND = "There were none; but other lines here say that not every impact was resolved."
 
 
-def contact_findings(trust: Examination) -> list[Finding]:
+def contact_findings(trust: Examination, judged: Judged) -> list[Finding]:
     """Every line on contacts for which there is a number."""
-    numbers = (
-        (trust.residual, residual_finding),
-        (trust.deepest, depth_finding),
-        (trust.passed, passage_finding),
-    )
-    return [find(trust) for number, find in numbers if not math.isnan(number)] + impact_findings(trust)
+    settled = [] if math.isnan(trust.residual) else [residual_finding(trust, judged)]
+    numbers = ((trust.deepest, depth_finding), (trust.passed, passage_finding))
+    return settled + [find(trust) for number, find in numbers if not math.isnan(number)] + impact_findings(trust)
 
 
-def residual_finding(trust: Examination) -> Finding:
-    """How far the contact solver was from its end."""
-    share = trust.residual / trust.impulse if trust.impulse > 0 else math.nan
-    level = GOOD if trust.residual == 0 else graded(share, RESIDUAL_LIMITS)
+def residual_finding(trust: Examination, judged: Judged) -> Finding:
+    """How far the contact solver was from its end.
+
+    Impulses that have not settled refute a result unless the same comes out where the sweeps end elsewhere.
+    """
+    level, number = residual_level(trust), f"{show(trust.residual, 2)} N s"
+    if level == BAD and holds_elsewhere(trust, judged):
+        meaning = f"Contact impulses had not settled{in_steps(trust)}{more_sweeps(trust)}. {elsewhere(trust)}"
+        return Finding(CONTACTS, FAIR, "Contact solver's residual", number, meaning)
     meaning = {
         GOOD: "Contact impulses had settled.",
         FAIR: f"Contact impulses still moved a little in the last sweep{more_sweeps(trust)}.",
-        BAD: f"Contact impulses had not settled{more_sweeps(trust)}.",
+        BAD: f"Contact impulses had not settled{in_steps(trust)}{more_sweeps(trust)}.",
         UNKNOWN: "Largest change of an impulse in the last sweep.",
     }[level]
     when = f" at t = {show(trust.residual_at)} s" * math.isfinite(trust.residual_at)
-    doubt = f"impulses of contacts have not settled{when}: {show(trust.residual, 2)} of {show(trust.impulse, 2)} N s"
-    number = f"{show(trust.residual, 2)} N s"
+    size = f"{show(trust.residual, 2)} of {show(trust.impulse, 2)} N s"
+    doubt = f"impulses of contacts have not settled{when}: {size}{refuted(trust, judged)}"
     return Finding(CONTACTS, level, "Contact solver's residual", number, meaning, doubt * (level == BAD))
+
+
+def residual_level(trust: Examination) -> str:
+    """The level of the residual as a share of the largest impulse."""
+    share = trust.residual / trust.impulse if trust.impulse > 0 else math.nan
+    return GOOD if trust.residual == 0 else graded(share, RESIDUAL_LIMITS)
+
+
+def holds_elsewhere(trust: Examination, judged: Judged) -> bool:
+    """Whether other numbers of sweeps were tried, and none of them leads far from the result."""
+    levels = [refined_finding(row, judged).level for row in trust.resettled]
+    return bool(levels) and all(level in (GOOD, FAIR) for level in levels)
+
+
+def refuted(trust: Examination, judged: Judged) -> str:
+    """A clause on what another number of sweeps does to the result, where it is another."""
+    found = [refined_finding(row, judged).doubt for row in trust.resettled]
+    return next((f", and {clause}" for clause in found if clause), "")
+
+
+def elsewhere(trust: Examination) -> str:
+    """A sentence on what other numbers of sweeps lead to."""
+    rows = [f"{show(row.objective)} with {row.what}" for row in trust.resettled]
+    return f"The result does not rest on where the sweeps end: the objective is {listed(rows)}."
+
+
+def in_steps(trust: Examination) -> str:
+    """A clause on how many steps have impulses that have not settled, as far as they were counted."""
+    if not (math.isfinite(trust.unsettled) and math.isfinite(trust.steps)):
+        return ""
+    return f" in {int(trust.unsettled)} of {several(int(trust.steps), 'step')}"
 
 
 def more_sweeps(trust: Examination) -> str:
@@ -129,7 +163,7 @@ def impact_findings(trust: Examination) -> list[Finding]:
 
 def resolved(trust: Examination) -> bool:
     """Whether no other number speaks against it that impacts were resolved in time."""
-    unsettled = residual_finding(trust).level == BAD
+    unsettled = residual_level(trust) == BAD
     gains = trust.gained > 0
     return not (unsettled or gains or trust.passed > PASSED_LIMITS[0] or depth_finding(trust).level == BAD)
 

@@ -173,7 +173,9 @@ class Examination:
         momentum: largest change of momentum in a step that nothing accounts for, relative.
         residual, residual_at, impulse: largest change of an impulse in the last sweep [N s], when [s], and largest
             impulse in a step [N s].
+        unsettled: steps in which that change is large beside the largest impulse.
         residual_finer: the residual with twice the sweeps [N s], where that was looked at.
+        resettled: the same z with other numbers of sweeps, where impulses have not settled.
         deepest, depth_contact, depth_time, size: deepest penetration [m], where, when; size of the smallest body [m].
         passed, passed_contact, passed_time, passed_depth: the deepest that a body was in another between two instants,
             as a share of its size, which contact, when [s], and how deep [m].
@@ -204,7 +206,9 @@ class Examination:
     momentum: float = np.nan
     residual: float = np.nan
     residual_at: float = np.nan
+    unsettled: float = np.nan
     residual_finer: float = np.nan
+    resettled: tuple[Refined, ...] = ()
     impulse: float = np.nan
     deepest: float = np.nan
     depth_contact: str = field(default="", metadata={"key": "deepest_at.contact"})

@@ -117,10 +117,14 @@ class Body:
         mass: Scalar = None,
         *,
         density: Scalar = None,
+        edge: Scalar = 0.0,
         **start: Unpack[BodyStart],
     ) -> Body:
-        """A uniform box; ``size``: the full lengths of its edges along x, y and z [m]. See ``ball``."""
-        return cls._of(name, (_solid(name, Box, size=size),), mass, density, start)
+        """A uniform box; ``size``: the full lengths of its edges along x, y and z [m]; ``edge``: their radius [m].
+
+        See ``ball`` and ``Box``.
+        """
+        return cls._of(name, (_solid(name, Box, size=size, edge=edge),), mass, density, start)
 
     @classmethod
     def capsule(
@@ -205,6 +209,8 @@ def _solid(name: str, kind: type[Shape], **sizes: Any) -> Shape:
     shape = kind.from_sizes(sizes, (0.0, 0.0, 0.0), UPRIGHT)
     if _plain(shape.volume) and shape.flatness:
         raise _refused(name, shape.flatness)
+    if shape.optional_fault:
+        raise _refused(name, shape.optional_fault)
     return shape
 
 

@@ -37,7 +37,8 @@ class Law:
 
     Problem files are read by these fields. A new one needs its key in ``ContactTable`` and ``PairTable``, in
     ``SurfaceTable`` where surfaces state it. Its metadata say whether they do, by ``combine``, which makes one of the
-    numbers of two surfaces, and whether variables may set it, by ``physical``, the least and the largest value.
+    numbers of two surfaces, and the least and the largest value that is ``physical``. Variables may set those that a
+    table states; where 0 leaves equations out, it is ``structural``: then variables set it only where it is not 0.
 
     Attributes:
         friction: Coulomb's coefficient mu; |tangential impulse| <= mu * normal impulse, on the exact disc.
@@ -50,10 +51,10 @@ class Law:
 
     friction: Scalar = field(default=0.5, metadata={"combine": prod, "physical": (0.0, inf)})
     restitution: Scalar = field(default=0.0, metadata={"combine": prod, "physical": (0.0, 1.0)})
-    torsion: Scalar = field(default=0.0, metadata={"combine": sum})
-    rolling: Scalar = field(default=0.0, metadata={"combine": sum})
-    frequency: Scalar = 0.0
-    damping: Scalar = 1.0
+    torsion: Scalar = field(default=0.0, metadata={"combine": sum, "physical": (0.0, inf), "structural": True})
+    rolling: Scalar = field(default=0.0, metadata={"combine": sum, "physical": (0.0, inf), "structural": True})
+    frequency: Scalar = field(default=0.0, metadata={"physical": (0.0, inf), "structural": True})
+    damping: Scalar = field(default=1.0, metadata={"physical": (0.0, inf)})
 
     @property
     def soft(self) -> bool:

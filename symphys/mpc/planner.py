@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -158,14 +159,17 @@ class Planner:
         return plan
 
     def _iterate(self, plan: RecedingPlan) -> RecedingPlan:
-        """One iteration of iLQR: slopes, costs, backward pass, and the best of the motions of all step lengths."""
+        """One iteration of iLQR: slopes, costs, backward pass, and the best of the motions of all step lengths.
+
+        The backward pass begins while threads are at the slopes of earlier steps.
+        """
         self._step.clock = plan.time
         u = plan.v @ self.weights.T if self._whole_inputs else plan.v
-        a, b, _ = self._step.slopes(plan.x[:-1], u, self.p, self.horizon.smoothing, plan.x[1:])
+        runs = self._step.slopes_from_end(plan.x[:-1], u, self.p, self.horizon.smoothing, plan.x[1:])
         costs = self._costs.expand(plan.x, plan.v, self.p, plan.time)
-        b = b @ self.weights if self._whole_inputs else b
+        slopes = ((a, b @ self.weights if self._whole_inputs else b) for a, b, _ in runs)
         room = self.lower - plan.v, self.upper - plan.v
-        found = plan_feedback(a, b, costs, room, self.damping / self.scale**2)
+        found = plan_feedback(slopes, costs, room, self.damping / self.scale**2)
         if found is None:
             return self._kept(plan, plan.back)
         ahead, back = found
@@ -185,32 +189,43 @@ class Planner:
 
 
 def plan_feedback(
-    a: Array, b: Array, costs: QuadraticCosts, room: tuple[Array, Array], damping: Array
+    slopes: Iterable[tuple[Array, Array]], costs: QuadraticCosts, room: tuple[Array, Array], damping: Array
 ) -> tuple[Array, Array] | None:
     """Feedforward (N, w) and gains (N, w, n); None where a Hessian is not positive definite, or slopes not finite.
 
     Args:
-        a: (N, n, n) the next state by the state.
-        b: (N, n, w) the next state by the decisions.
+        slopes: (K, n, n) and (K, n, w) the next states by the states and by the decisions, of runs of K steps; the last
+            run first.
         costs: about the motion.
         room: (N, w) each, how far decisions may go down and up.
         damping: (w,) added to the diagonal of the Hessian by decisions.
     """
-    n = a.shape[1]
-    through, curves = np.concatenate([a, b], axis=2), costs.curve[:-1]
-    if costs.ahead is not None:
-        curves = curves.copy()
-        later = costs.ahead @ through
-        curves[:, n:] += later
-        curves[:, :, n:] += later.transpose(0, 2, 1)
-    parts = (part[::-1] for part in (through, costs.slope[:-1], curves, *room))
-    steps = (LinearStep(t, q, c, low, high, damping) for t, q, c, low, high in zip(*parts, strict=True))
-    found = riccati_recursion(steps, CostToGo(costs.slope[-1, :n], costs.curve[-1, :n, :n]))
+    n = costs.slope.shape[1] - len(damping)
+    last = CostToGo(costs.slope[-1, :n], costs.curve[-1, :n, :n])
+    found = riccati_recursion(_from_end(slopes, costs, room, damping), last)
     if found is None:
         return None
     feedback = [each for each in reversed(found.feedback) if each is not None]
     ahead, back = np.array([each.ahead for each in feedback]), np.array([each.back for each in feedback])
     return (ahead, back) if np.isfinite(ahead).all() and np.isfinite(back).all() else None
+
+
+def _from_end(
+    slopes: Iterable[tuple[Array, Array]], costs: QuadraticCosts, room: tuple[Array, Array], damping: Array
+) -> Iterator[LinearStep]:
+    """The steps for the recursion, the last one first; see ``plan_feedback``."""
+    end = len(costs.slope) - 1
+    for a, b in slopes:
+        n, first = a.shape[1], end - len(a)
+        through, curves = np.concatenate([a, b], axis=2), costs.curve[first:end]
+        if costs.ahead is not None:
+            curves, later = curves.copy(), costs.ahead[first:end] @ through
+            curves[:, n:] += later
+            curves[:, :, n:] += later.transpose(0, 2, 1)
+        parts = through, costs.slope[first:end], curves, *(each[first:end] for each in room)
+        for t, q, c, low, high in zip(*(part[::-1] for part in parts), strict=True):
+            yield LinearStep(t, q, c, low, high, damping)
+        end = first
 
 
 def decision_order(model: Problem) -> NDArray[np.int64]:

@@ -21,11 +21,13 @@ from symphys.problem.model import (
     Variable,
     VariableSlot,
 )
-from symphys.problem.parametric.reposition import reposition
+from symphys.problem.parametric.reposition import placing, reposition
+from symphys.problem.parametric.starts import begin
 from symphys.problem.problem import Problem, load_problem, problem_of_tables
 from symphys.problem.quantities import set_quantities
 from symphys.problem.reading.solver_options import require_solvers, validate_options
 from symphys.problem.receding_horizon import PlantSettings, RecedingHorizon
+from symphys.problem.recordings import IdentifySettings, Measured, RecordedFile, Recording
 from symphys.problem.robot_alone import is_robot, robot_alone
 from symphys.problem.schema.json_schema import json_schema
 from symphys.problem.schema.reference import reference_page
@@ -39,6 +41,8 @@ __all__ = [
     "FeedbackController",
     "ForceLaw",
     "GuessedMotion",
+    "IdentifySettings",
+    "Measured",
     "Output",
     "Phase",
     "PlantSettings",
@@ -47,6 +51,8 @@ __all__ = [
     "RandomizedPose",
     "RandomizedQuantity",
     "RecedingHorizon",
+    "RecordedFile",
+    "Recording",
     "Scenarios",
     "Sensor",
     "Simulation",
@@ -54,9 +60,11 @@ __all__ = [
     "Termination",
     "Variable",
     "VariableSlot",
+    "begin",
     "is_robot",
     "json_schema",
     "load_problem",
+    "placing",
     "problem_of_tables",
     "reference_page",
     "reposition",

@@ -26,10 +26,21 @@ from symphys.problem.parametric.collision_filter import CollisionFilter
 from symphys.problem.parametric.forward_kinematics import forward_kinematics
 from symphys.problem.parametric.parts import Part
 from symphys.problem.parametric.reposition import check_anchors
+from symphys.problem.parametric.starts import check_starts
 from symphys.problem.parametric.world import ParametricWorld
-from symphys.problem.quantities import Quantity, duration_quantity, quantities, weight_quantities
+from symphys.problem.quantities import (
+    Quantity,
+    delay_quantities,
+    duration_quantity,
+    quantities,
+    recording_quantities,
+    start_quantities,
+    weight_quantities,
+)
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.reading.messages import report
+from symphys.problem.recordings.kept import recorded_appendix
+from symphys.problem.recordings.reading import read_identification
 from symphys.problem.references import read_references, reference_values
 from symphys.problem.schema import Document
 from symphys.problem.sweeps.sweep import Sweep
@@ -61,7 +72,18 @@ from symphys.problem.tables.variables import read_variables
 from symphys.problem.units import formula_units
 
 MEMBERS = ("body", "plane", "block", "terrain")
-SHARED_NAMES = (*MEMBERS, "joint", "coupling", "site", "sensor", "controller", "force", "reference", "variable")
+SHARED_NAMES = (
+    *MEMBERS,
+    "joint",
+    "coupling",
+    "site",
+    "sensor",
+    "controller",
+    "force",
+    "reference",
+    "variable",
+    "recording",
+)
 OWN_NAMES = ("phase", "cost", "target", "constraint", "output", "scenario")
 
 
@@ -127,23 +149,24 @@ def build(
     known = quantities(initial, parametric.parameters(), input_sizes(nominal)) | duration_quantity(simulation.duration)
     sensors, controllers = read_control(document, parametric, known, functions, starts, given, faults)
     sets = read_sets(document.phase, parametric, faults)
-    known |= weight_quantities(controllers) | force_quantities(document.force) | phase_quantities(sets)
+    known |= named_quantities(document, controllers, sets) | delay_quantities(references) | start_quantities(parametric)
     variables = read_variables(document.variable, known, simulation, faults)
     check_variables(document, simulation, parametric, nominal, variables, faults)
-    sampled = {name: quantity for name, quantity in known.items() if quantity.kind != "duration"}
+    sampled = {name: quantity for name, quantity in known.items() if quantity.kind not in ("duration", "recording")}
     scenarios = read_scenarios(document.scenario, sampled, parametric, simulation, variables, faults)
     faults.stop_if_any()
     values = at_guess(parametric, known, variables)
     start = checked_start(starts, parametric, values, faults)
     named = {**formula_names(values, start, variables), **given}
     forces, termination, objectives = read_laws(document, simulation, sets, nominal, known, named, variables, faults)
+    measured = read_identification(document, parametric, nominal, initial, simulation, named, variables, faults)
     check_read_at_start(objectives.phases, sensors, (document.ending[0], termination), faults)
     return ProblemData(
         name=printable(path.stem),
         title=document.title or printable(path.stem),
         description=document.description,
         file=str(path),
-        text=text + appendix(texts),
+        text=text + appendix(texts) + recorded_appendix(measured.new_files),
         simulation=simulation,
         parametric=parametric,
         initial=initial,
@@ -161,9 +184,20 @@ def build(
         termination=termination,
         scenarios=scenarios or None,
         mpc=mpc,
+        **measured.fields(),
         guess=read_guess(document.guess, simulation, nominal, references, faults),
         sweep=sweep,
     )
+
+
+def named_quantities(
+    document: Document,
+    controllers: Sequence[FeedbackController],
+    sets: Mapping[str, Mapping[str, tuple[float, ...]]],
+) -> dict[str, Quantity]:
+    """What variables may set beside the world: numbers of controllers, force laws and phases, clocks of recordings."""
+    clocks = recording_quantities(table.name for table in document.recording)
+    return weight_quantities(controllers) | force_quantities(document.force) | phase_quantities(sets) | clocks
 
 
 def checked_start(starts: StartValues, parametric: ParametricWorld, values: Mapping[str, Any], faults: Faults) -> Any:
@@ -208,6 +242,7 @@ def check_variables(
     check_rollout(nominal, simulation, variables, faults)
     check_varied(parametric, nominal, varied_names(document, variables), faults)
     check_anchors(parametric, variables, faults)
+    check_starts(parametric, varied_names(document, variables), faults)
 
 
 def varied_names(document: Document, variables: Sequence[Variable | None]) -> list[tuple[Place, str]]:

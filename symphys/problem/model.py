@@ -19,13 +19,15 @@ from symphys.problem.guess.motion import GuessedMotion
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.receding_horizon import RecedingHorizon
+from symphys.problem.recordings.kept import without_places
+from symphys.problem.recordings.types import IdentifySettings, RecordedFile, Recording
 from symphys.problem.references import ReferenceTrajectory
 from symphys.problem.sweeps.sweep import Sweep
 
 Array = NDArray[np.float64]
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 
-Kind = Literal["initial", "parameter", "control", "weight", "duration"]
+Kind = Literal["initial", "parameter", "control", "weight", "duration", "recording"]
 ALIVE = "alive"
 """In formulas: 1 until the motion is over, 0 from then on."""
 DURATION = "simulation.duration"
@@ -101,12 +103,14 @@ class Variable:
     Attributes:
         name: as in the file.
         kind: what is set: the state at the start, a physical parameter, a force or torque over time, the numbers of a
-            controller or force law, or the duration.
+            controller or force law, the duration, or the clock or scale of recordings.
         slots: all with the same number of components.
         knots: values over the duration; 1 unless a control. ``constant``: knot k holds over the k-th of ``knots``
             equal parts of the duration. ``linear``: knots at equal distances from start to end.
         interpolation: between knots.
         guess, lower, upper, scale, spread: (components * knots,), knot after knot; bounds may be infinite.
+        each: whether every recording has a value of its own.
+        prior: mean and standard deviation, (components,) each, that identification assumes; None: nothing.
     """
 
     name: str
@@ -119,6 +123,8 @@ class Variable:
     upper: Array
     scale: Array
     spread: Array
+    each: bool = False
+    prior: tuple[Array, Array] | None = None
 
     @property
     def components(self) -> int:
@@ -324,6 +330,8 @@ class ProblemData:
         scenarios: what differs from sample to sample; None: nothing.
         outputs: numbers that are reported, in the file's order.
         mpc: what [mpc] says; None without one.
+        recordings: measured motions, in the file's order; recorded_files: that they were read from.
+        identify: what [identify] says.
         guess: where the motion is guessed to pass; None: where the guess of the variables leads.
         sweep: what [sweep] says; None without one. ``text`` is without it.
     """
@@ -354,6 +362,9 @@ class ProblemData:
     scenarios: Scenarios | None = None
     outputs: tuple[Output, ...] = ()
     mpc: RecedingHorizon | None = None
+    recordings: tuple[Recording, ...] = field(default=(), repr=False)
+    recorded_files: tuple[RecordedFile, ...] = ()
+    identify: IdentifySettings = field(default_factory=IdentifySettings)
     guess: GuessedMotion | None = None
     sweep: Sweep | None = None
 
@@ -364,16 +375,18 @@ class ProblemData:
 
     @property
     def weights(self) -> dict[str, Array]:
-        """The numbers of all controllers, force laws and phases as the file has them, by names as ``brain.weights``."""
+        """The numbers of controllers, force laws, phases and references in the file, by names as ``brain.weights``."""
         own = [each.weights for each in self.controllers]
         own += [*(law.weights for law in self.forces), *(phase.weights for phase in self.phases)]
+        own += [each.weights for each in self.references]
         return {name: value for weights in own for name, value in weights.items()}
 
     @property
     def identity(self) -> str:
         """All that makes the problem this one: its text, and a digest of the numbers that controllers begin with."""
         digest = hashlib.sha256(b"".join(value.tobytes() for value in self.weights.values()))
-        return f"{self.text}\n{digest.hexdigest()}" if self.controllers else self.text
+        text = without_places(self.text)
+        return f"{text}\n{digest.hexdigest()}" if self.controllers else text
 
     def world(self, overrides: Mapping[str, Any] = NOTHING) -> World:
         """The world with its numbers, some replaced.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass
-from math import inf
+from dataclasses import dataclass, replace
+from math import inf, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,26 +13,39 @@ from numpy.typing import NDArray
 from symphys.model.state_layout import input_sizes
 from symphys.problem.feedback import FeedbackController
 from symphys.problem.model import DURATION, Kind, ProblemData, Variable, VariableSlot
-from symphys.problem.parametric.parts import VARIABLE
+from symphys.problem.parametric.joints import OWN
+from symphys.problem.parametric.parts import COMBINE, STRUCTURAL, VARIABLE
+from symphys.problem.parametric.world import CONTACT, ParametricWorld
+from symphys.problem.references import DELAY, ReferenceTrajectory
 from symphys.suggest import hint, quote
 
 Array = NDArray[np.float64]
 
 SLOT = re.compile(r"\s*([^\[\]\s]+)\s*(?:\[\s*(-?\d{1,9})?\s*(:)?\s*(-?\d{1,9})?\s*\])?\s*")
+EDGE = "edge"
 LIMITS: dict[str, tuple[float, float]] = {
     "mass": (0.0, inf),
     "radius": (0.0, inf),
     "size": (0.0, inf),
     "length": (0.0, inf),
+    EDGE: (0.0, inf),
     "duration": (0.0, inf),
+    "second_moments": (0.0, inf),
+    "correlations": (-1.0, 1.0),
+    "tilt": (-pi / 2, pi / 2),
     **VARIABLE,
 }
-"""What is physical; masses and sizes must exceed their limit."""
-ACTING = ("gain", "torque", "velocity", "range", "stiffness", "damping")
-"""Parameters of motors and springs, which must not be negative."""
-OPEN = ("mass", "radius", "size", "length", "duration")
+"""What is physical; masses, sizes and frequencies must exceed their limit."""
+ACTING = ("gain", "torque", "velocity", "range", "stiffness", "damping", "armature")
+"""Parameters of joints, motors and springs, which must not be negative."""
+OPEN = ("mass", "radius", "size", "length", "duration", "frequency")
+SMALL = ("second_moments",)
+SCALES = {"centre_of_mass": 0.01, "correlations": 0.1, "tilt": 0.01, DELAY: 0.01}
+"""How much what is usually 0 typically changes: [m], [-], [rad] and [s]."""
+MOST_ROUND = 0.99
+"""Of half of a box's smallest edge: the largest radius of its edges, unless ``upper`` says otherwise."""
 LEAST_SHARE = 1e-3
-"""Masses and sizes are not varied below this share of their value in the file, unless ``lower`` says so."""
+"""Masses, moments, sizes and frequencies stay above this share of their value in the file, unless ``lower`` is less."""
 
 
 class SlotError(ValueError):
@@ -44,13 +57,14 @@ class Quantity:
     """Something that a variable can set: (components,) as the file has it.
 
     ``own_scale``: whether it typically changes by its own size, as parameters do. ``like``: the parameter in whose
-    place it stands; None for what stands for itself.
+    place it stands; None for what stands for itself. ``ends``: least and largest value, where its name does not say.
     """
 
     kind: Kind
     nominal: Array
     own_scale: bool = False
     like: str | None = None
+    ends: tuple[float, float] | None = None
 
 
 def quantities(
@@ -62,6 +76,16 @@ def quantities(
     return found | {name: Quantity("parameter", value, own_scale=True) for name, value in parameters.items()}
 
 
+def start_quantities(parametric: ParametricWorld) -> dict[str, Quantity]:
+    """Coordinates of joints at the start, within the limits of the joints, and their rates."""
+    found = {name: Quantity("initial", value) for name, value in parametric.starts().items()}
+    for joint in parametric.joints:
+        name, low, high = f"{joint.name}.start", joint.limits.lower, joint.limits.upper
+        if name in found:
+            found[name] = replace(found[name], ends=(-inf if low is None else low, inf if high is None else high))
+    return found
+
+
 def duration_quantity(duration: float) -> dict[str, Quantity]:
     """How long the motion takes [s]."""
     return {DURATION: Quantity("duration", np.array([duration]), own_scale=True)}
@@ -70,6 +94,22 @@ def duration_quantity(duration: float) -> dict[str, Quantity]:
 def weight_quantities(controllers: Iterable[FeedbackController]) -> dict[str, Quantity]:
     """The numbers of controllers by name, such as ``brain.weights``."""
     return {name: Quantity("weight", value) for controller in controllers for name, value in controller.weights.items()}
+
+
+def recording_quantities(names: Iterable[str]) -> dict[str, Quantity]:
+    """Of each [[recording]] what is added to its times [s], and the factor of its lengths."""
+    found = dict[str, Quantity]()
+    for name in names:
+        found[f"{name}.offset"] = Quantity("recording", np.zeros(1))
+        found[f"{name}.scale"] = Quantity("recording", np.ones(1), own_scale=True)
+    return found
+
+
+def delay_quantities(references: Iterable[ReferenceTrajectory]) -> dict[str, Quantity]:
+    """The delays of references by name, such as ``walk.delay`` [s]."""
+    return {
+        name: Quantity("weight", value, own_scale=True) for each in references for name, value in each.weights.items()
+    }
 
 
 def read_slot(text: str, known: Mapping[str, Quantity]) -> VariableSlot:
@@ -101,16 +141,23 @@ def unknown(name: str, known: Collection[str]) -> str:
     """The nearest quantities; for a coefficient that no table states, how to state it."""
     owner, _, key = name.rpartition(".")
     owners = dict.fromkeys(other.rpartition(".")[0] for other in known)
-    if key in VARIABLE and owner in owners:
-        return f"{owner} states no {key}: give it a value there first, so that this variable has something to change"
+    of_contact = key in VARIABLE and (key in COMBINE or owner == CONTACT or "-" in owner)
+    if owner in owners and (of_contact or key in OWN or (f"{owner}.size" in known and key == EDGE)):
+        above = key in STRUCTURAL or key == EDGE or f"{owner}.anchor" in known
+        what = "a value above 0" if above else "a value"
+        return f"{owner} states no {key}: give it {what} there first, so that this variable has something to change"
     same_owner = [other for other in known if owner and other.startswith(f"{owner}.")]
-    stated = f"; what states no {key} has none to vary" if key in VARIABLE else ""
+    tables = "" if key in COMBINE else ": [contact] and [[pair]] may state it"
+    stated = f"; what states no {key} has none to vary{tables}" if key in VARIABLE else ""
+    stated += "; a [[reference]] must state its delay, 0 too, for a variable to set it" if key == DELAY else ""
     return hint(name, same_owner or known) + stated
 
 
 def set_quantities(problem: ProblemData, variable: Variable) -> str:
     """What a variable sets, as a file writes it; all that a list names gets the same values, which may not be meant."""
-    values = {**problem.initial, **problem.parameters, **problem.weights}
+    values = {**problem.initial, **problem.parametric.starts(), **problem.parameters, **problem.weights}
+    tables = {recording.table for recording in problem.recordings}
+    values |= {name: each.nominal for name, each in recording_quantities(sorted(tables)).items()}
     sizes = {DURATION: 1, **{name: value.size for name, value in values.items()}, **input_sizes(problem.world())}
 
     def text(slot: VariableSlot) -> str:
@@ -126,15 +173,28 @@ def set_quantities(problem: ProblemData, variable: Variable) -> str:
 def physical(name: str, kind: Kind) -> tuple[float, float]:
     """Least and largest value of a quantity that is physical."""
     key = name.rpartition(".")[2]
+    if kind == "recording":
+        return (0.0, inf) if key == "scale" else (-inf, inf)
+    if kind == "weight":
+        return -inf, inf
     return (0.0, inf) if kind == "parameter" and key in ACTING else LIMITS.get(key, (-inf, inf))
+
+
+def extremes(name: str, quantity: Quantity) -> tuple[float, float, bool]:
+    """Least and largest value that a quantity may have, and whether it must exceed the least."""
+    if quantity.ends is not None:
+        return *quantity.ends, False
+    name, kind = (name, quantity.kind) if quantity.like is None else (quantity.like, "parameter")
+    return *physical(name, kind), kind != "weight" and name.rpartition(".")[2] in OPEN
 
 
 def limits(slot: VariableSlot, known: Mapping[str, Quantity]) -> tuple[Array, Array]:
     """(components,) twice: the bounds that hold where the file states none."""
-    key = slot.name.rpartition(".")[2]
-    like, kind = known[slot.name].like, known[slot.name].kind
-    ends = physical(slot.name, kind) if like is None else physical(like, "parameter")
-    low, high = (np.full(len(slot.components), limit) for limit in ends)
-    if key in OPEN:
+    least, most, above = extremes(slot.name, known[slot.name])
+    low, high = (np.full(len(slot.components), limit) for limit in (least, most))
+    if above or slot.name.rpartition(".")[2] in SMALL:
         low = LEAST_SHARE * known[slot.name].nominal[list(slot.components)]
+    owner, _, key = slot.name.rpartition(".")
+    if key == EDGE and known[slot.name].kind == "parameter":
+        high = np.full(1, MOST_ROUND * known[f"{owner}.size"].nominal.min() / 2)
     return low, high

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from symphys.model.world import NOTHING
 from symphys.problem.reading.faults import Faults
 from symphys.problem.reading.time_series import SeriesError, read_series, series_text, written
 from symphys.problem.schema import Document
@@ -20,6 +21,7 @@ from symphys.problem.schema import Document
 Array = NDArray[np.float64]
 Expr = Any
 """casadi SX, MX or DM"""
+DELAY = "delay"
 
 
 @dataclass(frozen=True)
@@ -31,12 +33,19 @@ class ReferenceTrajectory:
         time: (n,) [s], increasing.
         columns: by name (n,).
         interpolation: "cubic" is the spline with continuous curvature ("not a knot" at its ends).
+        delay: by which formulas read it late [s], a number that variables may set; None where the file states none.
     """
 
     name: str
     time: Array = field(repr=False)
     columns: dict[str, Array] = field(repr=False)
     interpolation: Literal["linear", "cubic"] = "linear"
+    delay: float | None = None
+
+    @property
+    def weights(self) -> dict[str, Array]:
+        """Its delay by name, (1,) [s], if the file states one."""
+        return {} if self.delay is None else {f"{self.name}.{DELAY}": np.array([self.delay])}
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -93,10 +102,18 @@ def read_references(document: Document, faults: Faults) -> tuple[tuple[Reference
         except SeriesError as error:
             faults.add((*place, key), str(error))
             continue
-        found.append(ReferenceTrajectory(table.name, time, columns, table.interpolation))
+        if table.delay is not None and DELAY in columns:
+            faults.add((*place, DELAY), "there is a column of this name, so formulas would not know which; rename that")
+        found.append(ReferenceTrajectory(table.name, time, columns, table.interpolation, table.delay))
     return tuple(found), texts
 
 
-def reference_values(references: Iterable[ReferenceTrajectory], time: Expr) -> Mapping[str, Expr]:
-    """What all names of references mean at a time."""
-    return {name: value for each in references for name, value in each.at(time).items()}
+def reference_values(
+    references: Iterable[ReferenceTrajectory], time: Expr, delays: Mapping[str, Expr] = NOTHING
+) -> Mapping[str, Expr]:
+    """What all names of references mean at a time [s]; ``delays`` by name [s], else as the file has them."""
+    found: dict[str, Expr] = {}
+    for each in references:
+        late = delays.get(f"{each.name}.{DELAY}", each.delay)
+        found |= each.at(time if each.delay is None else time - late)
+    return found

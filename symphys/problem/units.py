@@ -34,11 +34,13 @@ TURNING = {
     **dict.fromkeys(("motor", "lower", "upper", "spring", "torque"), "N m"),
     **{"lock": "N, then N m", "gain": "1/s", "angle": "rad", "rate": "rad/s", "velocity": "rad/s", "rest": "rad"},
     **{"stiffness": "N m/rad", "damping": "N m s/rad", "armature": "kg m^2", "friction": "N m"},
+    **{"start": "rad", "start_rate": "rad/s"},
 }
 SLIDING = {
     **dict.fromkeys(("motor", "lower", "upper", "spring", "torque"), "N"),
     **{"lock": "N, then N m", "gain": "1/s", "position": "m", "rate": "m/s", "velocity": "m/s", "rest": "m"},
     **{"stiffness": "N/m", "damping": "N s/m", "armature": "kg", "friction": "N"},
+    **{"start": "m", "start_rate": "m/s"},
 }
 """Of what belongs to joints, likewise."""
 
@@ -65,6 +67,8 @@ def formula_units(world: World, names: Iterable[str], variables: Iterable[Variab
     known = {name: quantity_unit(name, world) for name in names if name.rpartition(".")[0] not in mixed}
     for variable in variables:
         units = {quantity_unit(slot.name, world) for slot in variable.slots}
+        if variable.kind == "recording":
+            units = {"s" if slot.name.endswith(".offset") else "" for slot in variable.slots}
         known[variable.name] = units.pop() if len(units) == 1 else None
     known = {"duration": "s"} | known | {"time": "s", ALIVE: ""}
     return {name: unit for name, unit in known.items() if unit is not None}

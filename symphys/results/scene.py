@@ -90,8 +90,10 @@ class Solid:
             return None
         keys = {key.name: key.count for key in SHAPES[kind].size_keys}
         sizes = {name: SIZES[count](entry.get(name)) for name, count in keys.items()}
-        whole = np.concatenate([np.ravel(size) for size in sizes.values()])
         lengths = [size for name, size in sizes.items() if keys[name]]
+        optional = [key.name for key in SHAPES[kind].optional_keys if key.name in entry]
+        sizes |= {name: values.number(entry[name]) for name in optional}
+        whole = np.concatenate([np.ravel(size) for size in sizes.values()])
         if not (whole.size and small([*whole, *centre]) and all(np.all(length > 0) for length in lengths)):
             return None
         if not lengths and SHAPES[kind].from_sizes(sizes, (0.0, 0.0, 0.0), UPRIGHT).flatness:

@@ -11,7 +11,7 @@ import numpy as np
 
 from symphys.model.state_layout import initial_state, input_columns, inputs_size
 from symphys.model.world import World
-from symphys.problem import Problem, Variable, reposition
+from symphys.problem import Problem, Variable, begin, placing, reposition
 from symphys.shooting import VariableBlock
 from symphys.transcription.formula_names import Parameters, spans
 
@@ -38,12 +38,15 @@ def blocks(problem: Problem) -> tuple[VariableBlock, ...]:
 
 def start_of(problem: Problem, world: World, inputs: Sequence[str], parameters: Parameters, z: Expr) -> RolloutStart:
     """The rollout's start as a function of z."""
-    initial = {name: ca.MX(ca.DM(value)) for name, value in problem.initial.items()}
+    starts = problem.parametric.starts()
+    initial = {name: ca.MX(ca.DM(value)) for name, value in (problem.initial | starts).items()}
     physical = {name: ca.MX(value) for name, value in zip(parameters.names, parameters.nominal, strict=True)}
     steps, scheduled = problem.simulation.steps, parameters.phases.at(ca.DM(np.arange(problem.simulation.steps)).T)
     u = ca.vertcat(ca.MX.zeros(inputs_size(world, inputs) - scheduled.shape[0], steps), scheduled)
     for variable, (first, last) in zip(problem.variables, spans(problem.variables), strict=True):
         part = z[first:last]
+        if variable.kind == "recording":  # of how a motion was measured, not of how it goes
+            continue
         if variable.kind == "control":
             u = u + _spread_inputs(problem, variable, input_columns(world, inputs), part)
             continue
@@ -52,8 +55,10 @@ def start_of(problem: Problem, world: World, inputs: Sequence[str], parameters: 
             values[slot.name] = _replace(values[slot.name], slot.components, part)
     varied = {slot.name for variable in problem.variables for slot in variable.slots}
     initial |= {name: _unit(initial[name]) for name in varied if name.endswith(".orientation")}
-    anchors = {name: physical[name] for name in sorted(varied & physical.keys()) if name.endswith(".anchor")}
-    initial = reposition(problem.parametric, anchors, initial)
+    begun = {name: initial.pop(name) for name in starts}
+    initial = begin(problem.parametric, {name: begun[name] for name in starts if name in varied}, initial)
+    places = {name: physical[name] for name in placing(sorted(varied & physical.keys()))}
+    initial = reposition(problem.parametric, places, initial)
     return RolloutStart(initial_state(world, initial), u, ca.vertcat(ca.MX(0, 1), *physical.values()))
 
 

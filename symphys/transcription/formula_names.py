@@ -23,7 +23,7 @@ from symphys.dynamics.observation import (
 from symphys.expression import Formula
 from symphys.model.state_layout import GIVEN, Layout, input_columns, input_sizes, input_symbols
 from symphys.model.world import Scheme, World
-from symphys.problem import ALIVE, DURATION, Problem, Simulation, Variable
+from symphys.problem import ALIVE, DURATION, Problem, Simulation, Variable, placing
 from symphys.problem.references import reference_values
 from symphys.transcription.feedback.sensor_memory import SensorMemory
 from symphys.transcription.formulas.phase_numbers import PhaseNumbers, phase_numbers
@@ -101,8 +101,9 @@ def varied_parameters(problem: Problem) -> Parameters:
 
 
 def swept_parameters(problem: Problem) -> list[str]:
-    """The parameters in which the problems of its sweep differ, but for anchors, which decide where bodies start."""
-    return sorted(name for name in problem.varied & problem.parameters.keys() if not name.endswith(".anchor"))
+    """The parameters in which the problems of its sweep differ, but for those that decide where bodies start."""
+    names = problem.varied & problem.parameters.keys()
+    return sorted(names.difference(placing(names)))
 
 
 def input_names(problem: Problem) -> tuple[str, ...]:
@@ -171,7 +172,8 @@ def namespace(
     names.update({name: ca.DM(value) for name, value in problem.parameters.items()})
     names.update(zip(parameters.names, parameters.symbols, strict=True))
     names.update(parameters.overrides())
-    names.update(reference_values([each for each in problem.references if not wanted.isdisjoint(each.names)], at.time))
+    followed = [each for each in problem.references if not wanted.isdisjoint(each.names)]
+    names.update(reference_values(followed, at.time, names))
     if not wanted.isdisjoint(joint_quantity_names(world)):
         names.update(joint_quantities(world, at.x))
     if not wanted.isdisjoint(body_quantity_names(world)):

@@ -97,17 +97,20 @@ def dense(function: ca.Function) -> ca.Function:
     return ca.Function(function.name(), arguments, results)
 
 
-def rollout_program(rollout: Rollout, exact: bool = False, recorded: Mapping[str, Formula] = NOTHING) -> Program:
+def rollout_program(
+    rollout: Rollout, exact: bool = False, recorded: Mapping[str, Formula] = NOTHING, shift: int = 1
+) -> Program:
     """A program of z and smoothing, with all that is asked of a rollout: see ``_epilogue``; and ``alive``.
 
     Args:
         rollout: of a problem.
         exact: for smoothing 0 only, whatever is given: it has less to compute.
         recorded: further outputs by name: what formulas are at the end of every step, one after the other.
+        shift: 0 for those at the start of every step.
     """
     samples = ProgramSamples(rollout)
     asked = terms(samples)
-    series = {name: samples.recorded(formula) for name, formula in recorded.items()}
+    series = {name: samples.recorded(formula, shift) for name, formula in recorded.items()}
     body = [*control_calls(rollout, samples), *step_calls(samples, exact)]
     epilogue, outputs = _epilogue(samples, asked)
     alive = _alive(samples)

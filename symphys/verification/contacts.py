@@ -11,6 +11,7 @@ from symphys.dynamics.observation import slip_function
 from symphys.trajectory import Trajectory
 from symphys.transcription import Record, Rollout, plain
 from symphys.verification.bodies import bodies
+from symphys.verification.refinement import UNSETTLED
 
 Array = NDArray[np.float64]
 
@@ -22,16 +23,18 @@ def contacts(rollout: Rollout, record: Record) -> dict[str, Any]:
 
     Returns:
         "residual" [N s]: the largest change of an impulse in a last sweep, at "residual_at" [s]; "impulse" [N s]: the
-        largest impulse of a contact in a step. "deepest" [m]: how far rigid surfaces overlapped, with the "contact" and
-        "time" [s] in "deepest_at" (None where they did not); "size" [m]: the smallest radius of gyration of a body.
-        "steps", and in how many of them "multiple_impacts" of a body, "ambiguous_impacts" of several bodies at one
-        instant, and "paradoxes" of friction.
+        largest impulse of a contact in a step; "unsettled", in how many steps that change is large beside it.
+        "deepest" [m]: how far rigid surfaces overlapped, with the "contact" and "time" [s] in "deepest_at" (None where
+        they did not); "size" [m]: the smallest radius of gyration of a body. "steps", and in how many of them
+        "multiple_impacts" of a body, "ambiguous_impacts" of several bodies at one instant, and "paradoxes" of friction.
     """
     motion = record.motion
+    impulse = float(np.linalg.norm(motion.contact_force, axis=2).max(initial=0.0) * rollout.dt)
     return {
         "residual": float(motion.residual.max(initial=0.0)),
         "residual_at": float(motion.time[int(motion.residual.argmax())]),
-        "impulse": float(np.linalg.norm(motion.contact_force, axis=2).max(initial=0.0) * rollout.dt),
+        "impulse": impulse,
+        "unsettled": int((motion.residual > UNSETTLED * impulse).sum()) if impulse > 0 else 0,
         "steps": rollout.steps,
         "multiple_impacts": int(motion.crowded.sum()),
         "ambiguous_impacts": int(motion.ambiguous.sum()),

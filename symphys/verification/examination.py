@@ -88,7 +88,11 @@ def _fault(transcription: Transcription, record: Record, compared: list[dict[str
 def survey(transcription: Transcription, record: Record) -> dict[str, Any]:
     """Energy and momentum, contacts, and tunnelling; it takes little beside a solve.
 
+    Where impulses of contacts have not settled, the motion is simulated again with other numbers of sweeps.
+
     Each module says what its numbers are.
     """
     rollout = transcription.timed(record).rollout
-    return {**balance(rollout, record), **contacts(rollout, record), **tunnelling(rollout, record)}
+    resolved = contacts(rollout, record)
+    again = refinement.resettled(transcription, record.z, resolved["residual"], resolved["impulse"])
+    return {**balance(rollout, record), **resolved, **again, **tunnelling(rollout, record)}

@@ -16,11 +16,13 @@ from symphys.transcription import Transcription, transcribe
 
 Array = NDArray[np.float64]
 
-FINER_DT, FINEST_DT, MORE_SWEEPS = "dt / 2", "dt / 4", "sweeps x 2"
+FINER_DT, FINEST_DT, MORE_SWEEPS, ONE_MORE = "dt / 2", "dt / 4", "sweeps x 2", "sweeps + 1"
 TOLD = {what: f"simulating with {what}" for what in (FINER_DT, FINEST_DT, MORE_SWEEPS)}
 """What announces each refinement, in their order."""
 SETTLED = 1e-3
 """Residuals below this share of the largest impulse are not looked into."""
+UNSETTLED = 5e-2
+"""Residuals above this share of the largest impulse say that impulses have not settled."""
 ROUNDING = 1e-9
 """Relative changes below this say nothing about the order of convergence."""
 
@@ -62,6 +64,25 @@ def settling(transcription: Transcription, z: Array, residual: float, impulse: f
         return {"residual_finer": float("inf")}
 
 
+def resettled(transcription: Transcription, z: Array, residual: float, impulse: float) -> dict[str, Any]:
+    """What becomes of ``z`` where impulses have not settled, if the sweeps end elsewhere.
+
+    Projections that go round in a cycle mostly do so in two turns, so that one sweep more ends in the other turn, and
+    twice as many show the cycle further on.
+
+    Returns:
+        "resettled": for one sweep more and for twice the sweeps the "objective" and the "worst" error / tolerance.
+        Nothing where impulses have settled.
+    """
+    if not residual > UNSETTLED * impulse > 0:
+        return {}
+    rows = []
+    for what in (ONE_MORE, MORE_SWEEPS):
+        verdict = finer_problem(transcription, what).judge(z)
+        rows.append({"what": what, "objective": verdict.objective, "worst": verdict.worst})
+    return {"resettled": rows}
+
+
 def change(block: VariableBlock, before: Array, after: Array) -> float | None:
     """|after - before| / |before| of one variable's part of a gradient, in its scale; None where it is flat."""
     part = slice(block.start, block.stop)
@@ -79,7 +100,7 @@ def order(values: Sequence[ArrayLike]) -> float | None:
     return float(np.log2(first / second))
 
 
-@lru_cache(maxsize=len(TOLD))
+@lru_cache(maxsize=len(TOLD) + 1)
 def finer_problem(transcription: Transcription, what: str) -> Transcription:
     """Refined so; made once for all runs of a problem."""
     problem = transcription.problem
@@ -88,5 +109,6 @@ def finer_problem(transcription: Transcription, what: str) -> Transcription:
         FINER_DT: replace(simulation, dt=simulation.dt / 2),
         FINEST_DT: replace(simulation, dt=simulation.dt / 4),
         MORE_SWEEPS: replace(simulation, sweeps=2 * simulation.sweeps),
+        ONE_MORE: replace(simulation, sweeps=simulation.sweeps + 1),
     }
     return transcribe(replace(problem, simulation=finer[what]), backend="casadi")

@@ -92,3 +92,20 @@ def test_check_can_look_at_what_a_run_found(run: Run, throw: Path, unreachable: 
     code, _, err = run("check", other, "--at", "reports/throw/least_squares-seed0")
     assert code == 2 and "'kick'" in err
     assert run("check", throw, "--at", "nowhere")[0] == 2
+
+
+def test_check_lists_recordings(run: Run) -> None:
+    """How many, of what, what is missing and held back; without an objective nothing else is examined."""
+    code, out, _ = run("check", "bounce_recorded")
+    assert code == 0
+    lines = [" ".join(line.split()) for line in out.splitlines()]
+    assert "variable let_go: 1 number for each recording, sets ball.position[2]" in lines
+    assert "recording drops: 3 motions of 56 samples, 1 held back, until 1.1 s" in lines
+    assert "ball.position[2]: noise 0.002, 1 of 168 samples missing" in lines
+    assert not any(line.startswith("solver") or "steps of 0.01 s apart" in line for line in lines)
+    assert "There is no objective but the recordings" in out
+
+
+def test_check_says_where_samples_lie_between_steps(run: Run) -> None:
+    out = run("check", "bounce_recorded", "--set", "simulation.dt=0.0125", "--set", "simulation.duration=1.125")[1]
+    assert "samples are 1.6 steps of 0.0125 s apart, so that most fall between two steps; dt = 0.01 would fit" in out

@@ -64,7 +64,9 @@ def test_the_readme_names_everything(kick: Transcription) -> None:
         assert line in text
 
 
-@pytest.mark.parametrize("name", ["kick", "fastest_move", "cart_pole", "ice_and_asphalt"])
+@pytest.mark.parametrize(
+    "name", ["kick", "fastest_move", "cart_pole", pytest.param("ice_and_asphalt", marks=pytest.mark.thorough)]
+)
 def test_slopes_of_a_step_are_those_of_linearize(name: str, kick: Transcription) -> None:
     one = kick if name == "kick" else transcribe(load_problem(find(name)), backend="casadi")
     linearize = slopes_function(tangent_of(one))

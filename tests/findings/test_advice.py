@@ -15,6 +15,7 @@ from symphys.findings.energy import balance_finding
 from symphys.findings.examination import Energy, Examination, GradientCheck, Growth, Miss, Refined, Slide, Smoothed
 from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Judged
 from symphys.findings.numerics import smoothed_findings
+from symphys.findings.verdict import doubts
 
 MET = Judged(1.0, 0.5, True, True, 1.0)
 NO_CHECKS = Judged(1.0, math.nan, True, False, 1.0)
@@ -23,14 +24,33 @@ UNSETTLED = Examination(residual=0.5, impulse=1.0)
 
 @pytest.mark.parametrize(("finer", "helps"), [(0.1, True), (0.5, False), (0.7, False), (math.inf, False)])
 def test_more_sweeps_are_advised_only_where_they_settle_more(finer: float, helps: bool) -> None:
-    line = residual_finding(replace(UNSETTLED, residual_finer=finer))
+    line = residual_finding(replace(UNSETTLED, residual_finer=finer), MET)
     assert line.level == BAD
     assert ("raise the number of sweeps" in line.meaning) == helps
     assert ("round in a cycle" in line.meaning) != helps
 
 
 def test_of_more_sweeps_nothing_is_said_that_nobody_measured() -> None:
-    assert residual_finding(UNSETTLED).meaning == "Contact impulses had not settled."
+    assert residual_finding(UNSETTLED, MET).meaning == "Contact impulses had not settled."
+
+
+@pytest.mark.parametrize(
+    ("worst", "level"), [((0.5, 0.9), FAIR), ((2.5, 0.5), FAIR), ((0.5, 4.0), BAD), ((math.nan, 0.5), BAD)]
+)
+def test_impulses_in_a_cycle_refute_what_does_not_hold_where_the_sweeps_end_elsewhere(
+    worst: tuple[float, float], level: str
+) -> None:
+    rows = tuple(Refined(what, 1.0, x) for what, x in zip(("sweeps + 1", "sweeps x 2"), worst, strict=True))
+    trust = replace(UNSETTLED, unsettled=285.0, steps=1000.0, resettled=rows)
+    line = residual_finding(trust, MET)
+    assert line.level == level and "in 285 of 1000 steps" in line.meaning
+    assert bool(line.doubt) == (level == BAD) == bool(doubts(trust, MET))
+    assert IN_TIME not in [each.meaning for each in impact_findings(replace(trust, multiple_impacts=0.0))]
+
+
+def test_the_doubt_says_what_another_number_of_sweeps_does() -> None:
+    told = residual_finding(replace(UNSETTLED, resettled=(Refined("sweeps + 1", 1.0, 7.0),)), MET).doubt
+    assert told.endswith("0.5 of 1 N s, and simulated with sweeps + 1 it misses by 7 × tolerance")  # noqa: RUF001
 
 
 def test_a_variable_without_influence_is_named_first_and_its_gradient_not_called_right() -> None:

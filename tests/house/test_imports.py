@@ -63,6 +63,12 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "casadi numpy pandas pyarrow scipy",
         "what a run folder holds",
     ),
+    "identification": ("errors results suggest", "cma numpy scipy", "estimates from recordings, no physics"),
+    "prediction": (
+        "errors expression files identification model problem results suggest threads transcription",
+        "numpy",
+        "what problems predict for their recordings",
+    ),
     "runs": (
         "codegen errors files findings json_values problem results shooting solvers trajectory transcription "
         "verification version",
@@ -95,8 +101,8 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "jax": ("api errors transcription", "jax numpy", "rollouts and steps for JAX"),
     "env": ("api errors", "gymnasium numpy", "environments for Gymnasium"),
     "cli": (
-        "api batches codegen doctor errors export files findings importing interrupts mpc problem problems report "
-        "results runs solvers suggest threads trajectory transcription verification version",
+        "api batches codegen doctor errors export files findings identification importing interrupts mpc prediction "
+        "problem problems report results runs solvers suggest threads trajectory transcription verification version",
         "click numpy rich",
         "the commands",
     ),

@@ -81,7 +81,8 @@ def test_the_feedback_of_a_plan_is_that_of_the_backward_pass() -> None:
     bounds = Bounds(room[0].ravel(), room[1].ravel(), np.full(20, 2.0))
     wanted = backward_pass([slopes], costs, knot_steps(stages()), stages().statics, bounds, 0.1)
     own = made._costs.expand(found.x, plan().v, made.p, 0.0)
-    got = plan_feedback(slopes.a, slopes.b, own, room, 0.1 / made.scale**2)
+    runs = [(slopes.a[13:], slopes.b[13:]), (slopes.a[:13], slopes.b[:13])]
+    got = plan_feedback(runs, own, room, 0.1 / made.scale**2)
     assert wanted is not None and got is not None
     gains = [gain for gain in wanted.gains if gain is not None]
     assert np.array([gain.ahead for gain in gains]) == pytest.approx(got[0], rel=1e-8, abs=1e-9)

@@ -101,9 +101,9 @@ def plans(count: int, **keys: object) -> list[Part]:
     ids=["free", "groups", "chain"],
 )
 def test_tens_of_thousands_are_counted_at_once(parts: list[Part]) -> None:
-    began = time.perf_counter()
+    began = time.process_time()
     count = CollisionFilter([*parts, ParametricStatic(Plane.ground(), {})], []).count(MOST_POINTS)
-    assert time.perf_counter() - began < 2
+    assert time.process_time() - began < 2
     assert count.points > MOST_POINTS
 
 

@@ -56,7 +56,12 @@ def test_a_block(load: Load) -> None:
     assert pair.name == "ball-ramp"
     assert (pair.law.friction, pair.law.restitution, pair.law.rolling) == (0.3, 0.5, 0.01)
     found = {name: value.tolist() for name, value in problem.parameters.items() if name.startswith("ramp")}
-    assert found == {"ramp.position": [1, 0, 0.5], "ramp.friction": [0.3], "ramp.restitution": [0.5]}
+    assert found == {
+        "ramp.position": [1, 0, 0.5],
+        "ramp.friction": [0.3],
+        "ramp.restitution": [0.5],
+        "ramp.rolling": [0.01],
+    }
 
 
 def test_blocks_of_every_shape(load: Load) -> None:

@@ -21,7 +21,7 @@ def test_the_guess_meets_the_puck_in_its_middle() -> None:
     assert motion["puck_y.position"][-1] > 0.2
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @seeds(5)
 def test_the_puck_comes_to_its_place(seed: int) -> None:
     """The pusher's way to the hit is that of its forces to a step, the puck's from there on that of its damping."""

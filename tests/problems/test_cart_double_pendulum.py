@@ -48,7 +48,7 @@ def test_the_motion_is_that_of_the_equations() -> None:
     np.testing.assert_allclose([motion[f"{name}.rate"][50] for name in ("rail", "pivot", "elbow")], rates, atol=0.05)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_the_guess_leads_to_a_swing() -> None:
     """It stands at the end, in the place where the cart began."""
     made = shipped("cart_double_pendulum")

@@ -23,10 +23,12 @@ SHIPPED = [
     "bank_shot",
     "basket",
     "bounce_cycle",
+    "bounce_recorded",
     "bowling",
     "cart_double_pendulum",
     "cart_pole",
     "cart_pole_walls",
+    "catch",
     "cost_of_transport",
     "dribble",
     "eddy_brake",
@@ -38,16 +40,20 @@ SHIPPED = [
     "gait_robot_fast",
     "gait_robot_trot",
     "half_cheetah_run",
+    "hopper_gait",
     "hopper_jump",
     "hopper_run",
     "ice_and_asphalt",
     "juggle",
     "knock",
     "mini_cheetah_ahead",
+    "mini_cheetah_mpc",
     "parcel",
     "pendulum",
     "planar_hopper",
+    "planar_hopper_mpc",
     "push_and_fly",
+    "push_box",
     "putt",
     "quadruped_shift",
     "quadruped_walk",
@@ -57,6 +63,7 @@ SHIPPED = [
     "spinner",
     "stairs",
     "three_hops",
+    "transport",
     "two_balls",
     "walker2d_walk",
 ]
@@ -73,7 +80,7 @@ def test_shipped_problems_are_valid(name: str) -> None:
     assert problem.title != name
     assert problem.description
     assert problem.variables
-    assert problem.costs or problem.targets
+    assert problem.costs or problem.targets or problem.recordings
     assert problem.world().bodies
 
 

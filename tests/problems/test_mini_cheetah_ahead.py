@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 from shipped import shipped, short_descent, solve
 
+from symphys.mpc import Controller, Plant, close_loop, record_of
+from symphys.problem import load_problem
+from symphys.problems import find
 from symphys.verification.refinement import FINER_DT, finer_problem
 
 LEGS = ("fl", "fr", "hl", "hr")
@@ -71,3 +74,12 @@ def test_it_walks_ahead_and_half_the_step_agrees() -> None:
     motion = made.simulate(found.z)
     lifted = np.stack([motion[f"{each}_shank.position"][:, 2] for each in LEGS], axis=1)
     assert (np.ptp(lifted, axis=0) > 0.01).all()
+
+
+@pytest.mark.thorough
+def test_a_controller_walks_a_heavier_robot_ahead() -> None:
+    """With half the step and masses 10 % off: after two seconds it is 0.8 m ahead, at its height and upright."""
+    problem = load_problem(find("mini_cheetah_mpc"), {"mpc.plant.masses": 1.1, "mpc.plant.latency": 0.01})
+    record = record_of(close_loop(Controller(problem, threads=1), Plant(problem)))
+    assert not record.stopped
+    assert record.done

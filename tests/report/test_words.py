@@ -79,8 +79,8 @@ def test_names_can_be_written(text: str) -> None:
 
 def test_levels() -> None:
     assert [graded(x, (1, 3)) for x in (0.5, 1, 2, 4, math.inf, math.nan)] == [GOOD, GOOD, FAIR, BAD, BAD, UNKNOWN]
-    assert residual_finding(Examination(residual=1e-3, impulse=0.1)).level == FAIR
-    assert residual_finding(Examination(residual=1e-3)).level == UNKNOWN
+    assert residual_finding(Examination(residual=1e-3, impulse=0.1), MET).level == FAIR
+    assert residual_finding(Examination(residual=1e-3), MET).level == UNKNOWN
     assert depth_finding(Examination(deepest=0.02, size=0.1)).level == BAD
     assert depth_finding(Examination(deepest=-1e-9)).level == GOOD
     named = depth_finding(Examination(deepest=0.02, size=0.1, depth_contact="box-ground", depth_time=1.5))

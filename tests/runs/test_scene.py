@@ -11,6 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from symphys.problem import Problem, load_problem
+from symphys.results.scene import Solid
 from symphys.results.scene_of_problem import make_scene
 from symphys.transcription import transcribe
 
@@ -129,6 +130,43 @@ def test_shapes_have_the_sizes_that_variables_set(tmp_path: Path) -> None:
         "shape": {"kind": "box", "size": [2, 1, 0.5], "centre": [7, 8, 0], "orientation": [1, 0, 0, 0]},
     }
     json.dumps(found, allow_nan=False)
+
+
+ROUND = """
+[simulation]
+duration = 0.1
+dt = 0.01
+[ground]
+[[body]]
+name = "crate"
+shape = { box = { size = [1, 2, 3], edge = 0.1 } }
+mass = 2.0
+position = [0, 0, 9]
+[[variable]]
+name = "edge"
+sets = "crate.edge"
+[[variable]]
+name = "centre"
+sets = "crate.centre_of_mass"
+[[variable]]
+name = "tilt"
+sets = "ground.tilt"
+[[cost]]
+name = "none"
+value = "0"
+"""
+
+
+def test_round_edges_centres_of_mass_and_tilt_are_drawn(tmp_path: Path) -> None:
+    z = {"edge": np.array([0.2]), "centre": np.array([0.1, 0, 0]), "tilt": np.array([0, 0.3])}
+    scene = make_scene(problem_of(tmp_path, ROUND), z)
+    (solid,) = scene.bodies[0].solids
+    assert (solid.radius, solid.half.tolist()) == (0.2, pytest.approx([0.3, 0.8, 1.3]))
+    assert solid.centre.tolist() == [-0.1, 0, 0]
+    assert scene.planes[0].normal == pytest.approx([np.sin(0.3), 0, np.cos(0.3)])
+    again = Solid.from_json(json.loads(json.dumps(solid.to_json(), allow_nan=False)))
+    assert again is not None
+    assert (again.radius, again.corners.tolist()) == (solid.radius, solid.corners.tolist())
 
 
 def test_terrain_is_sampled_around_the_start(tmp_path: Path) -> None:

@@ -262,7 +262,7 @@ def on_ice(sets: dict[str, Any]) -> list[dict[str, Any]]:
         ({"phase": on_ice({"ground.frction": 1})}, r'"ice".sets: there is no parameter "ground.frction"; .*friction'),
         (
             {"phase": on_ice({"sled.mass": 1})},
-            r"sled.mass is the same all along; .* may set gravity, ground.friction$",
+            r"sled.mass is the same .* may set gravity, contact.friction, contact.restitution, ground.friction$",
         ),
         ({"phase": on_ice({"gravity": 1})}, r"gravity takes 3 numbers, not 1"),
         ({"phase": on_ice({"ground.friction": "low"})}, r"ground.friction takes a number, not 'low'"),

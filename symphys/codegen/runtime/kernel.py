@@ -32,14 +32,16 @@ class Kernel(ABC):
         """``seeded``: names of the outputs that are differentiated."""
         self.program, self.report, self.seeded = program, report, tuple(seeded)
 
-    def forward(self, Z: ArrayLike, parameters: ArrayLike = ()) -> Outputs:
+    def forward(self, Z: ArrayLike, parameters: ArrayLike = (), skipped: int = 0) -> Outputs:
         """The outputs of rollouts.
 
         Args:
             Z: (batch, n) decision vectors, or one (n,).
             parameters: (batch, p) or one (p,) for all.
+            skipped: steps at the end that are not computed; see ``gradient``.
         """
         batch = self._batch(Z, parameters)
+        batch.skipped = self._checked(skipped)
         outputs = batch.outputs(self._width())
         self._run(batch)
         return self._named(outputs)
@@ -58,10 +60,8 @@ class Kernel(ABC):
             skipped: steps at the end that are not computed: ``program.discounted.state`` stays as it is, and what else
                 these steps would write is 0.
         """
-        if skipped and (self.program.discounted is None or not 0 <= skipped <= self.program.steps):
-            raise ProgramError(f"{skipped} of {self.program.steps} steps cannot be skipped, or no state is discounted")
         batch = self._batch(Z, parameters, seed)
-        batch.discount, batch.skipped = discount, skipped
+        batch.discount, batch.skipped = discount, self._checked(skipped)
         outputs, gradient = batch.outputs(self._width()), batch.gradient(self.program.z.size)
         self._run(batch)
         return self._named(outputs), gradient
@@ -87,6 +87,11 @@ class Kernel(ABC):
         trajectory = batch.trajectory(place, count)
         self._run(batch)
         return trajectory
+
+    def _checked(self, skipped: int) -> int:
+        if skipped and (self.program.discounted is None or not 0 <= skipped <= self.program.steps):
+            raise ProgramError(f"{skipped} of {self.program.steps} steps cannot be skipped, or no state is discounted")
+        return skipped
 
     def _batch(self, Z: ArrayLike, parameters: ArrayLike, seed: ArrayLike | None = None) -> RolloutBatch:
         rows = {"z": (Z, self.program.z.size), "parameters": (parameters, self.program.parameters.size)}

@@ -24,8 +24,8 @@ def ends(capsule: Capsule) -> list[Offset]:
 
 
 def corners(box: Box) -> list[Offset]:
-    """The eight corners of a box, body frame."""
-    x, y, z = box.half_sizes
+    """The eight corners of a box, body frame; the centres of their balls where its edges are round."""
+    x, y, z = box.half_sizes if is_zero(box.edge) else [half - box.edge for half in box.half_sizes]
     return [placed(box, (a * x, b * y, c * z)) for a, b, c in product(SIGNS, repeat=3)]
 
 

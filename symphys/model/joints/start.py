@@ -5,17 +5,20 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from symphys.maths import rotation
-from symphys.model.joints.frames import WORLD, pose
+from symphys.model.joints.frames import WORLD
 from symphys.model.joints.joint import JointFrame
 from symphys.model.joints.kind import Kind, PlacedFrames
 
 Array = NDArray[np.float64]
+Expr = Any
+"""casadi MX or DM"""
 State = dict[str, Array]
 """By names such as ``ball.position``."""
 Tree = Mapping[str, Mapping[str, str]]
@@ -58,9 +61,9 @@ class NamedJoint(Protocol):
 class BodyDisplacement:
     """A turn about a pivot (3,) [m] by a unit quaternion (4,), then a shift (3,) [m]; world frame."""
 
-    pivot: Array
-    shift: Array
-    turn: Array
+    pivot: Expr
+    shift: Expr
+    turn: Expr
 
 
 def moved_to_start(joints: Sequence[NamedJoint], state: Mapping[str, Array]) -> State:
@@ -72,20 +75,20 @@ def moved_to_start(joints: Sequence[NamedJoint], state: Mapping[str, Array]) -> 
     Velocities are transformed too: the motion against the side that stays is turned along, so that rates of joints are
     what they were, and what moves or spins as a whole goes on doing so. Zero stays zero.
     """
-    found, tree = {name: value.copy() for name, value in state.items()}, spanning_tree(joints)
+    tree, found = spanning_tree(joints), {name: ca.DM(value) for name, value in state.items()}
     for joint in joints:
         if joint.start and joint.name in tree[joint.first]:
-            _move(joint, tree, found, 1.0)
-    return found
+            move(joint, joint.start, tree, found)
+    return {name: np.array(value).ravel() for name, value in found.items()}
 
 
 def moved_to_zero(joints: Sequence[NamedJoint], state: Mapping[str, Array]) -> State:
     """The inverse of ``moved_to_start``: joints are at their ``start`` in ``state``, and at 0 in what it returns."""
-    found, tree = {name: value.copy() for name, value in state.items()}, spanning_tree(joints)
+    tree, found = spanning_tree(joints), {name: ca.DM(value) for name, value in state.items()}
     for joint in reversed(joints):
         if joint.start and joint.name in tree[joint.first]:
-            _move(joint, tree, found, -1.0)
-    return found
+            move(joint, joint.start, tree, found, back=True)
+    return {name: np.array(value).ravel() for name, value in found.items()}
 
 
 def unmoved(joint: NamedJoint, tree: Tree) -> str:
@@ -128,48 +131,77 @@ def subtree(start: str, cut: NamedJoint, tree: Tree) -> list[str]:
 
 def placed_frames(joint: NamedJoint, state: Mapping[str, Array]) -> tuple[PlacedFrames, Array]:
     """Both frames of a joint in the world, and (3,) [m] where the second is."""
+    placed, pivot = frames_of(joint, {name: ca.DM(value) for name, value in state.items()})
+    a, b, apart = (np.array(part) for part in (placed.a, placed.b, placed.apart))
+    return PlacedFrames(a, b, apart.ravel()), np.array(pivot).ravel()
+
+
+def frames_of(joint: NamedJoint, state: Mapping[str, Expr]) -> tuple[PlacedFrames, Expr]:
+    """As ``placed_frames``, of casadi's DM or MX."""
     axes, points = [], []
     for name, frame in zip((joint.first, joint.second or WORLD), joint.frames, strict=True):
-        lies = pose(name, state)
-        axes.append(lies.axes @ np.array(rotation.matrix(np.array(frame.orientation)), float))
-        points.append(lies.to_world(np.array(frame.point)))
+        own, point = rotation.matrix(ca.DM(frame.orientation)), ca.DM(frame.point)
+        if name != WORLD:
+            turned = rotation.matrix(state[f"{name}.orientation"])
+            own, point = turned @ own, state[f"{name}.position"] + turned @ point
+        axes.append(own)
+        points.append(point)
     return PlacedFrames(axes[0], axes[1], points[0] - points[1]), points[1]
 
 
-def _move(joint: NamedJoint, tree: Tree, state: State, way: float) -> None:
-    """Move one side of a joint from coordinates 0 to its start (``way`` 1), or back (-1), in place."""
-    moved, base, sign = subtree(joint.first, joint, tree), joint.second or WORLD, way
-    if WORLD in moved:
-        moved, base, sign = subtree(base, joint, tree), joint.first, -way
-    coordinates = list(zip(joint.kind.coordinates, joint.start, strict=True))
-    for coordinate, value in coordinates if way > 0 else reversed(coordinates):
-        placed, pivot = placed_frames(joint, state)
-        axis, angle = np.asarray(coordinate.axis(placed), float), sign * value * coordinate.turns
-        motion = BodyDisplacement(
-            pivot=pivot,
-            shift=(sign * value - angle) * axis,
-            turn=np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * axis]),
-        )
+def moving_side(joint: NamedJoint, tree: Tree) -> tuple[list[str], str, float]:
+    """The bodies that a joint moves, what it moves them against, and 1 or -1: which way as its coordinates grow."""
+    moved, base = subtree(joint.first, joint, tree), joint.second or WORLD
+    if WORLD not in moved:
+        return moved, base, 1.0
+    return subtree(base, joint, tree), joint.first, -1.0
+
+
+def move(joint: NamedJoint, start: Sequence[Expr], tree: Tree, state: dict[str, Expr], back: bool = False) -> None:
+    """Move one side of a joint from coordinates 0 to these, or ``back``, in place; of casadi's DM or MX."""
+    moved, base, sign = moving_side(joint, tree)
+    coordinates = list(zip(joint.kind.coordinates, start, strict=True))
+    for coordinate, value in reversed(coordinates) if back else coordinates:
+        placed, pivot = frames_of(joint, state)
+        axis, by = coordinate.axis(placed), (-sign if back else sign) * value
+        turn, shift = ca.DM([1, 0, 0, 0]), by * axis
+        if coordinate.turns:
+            turn, shift = ca.vertcat(ca.cos(by / 2), ca.sin(by / 2) * axis), ca.DM.zeros(3)
         for name in moved:
-            _displace(name, base, motion, state)
+            _displace(name, base, BodyDisplacement(pivot, shift, turn), state)
 
 
-def _displace(name: str, base: str, motion: BodyDisplacement, state: State) -> None:
+def drive(joint: NamedJoint, rates: Sequence[Expr], tree: Tree, state: dict[str, Expr]) -> None:
+    """Add rates of its coordinates [rad/s] or [m/s] to the velocities of the side that ``move`` moves, in place."""
+    moved, _, sign = moving_side(joint, tree)
+    placed, pivot = frames_of(joint, state)
+    for coordinate, rate in zip(joint.kind.coordinates, rates, strict=True):
+        along = sign * rate * coordinate.axis(placed)
+        for name in moved:
+            if coordinate.turns:
+                state[f"{name}.angular_velocity"] = state[f"{name}.angular_velocity"] + along
+                arm = state[f"{name}.position"] - pivot
+            state[f"{name}.velocity"] = state[f"{name}.velocity"] + (
+                ca.cross(along, arm) if coordinate.turns else along
+            )
+
+
+def _displace(name: str, base: str, motion: BodyDisplacement, state: dict[str, Expr]) -> None:
     """Displace a body, in place; ``base`` is what it moves against."""
-    axes = np.array(rotation.matrix(motion.turn), float)
+    axes = rotation.matrix(motion.turn)
     before = state[f"{name}.position"]
     after = motion.pivot + axes @ (before - motion.pivot) + motion.shift
     velocity, spin, centre = _drift(base, state)
-    own = state[f"{name}.velocity"] - velocity - np.cross(spin, before - centre)
-    state[f"{name}.velocity"] = velocity + np.cross(spin, after - centre) + axes @ own
+    own = state[f"{name}.velocity"] - velocity - ca.cross(spin, before - centre)
+    state[f"{name}.velocity"] = velocity + ca.cross(spin, after - centre) + axes @ own
     state[f"{name}.angular_velocity"] = spin + axes @ (state[f"{name}.angular_velocity"] - spin)
     state[f"{name}.position"] = after
-    orientation = np.array(rotation.multiply(motion.turn, state[f"{name}.orientation"]), float).ravel()
-    state[f"{name}.orientation"] = orientation / np.linalg.norm(orientation)
+    orientation = rotation.multiply(motion.turn, state[f"{name}.orientation"])
+    state[f"{name}.orientation"] = orientation / ca.norm_2(orientation)
 
 
-def _drift(name: str, state: State) -> tuple[Array, Array, Array]:
+def _drift(name: str, state: Mapping[str, Expr]) -> tuple[Expr, Expr, Expr]:
     """(3,) [m/s], (3,) [rad/s] and (3,) [m]: velocity, angular velocity and place of a body, or of the world."""
     if name == WORLD:
-        return np.zeros(3), np.zeros(3), np.zeros(3)
+        return ca.DM.zeros(3), ca.DM.zeros(3), ca.DM.zeros(3)
     return state[f"{name}.velocity"], state[f"{name}.angular_velocity"], state[f"{name}.position"]

@@ -8,7 +8,7 @@ from itertools import product
 from math import hypot
 from typing import Any, ClassVar, Self
 
-from symphys.model.scalar import Scalar
+from symphys.model.scalar import Scalar, is_zero
 from symphys.model.shapes.shape import FLATTEST, UPRIGHT, RoundedHull, SizeKey, SolidShape
 
 
@@ -18,6 +18,8 @@ class Box(SolidShape):
 
     Attributes:
         half_sizes: (3,) [m], along its own axes.
+        edge: radius of its edges [m]. Against planes and terrain its corners are balls of this radius, which lie
+            inside; all else meets the box with sharp edges, whose mass and inertia it has.
         centre: (3,) [m].
         orientation: (4,) unit quaternion w x y z.
     """
@@ -29,21 +31,27 @@ class Box(SolidShape):
     size_keys: ClassVar[tuple[SizeKey, ...]] = (
         SizeKey("size", "full length of its edges along x, y and z [m]", count=3),
     )
+    optional_keys: ClassVar[tuple[SizeKey, ...]] = (
+        SizeKey("edge", "radius of its edges where it touches planes and terrain [m]; 0: sharp"),
+    )
     contact_points: ClassVar[Mapping[str, int]] = {"plane": 8, "terrain": 8, "box": 16}
 
     half_sizes: tuple[Scalar, ...]
     centre: tuple[Scalar, ...] = (0.0, 0.0, 0.0)
     orientation: tuple[Scalar, ...] = UPRIGHT
+    edge: Scalar = 0.0
 
     @classmethod
     def from_sizes(cls, sizes: Mapping[str, Any], centre: tuple[Scalar, ...], orientation: tuple[Scalar, ...]) -> Self:
         """See ``SolidShape``."""
-        return cls(tuple(edge / 2 for edge in sizes["size"]), centre, orientation)
+        return cls(tuple(length / 2 for length in sizes["size"]), centre, orientation, sizes.get("edge", 0.0))
 
     @property
     def sizes(self) -> dict[str, Any]:
-        """The full edges."""
-        return {"size": tuple(2 * half for half in self.half_sizes)}
+        """The full edges, and their radius."""
+        return {"size": tuple(2 * half for half in self.half_sizes)} | (
+            {} if is_zero(self.edge) else {"edge": self.edge}
+        )
 
     @property
     def volume(self) -> Scalar:
@@ -60,13 +68,13 @@ class Box(SolidShape):
     @property
     def extent(self) -> float:
         """From the centre to the farthest point [m]."""
-        return hypot(*self.half_sizes)
+        return hypot(*(half - self.edge for half in self.half_sizes)) + float(self.edge)
 
     @property
     def rounded_hull(self) -> RoundedHull:
-        """Its eight corners."""
-        x, y, z = (float(half) for half in self.half_sizes)
-        return RoundedHull(0.0, tuple(product((-x, x), (-y, y), (-z, z))))
+        """Its eight corners, or the centres of their balls."""
+        x, y, z = (float(half - self.edge) for half in self.half_sizes)
+        return RoundedHull(float(self.edge), tuple(product((-x, x), (-y, y), (-z, z))))
 
     @property
     def mjcf_size(self) -> tuple[Scalar, ...]:
@@ -83,3 +91,12 @@ class Box(SolidShape):
             f"the smallest edge, {least:g} m, is less than {FLATTEST:g} of the largest, {most:g} m: that is no solid; "
             f"make it {FLATTEST * most:g} m or more, or use a [[plane]] for a wall"
         )
+
+    @property
+    def optional_fault(self) -> str:
+        """See ``SolidShape``."""
+        sizes = (*self.half_sizes, self.edge)
+        if not all(isinstance(size, int | float) for size in sizes) or 0 <= self.edge < min(self.half_sizes):
+            return ""
+        most = min(self.half_sizes)
+        return f"the radius of its edges must be less than half the smallest, {most:g} m, not {self.edge:g} m"

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-from symphys.model.scalar import Scalar
+import casadi as ca
+
+from symphys.model.scalar import Scalar, is_zero
 
 
 @dataclass(frozen=True)
@@ -40,8 +42,26 @@ class Plane:
     @property
     def parameters(self) -> dict[str, Any]:
         """The numbers that variables may set, by name."""
-        return {"offset": self.offset}
+        return {"offset": self.offset, "tilt": (0.0, 0.0)}
 
     def with_parameters(self, values: Mapping[str, Any]) -> Plane:
-        """The plane with other ``parameters``."""
-        return replace(self, **values)
+        """The plane with other ``parameters``; see ``tilted``. The distance from the origin stays ``offset``."""
+        flat = all(is_zero(angle) for angle in values["tilt"])
+        normal = self.normal if flat else tilted(self.normal, values["tilt"])
+        return replace(self, offset=values["offset"], normal=normal)
+
+
+def tilted(normal: Sequence[float], tilt: Sequence[Scalar]) -> tuple[Scalar, ...]:
+    """(3,): a unit vector, turned by two angles [rad] about axes x, then y, perpendicular to it.
+
+    These are the world's as the shortest turn from the z axis to ``normal`` carries them: the world's own for ground.
+    """
+    x, y, z = normal
+    if z <= -1 + 1e-12:
+        first, second = (1.0, 0.0, 0.0), (0.0, -1.0, 0.0)
+    else:
+        mixed = -x * y / (1 + z)
+        first, second = (1 - x * x / (1 + z), mixed, -x), (mixed, 1 - y * y / (1 + z), -y)
+    a, b = tilt
+    along = (ca.sin(b) * ca.cos(a), -ca.sin(a), ca.cos(b) * ca.cos(a))
+    return tuple(along[0] * p + along[1] * q + along[2] * n for p, q, n in zip(first, second, normal, strict=True))

@@ -60,6 +60,7 @@ class SolidShape(ABC):
         summary: one sentence for the JSON schema.
         example: its table in a problem file.
         size_keys: its sizes as problem files give them.
+        optional_keys: lengths that are 0 unless they are given.
         contact_points: in how many points it may touch another surface at once, by the kind of that; a pair of kinds
             may be stated by either of the two.
         turns: whether a turn about its centre changes it.
@@ -71,6 +72,7 @@ class SolidShape(ABC):
     summary: ClassVar[str]
     example: ClassVar[str]
     size_keys: ClassVar[tuple[SizeKey, ...]]
+    optional_keys: ClassVar[tuple[SizeKey, ...]] = ()
     contact_points: ClassVar[Mapping[str, int]]
     turns: ClassVar[bool] = True
     centre: tuple[Scalar, ...]
@@ -83,7 +85,7 @@ class SolidShape(ABC):
     @property
     @abstractmethod
     def sizes(self) -> dict[str, Any]:
-        """By the names of ``size_keys`` [m]: a number, a tuple of three, or a tuple of points."""
+        """By the names of ``size_keys`` [m]: a number, a tuple of three, or points; optional ones if not 0."""
 
     @property
     @abstractmethod
@@ -128,6 +130,11 @@ class SolidShape(ABC):
     @property
     def flatness(self) -> str:
         """Why it is too flat or thin to differ from a surface or a line without volume; empty if it is not."""
+        return ""
+
+    @property
+    def optional_fault(self) -> str:
+        """Why one of the ``optional_keys`` is impossible; empty if none is."""
         return ""
 
     @property

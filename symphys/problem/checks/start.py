@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from symphys.model.joints.frames import MEET, WORLD
 from symphys.problem.checks.start_values import Start
 from symphys.problem.model import DURATION, Variable
-from symphys.problem.parametric.reposition import reposition
+from symphys.problem.parametric.reposition import placing, reposition
+from symphys.problem.parametric.starts import begin
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.quantities import Quantity
 from symphys.problem.reading.faults import Faults
@@ -26,17 +27,21 @@ def at_guess(
     parametric: ParametricWorld, known: Mapping[str, Quantity], variables: Sequence[Variable]
 ) -> dict[str, Array]:
     """Every quantity's value at t = 0, with the first knot of every guess put in."""
-    values = {name: quantity.nominal.copy() for name, quantity in known.items()}
+    values = {name: quantity.nominal.copy() for name, quantity in known.items() if quantity.kind != "recording"}
     for variable in variables:
-        for slot in variable.slots:
+        for slot in variable.slots if variable.kind != "recording" else ():
             values[slot.name][list(slot.components)] = variable.guess[: variable.components]
     for name, value in values.items():
         if name.endswith(".orientation"):
             values[name] = value / max(float(np.linalg.norm(value)), 1e-12)
-    anchors = {name: ca.DM(values[name]) for name in varied(variables) if name.endswith(".anchor")}
-    moved = reposition(
-        parametric, anchors, {name: ca.DM(values[name]) for name, q in known.items() if q.kind == "initial"}
+    varying, starts = varied(variables), {name: values.pop(name) for name in parametric.starts() if name in values}
+    begun = begin(
+        parametric,
+        {name: ca.DM(value) for name, value in starts.items() if name in varying},
+        {name: ca.DM(values[name]) for name, q in known.items() if q.kind == "initial" and name in values},
     )
+    places = {name: ca.DM(values[name]) for name in placing(varying)}
+    moved = reposition(parametric, places, begun)
     return values | {name: np.array(value).ravel() for name, value in moved.items()}
 
 

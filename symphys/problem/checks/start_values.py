@@ -26,6 +26,7 @@ from symphys.dynamics.observation import (
 )
 from symphys.model.state_layout import GIVEN, Layout, initial_state
 from symphys.model.world import World
+from symphys.problem.parametric.parts import DISTRIBUTION
 from symphys.problem.parametric.world import ParametricWorld
 
 Array = NDArray[np.float64]
@@ -106,7 +107,7 @@ class StartValues:
 
     def of(self, parametric: ParametricWorld, values: Mapping[str, Array]) -> Start:
         """A world at its start; ``values`` has those of all of its parameters, and the state of every body."""
-        used = {name: values[name] for name in parametric.parameters()}
+        used = {name: values[name] for name in parametric.parameters() if name.rpartition(".")[2] not in DISTRIBUTION}
         for name, value in used.items():
             first = self._first.setdefault(name, value.copy())
             if name not in self._symbols and not name.endswith(".anchor") and not np.array_equal(first, value):

@@ -22,7 +22,8 @@ from symphys.problem.schema.include import MOST_INCLUDES, IncludedTable, Include
 from symphys.problems import parts
 from symphys.suggest import hint, quote
 
-OF_THE_PROBLEM = ("simulation", "phase", "termination", "fall", "objective", "solver", "solvers", "sweep")
+RECORDED = ("recording", "recorded", "identify")
+OF_THE_PROBLEM = ("simulation", "phase", "termination", "fall", "objective", "solver", "solvers", "sweep", *RECORDED)
 FURTHER = ("include", "included")
 OWN = ("title", "description")
 """What an included file says about itself alone."""

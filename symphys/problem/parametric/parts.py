@@ -8,9 +8,11 @@ from functools import cached_property
 from typing import Any
 
 from symphys.model.body import Body
+from symphys.model.scalar import is_zero
 from symphys.model.shapes import Scalar, Shape, Sphere, Static, Surface
 from symphys.model.shapes.inertia import Tensor, inertia_of, specific
 from symphys.model.world import Law
+from symphys.problem.parametric.mass_distribution import distribution, inertia
 
 Numbers = float | tuple[float, ...]
 Value = Callable[[str], Any]
@@ -22,15 +24,18 @@ COMBINE: dict[str, Callable[[list[Scalar]], Scalar]] = {
     name: about["combine"] for name, about in LAW.items() if "combine" in about
 }
 """Those that surfaces state."""
-VARIABLE: dict[str, tuple[float, float]] = {
-    name: about["physical"] for name, about in LAW.items() if "physical" in about
-}
-"""Those that are parameters where stated, with the least and the largest value that is physical."""
+VARIABLE: dict[str, tuple[float, float]] = {name: about["physical"] for name, about in LAW.items()}
+"""All of them are parameters where stated: the least and the largest value that is physical."""
+STRUCTURAL = tuple(name for name, about in LAW.items() if "structural" in about)
+"""Those whose 0 leaves equations out of the step, so that they are parameters only where they are not 0."""
+DISTRIBUTION = ("second_moments", "correlations")
+"""Parameters of a body that follow from mass, shape and inertia unless they are set."""
+CENTRE = "centre_of_mass"
 
 
 def stated(states: Mapping[str, float]) -> dict[str, Numbers]:
     """Those of the coefficients that may be varied."""
-    return {key: number for key, number in states.items() if key in VARIABLE}
+    return {key: number for key, number in states.items() if number or key not in STRUCTURAL}
 
 
 @dataclass(frozen=True)
@@ -66,19 +71,39 @@ class ParametricBody:
 
     def parameters(self) -> dict[str, Numbers]:
         """Parameter names and values."""
-        own: dict[str, Numbers] = {"mass": self.mass} if self.mass else {}
-        if len(self.shapes) == 1:
-            own |= self.shapes[0].parameters
+        own: dict[str, Numbers] = {}
+        if self.mass:
+            own = {
+                "mass": self.mass,
+                **dict(zip(DISTRIBUTION, self._distribution, strict=True)),
+                CENTRE: (0.0, 0.0, 0.0),
+            }
+        own |= self._sizes
         return {f"{self.name}.{key}": numbers for key, numbers in (own | stated(self.states)).items()}
 
     def valued(self, overrides: Mapping[str, Any], value: Value) -> Body:
-        """The body with its parameters' values; a mass given by density follows the size unless overridden."""
+        """The body with its parameters' values; mass by density and inertia follow the size unless overridden."""
         if not self.mass:
             return Body.frame(self.name)
+        body = self._centred(overrides, value)
+        if any(f"{self.name}.{key}" in overrides for key in DISTRIBUTION):
+            moments, correlations = (value(f"{self.name}.{key}") for key in DISTRIBUTION)
+            body = replace(body, inertia=inertia(moments, correlations))
+        centre = self.centre(value)
+        if all(is_zero(c) for c in centre):
+            return body
+        return replace(body, shapes=tuple(replace(s, centre=less(s.centre, centre)) for s in body.shapes))
+
+    def centre(self, value: Value) -> tuple[Scalar, ...]:
+        """(3,) [m]: where the centre of mass lies in the frame in which the file has shapes, sites and joints."""
+        return tuple(value(f"{self.name}.{CENTRE}")) if self.mass else (0.0, 0.0, 0.0)
+
+    def _centred(self, overrides: Mapping[str, Any], value: Value) -> Body:
+        """With its centre of mass at the origin of that frame."""
         mass = value(f"{self.name}.mass")
         if len(self.shapes) != 1:
             return Body(self.name, mass, self._inertia(mass, self._specific), self.shapes)
-        own = {key: f"{self.name}.{key}" for key in self.shapes[0].parameters}
+        own = {key: f"{self.name}.{key}" for key in self._sizes}
         shape = self.shapes[0].resized({key: value(name) for key, name in own.items()})
         varied = any(name in overrides for name in own.values())
         if self.density is not None and varied and f"{self.name}.mass" not in overrides:
@@ -86,6 +111,18 @@ class ParametricBody:
         if self.inertia is None and isinstance(shape, Sphere) and not any(shape.centre):
             return replace(Body.ball(self.name, shape.radius, mass, self.hollow), shapes=(shape,))
         return Body(self.name, mass, self._inertia(mass, specific((shape,)) if varied else self._specific), (shape,))
+
+    @cached_property
+    def _distribution(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Second moments of the mass and their correlations as the file has the body."""
+        nominal = {f"{self.name}.{key}": number for key, number in self._sizes.items()} | {
+            f"{self.name}.mass": self.mass
+        }
+        return distribution(self._centred({}, nominal.__getitem__).inertia)
+
+    @property
+    def _sizes(self) -> Mapping[str, Any]:
+        return self.shapes[0].parameters if len(self.shapes) == 1 else {}
 
     @cached_property
     def _specific(self) -> Tensor:
@@ -98,6 +135,11 @@ class ParametricBody:
 
     def _inertia(self, mass: Scalar, tensor: Tensor) -> Any:
         return inertia_of(tensor, mass) if self.inertia is None else self.inertia
+
+
+def less(point: Any, shift: Any) -> tuple[Scalar, ...]:
+    """A point less a vector (3,)."""
+    return tuple(a - b for a, b in zip(point, shift, strict=True))
 
 
 def _times(numbers: Any, factor: float) -> Any:

@@ -1,4 +1,8 @@
-"""Repositioning for anchors that vary: a subtree moves with its joint, and a robot goes on standing on the ground."""
+"""Repositioning for anchors and centres of mass that vary.
+
+A subtree moves with its joint's anchor, and a robot goes on standing on the ground. A body whose centre of mass varies
+stays where it is: what a state has as its position is another point of it.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +20,7 @@ from symphys.model.joints.start import Tree, spanning_tree, subtree
 from symphys.model.state_layout import initial_state
 from symphys.problem.model import Variable
 from symphys.problem.parametric.joints import ParametricJoint
+from symphys.problem.parametric.parts import CENTRE
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.reading.faults import Faults
 
@@ -24,27 +29,41 @@ Expr = Any
 State = Mapping[str, Expr]
 
 
+PLACING = ("anchor", CENTRE)
+
+
+def placing(names: Iterable[str]) -> list[str]:
+    """The parameters among these that decide where bodies start."""
+    return [name for name in names if name.rpartition(".")[2] in PLACING]
+
+
 def anchored(parametric: ParametricWorld, names: Iterable[str]) -> tuple[ParametricJoint, ...]:
     """The joints whose anchors are among these parameters."""
     found = set(names)
     return tuple(joint for joint in parametric.joints if joint.anchor in found)
 
 
-def reposition(parametric: ParametricWorld, anchors: Mapping[str, Expr], state: State) -> dict[str, Expr]:
-    """The state at the start where joints have these anchors, by the names of parameters, (3,) [m].
+def reposition(parametric: ParametricWorld, places: Mapping[str, Expr], state: State) -> dict[str, Expr]:
+    """The state at the start with these anchors and centres of mass, by the names of parameters, (3,) [m].
 
     A joint shifts its second body in the table, and its subtree, as one; if the world holds that side, it
     shifts the other one, the other way. Then a robot that nothing holds is lifted until its lowest point is as high
-    above what stands still as before. Velocities are those of one rigid body with what stays.
+    above what stands still as before. Velocities are those of one rigid body with what stays. ``state`` has the origins
+    of the frames in which the file has bodies; the result has their centres of mass.
     """
-    joints = anchored(parametric, anchors)
-    if not joints:
-        return dict(state)
-    tree, found = spanning_tree(parametric.joints), dict(state)
-    for joint in joints:
-        shift(joint, anchors[joint.anchor], tree, found)
-    for robot in robots(joints, tree):
-        lift(parametric, robot, state, found)
+    joints, found = anchored(parametric, places), dict(state)
+    if joints:
+        tree = spanning_tree(parametric.joints)
+        for joint in joints:
+            shift(joint, places[joint.anchor], tree, found)
+        for robot in robots(joints, tree):
+            lift(parametric, robot, state, found)
+    for body in parametric.bodies:
+        if f"{body.name}.{CENTRE}" in places:
+            arm = rotation.rotate(found[f"{body.name}.orientation"], places[f"{body.name}.{CENTRE}"])
+            found[f"{body.name}.position"] = found[f"{body.name}.position"] + arm
+            swing = ca.cross(found[f"{body.name}.angular_velocity"], arm)
+            found[f"{body.name}.velocity"] = found[f"{body.name}.velocity"] + swing
     return found
 
 

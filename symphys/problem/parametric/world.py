@@ -7,7 +7,7 @@ A [[pair]] of two surfaces goes before one of a surface and a group, and that on
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.model.body import Body
+from symphys.model.joints import Joint
 from symphys.model.joints.coupling import CouplingSpec, placed_couplings
 from symphys.model.shapes import Scalar, Static
 from symphys.model.site import Site
@@ -24,17 +25,20 @@ from symphys.problem.parametric.collision_filter import CollisionFilter
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.parametric.parts import (
     COMBINE,
-    LAW,
-    VARIABLE,
+    Numbers,
     PairRule,
     ParametricBody,
     ParametricSite,
     ParametricStatic,
     Part,
     Value,
+    less,
+    stated,
 )
 
 Array = NDArray[np.float64]
+CONTACT = "contact"
+"""What the law of [contact] is called among parameters."""
 
 
 @dataclass(frozen=True)
@@ -60,10 +64,31 @@ class ParametricWorld:
 
     def parameters(self) -> dict[str, Array]:
         """Every parameter with its value: (1,), or (3,) for gravity, the size of a box and the place of a block."""
-        found = {"gravity": np.array(self.gravity)}
+        found: dict[str, Numbers] = {"gravity": self.gravity, **self.contact_parameters}
         parts: tuple[Part | PairRule | ParametricJoint, ...] = (*self.parts, *self.pairs, *self.joints)
         for part in parts:
-            found |= {name: np.atleast_1d(np.array(numbers, float)) for name, numbers in part.parameters().items()}
+            found |= part.parameters()
+        return {name: np.atleast_1d(np.array(numbers, float)) for name, numbers in found.items()}
+
+    @cached_property
+    def contact_parameters(self) -> dict[str, Numbers]:
+        """Those of [contact], whose damping is one where some contact is soft."""
+        soft = self.contact.soft or any(pair.states.get("frequency") for pair in self.pairs)
+        known = stated(vars(self.contact))
+        return {f"{CONTACT}.{key}": number for key, number in known.items() if soft or key != "damping"}
+
+    def starts(self) -> dict[str, Array]:
+        """What variables may set of joints at the start, as the file has it, (coordinates,) each.
+
+        ``hip.start`` are the coordinates [rad] or [m]. ``hip.start_rate`` are rates [rad/s] or [m/s] that come on top
+        of those that the velocities of the bodies give: 0, as no file states them.
+        """
+        found = {}
+        for joint in self.joints:
+            count = len(joint.kind.coordinates)
+            if count:
+                found[f"{joint.name}.start"] = np.array(joint.start or (0.0,) * count)
+                found[f"{joint.name}.start_rate"] = np.zeros(count)
         return found
 
     def world(self, overrides: Mapping[str, Any]) -> World:
@@ -82,7 +107,7 @@ class ParametricWorld:
         bodies = tuple(body.valued(overrides, value) for body in self.bodies)
         statics = tuple(static.valued(value) for static in self.statics)
         places = {body.name: index for index, body in enumerate(bodies)}
-        joints = tuple(joint.valued(places, value) for joint in self.joints)
+        joints = tuple(self._joint(joint, places, value) for joint in self.joints)
         return World(
             bodies,
             statics,
@@ -90,11 +115,25 @@ class ParametricWorld:
             value("gravity"),
             joints,
             placed_couplings(self.couplings, joints),
-            tuple(
-                Site(site.name, None if site.body is None else places[site.body], site.position, site.orientation)
-                for site in self.sites
-            ),
+            tuple(self._site(site, places, value) for site in self.sites),
         )
+
+    def _joint(self, joint: ParametricJoint, places: Mapping[str, int], value: Value) -> Joint:
+        """A joint with its parameters' values, and its frames from the centres of mass."""
+        made = joint.valued(places, value)
+        ends = zip(made.frames, (joint.first, joint.second), strict=True)
+        first, second = (replace(frame, point=self._shifted(frame.point, body, value)) for frame, body in ends)
+        return replace(made, frames=(first, second))
+
+    def _site(self, site: ParametricSite, places: Mapping[str, int], value: Value) -> Site:
+        """A site on its body, from the centre of mass."""
+        place = None if site.body is None else places[site.body]
+        return Site(site.name, place, self._shifted(site.position, site.body, value), site.orientation)
+
+    def _shifted(self, point: Sequence[Scalar], body: str | None, value: Value) -> tuple[Scalar, ...]:
+        """(3,) from a body's centre of mass, where the file has it from the origin of the body's frame."""
+        part = None if body is None else self._named[body]
+        return less(point, part.centre(value)) if isinstance(part, ParametricBody) else tuple(point)
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:
@@ -159,15 +198,20 @@ class ParametricWorld:
 
     def law(self, a: str, b: str, value: Value) -> Law:
         """The contact law of the two by the rule above, with the values of what is a parameter."""
-        pair = self.pair(a, b)
-        own = pair.states if pair else {}
-        states = {name: self._named[name].states for name in (a, b)}
         found: dict[str, Scalar] = {}
-        for key in LAW:
-            if pair and key in own:
-                found[key] = value(f"{pair.name}.{key}") if key in VARIABLE else own[key]
-                continue
-            sides = [value(f"{x}.{key}") if key in VARIABLE else states[x][key] for x in (a, b) if key in states[x]]
-            if sides:
-                found[key] = COMBINE[key](sides)
-        return replace(self.contact, **found)
+        for key, sources in self.sources(a, b).items():
+            numbers = [value(f"{owner}.{key}") if varies else number for owner, number, varies in sources]
+            found[key] = numbers[0] if len(numbers) == 1 else COMBINE[key](numbers)
+        return Law(**found)
+
+    def sources(self, a: str, b: str) -> dict[str, list[tuple[str, float, bool]]]:
+        """By coefficient: who states it for the two (a pair, [contact], one surface or both), what, if a parameter."""
+        pair = self.pair(a, b)
+        found: dict[str, list[tuple[str, float, bool]]] = {}
+        for key, number in vars(self.contact).items():
+            found[key] = [(CONTACT, number, f"{CONTACT}.{key}" in self.contact_parameters)]
+            sides = [self._named[name] for name in (a, b) if key in self._named[name].states]
+            tables = [pair] if pair and key in pair.states else sides
+            if tables:
+                found[key] = [(each.name, each.states[key], key in stated(each.states)) for each in tables]
+        return found

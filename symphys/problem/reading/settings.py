@@ -10,7 +10,7 @@ from symphys.problem.reading.value_texts import shown
 from symphys.problem.schema import Document
 from symphys.suggest import hint, quote
 
-OPENED = ("simulation", "world", "contact", "objective", "solver", "mpc")
+OPENED = ("simulation", "world", "contact", "objective", "solver", "mpc", "identify")
 """Tables that a setting may open; it adds no body, surface, variable or objective."""
 OPENED_BELOW = ("solver", "mpc")
 """Those in which it may open tables, too."""

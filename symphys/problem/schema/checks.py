@@ -5,7 +5,7 @@ from __future__ import annotations
 import keyword
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any, TypeGuard
 
 from pydantic_core import PydanticCustomError
@@ -14,7 +14,7 @@ from symphys.expression import CONSTANTS, FUNCTIONS, OVER_TIME
 from symphys.problem.reading.value_texts import shown
 from symphys.suggest import quote
 
-RESERVED = frozenset({*FUNCTIONS, *CONSTANTS, *keyword.kwlist, *OVER_TIME, "time", "gravity", "ground"})
+RESERVED = frozenset({*FUNCTIONS, *CONSTANTS, *keyword.kwlist, *OVER_TIME, "time", "gravity", "ground", "contact"})
 IDENTIFIER = "[A-Za-z][A-Za-z0-9_]*"
 MAX_IDENTIFIER = 64
 MAX_LABEL = 100
@@ -241,3 +241,61 @@ def texts(value: object) -> list[str]:
     if not items or not all(isinstance(item, str) for item in items):
         raise fault('must be a text or a list of texts, for instance "ball.velocity" or ["ball.force[0:2]"]')
     return list(items)
+
+
+def cells(value: object) -> list[Any]:
+    """A column of numbers, or of rows of numbers; NaN is a missing one."""
+    rows: list[Any] = value if isinstance(value, list) else []
+    width = len(rows[0]) if rows and isinstance(rows[0], list) else 0
+    flat = [item for row in rows for item in row] if width else rows
+    uneven = width and any(len(row) != width for row in rows if isinstance(row, list))
+    if not flat or uneven or not all(is_cell(item) for item in flat):
+        raise fault("must be a list of numbers, or of rows with equally many; nan where one is missing")
+    return [[float(item) for item in row] for row in rows] if width else [float(item) for item in rows]
+
+
+def is_cell(value: object) -> bool:
+    """Whether the value is a finite number or NaN."""
+    return is_number(value) or (isinstance(value, float) and math.isnan(value))
+
+
+def positive_numbers(value: object) -> list[float]:
+    """A positive number, or a list of them; a list comes out."""
+    numbers: list[Any] = value if isinstance(value, list) else [value]
+    if not numbers or not all(is_number(number) and number > 0 for number in numbers):
+        raise fault(f"must be a number greater than 0, or a list with one for each component, not {shown(value)}")
+    return [float(number) for number in numbers]
+
+
+def held_back(value: object) -> bool | float | list[int | str]:
+    """True or false, a share, or a list of numbers and names."""
+    if isinstance(value, bool):
+        return value
+    if is_number(value) and 0 <= value <= 1:
+        return float(value)
+    if isinstance(value, list) and value and all(isinstance(item, str) or is_index(item) for item in value):
+        return list(value)
+    raise fault(f"must be true, a share from 0 to 1, or a list of numbers from 0 or names, not {shown(value)}")
+
+
+def is_index(value: object) -> bool:
+    """Whether the value is a whole number of at least 0."""
+    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
+
+
+def prior(value: object) -> list[list[float]]:
+    """A mean and a positive standard deviation, each a number or a list of numbers; lists come out."""
+    if not isinstance(value, list) or len(value) != 2:
+        raise fault(f"must be [mean, standard deviation], each a number or a list of numbers, not {shown(value)}")
+    return [coordinates(value[0]), positive_numbers(value[1])]
+
+
+def one_of(valid: Collection[str]) -> Callable[[object], str]:
+    """One of some texts."""
+
+    def check(value: object) -> str:
+        if not isinstance(value, str) or value not in valid:
+            raise fault(f"must be one of {', '.join(map(quote, valid))}, not {shown(value)}")
+        return value
+
+    return check

@@ -115,3 +115,8 @@ class ReferenceTable(SchemaTable):
     interpolation: Literal["linear", "cubic"] = Field(
         default="linear", description="between rows; before the first and after the last the values stay"
     )
+    delay: Finite | None = Field(
+        default=None,
+        description="the columns count so much later [s]: at `time` they are those of time - delay. Where it is given, "
+        "0 too, variables may set it: walk.delay",
+    )

@@ -32,6 +32,7 @@ from symphys.problem.schema.physics import (
     TerrainTable,
     WorldTable,
 )
+from symphys.problem.schema.recording import IdentifyTable, RecordedFileTable, RecordingTable
 from symphys.problem.schema.scenarios import ScenarioTable
 from symphys.problem.schema.sweep import SweepTable
 from symphys.problem.schema.types import Label, SchemaTable, deprecated
@@ -80,6 +81,9 @@ class Document(SchemaTable):
         default={}, description="options by solver: [solver.gradient], [solver.cma], ..."
     )
     mpc: MpcTable | None = None
+    recording: list[RecordingTable] = Field(default=[])
+    recorded: list[RecordedFileTable] = Field(default=[])
+    identify: IdentifyTable | None = None
     sweep: SweepTable | None = None
     set: dict[str, Any] = Field(
         default={}, description='values that replace others, such as those of included files: "body.torso.mass" = 3'

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -17,6 +17,7 @@ from symphys.problem.schema.types import (
     NonNegative,
     Numbers,
     Positive,
+    Prior,
     SchemaTable,
     Stop,
     Texts,
@@ -31,8 +32,8 @@ class VariableTable(SchemaTable):
 
     name: Identifier = Field(description="how formulas and results refer to it")
     sets: Texts = Field(
-        description='what it sets: "ball.velocity", "ball.force[0:2]", "knee.command", "ground.friction", or a list; '
-        "an orientation (w, x, y, z) is normalised"
+        description='what it sets: "ball.velocity", "ball.force[0:2]", "knee.command", "knee.start", '
+        '"ground.friction", or a list; an orientation (w, x, y, z) is normalised'
     )
     guess: Numbers | None = Field(
         default=None, description="where solvers start; default: what the file says (forces and commands: 0)"
@@ -51,6 +52,15 @@ class VariableTable(SchemaTable):
     knots: Knots = Field(default=1, description="for forces, torques and commands: number of values over the duration")
     interpolation: Interpolation = Field(
         default="constant", description="of forces, torques and commands between knots"
+    )
+    each: Literal["recording"] | None = Field(
+        default=None,
+        description='"recording": a value of its own for every recording, such as a start or the offset of a clock',
+    )
+    prior: Prior | None = Field(
+        default=None,
+        description="what `symphys identify` knows beforehand: [mean, standard deviation], each a number or a list "
+        "with one for each component",
     )
 
 

@@ -9,7 +9,7 @@ from pydantic import Field, PlainValidator, WithJsonSchema, create_model
 from symphys.model.shapes import SHAPES, SizeKey, Sphere
 from symphys.problem.reading.value_texts import listed
 from symphys.problem.schema import checks
-from symphys.problem.schema.types import Orientation, Points, Positive, SchemaTable, Size, Vector
+from symphys.problem.schema.types import NonNegative, Orientation, Points, Positive, SchemaTable, Size, Vector
 
 MOST_PARTS = 1000
 EXAMPLES = listed([f"{{ {kind} = {shape.example} }}" for kind, shape in SHAPES.items()], "or")
@@ -35,6 +35,7 @@ def one_of_the_shapes() -> type[SchemaTable]:
     fields: dict[str, Any] = {}
     for kind, shape in SHAPES.items():
         sizes: dict[str, Any] = {k.name: (value_of(k), Field(description=k.description)) for k in shape.size_keys}
+        sizes |= {k.name: (NonNegative, Field(default=0.0, description=k.description)) for k in shape.optional_keys}
         name = f"Solid{kind.capitalize()}Table"
         table = create_model(name, __base__=SchemaTable, __doc__=shape.summary, __module__=__name__, **sizes)
         fields[kind] = (table | None, Field(default=None, description=shape.example))

@@ -122,6 +122,11 @@ Texts = Annotated[
     PlainValidator(checks.texts),
     WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}, "minItems": 1}]}),
 ]
+Prior = Annotated[
+    list[list[float]],
+    PlainValidator(checks.prior),
+    WithJsonSchema({"type": "array", "items": coordinates_schema(), "minItems": 2, "maxItems": 2}),
+]
 Smoothing = Annotated[list[float], PlainValidator(checks.smoothing), WithJsonSchema(stages_schema())]
 Interpolation = Literal["constant", "linear"]
 Stop = Literal["met", "converged"]

@@ -16,8 +16,10 @@ from typing import Any
 import numpy as np
 
 from symphys.problem.model import Array, Simulation
+from symphys.problem.parametric.parts import DISTRIBUTION
 from symphys.problem.problem import Problem
 from symphys.problem.reader import ProblemReader
+from symphys.problem.recordings.kept import without_places
 
 KEPT = (
     "name",
@@ -85,8 +87,10 @@ class Family:
         return self._last[1]
 
     def note(self, whole: Problem) -> None:
-        """See in which parameters a problem differs from the one that all are made of."""
+        """See in which parameters a problem differs from the one that all are made of, but for those that follow."""
         for name, value in whole.parameters.items():
+            if name.rpartition(".")[2] in DISTRIBUTION:
+                continue
             if name not in self.varied and not np.array_equal(value, self.first.get(name, value)):
                 self.varied.add(name)
 
@@ -148,7 +152,8 @@ class LazyProblem(Problem):
     def identity(self) -> str:
         """As that of the problem, which need not be read for it."""
         digest: str = vars(self)["_digest"]
-        return f"{self.text}\n{digest}" if digest else self.text
+        text = without_places(self.text)
+        return f"{text}\n{digest}" if digest else text
 
 
 def arrived(state: dict[str, Any]) -> LazyProblem:

@@ -131,6 +131,8 @@ def check_varied(
     """Variables and phases must not give restitution to soft contacts; ``varied``: names, and where they are."""
     soft = {name for pair in nominal.pairs if pair.law.soft for name in parametric.owners(pair)}
     soft |= {pair.name for pair in parametric.pairs if pair.states.get("frequency", parametric.contact.frequency)}
+    owners = {parametric.owners(pair) for pair in nominal.pairs if pair.law.soft}
+    soft |= {source[0] for both in owners for source in parametric.sources(*both)["restitution"]}
     for place, name in varied:
         owner, _, key = name.rpartition(".")
         if key == "restitution" and owner in soft:

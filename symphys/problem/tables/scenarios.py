@@ -21,6 +21,7 @@ from symphys.problem.model import (
     VariableSlot,
 )
 from symphys.problem.parametric.joints import ParametricJoint
+from symphys.problem.parametric.starts import check_starts
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.quantities import Quantity, SlotError, limits, read_slot
 from symphys.problem.reading.faults import Faults, Place
@@ -104,6 +105,7 @@ class ScenarioReader:
             self.faults.add((*place, "factor"), "give either factor or shift")
             return
         self.take((*place, "sets"), slots, table.name)
+        check_starts(self.parametric, [((*place, "sets"), slot.name) for slot in slots], self.faults)
         shift = np.array([0.0] if table.shift is None else table.shift)
         if shift.size not in (1, *sizes):
             self.faults.add((*place, "shift"), f"must be a number, or {max(sizes)} of them; it has {shift.size}")

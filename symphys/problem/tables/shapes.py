@@ -69,10 +69,13 @@ def solid(
     """The shape of this kind that a table has; notes one that is too flat."""
     cls, own = SHAPES[kind], getattr(table, kind)
     keys = [key.name for key in cls.size_keys]
-    shape = cls.from_sizes({key: getattr(own, key) for key in keys}, centre, orientation)
+    given = [*keys, *(key.name for key in cls.optional_keys)]
+    shape = cls.from_sizes({key: getattr(own, key) for key in given}, centre, orientation)
     reason = shape.flatness
     if reason:
         faults.add((*place, kind, *(keys if len(keys) == 1 else [])), reason)
+    elif shape.optional_fault:
+        faults.add((*place, kind, cls.optional_keys[0].name), shape.optional_fault)
     return shape
 
 

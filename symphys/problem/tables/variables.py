@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from symphys.problem.checks.magnitude import check_mass
 from symphys.problem.model import Kind, Simulation, Variable, VariableSlot
-from symphys.problem.quantities import OPEN, Quantity, SlotError, limits, physical, read_slot
+from symphys.problem.quantities import SCALES, Quantity, SlotError, extremes, limits, read_slot
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.objectives import VariableTable
 from symphys.problem.schema.types import NestedList
@@ -19,6 +19,8 @@ from symphys.problem.schema.types import NestedList
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 WEIGHTS = 0.1
+CLOCK = 0.01
+"""[s]: offsets of clocks."""
 
 
 class VariableReader:
@@ -57,7 +59,11 @@ class VariableReader:
             upper=self.numbers("upper", np.min([high for _, high in limit], axis=0)),
             scale=scale,
             spread=self.numbers("spread", None) if self.table.spread is not None else scale / 10,
+            each=self.table.each is not None,
+            prior=self.prior(),
         )
+        if variable.each and kind == "duration":
+            self.add("each", "the duration is the same for all recordings; leave this out")
         self.check_numbers(variable)
         return variable
 
@@ -105,10 +111,12 @@ class VariableReader:
         return values[0] if same else None
 
     def usual_scale(self, slots: Sequence[VariableSlot], kind: Kind) -> Array | float:
-        """Parameters vary by their own size, numbers of controllers by WEIGHTS, everything else by 1."""
-        value = self.nominal(slots)
+        """Parameters vary by their own size, numbers of controllers by WEIGHTS, clocks by CLOCK, others by 1."""
+        value, key = self.nominal(slots), slots[0].name.rpartition(".")[2]
+        if key in SCALES and all(self.known[slot.name].own_scale for slot in slots):
+            return SCALES[key]
         if not all(self.known[slot.name].own_scale for slot in slots):
-            return WEIGHTS if kind == "weight" else 1.0
+            return {"weight": WEIGHTS, "recording": CLOCK}.get(kind, 1.0)
         if value is None:
             return 1.0
         return np.where(value == 0, 1.0, np.abs(value))
@@ -125,6 +133,18 @@ class VariableReader:
         except ValueError as error:
             self.add(key, str(error))
             return spread_out(0.0, self.count, self.table.knots)
+
+    def prior(self) -> tuple[Array, Array] | None:
+        """Mean and standard deviation, (components,) each."""
+        if self.table.prior is None:
+            return None
+        ends = [np.array(numbers) for numbers in self.table.prior]
+        if any(end.size not in (1, self.count) for end in ends):
+            wanted = f"a number or {self.count} numbers" if self.count > 1 else "a number"
+            self.add("prior", f"mean and standard deviation must each be {wanted}")
+            return None
+        mean, deviation = (np.broadcast_to(end, self.count).copy() for end in ends)
+        return mean, deviation
 
     def check_numbers(self, variable: Variable) -> None:
         """Bounds in order and physical, the guess inside them, positive scale."""
@@ -147,9 +167,9 @@ class VariableReader:
         """Bounds must not allow a negative mass, and the like; a quaternion must not be zero."""
         for slot in variable.slots:
             name = slot.name.rpartition(".")[2]
-            low, high = physical(slot.name, variable.kind)
-            if np.any(variable.lower < low) or (name in OPEN and np.any(variable.lower <= low)):
-                self.add("lower", f"{slot.name} must {'be greater than' if name in OPEN else 'be at least'} {low:g}")
+            low, high, above = extremes(slot.name, self.known[slot.name])
+            if np.any(variable.lower < low) or (above and np.any(variable.lower <= low)):
+                self.add("lower", f"{slot.name} must {'be greater than' if above else 'be at least'} {low:g}")
             if np.any(variable.upper > high):
                 self.add("upper", f"{slot.name} must be at most {high:g}")
             if name == "mass":

@@ -19,7 +19,7 @@ class QuantitySampler:
         """Look up what the numbers are without it."""
         self.varied, self.steps = varied, problem.simulation.steps
         self.lasts = max(1, round(varied.lasts / problem.simulation.dt)) if varied.lasts else self.steps
-        values = {**problem.initial, **problem.parameters, **problem.weights}
+        values = {**problem.initial, **problem.parametric.starts(), **problem.parameters, **problem.weights}
         size = len(varied.slots[0].components)
         blank = np.zeros(1 + max(max(slot.components) for slot in varied.slots))
         found = [values.get(slot.name, blank)[list(slot.components)] for slot in varied.slots]

@@ -105,10 +105,13 @@ class LinearizedStep:
         varying, given = self.rows(k, states, after, U, P, smoothing)
         return self._cut(self._off.jacobians(varying, given, self._columns))
 
-    def slopes_from_end(self, X: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float) -> Iterator[Slopes]:
+    def slopes_from_end(
+        self, X: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float, after: ArrayLike | None = None
+    ) -> Iterator[Slopes]:
         """The same of runs of steps, the last run first, each as soon as it is known; they are begun at once."""
         k = np.arange(len(np.asarray(X)))
-        varying, given = self.rows(k, X, self.step(k, X, U, P, smoothing), U, P, smoothing)
+        after = self.step(k, X, U, P, smoothing) if after is None else after
+        varying, given = self.rows(k, X, after, U, P, smoothing)
         return map(self._cut, self._off.jacobians_from_end(varying, given, self._columns))
 
     @property

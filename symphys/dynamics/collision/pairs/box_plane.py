@@ -10,5 +10,5 @@ from symphys.model.shapes import Box, Plane
 
 
 def box_plane(box: Box, plane: Plane, a: PredictedPath, _: PredictedPath) -> list[Contact]:
-    """Eight points: the corners."""
-    return [ball_on_plane(a, corner, 0.0, plane) for corner in corners(box)]
+    """Eight points: the corners, balls where edges are round."""
+    return [ball_on_plane(a, corner, box.edge, plane) for corner in corners(box)]

@@ -20,5 +20,5 @@ def capsule_terrain(capsule: Capsule, terrain: Terrain, a: PredictedPath, _: Pre
 
 
 def box_terrain(box: Box, terrain: Terrain, a: PredictedPath, _: PredictedPath) -> list[Contact]:
-    """Eight points: the corners."""
-    return [ball_on_terrain(corner, 0.0, terrain, a) for corner in corners(box)]
+    """Eight points: the corners, balls where edges are round."""
+    return [ball_on_terrain(corner, box.edge, terrain, a) for corner in corners(box)]

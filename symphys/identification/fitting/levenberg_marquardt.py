@@ -1,0 +1,216 @@
+"""Levenberg-Marquardt over all recordings at once, within bounds, on the arrow of shared and own numbers.
+
+The merit is sum rho(r) over all residuals and priors. Each step solves (H + lambda I) d = -g in scaled numbers over
+those that are free: a number at a bound that the gradient pushes against is held (active set), and the step is
+projected into the bounds. lambda follows the gain ratio (Nielsen 1999; Madsen, Nielsen, Tingleff 2004, algorithm 3.16).
+A trial of which a recording's simulation is not finite is refused, like one that raises the merit.
+
+The fit has converged where the step that is left, undamped, is below ``tolerance`` standard errors: its expected fall
+of the merit is below tolerance^2 times the merit per residual. That needs no unit and no scale.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from symphys.identification.fitting.arrow import ArrowSystem, assemble, costs
+from symphys.identification.fitting.state import FitOptions, FitOutcome, FitState, FitStatus, FitStep, begin
+from symphys.identification.interface import Array, Bools, FitParameters, IdentificationError, Ints, RecordedResiduals
+
+LOOSEST = 1 / 3
+"""lambda falls at most to this share after a step that went as foreseen."""
+WORTH = 1e-4
+"""A step is taken if the merit falls by more than this share of what the model expects."""
+STIFFEST = 1e20
+"""lambda over the largest diagonal of the first blocks: beyond it a step is no step."""
+EXACT = 1e-16
+"""Merit per residual below which recordings are met exactly: residuals of 1e-8 of the noise."""
+ROUNDING = 1e-14
+"""A fall of the merit by this share of itself cannot be told from rounding."""
+PROGRESS = 1e-2
+"""A fall of the merit by this share of itself per residual is progress: that of a tenth of a standard error."""
+EXACTLY = "the recordings are met exactly"
+BUDGET = "the iterations are used up: raise `iterations`"
+STOPPED = "interrupted: the state goes on from here"
+STALLED = (
+    "no lower merit was found although the Jacobian promises one, {left:.2g} standard errors away: the merit may have "
+    "a kink there (impacts that begin or end within a recording), or the Jacobian is wrong"
+)
+SLOW = "the merit hardly falls any more; the Jacobian puts its minimum {left:.2g} standard errors away"
+START = "the simulation of {names} is not finite at the guess: look at its start, or bound the numbers"
+TRIALS = "the simulation of {names} is not finite at any step from the best point: bound the numbers"
+
+
+class RecordingFit:
+    """Levenberg-Marquardt on some recordings of a problem."""
+
+    def __init__(
+        self,
+        problem: RecordedResiduals,
+        options: FitOptions,
+        which: Ints | None = None,
+        weights: Array | None = None,
+        hold_shared: bool = False,
+    ) -> None:
+        """``which`` are fitted, those not held back by default; their costs count ``weights`` (K,) times."""
+        self.problem, self.options, self.loss = problem, options, options.loss
+        self.which = np.flatnonzero(~problem.held_back) if which is None else which
+        if not self.which.size:
+            raise IdentificationError("no recording is left to fit to: all are held back")
+        self.weights = np.ones(len(self.which)) if weights is None else weights
+        self.hold_shared, self.simulations, self.jacobians = hold_shared, 0, 0
+        self.size = max(1, sum(len(problem.rows(int(k)).time) for k in self.which))
+
+    def run(
+        self,
+        start: FitState | None = None,
+        monitor: Callable[[FitStep, FitState], None] | None = None,
+        stop: Callable[[], bool] | None = None,
+    ) -> FitOutcome:
+        """Fit from the guess, or go on from ``start``; ``stop`` is asked and ``monitor`` told after each iteration."""
+        began = time.perf_counter()
+        state = start or begin(self.problem.shared.guess, self.problem.own.guess)
+        system = self._system(state.shared, state.own)
+        if not system.finite:
+            return FitOutcome(FitStatus.NOT_FINITE, START.format(names=self._names(system.costs)), state, system)
+        if state.history:  # the work of the start is in its history
+            last = state.history[-1]
+            self.simulations, self.jacobians, began = last.simulations, last.jacobians, began - last.seconds
+        if math.isnan(state.damping):
+            state = self._first(state, system, began)
+            if monitor:
+                monitor(state.history[-1], state)
+        while True:
+            ended = self._ended(state, system)
+            if ended is None and stop is not None and stop():
+                ended = (FitStatus.INTERRUPTED, STOPPED)
+            found = ended or self._step(state, system, began)
+            if isinstance(found[0], FitStatus):
+                return FitOutcome(*found, state, system)
+            state, system = found
+            if monitor:
+                monitor(state.history[-1], state)
+
+    def _system(self, shared: Array, own: Array) -> ArrowSystem:
+        self.jacobians += len(self.which)
+        evaluated = self.problem.jacobian(shared, own, self.which)
+        return assemble(self.problem, evaluated, shared, own, self.which, self.loss, self.weights)
+
+    def _first(self, begun: FitState, system: ArrowSystem, began: float) -> FitState:
+        """The first iteration sets lambda."""
+        diagonals = np.diagonal(system.blocks, axis1=1, axis2=2)
+        size = float(np.max(diagonals, initial=0.0)) or 1.0
+        state = replace(begun, damping=self.options.damping * size, stiffest=STIFFEST * size, mark=system.cost)
+        state = replace(state, first=len(state.history))
+        return self._recorded(state, system, 0.0, began)
+
+    def _recorded(self, state: FitState, system: ArrowSystem, step: float, began: float) -> FitState:
+        """The state with a row of its history."""
+        row = FitStep(
+            iteration=len(state.history),
+            merit=system.cost,
+            left=self.left(state, system),
+            damping=state.damping,
+            step=step,
+            simulations=self.simulations,
+            jacobians=self.jacobians,
+            seconds=time.perf_counter() - began,
+        )
+        return replace(state, history=(*state.history, row))
+
+    def free(self, state: FitState, system: ArrowSystem) -> tuple[Bools, Bools]:
+        """(s,) and (k, o) of the recordings that are fitted: False where a bound holds a number."""
+        shared = movable(self.problem.shared, state.shared, system.shared_gradient)
+        own = movable(self.problem.own, state.own, system.own_gradient, self.which)
+        return shared & (not self.hold_shared), own
+
+    def left(self, state: FitState, system: ArrowSystem) -> float:
+        """Standard errors between the state and where its quadratic model has the minimum."""
+        if not system.cost > 0:
+            return 0.0
+        step = system.step(0.0, *self.free(state, system))
+        return math.sqrt(max(system.expected_fall(*step), 0.0) * self.size / system.cost)
+
+    def _ended(self, state: FitState, system: ArrowSystem) -> tuple[FitStatus, str] | None:
+        last = state.history[-1]
+        if system.cost <= EXACT * self.size:
+            return FitStatus.CONVERGED, EXACTLY
+        if last.left <= self.options.tolerance:
+            return FitStatus.CONVERGED, f"{last.left:.1g} standard errors are left"
+        if last.iteration - state.first >= self.options.iterations:
+            return FitStatus.BUDGET, BUDGET
+        if state.quiet >= (self.options.patience or math.inf):
+            return FitStatus.STALLED, SLOW.format(left=last.left)
+        return None
+
+    def _step(
+        self, state: FitState, system: ArrowSystem, began: float
+    ) -> tuple[FitState, ArrowSystem] | tuple[FitStatus, str]:
+        """One step that lowers the merit, and the system there; lambda grows until there is one."""
+        free = self.free(state, system)
+        refused, merit = "", system.cost
+        while state.damping <= state.stiffest:
+            shared, own, step, expected = self._trial(state, system, free)
+            recordings, priors = costs(self.problem, shared, own, self.which, self.loss, self.weights)
+            self.simulations += len(self.which)
+            trial = float(recordings.sum()) + priors
+            refused = "" if math.isfinite(trial) else self._names(recordings)
+            if expected > 0 and math.isfinite(trial) and (merit - trial) / expected > WORTH:
+                there = self._system(shared, own)
+                if there.finite:
+                    return self._accept(state, there, shared, own, step, (merit - trial) / expected, began), there
+                refused = self._names(there.costs)
+            state = replace(state, damping=state.damping * state.growth, growth=2 * state.growth)
+        if refused:
+            return FitStatus.NOT_FINITE, TRIALS.format(names=refused)
+        left = state.history[-1].left
+        if left <= math.sqrt(ROUNDING * self.size):
+            return (
+                FitStatus.CONVERGED,
+                f"{left:.1g} standard errors are left, which the merit's last digits do not show",
+            )
+        return FitStatus.STALLED, STALLED.format(left=left)
+
+    def _trial(
+        self, state: FitState, system: ArrowSystem, free: tuple[Bools, Bools]
+    ) -> tuple[Array, Array, float, float]:
+        """The next shared and own numbers, the length of the step in scales, and what the model expects it to gain."""
+        d_shared, d_own = system.step(state.damping, *free)
+        shared_of, own_of, which = self.problem.shared, self.problem.own, self.which
+        shared = np.clip(state.shared + shared_of.scale * d_shared, shared_of.lower, shared_of.upper)
+        own = state.own.copy()
+        own[which] += own_of.scale[which] * d_own
+        own = np.clip(own, own_of.lower, own_of.upper)
+        taken = (shared - state.shared) / shared_of.scale, ((own - state.own) / own_of.scale)[which]
+        length = math.sqrt(float(np.sum(taken[0] ** 2) + np.sum(taken[1] ** 2)))
+        return shared, own, length, system.expected_fall(*taken)
+
+    def _accept(
+        self, state: FitState, system: ArrowSystem, shared: Array, own: Array, step: float, gain: float, began: float
+    ) -> FitState:
+        """The state after a step; lambda falls with the gain ratio."""
+        damping = state.damping * max(LOOSEST, 1 - (2 * gain - 1) ** 3)
+        fell = system.cost < state.mark * (1 - PROGRESS / self.size)
+        mark, quiet = (system.cost, 0) if fell else (state.mark, state.quiet + 1)
+        taken = replace(state, shared=shared, own=own, damping=damping, growth=2.0, mark=mark, quiet=quiet)
+        return self._recorded(taken, system, step, began)
+
+    def _names(self, recordings: Array) -> str:
+        """Of those whose costs are not finite."""
+        bad = [
+            self.problem.recordings[k] for k, cost in zip(self.which, recordings, strict=True) if not np.isfinite(cost)
+        ]
+        return ", ".join(bad[:3]) + (f" and {len(bad) - 3} more" if len(bad) > 3 else "")
+
+
+def movable(parameters: FitParameters, values: Array, gradient: Array, which: Ints | None = None) -> Bools:
+    """False for a number at a bound that the gradient pushes against, and for one whose bounds are equal."""
+    some = slice(None) if which is None else which
+    at, lower, upper = values[some], parameters.lower[some], parameters.upper[some]
+    against = ((at <= lower) & (gradient > 0)) | ((at >= upper) & (gradient < 0))
+    return np.asarray(~against & (lower < upper))

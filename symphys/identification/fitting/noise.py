@@ -1,0 +1,86 @@
+"""Noise that is not given: its standard deviation from what is left, quantity by quantity.
+
+sigma^2 = sum psi(r / sigma)^2 / (beta (m - h)), with m residuals of the quantity, h their leverage (how many numbers
+they determine), and beta the mean of psi^2 under normal noise (Huber's proposal 2). In least squares that is the
+unbiased variance. Fit and estimate take turns until the deviations stand.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from symphys.identification.fitting.robust_loss import RobustLoss
+from symphys.identification.inference.uncertainty import Information, pseudo_inverse
+from symphys.identification.interface import Array, Ints, RecordedResiduals, ResidualRows, Rows
+
+LEAST = 1e-12
+"""A factor on the guess of a noise is at least so large: recordings that are met exactly have none."""
+ENOUGH = 0.5
+"""Residuals less their leverage that an estimate needs."""
+TURNS, LEAST_CHANGE = 50, 1e-4
+"""Turns of Huber's proposal 2 on the same residuals, at most, and the change at which they end."""
+
+
+class RescaledResiduals:
+    """A problem whose residuals of each quantity are divided by a factor more."""
+
+    def __init__(self, problem: RecordedResiduals, factors: Array) -> None:
+        """``factors`` (q,) by quantity, on the noise that the problem divides by."""
+        self.problem, self.factors = problem, factors
+        self.recordings, self.held_back = problem.recordings, problem.held_back
+        self.shared, self.own = problem.shared, problem.own
+        self.quantities, self.units, self.noise_known = problem.quantities, problem.units, problem.noise_known
+        self._divisors: dict[int, Array] = {}
+
+    def rows(self, recording: int) -> ResidualRows:
+        """See ``RecordedResiduals``; the noise is the estimated one."""
+        rows = self.problem.rows(recording)
+        return replace(rows, noise=rows.noise * self.factors[rows.quantity])
+
+    def _divisor(self, recording: int) -> Array:
+        if recording not in self._divisors:
+            self._divisors[recording] = self.factors[self.problem.rows(recording).quantity]
+        return self._divisors[recording]
+
+    def residuals(self, shared: Array, own: Array, which: Ints) -> list[Array]:
+        """See ``RecordedResiduals``."""
+        found = self.problem.residuals(shared, own, which)
+        return [r / self._divisor(int(k)) for k, r in zip(which, found, strict=True)]
+
+    def jacobian(self, shared: Array, own: Array, which: Ints) -> Rows:
+        """See ``RecordedResiduals``."""
+        found = []
+        for k, (r, by_shared, by_own) in zip(which, self.problem.jacobian(shared, own, which), strict=True):
+            divisor = self._divisor(int(k))
+            found.append((r / divisor, by_shared / divisor[:, None], by_own / divisor[:, None]))
+        return found
+
+
+def noise_factors(
+    problem: RecordedResiduals, evaluated: Rows, which: Ints, loss: RobustLoss, information: Information
+) -> Array:
+    """(q,) noise of each quantity by what its residuals are divided by; 1 where it is given."""
+    count = len(problem.quantities)
+    inverse, _ = pseudo_inverse(information.shared, information.reference)
+    quantities, leverages = [], []
+    for at, (k, (_, by_shared, by_own)) in enumerate(zip(which, evaluated, strict=True)):
+        quantities.append(problem.rows(int(k)).quantity)
+        own_rows = by_own * problem.own.scale[k] * information.free_own[at]
+        ahead = by_shared * problem.shared.scale * information.free_shared + own_rows @ information.gain[at]
+        alone = np.einsum("ma,ab,mb->m", own_rows, information.own_inverse[at], own_rows)
+        leverages.append(np.einsum("ma,ab,mb->m", ahead, inverse, ahead) + alone)
+    r, quantity, leverage = (np.concatenate(each) for each in ([r for r, _, _ in evaluated], quantities, leverages))
+    factors = np.ones(count)
+    for _ in range(TURNS):
+        scaled = r / factors[quantity]
+        squares = np.bincount(quantity, loss.influence(scaled) ** 2, minlength=count)
+        freedom = np.bincount(quantity, 1 - leverage * loss.inside(scaled), minlength=count)
+        enough = (freedom > ENOUGH) & ~problem.noise_known
+        change = np.sqrt(squares / (loss.normal_square * np.where(enough, freedom, 1.0)))
+        change = np.where(enough, np.maximum(change, LEAST), 1.0)
+        factors = factors * change
+        if np.all(np.abs(change - 1) < LEAST_CHANGE):
+            break
+    return factors

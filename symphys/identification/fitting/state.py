@@ -1,0 +1,181 @@
+"""Options, states and outcomes of a fit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from symphys.identification.fitting.arrow import ArrowSystem
+from symphys.identification.fitting.robust_loss import RobustLoss
+from symphys.identification.interface import Array, IdentificationError, RecordedResiduals
+
+NUMBERS: dict[str, Callable[[Any], Any]] = {
+    **dict.fromkeys(("damping", "growth", "stiffest", "mark", "horizon"), float),
+    **dict.fromkeys(("quiet", "first"), int),
+}
+"""Fields of a state that are one number."""
+
+
+class FitStatus(Enum):
+    """How a fit ended."""
+
+    CONVERGED = "converged"
+    STALLED = "stalled"
+    BUDGET = "budget"
+    NOT_FINITE = "not_finite"
+    INTERRUPTED = "interrupted"
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """Options of Levenberg-Marquardt.
+
+    Attributes:
+        iterations: steps at most, of each horizon and of each turn with the noise.
+        damping: first lambda, as a share of the largest diagonal of the first blocks.
+        tolerance: converged where so many standard errors are left.
+        patience: stalled where the merit has fallen by less than a tenth of a standard error makes in so many steps;
+            0 goes on regardless.
+        threshold: of Huber's loss, in units of the noise; inf: least squares.
+        horizons: shares of the recordings' time that are fitted one after the other, rising to 1. Where impacts make
+            motions chaotic, (0.3, 0.5, 0.7, 0.85, 1) ends at minima that a fit of the whole does not reach.
+    """
+
+    iterations: int = 100
+    damping: float = 1e-3
+    tolerance: float = 1e-4
+    patience: int = 10
+    threshold: float = math.inf
+    horizons: tuple[float, ...] = (1.0,)
+
+    def __post_init__(self) -> None:
+        """IdentificationError names the option and what would be valid."""
+        for name in ("iterations", "tolerance", "patience"):
+            if not getattr(self, name) >= 0:
+                raise IdentificationError(f"{name} is {getattr(self, name)}: it must be at least 0")
+        for name in ("damping", "threshold"):
+            if not getattr(self, name) > 0:
+                raise IdentificationError(f"{name} is {getattr(self, name)}: it must be above 0")
+        rising = all(0 < a < b for a, b in pairwise((*self.horizons, math.inf)))
+        if not rising or self.horizons[-1:] != (1.0,):
+            raise IdentificationError(f"horizons are {self.horizons}: they must be above 0 and rise to 1")
+
+    @property
+    def loss(self) -> RobustLoss:
+        """The loss."""
+        return RobustLoss(self.threshold)
+
+
+@dataclass(frozen=True)
+class FitStep:
+    """An iteration; 0 is the start.
+
+    Attributes:
+        iteration: its number.
+        merit: sum rho, with priors.
+        left: standard errors between the point and where the Jacobian puts the minimum.
+        damping: lambda.
+        step: length, in scales.
+        simulations, jacobians: of single recordings, so far.
+        seconds: so far.
+    """
+
+    iteration: int
+    merit: float
+    left: float
+    damping: float
+    step: float
+    simulations: int
+    jacobians: int
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class FitState:
+    """Between two iterations: all that the fit needs to go on.
+
+    Attributes:
+        shared, own: (s,) and (K, o).
+        damping, growth: lambda, and the factor on it after a step that is refused; nan: the next iteration sets lambda.
+        stiffest: a lambda beyond which the search for a step is given up.
+        mark, quiet: the merit at the last progress, and iterations since.
+        history: the iterations so far.
+        noise: (q,) factors on the noise of each quantity under which the merit is computed; empty: none.
+        horizon: share of the recordings that is fitted.
+        first: the iteration at which lambda was last set anew.
+    """
+
+    shared: Array
+    own: Array
+    damping: float
+    growth: float
+    stiffest: float
+    mark: float
+    quiet: int
+    history: tuple[FitStep, ...]
+    noise: tuple[float, ...] = ()
+    horizon: float = 0.0
+    first: int = 0
+
+    def plain(self) -> dict[str, Any]:
+        """As JSON-able lists and numbers, from which ``revive_state`` makes the same state to the last bit."""
+        found = {name: getattr(self, name) for name in NUMBERS}
+        rows = [list(vars(row).values()) for row in self.history]
+        return {
+            "shared": self.shared.tolist(),
+            "own": self.own.tolist(),
+            **found,
+            "history": rows,
+            "noise": list(self.noise),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class FitOutcome:
+    """How a fit ended, and where.
+
+    Attributes:
+        status, reason: what ended it, and what that means.
+        state: there; ``fit`` goes on from it.
+        system: the arrow there, of the recordings that were fitted.
+    """
+
+    status: FitStatus
+    reason: str
+    state: FitState
+    system: ArrowSystem
+
+    @property
+    def merit(self) -> float:
+        """Sum of rho there, with priors."""
+        return self.system.cost
+
+
+def begin(shared: Array, own: Array) -> FitState:
+    """The state before the first iteration, at shared (s,) and own (K, o) within the bounds."""
+    return FitState(shared, own, math.nan, 2.0, math.nan, math.inf, 0, ())
+
+
+def revive_state(saved: Mapping[str, Any], problem: RecordedResiduals) -> FitState:
+    """The state in ``FitState.plain``; IdentificationError if it is damaged or of other parameters."""
+    try:
+        shared, own = np.array(saved["shared"], float), np.array(saved["own"], float).reshape(problem.own.guess.shape)
+        numbers = {name: kind(saved[name]) for name, kind in NUMBERS.items()}
+        history = tuple(FitStep(*row) for row in saved["history"])
+        noise = tuple(map(float, saved["noise"]))
+        state = FitState(shared=shared, own=own, history=history, noise=noise, **numbers)
+    except (KeyError, TypeError, ValueError) as error:
+        raise IdentificationError(
+            f"the saved fit is damaged or of other recordings ({error!r}): start afresh"
+        ) from error
+    if shared.shape != problem.shared.guess.shape:
+        raise IdentificationError(
+            f"the saved fit has {shared.size} shared numbers, the problem {len(problem.shared.names)}"
+        )
+    return state

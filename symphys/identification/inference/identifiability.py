@@ -1,0 +1,229 @@
+"""Directions of the shared numbers that the recordings do not determine, in words.
+
+Each number has a unit: its scale, or its own size where that is larger. In these units the Jacobian, with the own
+numbers eliminated and without priors of the shared ones, has a singular value for each direction, whose inverse is the
+standard error along it. A direction is open where that is above ``WIDE``: the recordings leave it open by more than the
+numbers' own size. Above ``NOTHING``, or where the singular value is rounding, there is no information at all.
+
+A basis of the open directions is brought into echelon form, so that numbers that have nothing to do with each other
+fall apart. If n numbers share n - 1 open directions, one combination of them is determined: with logarithms of integer
+weights a product, d log a = -d log b leaves a b.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from symphys.identification.fitting.robust_loss import RobustLoss
+from symphys.identification.inference.advice import advice
+from symphys.identification.inference.uncertainty import Information
+from symphys.identification.interface import Array, Ints, RecordedResiduals, Rows
+from symphys.results.identification.parts import OpenDirection
+
+WIDE = 1.0
+"""Standard error of a direction, in units of the numbers, above which it is called open."""
+SMALL = 0.02
+"""A component of a direction is none if it is smaller, relative to the largest."""
+EXPONENTS = (1, 2, 3)
+"""Largest powers that are tried."""
+ROUNDING = 1e-10
+"""A singular value is none if it is smaller, relative to the largest: derivatives have rounding."""
+NOTHING = 1e3
+"""Standard error, in units of the numbers, above which a direction has no information at all."""
+FAR = 0.1
+"""How far along an open direction a claim of every value is tried, as a share of the numbers."""
+SAME = 1e-3
+"""Residuals that change by less than this share of what one number alone changes are the same."""
+CLOSE = 0.03
+"""A power is recognised within this share of the largest."""
+
+
+def open_directions(
+    problem: RecordedResiduals,
+    evaluated: Rows,
+    shared: Array,
+    own: Array,
+    which: Ints,
+    loss: RobustLoss,
+    information: Information,
+) -> tuple[OpenDirection, ...]:
+    """Those among the shared numbers that no bound holds, from the recordings in ``which`` without shared priors."""
+    free = np.flatnonzero(information.free_shared)
+    if not free.size:
+        return ()
+    parameters = problem.shared
+    units = np.maximum(np.abs(shared), parameters.scale)[free]
+    rows = reduced_rows(problem, evaluated, which, loss, information)[:, free] * units
+    _, sizes, basis = np.linalg.svd(rows)
+    wanted = sizes < 1 / WIDE
+    if not wanted.any():
+        return ()
+    found, directions = [], echelon(basis[wanted])
+    for members, part in components(directions):
+        error = direction_error(rows, directions[part], float(sizes[0]))
+        moves = own_moves(problem, information, free, units / parameters.scale[free], directions[part])
+        named, open_part = free[members], directions[np.ix_(part, members)] * units[members]
+        text = describe(problem, shared, own, which, named, open_part, moves)
+        if np.isfinite(error):
+            text = f"{text}, or nearly so: the standard error is {error:.2g} times their size"
+        prior = bool(np.isfinite(parameters.prior_deviation[named]).any())
+        names = tuple(parameters.names[i] for i in named)
+        told = advice([parameters.sets[i] for i in named])
+        found.append(OpenDirection(names, tuple(moves), text, told, error, prior))
+    return tuple(found)
+
+
+def reduced_rows(
+    problem: RecordedResiduals, evaluated: Rows, which: Ints, loss: RobustLoss, information: Information
+) -> Array:
+    """(s, s) triangle R with R'R the Schur complement, by orthogonal elimination: no squares lose digits."""
+    s, o = len(problem.shared.names), len(problem.own.names)
+    stacked = [np.zeros((s, s))]
+    prior = 1 / problem.own.prior_deviation
+    for at, (k, (r, by_shared, by_own)) in enumerate(zip(which, evaluated, strict=True)):
+        weight = np.sqrt(loss.weight(r))[:, None]
+        free = information.free_own[at]
+        own_rows = np.concatenate([weight * by_own, np.diag(prior[k])])[:, free] * problem.own.scale[k][free]
+        shared_rows = np.concatenate([weight * by_shared, np.zeros((o, s))])
+        lengths = np.linalg.norm(own_rows, axis=0)
+        left, sizes, _ = np.linalg.svd(own_rows / np.where(lengths > 0, lengths, 1.0), full_matrices=False)
+        range_of_own = left[:, sizes > ROUNDING * np.max(sizes, initial=0.0)]
+        left_over = shared_rows - range_of_own @ (range_of_own.T @ shared_rows)
+        stacked.append(np.asarray(np.linalg.qr(left_over, mode="r")))
+    return np.asarray(np.linalg.qr(np.concatenate(stacked), mode="r"))
+
+
+def direction_error(rows: Array, directions: Array, largest: float) -> float:
+    """Standard error along the least determined of directions (d, n); inf where there is no information."""
+    span = np.linalg.qr(directions.T)[0]
+    size = float(np.linalg.svd(rows @ span, compute_uv=False)[-1])
+    return np.inf if size <= max(ROUNDING * largest, 1 / NOTHING) else 1 / size
+
+
+def echelon(basis: Array) -> Array:
+    """(d, n) the same directions with as many zeros as elimination with full pivoting makes, largest component 1."""
+    rows = basis.copy()
+    used: list[int] = []
+    for i in range(len(rows)):
+        left = np.abs(rows[i:]).copy()
+        left[:, used] = 0
+        at, pivot = divmod(int(np.argmax(left)), left.shape[1])
+        rows[[i, i + at]] = rows[[i + at, i]]
+        rows[i] /= rows[i, pivot]
+        others = np.arange(len(rows)) != i
+        rows[others] -= np.outer(rows[others, pivot], rows[i])
+        used.append(pivot)
+    rows /= np.max(np.abs(rows), axis=1, keepdims=True)
+    return np.where(np.abs(rows) < SMALL, 0.0, rows)
+
+
+def components(rows: Array) -> list[tuple[Ints, Ints]]:
+    """Numbers and directions that have to do with each other: (members, rows) of each group, by index."""
+    left, found = list(range(len(rows))), []
+    while left:
+        part, members = [left.pop(0)], np.zeros(rows.shape[1], bool)
+        members |= rows[part[0]] != 0
+        grown = True
+        while grown:
+            more = [i for i in left if np.any(members & (rows[i] != 0))]
+            grown = bool(more)
+            part += more
+            left = [i for i in left if i not in more]
+            members |= np.any(rows[part] != 0, axis=0)
+        found.append((np.flatnonzero(members), np.array(sorted(part))))
+    return found
+
+
+def own_moves(problem: RecordedResiduals, information: Information, free: Ints, units: Array, rows: Array) -> list[str]:
+    """Names of own numbers that follow directions (d, n) by more than a share of their scale in most recordings."""
+    moves = np.einsum("kos,ds->kdo", information.gain[:, :, free] * units, rows)
+    often = np.median(np.max(np.abs(moves), axis=1), axis=0) if moves.size else np.zeros(0)
+    return [name for name, size in zip(problem.own.names, often, strict=True) if size > SMALL]
+
+
+def describe(
+    problem: RecordedResiduals, shared: Array, own: Array, which: Ints, named: Ints, rows: Array, moves: list[str]
+) -> str:
+    """In words: directions (d, n) of the shared numbers at the indices ``named``, in their own units."""
+    names = [problem.shared.names[i] for i in named]
+    if moves:
+        every = f"{listed(moves)} of each recording"
+        return f"{listed(names)} can change together with {every} without an effect on what was measured"
+    if len(rows) == len(named):
+        return f"{listed(names)} {'has' if len(names) == 1 else 'have'} no effect on what was measured"
+    if len(rows) < len(named) - 1:
+        return f"{listed(names)} can change together without an effect on what was measured"
+    if np.all(shared[named] != 0):
+        powers = whole_powers(kernel(rows / shared[named]))
+        exponents = rows / shared[named]
+        if powers is not None:
+            exponents = exponents - np.outer(exponents @ powers, powers) / (powers @ powers)
+        far = shared[named] * np.exp(FAR * exponents / np.max(np.abs(exponents), axis=1, keepdims=True))
+        if powers is not None and unchanged(problem, shared, own, which, named, far):
+            kind = "their product" if np.all(powers == 1) else "the ratio" if ratio(powers) else "the combination"
+            return f"{listed(names)} appear only as {kind} {monomial(names, powers)}"
+    weights = kernel(rows)
+    weights = weights / weights[np.argmax(np.abs(weights))]
+    sums = " + ".join(f"{weight:.3g} {name}" for weight, name in zip(weights, names, strict=True)).replace("+ -", "- ")
+    size = np.maximum(np.abs(shared), problem.shared.scale)[named]
+    far = shared[named] + FAR * rows / np.max(np.abs(rows / size), axis=1, keepdims=True)
+    local = "" if unchanged(problem, shared, own, which, named, far) else " near the estimate"
+    return f"{listed(names)} appear only as {sums}{local}"
+
+
+def unchanged(problem: RecordedResiduals, shared: Array, own: Array, which: Ints, named: Ints, far: Array) -> bool:
+    """Whether points (d, n) a tenth away along open directions have the residuals of the estimate.
+
+    What is open by the Jacobian is open near the estimate; a product is claimed of every value.
+    """
+    here = np.concatenate(problem.residuals(shared, own, which))
+
+    def change(values: Array) -> float:
+        there = shared.copy()
+        there[named] = values
+        if np.any((there < problem.shared.lower) | (there > problem.shared.upper)):
+            return np.inf
+        return float(np.linalg.norm(np.concatenate(problem.residuals(there, own, which)) - here))
+
+    for point in far:
+        at = int(np.argmax(np.abs(point - shared[named])))
+        alone = shared[named].copy()
+        alone[at] = point[at]
+        if not change(point) <= SAME * change(alone):
+            return False
+    return True
+
+
+def kernel(directions: Array) -> Array:
+    """(n,) orthogonal to (n - 1, n) directions."""
+    return np.asarray(np.linalg.svd(directions)[2][-1])
+
+
+def whole_powers(weights: Array) -> Array | None:
+    """(n,) small integers, the first above 0, that weights (n,) are a multiple of; None where there are none."""
+    for most in EXPONENTS:
+        powers = weights / weights[np.argmax(np.abs(weights))] * most
+        near = np.round(powers)
+        if np.all(np.abs(powers - near) <= CLOSE * most) and np.all(near != 0):
+            return np.asarray(near * np.sign(near[0]))
+    return None
+
+
+def ratio(powers: Array) -> bool:
+    """Whether a monomial is one number by another."""
+    return bool(len(powers) == 2 and sorted(powers) == [-1, 1])
+
+
+def monomial(names: list[str], powers: Array) -> str:
+    """``mass * friction / radius^2``."""
+    parts = {True: [], False: []}  # type: dict[bool, list[str]]
+    for name, power in zip(names, powers, strict=True):
+        parts[power > 0].append(name if abs(power) == 1 else f"{name}^{abs(int(power))}")
+    below = parts[False]
+    under = f" / {below[0]}" if len(below) == 1 else f" / ({' * '.join(below)})" if below else ""
+    return " * ".join(parts[True]) + under
+
+
+def listed(names: list[str]) -> str:
+    """``a, b and c``."""
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

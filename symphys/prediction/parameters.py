@@ -1,0 +1,124 @@
+"""The numbers that are identified: of variables, shared by all recordings or own to each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.identification import FitParameters
+from symphys.problem import Problem, Recording, Variable
+from symphys.problem.units import quantity_unit
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+TURN = 0.1
+"""[rad] a sensible change of an orientation."""
+
+
+@dataclass(frozen=True)
+class NumberBlock:
+    """The numbers of one variable.
+
+    Attributes:
+        variable: of the problem.
+        first: where they begin among the shared numbers, or among those of a recording.
+        where: (components,) their places in the simulation's z.
+        recorded: whether recordings say where they begin; a prior then is about that.
+    """
+
+    variable: Variable
+    first: int
+    where: Ints
+    recorded: bool = False
+
+    @property
+    def turns(self) -> bool:
+        """Whether they are a rotation vector (3,) [rad], in the body's frame, from where an orientation begins."""
+        return self.variable.slots[0].name.endswith(".orientation") and self.variable.components == 4
+
+    @property
+    def count(self) -> int:
+        """How many they are."""
+        return 3 if self.turns else len(self.where)
+
+    @property
+    def part(self) -> slice:
+        """Their places among shared or own numbers."""
+        return slice(self.first, self.first + self.count)
+
+    @property
+    def of_recordings(self) -> str:
+        """``offset`` or ``scale`` of how motions were measured; else empty."""
+        return self.variable.slots[0].name.rpartition(".")[2] if self.variable.kind == "recording" else ""
+
+    def concerns(self, recording: Recording) -> bool:
+        """Whether it says how a recording was measured."""
+        return any(slot.name.rpartition(".")[0] == recording.table for slot in self.variable.slots)
+
+
+def number_blocks(problem: Problem, start: int) -> tuple[tuple[NumberBlock, ...], tuple[NumberBlock, ...]]:
+    """Those of shared variables, then those with a value for each recording; ``start``: where variables begin in z."""
+    found: dict[bool, list[NumberBlock]] = {False: [], True: []}
+    for variable in problem.variables:
+        blocks = found[variable.each]
+        first = blocks[-1].part.stop if blocks else 0
+        recorded = variable.each and any(variable.slots[0].name in each.start for each in problem.recordings)
+        blocks.append(NumberBlock(variable, first, start + np.arange(variable.guess.size), recorded))
+        start += variable.guess.size
+    return tuple(found[False]), tuple(found[True])
+
+
+def fit_numbers(problem: Problem, blocks: Sequence[NumberBlock], guess: Array) -> FitParameters:
+    """The numbers with bounds, scales and priors; ``guess`` (n,) or (K, n)."""
+    world = problem.world()
+    columns: dict[str, list[Array]] = {key: [] for key in ("lower", "upper", "scale", "mean", "deviation")}
+    names, sets, units = list[str](), list[str](), list[str]()
+    for block in blocks:
+        variable, slot = block.variable, block.variable.slots[0]
+        labels = axes(variable.name, block.count)
+        names += labels
+        sets += [slot.name] * len(labels)
+        units += ["rad" if block.turns else quantity_unit(slot.name, world) or ""] * len(labels)
+        for key, numbers in numbers_of(block).items():
+            columns[key].append(numbers)
+    joined = {key: np.concatenate([np.zeros(0), *parts]) for key, parts in columns.items()}
+    spread = {key: np.broadcast_to(numbers, guess.shape).copy() for key, numbers in joined.items()}
+    for block in blocks:
+        if block.recorded:
+            spread["mean"][..., block.part] += guess[..., block.part]
+    return FitParameters(
+        names=tuple(names),
+        guess=np.clip(guess, spread["lower"], spread["upper"]),
+        lower=spread["lower"],
+        upper=spread["upper"],
+        scale=spread["scale"],
+        prior_mean=spread["mean"],
+        prior_deviation=spread["deviation"],
+        quantities=tuple(sets),
+        units=tuple(units),
+    )
+
+
+def numbers_of(block: NumberBlock) -> dict[str, Array]:
+    """Bounds, scale and prior of the numbers of a block."""
+    variable, free = block.variable, np.full(block.count, np.inf)
+    if block.turns:
+        deviation = free if variable.prior is None else np.full(3, float(variable.prior[1].max()))
+        zero = np.zeros(3)
+        return {"lower": -free, "upper": free, "scale": zero + TURN, "mean": zero, "deviation": deviation}
+    mean, deviation = (np.zeros(block.count), free) if variable.prior is None else variable.prior
+    return {
+        "lower": variable.lower,
+        "upper": variable.upper,
+        "scale": variable.scale,
+        "mean": np.asarray(mean, float),
+        "deviation": np.asarray(deviation, float),
+    }
+
+
+def axes(name: str, count: int) -> list[str]:
+    """``size[0]``, ``size[1]``; the name alone of one number."""
+    return [name] if count == 1 else [f"{name}[{k}]" for k in range(count)]

@@ -1,0 +1,172 @@
+"""What a problem predicts for each of its recordings, and the derivatives of that by what is identified."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.prediction.parameters import number_blocks
+from symphys.prediction.rotations import turned
+from symphys.problem import Problem, Recording, Variable, VariableSlot
+from symphys.transcription.quantity_slopes import QuantitySlopes
+from symphys.transcription.rollout import symbolic_rollout
+
+Array = NDArray[np.float64]
+CLOSE = 1e-9
+"""Steps: a sample so near to the start of a step is there."""
+SCALED = ("position", "velocity")
+"""What a scale of lengths scales of a start."""
+
+
+@dataclass(frozen=True)
+class PredictedSamples:
+    """A recording as it is predicted.
+
+    Attributes:
+        values: (n, m) the quantities at its samples, of the world, not scaled.
+        slopes: (n, m, s + o) by shared and own numbers; None where it was not asked for.
+        scale: of its lengths: measured ones times this are those of the world.
+        by_scale: (s + o,) the derivative of the scale.
+    """
+
+    values: Array
+    slopes: Array | None
+    scale: float
+    by_scale: Array
+
+
+class Predictor:
+    """Simulates recordings: what was measured, at the times of the samples.
+
+    The simulation's z has first what recordings set at the start, then the problem's variables.
+
+    Attributes:
+        recordings: that are predicted.
+        shared, own: blocks of the numbers that are identified.
+        sizes: by the text of a formula, how many numbers it has.
+        starts: (K, n) z at the guess.
+    """
+
+    def __init__(self, problem: Problem, recordings: Sequence[Recording], threads: int | None = None) -> None:
+        """Nothing is compiled before it is asked for; KernelUnavailable then, where nothing can be compiled."""
+        self.recordings, self.dt = tuple(recordings), problem.simulation.dt
+        self._given = given_variables(problem, self.recordings)
+        begin = sum(variable.guess.size for variable in self._given)
+        self.shared, self.own = number_blocks(problem, begin)
+        last = math.ceil(max(r.time[-1] for r in self.recordings) / self.dt - CLOSE)
+        steps = max(last, problem.simulation.steps) + 2
+        simulation = replace(problem.simulation, duration=steps * self.dt)
+        whole = replace(problem, simulation=simulation, variables=(*self._given, *problem.variables))
+        formulas = {m.value.text: m.value for r in self.recordings for m in r.measured}
+        self._motion = QuantitySlopes(symbolic_rollout(whole), formulas, threads=threads)
+        self.sizes = self._motion.sizes
+        guess = np.concatenate([variable.guess for variable in whole.variables])
+        self.starts = np.array([self._start(each, guess) for each in self.recordings])
+
+    def values(self, shared: Array, own: Array, which: Sequence[int]) -> Iterator[PredictedSamples]:
+        """The recordings at shared (s,) and own (K, o) numbers."""
+        set_ = [self._set(shared, own[k], k) for k in which]
+        lasts = [each.last(self._motion.steps) for each in set_]
+        for each, samples in zip(set_, self._motion.values(np.array([e.z for e in set_]), lasts), strict=True):
+            yield PredictedSamples(interpolated(samples, each.at)[0], None, each.scale, each.by_scale)
+
+    def slopes(self, shared: Array, own: Array, which: Sequence[int]) -> Iterator[PredictedSamples]:
+        """The same with derivatives."""
+        set_ = [self._set(shared, own[k], k) for k in which]
+        lasts = [each.last(self._motion.steps) for each in set_]
+        z, along = np.array([each.z for each in set_]), np.array([each.along for each in set_])
+        for each, (samples, slopes) in zip(set_, self._motion.slopes(z, along, lasts), strict=True):
+            values, rates = interpolated(samples, each.at)
+            by = interpolated(slopes, each.at)[0] + rates[:, :, None] * (each.by_offset / self.dt)
+            yield PredictedSamples(values, by, each.scale, each.by_scale)
+
+    def _set(self, shared: Array, own: Array, k: int) -> _Set:
+        """What the simulation of a recording gets."""
+        recording, width = self.recordings[k], len(shared)
+        z, along = self.starts[k].copy(), np.zeros((self.starts.shape[1], width + len(own)))
+        measured = {"offset": 0.0, "scale": 1.0}
+        by = {key: np.zeros(width + len(own)) for key in measured}
+        both = [(block, shared, 0) for block in self.shared] + [(block, own, width) for block in self.own]
+        for block, numbers, offset in both:
+            columns = offset + np.arange(block.part.start, block.part.stop)
+            if block.of_recordings:
+                if block.concerns(recording):
+                    measured[block.of_recordings] = float(numbers[block.first])
+                    by[block.of_recordings][columns] = 1
+            elif block.turns:
+                z[block.where], along[np.ix_(block.where, columns)] = turned(z[block.where], numbers[block.part])
+            else:
+                z[block.where], along[block.where, columns] = numbers[block.part], 1
+        place = 0
+        for variable in self._given:
+            part = slice(place, place + variable.guess.size)
+            place = part.stop
+            if variable.slots[0].name.rpartition(".")[2] in SCALED:
+                along[part] += np.outer(z[part], by["scale"])
+                z[part] *= measured["scale"]
+        at = (recording.time + measured["offset"]) / self.dt
+        return _Set(z, along, at, by["offset"], measured["scale"], by["scale"])
+
+    def _start(self, recording: Recording, guess: Array) -> Array:
+        """(n,): z at the guess, with what the recording sets."""
+        z, place = guess.copy(), 0
+        for variable in self._given:
+            name, size = variable.slots[0].name, variable.guess.size
+            z[place : place + size] = recording.start.get(name, variable.guess)
+            place += size
+        for block in self.own:
+            slot = block.variable.slots[0]
+            if slot.name in recording.start:
+                z[block.where] = recording.start[slot.name][list(slot.components)]
+        return z
+
+    def guesses(self, own: bool) -> Array:
+        """(s,) or (K, o): where numbers begin."""
+        blocks = self.own if own else self.shared
+        starts = self.starts if own else self.starts[0]
+        found = np.zeros((*starts.shape[:-1], blocks[-1].part.stop if blocks else 0))
+        for block in blocks:
+            if not block.turns:
+                found[..., block.part] = starts[..., block.where]
+        return found
+
+
+@dataclass(frozen=True)
+class _Set:
+    """z (n,) of a recording with its derivatives (n, s + o), places of samples in steps, and how it was measured."""
+
+    z: Array
+    along: Array
+    at: Array
+    by_offset: Array
+    scale: float
+    by_scale: Array
+
+    def last(self, steps: int) -> int:
+        """The last state that is needed."""
+        return int(min(max(math.floor(self.at[-1] + CLOSE) + 1, 1), steps - 1))
+
+
+def given_variables(problem: Problem, recordings: Sequence[Recording]) -> tuple[Variable, ...]:
+    """What recordings set at the start, as variables that nobody chooses."""
+    names = dict.fromkeys(name for recording in recordings for name in recording.start)
+    return tuple(_given(name, problem.initial[name]) for name in names)
+
+
+def _given(name: str, nominal: Array) -> Variable:
+    infinite, one = np.full(nominal.size, np.inf), np.ones(nominal.size)
+    slot = VariableSlot(name, tuple(range(nominal.size)))
+    return Variable(f"{name}:recorded", "initial", (slot,), 1, "constant", nominal, -infinite, infinite, one, 0 * one)
+
+
+def interpolated(samples: Array, at: Array) -> tuple[Array, Array]:
+    """(n, ...) linear between the rows of samples (steps, ...) at places in steps (n,), and the slope by the place."""
+    first = np.clip(np.floor(at + CLOSE).astype(int), 0, len(samples) - 2)
+    share = np.clip(at - first, 0, 1).reshape(-1, *[1] * (samples.ndim - 1))
+    share = np.where(share < CLOSE, 0.0, share)
+    rise = samples[first + 1] - samples[first]
+    return np.where(share == 0, samples[first], samples[first] + share * rise), rise

@@ -1,0 +1,161 @@
+"""From predictions to residuals: predicted less measured, over its standard deviation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.expression.units import unit_of
+from symphys.identification import FitParameters, IdentificationError, ResidualRows
+from symphys.model.world import World
+from symphys.prediction.parameters import fit_numbers
+from symphys.prediction.predictor import PredictedSamples, Predictor
+from symphys.prediction.rotations import rotation_slopes, rotation_vectors
+from symphys.problem import Measured, Problem, Recording
+from symphys.problem.units import quantity_unit
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Ints = NDArray[np.int64]
+LENGTHS = ("m", "m/s", "m/s^2")
+"""Units of what a scale of lengths scales."""
+GUESSED, GUESSED_TURN, LEAST = 0.01, 0.02, 1e-9
+"""Where the noise is not given, it begins as a share of the spread of what was measured, or as an angle [rad]."""
+
+
+class RecordingResiduals:
+    """The residuals of a problem's recordings, in the units of the measurement; see ``RecordedResiduals``.
+
+    Attributes:
+        predictor: of the recordings.
+        noise: by quantity (residuals of a sample,) what residuals are divided by.
+    """
+
+    def __init__(self, problem: Problem, predictor: Predictor) -> None:
+        """Look up units, noise and what is missing."""
+        self.predictor = predictor
+        taken = predictor.recordings
+        self.recordings = tuple(each.name for each in taken)
+        self.held_back = np.array([each.held_back for each in taken])
+        self.shared: FitParameters = fit_numbers(problem, predictor.shared, predictor.guesses(own=False))
+        self.own: FitParameters = fit_numbers(problem, predictor.own, predictor.guesses(own=True))
+        keys = dict.fromkeys(_key(recording, each) for recording in taken for each in recording.measured)
+        self._places = {key: place for place, key in enumerate(keys)}
+        self.quantities = quantity_names(list(keys))
+        world, first = problem.world(), {_key(r, m): m for r in taken for m in r.measured}
+        self._units = [_unit(each, world) for each in first.values()]
+        self.units = tuple(
+            "rad" if each.orientation else unit for each, unit in zip(first.values(), self._units, strict=True)
+        )
+        self.noise_known = np.array([each.noise is not None for each in first.values()])
+        self.noise = [self._noise(key, each) for key, each in first.items()]
+        self._present = [[present(each) for each in recording.measured] for recording in taken]
+
+    def _noise(self, key: tuple[str, str], first: Measured) -> Array:
+        if first.noise is not None:
+            return first.noise
+        if first.orientation:
+            return np.full(3, GUESSED_TURN)
+        found = [m.values for r in self.predictor.recordings for m in r.measured if _key(r, m) == key]
+        values = np.concatenate(found)
+        spread = np.nanstd(values, axis=0)
+        largest = float(np.nanmax(np.abs(values)))
+        return np.asarray(np.maximum(GUESSED * np.where(spread > 0, spread, largest), LEAST))
+
+    def rows(self, recording: int) -> ResidualRows:
+        """See ``RecordedResiduals``."""
+        taken, parts = self.predictor.recordings[recording], list[tuple[Any, ...]]()
+        for each, kept in zip(taken.measured, self._present[recording], strict=True):
+            place = self._places[_key(taken, each)]
+            component = np.broadcast_to(np.arange(kept.shape[1]), kept.shape)[kept]
+            time = np.broadcast_to(taken.time[:, None], kept.shape)[kept]
+            parts.append((np.full(component.size, place), component, time, self.noise[place][component]))
+        quantity, component, time, noise = (np.concatenate(each) for each in zip(*parts, strict=True))
+        return ResidualRows(quantity, component, time, noise)
+
+    def residuals(self, shared: Array, own: Array, which: Ints) -> list[Array]:
+        """See ``RecordedResiduals``."""
+        found = self.predictor.values(shared, own, which.tolist())
+        return [self._residuals(int(k), sampled) for k, sampled in zip(which, found, strict=True)]
+
+    def jacobian(self, shared: Array, own: Array, which: Ints) -> list[tuple[Array, Array, Array]]:
+        """See ``RecordedResiduals``."""
+        found = []
+        for k, sampled in zip(which, self.predictor.slopes(shared, own, which.tolist()), strict=True):
+            by = self._slopes(int(k), sampled)
+            found.append((self._residuals(int(k), sampled), by[:, : len(shared)], by[:, len(shared) :]))
+        return found
+
+    def _residuals(self, k: int, sampled: PredictedSamples) -> Array:
+        taken, parts = self.predictor.recordings[k], []
+        for each, kept, place, columns in self._parts(k):
+            off = difference(each, sampled.values[:, columns] / self._scale(place, sampled)) / self.noise[place]
+            parts.append(off[kept])
+        joined = np.sqrt(taken.weight) * np.concatenate(parts)
+        return joined if np.isfinite(joined).all() else np.full(joined.shape, np.inf)
+
+    def _slopes(self, k: int, sampled: PredictedSamples) -> Array:
+        assert sampled.slopes is not None, "slopes were asked for"
+        taken, parts = self.predictor.recordings[k], []
+        for each, kept, place, columns in self._parts(k):
+            values, by, scale = sampled.values[:, columns], sampled.slopes[:, columns], self._scale(place, sampled)
+            if each.orientation:
+                by = rotation_slopes(each.values, values) @ by
+            elif self._units[place] in LENGTHS:
+                by = by / scale - (values / scale**2)[:, :, None] * sampled.by_scale
+            parts.append((by / self.noise[place][:, None])[kept])
+        return np.asarray(np.sqrt(taken.weight) * np.concatenate(parts))
+
+    def _parts(self, k: int) -> Iterator[tuple[Measured, Bools, int, slice]]:
+        """What was measured, where there is a number, its place among quantities, and its columns of predictions."""
+        taken = self.predictor.recordings[k]
+        stops = np.cumsum(list(self.predictor.sizes.values())).tolist()
+        columns = {
+            text: slice(stop - size, stop)
+            for (text, size), stop in zip(self.predictor.sizes.items(), stops, strict=True)
+        }
+        for each, kept in zip(taken.measured, self._present[k], strict=True):
+            yield each, kept, self._places[_key(taken, each)], columns[each.value.text]
+
+    def _scale(self, place: int, sampled: PredictedSamples) -> float:
+        return sampled.scale if self._units[place] in LENGTHS else 1.0
+
+
+def residuals_of(problem: Problem, threads: int | None = None) -> RecordingResiduals:
+    """The residuals of all recordings of a problem; IdentificationError where there is nothing to identify."""
+    if not problem.recordings:
+        raise IdentificationError("there is no [[recording]] to identify from; see docs/identification.md")
+    if not problem.variables:
+        raise IdentificationError("there is no [[variable]], so that nothing can be identified")
+    return RecordingResiduals(problem, Predictor(problem, problem.recordings, threads))
+
+
+def present(measured: Measured) -> Bools:
+    """(n, residuals of a sample): where there is a number."""
+    finite: Bools = np.isfinite(measured.values)
+    return np.repeat(np.all(finite, axis=1, keepdims=True), 3, axis=1) if measured.orientation else finite
+
+
+def difference(measured: Measured, predicted: Array) -> Array:
+    """(n, m) predicted less measured; of orientations (n, 3) the rotation vector [rad] from measured to predicted."""
+    return rotation_vectors(measured.values, predicted) if measured.orientation else predicted - measured.values
+
+
+def quantity_names(keys: Sequence[tuple[str, str]]) -> tuple[str, ...]:
+    """What is measured, by its name; with the table's where tables have the same name for different formulas."""
+    names = [name for name, _ in keys]
+    return tuple(name if names.count(name) == 1 else f"{name}: {text}" for name, text in keys)
+
+
+def _key(recording: Recording, measured: Measured) -> tuple[str, str]:
+    """What makes a quantity: its name and formula."""
+    return measured.name, measured.value.text
+
+
+def _unit(measured: Measured, world: World) -> str:
+    """Of what was measured, as far as it is known."""
+    units = {name: unit for name in measured.value.names if (unit := quantity_unit(name, world)) is not None}
+    return unit_of(measured.value, units)

@@ -1,0 +1,56 @@
+"""Rotation vectors between unit quaternions (w, x, y, z), with their derivatives."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+SMALL = 1e-4
+"""Of the sine of half an angle: below it series stand for quotients."""
+
+
+def turned(q: Array, v: Array) -> tuple[Array, Array]:
+    """q exp(v / 2) (4,) for a rotation vector v (3,) [rad] in the frame that q turns, and its derivative (4, 3)."""
+    half = float(np.linalg.norm(v)) / 2
+    sinc = np.sinc(half / np.pi)
+    turn = np.array([np.cos(half), *(sinc / 2 * v)])
+    slope = (np.cos(half) - sinc) / half**2 / 8 if half > SMALL else -1 / 24
+    by = np.vstack([-sinc / 4 * v, sinc / 2 * np.eye(3) + slope * np.outer(v, v)])
+    w, x, y, z = q
+    left = np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])
+    return left @ turn, left @ by
+
+
+def rotation_vectors(q: Array, p: Array) -> Array:
+    """(n, 3) [rad]: of conj(q) p, the rotation from q to p (n, 4) in the frame that q turns; at most half a turn."""
+    w, v, _ = _relative(q, p)
+    return np.asarray(_factors(w, v)[0] * v)
+
+
+def rotation_slopes(q: Array, p: Array) -> Array:
+    """(n, 3, 4): how these change with p."""
+    w, v, rows = _relative(q, p)
+    factor, by_w, by_s = _factors(w, v)
+    by_v = factor[:, :, None] * np.eye(3) + by_s[:, :, None] * v[:, :, None] * v[:, None, :]
+    return np.asarray(by_v @ rows[:, 1:] + by_w[:, :, None] * v[:, :, None] * rows[:, :1])
+
+
+def _relative(q: Array, p: Array) -> tuple[Array, Array, Array]:
+    """Scalar part (n, 1), which is not negative, and vector part (n, 3) of conj(q) p, and both by p (n, 4, 4)."""
+    w, x, y, z = q.T
+    rows = np.array([[w, x, y, z], [-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w]]).transpose(2, 0, 1)
+    found = np.einsum("nij,nj->ni", rows, p)
+    sign = np.where(found[:, :1] < 0, -1.0, 1.0)
+    found, rows = sign * found, sign[:, :, None] * rows
+    return found[:, :1], found[:, 1:], rows
+
+
+def _factors(w: Array, v: Array) -> tuple[Array, Array, Array]:
+    """The rotation vector is f v: f, its derivative by w, and that by |v| over |v|; each (n, 1)."""
+    s = np.linalg.norm(v, axis=1, keepdims=True)
+    size, small = w**2 + s**2, s < SMALL
+    safe, whole = np.where(small, 1.0, s), np.where(small, w, 1.0)
+    f = np.where(small, 2 / whole * (1 - s**2 / (3 * whole**2)), 2 * np.arctan2(safe, w) / safe)
+    by_s = np.where(small, -4 / (3 * whole**3), (2 * w / size - f) / safe**2)
+    return f, -2 / size, by_s

@@ -1,0 +1,121 @@
+"""All that a problem file says of identification: recordings, what varies from one to the next, and [identify]."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.model.world import World
+from symphys.problem.model import Simulation, Variable
+from symphys.problem.parametric.world import ParametricWorld
+from symphys.problem.reading.faults import Faults
+from symphys.problem.recordings.conversion import MeasurementFrame
+from symphys.problem.recordings.files import FileFinder
+from symphys.problem.recordings.magnitude import longest
+from symphys.problem.recordings.starts import Starts
+from symphys.problem.recordings.table import RecordedWorld, read_recordings
+from symphys.problem.recordings.types import IdentifySettings, RecordedFile, Recording
+from symphys.problem.schema import Document
+from symphys.problem.schema.recording import RecordingTable
+from symphys.problem.tables.shapes import read_orientation
+from symphys.problem.units import formula_units
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """What there is to identify from.
+
+    Attributes:
+        recordings: of all tables.
+        recorded_files: that they were read from.
+        new_files: those of them that the problem's text does not keep yet.
+        identify: the settings of [identify].
+    """
+
+    recordings: tuple[Recording, ...] = ()
+    recorded_files: tuple[RecordedFile, ...] = ()
+    new_files: tuple[RecordedFile, ...] = ()
+    identify: IdentifySettings = field(default_factory=IdentifySettings)
+
+    def fields(self) -> dict[str, Any]:
+        """Those of the problem."""
+        return {"recordings": self.recordings, "recorded_files": self.recorded_files, "identify": self.identify}
+
+
+def read_identification(
+    document: Document,
+    parametric: ParametricWorld,
+    nominal: World,
+    initial: Mapping[str, Array],
+    simulation: Simulation,
+    sample: Mapping[str, Any],
+    variables: Sequence[Variable],
+    faults: Faults,
+) -> Identified:
+    """Recordings and settings; notes what is wrong with them.
+
+    Args:
+        document: the tables.
+        parametric: the world.
+        nominal: the same with its numbers.
+        initial: the start in the file.
+        simulation: how time passes.
+        sample: a value for each name in formulas, as the guess has it.
+        variables: that may vary.
+        faults: gets what is wrong.
+    """
+    if not document.recording:
+        check_unused(document, faults)
+        return Identified()
+    world = RecordedWorld(
+        sample,
+        formula_units(nominal, sample, variables),
+        simulation.duration,
+        simulation.dt,
+        longest(parametric, initial, simulation.duration),
+        Starts(parametric.joints, initial),
+        frozenset(slot.name for variable in variables for slot in variable.slots if variable.kind == "initial"),
+    )
+    finder = FileFinder(document.recorded)
+    frames = [read_frame(index, table, faults) for index, table in enumerate(document.recording)]
+    recordings = read_recordings(document.recording, world, finder, frames, faults)
+    check_starts(recordings, variables, faults)
+    faults.stop_if_any()
+    settings = IdentifySettings() if document.identify is None else IdentifySettings(**document.identify.model_dump())
+    new = tuple(finder.found.values())
+    return Identified(recordings, (*finder.kept.values(), *new), new, settings)
+
+
+def read_frame(index: int, table: RecordingTable, faults: Faults) -> MeasurementFrame | None:
+    """Where the measurement system lies; None: as the world."""
+    if table.frame is None:
+        return None
+    place = ("recording", index, "frame", "orientation")
+    orientation = read_orientation(place, table.frame.orientation, faults)
+    return MeasurementFrame(np.array(table.frame.position), orientation)
+
+
+def check_unused(document: Document, faults: Faults) -> None:
+    """Without recordings, nothing refers to them."""
+    if document.identify is not None:
+        faults.add(("identify",), "there is no [[recording]] to identify from")
+    for index, table in enumerate(document.variable):
+        if table.each is not None:
+            faults.add(("variable", index, "each"), "there is no [[recording]]; leave this out, or add one")
+    faults.stop_if_any()
+
+
+def check_starts(recordings: Sequence[Recording], variables: Sequence[Variable], faults: Faults) -> None:
+    """What recordings set at the start, no variable sets for all of them together."""
+    given = {name: each.table for each in recordings for name in each.start}
+    for index, variable in enumerate(variables):
+        for slot in variable.slots:
+            if slot.name in given and not variable.each:
+                text = f'recording {given[slot.name]} sets {slot.name} at the start; with each = "recording" that is'
+                faults.add(("variable", index, "sets"), f"{text} where this variable begins, otherwise leave it out")

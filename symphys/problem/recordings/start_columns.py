@@ -1,0 +1,77 @@
+"""Which columns say where a motion begins: the key ``start`` of [[recording]]."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
+from symphys.problem.recordings.conversion import MeasurementFrame, check_table, convert
+from symphys.problem.recordings.starts import Starts
+from symphys.problem.schema.recording import ColumnsTable, RecordingTable
+from symphys.suggest import hint, quote
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StartColumns:
+    """A quantity that the first row sets: its name, its columns and their units, how many numbers, and the unit."""
+
+    quantity: str
+    table: ColumnsTable
+    size: int
+
+    def first_row(self, rows: RecordedColumns, frame: MeasurementFrame | None) -> Array:
+        """(size,): what the first row of a recording has; RecordingFault where a number is missing."""
+        key = ("start", self.quantity)
+        rows.require(self.table.columns, key)
+        value: Array = convert(rows.part(0, 1), self.table.columns, self.table, self.quantity, self.size, frame, key)[0]
+        if not np.isfinite(value).all():
+            raise RecordingFault(key, f"{rows.where(0)}: the first row lacks a number of {self.quantity}")
+        return value
+
+
+def read_start_columns(
+    table: RecordingTable, sample: Mapping[str, Any], units: Mapping[str, str], starts: Starts
+) -> list[StartColumns]:
+    """What ``start`` says, with the units that the same columns have in ``measured``."""
+    known = {name: value.size for name, value in starts.initial.items()}
+    known |= dict.fromkeys(starts.of_joints, 1)
+    found = list[StartColumns]()
+    for quantity, given in leaves(table.start):
+        key = ("start", quantity)
+        if quantity not in known:
+            text = f"a recording cannot set {quote(quantity)} at the start; {hint(quantity, known)}"
+            raise RecordingFault(key, text)
+        try:
+            columns = ColumnsTable.model_validate(given if isinstance(given, Mapping) else {"columns": given})
+        except ValidationError as error:
+            text = str(error.errors(include_url=False)[0]["msg"])
+            raise RecordingFault(
+                key, f'{text}; write "position", ["x", "y", "z"] or {{ columns = "x", unit = "mm" }}'
+            ) from None
+        if not isinstance(given, Mapping):
+            columns = next((as_columns(each) for each in table.measured if each.columns == columns.columns), columns)
+        check_table(columns, units.get(quantity, ""), quantity, key)
+        found.append(StartColumns(quantity, columns, known[quantity]))
+    return found
+
+
+def as_columns(table: ColumnsTable) -> ColumnsTable:
+    """Its columns and units alone."""
+    return ColumnsTable(**{key: getattr(table, key) for key in ColumnsTable.model_fields})
+
+
+def leaves(tables: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, object]]:
+    """Quantities and what they are set from, as TOML may nest them: { cube = { position = "x" } } is cube.position."""
+    for key, value in tables.items():
+        if isinstance(value, Mapping) and "columns" not in value:
+            yield from leaves(value, f"{before}{key}.")
+        else:
+            yield f"{before}{key}", value

@@ -1,0 +1,163 @@
+"""Where a motion begins as its recording has it: the bodies that it names, and those that joints carry with them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.maths import rotation
+from symphys.model.joints.frames import WORLD
+from symphys.model.joints.start import moved_to_start, moved_to_zero, placed_frames, spanning_tree
+from symphys.problem.parametric.joints import ParametricJoint
+
+Array = NDArray[np.float64]
+State = dict[str, Array]
+FIELDS = ("position", "orientation", "velocity", "angular_velocity")
+
+
+@dataclass(frozen=True)
+class RecordedJoint:
+    """What a recording may set of a joint: a coordinate and its rate, ``hinge.angle`` and ``hinge.rate``."""
+
+    joint: ParametricJoint
+    rate: bool
+
+
+def joint_starts(joints: Sequence[ParametricJoint]) -> dict[str, RecordedJoint]:
+    """By name what recordings may set of rigid joints with one coordinate that close no loop."""
+    tree, found = spanning_tree(joints), dict[str, RecordedJoint]()
+    for joint in joints:
+        if joint.name in tree[joint.first] and len(joint.kind.coordinates) == 1:
+            value = "angle" if joint.kind.coordinates[0].turns else "position"
+            found[f"{joint.name}.{value}"] = RecordedJoint(joint, rate=False)
+            found[f"{joint.name}.rate"] = RecordedJoint(joint, rate=True)
+    return found
+
+
+class Starts:
+    """The states of all bodies at the starts of recordings."""
+
+    def __init__(self, joints: Sequence[ParametricJoint], initial: Mapping[str, Array]) -> None:
+        """``initial``: the start in the file, with every joint at its ``start``."""
+        self.joints = {joint.name: joint for joint in joints}
+        self.initial = dict(initial)
+        self.of_joints = joint_starts(joints)
+        self._tree = spanning_tree(joints)
+
+    def complete(self, given: Mapping[str, Array]) -> State:
+        """What a recording sets, and the states of all bodies that joints carry with these, by names of ``initial``.
+
+        A joint has the coordinate and the rate that are given, else those of the file. A body that is given itself is
+        not carried by others.
+        """
+        plain = {name: value.copy() for name, value in given.items() if name not in self.of_joints}
+        bent = {name: float(value[0]) for name, value in given.items() if name in self.of_joints}
+        touched = [self.of_joints[name].joint for name in bent]
+        own = {name.rpartition(".")[0]: None for name in plain}
+        ends = {end: None for joint in touched for end in (joint.first, joint.second) if end is not None}
+        group = self._connected([*own, *ends])
+        if len(group) == len(own):
+            return plain
+        before = self._bent(bent)
+        state = {name: value.copy() for name, value in before.items()} | plain
+        rates = {self.of_joints[name].joint.name: value for name, value in bent.items() if self.of_joints[name].rate}
+        for joint, base, body in self._outwards([*own], group):
+            if base != WORLD:
+                follow(body, base, before, state)
+            if joint.name in rates:
+                turn_on(joint, body, rates[joint.name], state)
+        return {f"{body}.{field}": state[f"{body}.{field}"] for body in group for field in FIELDS}
+
+    def _bent(self, bent: Mapping[str, float]) -> State:
+        """The file's start with other coordinates of joints."""
+        angles = {self.of_joints[n].joint.name: v for n, v in bent.items() if not self.of_joints[n].rate}
+        if not angles:
+            return self.initial
+        joints = list(self.joints.values())
+        posed = [replace(each, start=(angles[each.name],)) if each.name in angles else each for each in joints]
+        return moved_to_start(posed, moved_to_zero(joints, self.initial))
+
+    def _connected(self, bodies: Sequence[str]) -> list[str]:
+        """These bodies, and all that joints connect to them, but through the world."""
+        found, queue = dict.fromkeys(bodies), [*bodies]
+        while queue:
+            for other in self._tree[queue.pop()].values():
+                if other != WORLD and other not in found:
+                    found[other] = None
+                    queue.append(other)
+        return list(found)
+
+    def _outwards(self, own: Sequence[str], group: Sequence[str]) -> Iterator[tuple[ParametricJoint, str, str]]:
+        """Joints from what stays outwards, each with the body that carries and the one that is carried."""
+        firsts = {joint.first for joint in self.joints.values() if joint.name in self._tree[joint.first]}
+        seen, queue = {WORLD, *own}, [WORLD, *own]
+        while True:
+            while queue:
+                base = queue.pop(0)
+                for name, other in self._tree[base].items():
+                    if other in group and other not in seen:
+                        seen.add(other)
+                        queue.append(other)
+                        yield self.joints[name], base, other
+            left = [body for body in group if body not in seen]
+            if not left:
+                return
+            root = next((body for body in left if body not in firsts), left[0])
+            seen.add(root)
+            queue.append(root)
+
+
+def follow(body: str, base: str, before: State, state: State) -> None:
+    """Move a body, in place, as one rigid body with its base, which lay elsewhere before."""
+    turn = quaternion_product(state[f"{base}.orientation"], conjugate(before[f"{base}.orientation"]))
+    axes = np.array(rotation.matrix(turn), float)
+    arm = axes @ (before[f"{body}.position"] - before[f"{base}.position"])
+    state[f"{body}.position"] = state[f"{base}.position"] + arm
+    orientation = quaternion_product(turn, before[f"{body}.orientation"])
+    state[f"{body}.orientation"] = orientation / np.linalg.norm(orientation)
+    spin = state[f"{base}.angular_velocity"]
+    own = before[f"{body}.angular_velocity"] - before[f"{base}.angular_velocity"]
+    slide = before[f"{body}.velocity"] - before[f"{base}.velocity"]
+    slide = slide - np.cross(
+        before[f"{base}.angular_velocity"], before[f"{body}.position"] - before[f"{base}.position"]
+    )
+    state[f"{body}.angular_velocity"] = spin + axes @ own
+    state[f"{body}.velocity"] = state[f"{base}.velocity"] + np.cross(spin, arm) + axes @ slide
+
+
+def turn_on(joint: ParametricJoint, body: str, rate: float, state: State) -> None:
+    """Give a body, in place, the rate of its joint; what the file's start has of it is replaced."""
+    coordinate = joint.kind.coordinates[0]
+    placed, point = placed_frames(joint, state)
+    axis = np.asarray(coordinate.axis(placed), float)
+    base = (joint.second or WORLD) if body == joint.first else joint.first
+    sign = 1.0 if body == joint.first else -1.0
+    spin, velocity, centre = motion_of(base, state)
+    arm = state[f"{body}.position"] - centre
+    still = velocity + np.cross(spin, arm)
+    if coordinate.turns:
+        state[f"{body}.angular_velocity"] = spin + sign * rate * axis
+        state[f"{body}.velocity"] = still + sign * rate * np.cross(axis, state[f"{body}.position"] - point)
+    else:
+        state[f"{body}.angular_velocity"] = spin.copy()
+        state[f"{body}.velocity"] = still + sign * rate * axis
+
+
+def motion_of(name: str, state: State) -> tuple[Array, Array, Array]:
+    """(3,) [rad/s], (3,) [m/s] and (3,) [m]: spin, velocity and place of a body, or of the world."""
+    if name == WORLD:
+        return np.zeros(3), np.zeros(3), np.zeros(3)
+    return state[f"{name}.angular_velocity"], state[f"{name}.velocity"], state[f"{name}.position"]
+
+
+def conjugate(q: Array) -> Array:
+    """(4,): the quaternion that turns back."""
+    return np.array([q[0], -q[1], -q[2], -q[3]])
+
+
+def quaternion_product(p: Array, q: Array) -> Array:
+    """(4,): p q, which turns by q first."""
+    return np.array(rotation.multiply(p, q), float).ravel()

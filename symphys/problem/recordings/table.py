@@ -1,0 +1,268 @@
+"""The [[recording]] tables: from columns of files or tables to recordings in the units and the frame of the world."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.expression import Formula, FormulaError, parse
+from symphys.expression.units import unit_of
+from symphys.problem.reading.faults import Faults
+from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
+from symphys.problem.recordings.conversion import (
+    LENGTH,
+    ORIENTATION,
+    PLACED,
+    TURNED,
+    MeasurementFrame,
+    check_table,
+    convert,
+)
+from symphys.problem.recordings.csv_file import read_csv
+from symphys.problem.recordings.files import ARRAYS, FileFinder
+from symphys.problem.recordings.magnitude import check_lengths
+from symphys.problem.recordings.npz_file import read_npz
+from symphys.problem.recordings.splits import held_back, pieces
+from symphys.problem.recordings.start_columns import StartColumns, read_start_columns
+from symphys.problem.recordings.starts import Starts
+from symphys.problem.recordings.times import check_ends, read_times, time_column
+from symphys.problem.recordings.types import Measured, Recording
+from symphys.problem.schema.recording import MeasuredTable, RecordingTable
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedWorld:
+    """What recordings are checked against.
+
+    Attributes:
+        sample: a value for each name in formulas, as the guess has it.
+        units: of these, where they are known.
+        duration: [s] of the simulation.
+        dt: [s] its time step.
+        length: [m] that nothing exceeds by far; see ``longest``.
+        starts: of bodies and joints.
+        moved: names of initial quantities that variables set.
+    """
+
+    sample: Mapping[str, Any]
+    units: Mapping[str, str]
+    duration: float
+    dt: float
+    length: float
+    starts: Starts
+    moved: frozenset[str]
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredColumns:
+    """A quantity that was measured: its formula, and what the columns hold.
+
+    Attributes:
+        table: as the file has it.
+        formula: of what was measured.
+        quantity: its name, if the formula is one; else empty.
+        value: (size,) at the start of the guess.
+        unit: as far as it is known.
+        noise: of the residuals; None: not known.
+    """
+
+    table: MeasuredTable
+    formula: Formula
+    quantity: str
+    value: Array
+    unit: str
+    noise: Array | None
+
+    @property
+    def orientation(self) -> bool:
+        """Whether it is a unit quaternion."""
+        return self.quantity.rpartition(".")[2] == ORIENTATION and self.value.size == 4
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """The rows of one recording: its name, by what else it is known, and where they are."""
+
+    name: str
+    aliases: tuple[str, ...]
+    columns: RecordedColumns
+    first: int
+    last: int
+
+
+class RecordingReader:
+    """Reads one table; a RecordingFault ends that."""
+
+    def __init__(
+        self,
+        table: RecordingTable,
+        world: RecordedWorld,
+        finder: FileFinder,
+        folder: Path,
+        frame: MeasurementFrame | None,
+    ) -> None:
+        """``folder``: in which files are looked for; ``frame``: of the measurement system."""
+        self.table, self.world, self.finder, self.folder, self.frame = table, world, finder, folder, frame
+
+    def read(self) -> list[Recording]:
+        """All recordings of the table."""
+        self._check_keys()
+        measured = [self._measured(k, each) for k, each in enumerate(self.table.measured)]
+        start = read_start_columns(self.table, self.world.sample, self.world.units, self.world.starts)
+        found, known = list[Recording](), list[tuple[str, ...]]()
+        for piece in self._pieces(self._wanted(start)):
+            found.append(self._recording(piece, measured, start))
+            known.append((piece.name, *piece.aliases))
+        check_ends(found, self.world.duration, self.world.dt)
+        held = held_back(self.table.held_back, known)
+        for k, each in enumerate(measured):
+            if all(np.isnan(recording.measured[k].values).all() for recording in found):
+                text = f"no recording has a number of {each.formula.text}"
+                raise RecordingFault(("measured", k, "columns"), text)
+        return [replace(each, held_back=back) for each, back in zip(found, held, strict=True)]
+
+    def _check_keys(self) -> None:
+        """Keys that exclude each other."""
+        table = self.table
+        if (table.files is None) == (table.table is None):
+            raise RecordingFault("files", "give either files (CSV or NPZ files) or table (columns of numbers)")
+        if table.rate is not None and table.time is not None:
+            raise RecordingFault("rate", "stands instead of time; leave one of them out")
+        if table.rows is not None and table.split is not None:
+            raise RecordingFault("split", "stands instead of rows; leave one of them out")
+        if table.rows is not None and table.table is not None:
+            raise RecordingFault("rows", "is for NPZ files; give split, or a [[recording]] for each table")
+
+    def _measured(self, k: int, table: MeasuredTable) -> MeasuredColumns:
+        """The formula of one quantity, tried on the start."""
+        key = ("measured", k)
+        try:
+            formula = parse(table.value)
+            value = np.array(formula.evaluate(self.world.sample), float).ravel()
+        except FormulaError as error:
+            raise RecordingFault((*key, "value"), str(error)) from None
+        text = "".join(table.value.split())
+        quantity = text if formula.names == {text} else ""
+        unit = unit_of(formula, self.world.units)
+        check_table(table, unit, quantity or table.value, key)
+        fields = {name.rpartition(".")[2] for name in formula.names}
+        if self.frame is not None and not quantity and fields & {PLACED, ORIENTATION, *TURNED}:
+            text = "a frame turns whole quantities; measure all components, with nan for those that are missing"
+            raise RecordingFault((*key, "value"), text)
+        found = MeasuredColumns(table, formula, quantity, value, unit, None)
+        residuals = 3 if found.orientation else value.size
+        if table.noise is None:
+            return found
+        if len(table.noise) not in (1, residuals):
+            wanted = f"a number or {residuals} numbers" if residuals > 1 else "a number"
+            raise RecordingFault((*key, "noise"), f"must be {wanted}, not a list of {len(table.noise)}")
+        noise = np.broadcast_to(np.array(table.noise), residuals).copy()
+        return MeasuredColumns(table, formula, quantity, value, unit, noise)
+
+    def _wanted(self, start: Sequence[StartColumns]) -> set[str]:
+        """The names of all columns that are used."""
+        single = {name for name in (time_column(self.table), self.table.split) if name is not None}
+        tables = [*self.table.measured, *(each.table for each in start)]
+        return single | {name for table in tables for name in table.columns}
+
+    def _pieces(self, wanted: set[str]) -> Iterator[Piece]:
+        """The rows of every recording."""
+        table = self.table
+        files = [""] if table.table is not None else self.finder.names(table.files or [], self.folder)
+        stems = [PurePosixPath(file).stem for file in files]
+        times = Counter(stems)
+        for file, stem in zip(files, stems, strict=True):
+            columns, starts = self._columns(file, wanted)
+            self._check_columns(columns)
+            parts = pieces(columns, starts, table.split)
+            own = [] if len(files) == 1 else [stem if times[stem] == 1 else file]
+            for k, (first, last) in enumerate(parts):
+                numbered = [] if table.rows is None and table.split is None else [f"{k:04d}"]
+                name = "/".join([table.name, *own, *numbered])
+                aliases = (file, stem, *(numbered if not own else ()))
+                yield Piece(name, aliases, columns, first, last)
+
+    def _check_columns(self, columns: RecordedColumns) -> None:
+        """Every column that is named must be there."""
+        name = time_column(self.table)
+        if name is not None and name not in columns.names and self.table.time is None:
+            text = f'{columns.label} has no column "{name}"; name it with time = "...", or give rate [Hz]'
+            raise RecordingFault("time", f"{text}; the columns are {', '.join(columns.names[:30])}")
+        columns.require([name] if name is not None else [], "time")
+        columns.require([self.table.split] if self.table.split is not None else [], "split")
+        for k, each in enumerate(self.table.measured):
+            columns.require(each.columns, ("measured", k, "columns"))
+
+    def _columns(self, name: str, wanted: set[str]) -> tuple[RecordedColumns, Array | None]:
+        """Columns and first rows of a file, or of the table."""
+        if self.table.table is not None:
+            return table_columns(self.table.table), None
+        arrays = PurePosixPath(name).suffix.lower() in ARRAYS
+        if self.table.rows is not None and not arrays:
+            raise RecordingFault("rows", f"is for NPZ files, and {name} is none; use split")
+        with self.finder.open(name, self.folder) as stream:
+            return read_npz(stream, name, wanted, self.table.rows) if arrays else (read_csv(stream, name, wanted), None)
+
+    def _recording(self, piece: Piece, measured: Sequence[MeasuredColumns], start: Sequence[StartColumns]) -> Recording:
+        """One recording, in the units of the engine."""
+        columns, first, last = piece.columns, piece.first, piece.last
+        time, cut = read_times(columns, first, last, self.table, self.world.duration)
+        rows = columns.part(first, last)
+        found = [self._values(k, each, rows, time, len(time)) for k, each in enumerate(measured)]
+        given = {each.quantity: each.first_row(rows, self.frame) for each in start}
+        return Recording(
+            name=piece.name,
+            source=f"{columns.label}, rows {first + columns.first} to {last - 1 - cut + columns.first}",
+            time=time,
+            measured=tuple(found),
+            start=self.world.starts.complete(given) if given else {},
+            weight=self.table.weight,
+        )
+
+    def _values(self, k: int, each: MeasuredColumns, rows: RecordedColumns, time: Array, count: int) -> Measured:
+        """The samples of one quantity."""
+        key, table = ("measured", k, "columns"), each.table
+        values = convert(rows, table.columns, table, each.quantity, each.value.size, self.frame, key)[:count]
+        if each.unit == LENGTH:
+            given = {name for name in each.formula.names if name in self.world.moved}
+            begins = None if given or self.table.start or not np.isfinite(each.value).all() else each.value
+            check_lengths(values, begins, time, self.world.length, rows.where(0), key)
+        values.setflags(write=False)
+        name = table.name or " ".join(each.formula.text.split())
+        return Measured(name, each.formula, tuple(table.columns), values, each.noise, each.orientation)
+
+
+def table_columns(table: Mapping[str, Sequence[Any]]) -> RecordedColumns:
+    """The columns of a table in the problem file."""
+    found = {name: np.array(values, float) for name, values in table.items()}
+    counts = {name: len(values) for name, values in found.items()}
+    if len(set(counts.values())) > 1:
+        sizes = ", ".join(f"{name} {count}" for name, count in counts.items())
+        raise RecordingFault("table", f"all columns need as many numbers; there are: {sizes}")
+    return RecordedColumns("table", found, tuple(found), 0, from_zero=True)
+
+
+def read_recordings(
+    tables: Sequence[RecordingTable],
+    world: RecordedWorld,
+    finder: FileFinder,
+    frames: Sequence[MeasurementFrame | None],
+    faults: Faults,
+) -> tuple[Recording, ...]:
+    """The recordings of all tables; ``frames`` of their measurement systems. Notes what is wrong with each table."""
+    found = list[Recording]()
+    for index, (table, frame) in enumerate(zip(tables, frames, strict=True)):
+        folder = Path(faults.origin(("recording", index)).file).parent
+        try:
+            found += RecordingReader(table, world, finder, folder, frame).read()
+        except RecordingFault as fault:
+            faults.add(("recording", index, *fault.key), str(fault))
+    return tuple(found)

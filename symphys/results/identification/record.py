@@ -1,0 +1,175 @@
+"""identification.json and identification.npz of a run folder: one definition for who writes and who reads.
+
+| file | holds |
+|---|---|
+| identification.json | estimates with intervals, open directions, residuals by quantity, predictions, how it ended |
+| identification.npz | own numbers, correlations, iterations, draws of the bootstrap, every residual |
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from symphys import files
+from symphys import json_values as values
+from symphys.json_values import Array
+from symphys.results.archives import read_archive
+from symphys.results.identification.parts import (
+    GlobalSearch,
+    OpenDirection,
+    ParameterEstimate,
+    PredictionErrors,
+    QuantityResiduals,
+)
+from symphys.results.text_files import ReportError, read_table
+
+IDENTIFICATION, ARRAYS = "identification.json", "identification.npz"
+FORMAT = 1
+HISTORY = ("iteration", "merit", "left", "damping", "step", "simulations", "jacobians", "seconds")
+"""Columns of the iterations: ``left`` are standard errors to where the Jacobian puts the minimum."""
+ARRAY = {"array": True}
+"""Metadata of fields in the archive."""
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """What recordings say of a model: K recordings, s shared numbers, o own numbers of each recording.
+
+    Attributes:
+        problem, title: names.
+        status, reason: how the fit ended, and what that means.
+        merit: sum of the losses of all residuals, and of the priors.
+        residual_count, freedom: residuals that were fitted to, and those less the numbers that were estimated.
+        threshold: of Huber's loss, in units of the noise; inf: least squares.
+        parameters: the shared numbers.
+        own_names: of the own numbers.
+        open: directions that the recordings do not determine.
+        quantities: what is left of each measured quantity, in the recordings that were fitted to.
+        fitted_errors, held_back_errors: how far simulations are from the recordings that were fitted to, and from those
+            that were held back.
+        recordings: (K,) names.
+        search: the check against local minima, where there was one.
+        bootstrap_note: why there is no bootstrap; else how its steps compare with fits in full.
+        doubts: why not to rely on it, a sentence each.
+        seconds: wall time by part: "fit", "uncertainty", "bootstrap", "study", "search".
+        evaluations: "simulations" and "jacobians" of single recordings.
+        held_back: (K,) 1 where a recording was held back, else 0.
+        recording_ratio: (K,) root mean square of residuals by noise.
+        own, own_error: (K, o) own numbers and their standard errors.
+        own_at_bound: (K, o) -1 at the lower bound, 1 at the upper, else 0.
+        correlation, covariance: (s, s) of the shared numbers; nan where not known.
+        history: (i, 8) the iterations, with the columns of ``HISTORY``.
+        draws: (b, s) of the bootstrap.
+        residual, residual_recording, residual_quantity, residual_component, residual_time, residual_impact: (m,) every
+            residual by noise, held back ones too; indices; [s] time, and time since the last impact.
+    """
+
+    problem: str
+    title: str
+    status: str
+    reason: str
+    merit: float
+    residual_count: int
+    freedom: int
+    threshold: float
+    parameters: tuple[ParameterEstimate, ...]
+    own_names: tuple[str, ...]
+    open: tuple[OpenDirection, ...]
+    quantities: tuple[QuantityResiduals, ...]
+    fitted_errors: tuple[PredictionErrors, ...]
+    held_back_errors: tuple[PredictionErrors, ...]
+    recordings: tuple[str, ...]
+    search: GlobalSearch | None
+    bootstrap_note: str
+    doubts: tuple[str, ...]
+    seconds: Mapping[str, float]
+    evaluations: Mapping[str, float]
+    held_back: Array = field(repr=False, metadata=ARRAY)
+    recording_ratio: Array = field(repr=False, metadata=ARRAY)
+    own: Array = field(repr=False, metadata=ARRAY)
+    own_error: Array = field(repr=False, metadata=ARRAY)
+    own_at_bound: Array = field(repr=False, metadata=ARRAY)
+    correlation: Array = field(repr=False, metadata=ARRAY)
+    covariance: Array = field(repr=False, metadata=ARRAY)
+    history: Array = field(repr=False, metadata=ARRAY)
+    draws: Array = field(repr=False, metadata=ARRAY)
+    residual: Array = field(repr=False, metadata=ARRAY)
+    residual_recording: Array = field(repr=False, metadata=ARRAY)
+    residual_quantity: Array = field(repr=False, metadata=ARRAY)
+    residual_component: Array = field(repr=False, metadata=ARRAY)
+    residual_time: Array = field(repr=False, metadata=ARRAY)
+    residual_impact: Array = field(repr=False, metadata=ARRAY)
+
+    def __getitem__(self, name: str) -> ParameterEstimate:
+        """The estimate of a shared number; KeyError lists the names."""
+        found = {each.name: each for each in self.parameters}
+        if name not in found:
+            raise KeyError(f"no shared number {name}: there are {', '.join(found)}")
+        return found[name]
+
+    def own_numbers(self, recording: str) -> dict[str, tuple[float, float]]:
+        """Own numbers of a recording by name, each with its standard error; KeyError without such a recording."""
+        if recording not in self.recordings:
+            raise KeyError(
+                f"no recording {recording}: there are {len(self.recordings)}, the first {self.recordings[:1]}"
+            )
+        k = self.recordings.index(recording)
+        pairs = zip(self.own_names, self.own[k], self.own_error[k], strict=True)
+        return {name: (float(value), float(error)) for name, value, error in pairs}
+
+    def worst(self, count: int = 5) -> tuple[tuple[str, float], ...]:
+        """The recordings whose residuals are largest, and their root mean square by noise."""
+        order = np.argsort(np.where(np.isnan(self.recording_ratio), -np.inf, -self.recording_ratio))
+        known = [int(k) for k in order if not np.isnan(self.recording_ratio[k])]
+        return tuple((self.recordings[k], float(self.recording_ratio[k])) for k in known[:count])
+
+    def to_json(self) -> dict[str, Any]:
+        """The object of identification.json, which has all but the arrays."""
+        found = {each.name: getattr(self, each.name) for each in fields(self) if not is_array(each)}
+        for name in ("parameters", "open", "quantities", "fitted_errors", "held_back_errors"):
+            found[name] = [vars(each) for each in found[name]]
+        found["search"] = None if self.search is None else vars(self.search)
+        return {"format": FORMAT, **found}
+
+    def write(self, folder: Path) -> None:
+        """Both files; the table last, since nothing counts without it."""
+        files.write_npz(
+            folder / ARRAYS, {each.name: getattr(self, each.name) for each in fields(self) if is_array(each)}
+        )
+        files.write_json(folder / IDENTIFICATION, self.to_json())
+
+
+def is_array(each: Any) -> bool:
+    """Whether a field is in the archive."""
+    return bool(each.metadata.get("array"))
+
+
+def read_identification(folder: Path) -> Identification:
+    """The record in a folder.
+
+    Raises:
+        ReportError: a file is missing, or is none of this kind.
+    """
+    table = read_table(folder / IDENTIFICATION)
+    if table.get("format") != FORMAT:
+        known = values.name(table.get("format")) or "unknown"
+        raise ReportError(f"{IDENTIFICATION}: format {known}, {FORMAT} is expected")
+    plain = [each.name for each in fields(Identification) if not is_array(each)]
+    if missing := [name for name in plain if name not in table]:
+        raise ReportError(f"{IDENTIFICATION}: it lacks {', '.join(missing)}")
+    names = [each.name for each in fields(Identification) if is_array(each)]
+    arrays = read_archive(folder / ARRAYS, names)
+    if missing := [name for name in names if name not in arrays]:
+        raise ReportError(f"{ARRAYS}: it lacks {', '.join(missing)}")
+    searched = table["search"]
+    given: dict[str, Any] = {name: np.asarray(arrays[name], float) for name in names}
+    given["search"] = values.record(GlobalSearch, searched, values.words) if isinstance(searched, dict) else None
+    record = values.record(Identification, table, values.words, **given)
+    if record.recording_ratio.shape != (len(record.recordings),) or record.own.shape[:1] != (len(record.recordings),):
+        raise ReportError(f"{ARRAYS}: it is not of the recordings in {IDENTIFICATION}")
+    return record

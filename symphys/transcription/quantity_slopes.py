@@ -1,0 +1,100 @@
+"""Quantities over time of many rollouts of different lengths, and their exact derivatives along few directions.
+
+Forward mode: a lane carries a rollout and its derivatives along ``TOGETHER`` directions. For few numbers that set a
+whole motion this costs about one rollout for each direction; adjoints cost a few for each number that comes out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.codegen import Kernel, Program, compile_program, processors
+from symphys.codegen.program.tangent import tangent_name, tangent_program
+from symphys.expression import Formula
+from symphys.transcription.program import rollout_program
+from symphys.transcription.rollout import Rollout
+
+Array = NDArray[np.float64]
+TOGETHER = 4
+"""Directions in a lane. With one, 25 directions of a cube's toss took 36 rollouts; with 4, 23; with 8, 24."""
+ROWS = 128
+"""Rollouts, or groups of directions of them, in a call: the arrays of a call stay small."""
+
+
+class QuantitySlopes:
+    """Kernels for the values of formulas at the start of every step, and for their derivatives.
+
+    Attributes:
+        rollout: of a problem.
+        sizes: by the name of a formula, how many numbers it has.
+        steps: of the longest rollout.
+    """
+
+    def __init__(
+        self, rollout: Rollout, formulas: Mapping[str, Formula], smoothing: float = 0.0, threads: int | None = None
+    ) -> None:
+        """Nothing is compiled before it is asked for; KernelUnavailable then, where nothing can be compiled."""
+        self.rollout, self.smoothing, self.steps = rollout, smoothing, rollout.steps
+        self._threads = processors() if threads is None else threads
+        self._program = rollout_program(rollout, smoothing == 0, formulas, shift=0)
+        self.names = tuple(formulas)
+        self.sizes = {name: self._program.outputs[name].size // self.steps for name in formulas}
+
+    def values(self, Z: Array, lasts: Sequence[int]) -> Iterator[Array]:
+        """For each row of Z (B, n): (last + 1, m) the quantities, side by side, at the starts of steps 0 .. last."""
+        for rows, skipped in self._calls(lasts, 1):
+            found = self._values.forward(Z[rows], (self.smoothing,), skipped)
+            yield from self._rows(found, self.names, [lasts[row] + 1 for row in rows], 1)
+
+    def slopes(self, Z: Array, directions: Array, lasts: Sequence[int]) -> Iterator[tuple[Array, Array]]:
+        """The same with their derivatives: (last + 1, m) and (last + 1, m, d).
+
+        ``directions``: (B, n, d) how the numbers of each row of Z change.
+        """
+        count, n, d = directions.shape
+        groups = -(-d // TOGETHER)
+        padded = np.zeros((count, n, groups * TOGETHER))
+        padded[:, :, :d] = directions
+        seeds = padded.reshape(count, n, groups, TOGETHER).transpose(0, 2, 1, 3).reshape(count, groups, -1)
+        names = tuple(map(tangent_name, self.names))
+        for rows, skipped in self._calls(lasts, groups):
+            given = seeds[rows].reshape(len(rows) * groups, -1)
+            parameters = np.column_stack([np.full(len(given), self.smoothing), given])
+            found = self._slopes.forward(np.repeat(Z[rows], groups, axis=0), parameters, skipped)
+            lengths = [lasts[row] + 1 for row in rows]
+            first = {name: block[::groups] for name, block in found.items()}
+            values = self._rows(first, self.names, lengths, 1)
+            lanes = self._rows(found, names, np.repeat(lengths, groups).tolist(), TOGETHER)
+            for value in values:
+                along = [next(lanes).reshape(*value.shape, TOGETHER) for _ in range(groups)]
+                yield value, np.concatenate(along, axis=2)[:, :, :d]
+
+    def _calls(self, lasts: Sequence[int], groups: int) -> Iterator[tuple[list[int], int]]:
+        """Rows that are computed together, in their order, and how many steps none of them needs."""
+        together = max(1, ROWS // groups)
+        for first in range(0, len(lasts), together):
+            rows = list(range(first, min(first + together, len(lasts))))
+            yield rows, self.steps - 1 - max(lasts[row] for row in rows)
+
+    def _rows(
+        self, found: Mapping[str, Array], names: Sequence[str], lengths: Sequence[int], width: int
+    ) -> Iterator[Array]:
+        """(length, numbers): for each row the named outputs side by side."""
+        for row, length in enumerate(lengths):
+            parts = [found[name][row].reshape(self.steps, -1)[:length] for name in names]
+            yield np.concatenate([part.reshape(length, -1, width) for part in parts], axis=1).reshape(length, -1)
+
+    @cached_property
+    def _values(self) -> Kernel:
+        return self._compiled(self._program)
+
+    @cached_property
+    def _slopes(self) -> Kernel:
+        return self._compiled(tangent_program(self._program, TOGETHER, self.names))
+
+    def _compiled(self, program: Program) -> Kernel:
+        return compile_program(program, seeded=(), threads=self._threads)
