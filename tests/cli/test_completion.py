@@ -33,4 +33,4 @@ def test_problems_complete(command: str, tmp_path: Path, monkeypatch: pytest.Mon
 def test_solvers_and_backends_complete() -> None:
     assert completed("solve", "--solver", "gradient,l") == ["gradient,least_squares"]
     assert completed("solve", "--backend", "simd") == ["simd", "simd32"]
-    assert completed("new", "--from", "ho") == ["hopper_jump", "hopper_run"]
+    assert completed("new", "--from", "ho") == ["hopper_gait", "hopper_jump", "hopper_run"]
