@@ -13,6 +13,7 @@ from symphys.prediction.parameters import number_blocks
 from symphys.prediction.rotations import turned
 from symphys.problem import Problem, Recording, Variable, VariableSlot
 from symphys.transcription.quantity_slopes import QuantitySlopes
+from symphys.transcription.randomization.numbers import hidden
 from symphys.transcription.rollout import symbolic_rollout
 
 Array = NDArray[np.float64]
@@ -158,9 +159,7 @@ def given_variables(problem: Problem, recordings: Sequence[Recording]) -> tuple[
 
 
 def _given(name: str, nominal: Array) -> Variable:
-    infinite, one = np.full(nominal.size, np.inf), np.ones(nominal.size)
-    slot = VariableSlot(name, tuple(range(nominal.size)))
-    return Variable(f"{name}:recorded", "initial", (slot,), 1, "constant", nominal, -infinite, infinite, one, 0 * one)
+    return hidden(f"{name}:recorded", "initial", VariableSlot(name, tuple(range(nominal.size))), nominal)
 
 
 def interpolated(samples: Array, at: Array) -> tuple[Array, Array]:

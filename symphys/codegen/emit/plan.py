@@ -107,15 +107,7 @@ class _Pull:
 
 
 def _reaches(calls: Sequence[FunctionCall], steps: int, functions: DistinctFunctions) -> list[_Reach]:
-    return [
-        _Reach(
-            call,
-            [place.words(steps) for place in call.inputs],
-            [place.words(steps) for place in call.outputs],
-            functions.dependence(call.function),
-        )
-        for call in calls
-    ]
+    return [_Reach.of(call, steps, functions.dependence(call.function)) for call in calls]
 
 
 def _push(call: FunctionCall, functions: DistinctFunctions, tape: _Tape | None = None) -> list[int]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,12 @@ class CallActivity:
     inputs: list[Words]
     outputs: list[Words]
     dependence: Sequence[Flags]
+
+    @classmethod
+    def of(cls, call: FunctionCall, steps: int, dependence: Sequence[Flags]) -> Self:
+        """Of a call that is made in so many steps."""
+        inputs, outputs = ([place.words(steps) for place in places] for places in (call.inputs, call.outputs))
+        return cls(call, inputs, outputs, dependence)
 
 
 class Activity:

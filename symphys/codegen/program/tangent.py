@@ -47,15 +47,7 @@ class _TangentWriter:
         self.program, self.directions, self.wanted = program, directions, outputs
         functions = DistinctFunctions()
         phases = [
-            [
-                CallActivity(
-                    call,
-                    [place.words(steps) for place in call.inputs],
-                    [place.words(steps) for place in call.outputs],
-                    functions.dependence(call.function),
-                )
-                for call in calls
-            ]
+            [CallActivity.of(call, steps, functions.dependence(call.function)) for call in calls]
             for calls, steps in ((program.prologue, 1), (program.body, program.steps), (program.epilogue, 1))
         ]
         self.activity = Activity(program, phases, [program.outputs[name] for name in outputs])

@@ -142,8 +142,7 @@ def _left(program: Program, pulls: Sequence[_Pull]) -> list[Place]:
 
 
 def _reach(call: FunctionCall, functions: DistinctFunctions) -> CallActivity:
-    inputs, outputs = ([place.words(1) for place in places] for places in (call.inputs, call.outputs))
-    return CallActivity(call, inputs, outputs, functions.dependence(call.function))
+    return CallActivity.of(call, 1, functions.dependence(call.function))
 
 
 def _cheaper(
