@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from joint_texts import HINGE, SLIDER, UNIVERSAL, body, joint
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -20,19 +21,6 @@ Load = Callable[..., Problem]
 Refused = Callable[..., ProblemError]
 Names = Callable[[ProblemError, str, str], None]
 Array = NDArray[np.float64]
-
-HINGE, SLIDER = "hinge = { axis = [0, 1, 0] }", "slider = { axis = [1, 0, 0] }"
-UNIVERSAL = "universal = { axes = [[0, 1, 0], [1, 0, 0]] }"
-
-
-def body(name: str, z: float, more: str = "") -> str:
-    return f'[[body]]\nname = "{name}"\nmass = 1\ninertia = 1\nposition = [0, 0, {z}]\n{more}\n'
-
-
-def joint(name: str, ends: str, z: float, more: str = "", kind: str = HINGE) -> str:
-    first, second = ends.split()
-    return f'[[joint]]\nname = "{name}"\nbetween = ["{first}", "{second}"]\n{kind}\npoint = [0, 0, {z}]\n{more}\n'
-
 
 LINKS = body("torso", 1.5) + body("thigh", 0.75) + body("shin", 0.25)
 TIME = "[simulation]\nduration = 1.0\ndt = 0.01\n"

@@ -6,8 +6,10 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import casadi as ca
+import joint_texts
 import numpy as np
 import pytest
+from joint_texts import SLIDER, UNIVERSAL, joint
 from numpy.typing import NDArray
 
 from symphys.dynamics.observation.joint_coordinates import readings
@@ -23,18 +25,11 @@ Refused = Callable[..., ProblemError]
 Names = Callable[[ProblemError, str, str], None]
 Array = NDArray[np.float64]
 
-HINGE, SLIDER = "hinge = { axis = [0, 1, 0] }", "slider = { axis = [1, 0, 0] }"
-UNIVERSAL = "universal = { axes = [[0, 1, 0], [1, 0, 0]] }"
 TIME = "[simulation]\nduration = 0.2\ndt = 0.01\n"
 
 
 def body(name: str, z: float, more: str = "") -> str:
-    return f'[[body]]\nname = "{name}"\nmass = 1\ninertia = [0.1, 0.2, 0.3]\nposition = [0, 0, {z}]\n{more}\n'
-
-
-def joint(name: str, ends: str, z: float, start: str = "", kind: str = HINGE) -> str:
-    first, second = ends.split()
-    return f'[[joint]]\nname = "{name}"\nbetween = ["{first}", "{second}"]\n{kind}\npoint = [0, 0, {z}]\n{start}\n'
+    return joint_texts.body(name, z, more, inertia="[0.1, 0.2, 0.3]")
 
 
 def variable(name: str, sets: str, guess: str) -> str:
