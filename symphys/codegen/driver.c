@@ -10,11 +10,6 @@ typedef struct {
   word skipped;                      /* steps at the end, in which nothing moves */
 } batch;
 
-static void run(const phase *calls, V *m, V *b, word k) {
-  const word *t = calls->entries;
-  for (word c = 0; c < calls->count; c++, t += t[1]) FUNCTIONS[t[0]](m, b, t + 2, k);
-}
-
 static word total(const ranges *r) {
   word sum = 0;
   for (word i = 0; i < r->count; i++) sum += r->places[2 * i + 1];
@@ -63,9 +58,11 @@ static void rested(const program *p, word steps, V *b) {
     for (word w = 0; w < x[1]; w++) b[x[0] + steps * x[2] + w] += b[x[0] + k * x[2] + w];
 }
 
-static void roll(const program *p, word steps, V *m) {
+static void roll(const program *p, word steps, V *m, left_out *x) {
   run(&p->prologue, m, 0, 0);
-  for (word k = 0; k < steps; k++) run(&p->body, m, 0, k);
+  for (word k = 0; k < steps; k++)
+    if (p->guards.count) step_left(p, x, m, k);
+    else run(&p->body, m, 0, k);
   if (steps < p->steps) rest(p, steps, m);
   run(&p->epilogue, m, 0, 0);
 }
@@ -79,12 +76,15 @@ static void discount_adjoint(const program *p, double discount, const V *m, V *b
 }
 
 /* States are in the memory; the scratch of a step, and the tape for its adjoints, are computed again. */
-static void pull(const program *p, word steps, double discount, V *m, V *b) {
+static void pull(const program *p, word steps, double discount, V *m, V *b, left_out *x) {
   run(&p->back_epilogue, m, b, 0);
   if (steps < p->steps) rested(p, steps, b);
   for (word k = steps - 1; k >= 0; k--) {
-    run(&p->again, m, 0, k);
-    run(&p->back_body, m, b, k);
+    if (p->guards.count) back_left(p, x, m, b, k);
+    else {
+      run(&p->again, m, 0, k);
+      run(&p->back_body, m, b, k);
+    }
     if (discount > 0) discount_adjoint(p, discount, m, b, k);
   }
   run(&p->back_prologue, m, b, 0);
@@ -98,18 +98,20 @@ static void record(const batch *x, const V *m, word row, word rows) {
 }
 
 /* Memory: size vectors, then the tape, then size vectors of adjoints. */
-API void evaluate(const program *p, const batch *x, V *m) {
+API void evaluate(const program *p, const batch *of, V *m) {
   V *b = m + p->size + p->tape;
-  for (word row = 0; row < x->rows; row += LANES) {
-    word rows = x->rows - row < LANES ? x->rows - row : LANES;
-    fill(p, x, m, row, rows);
-    roll(p, p->steps - x->skipped, m);
-    if (x->outputs) scatter(x->outputs, m, &p->outputs, total(&p->outputs), row, rows);
-    if (x->trajectory) record(x, m, row, rows);
-    if (!x->gradient) continue;
+  left_out x = begin_guards(p, of->gradient != 0);
+  for (word row = 0; row < of->rows; row += LANES) {
+    word rows = of->rows - row < LANES ? of->rows - row : LANES;
+    fill(p, of, m, row, rows);
+    roll(p, p->steps - of->skipped, m, &x);
+    if (of->outputs) scatter(of->outputs, m, &p->outputs, total(&p->outputs), row, rows);
+    if (of->trajectory) record(of, m, row, rows);
+    if (!of->gradient) continue;
     memset(b, 0, sizeof(V) * p->size);
-    gather(b, &p->seeded, &x->seed, row, rows, 1);
-    pull(p, p->steps - x->skipped, x->discount, m, b);
-    scatter(x->gradient, b, &p->z, total(&p->z), row, rows);
+    gather(b, &p->seeded, &of->seed, row, rows, 1);
+    pull(p, p->steps - of->skipped, of->discount, m, b, &x);
+    scatter(of->gradient, b, &p->z, total(&p->z), row, rows);
   }
+  end_guards(&x);
 }

@@ -198,7 +198,7 @@ def _push(
     gap = contact.geometry.gap_after(moved[0], moved[1] if len(moved) > 1 else UNMOVED) + constraint.slack
     free = old - share * gap * constraint.normal_mass * constraint.separates
     # at 0 the slope is that of ``free``: a body that exactly touches is held by the surface
-    new = ca.if_else(ca.logic_or(lasts, free >= 0), free, 0)
+    new = constraint.near * ca.if_else(ca.logic_or(lasts, free >= 0), free, 0)
     step = (new - old) * constraint.normal
     if constraint.same:
         after = along[0]

@@ -14,6 +14,7 @@ from typing import Any
 
 import casadi as ca
 
+from symphys.dynamics.broad_phase import near_pairs
 from symphys.dynamics.context import State, StepContext
 from symphys.dynamics.impact.deferred_impacts import defer_impacts
 from symphys.dynamics.impact.impact import StepSplit, find_split, resolve_impact
@@ -31,6 +32,7 @@ SPLITS_OFF_CENTRE = 2
 def take_step(context: StepContext, x: State) -> tuple[State, list[Substep]]:
     """The state after one step, and the substeps and impacts that led there."""
     left: Expr = ca.SX(context.settings.scheme.dt)
+    context = replace(context, near=near_pairs(context, x))
     count = splits_of(context.world, context.settings.scheme)
     substeps, splits = list[Substep](), list[StepSplit]()
 

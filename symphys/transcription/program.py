@@ -19,6 +19,7 @@ from symphys.transcription.decision_variables import start_of
 from symphys.transcription.feedback.controller_calls import Places, control_calls
 from symphys.transcription.formulas.motion_parts import part_arguments
 from symphys.transcription.gradient_probe import combined
+from symphys.transcription.guarded_calls import guarded, most_zeros
 from symphys.transcription.objective import Terms, terms
 from symphys.transcription.rollout import Rollout
 
@@ -141,7 +142,10 @@ def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:
     arguments = {"u": samples.u, "p": samples.p, "smoothing": samples.smoothing}
     after = samples.x.later() if rollout.termination is None else samples.layout.take(rollout.memory.size - 1)
     places: dict[TracedVector, Place] = {slot: _part(after, part) for slot, part in recording.results.items()}
-    calls = []
+    calls, zeros = list[FunctionCall](), None
+    if widest := most_zeros(recording.calls):
+        zeros = samples.layout.take(widest)
+        calls.append(FunctionCall(ca.Function("zeros", [], [ca.DM.zeros(widest)]), (), (zeros,)))
     for piece in recording.calls:
         for slot in piece.inputs:
             if slot.name in columns:
@@ -151,7 +155,8 @@ def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:
         for slot in piece.outputs:
             places.setdefault(slot, samples.layout.take(slot.size))
         inputs, outputs = (tuple(places[slot] for slot in slots) for slots in (piece.inputs, piece.outputs))
-        calls.append(FunctionCall(piece.function, inputs, outputs))
+        call = FunctionCall(piece.function, inputs, outputs)
+        calls.append(call if piece.guard is None else guarded(call, piece.guard, places, zeros))
     if after.size > columns.size:
         calls.append(_remember(samples, _part(after, slice(columns.size, None))))
     if rollout.termination is not None:

@@ -51,7 +51,7 @@ def plain_source(program: Program, seeded: Sequence[str], further: Mapping[str, 
     lists = {name: f"{{{count}, {name.upper()}}}" for name, count in counts.items()}
     fields = [str(program.size), str(planned.tape), str(program.steps), *(lists[name] for name in RANGES), "VALUES"]
     data = _array("program", "PROGRAM", [*fields, *(lists[name] for name in TABLES)])
-    driver = resource("program.h") + resource("driver.c")
+    driver = resource("program.h") + resource("guards.c") + resource("driver.c")
     text = "\n".join([resource("plain.h"), *declared, listed, *texts, driver, values, *arrays, data])
     return PlainSource(text, 2 * program.size + planned.tape)
 

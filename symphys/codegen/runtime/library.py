@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from symphys.codegen.emit.guarding import Guarding
 from symphys.codegen.emit.plan import Plan
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.program.program import Place, Program
 
 TABLES = ("prologue", "body", "epilogue", "again", "back_body", "back_prologue", "back_epilogue")
+MARKS = {"body": "body_marks", "again": "again_marks", "back_body": "back_marks"}
 WORD = ctypes.c_int64
 Memory = Any
 """(words, lanes) float64 or float32, aligned: the values, the tape and the adjoints"""
@@ -43,6 +45,10 @@ def program_fields(phase: type) -> Any:
         ("discounted", WORD * 3),
         ("kept", WORD * 2),
         ("written", List),
+        ("guards", List),
+        ("aliases", List),
+        ("first", WORD),
+        *((name, ctypes.c_void_p) for name in MARKS.values()),
     )
 
 
@@ -88,10 +94,19 @@ class Loaded:
             setattr(self.data, name, self._list(*plan.tables[name]))
         written = [place for call in program.body for place in call.outputs if place.stride]
         self.data.written = self._list(len(written), strided(written))
+        if plan.guarding is not None:
+            self._guard(plan.guarding)
         if program.discounted is not None:
             state, kept = program.discounted.state, program.discounted.kept
             self.data.discounted = (WORD * 3)(state.offset, state.size, state.stride)
             self.data.kept = (WORD * 2)(*((kept.offset, kept.stride) if kept else (0, 0)))
+
+    def _guard(self, guarding: Guarding) -> None:
+        self.data.guards = self._list(len(guarding.words), guarding.words)
+        self.data.aliases = self._list(len(guarding.aliases), guarding.aliases)
+        self.data.first = guarding.first
+        for table, name in MARKS.items():
+            setattr(self.data, name, self._list(0, guarding.marks[table]).words)
 
     def _list(self, count: int, words: Any) -> List:
         self._kept.append(words)

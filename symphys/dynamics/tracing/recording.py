@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import casadi as ca
 
-from symphys.dynamics.tracing.pytree import Code, TracedMatrix, dismantle, outline, rebuild
+from symphys.dynamics.tracing.pytree import Code, TracedMatrix, dismantle, outline, rebuild, slots_of
 from symphys.dynamics.tracing.trace import Tracer
 
 T = TypeVar("T")
@@ -38,11 +38,12 @@ class TracedVector:
 
 @dataclass(frozen=True)
 class TracedCall:
-    """A call of an SX function of vectors, which returns vectors."""
+    """A call of an SX function of vectors, which returns vectors; see ``guards`` for when it may be left out."""
 
     function: ca.Function
     inputs: tuple[TracedVector, ...]
     outputs: tuple[TracedVector, ...]
+    guard: Any = None
 
 
 class Recorder(Tracer):
@@ -52,6 +53,7 @@ class Recorder(Tracer):
         """Nothing yet."""
         super().__init__()
         self.calls: list[TracedCall] = []
+        self.guards: list[TracedVector] = []
         self._slots: list[TracedVector] = []
         self._adopted: list[Expr] = []
         self._given: dict[tuple[int, tuple[int, ...]], Sequence[int]] = {}
@@ -59,6 +61,34 @@ class Recorder(Tracer):
     def argument(self, name: str, symbols: Expr) -> None:
         """A slot for an argument of the step."""
         self._slots.append(TracedVector(name, symbols.numel(), self.take(symbols)))
+
+    def guard(self, word: Any) -> None:
+        """See ``decorator.guard``; what is known already guards nothing."""
+        (code,) = word.codes if isinstance(word, TracedMatrix) else self._codes(word)
+        if not isinstance(code, float):
+            self.guards.append(self._slots[code[0]])
+
+    def gathered(self, tree: T) -> T:
+        """The same tree; each part of it that has a slot lies in a slot of its own."""
+        leaves: list[Expr] = []
+        shape = dismantle(tree, leaves)
+        columns: dict[int, list[Code]] = {}
+        codes = [leaf.codes if isinstance(leaf, TracedMatrix) else self._codes(leaf) for leaf in leaves]
+        for slot, each in zip(slots_of(shape), codes, strict=True):
+            columns.setdefault(slot, []).extend(code for code in each if not isinstance(code, float))
+        used: dict[int, int] = {}
+        for column in columns.values():
+            for code in column:
+                used.setdefault(code[0], len(used))
+        symbols = [ca.SX.sym("a", self._slots[k].size) for k in used]
+        results = [ca.vertcat(*(symbols[used[k]][j] for k, j in column)) for column in columns.values() if column]
+        new = iter(self._apply(self.shared(ca.Function("piece", symbols, results)), list(used)) if results else ())
+        taken = {slot: (next(new), iter(range(len(column)))) for slot, column in columns.items() if column}
+        found = []
+        for slot, leaf, each in zip(slots_of(shape), leaves, codes, strict=True):
+            moved = [c if isinstance(c, float) else (taken[slot][0], next(taken[slot][1])) for c in each]
+            found.append(TracedMatrix(leaf.leaf if isinstance(leaf, TracedMatrix) else outline(leaf), tuple(moved)))
+        return rebuild(shape, iter(found))
 
     def give(self, name: str, values: Sequence[Expr]) -> TracedVector:
         """A call that puts values side by side."""

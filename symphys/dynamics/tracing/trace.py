@@ -74,6 +74,13 @@ class Tracer(ABC):
             state = once(context, state)
         return state
 
+    def guard(self, word: Any) -> None:
+        """What tells which calls are without effect; of use to a recorder alone."""
+
+    def gathered(self, tree: T) -> T:
+        """The same tree."""
+        return tree
+
     @abstractmethod
     def _apply(self, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
         """The slots that take what the function gives."""
@@ -196,13 +203,16 @@ class _Given:
 
     def placed(self, matrix: Expr, slot: int) -> TracedMatrix:
         """The codes of a matrix, whose numbers go to a slot if they lie nowhere yet."""
-        return TracedMatrix(outline(matrix), tuple([self._code(number, slot) for number in matrix.nonzeros()]))
+        numbers = matrix.nonzeros()
+        new = [not number.is_constant() and number.element_hash() not in self._homes for number in numbers]
+        whole = len(numbers) == 3 and any(new)  # a vector of space stays together, also what is left of it as it was
+        return TracedMatrix(outline(matrix), tuple([self._code(number, slot, whole) for number in numbers]))
 
-    def _code(self, number: Expr, slot: int) -> Code:
+    def _code(self, number: Expr, slot: int, anew: bool) -> Code:
         if number.is_constant():
             return float(number)
         code = number.element_hash()
-        if code not in self._homes:
+        if code not in self._homes or (anew and self._homes[code][0] >= 0):
             column = self.columns.setdefault(slot, [])
             self._homes[code] = (-1 - list(self.columns).index(slot), len(column))
             column.append(number)
