@@ -1,7 +1,7 @@
 """The broad phase: pairs of surfaces that are too far apart to act within a step.
 
-A pair is far where the spheres around its surfaces are farther apart than bodies can come near each other in the step,
-at twice the speed of the fastest. A far pair gives no impulse. That is part of the scheme, so every way to compute a
+A pair is far where the spheres around its surfaces are farther apart than its bodies go in the step at their speeds, one
+of them struck by the fastest body. A far pair gives no impulse. That is part of the scheme, so every way to compute a
 step agrees. A compiled kernel leaves out the calls of pairs that are far (``symphys.dynamics.tracing.guards``).
 """
 
@@ -25,8 +25,6 @@ Expr = Any
 
 FEWEST = 12
 """Pairs of surfaces from which on looking for those that are far costs less than it saves."""
-FASTER = 2.0
-"""Times the speed of the fastest body: a body at rest gets as much from a blow of a heavier one."""
 
 
 def near_pairs(context: StepContext, x: State) -> tuple[Expr, ...]:
@@ -44,7 +42,7 @@ def near_pairs(context: StepContext, x: State) -> tuple[Expr, ...]:
         _speed(x[f"{body.name}.velocity"], x[f"{body.name}.reaction_force"], _push(context, body.name), body.mass, gravity, dt)
         for body in world.bodies
     )
-    reach = _reach(speeds, gravity, dt)
+    fastest = _fastest(speeds)
     found = dict[tuple[Side, Side], Expr]()
     for first, second in dict.fromkeys(sides):
         radii = _radius(world, first, held), _radius(world, second, held)
@@ -55,9 +53,12 @@ def near_pairs(context: StepContext, x: State) -> tuple[Expr, ...]:
         if second.body is None:
             plane = world.surface(second)
             assert isinstance(plane, Plane)
-            near = _near_plane(position, (plane.normal, plane.offset), radii[0], reach, smoothing)
+            speed = speeds[first.body], ca.SX(0), fastest
+            near = _near_plane(position, (plane.normal, plane.offset), radii[0], dt, speed, smoothing)
         else:
-            near = _near(position, x[f"{world.bodies[second.body].name}.position"], sum(radii), reach, smoothing)
+            speed = speeds[first.body], speeds[second.body], fastest
+            other = x[f"{world.bodies[second.body].name}.position"]
+            near = _near(position, other, sum(radii), dt, speed, smoothing)
         found[first, second] = guard(near)
     return tuple(found[each] for each in sides)
 
@@ -84,17 +85,18 @@ def _speed(velocity: Expr, reaction: Expr, push: Expr, mass: Expr, gravity: Expr
 
 
 @traced
-def _reach(speeds: Sequence[Expr], gravity: Expr, dt: Expr) -> Expr:
-    """How far a body may go within the step [m]."""
-    return FASTER * dt * ca.mmax(ca.vertcat(*speeds))
+def _fastest(speeds: Sequence[Expr]) -> Expr:
+    return ca.mmax(ca.vertcat(*speeds))
 
 
 @traced
-def _near(a: Expr, b: Expr, radii: float, reach: Expr, smoothing: Expr) -> Expr:
-    return ca.logic_or(length(a - b) < radii + 2 * reach, smoothing > 0)
+def _near(a: Expr, b: Expr, radii: float, dt: Expr, speeds: tuple[Expr, ...], smoothing: Expr) -> Expr:
+    return ca.logic_or(length(a - b) < radii + dt * sum(speeds), smoothing > 0)
 
 
 @traced
-def _near_plane(position: Expr, plane: tuple[Any, Any], radius: float, reach: Expr, smoothing: Expr) -> Expr:
+def _near_plane(
+    position: Expr, plane: tuple[Any, Any], radius: float, dt: Expr, speeds: tuple[Expr, ...], smoothing: Expr
+) -> Expr:
     normal, offset = plane
-    return ca.logic_or(ca.dot(ca.vertcat(*normal), position) - offset < radius + reach, smoothing > 0)
+    return ca.logic_or(ca.dot(ca.vertcat(*normal), position) - offset < radius + dt * sum(speeds), smoothing > 0)

@@ -34,6 +34,9 @@ from symphys.dynamics.tracing.pytree import (
 )
 
 T = TypeVar("T")
+
+TOGETHER = 6
+"""Numbers of a result, or of a member of it, that stay side by side."""
 Expr = Any
 """casadi SX"""
 
@@ -142,8 +145,7 @@ class Tracer(ABC):
         with tracing(None):
             result_shape = dismantle(function(*arguments, **named), results)
         given = _Given(entries)
-        leaves = zip(map(self.value, results), slots_of(result_shape), strict=True)
-        matrices = tuple(given.placed(leaf, slot) for leaf, slot in leaves)
+        matrices = given.placed(list(map(self.value, results)), slots_of(result_shape))
         if not given.columns:
             return Template(None, (), result_shape, matrices)
         columns: Any = [ca.vertcat(*column) for column in given.columns.values()]
@@ -201,12 +203,26 @@ class _Given:
         self.columns: dict[int, list[Expr]] = {}
         self._homes = {e.element_hash(): (k, j) for k, column in enumerate(entries) for j, e in enumerate(column)}
 
-    def placed(self, matrix: Expr, slot: int) -> TracedMatrix:
-        """The codes of a matrix, whose numbers go to a slot if they lie nowhere yet."""
-        numbers = matrix.nonzeros()
-        new = [not number.is_constant() and number.element_hash() not in self._homes for number in numbers]
-        whole = len(numbers) == 3 and any(new)  # a vector of space stays together, also what is left of it as it was
-        return TracedMatrix(outline(matrix), tuple([self._code(number, slot, whole) for number in numbers]))
+    def placed(self, matrices: Sequence[Expr], slots: Sequence[int]) -> tuple[TracedMatrix, ...]:
+        """The codes of matrices, whose numbers go to their slots if they lie nowhere yet.
+
+        The few numbers of a body, such as its velocities, stay together, also those that are left as they were.
+        """
+        numbers = [matrix.nonzeros() for matrix in matrices]
+        size, new = dict[int, int](), dict[int, bool]()
+        for slot, own in zip(slots, numbers, strict=True):
+            size[slot] = size.get(slot, 0) + len(own)
+            new[slot] = new.get(slot, False) or any(map(self._is_new, own))
+        return tuple(
+            TracedMatrix(
+                outline(matrix),
+                tuple([self._code(number, slot, new[slot] and size[slot] <= TOGETHER) for number in own]),
+            )
+            for matrix, slot, own in zip(matrices, slots, numbers, strict=True)
+        )
+
+    def _is_new(self, number: Expr) -> bool:
+        return not number.is_constant() and number.element_hash() not in self._homes
 
     def _code(self, number: Expr, slot: int, anew: bool) -> Code:
         if number.is_constant():
