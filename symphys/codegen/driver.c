@@ -58,10 +58,10 @@ static void rested(const program *p, word steps, V *b) {
     for (word w = 0; w < x[1]; w++) b[x[0] + steps * x[2] + w] += b[x[0] + k * x[2] + w];
 }
 
-static void roll(const program *p, word steps, V *m, left_out *x) {
+static void roll(const program *p, word steps, V *m, int gradient) {
   run(&p->prologue, m, 0, 0);
   for (word k = 0; k < steps; k++)
-    if (p->guards.count) step_left(p, x, m, k);
+    if (p->calls.count) step_left(p, m, k, gradient);
     else run(&p->body, m, 0, k);
   if (steps < p->steps) rest(p, steps, m);
   run(&p->epilogue, m, 0, 0);
@@ -76,11 +76,11 @@ static void discount_adjoint(const program *p, double discount, const V *m, V *b
 }
 
 /* States are in the memory; the scratch of a step, and the tape for its adjoints, are computed again. */
-static void pull(const program *p, word steps, double discount, V *m, V *b, left_out *x) {
+static void pull(const program *p, word steps, double discount, V *m, V *b) {
   run(&p->back_epilogue, m, b, 0);
   if (steps < p->steps) rested(p, steps, b);
   for (word k = steps - 1; k >= 0; k--) {
-    if (p->guards.count) back_left(p, x, m, b, k);
+    if (p->calls.count) back_left(p, m, b, k);
     else {
       run(&p->again, m, 0, k);
       run(&p->back_body, m, b, k);
@@ -97,21 +97,19 @@ static void record(const batch *x, const V *m, word row, word rows) {
         x->trajectory[((row + l) * x->count + k) * x->size + j] = (double)LANE(m[x->offset + k * x->stride + j], l);
 }
 
-/* Memory: size vectors, then the tape, then size vectors of adjoints. */
-API void evaluate(const program *p, const batch *of, V *m) {
+/* Memory: size vectors, then the tape, then size vectors of adjoints, then what ``guards.c`` notes. */
+API void evaluate(const program *p, const batch *x, V *m) {
   V *b = m + p->size + p->tape;
-  left_out x = begin_guards(p, of->gradient != 0);
-  for (word row = 0; row < of->rows; row += LANES) {
-    word rows = of->rows - row < LANES ? of->rows - row : LANES;
-    fill(p, of, m, row, rows);
-    roll(p, p->steps - of->skipped, m, &x);
-    if (of->outputs) scatter(of->outputs, m, &p->outputs, total(&p->outputs), row, rows);
-    if (of->trajectory) record(of, m, row, rows);
-    if (!of->gradient) continue;
+  for (word row = 0; row < x->rows; row += LANES) {
+    word rows = x->rows - row < LANES ? x->rows - row : LANES;
+    fill(p, x, m, row, rows);
+    roll(p, p->steps - x->skipped, m, x->gradient != 0);
+    if (x->outputs) scatter(x->outputs, m, &p->outputs, total(&p->outputs), row, rows);
+    if (x->trajectory) record(x, m, row, rows);
+    if (!x->gradient) continue;
     memset(b, 0, sizeof(V) * p->size);
-    gather(b, &p->seeded, &of->seed, row, rows, 1);
-    pull(p, p->steps - of->skipped, of->discount, m, b, &x);
-    scatter(of->gradient, b, &p->z, total(&p->z), row, rows);
+    gather(b, &p->seeded, &x->seed, row, rows, 1);
+    pull(p, p->steps - x->skipped, x->discount, m, b);
+    scatter(x->gradient, b, &p->z, total(&p->z), row, rows);
   }
-  end_guards(&x);
 }

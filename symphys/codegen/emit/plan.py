@@ -141,6 +141,9 @@ def _again(
     for pull in pulls:
         for words in pull.reads(functions):
             needed[words] = True
+    for call in program.body:
+        if call.section is not None:
+            needed[call.section.offset] = True
     needed &= scratch
     chosen = []
     for reach in reversed(body):

@@ -55,6 +55,8 @@ class FunctionCall:
         outputs: where its results go. They are written, or added to what is there if ``accumulate``.
         guard: a word of scratch; where it is 0 the call may be left out. Its function then gives what ``otherwise`` has.
         otherwise: for each result the place that holds the same then; None where no call reads it then.
+        section: the same for a run of calls that have one word in common, which are left out together.
+        beside: what ``otherwise`` is, for the section.
     """
 
     function: Function
@@ -63,6 +65,8 @@ class FunctionCall:
     accumulate: bool = False
     guard: Place | None = None
     otherwise: tuple[Place | None, ...] = ()
+    section: Place | None = None
+    beside: tuple[Place | None, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from symphys.codegen.emit.guarding import Guarding
+from symphys.codegen.emit.guarding import WIDTHS, Guarding
 from symphys.codegen.emit.plan import Plan
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.program.program import Place, Program
 
 TABLES = ("prologue", "body", "epilogue", "again", "back_body", "back_prologue", "back_epilogue")
-MARKS = {"body": "body_marks", "again": "again_marks", "back_body": "back_marks"}
 WORD = ctypes.c_int64
 Memory = Any
 """(words, lanes) float64 or float32, aligned: the values, the tape and the adjoints"""
@@ -45,10 +44,8 @@ def program_fields(phase: type) -> Any:
         ("discounted", WORD * 3),
         ("kept", WORD * 2),
         ("written", List),
-        ("guards", List),
-        ("aliases", List),
         ("first", WORD),
-        *((name, ctypes.c_void_p) for name in MARKS.values()),
+        *((name, List) for name in WIDTHS),
     )
 
 
@@ -81,6 +78,7 @@ class Loaded:
         except OSError as error:
             raise KernelUnavailable(f"the compiled kernel cannot be loaded: {error}") from error
         self._evaluate = _prepared(library.evaluate, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
+        self._prepare = _prepared(library.prepare, ctypes.c_void_p, ctypes.c_void_p)
         self._begin = _prepared(library.begin, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
         self._perform = _prepared(library.perform, ctypes.c_void_p, ctypes.c_void_p, WORD)
         self._kept: list[Any] = []
@@ -102,11 +100,10 @@ class Loaded:
             self.data.kept = (WORD * 2)(*((kept.offset, kept.stride) if kept else (0, 0)))
 
     def _guard(self, guarding: Guarding) -> None:
-        self.data.guards = self._list(len(guarding.words), guarding.words)
-        self.data.aliases = self._list(len(guarding.aliases), guarding.aliases)
         self.data.first = guarding.first
-        for table, name in MARKS.items():
-            setattr(self.data, name, self._list(0, guarding.marks[table]).words)
+        for name, words in guarding.rows.items():
+            setattr(self.data, name, self._list(guarding.count(name), words if words.size else np.zeros(1, np.int64)))
+        self.data.calls.count -= 1
 
     def _list(self, count: int, words: Any) -> List:
         self._kept.append(words)
@@ -116,6 +113,11 @@ class Loaded:
     def addresses(self) -> tuple[int, int]:
         """Of the driver's ``evaluate`` and of the program that it wants."""
         return ctypes.cast(self._evaluate, ctypes.c_void_p).value or 0, ctypes.addressof(self.data)
+
+    def prepare(self, memory: Memory) -> None:
+        """Make a memory ready for the driver's notes."""
+        if self.data.calls.count:
+            self._prepare(ctypes.byref(self.data), memory.ctypes.data)
 
     def evaluate(self, batch: BatchData, memory: Memory) -> None:
         """Run a batch in this memory; the interpreter is free meanwhile."""
