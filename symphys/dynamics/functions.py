@@ -114,7 +114,7 @@ def trace_step(
     for names in owners.values():
         slot = recorder.give("next", [after[name] for name in names])
         results[slot] = slice(layout[names[0]].start, layout[names[-1]].stop)
-    return TracedStep(with_guards(without_dead_code(recorder.calls), recorder.guards), results)
+    return TracedStep(with_guards(without_dead_code(recorder.calls), recorder.guards, recorder.sections), results)
 
 
 def _packed(layout: Layout, tracer: InlineTracer, x: State) -> Expr:

@@ -20,6 +20,7 @@ from symphys.dynamics.impact.deferred_impacts import defer_impacts
 from symphys.dynamics.impact.impact import StepSplit, find_split, resolve_impact
 from symphys.dynamics.impact.restitution import eccentric_bodies
 from symphys.dynamics.substep import Substep, advance
+from symphys.dynamics.tracing.decorator import section
 from symphys.model.world import Scheme, World
 
 Expr = Any
@@ -42,6 +43,7 @@ def take_step(context: StepContext, x: State) -> tuple[State, list[Substep]]:
         before = advance(context, x, split.first, suppressed=split.fast)
 
         # the impact: no time passes
+        section(split.impact)
         impact = resolve_impact(context, before.x, split)
 
         x, left = impact.x, left - split.first

@@ -16,8 +16,9 @@ def most_zeros(calls: Sequence[TracedCall]) -> int:
         (
             vector.size
             for call in calls
-            if call.guard is not None
-            for vector, part in zip(call.outputs, call.guard.otherwise, strict=True)
+            for guard in (call.guard, call.section)
+            if guard is not None
+            for vector, part in zip(call.outputs, guard.otherwise, strict=True)
             if part is not None and part.vector is None
         ),
         default=0,
@@ -25,16 +26,21 @@ def most_zeros(calls: Sequence[TracedCall]) -> int:
 
 
 def guarded(
-    call: FunctionCall, guard: Guard, places: Mapping[TracedVector, Place], zeros: Place | None
+    call: FunctionCall, traced: TracedCall, places: Mapping[TracedVector, Place], zeros: Place | None
 ) -> FunctionCall:
-    """The call with its guard, whose vectors lie in ``places``."""
+    """The call with its guard and its section, whose vectors lie in ``places``."""
 
-    def stand_in(place: Place, part: Part | None) -> Place | None:
-        if part is None:
-            return None
+    def part_of(part: Part, size: int) -> Place:
         whole = zeros if part.vector is None else places[part.vector]
         assert whole is not None
-        return Place(whole.offset + part.start, place.size, whole.stride)
+        return Place(whole.offset + part.start, size, whole.stride)
 
-    otherwise = tuple(stand_in(place, part) for place, part in zip(call.outputs, guard.otherwise, strict=True))
-    return replace(call, guard=places[guard.word], otherwise=otherwise)
+    def stand_ins(guard: Guard) -> tuple[Place | None, ...]:
+        parts = zip(call.outputs, guard.otherwise, strict=True)
+        return tuple(None if part is None else part_of(part, place.size) for place, part in parts)
+
+    if traced.guard is not None:
+        call = replace(call, guard=part_of(traced.guard.word, 1), otherwise=stand_ins(traced.guard))
+    if traced.section is not None:
+        call = replace(call, section=part_of(traced.section.word, 1), beside=stand_ins(traced.section))
+    return call

@@ -155,8 +155,7 @@ def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:
         for slot in piece.outputs:
             places.setdefault(slot, samples.layout.take(slot.size))
         inputs, outputs = (tuple(places[slot] for slot in slots) for slots in (piece.inputs, piece.outputs))
-        call = FunctionCall(piece.function, inputs, outputs)
-        calls.append(call if piece.guard is None else guarded(call, piece.guard, places, zeros))
+        calls.append(guarded(FunctionCall(piece.function, inputs, outputs), piece, places, zeros))
     if after.size > columns.size:
         calls.append(_remember(samples, _part(after, slice(columns.size, None))))
     if rollout.termination is not None:

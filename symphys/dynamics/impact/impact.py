@@ -75,7 +75,7 @@ def find_split(context: StepContext, x: State, duration: Expr, share: float) -> 
     first = _inside(earliest, duration, share)
     until = _until(earliest[1], first, context.settings.scheme.dt)
     struck = [_is_struck(c, contact.hit, contact.time, until) for contact, c in zip(contacts, fast, strict=True)]
-    late = [_late(earliest[1], s, contact.time) for contact, s in zip(contacts, struck, strict=True)]
+    late = [_late(earliest, s, contact.time) for contact, s in zip(contacts, struck, strict=True)]
     return StepSplit(earliest[0], first, tuple(fast), tuple(struck), tuple(late))
 
 
@@ -105,8 +105,9 @@ def _is_struck(closes: Expr, hit: Expr, time: Expr, until: Expr) -> Expr:
 
 
 @traced
-def _late(earliest: Expr, struck: Expr, time: Expr) -> Expr:
-    return ca.if_else(struck, time - earliest, 0)
+def _late(earliest: tuple[Expr, Expr], struck: Expr, time: Expr) -> Expr:
+    impact, first = earliest
+    return ca.if_else(ca.logic_and(impact, struck), time - first, 0)
 
 
 @traced

@@ -30,6 +30,10 @@ class Tracing(Protocol):
         """``function(*arguments, **named)``."""
         ...
 
+    def section(self, word: Any) -> None:
+        """The same for all calls together that depend on ``word``."""
+        ...
+
     def gathered(self, tree: T) -> T:
         """The same, its numbers side by side."""
         ...
@@ -68,6 +72,14 @@ def guard(word: T) -> T:
     tracer = _TRACER.get()
     if tracer is not None:
         tracer.guard(word)
+    return word
+
+
+def section(word: T) -> T:
+    """The same word, 0 or 1, marked: a compiled kernel jumps over what is without effect where it is 0."""
+    tracer = _TRACER.get()
+    if tracer is not None:
+        tracer.section(word)
     return word
 
 

@@ -8,7 +8,7 @@ of that kind, or are used by such calls only, can be left out.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from heapq import heapify, heappop, heappush
 from typing import Any
@@ -36,29 +36,43 @@ class Guard:
     """When a call may be left out.
 
     Attributes:
-        word: the call is without effect where this is 0.
+        word: the call is without effect where this is 0: one entry.
         otherwise: for each result what it equals then; None where nothing uses it then.
     """
 
-    word: TracedVector
+    word: Part
     otherwise: tuple[Part | None, ...]
 
 
-def with_guards(calls: Sequence[TracedCall], words: Sequence[TracedVector]) -> tuple[TracedCall, ...]:
-    """The calls, with guards where one of ``words`` leaves them without effect."""
+def with_guards(
+    calls: Sequence[TracedCall], guards: Sequence[TracedVector], sections: Sequence[tuple[TracedVector, int]]
+) -> tuple[TracedCall, ...]:
+    """The calls, with what leaves them without effect; each section in one piece.
+
+    Args:
+        calls: of a step.
+        guards: words that each leave out a few calls, here and there. What they depend on comes first.
+        sections: words, as entries of vectors, that each leave out many calls that follow one another.
+    """
     search = _Search(calls)
-    for word in words:
-        search.leave_out(word)
-    first = search.needed(words)
+    first = search.needed(guards)
+    found: dict[int, Guard] = {}
+    for word in guards:
+        found |= search.left_out(Part(word), first | found.keys())
     order = [k for k in range(len(calls)) if k in first] + [k for k in range(len(calls)) if k not in first]
-    return tuple(replace(calls[k], guard=search.guards.get(k)) for k in order)
+    apart: dict[int, Guard] = {}
+    for vector, entry in sections:
+        left = search.left_out(Part(vector, entry), apart.keys())
+        arranged = search.in_one_piece(order, left)
+        if arranged is not None:
+            order, apart = arranged, apart | left
+    return tuple(replace(calls[k], guard=found.get(k), section=apart.get(k)) for k in order)
 
 
 class _Search:
     """Calls by who reads and who writes a vector, and the guards that have been found."""
 
     def __init__(self, calls: Sequence[TracedCall]) -> None:
-        self.guards: dict[int, Guard] = {}
         self._calls = calls
         self._readers: dict[TracedVector, list[int]] = {}
         self._writer: dict[TracedVector, int] = {}
@@ -68,41 +82,63 @@ class _Search:
             for vector in call.inputs:
                 self._readers.setdefault(vector, []).append(k)
 
-    def leave_out(self, word: TracedVector) -> None:
-        """Find the calls that are without effect where ``word`` is 0."""
-        found = self._simplified(word)
-        left, standing = set[int](), set[TracedVector]()
+    def left_out(self, word: Part, without: Collection[int]) -> dict[int, Guard]:
+        """The calls that are without effect where ``word`` is 0, but for those ``without``."""
+        assert word.vector is not None
+        found = self._simplified(word.vector, word.start)
+        left, standing = dict[int, Guard](), {word.vector}
         looked_at = set(found)
         waiting = [-k for k in found]
         heapify(waiting)
         while waiting:
             k = -heappop(waiting)
-            otherwise = None if k in self.guards else self._otherwise(k, found.get(k), left, standing)
+            otherwise = None if k in without else self._otherwise(k, found.get(k), left.keys(), standing)
             if otherwise is None:
                 continue
-            left.add(k)
+            left[k] = Guard(word, otherwise)
             standing |= {part.vector for part in otherwise if part is not None and part.vector is not None}
-            self.guards[k] = Guard(word, otherwise)
             for vector in self._calls[k].inputs:
                 writer = self._writer.get(vector)
-                if writer is not None and writer not in looked_at and vector != word:
+                if writer is not None and writer not in looked_at:
                     looked_at.add(writer)
                     heappush(waiting, -writer)
+        return left
+
+    def in_one_piece(self, order: Sequence[int], left: Mapping[int, Guard]) -> list[int] | None:
+        """The calls in an order in which those of a section follow one another; None if there is none."""
+        places = [i for i, k in enumerate(order) if k in left]
+        if not places:
+            return None
+        inside, before, after = list[int](), list[int](), list[int]()
+        follows: set[TracedVector] = set()
+        within: set[TracedVector] = set()
+        for k in order[places[0] : places[-1] + 1]:
+            call = self._calls[k]
+            if k in left:
+                if not follows.isdisjoint(call.inputs):
+                    return None
+                inside.append(k)
+                within.update(call.outputs)
+            elif within.isdisjoint(call.inputs) and follows.isdisjoint(call.inputs):
+                before.append(k)
+            else:
+                after.append(k)
+                follows.update(call.outputs)
+        return [*order[: places[0]], *before, *inside, *after, *order[places[-1] + 1 :]]
 
     def needed(self, words: Sequence[TracedVector]) -> set[int]:
-        """The calls that the words depend on: they come first, and none is left out."""
+        """The calls that words depend on."""
         found: set[int] = set()
         waiting = [self._writer[word] for word in words if word in self._writer]
         while waiting:
             k = waiting.pop()
             if k not in found:
                 found.add(k)
-                self.guards.pop(k, None)
                 waiting += [self._writer[vector] for vector in self._calls[k].inputs if vector in self._writer]
         return found
 
     def _otherwise(
-        self, k: int, found: list[Part | None] | None, left: set[int], standing: set[TracedVector]
+        self, k: int, found: list[Part | None] | None, left: Collection[int], standing: Collection[TracedVector]
     ) -> tuple[Part | None, ...] | None:
         """What stands for the results of a call; None if one of them is needed and has to be computed.
 
@@ -111,15 +147,15 @@ class _Search:
         parts: list[Part | None] = []
         outputs = self._calls[k].outputs
         for vector, part in zip(outputs, found or [None] * len(outputs), strict=True):
-            needed = bool(vector.name) or vector in standing or not left.issuperset(self._readers.get(vector, ()))
+            needed = bool(vector.name) or vector in standing or any(reader not in left for reader in self._readers.get(vector, ()))
             if needed and (vector.name or part is None):
                 return None
             parts.append(part if needed else None)
         return tuple(parts)
 
-    def _simplified(self, word: TracedVector) -> dict[int, list[Part | None]]:
+    def _simplified(self, word: TracedVector, start: int) -> dict[int, list[Part | None]]:
         """For each call that reads something known what its results are, as far as they are known; in order."""
-        known: dict[TracedVector, Known] = {word: (True,)}
+        known: dict[TracedVector, Known] = {word: tuple(j == start for j in range(word.size))}
         found: dict[int, list[Part | None]] = {}
         waiting = list(self._readers.get(word, ()))
         heapify(waiting)

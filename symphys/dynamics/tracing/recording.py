@@ -44,6 +44,7 @@ class TracedCall:
     inputs: tuple[TracedVector, ...]
     outputs: tuple[TracedVector, ...]
     guard: Any = None
+    section: Any = None
 
 
 class Recorder(Tracer):
@@ -54,6 +55,7 @@ class Recorder(Tracer):
         super().__init__()
         self.calls: list[TracedCall] = []
         self.guards: list[TracedVector] = []
+        self.sections: list[tuple[TracedVector, int]] = []
         self._slots: list[TracedVector] = []
         self._adopted: list[Expr] = []
         self._given: dict[tuple[int, tuple[int, ...]], Sequence[int]] = {}
@@ -67,6 +69,12 @@ class Recorder(Tracer):
         (code,) = word.codes if isinstance(word, TracedMatrix) else self._codes(word)
         if not isinstance(code, float):
             self.guards.append(self._slots[code[0]])
+
+    def section(self, word: Any) -> None:
+        """See ``decorator.section``."""
+        (code,) = word.codes if isinstance(word, TracedMatrix) else self._codes(word)
+        if not isinstance(code, float):
+            self.sections.append((self._slots[code[0]], code[1]))
 
     def gathered(self, tree: T) -> T:
         """The same tree; each part of it that has a slot lies in a slot of its own."""

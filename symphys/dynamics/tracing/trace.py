@@ -80,6 +80,9 @@ class Tracer(ABC):
     def guard(self, word: Any) -> None:
         """What tells which calls are without effect; of use to a recorder alone."""
 
+    def section(self, word: Any) -> None:
+        """Likewise."""
+
     def gathered(self, tree: T) -> T:
         """The same tree."""
         return tree
