@@ -172,7 +172,7 @@ static void take_in(const program *p, left_out *x, const char *needed) {
     both += needed[i] || x->on[i];
   }
   if (!missing) return;
-  int keep = both <= wanted + wanted / 4 + 4;
+  int keep = both <= wanted + wanted / 8 + 1;
   for (word i = 0; i < guards; i++) x->on[i] = needed[i] || (keep && x->on[i]);
   x->forward = x->backward = 0;
 }

@@ -8,14 +8,16 @@ step agrees. A compiled kernel leaves out the calls of pairs that are far (``sym
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import hypot
 from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.context import State, StepContext
+from symphys.dynamics.context import State, StepContext, StepSettings
 from symphys.dynamics.tracing.decorator import guard, traced
 from symphys.maths.smoothing import length
+from symphys.model.body import Body
 from symphys.model.scalar import is_number
 from symphys.model.shapes import Plane
 from symphys.model.world import Side, World
@@ -32,40 +34,56 @@ def near_pairs(context: StepContext, x: State) -> tuple[Expr, ...]:
 
     Smoothed contacts act from afar, so with smoothing all are near.
     """
-    world = context.world
+    world, settings = context.world, context.settings
     sides = [(pair.first, pair.second) for pair in world.pairs]
-    held = {index for joint in world.joints for index in joint.bodies}
     if len(set(sides)) < FEWEST:
         return ()
-    dt, gravity, smoothing = context.settings.scheme.dt, context.settings.gravity, context.settings.smoothing
-    speeds = tuple(
-        _speed(x[f"{body.name}.velocity"], x[f"{body.name}.reaction_force"], _push(context, body.name), body.mass, gravity, dt)
-        for body in world.bodies
-    )
-    fastest = _fastest(speeds)
+    held = {index for joint in world.joints for index in joint.bodies}
+    bodies = [_sight(x, body, context.input(f"{body.name}.force"), settings) for body in world.bodies]
+    fastest = _fastest(tuple(body.speed for body in bodies))
     found = dict[tuple[Side, Side], Expr]()
     for first, second in dict.fromkeys(sides):
         radii = _radius(world, first, held), _radius(world, second, held)
-        if None in radii:
+        if first.body is None or radii[0] is None or radii[1] is None:
             found[first, second] = ca.SX(1)
-            continue
-        position = x[f"{world.bodies[first.body or 0].name}.position"]
-        if second.body is None:
+        elif second.body is None:
             plane = world.surface(second)
             assert isinstance(plane, Plane)
-            speed = speeds[first.body], ca.SX(0), fastest
-            near = _near_plane(position, (plane.normal, plane.offset), radii[0], dt, speed, smoothing)
+            place = plane.normal, plane.offset
+            found[first, second] = guard(_near_plane(bodies[first.body], place, radii[0], fastest, settings))
         else:
-            speed = speeds[first.body], speeds[second.body], fastest
-            other = x[f"{world.bodies[second.body].name}.position"]
-            near = _near(position, other, sum(radii), dt, speed, smoothing)
-        found[first, second] = guard(near)
+            both = bodies[first.body], bodies[second.body]
+            found[first, second] = guard(_near(*both, radii[0] + radii[1], fastest, settings))
     return tuple(found[each] for each in sides)
 
 
-def _push(context: StepContext, name: str) -> Expr:
-    given = context.input(f"{name}.force")
-    return ca.SX.zeros(3) if given is None else given
+@dataclass(frozen=True)
+class _Sight:
+    """What the broad phase needs of a body.
+
+    Attributes:
+        position, velocity: (3,) [m], [m/s].
+        gained: of speed within the step, without gravity and blows [m/s].
+        speed: the largest within the step [m/s].
+    """
+
+    position: Expr
+    velocity: Expr
+    gained: Expr
+    speed: Expr
+
+
+def _sight(x: State, body: Body, push: Expr | None, settings: StepSettings) -> _Sight:
+    parts = (x[f"{body.name}.{field}"] for field in ("position", "velocity", "reaction_force"))
+    return _seen(*parts, ca.SX.zeros(3) if push is None else push, body.mass, settings.gravity, settings.scheme.dt)
+
+
+@traced
+def _seen(
+    position: Expr, velocity: Expr, reaction: Expr, push: Expr, mass: Expr, gravity: Expr, dt: Expr
+) -> _Sight:
+    gained = dt * (length(reaction) + length(push)) / mass
+    return _Sight(position, velocity, gained, length(velocity) + gained + dt * length(gravity))
 
 
 def _radius(world: World, side: Side, held: set[int]) -> float | None:
@@ -79,24 +97,21 @@ def _radius(world: World, side: Side, held: set[int]) -> float | None:
 
 
 @traced
-def _speed(velocity: Expr, reaction: Expr, push: Expr, mass: Expr, gravity: Expr, dt: Expr) -> Expr:
-    """The largest speed of a body within the step before anything hits it [m/s]."""
-    return length(velocity) + dt * (length(gravity) + (length(reaction) + length(push)) / mass)
-
-
-@traced
 def _fastest(speeds: Sequence[Expr]) -> Expr:
     return ca.mmax(ca.vertcat(*speeds))
 
 
 @traced
-def _near(a: Expr, b: Expr, radii: float, dt: Expr, speeds: tuple[Expr, ...], smoothing: Expr) -> Expr:
-    return ca.logic_or(length(a - b) < radii + dt * sum(speeds), smoothing > 0)
+def _near(a: _Sight, b: _Sight, radii: float, fastest: Expr, settings: StepSettings) -> Expr:
+    reach = settings.scheme.dt * (length(a.velocity - b.velocity) + a.gained + b.gained + fastest)
+    return ca.logic_or(length(a.position - b.position) < radii + reach, settings.smoothing > 0)
 
 
 @traced
 def _near_plane(
-    position: Expr, plane: tuple[Any, Any], radius: float, dt: Expr, speeds: tuple[Expr, ...], smoothing: Expr
+    a: _Sight, plane: tuple[Any, Any], radius: float, fastest: Expr, settings: StepSettings
 ) -> Expr:
     normal, offset = plane
-    return ca.logic_or(ca.dot(ca.vertcat(*normal), position) - offset < radius + dt * sum(speeds), smoothing > 0)
+    reach = settings.scheme.dt * (a.speed + fastest)
+    height = ca.dot(ca.vertcat(*normal), a.position) - offset
+    return ca.logic_or(height < radius + reach, settings.smoothing > 0)
