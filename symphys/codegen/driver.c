@@ -1,5 +1,4 @@
 /* The loops over blocks of lanes, time and calls. Programs are data: what is compiled does not depend on their length. */
-#include <string.h>
 
 typedef struct {
   word rows;
@@ -100,6 +99,9 @@ static void record(const batch *x, const V *m, word row, word rows) {
 /* Memory: size vectors, then the tape, then size vectors of adjoints, then what ``guards.c`` notes. */
 API void evaluate(const program *p, const batch *x, V *m) {
   V *b = m + p->size + p->tape;
+#ifdef FRESH
+  if (p->calls.count) prepare(p, m);
+#endif
   for (word row = 0; row < x->rows; row += LANES) {
     word rows = x->rows - row < LANES ? x->rows - row : LANES;
     fill(p, x, m, row, rows);

@@ -1,5 +1,15 @@
 /* Calls that are without effect are left out; emit/guarding.py says what the data mean. What the driver notes lies behind
    the adjoints and stays from one evaluation to the next: ``prepare`` begins it. */
+#include <string.h>
+
+#ifndef LOWEST
+static int LOWEST(unsigned long long bits) {
+  int lowest = 0;
+  for (; !(bits & 1); bits >>= 1) lowest++;
+  return lowest;
+}
+#endif
+
 typedef struct {
   word forward, backward;   /* whether the lists of a direction have what is on */
   char *on, *needed, *seen; /* by guard: in the lists, needed in a step; by step and guard: needed */
@@ -118,7 +128,7 @@ static void note(const program *p, left_out *x, int backward) {
   for (word t = from; t < to; t++) x->counts[t] = x->copies[t] = 0;
   for (word block = 0; block <= p->calls.count / 64; block++)
     for (unsigned long long left = x->runs[block]; left; left &= left - 1) {
-      word k = 64 * block + __builtin_ctzll(left);
+      word k = 64 * block + LOWEST(left);
       const word *call = p->calls.places + 7 * k, *section = p->sections.places + 5 * s;
       if (inside && k >= section[1]) {
         for (word t = from; t < to; t++) end_section(p, x, t, s);

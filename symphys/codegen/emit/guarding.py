@@ -53,8 +53,8 @@ class Guarding:
     arena: int
 
     def count(self, name: str) -> int:
-        """Rows of a kind."""
-        return len(self.rows[name]) // WIDTHS[name]
+        """Rows of a kind; of calls without the last."""
+        return len(self.rows[name]) // WIDTHS[name] - (name == "calls")
 
 
 def guarding_of(program: Program, tables: Mapping[str, tuple[Sequence[FunctionCall], Entries]]) -> Guarding | None:

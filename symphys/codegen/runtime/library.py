@@ -103,7 +103,6 @@ class Loaded:
         self.data.first = guarding.first
         for name, words in guarding.rows.items():
             setattr(self.data, name, self._list(guarding.count(name), words if words.size else np.zeros(1, np.int64)))
-        self.data.calls.count -= 1
 
     def _list(self, count: int, words: Any) -> List:
         self._kept.append(words)

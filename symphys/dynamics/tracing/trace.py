@@ -34,9 +34,6 @@ from symphys.dynamics.tracing.pytree import (
 )
 
 T = TypeVar("T")
-
-TOGETHER = 6
-"""Numbers of a result, or of a member of it, that stay side by side."""
 Expr = Any
 """casadi SX"""
 
@@ -212,17 +209,19 @@ class _Given:
         The few numbers of a body, such as its velocities, stay together, also those that are left as they were.
         """
         numbers = [matrix.nonzeros() for matrix in matrices]
-        size, new = dict[int, int](), dict[int, bool]()
+        by_slot: dict[int, list[list[Expr]]] = {}
         for slot, own in zip(slots, numbers, strict=True):
-            size[slot] = size.get(slot, 0) + len(own)
-            new[slot] = new.get(slot, False) or any(map(self._is_new, own))
+            by_slot.setdefault(slot, []).append(own)
+        anew = {slot: self._together(parts) for slot, parts in by_slot.items()}
         return tuple(
-            TracedMatrix(
-                outline(matrix),
-                tuple([self._code(number, slot, new[slot] and size[slot] <= TOGETHER) for number in own]),
-            )
+            TracedMatrix(outline(matrix), tuple([self._code(number, slot, anew[slot]) for number in own]))
             for matrix, slot, own in zip(matrices, slots, numbers, strict=True)
         )
+
+    def _together(self, parts: Sequence[Sequence[Expr]]) -> bool:
+        """Whether all numbers of a slot go there: one or two vectors of space, of which something is new."""
+        vectors = len(parts) <= 2 and all(len(part) == 3 for part in parts)
+        return vectors and any(self._is_new(number) for part in parts for number in part)
 
     def _is_new(self, number: Expr) -> bool:
         return not number.is_constant() and number.element_hash() not in self._homes
