@@ -59,11 +59,14 @@ def defer_impacts(context: StepContext, x: State, duration: Expr, splits: Sequen
         for body in first.keys() & set(bodies_of(pair)):
             first[body] = _sooner(first[body], meets, contact.time, contact.rate)
     found, chained, plastic = list[Expr](), ca.SX(0), ca.SX(0)
+    touching: dict[int, list[int]] = {}
+    for j, pair in enumerate(pairs):
+        for body in bodies_of(pair):
+            touching.setdefault(body, []).append(j)
     for (pair, each, contact), (fast, meets) in zip(looked_at, hits, strict=True):
         waits = _passes(fast, meets)
         for body in sorted(first.keys() & set(bodies_of(pair))):
-            struck = [split.struck[j] for split in splits for j, other in enumerate(pairs) if body in bodies_of(other)]
-            struck = struck if body in eccentric else []
+            struck = [split.struck[j] for split in splits for j in touching[body]] if body in eccentric else []
             waits = _later(waits, fast, contact.time, first[body][0], tuple(struck))
             if (room := _room(world, pair, eccentric)) is not None:
                 before, sight = ((waits,), (chained,), (plastic,)), (fast, contact, each)

@@ -74,19 +74,19 @@ class _Search:
 
     def __init__(self, calls: Sequence[TracedCall]) -> None:
         self._calls = calls
-        self._readers: dict[TracedVector, list[int]] = {}
-        self._writer: dict[TracedVector, int] = {}
-        self._evaluated: dict[tuple[int, tuple[Known, ...]], list[list[Any]]] = {}
+        self._readers: dict[int, list[int]] = {}
+        self._writer: dict[int, int] = {}
+        self._evaluated: dict[tuple[int, tuple[Known | None, ...]], list[tuple[_Same | None, Known | None]]] = {}
         for k, call in enumerate(calls):
-            self._writer |= dict.fromkeys(call.outputs, k)
+            self._writer |= {vector.number: k for vector in call.outputs}
             for vector in call.inputs:
-                self._readers.setdefault(vector, []).append(k)
+                self._readers.setdefault(vector.number, []).append(k)
 
     def left_out(self, word: Part, without: Collection[int]) -> dict[int, Guard]:
         """The calls that are without effect where ``word`` is 0, but for those ``without``."""
         assert word.vector is not None
         found = self._simplified(word.vector, word.start)
-        left, standing = dict[int, Guard](), {word.vector}
+        left, standing = dict[int, Guard](), {word.vector.number}
         looked_at = set(found)
         waiting = [-k for k in found]
         heapify(waiting)
@@ -96,9 +96,9 @@ class _Search:
             if otherwise is None:
                 continue
             left[k] = Guard(word, otherwise)
-            standing |= {part.vector for part in otherwise if part is not None and part.vector is not None}
+            standing |= {part.vector.number for part in otherwise if part is not None and part.vector is not None}
             for vector in self._calls[k].inputs:
-                writer = self._writer.get(vector)
+                writer = self._writer.get(vector.number)
                 if writer is not None and writer not in looked_at:
                     looked_at.add(writer)
                     heappush(waiting, -writer)
@@ -110,35 +110,36 @@ class _Search:
         if not places:
             return None
         inside, before, after = list[int](), list[int](), list[int]()
-        follows: set[TracedVector] = set()
-        within: set[TracedVector] = set()
+        follows, within = set[int](), set[int]()
         for k in order[places[0] : places[-1] + 1]:
-            call = self._calls[k]
+            reads = [vector.number for vector in self._calls[k].inputs]
+            writes = [vector.number for vector in self._calls[k].outputs]
             if k in left:
-                if not follows.isdisjoint(call.inputs):
+                if not follows.isdisjoint(reads):
                     return None
                 inside.append(k)
-                within.update(call.outputs)
-            elif within.isdisjoint(call.inputs) and follows.isdisjoint(call.inputs):
+                within.update(writes)
+            elif within.isdisjoint(reads) and follows.isdisjoint(reads):
                 before.append(k)
             else:
                 after.append(k)
-                follows.update(call.outputs)
+                follows.update(writes)
         return [*order[: places[0]], *before, *inside, *after, *order[places[-1] + 1 :]]
 
     def needed(self, words: Sequence[TracedVector]) -> set[int]:
         """The calls that words depend on."""
         found: set[int] = set()
-        waiting = [self._writer[word] for word in words if word in self._writer]
+        waiting = [self._writer[word.number] for word in words if word.number in self._writer]
         while waiting:
             k = waiting.pop()
             if k not in found:
                 found.add(k)
-                waiting += [self._writer[vector] for vector in self._calls[k].inputs if vector in self._writer]
+                inputs = (vector.number for vector in self._calls[k].inputs)
+                waiting += [self._writer[number] for number in inputs if number in self._writer]
         return found
 
     def _otherwise(
-        self, k: int, found: list[Part | None] | None, left: Collection[int], standing: Collection[TracedVector]
+        self, k: int, found: list[Part | None] | None, left: Collection[int], standing: Collection[int]
     ) -> tuple[Part | None, ...] | None:
         """What stands for the results of a call; None if one of them is needed and has to be computed.
 
@@ -147,7 +148,7 @@ class _Search:
         parts: list[Part | None] = []
         outputs = self._calls[k].outputs
         for vector, part in zip(outputs, found or [None] * len(outputs), strict=True):
-            needed = bool(vector.name) or vector in standing or any(reader not in left for reader in self._readers.get(vector, ()))
+            needed = bool(vector.name) or vector.number in standing or not all(map(left.__contains__, self._readers.get(vector.number, ())))
             if needed and (vector.name or part is None):
                 return None
             parts.append(part if needed else None)
@@ -155,53 +156,72 @@ class _Search:
 
     def _simplified(self, word: TracedVector, start: int) -> dict[int, list[Part | None]]:
         """For each call that reads something known what its results are, as far as they are known; in order."""
-        known: dict[TracedVector, Known] = {word: tuple(j == start for j in range(word.size))}
+        known: dict[int, Known] = {word.number: tuple(j == start for j in range(word.size))}
         found: dict[int, list[Part | None]] = {}
-        waiting = list(self._readers.get(word, ()))
+        waiting = list(self._readers.get(word.number, ()))
         heapify(waiting)
         while waiting:
             k = heappop(waiting)
             if k in found:
                 continue
             call = self._calls[k]
-            zeros = tuple(known.get(vector, (False,) * vector.size) for vector in call.inputs)
+            zeros = tuple([known.get(vector.number) for vector in call.inputs])
             found[k] = []
-            for vector, entries in zip(call.outputs, self._results(call.function, zeros), strict=True):
-                found[k].append(_part(entries, call.inputs))
-                if any(entry == 0 for entry in entries):
-                    known[vector] = tuple(entry == 0 for entry in entries)
-                    for reader in self._readers.get(vector, ()):
+            for vector, (same, zero) in zip(call.outputs, self._results(call.function, zeros), strict=True):
+                found[k].append(None if same is None else same.of(call.inputs))
+                if zero is not None:
+                    known[vector.number] = zero
+                    for reader in self._readers.get(vector.number, ()):
                         heappush(waiting, reader)
         return found
 
-    def _results(self, function: ca.Function, zeros: tuple[Known, ...]) -> list[list[Any]]:
-        """The entries of each result: 0, or (argument, entry) that it equals, or None."""
+    def _results(self, function: ca.Function, zeros: tuple[Known | None, ...]) -> list[tuple[_Same | None, Known | None]]:
+        """For each result what it equals, with the number of an argument as its vector; and where it is 0, if it is."""
         key = function.__hash__(), zeros
         if key not in self._evaluated:
-            symbols = [ca.SX.sym("a", len(known)) for known in zeros]
+            symbols = [ca.SX.sym("a", function.numel_in(i)) for i in range(function.n_in())]
             homes = {e.element_hash(): (i, j) for i, column in enumerate(symbols) for j, e in enumerate(column.nonzeros())}
             arguments = []
             for column, known in zip(symbols, zeros, strict=True):
-                entries = [ca.SX(0) if zero else e for zero, e in zip(known, column.nonzeros(), strict=True)]
-                arguments.append(ca.vertcat(*entries) if entries else column)
-            results = function.call([ca.densify(each) for each in arguments])
-            self._evaluated[key] = [[_entry(e, homes) for e in ca.densify(result).nonzeros()] for result in results]
+                entries = column.nonzeros()
+                if known is not None:
+                    entries = [ca.SX(0) if zero else e for zero, e in zip(known, entries, strict=True)]
+                arguments.append(ca.densify(ca.vertcat(*entries)) if entries else column)
+            found = []
+            for result in function.call(arguments):
+                entries = [_entry(e, homes) for e in ca.densify(result).nonzeros()]
+                zero = tuple(entry == 0 for entry in entries)
+                found.append((_part(entries), zero if any(zero) else None))
+            self._evaluated[key] = found
         return self._evaluated[key]
 
 
 def _entry(expression: Expr, homes: dict[int, tuple[int, int]]) -> Any:
+    """0, (argument, entry) that an expression equals, or None."""
     if expression.is_constant():
         return 0 if float(expression) == 0 else None
     return homes.get(expression.element_hash())
 
 
-def _part(entries: Sequence[Any], inputs: Sequence[TracedVector]) -> Part | None:
+def _part(entries: Sequence[Any]) -> _Same | None:
     """What a result equals: zeros, or neighbouring entries of one argument; None if it has to be computed."""
     if all(entry == 0 for entry in entries):
-        return Part(None)
+        return _Same(None)
     if any(entry is None or entry == 0 for entry in entries):
         return None
     (argument, start), *_ = entries
     if any(entry != (argument, start + j) for j, entry in enumerate(entries)):
         return None
-    return Part(inputs[argument], start)
+    return _Same(argument, start)
+
+
+@dataclass(frozen=True)
+class _Same:
+    """Entries ``start`` and after of an argument, by its number; of None: zeros."""
+
+    argument: int | None
+    start: int = 0
+
+    def of(self, inputs: Sequence[TracedVector]) -> Part:
+        """The same of the vectors of a call."""
+        return Part(None if self.argument is None else inputs[self.argument], self.start)

@@ -126,7 +126,7 @@ class Recorder(Tracer):
     def _adopt(self, column: Expr) -> None:
         homes = {symbol.element_hash(): self._homes[symbol.element_hash()][0] for symbol in ca.symvar(column)}
         slots = list(dict.fromkeys(homes.values()))
-        symbols = [self._columns[slot] for slot in slots]
+        symbols = [self._column(slot) for slot in slots]
         (given,) = self._add("", self.shared(ca.Function("piece", symbols, [column])), slots)
         self._adopted.append(column)
         self._homes |= {entry.element_hash(): (given, k) for k, entry in enumerate(column.nonzeros())}
@@ -177,8 +177,8 @@ class Recorder(Tracer):
     def _add(self, name: str, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
         first = len(self._slots)
         for k in range(function.n_out()):
-            symbols = ca.SX.sym("kept", function.numel_out(k))
-            self._slots.append(TracedVector(name, symbols.numel(), self.take(symbols)))
+            size = function.numel_out(k)
+            self._slots.append(TracedVector(name, size, self._slot(size)))
         self.calls.append(TracedCall(function, tuple(self._slots[k] for k in slots), tuple(self._slots[first:])))
         return range(first, len(self._slots))
 

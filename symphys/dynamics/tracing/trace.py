@@ -62,8 +62,9 @@ class Tracer(ABC):
     def __init__(self, reduces: bool = True) -> None:
         """``reduces``: what a function computes twice is looked for, which takes up to half of the building."""
         self._reduces = reduces
-        self._columns: list[Expr] = []
+        self._columns: list[Expr | None] = []
         self._entries: list[list[Expr]] = []
+        self._sizes: list[int] = []
         self._homes: dict[int, tuple[int, int]] = {}
         self._templates: dict[Hashable, Template] = {}
         self._functions: dict[str, ca.Function] = {}
@@ -94,17 +95,37 @@ class Tracer(ABC):
 
     def take(self, column: Expr) -> int:
         """A slot for a column of symbols or expressions."""
-        self._columns.append(column)
-        self._entries.append(column.nonzeros())
-        for place, entry in enumerate(self._entries[-1]):
-            self._homes.setdefault(entry.element_hash(), (len(self._columns) - 1, place))
-        return len(self._columns) - 1
+        number = self._slot(column.numel())
+        self._hold(number, column)
+        return number
+
+    def _slot(self, size: int) -> int:
+        """A slot of that size, as yet without expressions."""
+        self._columns.append(None)
+        self._entries.append([])
+        self._sizes.append(size)
+        return len(self._sizes) - 1
+
+    def _hold(self, number: int, column: Expr) -> None:
+        self._columns[number], self._entries[number] = column, column.nonzeros()
+        for place, entry in enumerate(self._entries[number]):
+            self._homes.setdefault(entry.element_hash(), (number, place))
+
+    def _column(self, number: int) -> Expr:
+        """What lies in a slot: symbols, once somebody asks for what a call has given."""
+        if self._columns[number] is None:
+            self._hold(number, ca.SX.sym("kept", self._sizes[number]))
+        return self._columns[number]
+
+    def _entry(self, code: tuple[int, int]) -> Expr:
+        self._column(code[0])
+        return self._entries[code[0]][code[1]]
 
     def value(self, leaf: Expr) -> Expr:
         """A leaf of a tree as an expression."""
         if not isinstance(leaf, TracedMatrix):
             return leaf
-        entries = [ca.SX(c) if isinstance(c, float) else self._entries[c[0]][c[1]] for c in leaf.codes]
+        entries = [ca.SX(c) if isinstance(c, float) else self._entry(c) for c in leaf.codes]
         return matrix(leaf.leaf, entries)
 
     def call(self, function: Callable[..., T], arguments: tuple[Any, ...], named: dict[str, Any]) -> T:
@@ -118,7 +139,7 @@ class Tracer(ABC):
             known.append(
                 tuple([c if isinstance(c, float) else (slots.setdefault(c[0], len(slots)), c[1]) for c in codes])
             )
-        key = (function, shape, tuple(known), tuple([self._columns[slot].numel() for slot in slots]))
+        key = (function, shape, tuple(known), tuple([self._sizes[slot] for slot in slots]))
         template = self._templates.get(key)
         if template is None:
             template = self._templates[key] = self._build(function, shape, known, slots)
@@ -135,7 +156,7 @@ class Tracer(ABC):
 
     def _build(self, function: Callable[..., Any], shape: Any, known: Sequence[Any], slots: Iterable[int]) -> Template:
         """The template of a function for arguments of this structure."""
-        symbols = [ca.SX.sym("a", self._columns[slot].numel()) for slot in slots]
+        symbols = [ca.SX.sym("a", self._sizes[slot]) for slot in slots]
         entries: list[list[Expr]] = [symbol.nonzeros() for symbol in symbols]
         outlines: list[Leaf] = []
         leaves_of(shape, outlines)
@@ -189,10 +210,11 @@ class InlineTracer(Tracer):
         self.take(column)
 
     def _apply(self, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
-        first, columns = len(self._columns), function.call([self._columns[slot] for slot in slots])
-        self._columns += columns
-        self._entries += [column.nonzeros() for column in columns]
-        return range(first, len(self._columns))
+        columns = function.call([self._column(slot) for slot in slots])
+        found = [self._slot(column.numel()) for column in columns]
+        for number, column in zip(found, columns, strict=True):
+            self._columns[number], self._entries[number] = column, column.nonzeros()
+        return found
 
 
 class _Given:
