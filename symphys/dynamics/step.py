@@ -14,7 +14,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.broad_phase import near_pairs
+from symphys.dynamics.collision.broad_phase import near_pairs
 from symphys.dynamics.context import State, StepContext
 from symphys.dynamics.impact.deferred_impacts import defer_impacts
 from symphys.dynamics.impact.impact import StepSplit, find_split, resolve_impact

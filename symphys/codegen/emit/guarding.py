@@ -143,14 +143,14 @@ class _Rows:
             "sections": self._sections,
             "copies": self._copies,
         }
-        calls, sections, copies, chains = len(self._body), len(self._sections), len(self._copies), len(self._chains.roots)
+        calls, sections = len(self._body), len(self._sections)
         seen = (2 + self._program.steps) * len(self._guards) // 8 + 1
-        arena = 64 + seen + calls // 64 + 1 + self._words + 3 * (calls + sections) + 2 * chains
+        arena = 64 + seen + calls // 64 + 1 + self._words + 3 * (calls + sections) + 2 * len(self._chains.roots)
         computes = [k for k, call in enumerate(self._body) if any(place.offset in word for place in call.outputs)]
         return Guarding(
             first=1 + max(computes, default=NONE),
             rows={name: np.array(each, np.int64).ravel() for name, each in rows.items()},
-            arena=arena + 3 * (6 * sections + 4 * copies),
+            arena=arena + 3 * (6 * sections + 4 * len(self._copies)),
         )
 
 
@@ -176,7 +176,9 @@ class _Chains:
     def source(self, place: Place) -> tuple[int, int, int]:
         """(chain, offset in it, 0), or (NONE, offset, stride)."""
         chain = self.of(place)
-        return (NONE, place.offset, place.stride) if chain == NONE else (chain, place.offset - self._newest[chain].offset, 0)
+        if chain == NONE:
+            return NONE, place.offset, place.stride
+        return chain, place.offset - self._newest[chain].offset, 0
 
     def extend(self, place: Place, other: Place) -> int:
         """The chain that a result goes on with, for which ``other`` may stand; a new one if that is part of none."""

@@ -84,7 +84,7 @@ def section(word: T) -> T:
 
 
 def gathered(tree: T) -> T:
-    """The same tree; between calls its numbers then lie side by side, so that a call that is left out has a stand-in."""
+    """The same tree; between calls its numbers lie side by side, so that they can stand for results of a call."""
     tracer = _TRACER.get()
     return tree if tracer is None else tracer.gathered(tree)
 

@@ -21,6 +21,8 @@ Expr = Any
 """casadi SX"""
 Known = tuple[bool, ...]
 """For each entry of a vector whether it is known to be 0."""
+Pattern = tuple[Known | None, ...]
+"""What is known of each argument of a call; None: nothing."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,22 @@ class Guard:
 
     word: Part
     otherwise: tuple[Part | None, ...]
+
+
+@dataclass(frozen=True)
+class _Same:
+    """Entries ``start`` and after of an argument, by its number; of None: zeros."""
+
+    argument: int | None
+    start: int = 0
+
+    def of(self, inputs: Sequence[TracedVector]) -> Part:
+        """The same of the vectors of a call."""
+        return Part(None if self.argument is None else inputs[self.argument], self.start)
+
+
+Simplified = tuple[_Same | None, Known | None]
+"""What a result equals, and where it is 0."""
 
 
 def with_guards(
@@ -76,7 +94,7 @@ class _Search:
         self._calls = calls
         self._readers: dict[int, list[int]] = {}
         self._writer: dict[int, int] = {}
-        self._evaluated: dict[tuple[int, tuple[Known | None, ...]], list[tuple[_Same | None, Known | None]]] = {}
+        self._evaluated: dict[tuple[int, Pattern], list[Simplified]] = {}
         for k, call in enumerate(calls):
             self._writer |= {vector.number: k for vector in call.outputs}
             for vector in call.inputs:
@@ -148,7 +166,8 @@ class _Search:
         parts: list[Part | None] = []
         outputs = self._calls[k].outputs
         for vector, part in zip(outputs, found or [None] * len(outputs), strict=True):
-            needed = bool(vector.name) or vector.number in standing or not all(map(left.__contains__, self._readers.get(vector.number, ())))
+            readers = self._readers.get(vector.number, ())
+            needed = bool(vector.name) or vector.number in standing or not all(k in left for k in readers)
             if needed and (vector.name or part is None):
                 return None
             parts.append(part if needed else None)
@@ -175,23 +194,22 @@ class _Search:
                         heappush(waiting, reader)
         return found
 
-    def _results(self, function: ca.Function, zeros: tuple[Known | None, ...]) -> list[tuple[_Same | None, Known | None]]:
-        """For each result what it equals, with the number of an argument as its vector; and where it is 0, if it is."""
+    def _results(self, function: ca.Function, zeros: Pattern) -> list[Simplified]:
+        """What is known of each result."""
         key = function.__hash__(), zeros
         if key not in self._evaluated:
-            symbols = [ca.SX.sym("a", function.numel_in(i)) for i in range(function.n_in())]
-            homes = {e.element_hash(): (i, j) for i, column in enumerate(symbols) for j, e in enumerate(column.nonzeros())}
-            arguments = []
-            for column, known in zip(symbols, zeros, strict=True):
-                entries = column.nonzeros()
+            homes, arguments = dict[int, tuple[int, int]](), list[Expr]()
+            for i, known in enumerate(zeros):
+                entries: list[Expr] = ca.SX.sym("a", function.numel_in(i)).nonzeros()
+                homes |= {e.element_hash(): (i, j) for j, e in enumerate(entries)}
                 if known is not None:
                     entries = [ca.SX(0) if zero else e for zero, e in zip(known, entries, strict=True)]
-                arguments.append(ca.densify(ca.vertcat(*entries)) if entries else column)
-            found = []
+                arguments.append(ca.densify(ca.vertcat(ca.SX(0, 1), *entries)))
+            found = list[Simplified]()
             for result in function.call(arguments):
-                entries = [_entry(e, homes) for e in ca.densify(result).nonzeros()]
-                zero = tuple(entry == 0 for entry in entries)
-                found.append((_part(entries), zero if any(zero) else None))
+                same = [_entry(e, homes) for e in ca.densify(result).nonzeros()]
+                zero = tuple(entry == 0 for entry in same)
+                found.append((_part(same), zero if any(zero) else None))
             self._evaluated[key] = found
         return self._evaluated[key]
 
@@ -213,15 +231,3 @@ def _part(entries: Sequence[Any]) -> _Same | None:
     if any(entry != (argument, start + j) for j, entry in enumerate(entries)):
         return None
     return _Same(argument, start)
-
-
-@dataclass(frozen=True)
-class _Same:
-    """Entries ``start`` and after of an argument, by its number; of None: zeros."""
-
-    argument: int | None
-    start: int = 0
-
-    def of(self, inputs: Sequence[TracedVector]) -> Part:
-        """The same of the vectors of a call."""
-        return Part(None if self.argument is None else inputs[self.argument], self.start)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import count
 from typing import Any, TypeVar
 
 import casadi as ca
@@ -80,23 +81,24 @@ class Recorder(Tracer):
         """The same tree; each part of it that has a slot lies in a slot of its own."""
         leaves: list[Expr] = []
         shape = dismantle(tree, leaves)
-        columns: dict[int, list[Code]] = {}
+        columns: dict[int, list[tuple[int, int]]] = {}
         codes = [leaf.codes if isinstance(leaf, TracedMatrix) else self._codes(leaf) for leaf in leaves]
         for slot, each in zip(slots_of(shape), codes, strict=True):
             columns.setdefault(slot, []).extend(code for code in each if not isinstance(code, float))
         used: dict[int, int] = {}
         for column in columns.values():
-            for code in column:
-                used.setdefault(code[0], len(used))
-        symbols = [ca.SX.sym("a", self._slots[k].size) for k in used]
+            for number, _ in column:
+                used.setdefault(number, len(used))
+        symbols = [ca.SX.sym("a", self._sizes[k]) for k in used]
         results = [ca.vertcat(*(symbols[used[k]][j] for k, j in column)) for column in columns.values() if column]
         new = iter(self._apply(self.shared(ca.Function("piece", symbols, results)), list(used)) if results else ())
-        taken = {slot: (next(new), iter(range(len(column)))) for slot, column in columns.items() if column}
+        taken = {slot: (next(new), count()) for slot, column in columns.items() if column}
         found = []
         for slot, leaf, each in zip(slots_of(shape), leaves, codes, strict=True):
             moved = [c if isinstance(c, float) else (taken[slot][0], next(taken[slot][1])) for c in each]
             found.append(TracedMatrix(leaf.leaf if isinstance(leaf, TracedMatrix) else outline(leaf), tuple(moved)))
-        return rebuild(shape, iter(found))
+        together: T = rebuild(shape, iter(found))
+        return together
 
     def give(self, name: str, values: Sequence[Expr]) -> TracedVector:
         """A call that puts values side by side."""

@@ -77,9 +77,11 @@ class Tracer(ABC):
 
     def guard(self, word: Any) -> None:
         """What tells which calls are without effect; of use to a recorder alone."""
+        del word
 
     def section(self, word: Any) -> None:
         """Likewise."""
+        del word
 
     def gathered(self, tree: T) -> T:
         """The same tree."""

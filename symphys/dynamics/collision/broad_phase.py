@@ -1,8 +1,8 @@
 """The broad phase: pairs of surfaces that are too far apart to act within a step.
 
-A pair is far where the spheres around its surfaces are farther apart than its bodies go in the step at their speeds, one
-of them struck by the fastest body. A far pair gives no impulse. That is part of the scheme, so every way to compute a
-step agrees. A compiled kernel leaves out the calls of pairs that are far (``symphys.dynamics.tracing.guards``).
+A pair is far where the spheres around its surfaces are farther apart than its bodies go in the step at their speeds,
+one of them struck by the fastest body. A far pair gives no impulse. That is part of the scheme, so every way to compute
+a step agrees. A compiled kernel leaves out the calls of pairs that are far (``symphys.dynamics.tracing.guards``).
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from symphys.maths.smoothing import length
 from symphys.model.body import Body
 from symphys.model.scalar import is_number
 from symphys.model.shapes import Plane
+from symphys.model.shapes.shape import SolidShape
 from symphys.model.world import Side, World
 
 Expr = Any
@@ -74,23 +75,23 @@ class _Sight:
 
 
 def _sight(x: State, body: Body, push: Expr | None, settings: StepSettings) -> _Sight:
-    parts = (x[f"{body.name}.{field}"] for field in ("position", "velocity", "reaction_force"))
-    return _seen(*parts, ca.SX.zeros(3) if push is None else push, body.mass, settings.gravity, settings.scheme.dt)
+    position, velocity, reaction = (x[f"{body.name}.{field}"] for field in ("position", "velocity", "reaction_force"))
+    force = reaction, ca.SX.zeros(3) if push is None else push
+    return _seen(position, velocity, force, body.mass, settings.gravity, settings.scheme.dt)
 
 
 @traced
-def _seen(
-    position: Expr, velocity: Expr, reaction: Expr, push: Expr, mass: Expr, gravity: Expr, dt: Expr
-) -> _Sight:
-    gained = dt * (length(reaction) + length(push)) / mass
+def _seen(position: Expr, velocity: Expr, forces: tuple[Expr, Expr], mass: Expr, gravity: Expr, dt: Expr) -> _Sight:
+    gained = dt * (length(forces[0]) + length(forces[1])) / mass
     return _Sight(position, velocity, gained, length(velocity) + gained + dt * length(gravity))
 
 
 def _radius(world: World, side: Side, held: set[int]) -> float | None:
-    """Of the sphere around a surface, about the centre of mass of its body [m]; None if it has none or it may change."""
+    """Of the sphere around a surface, about the centre of mass of its body [m]; None: it has none, or may change."""
     surface = world.surface(side)
     if side.body is None:
         return 0.0 if isinstance(surface, Plane) else None
+    assert isinstance(surface, SolidShape)
     if side.body in held or not is_number((surface.centre, surface.sizes)):
         return None
     return hypot(*surface.centre) + surface.extent
@@ -108,9 +109,7 @@ def _near(a: _Sight, b: _Sight, radii: float, fastest: Expr, settings: StepSetti
 
 
 @traced
-def _near_plane(
-    a: _Sight, plane: tuple[Any, Any], radius: float, fastest: Expr, settings: StepSettings
-) -> Expr:
+def _near_plane(a: _Sight, plane: tuple[Any, Any], radius: float, fastest: Expr, settings: StepSettings) -> Expr:
     normal, offset = plane
     reach = settings.scheme.dt * (a.speed + fastest)
     height = ca.dot(ca.vertcat(*normal), a.position) - offset
