@@ -1,5 +1,4 @@
 /* The loops over blocks of lanes, time and calls. Programs are data: what is compiled does not depend on their length. */
-#include <string.h>
 
 typedef struct {
   word rows;
@@ -9,11 +8,6 @@ typedef struct {
   double discount;                      /* of the adjoint of what is discounted, in each step back */
   word skipped;                      /* steps at the end, in which nothing moves */
 } batch;
-
-static void run(const phase *calls, V *m, V *b, word k) {
-  const word *t = calls->entries;
-  for (word c = 0; c < calls->count; c++, t += t[1]) FUNCTIONS[t[0]](m, b, t + 2, k);
-}
 
 static word total(const ranges *r) {
   word sum = 0;
@@ -63,9 +57,11 @@ static void rested(const program *p, word steps, V *b) {
     for (word w = 0; w < x[1]; w++) b[x[0] + steps * x[2] + w] += b[x[0] + k * x[2] + w];
 }
 
-static void roll(const program *p, word steps, V *m) {
+static void roll(const program *p, word steps, V *m, int gradient) {
   run(&p->prologue, m, 0, 0);
-  for (word k = 0; k < steps; k++) run(&p->body, m, 0, k);
+  for (word k = 0; k < steps; k++)
+    if (p->calls.count) step_left(p, m, k, gradient);
+    else run(&p->body, m, 0, k);
   if (steps < p->steps) rest(p, steps, m);
   run(&p->epilogue, m, 0, 0);
 }
@@ -83,8 +79,11 @@ static void pull(const program *p, word steps, double discount, V *m, V *b) {
   run(&p->back_epilogue, m, b, 0);
   if (steps < p->steps) rested(p, steps, b);
   for (word k = steps - 1; k >= 0; k--) {
-    run(&p->again, m, 0, k);
-    run(&p->back_body, m, b, k);
+    if (p->calls.count) back_left(p, m, b, k);
+    else {
+      run(&p->again, m, 0, k);
+      run(&p->back_body, m, b, k);
+    }
     if (discount > 0) discount_adjoint(p, discount, m, b, k);
   }
   run(&p->back_prologue, m, b, 0);
@@ -97,13 +96,16 @@ static void record(const batch *x, const V *m, word row, word rows) {
         x->trajectory[((row + l) * x->count + k) * x->size + j] = (double)LANE(m[x->offset + k * x->stride + j], l);
 }
 
-/* Memory: size vectors, then the tape, then size vectors of adjoints. */
+/* Memory: size vectors, then the tape, then size vectors of adjoints, then what ``guards.c`` notes. */
 API void evaluate(const program *p, const batch *x, V *m) {
   V *b = m + p->size + p->tape;
+#ifdef FRESH
+  if (p->calls.count) prepare(p, m);
+#endif
   for (word row = 0; row < x->rows; row += LANES) {
     word rows = x->rows - row < LANES ? x->rows - row : LANES;
     fill(p, x, m, row, rows);
-    roll(p, p->steps - x->skipped, m);
+    roll(p, p->steps - x->skipped, m, x->gradient != 0);
     if (x->outputs) scatter(x->outputs, m, &p->outputs, total(&p->outputs), row, rows);
     if (x->trajectory) record(x, m, row, rows);
     if (!x->gradient) continue;

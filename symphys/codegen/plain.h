@@ -11,3 +11,4 @@ typedef int I; /* a mask: 0 or 1 */
 #define LANE(x, l) (x)
 #define NOINLINE
 #define API static
+#define FRESH 1 /* memory is the caller's, and new to every evaluation */

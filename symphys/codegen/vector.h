@@ -19,6 +19,7 @@ typedef N I __attribute__((vector_size(LANES * sizeof(R))));
 #define LANE(x, l) (x)[l]
 #define NAN __builtin_nan("")
 #define INFINITY __builtin_inf()
+#define LOWEST(x) __builtin_ctzll(x) /* of the bits that are set */
 #define NOINLINE __attribute__((noinline, unused))
 #define API __attribute__((visibility("default")))
 

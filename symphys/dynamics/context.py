@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +11,7 @@ import casadi as ca
 from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.state_layout import input_columns
-from symphys.model.world import Scheme, World
+from symphys.model.world import Pair, Scheme, World
 
 Expr = Any
 """casadi SX, MX or DM"""
@@ -56,12 +57,18 @@ class StepContext:
         settings: how.
         inputs: names of the forces and torques that ``u`` stacks.
         u: what the inputs stack, constant over the step.
+        near: per pair: 1 if it may act in the step, 0 if it is too far apart; empty: all may.
     """
 
     world: World
     settings: StepSettings
     inputs: tuple[str, ...]
     u: Expr
+    near: tuple[Expr, ...] = ()
+
+    def near_pairs(self) -> Iterator[tuple[Pair, Expr]]:
+        """The pairs, and whether they may act."""
+        return zip(self.world.pairs, self.near or [ca.SX(1)] * len(self.world.pairs), strict=True)
 
     def input(self, name: str) -> Expr | None:
         """The input of this name; None if there is none."""

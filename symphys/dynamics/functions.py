@@ -14,6 +14,7 @@ from symphys.dynamics.step import take_step
 from symphys.dynamics.step_report import report
 from symphys.dynamics.tracing.dead_code import without_dead_code
 from symphys.dynamics.tracing.decorator import tracing
+from symphys.dynamics.tracing.guards import with_guards
 from symphys.dynamics.tracing.recording import Recorder, TracedCall, TracedVector
 from symphys.dynamics.tracing.trace import InlineTracer
 from symphys.model.state_layout import Layout
@@ -113,7 +114,7 @@ def trace_step(
     for names in owners.values():
         slot = recorder.give("next", [after[name] for name in names])
         results[slot] = slice(layout[names[0]].start, layout[names[-1]].stop)
-    return TracedStep(without_dead_code(recorder.calls), results)
+    return TracedStep(with_guards(without_dead_code(recorder.calls), recorder.guards, recorder.sections), results)
 
 
 def _packed(layout: Layout, tracer: InlineTracer, x: State) -> Expr:

@@ -18,7 +18,7 @@ from symphys.dynamics.joints.assembly import KinematicTrees
 from symphys.dynamics.joints.coordinate_constraint import CoordinateConstraint
 from symphys.dynamics.joints.loop_closure import Displacements, TreeDisplacement, close_loops, displaced
 from symphys.dynamics.motion import PredictedMotion, apply
-from symphys.dynamics.tracing.decorator import repeat, traced
+from symphys.dynamics.tracing.decorator import gathered, repeat, traced
 from symphys.dynamics.unknowns import AllVelocities, GeneralizedVelocities, PlacedConstraint, Velocities
 from symphys.model.joints import kinematic_trees
 
@@ -112,10 +112,11 @@ def close_gaps(
     )
     limits = tuple(each for each in joints if _of_tree(each))
     fixed = PositionPass(trees.motions, rigid, limits, scheme.push_out)
-    before: Pushed = tuple(moved), tuple(ca.SX(0) for _ in rigid)
-    along, _ = repeat(scheme.position_sweeps, _push_all, fixed, before)
+    along = gathered(tuple(moved)) if context.near else tuple(moved)
+    before: Pushed = along, tuple(ca.SX(0) for _ in rigid)
+    pushed, _ = repeat(scheme.position_sweeps, _push_all, fixed, before)
     others = tuple(each for each in joints if not _of_tree(each))
-    along, by_loops = close_loops(scheme.position_sweeps, trees.motions, others, along)
+    along, by_loops = close_loops(scheme.position_sweeps, trees.motions, others, pushed)
     return _closed(context, trees, along, by_loops)
 
 
@@ -198,7 +199,7 @@ def _push(
     gap = contact.geometry.gap_after(moved[0], moved[1] if len(moved) > 1 else UNMOVED) + constraint.slack
     free = old - share * gap * constraint.normal_mass * constraint.separates
     # at 0 the slope is that of ``free``: a body that exactly touches is held by the surface
-    new = ca.if_else(ca.logic_or(lasts, free >= 0), free, 0)
+    new = constraint.near * ca.if_else(ca.logic_or(lasts, free >= 0), free, 0)
     step = (new - old) * constraint.normal
     if constraint.same:
         after = along[0]

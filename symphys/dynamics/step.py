@@ -14,11 +14,13 @@ from typing import Any
 
 import casadi as ca
 
+from symphys.dynamics.collision.broad_phase import near_pairs
 from symphys.dynamics.context import State, StepContext
 from symphys.dynamics.impact.deferred_impacts import defer_impacts
 from symphys.dynamics.impact.impact import StepSplit, find_split, resolve_impact
 from symphys.dynamics.impact.restitution import eccentric_bodies
 from symphys.dynamics.substep import Substep, advance
+from symphys.dynamics.tracing.decorator import section
 from symphys.model.world import Scheme, World
 
 Expr = Any
@@ -31,6 +33,7 @@ SPLITS_OFF_CENTRE = 2
 def take_step(context: StepContext, x: State) -> tuple[State, list[Substep]]:
     """The state after one step, and the substeps and impacts that led there."""
     left: Expr = ca.SX(context.settings.scheme.dt)
+    context = replace(context, near=near_pairs(context, x))
     count = splits_of(context.world, context.settings.scheme)
     substeps, splits = list[Substep](), list[StepSplit]()
 
@@ -40,6 +43,7 @@ def take_step(context: StepContext, x: State) -> tuple[State, list[Substep]]:
         before = advance(context, x, split.first, suppressed=split.fast)
 
         # the impact: no time passes
+        section(split.impact)
         impact = resolve_impact(context, before.x, split)
 
         x, left = impact.x, left - split.first

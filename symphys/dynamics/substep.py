@@ -37,7 +37,7 @@ from symphys.dynamics.motion import PredictedMotion, angular_velocity, apply, is
 from symphys.dynamics.pgs import apply_start, iterate
 from symphys.dynamics.position_correction import Corrected, close_gaps, displacements
 from symphys.dynamics.prediction import bodies_of, detect_contacts, free_motions, jointed_bodies, predicted_motions
-from symphys.dynamics.tracing.decorator import traced
+from symphys.dynamics.tracing.decorator import gathered, traced
 from symphys.dynamics.unknowns import Momenta, Momentum, PlacedConstraint
 from symphys.maths import rotation
 from symphys.model.state_layout import BODY_FIELDS
@@ -96,10 +96,11 @@ def advance(
     # 4. constraints of contacts (7-13) and of joints (25, 26)
     suppressed = suppressed or [ca.SX(0)] * len(contacts)
     constraints = []
-    for pair, contact, off in zip(world.pairs, contacts, suppressed, strict=True):
+    for (pair, near), contact, off in zip(context.near_pairs(), contacts, suppressed, strict=True):
         bodies = bodies_of(pair)
         moving = tuple(trees.motions[i] for i in bodies)
-        conditions = Conditions(off, plastic, x[f"{pair.name}.force"], trees.same(bodies), may_couple(world, pair))
+        force, coupled = x[f"{pair.name}.force"], may_couple(world, pair)
+        conditions = Conditions(off, plastic, force, trees.same(bodies), coupled, near)
         constraint = prepare(context.settings, pair.law, contact, moving, duration, conditions)
         constraints.append(trees.placed(bodies, constraint))
     joints, fitted = joint_constraints(context, x, trees, paths, duration, kick)
@@ -107,7 +108,8 @@ def advance(
     # 5-6. velocities: warm start (16), then projections (14, 15, 17)
     given = distribute_loads(context, constraints, _warm_start(context, constraints, x, kick))
     every = (*(each.placed for each in joints), *constraints)
-    start = apply_start(every, trees.states, (*warm_started(context, joints, x, kick), *given))
+    states = gathered(trees.states) if context.near else trees.states
+    start = apply_start(every, states, (*warm_started(context, joints, x, kick), *given))
     solved = iterate(world, scheme.sweeps, every, start, trees.motions)
     by_joints, impulses = solved.impulses[: len(joints)], solved.impulses[len(joints) :]
     momenta = momenta_of(context, trees, solved.momenta)
@@ -191,16 +193,16 @@ def _warm_start(
     for pair, each in zip(context.world.pairs, constraints, strict=True):
         force = x[f"{pair.name}.force"]
         torque = x[f"{pair.name}.torque"] if pair.law.spins else None
-        impulses.append(_resumed(each.constraint.impulse_normal, kick, force, torque))
+        impulses.append(_resumed(each.constraint, kick, force, torque))
     return impulses
 
 
 @traced
-def _resumed(n: Expr, kick: Expr, force: Expr, torque: Expr | None) -> ContactImpulse:
+def _resumed(constraint: ContactConstraint, kick: Expr, force: Expr, torque: Expr | None) -> ContactImpulse:
+    n = constraint.impulse_normal
     normal, tangent = _split(kick * force, n)
-    if torque is None:
-        return ContactImpulse(ca.fmax(normal, 0), tangent, ZERO.spin, ZERO.roll)
-    return ContactImpulse(ca.fmax(normal, 0), tangent, *_split(kick * torque, n))
+    turning = (ZERO.spin, ZERO.roll) if torque is None else _split(kick * torque, n)
+    return ContactImpulse(ca.fmax(normal, 0), tangent, *turning).times(constraint.near)
 
 
 def _split(impulse: Expr, n: Expr) -> tuple[Expr, Expr]:

@@ -45,6 +45,11 @@ def clip(x: Expr, low: Expr, high: Expr, width: Expr) -> Expr:
     return low + positive(x - low, width) - positive(x - high, width)
 
 
+def either(a: Expr, b: Expr) -> Expr:
+    """Logical or of two flags, 0 or 1; where one is known to be 0 it is the other as it stands."""
+    return a + b - a * b
+
+
 def length(a: Expr) -> Expr:
     """|a| of a vector, with slope 0 at a = 0 (width 1e-12)."""
     return ca.sqrt(ca.dot(a, a) + TINY_SQUARE)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
@@ -11,7 +12,8 @@ import numpy as np
 
 from symphys.codegen import AdjointDiscount, FunctionCall, MemoryLayout, Place, Program
 from symphys.dynamics.functions import trace_step
-from symphys.dynamics.tracing.recording import TracedVector
+from symphys.dynamics.tracing.guards import Guard, Part
+from symphys.dynamics.tracing.recording import TracedCall, TracedVector
 from symphys.expression import Formula
 from symphys.model.state_layout import Layout as Columns
 from symphys.problem import ALIVE
@@ -141,7 +143,10 @@ def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:
     arguments = {"u": samples.u, "p": samples.p, "smoothing": samples.smoothing}
     after = samples.x.later() if rollout.termination is None else samples.layout.take(rollout.memory.size - 1)
     places: dict[TracedVector, Place] = {slot: _part(after, part) for slot, part in recording.results.items()}
-    calls = []
+    calls, zeros = list[FunctionCall](), None
+    if widest := _most_zeros(recording.calls):
+        zeros = samples.layout.take(widest)
+        calls.append(FunctionCall(ca.Function("zeros", [], [ca.DM.zeros(widest)]), (), (zeros,)))
     for piece in recording.calls:
         for slot in piece.inputs:
             if slot.name in columns:
@@ -151,12 +156,48 @@ def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:
         for slot in piece.outputs:
             places.setdefault(slot, samples.layout.take(slot.size))
         inputs, outputs = (tuple(places[slot] for slot in slots) for slots in (piece.inputs, piece.outputs))
-        calls.append(FunctionCall(piece.function, inputs, outputs))
+        calls.append(_guarded(FunctionCall(piece.function, inputs, outputs), piece, places, zeros))
     if after.size > columns.size:
         calls.append(_remember(samples, _part(after, slice(columns.size, None))))
     if rollout.termination is not None:
         calls.append(FunctionCall(rollout.termination, (samples.x, after, samples.p), (samples.x.later(),)))
     return calls
+
+
+def _most_zeros(calls: Sequence[TracedCall]) -> int:
+    """The size of the longest result that zeros stand for."""
+    return max(
+        (
+            vector.size
+            for call in calls
+            for guard in (call.guard, call.section)
+            if guard is not None
+            for vector, part in zip(call.outputs, guard.otherwise, strict=True)
+            if part is not None and part.vector is None
+        ),
+        default=0,
+    )
+
+
+def _guarded(
+    call: FunctionCall, traced: TracedCall, places: Mapping[TracedVector, Place], zeros: Place | None
+) -> FunctionCall:
+    """The call with its guard and its section, whose vectors lie in ``places``."""
+
+    def part_of(part: Part, size: int) -> Place:
+        whole = zeros if part.vector is None else places[part.vector]
+        assert whole is not None
+        return Place(whole.offset + part.start, size, whole.stride)
+
+    def stand_ins(guard: Guard) -> tuple[Place | None, ...]:
+        parts = zip(call.outputs, guard.otherwise, strict=True)
+        return tuple(None if part is None else part_of(part, place.size) for place, part in parts)
+
+    if traced.guard is not None:
+        call = replace(call, guard=part_of(traced.guard.word, 1), otherwise=stand_ins(traced.guard))
+    if traced.section is not None:
+        call = replace(call, section=part_of(traced.section.word, 1), beside=stand_ins(traced.section))
+    return call
 
 
 def _alive(samples: ProgramSamples) -> Place | None:

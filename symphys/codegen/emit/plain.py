@@ -7,8 +7,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from symphys.codegen.emit.dialect import NUMBERS
+from symphys.codegen.emit.guarding import Guarding
 from symphys.codegen.emit.plan import plan
-from symphys.codegen.emit.source import resource
+from symphys.codegen.emit.source import DRIVER, resource
 from symphys.codegen.emit.writer import Form, write
 from symphys.codegen.graph.instructions import graph_of
 from symphys.codegen.program.program import Function, Place, Program
@@ -50,10 +51,20 @@ def plain_source(program: Program, seeded: Sequence[str], further: Mapping[str, 
     arrays = [_array("word", f"{name.upper()}[]", map(str, row)) for name, row in words.items()]
     lists = {name: f"{{{count}, {name.upper()}}}" for name, count in counts.items()}
     fields = [str(program.size), str(planned.tape), str(program.steps), *(lists[name] for name in RANGES), "VALUES"]
-    data = _array("program", "PROGRAM", [*fields, *(lists[name] for name in TABLES)])
-    driver = resource("program.h") + resource("driver.c")
-    text = "\n".join([resource("plain.h"), *declared, listed, *texts, driver, values, *arrays, data])
-    return PlainSource(text, 2 * program.size + planned.tape)
+    rows, left = _guarding(planned.guarding)
+    data = _array("program", "PROGRAM", [*fields, *(lists[name] for name in TABLES), *left])
+    driver = "".join(map(resource, DRIVER))
+    text = "\n".join([resource("plain.h"), *declared, listed, *texts, driver, values, *arrays, *rows, data])
+    return PlainSource(text, 2 * program.size + planned.tape + (planned.guarding.arena if planned.guarding else 0))
+
+
+def _guarding(guarding: Guarding | None) -> tuple[list[str], list[str]]:
+    """The arrays of what may be left out, and the fields of the program that name them."""
+    if guarding is None:
+        return [], []
+    arrays = [_array("word", f"{name.upper()}[]", map(str, words)) for name, words in guarding.rows.items()]
+    fields = [f".{name} = {{{guarding.count(name)}, {name.upper()}}}" for name in guarding.rows]
+    return arrays, [f".first = {guarding.first}", *fields]
 
 
 def plain_functions(functions: Mapping[str, Function]) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.codegen.emit.functions import DistinctFunctions
+from symphys.codegen.emit.guarding import Guarding, guarding_of
 from symphys.codegen.emit.writer import Form
 from symphys.codegen.graph.activity import Activity, CallActivity
 from symphys.codegen.graph.adjoint import Mask
@@ -31,11 +32,13 @@ class Plan:
         functions: the C functions, in the order of their numbers.
         tables: for each phase the number of calls and their entries.
         tape: words after the program's own, for what adjoints need not compute again.
+        guarding: of calls that may be left out; None: none may.
     """
 
     functions: tuple[tuple[Graph, Form], ...]
     tables: dict[str, tuple[int, Table]]
     tape: int
+    guarding: Guarding | None = None
 
 
 def plan(program: Program, seeded: Sequence[str], word: int = 64) -> Plan:
@@ -65,7 +68,13 @@ def plan(program: Program, seeded: Sequence[str], word: int = 64) -> Plan:
         "back_body": [pull.entry(functions) for pull in pulls[1]],
         "back_epilogue": [pull.entry(functions) for pull in pulls[2]],
     }
-    return Plan(tuple(functions.listed), {name: (len(rows), _flat(rows)) for name, rows in entries.items()}, tape)
+    guarded = {
+        "body": ([reach.call for reach in body], entries["body"]),
+        "again": ([reach.call for reach in again], entries["again"]),
+        "back_body": ([pull.reach.call for pull in pulls[1]], entries["back_body"]),
+    }
+    tables = {name: (len(rows), _flat(rows)) for name, rows in entries.items()}
+    return Plan(tuple(functions.listed), tables, tape, guarding_of(program, guarded))
 
 
 @dataclass
@@ -132,6 +141,9 @@ def _again(
     for pull in pulls:
         for words in pull.reads(functions):
             needed[words] = True
+    for call in program.body:
+        if call.section is not None:
+            needed[call.section.offset] = True
     needed &= scratch
     chosen = []
     for reach in reversed(body):

@@ -10,6 +10,7 @@ from symphys.codegen.emit.plan import Plan
 from symphys.codegen.emit.writer import write
 
 ROOM = "symphys.codegen"
+DRIVER = ("program.h", "guards.c", "driver.c")
 FILES, SHARE = 4, 400
 """Most files of values and most of adjoints; nodes for which another file is begun."""
 
@@ -36,7 +37,7 @@ def sources(plan: Plan, lanes: int, single: bool) -> list[SourceFile]:
     declared = "".join(f"void {name}(V *m, V *b, const word *t, word k);\n" for name in names)
     table = ", ".join(names) or "0"
     listed = f"{declared}static void (*const FUNCTIONS[])(V *, V *, const word *, word) = {{{table}}};\n"
-    return [*found, SourceFile(head + listed + "".join(map(resource, ("program.h", "driver.c", "phases.c"))))]
+    return [*found, SourceFile(head + listed + "".join(map(resource, (*DRIVER, "phases.c"))))]
 
 
 def spread(texts: Sequence[str], work: Sequence[int], most: int) -> list[list[str]]:

@@ -53,12 +53,20 @@ class FunctionCall:
         function: SX Function of dense vectors without free symbols; equal functions are compiled once.
         inputs: where its arguments lie.
         outputs: where its results go. They are written, or added to what is there if ``accumulate``.
+        guard: a word of scratch; where it is 0 the call may be left out, as it then gives what ``otherwise`` has.
+        otherwise: for each result the place that holds the same then; None where no call reads it then.
+        section: the same for a run of calls that have one word in common, which are left out together.
+        beside: what ``otherwise`` is, for the section.
     """
 
     function: Function
     inputs: tuple[Place, ...]
     outputs: tuple[Place, ...]
     accumulate: bool = False
+    guard: Place | None = None
+    otherwise: tuple[Place | None, ...] = ()
+    section: Place | None = None
+    beside: tuple[Place | None, ...] = ()
 
 
 @dataclass(frozen=True)

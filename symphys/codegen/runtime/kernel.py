@@ -122,7 +122,8 @@ class ProcessorKernel(Kernel):
         self.loaded = loaded
         self.threads = processors() if threads is None else threads
         real = np.dtype(np.float32 if report.precision == "single" else np.float64)
-        self._pool = MemoryPool(report.bytes_per_lane // real.itemsize, report.lanes, real)
+        words = report.bytes_per_lane // real.itemsize + -(-8 * report.arena // (report.lanes * real.itemsize))
+        self._pool = MemoryPool(words, report.lanes, real, loaded.prepare)
 
     def fixed(self, seed: ArrayLike = ()) -> Fixed:
         """An evaluation of one z at fixed addresses, with a row for each seed (rows, s), or one row without any."""

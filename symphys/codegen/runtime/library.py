@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from symphys.codegen.emit.guarding import WIDTHS, Guarding
 from symphys.codegen.emit.plan import Plan
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.program.program import Place, Program
@@ -43,6 +44,8 @@ def program_fields(phase: type) -> Any:
         ("discounted", WORD * 3),
         ("kept", WORD * 2),
         ("written", List),
+        ("first", WORD),
+        *((name, List) for name in WIDTHS),
     )
 
 
@@ -75,6 +78,7 @@ class Loaded:
         except OSError as error:
             raise KernelUnavailable(f"the compiled kernel cannot be loaded: {error}") from error
         self._evaluate = _prepared(library.evaluate, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
+        self._prepare = _prepared(library.prepare, ctypes.c_void_p, ctypes.c_void_p)
         self._begin = _prepared(library.begin, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
         self._perform = _prepared(library.perform, ctypes.c_void_p, ctypes.c_void_p, WORD)
         self._kept: list[Any] = []
@@ -88,10 +92,17 @@ class Loaded:
             setattr(self.data, name, self._list(*plan.tables[name]))
         written = [place for call in program.body for place in call.outputs if place.stride]
         self.data.written = self._list(len(written), strided(written))
+        if plan.guarding is not None:
+            self._guard(plan.guarding)
         if program.discounted is not None:
             state, kept = program.discounted.state, program.discounted.kept
             self.data.discounted = (WORD * 3)(state.offset, state.size, state.stride)
             self.data.kept = (WORD * 2)(*((kept.offset, kept.stride) if kept else (0, 0)))
+
+    def _guard(self, guarding: Guarding) -> None:
+        self.data.first = guarding.first
+        for name, words in guarding.rows.items():
+            setattr(self.data, name, self._list(guarding.count(name), words if words.size else np.zeros(1, np.int64)))
 
     def _list(self, count: int, words: Any) -> List:
         self._kept.append(words)
@@ -101,6 +112,11 @@ class Loaded:
     def addresses(self) -> tuple[int, int]:
         """Of the driver's ``evaluate`` and of the program that it wants."""
         return ctypes.cast(self._evaluate, ctypes.c_void_p).value or 0, ctypes.addressof(self.data)
+
+    def prepare(self, memory: Memory) -> None:
+        """Make a memory ready for the driver's notes."""
+        if self.data.calls.count:
+            self._prepare(ctypes.byref(self.data), memory.ctypes.data)
 
     def evaluate(self, batch: BatchData, memory: Memory) -> None:
         """Run a batch in this memory; the interpreter is free meanwhile."""

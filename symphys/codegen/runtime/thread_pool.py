@@ -20,8 +20,9 @@ T = TypeVar("T")
 class MemoryPool:
     """Memories of one shape, kept from call to call; a task has one for itself while it runs."""
 
-    def __init__(self, words: int, lanes: int, real: Any) -> None:
-        """Memories of (words, lanes) numbers of this type."""
+    def __init__(self, words: int, lanes: int, real: Any, prepare: Callable[[Memory], None] | None = None) -> None:
+        """Memories of (words, lanes) numbers of this type; ``prepare`` makes one ready."""
+        self._prepare = prepare
         self._shape, self._real = (words, lanes), np.dtype(real)
         self._free: list[Memory] = []
 
@@ -59,7 +60,10 @@ class MemoryPool:
         size = int(np.prod(self._shape)) * self._real.itemsize
         raw = np.empty(size + alignment, dtype=np.uint8)
         start = -raw.ctypes.data % alignment
-        return raw[start : start + size].view(self._real).reshape(self._shape)
+        memory = raw[start : start + size].view(self._real).reshape(self._shape)
+        if self._prepare is not None:
+            self._prepare(memory)
+        return memory
 
 
 @cache

@@ -62,6 +62,7 @@ def compile_program(
         cached=built.cached,
         seconds=time.perf_counter() - started,
         note=built.note,
+        arena=planned.guarding.arena if planned.guarding else 0,
     )
     return ProcessorKernel(program, loaded, report, names, threads)
 

@@ -20,6 +20,7 @@ class BuildReport:
         cached: whether it came from the cache.
         seconds: from the program to the loaded kernel.
         note: what the user should know, or empty.
+        arena: words of 8 bytes of a block, for what its driver notes.
     """
 
     compiler: str
@@ -32,3 +33,4 @@ class BuildReport:
     cached: bool
     seconds: float
     note: str
+    arena: int = 0

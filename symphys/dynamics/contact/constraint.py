@@ -27,7 +27,7 @@ from symphys.model.world import Law
 Expr = Any
 """casadi SX, MX or DM"""
 
-NEVER = ca.SX(0)
+NEVER, ALWAYS = ca.SX(0), ca.SX(1)
 UNREACHED = -1e6
 """[m/s] a normal velocity that no constraint reaches: it gives no impulse."""
 LEAST = 0.01
@@ -110,6 +110,7 @@ class ContactConstraint:
         same: whether both bodies are of one tree of joints.
         coupling: where friction may act strongly on the normal velocity.
         paradox: 1 if the friction of the free slip would pull the surfaces together.
+        near: 0 if the surfaces are too far apart to act: no impulse is given.
     """
 
     law: Law
@@ -136,6 +137,7 @@ class ContactConstraint:
     same: bool
     coupling: Coupling | None = None
     paradox: Expr = NEVER
+    near: Expr = ALWAYS
 
     def slip(self, momenta: tuple[Any, ...]) -> Expr:
         """(3,) [m/s]: relative velocity of the touching points."""
@@ -149,11 +151,11 @@ class ContactConstraint:
     def project(self, momenta: tuple[Any, ...], old: ContactImpulse) -> tuple[tuple[Any, ...], ContactImpulse]:
         """One projection of each of its impulses, one after the other."""
         zero = ca.SX.zeros(3)
-        normal, tangent = _forces(self, self.slip(momenta), old)
+        normal, tangent = (self.near * force for force in _forces(self, self.slip(momenta), old))
         momenta = self.apply(momenta, ContactImpulse(normal - old.normal, tangent - old.tangent, ca.SX(0), zero))
         if not self.law.spins:
             return momenta, ContactImpulse(normal, tangent, old.spin, old.roll)
-        spin, roll = _torques(self, momenta, old, normal)
+        spin, roll = (self.near * torque for torque in _torques(self, momenta, old, normal))
         momenta = self.apply(momenta, ContactImpulse(ca.SX(0), zero, spin - old.spin, roll - old.roll))
         return momenta, ContactImpulse(normal, tangent, spin, roll)
 

@@ -78,6 +78,6 @@ def _linear(constraints: tuple[ContactConstraint, ...], loads: tuple[Expr, ...])
         spread += part * ca.mtimes(arm, arm.T)
     slope = ca.mtimes(ca.inv(spread + (BLUNT * ca.trace(spread) + BLUNT**2) * ca.SX.eye(3)), torque)
     return tuple(
-        ca.fmax(load + part * (mean + ca.dot(slope, arm) - load), 0)
-        for part, arm, load in zip(parts, arms, loads, strict=True)
+        constraint.near * ca.fmax(load + part * (mean + ca.dot(slope, arm) - load), 0)
+        for constraint, part, arm, load in zip(constraints, parts, arms, loads, strict=True)
     )

@@ -58,6 +58,7 @@ class Conditions:
         force: (3,) with which the contact acted at the end of the last step [N].
         same: whether both bodies are of one tree of joints.
         coupled: whether friction may act strongly on the normal velocity.
+        near: 0 if the surfaces are too far apart to act.
     """
 
     suppressed: Expr
@@ -65,6 +66,7 @@ class Conditions:
     force: Expr
     same: bool
     coupled: bool
+    near: Expr
 
 
 @traced
@@ -113,6 +115,7 @@ def prepare(
         same=same,
         coupling=coupling_of(push, frame.normal, law, softness) if coupled else None,
         paradox=pulls_together(push, frame.normal, law, slip) if coupled else ca.SX(0),
+        near=conditions.near,
     )
 
 

@@ -14,6 +14,7 @@ from symphys.dynamics.impact.impact import TOUCHING, StepSplit, strikes
 from symphys.dynamics.impact.restitution import eccentric_bodies
 from symphys.dynamics.prediction import bodies_of, detect_contacts, predicted_motions
 from symphys.dynamics.tracing.decorator import traced
+from symphys.maths.smoothing import either
 from symphys.model.scalar import is_zero
 from symphys.model.shapes import Sphere
 from symphys.model.world import Law, Pair, World
@@ -48,7 +49,9 @@ def defer_impacts(context: StepContext, x: State, duration: Expr, splits: Sequen
     """
     pairs, world = context.world.pairs, context.world
     contacts = detect_contacts(context, predicted_motions(context, x, duration), duration)
-    hits = [_hit(context.settings, pair.law, contact) for pair, contact in zip(pairs, contacts, strict=True)]
+    near = [each for _, each in context.near_pairs()]
+    looked_at = list(zip(pairs, near, contacts, strict=True))
+    hits = [_hit(context.settings, pair.law, contact, each) for pair, each, contact in looked_at]
     eccentric, sides = eccentric_bodies(world), {k for pair in pairs for k in bodies_of(pair)}
     rebounds = {k for pair in pairs if not is_zero(pair.law.restitution) for k in bodies_of(pair)}
     first: dict[int, tuple[Expr, Expr]] = dict.fromkeys(sides & (eccentric | rebounds), (duration, ca.SX(0)))
@@ -56,15 +59,19 @@ def defer_impacts(context: StepContext, x: State, duration: Expr, splits: Sequen
         for body in first.keys() & set(bodies_of(pair)):
             first[body] = _sooner(first[body], meets, contact.time, contact.rate)
     found, chained, plastic = list[Expr](), ca.SX(0), ca.SX(0)
-    for pair, contact, (fast, meets) in zip(pairs, contacts, hits, strict=True):
+    touching: dict[int, list[int]] = {}
+    for j, pair in enumerate(pairs):
+        for body in bodies_of(pair):
+            touching.setdefault(body, []).append(j)
+    for (pair, each, contact), (fast, meets) in zip(looked_at, hits, strict=True):
         waits = _passes(fast, meets)
         for body in sorted(first.keys() & set(bodies_of(pair))):
-            struck = [split.struck[j] for split in splits for j, other in enumerate(pairs) if body in bodies_of(other)]
-            struck = struck if body in eccentric else []
+            struck = [split.struck[j] for split in splits for j in touching[body]] if body in eccentric else []
             waits = _later(waits, fast, contact.time, first[body][0], tuple(struck))
             if (room := _room(world, pair, eccentric)) is not None:
-                before = waits, chained, plastic
-                waits, chained, plastic = _driven(context.settings, before, fast, contact, first[body], duration, room)
+                before, sight = ((waits,), (chained,), (plastic,)), (fast, contact, each)
+                flags = _driven(context.settings, before, sight, first[body], duration, room)
+                (waits,), (chained,), (plastic,) = flags
         found.append(waits)
         chained = _chained(chained, waits, meets)
     return DeferredImpacts(tuple(found), chained, plastic)
@@ -80,9 +87,9 @@ def _room(world: World, pair: Pair, eccentric: set[int]) -> Expr | None:
 
 
 @traced
-def _hit(settings: StepSettings, law: Law, contact: Contact) -> tuple[Expr, Expr]:
+def _hit(settings: StepSettings, law: Law, contact: Contact, near: Expr) -> tuple[Expr, Expr]:
     """(whether it closes at speed, whether it then meets)."""
-    fast = strikes(settings, law, contact)
+    fast = strikes(settings, law, contact, near)
     return fast, ca.logic_and(fast, contact.hit)
 
 
@@ -95,27 +102,27 @@ def _sooner(first: tuple[Expr, Expr], meets: Expr, time: Expr, rate: Expr) -> tu
 @traced
 def _driven(
     settings: StepSettings,
-    before: tuple[Expr, Expr, Expr],
-    fast: Expr,
-    contact: Contact,
+    before: tuple[tuple[Expr], ...],
+    sight: tuple[Expr, Contact, Expr],
     first: tuple[Expr, Expr],
     duration: Expr,
     room: Expr,
-) -> tuple[Expr, Expr, Expr]:
+) -> tuple[tuple[Expr], ...]:
     """(whether a pair waits, whether there is a chain, one without room), with a pair that a hit may drive together.
 
     Its surfaces are apart, and the hit comes before they meet. It waits if they cannot go far into each other.
     """
-    way = 2 * first[1] * duration
+    (fast, contact, near), way = sight, 2 * first[1] * duration
     apart = ca.logic_and(contact.gap > TOUCHING * settings.reference * settings.scheme.dt**2, 1 - fast)
-    driven = ca.logic_and(ca.logic_and(apart, first[1] > 0), contact.gap < way)
+    driven = ca.logic_and(near, ca.logic_and(ca.logic_and(apart, first[1] > 0), contact.gap < way))
     waits = ca.logic_and(driven, way < room)
-    return ca.fmax(before[0], waits), ca.fmax(before[1], driven), ca.fmax(before[2], ca.logic_and(driven, 1 - waits))
+    found = waits, driven, ca.logic_and(driven, 1 - waits)
+    return tuple((either(flag, new),) for (flag,), new in zip(before, found, strict=True))
 
 
 @traced
 def _chained(before: Expr, waits: Expr, meets: Expr) -> Expr:
-    return ca.fmax(before, ca.logic_and(waits, meets))
+    return either(before, ca.logic_and(waits, meets))
 
 
 @traced
@@ -126,4 +133,4 @@ def _passes(fast: Expr, meets: Expr) -> Expr:
 @traced
 def _later(waits: Expr, fast: Expr, time: Expr, first: Expr, struck: tuple[Expr, ...]) -> Expr:
     before = ca.mmax(ca.vertcat(*struck)) if struck else ca.SX(0)
-    return ca.fmax(waits, ca.logic_and(fast, ca.logic_or(time > first, before)))
+    return either(waits, ca.logic_and(fast, ca.logic_or(time > first, before)))

@@ -25,10 +25,10 @@ from symphys.dynamics.joints.assembly import locks_at, momenta_of, prepare_trees
 from symphys.dynamics.motion import PredictedMotion, angular_velocity, apply
 from symphys.dynamics.prediction import bodies_of, detect_contacts, predicted_motions
 from symphys.dynamics.substep import Substep
-from symphys.dynamics.tracing.decorator import traced
+from symphys.dynamics.tracing.decorator import gathered, traced
 from symphys.dynamics.unknowns import Iterate, Momentum, PlacedConstraint
 from symphys.maths import rotation
-from symphys.maths.smoothing import positive
+from symphys.maths.smoothing import either, positive
 from symphys.model.world import Law
 
 Expr = Any
@@ -65,21 +65,24 @@ def find_split(context: StepContext, x: State, duration: Expr, share: float) -> 
     Without an impact the split is at ``share`` of the duration.
     """
     contacts = detect_contacts(context, predicted_motions(context, x, duration), duration)
-    fast = [strikes(context.settings, p.law, c) for p, c in zip(context.world.pairs, contacts, strict=True)]
+    fast = [
+        strikes(context.settings, pair.law, contact, near)
+        for (pair, near), contact in zip(context.near_pairs(), contacts, strict=True)
+    ]
     earliest = ca.SX(0), duration
     for contact, closes in zip(contacts, fast, strict=True):
         earliest = _earlier(earliest, closes, contact.hit, contact.time, context.settings.scheme.dt)
     first = _inside(earliest, duration, share)
     until = _until(earliest[1], first, context.settings.scheme.dt)
     struck = [_is_struck(c, contact.hit, contact.time, until) for contact, c in zip(contacts, fast, strict=True)]
-    late = [_late(earliest[1], s, contact.time) for contact, s in zip(contacts, struck, strict=True)]
+    late = [_late(earliest, s, contact.time) for contact, s in zip(contacts, struck, strict=True)]
     return StepSplit(earliest[0], first, tuple(fast), tuple(struck), tuple(late))
 
 
 @traced
-def strikes(settings: StepSettings, law: Law, contact: Contact) -> Expr:
+def strikes(settings: StepSettings, law: Law, contact: Contact, near: Expr) -> Expr:
     """1 if a contact is an impact."""
-    return ca.SX(0) if law.soft else closes_fast(settings, contact)
+    return ca.SX(0) if law.soft else ca.logic_and(near, closes_fast(settings, contact))
 
 
 @traced
@@ -87,7 +90,7 @@ def _earlier(earliest: tuple[Expr, Expr], closes: Expr, hit: Expr, time: Expr, d
     """(whether there is an impact, when), with one more contact looked at; at a tie with the slope of this one."""
     meets = ca.logic_and(closes, hit)
     sooner = ca.logic_and(meets, time < earliest[1] + TOGETHER * dt)
-    return ca.fmax(earliest[0], meets), ca.if_else(sooner, time, earliest[1])
+    return either(earliest[0], meets), ca.if_else(sooner, time, earliest[1])
 
 
 @traced
@@ -102,8 +105,9 @@ def _is_struck(closes: Expr, hit: Expr, time: Expr, until: Expr) -> Expr:
 
 
 @traced
-def _late(earliest: Expr, struck: Expr, time: Expr) -> Expr:
-    return ca.if_else(struck, time - earliest, 0)
+def _late(earliest: tuple[Expr, Expr], struck: Expr, time: Expr) -> Expr:
+    impact, first = earliest
+    return ca.if_else(ca.logic_and(impact, struck), time - first, 0)
 
 
 @traced
@@ -126,16 +130,17 @@ def resolve_impact(context: StepContext, x: State, split: StepSplit) -> Substep:
     momenta = tuple(Momentum(motion.velocity, motion.momentum_k) for motion in motions)
     trees = prepare_trees(context, motions, momenta, ca.SX(0))
     constraints = []
-    for pair, contact, struck in zip(context.world.pairs, contacts, split.struck, strict=True):
+    for (pair, near), contact, struck in zip(context.near_pairs(), contacts, split.struck, strict=True):
         bodies = bodies_of(pair)
         moving = tuple(trees.motions[i] for i in bodies)
         coupled = may_couple(context.world, pair)
-        arguments = pair.law, contact, moving, struck, split.impact, trees.same(bodies), coupled
+        arguments = pair.law, contact, moving, struck, split.impact, trees.same(bodies), coupled, near
         constraints.append(trees.placed(bodies, _constraint(context.settings, *arguments)))
     locks = locks_at(context, trees)
     n, still = len(locks), (*(nothing for _, nothing in locks), *(ZERO for _ in constraints))
     every = (*(constraint for constraint, _ in locks), *constraints)
-    solved = rebound(context, every, Iterate(trees.states, still, still), motions, trees)
+    states = gathered(trees.states) if context.near else trees.states
+    solved = rebound(context, every, Iterate(states, still, still), motions, trees)
     after = _with_velocities(context, x, motions, momenta_of(context, trees, solved.momenta), split.impact)
     _delay(context, after, constraints, solved.impulses[n:], split.late)
     forces = (x[f"{pair.name}.force"] for pair in context.world.pairs)
@@ -154,6 +159,7 @@ def _constraint(
     impact: Expr,
     same: bool,
     coupled: bool,
+    near: Expr,
 ) -> ContactConstraint:
     """The constraint of a contact at an impact: where ``struck`` it rebounds, where it touches it holds."""
     now, scheme = ca.SX(0), settings.scheme
@@ -186,6 +192,7 @@ def _constraint(
         smoothing=settings.smoothing,
         same=same,
         coupling=coupling_of(push, frame.normal, law, ca.SX(0)) if coupled else None,
+        near=near,
     )
 
 

@@ -22,8 +22,20 @@ C = TypeVar("C")
 class Tracing(Protocol):
     """What traces the calls of a step."""
 
+    def guard(self, word: Any) -> None:
+        """Where ``word`` is 0, what depends on it may be left out."""
+        ...
+
     def call(self, function: Callable[..., T], arguments: tuple[Any, ...], named: dict[str, Any]) -> T:
         """``function(*arguments, **named)``."""
+        ...
+
+    def section(self, word: Any) -> None:
+        """The same for all calls together that depend on ``word``."""
+        ...
+
+    def gathered(self, tree: T) -> T:
+        """The same, its numbers side by side."""
         ...
 
     def repeat(self, count: int, once: Callable[[Any, T], T], context: Any, state: T) -> T:
@@ -53,6 +65,28 @@ def traced(function: Callable[P, T]) -> Callable[P, T]:
         return function(*arguments, **named) if tracer is None else tracer.call(function, arguments, named)
 
     return call
+
+
+def guard(word: T) -> T:
+    """The same word, 0 or 1, marked: a compiled kernel leaves out the calls that are without effect where it is 0."""
+    tracer = _TRACER.get()
+    if tracer is not None:
+        tracer.guard(word)
+    return word
+
+
+def section(word: T) -> T:
+    """The same word, 0 or 1, marked: a compiled kernel jumps over what is without effect where it is 0."""
+    tracer = _TRACER.get()
+    if tracer is not None:
+        tracer.section(word)
+    return word
+
+
+def gathered(tree: T) -> T:
+    """The same tree; between calls its numbers lie side by side, so that they can stand for results of a call."""
+    tracer = _TRACER.get()
+    return tree if tracer is None else tracer.gathered(tree)
 
 
 def repeat(count: int, once: Callable[[C, T], T], context: C, state: T) -> T:

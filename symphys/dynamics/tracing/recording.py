@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import count
 from typing import Any, TypeVar
 
 import casadi as ca
 
-from symphys.dynamics.tracing.pytree import Code, TracedMatrix, dismantle, outline, rebuild
+from symphys.dynamics.tracing.pytree import Code, TracedMatrix, dismantle, outline, rebuild, slots_of
 from symphys.dynamics.tracing.trace import Tracer
 
 T = TypeVar("T")
@@ -38,11 +39,13 @@ class TracedVector:
 
 @dataclass(frozen=True)
 class TracedCall:
-    """A call of an SX function of vectors, which returns vectors."""
+    """A call of an SX function of vectors, which returns vectors; see ``guards`` for when it may be left out."""
 
     function: ca.Function
     inputs: tuple[TracedVector, ...]
     outputs: tuple[TracedVector, ...]
+    guard: Any = None
+    section: Any = None
 
 
 class Recorder(Tracer):
@@ -52,6 +55,8 @@ class Recorder(Tracer):
         """Nothing yet."""
         super().__init__()
         self.calls: list[TracedCall] = []
+        self.guards: list[TracedVector] = []
+        self.sections: list[tuple[TracedVector, int]] = []
         self._slots: list[TracedVector] = []
         self._adopted: list[Expr] = []
         self._given: dict[tuple[int, tuple[int, ...]], Sequence[int]] = {}
@@ -59,6 +64,41 @@ class Recorder(Tracer):
     def argument(self, name: str, symbols: Expr) -> None:
         """A slot for an argument of the step."""
         self._slots.append(TracedVector(name, symbols.numel(), self.take(symbols)))
+
+    def guard(self, word: Any) -> None:
+        """See ``decorator.guard``; what is known already guards nothing."""
+        (code,) = word.codes if isinstance(word, TracedMatrix) else self._codes(word)
+        if not isinstance(code, float):
+            self.guards.append(self._slots[code[0]])
+
+    def section(self, word: Any) -> None:
+        """See ``decorator.section``."""
+        (code,) = word.codes if isinstance(word, TracedMatrix) else self._codes(word)
+        if not isinstance(code, float):
+            self.sections.append((self._slots[code[0]], code[1]))
+
+    def gathered(self, tree: T) -> T:
+        """The same tree; each part of it that has a slot lies in a slot of its own."""
+        leaves: list[Expr] = []
+        shape = dismantle(tree, leaves)
+        columns: dict[int, list[tuple[int, int]]] = {}
+        codes = [leaf.codes if isinstance(leaf, TracedMatrix) else self._codes(leaf) for leaf in leaves]
+        for slot, each in zip(slots_of(shape), codes, strict=True):
+            columns.setdefault(slot, []).extend(code for code in each if not isinstance(code, float))
+        used: dict[int, int] = {}
+        for column in columns.values():
+            for number, _ in column:
+                used.setdefault(number, len(used))
+        symbols = [ca.SX.sym("a", self._sizes[k]) for k in used]
+        results = [ca.vertcat(*(symbols[used[k]][j] for k, j in column)) for column in columns.values() if column]
+        new = iter(self._apply(self.shared(ca.Function("piece", symbols, results)), list(used)) if results else ())
+        taken = {slot: (next(new), count()) for slot, column in columns.items() if column}
+        found = []
+        for slot, leaf, each in zip(slots_of(shape), leaves, codes, strict=True):
+            moved = [c if isinstance(c, float) else (taken[slot][0], next(taken[slot][1])) for c in each]
+            found.append(TracedMatrix(leaf.leaf if isinstance(leaf, TracedMatrix) else outline(leaf), tuple(moved)))
+        together: T = rebuild(shape, iter(found))
+        return together
 
     def give(self, name: str, values: Sequence[Expr]) -> TracedVector:
         """A call that puts values side by side."""
@@ -88,7 +128,7 @@ class Recorder(Tracer):
     def _adopt(self, column: Expr) -> None:
         homes = {symbol.element_hash(): self._homes[symbol.element_hash()][0] for symbol in ca.symvar(column)}
         slots = list(dict.fromkeys(homes.values()))
-        symbols = [self._columns[slot] for slot in slots]
+        symbols = [self._column(slot) for slot in slots]
         (given,) = self._add("", self.shared(ca.Function("piece", symbols, [column])), slots)
         self._adopted.append(column)
         self._homes |= {entry.element_hash(): (given, k) for k, entry in enumerate(column.nonzeros())}
@@ -139,8 +179,8 @@ class Recorder(Tracer):
     def _add(self, name: str, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
         first = len(self._slots)
         for k in range(function.n_out()):
-            symbols = ca.SX.sym("kept", function.numel_out(k))
-            self._slots.append(TracedVector(name, symbols.numel(), self.take(symbols)))
+            size = function.numel_out(k)
+            self._slots.append(TracedVector(name, size, self._slot(size)))
         self.calls.append(TracedCall(function, tuple(self._slots[k] for k in slots), tuple(self._slots[first:])))
         return range(first, len(self._slots))
 

@@ -62,8 +62,9 @@ class Tracer(ABC):
     def __init__(self, reduces: bool = True) -> None:
         """``reduces``: what a function computes twice is looked for, which takes up to half of the building."""
         self._reduces = reduces
-        self._columns: list[Expr] = []
+        self._columns: list[Expr | None] = []
         self._entries: list[list[Expr]] = []
+        self._sizes: list[int] = []
         self._homes: dict[int, tuple[int, int]] = {}
         self._templates: dict[Hashable, Template] = {}
         self._functions: dict[str, ca.Function] = {}
@@ -73,6 +74,18 @@ class Tracer(ABC):
         for _ in range(count):
             state = once(context, state)
         return state
+
+    def guard(self, word: Any) -> None:
+        """What tells which calls are without effect; of use to a recorder alone."""
+        del word
+
+    def section(self, word: Any) -> None:
+        """Likewise."""
+        del word
+
+    def gathered(self, tree: T) -> T:
+        """The same tree."""
+        return tree
 
     @abstractmethod
     def _apply(self, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
@@ -84,17 +97,37 @@ class Tracer(ABC):
 
     def take(self, column: Expr) -> int:
         """A slot for a column of symbols or expressions."""
-        self._columns.append(column)
-        self._entries.append(column.nonzeros())
-        for place, entry in enumerate(self._entries[-1]):
-            self._homes.setdefault(entry.element_hash(), (len(self._columns) - 1, place))
-        return len(self._columns) - 1
+        number = self._slot(column.numel())
+        self._hold(number, column)
+        return number
+
+    def _slot(self, size: int) -> int:
+        """A slot of that size, as yet without expressions."""
+        self._columns.append(None)
+        self._entries.append([])
+        self._sizes.append(size)
+        return len(self._sizes) - 1
+
+    def _hold(self, number: int, column: Expr) -> None:
+        self._columns[number], self._entries[number] = column, column.nonzeros()
+        for place, entry in enumerate(self._entries[number]):
+            self._homes.setdefault(entry.element_hash(), (number, place))
+
+    def _column(self, number: int) -> Expr:
+        """What lies in a slot: symbols, once somebody asks for what a call has given."""
+        if self._columns[number] is None:
+            self._hold(number, ca.SX.sym("kept", self._sizes[number]))
+        return self._columns[number]
+
+    def _entry(self, code: tuple[int, int]) -> Expr:
+        self._column(code[0])
+        return self._entries[code[0]][code[1]]
 
     def value(self, leaf: Expr) -> Expr:
         """A leaf of a tree as an expression."""
         if not isinstance(leaf, TracedMatrix):
             return leaf
-        entries = [ca.SX(c) if isinstance(c, float) else self._entries[c[0]][c[1]] for c in leaf.codes]
+        entries = [ca.SX(c) if isinstance(c, float) else self._entry(c) for c in leaf.codes]
         return matrix(leaf.leaf, entries)
 
     def call(self, function: Callable[..., T], arguments: tuple[Any, ...], named: dict[str, Any]) -> T:
@@ -108,7 +141,7 @@ class Tracer(ABC):
             known.append(
                 tuple([c if isinstance(c, float) else (slots.setdefault(c[0], len(slots)), c[1]) for c in codes])
             )
-        key = (function, shape, tuple(known), tuple([self._columns[slot].numel() for slot in slots]))
+        key = (function, shape, tuple(known), tuple([self._sizes[slot] for slot in slots]))
         template = self._templates.get(key)
         if template is None:
             template = self._templates[key] = self._build(function, shape, known, slots)
@@ -125,7 +158,7 @@ class Tracer(ABC):
 
     def _build(self, function: Callable[..., Any], shape: Any, known: Sequence[Any], slots: Iterable[int]) -> Template:
         """The template of a function for arguments of this structure."""
-        symbols = [ca.SX.sym("a", self._columns[slot].numel()) for slot in slots]
+        symbols = [ca.SX.sym("a", self._sizes[slot]) for slot in slots]
         entries: list[list[Expr]] = [symbol.nonzeros() for symbol in symbols]
         outlines: list[Leaf] = []
         leaves_of(shape, outlines)
@@ -135,8 +168,7 @@ class Tracer(ABC):
         with tracing(None):
             result_shape = dismantle(function(*arguments, **named), results)
         given = _Given(entries)
-        leaves = zip(map(self.value, results), slots_of(result_shape), strict=True)
-        matrices = tuple(given.placed(leaf, slot) for leaf, slot in leaves)
+        matrices = given.placed(list(map(self.value, results)), slots_of(result_shape))
         if not given.columns:
             return Template(None, (), result_shape, matrices)
         columns: Any = [ca.vertcat(*column) for column in given.columns.values()]
@@ -180,10 +212,11 @@ class InlineTracer(Tracer):
         self.take(column)
 
     def _apply(self, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
-        first, columns = len(self._columns), function.call([self._columns[slot] for slot in slots])
-        self._columns += columns
-        self._entries += [column.nonzeros() for column in columns]
-        return range(first, len(self._columns))
+        columns = function.call([self._column(slot) for slot in slots])
+        found = [self._slot(column.numel()) for column in columns]
+        for number, column in zip(found, columns, strict=True):
+            self._columns[number], self._entries[number] = column, column.nonzeros()
+        return found
 
 
 class _Given:
@@ -194,15 +227,34 @@ class _Given:
         self.columns: dict[int, list[Expr]] = {}
         self._homes = {e.element_hash(): (k, j) for k, column in enumerate(entries) for j, e in enumerate(column)}
 
-    def placed(self, matrix: Expr, slot: int) -> TracedMatrix:
-        """The codes of a matrix, whose numbers go to a slot if they lie nowhere yet."""
-        return TracedMatrix(outline(matrix), tuple([self._code(number, slot) for number in matrix.nonzeros()]))
+    def placed(self, matrices: Sequence[Expr], slots: Sequence[int]) -> tuple[TracedMatrix, ...]:
+        """The codes of matrices, whose numbers go to their slots if they lie nowhere yet.
 
-    def _code(self, number: Expr, slot: int) -> Code:
+        The few numbers of a body, such as its velocities, stay together, also those that are left as they were.
+        """
+        numbers = [matrix.nonzeros() for matrix in matrices]
+        by_slot: dict[int, list[list[Expr]]] = {}
+        for slot, own in zip(slots, numbers, strict=True):
+            by_slot.setdefault(slot, []).append(own)
+        anew = {slot: self._together(parts) for slot, parts in by_slot.items()}
+        return tuple(
+            TracedMatrix(outline(matrix), tuple([self._code(number, slot, anew[slot]) for number in own]))
+            for matrix, slot, own in zip(matrices, slots, numbers, strict=True)
+        )
+
+    def _together(self, parts: Sequence[Sequence[Expr]]) -> bool:
+        """Whether all numbers of a slot go there: one or two vectors of space, of which something is new."""
+        vectors = len(parts) <= 2 and all(len(part) == 3 for part in parts)
+        return vectors and any(self._is_new(number) for part in parts for number in part)
+
+    def _is_new(self, number: Expr) -> bool:
+        return not number.is_constant() and number.element_hash() not in self._homes
+
+    def _code(self, number: Expr, slot: int, anew: bool) -> Code:
         if number.is_constant():
             return float(number)
         code = number.element_hash()
-        if code not in self._homes:
+        if code not in self._homes or (anew and self._homes[code][0] >= 0):
             column = self.columns.setdefault(slot, [])
             self._homes[code] = (-1 - list(self.columns).index(slot), len(column))
             column.append(number)

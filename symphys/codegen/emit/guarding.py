@@ -1,0 +1,233 @@
+"""What the driver needs to leave out calls that are without effect.
+
+A guard is a word that is 0 where a call changes nothing. A result of a call that is left out stands for another place:
+that of an argument, or of zeros. Results that stand for one another form a chain, such as the velocity of a body after
+each of its contacts. Whoever reads the newest of a chain reads what was written last by a call that was not left out,
+and its adjoint adds there. The driver notes which calls are left and where they read (``guards.c``), and keeps that for
+as long as it has all calls that are needed.
+
+A section is a run of calls that is left out where one word is 0, such as those of an impact. Its results are copied
+then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.codegen.errors import ProgramError
+from symphys.codegen.program.program import FunctionCall, Place, Program
+
+Words = NDArray[np.int64]
+Entries = Sequence[Sequence[int]]
+NONE = -1
+TABLES = ("body", "again", "back_body")
+WIDTHS = {"guards": 1, "groups": 1, "calls": 7, "reads": 2, "writes": 2, "chains": 2, "sections": 5, "copies": 5}
+
+
+@dataclass(frozen=True)
+class Guarding:
+    """Guards and sections of a program's body.
+
+    Attributes:
+        first: calls of the body up to the last that computes a guard.
+        rows: what the driver reads, by names of ``WIDTHS``, in rows of these widths:
+
+            - guards: offset of the word;
+            - groups: the numbers of calls by guard, those without one last, after the ends of these groups;
+            - calls: where its entry begins in each of ``TABLES``, laid one after the other (-1: it has none); where its
+              reads forwards, its reads backwards, its writes and its copies begin. A row more than there are calls;
+            - reads: position in the tables, chain;
+            - writes: chain, offset;
+            - chains: offset and stride where each begins;
+            - sections: first call, the one after the last; chain of its word, offset in it, 0; or -1, offset, stride;
+            - copies: offset; chain of the source, offset in it, 0; or -1, offset, stride; size.
+        arena: words of 8 bytes that the driver needs for itself.
+    """
+
+    first: int
+    rows: dict[str, Words]
+    arena: int
+
+    def count(self, name: str) -> int:
+        """Rows of a kind; of calls without the last."""
+        return len(self.rows[name]) // WIDTHS[name] - (name == "calls")
+
+
+def guarding_of(program: Program, tables: Mapping[str, tuple[Sequence[FunctionCall], Entries]]) -> Guarding | None:
+    """Of a program; None if it has neither guards nor sections.
+
+    Args:
+        program: whose body has calls with guards.
+        tables: for each of ``TABLES`` the calls and their entries.
+    """
+    body = _followed(program)
+    if not any(call.guard or call.section for call in body):
+        return None
+    guards = list(dict.fromkeys(call.guard.offset for call in body if call.guard is not None))
+    rows = _Rows(program, body, guards)
+    rows.lay(tables)
+    return rows.guarding()
+
+
+class _Rows:
+    """The rows of ``Guarding``, from the calls of a body in their order."""
+
+    def __init__(self, program: Program, body: Sequence[FunctionCall], guards: Sequence[int]) -> None:
+        self._program, self._body, self._guards = program, body, guards
+        self._chains = _Chains(program.size)
+        self._starts = np.full((len(body) + 1, WIDTHS["calls"]), NONE, np.int64)
+        self._reads: list[tuple[int, int]] = []
+        self._writes: list[tuple[int, int]] = []
+        self._copies: list[tuple[int, ...]] = []
+        self._sections: list[tuple[int, ...]] = []
+        self._words = 0
+
+    def lay(self, tables: Mapping[str, tuple[Sequence[FunctionCall], Entries]]) -> None:
+        """Go through the calls as they follow one another, with their entries in all tables."""
+        numbers = {id(call): k for k, call in enumerate(self._program.body)}
+        entries: list[list[tuple[int, Sequence[int]]]] = [[] for _ in self._body]
+        for table, name in enumerate(TABLES):
+            for call, entry in zip(*tables[name], strict=True):
+                entries[numbers[id(call)]].append((self._words, entry))
+                self._starts[numbers[id(call)], table] = self._words
+                self._words += len(entry)
+        for k, call in enumerate(self._body):
+            self._section(k, call)
+            places = {place.offset: chain for place in call.inputs if (chain := self._chains.of(place)) != NONE}
+            forward = [each for each in entries[k] if each[0] == self._starts[k, 0]]
+            self._starts[k, 3] = len(self._reads)
+            self._read(forward, places)
+            self._starts[k, 4] = len(self._reads)
+            self._read([each for each in entries[k] if each not in forward], places)
+            self._starts[k, 5:] = len(self._writes), len(self._copies)
+            self._write(call)
+        self._starts[-1, 3:] = len(self._reads), len(self._reads), len(self._writes), len(self._copies)
+
+    def _read(self, entries: Sequence[tuple[int, Sequence[int]]], places: Mapping[int, int]) -> None:
+        for start, entry in entries:
+            for i in range(2, len(entry), 2):
+                if entry[i] in places:
+                    self._reads.append((start + i, places[entry[i]]))
+
+    def _write(self, call: FunctionCall) -> None:
+        for place, other in zip(call.outputs, call.beside, strict=False):
+            if other is not None:
+                self._copies.append((place.offset, *self._chains.source(other), place.size))
+        for place, other in zip(call.outputs, call.otherwise, strict=False):
+            if other is not None and call.guard is not None:
+                self._writes.append((self._chains.extend(place, other), place.offset))
+
+    def _section(self, k: int, call: FunctionCall) -> None:
+        before = self._body[k - 1].section if k else None
+        if call.section is not None and call.section != before:
+            end = next((j for j in range(k, len(self._body)) if self._body[j].section != call.section), len(self._body))
+            self._sections.append((k, end, *self._chains.source(call.section)))
+
+    def guarding(self) -> Guarding:
+        """All rows."""
+        word = {offset: g for g, offset in enumerate(self._guards)}
+        groups: list[list[int]] = [[] for _ in range(len(word) + 1)]
+        for k, call in enumerate(self._body):
+            groups[NONE if call.guard is None else word[call.guard.offset]].append(k)
+        rows = {
+            "guards": self._guards,
+            "groups": [*np.cumsum([len(group) for group in groups]), *(k for group in groups for k in group)],
+            "calls": self._starts,
+            "reads": self._reads,
+            "writes": self._writes,
+            "chains": self._chains.roots,
+            "sections": self._sections,
+            "copies": self._copies,
+        }
+        calls, sections = len(self._body), len(self._sections)
+        seen = (2 + self._program.steps) * len(self._guards) // 8 + 1
+        arena = 64 + seen + calls // 64 + 1 + self._words + 3 * (calls + sections) + 2 * len(self._chains.roots)
+        computes = [k for k, call in enumerate(self._body) if any(place.offset in word for place in call.outputs)]
+        return Guarding(
+            first=1 + max(computes, default=NONE),
+            rows={name: np.array(each, np.int64).ravel() for name, each in rows.items()},
+            arena=arena + 3 * (6 * sections + 4 * len(self._copies)),
+        )
+
+
+class _Chains:
+    """Chains of results, while calls follow one another."""
+
+    def __init__(self, size: int) -> None:
+        self.roots: list[tuple[int, int]] = []
+        self._newest: list[Place] = []
+        self._chain = np.full(size, NONE, np.int64)
+
+    def of(self, place: Place) -> int:
+        """The chain whose newest result has this place, all of it or a part; NONE if it is part of none."""
+        return NONE if place.stride or not place.size else int(self._chain[place.offset])
+
+    def follows(self, place: Place) -> bool:
+        """Whether what is read there is the newest of its chain as it was written, or part of no chain."""
+        chains = set() if place.stride else set(self._chain[place.offset : place.offset + place.size].tolist())
+        if chains <= {NONE}:
+            return True
+        return len(chains) == 1 and self._newest[chains.pop()] == place
+
+    def source(self, place: Place) -> tuple[int, int, int]:
+        """(chain, offset in it, 0), or (NONE, offset, stride)."""
+        chain = self.of(place)
+        if chain == NONE:
+            return NONE, place.offset, place.stride
+        return chain, place.offset - self._newest[chain].offset, 0
+
+    def extend(self, place: Place, other: Place) -> int:
+        """The chain that a result goes on with, for which ``other`` may stand; a new one if that is part of none."""
+        chain = self.of(other)
+        if chain == NONE:
+            chain = len(self.roots)
+            self.roots.append((other.offset, other.stride))
+            self._newest.append(other)
+        self._newest[chain] = place
+        self._chain[place.offset : place.offset + place.size] = chain
+        return chain
+
+
+def _followed(program: Program) -> list[FunctionCall]:
+    """The body without those guards whose chains somebody reads elsewhere than at their ends."""
+    body = list(program.body)
+    for call in body:
+        _check(call)
+    while (guard := _unfollowed(program.size, body)) is not None:
+        body = [replace(call, guard=None, otherwise=()) if call.guard == guard else call for call in body]
+    return body
+
+
+def _unfollowed(size: int, body: Sequence[FunctionCall]) -> Place | None:
+    """A guard whose results are read where they are not the newest."""
+    chains, guards = _Chains(size), dict[int, Place]()
+    for call in body:
+        for place in call.inputs:
+            if not chains.follows(place):
+                return guards[place.offset] if place.offset in guards else next(iter(guards.values()))
+        for place, other in zip(call.outputs, call.otherwise, strict=False):
+            if other is not None and call.guard is not None:
+                if not chains.follows(other):
+                    return call.guard
+                chains.extend(place, other)
+                guards[place.offset] = call.guard
+    return None
+
+
+def _check(call: FunctionCall) -> None:
+    """Refuse what the driver cannot follow."""
+    who = call.function.name()
+    for word, others, what in ((call.guard, call.otherwise, "guard"), (call.section, call.beside, "section")):
+        if word is None:
+            continue
+        if word.size != 1 or word.stride:
+            raise ProgramError(f"{who}: the word of its {what} is not one of scratch but {word}")
+        if len(others) != len(call.outputs) or call.accumulate:
+            raise ProgramError(f"{who}: with a {what} it says of each result what stands for it, and adds to nothing")
+        for place, other in zip(call.outputs, others, strict=True):
+            if other is not None and (place.stride or other.size != place.size):
+                raise ProgramError(f"{who}: {other} cannot stand for {place}")

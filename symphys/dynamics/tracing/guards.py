@@ -1,0 +1,233 @@
+"""Which calls of a traced step are without effect where a guard is 0, and what stands for their results then.
+
+A guard is a word of the step that is 0 or 1, such as whether a pair of surfaces is near. What it multiplies is 0 with
+it, and what is added to that stays as it is. So each call is evaluated with symbols, and with 0 where its arguments are
+known to be 0: results that come out as 0, or as one of the arguments, need no computing. A call whose results are all
+of that kind, or are used by such calls only, can be left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from heapq import heapify, heappop, heappush
+from typing import Any
+
+import casadi as ca
+
+from symphys.dynamics.tracing.recording import TracedCall, TracedVector
+
+Expr = Any
+"""casadi SX"""
+Known = tuple[bool, ...]
+"""For each entry of a vector whether it is known to be 0."""
+Pattern = tuple[Known | None, ...]
+"""What is known of each argument of a call; None: nothing."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """Entries ``start`` and after of a vector; of None: zeros."""
+
+    vector: TracedVector | None
+    start: int = 0
+
+
+@dataclass(frozen=True)
+class Guard:
+    """When a call may be left out.
+
+    Attributes:
+        word: the call is without effect where this is 0: one entry.
+        otherwise: for each result what it equals then; None where nothing uses it then.
+    """
+
+    word: Part
+    otherwise: tuple[Part | None, ...]
+
+
+@dataclass(frozen=True)
+class _Same:
+    """Entries ``start`` and after of an argument, by its number; of None: zeros."""
+
+    argument: int | None
+    start: int = 0
+
+    def of(self, inputs: Sequence[TracedVector]) -> Part:
+        """The same of the vectors of a call."""
+        return Part(None if self.argument is None else inputs[self.argument], self.start)
+
+
+Simplified = tuple[_Same | None, Known | None]
+"""What a result equals, and where it is 0."""
+
+
+def with_guards(
+    calls: Sequence[TracedCall], guards: Sequence[TracedVector], sections: Sequence[tuple[TracedVector, int]]
+) -> tuple[TracedCall, ...]:
+    """The calls, with what leaves them without effect; each section in one piece.
+
+    Args:
+        calls: of a step.
+        guards: words that each leave out a few calls, here and there. What they depend on comes first.
+        sections: words, as entries of vectors, that each leave out many calls that follow one another.
+    """
+    search = _Search(calls)
+    first = search.needed(guards)
+    found: dict[int, Guard] = {}
+    for word in guards:
+        found |= search.left_out(Part(word), first | found.keys())
+    order = [k for k in range(len(calls)) if k in first] + [k for k in range(len(calls)) if k not in first]
+    apart: dict[int, Guard] = {}
+    for vector, entry in sections:
+        left = search.left_out(Part(vector, entry), apart.keys())
+        arranged = search.in_one_piece(order, left)
+        if arranged is not None:
+            order, apart = arranged, apart | left
+    return tuple(replace(calls[k], guard=found.get(k), section=apart.get(k)) for k in order)
+
+
+class _Search:
+    """Calls by who reads and who writes a vector, and the guards that have been found."""
+
+    def __init__(self, calls: Sequence[TracedCall]) -> None:
+        self._calls = calls
+        self._readers: dict[int, list[int]] = {}
+        self._writer: dict[int, int] = {}
+        self._evaluated: dict[tuple[int, Pattern], list[Simplified]] = {}
+        for k, call in enumerate(calls):
+            self._writer |= {vector.number: k for vector in call.outputs}
+            for vector in call.inputs:
+                self._readers.setdefault(vector.number, []).append(k)
+
+    def left_out(self, word: Part, without: Collection[int]) -> dict[int, Guard]:
+        """The calls that are without effect where ``word`` is 0, but for those ``without``."""
+        assert word.vector is not None
+        found = self._simplified(word.vector, word.start)
+        left, standing = dict[int, Guard](), {word.vector.number}
+        looked_at = set(found)
+        waiting = [-k for k in found]
+        heapify(waiting)
+        while waiting:
+            k = -heappop(waiting)
+            otherwise = None if k in without else self._otherwise(k, found.get(k), left.keys(), standing)
+            if otherwise is None:
+                continue
+            left[k] = Guard(word, otherwise)
+            standing |= {part.vector.number for part in otherwise if part is not None and part.vector is not None}
+            for vector in self._calls[k].inputs:
+                writer = self._writer.get(vector.number)
+                if writer is not None and writer not in looked_at:
+                    looked_at.add(writer)
+                    heappush(waiting, -writer)
+        return left
+
+    def in_one_piece(self, order: Sequence[int], left: Mapping[int, Guard]) -> list[int] | None:
+        """The calls in an order in which those of a section follow one another; None if there is none."""
+        places = [i for i, k in enumerate(order) if k in left]
+        if not places:
+            return None
+        inside, before, after = list[int](), list[int](), list[int]()
+        follows, within = set[int](), set[int]()
+        for k in order[places[0] : places[-1] + 1]:
+            reads = [vector.number for vector in self._calls[k].inputs]
+            writes = [vector.number for vector in self._calls[k].outputs]
+            if k in left:
+                if not follows.isdisjoint(reads):
+                    return None
+                inside.append(k)
+                within.update(writes)
+            elif within.isdisjoint(reads) and follows.isdisjoint(reads):
+                before.append(k)
+            else:
+                after.append(k)
+                follows.update(writes)
+        return [*order[: places[0]], *before, *inside, *after, *order[places[-1] + 1 :]]
+
+    def needed(self, words: Sequence[TracedVector]) -> set[int]:
+        """The calls that words depend on."""
+        found: set[int] = set()
+        waiting = [self._writer[word.number] for word in words if word.number in self._writer]
+        while waiting:
+            k = waiting.pop()
+            if k not in found:
+                found.add(k)
+                inputs = (vector.number for vector in self._calls[k].inputs)
+                waiting += [self._writer[number] for number in inputs if number in self._writer]
+        return found
+
+    def _otherwise(
+        self, k: int, found: list[Part | None] | None, left: Collection[int], standing: Collection[int]
+    ) -> tuple[Part | None, ...] | None:
+        """What stands for the results of a call; None if one of them is needed and has to be computed.
+
+        ``left`` are the calls that are left out, ``standing`` what stands for their results.
+        """
+        parts: list[Part | None] = []
+        outputs = self._calls[k].outputs
+        for vector, part in zip(outputs, found or [None] * len(outputs), strict=True):
+            readers = self._readers.get(vector.number, ())
+            needed = bool(vector.name) or vector.number in standing or not all(k in left for k in readers)
+            if needed and (vector.name or part is None):
+                return None
+            parts.append(part if needed else None)
+        return tuple(parts)
+
+    def _simplified(self, word: TracedVector, start: int) -> dict[int, list[Part | None]]:
+        """For each call that reads something known what its results are, as far as they are known; in order."""
+        known: dict[int, Known] = {word.number: tuple(j == start for j in range(word.size))}
+        found: dict[int, list[Part | None]] = {}
+        waiting = list(self._readers.get(word.number, ()))
+        heapify(waiting)
+        while waiting:
+            k = heappop(waiting)
+            if k in found:
+                continue
+            call = self._calls[k]
+            zeros = tuple([known.get(vector.number) for vector in call.inputs])
+            found[k] = []
+            for vector, (same, zero) in zip(call.outputs, self._results(call.function, zeros), strict=True):
+                found[k].append(None if same is None else same.of(call.inputs))
+                if zero is not None:
+                    known[vector.number] = zero
+                    for reader in self._readers.get(vector.number, ()):
+                        heappush(waiting, reader)
+        return found
+
+    def _results(self, function: ca.Function, zeros: Pattern) -> list[Simplified]:
+        """What is known of each result."""
+        key = function.__hash__(), zeros
+        if key not in self._evaluated:
+            homes, arguments = dict[int, tuple[int, int]](), list[Expr]()
+            for i, known in enumerate(zeros):
+                entries: list[Expr] = ca.SX.sym("a", function.numel_in(i)).nonzeros()
+                homes |= {e.element_hash(): (i, j) for j, e in enumerate(entries)}
+                if known is not None:
+                    entries = [ca.SX(0) if zero else e for zero, e in zip(known, entries, strict=True)]
+                arguments.append(ca.densify(ca.vertcat(ca.SX(0, 1), *entries)))
+            found = list[Simplified]()
+            for result in function.call(arguments):
+                same = [_entry(e, homes) for e in ca.densify(result).nonzeros()]
+                zero = tuple(entry == 0 for entry in same)
+                found.append((_part(same), zero if any(zero) else None))
+            self._evaluated[key] = found
+        return self._evaluated[key]
+
+
+def _entry(expression: Expr, homes: dict[int, tuple[int, int]]) -> Any:
+    """0, (argument, entry) that an expression equals, or None."""
+    if expression.is_constant():
+        return 0 if float(expression) == 0 else None
+    return homes.get(expression.element_hash())
+
+
+def _part(entries: Sequence[Any]) -> _Same | None:
+    """What a result equals: zeros, or neighbouring entries of one argument; None if it has to be computed."""
+    if all(entry == 0 for entry in entries):
+        return _Same(None)
+    if any(entry is None or entry == 0 for entry in entries):
+        return None
+    (argument, start), *_ = entries
+    if any(entry != (argument, start + j) for j, entry in enumerate(entries)):
+        return None
+    return _Same(argument, start)

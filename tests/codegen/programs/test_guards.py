@@ -1,0 +1,142 @@
+"""Kernels that leave out calls without effect give what kernels give that do not, to the last bit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from heaps import heap
+from plain_c import plain
+from repeats import thorough
+
+import symphys
+from symphys.codegen import (
+    Cache,
+    FunctionCall,
+    KernelUnavailable,
+    MemoryLayout,
+    Place,
+    Program,
+    ProgramError,
+    compile_program,
+)
+from symphys.codegen.emit.guarding import guarding_of
+from symphys.codegen.emit.plan import plan
+from symphys.transcription import rollout_program
+from symphys.transcription.rollout import symbolic_rollout
+
+HEAPS = {
+    "spheres": heap(["sphere"] * 6),
+    "capsules": heap(["capsule"] * 5, law="friction = 0.4\ntorsion = 0.01\nrolling = 0.005"),
+    "a box": heap(["box", *["sphere"] * 5], restitution=0.0),
+    "soft": heap(["sphere"] * 6, law="friction = 0.4\nfrequency = 30", restitution=0.0),
+}
+
+
+def program_of(name: str, folder: Path, exact: bool = True) -> Program:
+    path = folder / "heap.toml"
+    path.write_text(HEAPS[name], "utf-8")
+    return rollout_program(symbolic_rollout(symphys.load(path)), exact)
+
+
+def whole(program: Program) -> Program:
+    """The same without guards and sections."""
+    bare: dict[str, Any] = {"guard": None, "otherwise": (), "section": None, "beside": ()}
+    return replace(program, body=tuple(replace(call, **bare) for call in program.body))
+
+
+@pytest.fixture(params=["spheres", thorough("capsules"), "a box", thorough("soft")])
+def heap_program(request: pytest.FixtureRequest, tmp_path: Path) -> Program:
+    return program_of(request.param, tmp_path)
+
+
+def test_values_and_gradients_are_the_same_to_the_last_bit(heap_program: Program, cache: Cache) -> None:
+    guess = np.random.default_rng(2).uniform(-2, 2, (11, heap_program.z.size))
+    results = []
+    for program in (heap_program, whole(heap_program)):
+        try:
+            kernel = compile_program(program, cache=cache, threads=1, seeded=("merit",), lanes=4)
+        except KernelUnavailable as error:
+            pytest.skip(str(error))
+        values, gradients = kernel.gradient(guess, [1.0], [0.0])
+        again = kernel.forward(guess[::-1], [0.0])  # in another order: what the driver has noted is of no influence
+        assert all(np.array_equal(again[name][::-1], values[name]) for name in values)
+        results.append((values, gradients))
+    (values, gradients), (others, expected) = results
+    assert np.isfinite(gradients).all()
+    assert np.abs(expected).max() > 0
+    assert all(np.array_equal(values[name], others[name]) for name in values)
+    assert np.array_equal(gradients, expected)
+
+
+def test_most_calls_of_a_heap_are_guarded(heap_program: Program) -> None:
+    guarding = plan(heap_program, ["merit"]).guarding
+    assert guarding is not None
+    guarded = sum(call.guard is not None for call in heap_program.body)
+    assert guarded > 0.8 * len(heap_program.body)
+    assert guarding.count("sections") > 0
+
+
+def test_plain_c_leaves_out_the_same(tmp_path: Path, cache: Cache) -> None:
+    program = program_of("spheres", tmp_path)
+    program = replace(program, outputs={"merit": program.outputs["merit"]})
+    try:
+        kernel = compile_program(program, cache=cache, threads=1, seeded=("merit",))
+    except KernelUnavailable as error:
+        pytest.skip(str(error))
+    call, guess = plain(program, tmp_path), np.random.default_rng(1).uniform(-2, 2, program.z.size)
+    outputs, gradient = call(guess, [0.0], [1.0])
+    values, expected = kernel.gradient(guess, [1.0], [0.0])
+    assert outputs.tolist() == values["merit"].ravel().tolist()
+    assert gradient == pytest.approx(expected.ravel(), rel=1e-9, abs=1e-9)
+
+
+def halving(guard: bool, older: bool = False) -> Program:
+    """x is moved by z where it is above 1; otherwise by nothing."""
+    at = MemoryLayout()
+    z, word, moved, more, out = at.take(1), at.take(1), at.take(1), at.take(1), at.take(1)
+    x, g, y = ca.SX.sym("x"), ca.SX.sym("g"), ca.SX.sym("y")
+    above = ca.Function("above", [x], [x > 1])
+    move = ca.Function("move", [g, x], [x + g * x * x])
+    last = ca.Function("last", [x, y], [x + y])
+    guarded = {"guard": word, "otherwise": (z,)} if guard else {}
+    chained = {"guard": word, "otherwise": (moved,)} if guard else {}
+    body = (
+        FunctionCall(above, (z,), (word,)),
+        FunctionCall(move, (word, z), (moved,), **guarded),
+        FunctionCall(move, (word, moved), (more,), **chained),
+        FunctionCall(last, (more, moved if older else z), (out,)),
+    )
+    end = Place(at.take(1).offset, 1)
+    keep = FunctionCall(ca.Function("keep", [x], [x]), (out,), (end,), accumulate=True)
+    return Program(at.size, z, Place(0, 0), 1, {"end": end}, body=(*body, keep), zeroed=(end,))
+
+
+@pytest.mark.parametrize("older", [False, True])
+def test_a_guard_of_which_an_older_result_is_read_is_given_up(older: bool, cache: Cache) -> None:
+    try:
+        kernels = [compile_program(halving(guard, older), cache=cache, lanes=1) for guard in (True, False)]
+    except KernelUnavailable as error:
+        pytest.skip(str(error))
+    for z in (0.5, 2.0, 0.25):
+        (a, slope), (b, expected) = (kernel.gradient([z], [1.0]) for kernel in kernels)
+        assert a["end"] == b["end"]
+        assert slope == expected
+    assert (plan(halving(True, older), ["end"]).guarding is None) == older
+
+
+def test_a_guard_that_the_driver_cannot_follow_is_refused() -> None:
+    program = halving(True)
+    tables: Any = {name: ([], []) for name in ("body", "again", "back_body")}
+    for change, why in (
+        ({"guard": Place(0, 2)}, "the word of its guard"),
+        ({"otherwise": ()}, "what stands for it"),
+        ({"otherwise": (Place(0, 3),)}, "cannot stand for"),
+    ):
+        calls = (program.body[0], replace(program.body[1], **change), *program.body[2:])
+        with pytest.raises(ProgramError, match=why):
+            guarding_of(replace(program, body=calls), tables)
