@@ -33,7 +33,7 @@ NEVER = ca.SX(0)
 REDUNDANT = 1e-6
 """Of the mobility of both bodies by themselves."""
 HEAVIER = 0.27
-"""Of k dt^2: what a spring adds to an effective mass. With 1/4 leapfrog would be at the edge of stability as k grows."""
+"""Of k dt^2: what a spring adds to an effective mass; with 1/4 leapfrog would be at the edge of stability."""
 REACHED = 1e-4
 """[rad], [m] in a step: what comes to a limit faster than that strikes it."""
 
@@ -335,9 +335,9 @@ def _spring(settings: StepSettings, at: CoordinateTerms, substep: SubstepTimes, 
     """(a, b) of the impulse -(a + b rate) of a spring and damper.
 
     The spring acts as if the coordinate were heavier by ``HEAVIER`` k dt^2, whatever accelerates it: of second order,
-    keeps energy, is stable at any k, and at rest its force is k (q - rest). The damper acts on the mean of the rates before
-    and after: with all that acted in the step before, else what falls on it from then to now would count twice, an
-    error of first order.
+    keeps energy, is stable at any k, and at rest its force is k (q - rest). The damper acts on the mean of the rates
+    before and after: with all that acted in the step before, else what falls on it from then to now would count twice,
+    an error of first order.
     """
     heavier = HEAVIER * spring.stiffness * settings.scheme.dt**2
     half = substep.kick * spring.damping / 2
