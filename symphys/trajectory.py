@@ -107,6 +107,10 @@ class Trajectory:
         count = int((~np.isnan(self.joint_value[0, index])).sum())
         return np.asarray(array[:, 0] if count == 1 else array[:, :count])
 
+    def __contains__(self, name: object) -> bool:
+        """Whether there is a quantity of this name."""
+        return name in self._columns
+
     @property
     def units(self) -> dict[str, str]:
         """The unit of every quantity by its name: ``{"ball.position": "m", ...}``; empty where there is none."""

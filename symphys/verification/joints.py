@@ -30,10 +30,10 @@ AT_LIMIT = 1e-6
 def joint_work(rollout: Rollout, record: Record) -> tuple[Array, Array]:
     """(N,) [J]: the work of motors, springs and dry friction in each step, and the sum of its sizes, joint by joint.
 
-    What a command gives acts from the start of its step to the end. Leapfrog has others' forces half a substep ahead in
-    the velocities at the ends of a step; of a step that is cut only the last force is known, and they are taken to get
-    there in even steps. Of a servo that goes from one bound to the other within a step that is wrong by up to twice its
-    work.
+    What a command gives acts from the start of its step to the end, also beside what a motor makes of its coordinate.
+    Leapfrog has others' forces half a substep ahead in the velocities at the ends of a step; of a step that is cut only
+    the last force is known, and they are taken to get there in even steps. Of a servo that goes from one bound to the
+    other within a step that is wrong by up to twice its work.
     """
     layout, x = Layout(rollout.world), record.arrays.x
     total, gross, lag = np.zeros(rollout.steps), np.zeros(rollout.steps), x[:, layout["lag"]]
@@ -42,9 +42,9 @@ def joint_work(rollout: Rollout, record: Record) -> tuple[Array, Array]:
             force = x[:, layout[f"{joint.name}.{part}"]]
             is_torque = part == "motor" and given_torque(joint.motor)
             ahead = rollout.dt if is_torque else rollout.dt / 2 + lag[:-1] + lag[1:]
-            impulse = rollout.dt * force[:-1] + ahead * (force[1:] - force[:-1])
-            if part == "motor" and joint.drive == DRIVE:
-                impulse -= lag[:-1] * np.diff(x[:, layout[f"{joint.name}.{DRIVE}"]], axis=0)
+            drive = x[:, layout[f"{joint.name}.{DRIVE}"]] if part == "motor" and joint.drive == DRIVE else 0 * force
+            other = force - drive
+            impulse = rollout.dt * (drive[1:] + other[:-1]) + ahead * (other[1:] - other[:-1])
             work = impulse * (rate[:-1] + rate[1:]) / 2
             total += work.sum(axis=1)
             gross += 0 if is_torque else np.abs(work).sum(axis=1)

@@ -131,6 +131,44 @@ value = "hip.position[2]"
 tolerance = 0.1
 """
 
+LIFT = """
+[simulation]
+duration = 2.0
+dt = 0.01
+cuts = 2
+sweeps = 30
+
+[[body]]
+name = "tray"
+shape = { box = { size = [0.4, 0.4, 0.1] } }
+mass = 1.0
+position = [0, 0, 1.0]
+
+[[body]]
+name = "ball"
+shape = { sphere = { radius = 0.1 } }
+mass = 0.4
+position = [0, 0, 1.15]
+
+[[joint]]
+name = "lift"
+between = ["world", "tray"]
+slider = { axis = [0, 0, 1] }
+motor = { affine = { gain = 100, kp = 100, kv = 20, offset = 13.734 } }
+
+[[variable]]
+name = "height"
+sets = "lift.command"
+knots = 5
+interpolation = "linear"
+guess = [0, -0.2, -0.4, -0.6, -0.6]
+
+[[target]]
+name = "t"
+value = "lift.position"
+tolerance = 1
+"""
+
 
 def found(made: Transcription) -> tuple[Record, dict[str, Any]]:
     record = made.record(made.shooting.start(0))
@@ -164,6 +202,13 @@ def test_springs_and_motors_of_a_foot_on_the_ground_account_for_energy(make: Mak
     told = found(make(CROUCH, simulation__dt=0.01))[1]
     assert max(told["energy"]["applied"]) > 5
     assert told["gained"] < 0.05
+
+
+def test_position_motors_account_for_energy_in_cut_steps(make: Make) -> None:
+    """A tray with a ball on it is let down: its contact adds nothing."""
+    told = found(make(LIFT))[1]
+    assert told["energy"]["applied"][-1] < -8
+    assert told["gained"] < 5e-4
 
 
 def test_the_momentum_of_what_hangs_together_adds_up(make: Make) -> None:

@@ -32,6 +32,8 @@ Expr = Any
 NEVER = ca.SX(0)
 REDUNDANT = 1e-6
 """Of the mobility of both bodies by themselves."""
+HEAVIER = 0.27
+"""Of k dt^2: what a spring adds to an effective mass; with 1/4 leapfrog would be at the edge of stability."""
 REACHED = 1e-4
 """[rad], [m] in a step: what comes to a limit faster than that strikes it."""
 
@@ -332,15 +334,16 @@ def coupling_constraint(
 def _spring(settings: StepSettings, at: CoordinateTerms, substep: SubstepTimes, spring: Spring) -> tuple[Expr, Expr]:
     """(a, b) of the impulse -(a + b rate) of a spring and damper.
 
-    The spring acts with k / (1 + (w dt)^2 / 3), w^2 = k / m: of second order, keeps energy and is stable at any k. The
-    damper acts on the mean of the rates before and after: with all that acted in the step before, else what falls on it
-    from then to now would count twice, an error of first order.
+    The spring acts as if the coordinate were heavier by ``HEAVIER`` k dt^2, whatever accelerates it: of second order,
+    keeps energy, is stable at any k, and at rest its force is k (q - rest). The damper acts on the mean of the rates
+    before and after: with all that acted in the step before, else what falls on it from then to now would count twice,
+    an error of first order.
     """
-    dt = settings.scheme.dt
-    stiffness = spring.stiffness / (1 + spring.stiffness * at.mobility * dt * dt / 3)
+    heavier = HEAVIER * spring.stiffness * settings.scheme.dt**2
     half = substep.kick * spring.damping / 2
     before = at.rate_now + (at.rate_due - at.rate_now) * (1 - 2 * substep.kick / substep.duration)
-    return substep.kick * stiffness * (at.value - spring.rest) + half * before, half
+    pull = substep.kick * spring.stiffness * (at.value - spring.rest)
+    return pull + (half - heavier) * before, half + heavier
 
 
 CONSTRAINTS = {

@@ -15,6 +15,7 @@ from symphys.model.joints import (
     HINGE,
     SLIDER,
     UNIVERSAL,
+    AffineMotor,
     Joint,
     JointFrame,
     Limits,
@@ -123,6 +124,25 @@ def test_a_damper_under_a_load_is_of_second_order() -> None:
         errors.append(abs(states["cart.velocity"][-1, 2] + exact))
     assert errors[1] < 5e-4
     assert errors[0] == pytest.approx(4 * errors[1], rel=0.05)
+
+
+@pytest.mark.parametrize("dt", [0.02, 0.005])
+@pytest.mark.parametrize("stiffness", [2000.0, 50000.0])
+def test_what_is_held_comes_to_rest_where_its_force_is_the_load(dt: float, stiffness: float) -> None:
+    """k (target - q) = m g of a position motor, m g and a torque motor's force of a spring; at any time step."""
+    load, damping = 2.0 * 9.81, 2 * np.sqrt(stiffness * 2.0)
+    motors = AffineMotor(gain=stiffness / 2, kp=stiffness / 4, kv=damping / 4, gear=2.0), TorqueMotor(100.0)
+    for motor, spring, command, rest in (
+        (motors[0], None, 0.3, 2 * 0.3 / 2 - load / stiffness),
+        (motors[1], Spring(stiffness, damping, rest=0.1), 5.0, 0.1 + (5.0 - load) / stiffness),
+    ):
+        frames = JointFrame((0, 0, 0), ABOUT_Z), JointFrame((0, 0, 0), ABOUT_Z)
+        rail = Joint("rail", SLIDER, 0, None, frames, motor=motor, spring=spring)
+        world = World((Body("block", 2.0, 0.1),), gravity=(0, 0, -9.81), joints=(rail,))
+        lab = Lab(world, Scheme(dt=dt), ["rail.command"])
+        steps = round(4.0 / dt)
+        states = lab.states({"block.position": [0, 0, 0]}, 4.0, u=np.full((1, steps), command))
+        assert states["block.position"][-1, 2] == pytest.approx(rest, abs=1e-9)
 
 
 def test_a_spring_of_any_stiffness_is_stable() -> None:
