@@ -13,10 +13,12 @@ from symphys import files
 from symphys import identification as numbers
 from symphys.errors import SymphysError
 from symphys.identification import FitOptions, FitState, FitStep, IdentificationOptions, SearchOptions, revive_state
+from symphys.prediction.replays import worst_replays
 from symphys.prediction.residuals import RecordingResiduals, residuals_of
 from symphys.problem import IdentifySettings, Problem
 from symphys.problem.loading import Source, load
 from symphys.results.identification import Identification
+from symphys.results.identification.replays import write_replays
 from symphys.suggest import hint
 from symphys.threads import limited
 
@@ -78,6 +80,7 @@ def identify(
             files.make_folder(place)
         found = numbers.identify(residuals, options_of(chosen), start, told, stop, loaded.name, loaded.title)
     if place is not None:
+        write_replays(place, *worst_replays(loaded, residuals, found))
         found.write(place)
         if found.status != numbers.FitStatus.INTERRUPTED.value:
             files.remove(place / STATE)

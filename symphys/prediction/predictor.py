@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from symphys.prediction.parameters import number_blocks
 from symphys.prediction.rotations import turned
 from symphys.problem import Problem, Recording, Variable, VariableSlot
+from symphys.trajectory import Trajectory
 from symphys.transcription.quantity_slopes import QuantitySlopes
 from symphys.transcription.randomization.numbers import hidden
 from symphys.transcription.rollout import symbolic_rollout
+from symphys.transcription.simulation import recorder, simulate
 
 Array = NDArray[np.float64]
 CLOSE = 1e-9
@@ -63,6 +65,7 @@ class Predictor:
         simulation = replace(problem.simulation, duration=steps * self.dt)
         whole = replace(problem, simulation=simulation, variables=(*self._given, *problem.variables))
         formulas = {m.value.text: m.value for r in self.recordings for m in r.measured}
+        self._variables = whole.variables
         self._motion = QuantitySlopes(symbolic_rollout(whole), formulas, threads=threads)
         self.sizes = self._motion.sizes
         guess = np.concatenate([variable.guess for variable in whole.variables])
@@ -84,6 +87,20 @@ class Predictor:
             values, rates = interpolated(samples, each.at)
             by = interpolated(slopes, each.at)[0] + rates[:, :, None] * (each.by_offset / self.dt)
             yield PredictedSamples(values, by, each.scale, each.by_scale)
+
+    def motion(self, shared: Array, own: Array, k: int) -> tuple[Trajectory, int, Array]:
+        """A recording's motion by the exact rollout, how many of its steps were measured, and when."""
+        each, rollout = self._set(shared, own, k), self._motion.rollout
+        record = simulate(rollout, recorder(rollout), each.z, 0.0)
+        return record.motion, each.last(rollout.steps), each.at * self.dt
+
+    def by_variable(self, shared: Array, own: Array, k: int) -> dict[str, Array]:
+        """What the simulation of a recording gets, by variable: (components, 1) each."""
+        z, found, place = self._set(shared, own, k).z, dict[str, Array](), 0
+        for variable in self._variables:
+            found[variable.name] = z[place : place + variable.guess.size].reshape(variable.components, -1)
+            place += variable.guess.size
+        return found
 
     def _set(self, shared: Array, own: Array, k: int) -> _Set:
         """What the simulation of a recording gets."""

@@ -120,6 +120,11 @@ class RecordingResiduals:
         for each, kept in zip(taken.measured, self._present[k], strict=True):
             yield each, kept, self._places[_key(taken, each)], columns[each.value.text]
 
+    def columns(self, k: int, sampled: PredictedSamples) -> Iterator[tuple[Measured, str, Array, float]]:
+        """Of a recording what was measured, its unit, what is predicted, and the factor from measured to predicted."""
+        for each, _, place, columns in self._parts(k):
+            yield each, self._units[place], sampled.values[:, columns], self._scale(place, sampled)
+
     def _scale(self, place: int, sampled: PredictedSamples) -> float:
         return sampled.scale if self._units[place] in LENGTHS else 1.0
 

@@ -1,4 +1,4 @@
-"""Reports made from run folders alone: a page for a run, one for a batch, one for a motion.
+"""Reports made from run folders alone: a page for a run, a batch, a motion, an identification.
 
 Every page is one HTML file that shows all without anything else: no network, no other file. Beside a full one lies a
 folder with its figures as SVG and CSV, to which it links; a light one draws its curves itself. Importing this package
@@ -9,6 +9,7 @@ runs below a folder.
 from symphys.report.making.batch import WantedPages, make_pages, outdated, report, wanted_below
 from symphys.report.pages.batch import write_batch_report
 from symphys.report.pages.closed_loop import write_closed_loop_page
+from symphys.report.pages.identification import write_identification_page
 from symphys.report.pages.motion import write_motion, write_motion_page
 from symphys.report.pages.run import write_light_report, write_run_figures, write_run_report
 from symphys.verbs import make_callable
@@ -21,6 +22,7 @@ __all__ = [
     "wanted_below",
     "write_batch_report",
     "write_closed_loop_page",
+    "write_identification_page",
     "write_light_report",
     "write_motion",
     "write_motion_page",

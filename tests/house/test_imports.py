@@ -65,7 +65,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     ),
     "identification": ("errors results suggest", "cma numpy scipy", "estimates from recordings, no physics"),
     "prediction": (
-        "errors expression files identification model problem results suggest threads transcription",
+        "errors expression files identification model problem results suggest threads trajectory transcription",
         "numpy",
         "what problems predict for their recordings",
     ),

@@ -36,6 +36,7 @@ def identify(source: str, assignments: tuple[str, ...], threads: int | None, out
     linear_algebra.limit()
     from symphys.interrupts import Interrupts
     from symphys.prediction import identify as identified
+    from symphys.report import write_identification_page
     from symphys.results.case_name import case_name
     from symphys.results.identification.summary import summary
 
@@ -46,7 +47,7 @@ def identify(source: str, assignments: tuple[str, ...], threads: int | None, out
     with Interrupts().listening() as asked:
         found = identified(problem, folder, threads=threads, monitor=told, stop=asked, **asked_for)
     click.echo(f"\n{summary(found)}")
-    click.echo(folder)
+    click.echo(write_identification_page(folder))
     if found.status == "interrupted":
         return INTERRUPTED
     return 0 if found.status == "converged" and not found.doubts else 1

@@ -11,6 +11,7 @@ from symphys.report.figures import style
 from symphys.report.pages.markup import PACKED, Html, dot, embedded, join, tag
 from symphys.report.robots.branches import colours, keys, linked, traced
 from symphys.report.robots.joint_positions import SQUARE, axes_of, drawable
+from symphys.report.scene.ghosts import MEASURED
 from symphys.report.scene.views import SIDE_YZ, TOP, choose_views, reach, solids_of
 from symphys.results.polytope import Polytope
 from symphys.results.scene import Scene, SceneTerrain, Solid
@@ -108,6 +109,7 @@ def body_data(trajectory: Trajectory, scene: Scene) -> list[dict[str, object]]:
             "colour": colour,
             "solids": list(map(solid_data, solids_of(trajectory, scene, body))),
             "path": names[body] in kept,
+            "ghost": names[body].endswith(MEASURED),
         }
         for body, colour in enumerate(colours(trajectory, scene))
     ]

@@ -149,7 +149,7 @@ class Player {
   }
 
   solids(poses) {
-    return this.data.bodies.flatMap((body, b) => body.solids.map((solid) => place(solid, poses[b], body.colour, false)));
+    return this.data.bodies.flatMap((body, b) => body.solids.map((solid) => ({ ...place(solid, poses[b], body.colour, false), ghost: body.ghost })));
   }
 
   drawFixtures(cells) {
@@ -163,7 +163,9 @@ class Player {
     const moving = [], painter = this.painter;
     for (const solid of ordered) {
       if (solid.fixed && !moving.some((other) => overlap(other, solid, painter.eye))) continue;
+      painter.pen.globalAlpha = solid.ghost ? 0.4 : 1; // what was measured is seen through
       painter.drawSolid(solid, this.data.planes);
+      painter.pen.globalAlpha = 1;
       if (!solid.fixed) moving.push(solid);
       if (!solid.fixed) this.hide(solid, cells);
     }

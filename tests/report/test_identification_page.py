@@ -1,0 +1,116 @@
+"""The page of an identification: what it says of a fit, and what was measured beside what is simulated."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import symphys
+from symphys.report import write_identification_page
+from symphys.report.scene.ghosts import with_ghosts
+from symphys.results.identification import read_identification
+from symphys.results.identification.replays import read_replays
+from symphys.results.scene import read_scene
+
+TOSSES = """
+title = "Thrown"
+[simulation]
+duration = 0.5
+dt = 0.01
+[[body]]
+name = "ball"
+shape = { sphere = { radius = 0.1 } }
+mass = 1.0
+position = [0, 0, 1]
+[ground]
+[[variable]]
+name = "mass"
+sets = "ball.mass"
+lower = 0.1
+upper = 5
+[[variable]]
+name = "speed"
+sets = "ball.velocity[0]"
+each = "recording"
+[[recording]]
+name = "toss"
+rate = 50
+until = 0.42
+measured = [{ value = "ball.position", columns = "p", noise = 0.001 }]
+[recording.table]
+"""
+
+
+def text_of(page: Path) -> str:
+    text = re.sub(r"<(script|style|svg)\b.*?</\1>", " ", page.read_text("utf-8"), flags=re.DOTALL)
+    return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", text)).split())
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("identified")
+    symphys.identify("bounce_recorded", path, bootstrap=0)
+    write_identification_page(path)
+    return path
+
+
+def test_it_says_what_was_found(folder: Path) -> None:
+    found, page = read_identification(folder), text_of(folder / "report.html")
+    each = found["bounce"]
+    assert "Converged" in page
+    assert f"{each.value:.5f}".rstrip("0") in page
+    assert f"{each.lower:.6f}"[:7] in page
+    assert "The recordings determine every number." in page
+    assert "no memory, no course, and the size of the noise" in page
+    for error in (found.fitted_errors[0], found.held_back_errors[0]):
+        assert f"{error.mean:.3g}" in page
+    assert "Among the worst: drops/0002 Held back" in page
+
+
+def test_figures_hold_the_numbers(folder: Path) -> None:
+    found = read_identification(folder)
+    table = (folder / "figures" / "course.csv").read_text("utf-8")
+    assert f"{found.history[-1, 0]:g}" in table
+    assert (folder / "figures" / "residuals.svg").read_text("utf-8").startswith("<?xml")
+    assert not (folder / "figures" / "correlations.svg").exists(), "of one number there are none"
+
+
+def test_a_replay_is_what_was_measured_beside_the_simulation(folder: Path) -> None:
+    replays, found = read_replays(folder), read_identification(folder)
+    assert [each.name for each in replays] == [name for name, _ in found.worst(3)]
+    (problem, first) = symphys.load("bounce_recorded"), replays[0]
+    (recording,) = (each for each in problem.recordings if each.name == first.name)
+    assert first.quantities[0].measured == pytest.approx(recording.measured[0].values)
+    off = (first.quantities[0].simulated - first.quantities[0].measured) / 0.002
+    assert np.sqrt(np.mean(off**2)) == pytest.approx(first.ratio, rel=1e-6)
+    at = np.interp(first.time, first.motion.time, first.motion["ball.position"][:, 2])
+    assert first.quantities[0].simulated.ravel() == pytest.approx(at, abs=1e-9)
+
+
+def test_the_measured_body_is_seen_through(folder: Path) -> None:
+    replay, page = read_replays(folder)[0], (folder / "report.html").read_text("utf-8")
+    motion, scene = with_ghosts(replay, read_scene(folder / "scene.json"))
+    assert motion.body_names == ("ball", "ball measured")
+    assert scene.solids("ball measured") == scene.solids("ball")
+    height = np.interp(motion.time, replay.time, replay.quantities[0].measured[:, 0])
+    assert motion["ball measured.position"][:, 2] == pytest.approx(height)
+    data = json.loads(re.search(r'<script type="application/json"[^>]*>(.*?)</script>', page, re.DOTALL)[1])
+    assert [body["ghost"] for body in data["bodies"]] == [False, True]
+
+
+def test_what_is_not_determined_is_named(tmp_path: Path) -> None:
+    time = np.arange(0, 0.42, 0.02)
+    rows = [[0.5 * t, 0.0, 1 - 4.905 * t * t] for t in time]
+    (tmp_path / "tosses.toml").write_text(f"{TOSSES}p = {json.dumps(rows)}\n", "utf-8")
+    out = tmp_path / "out"
+    found = symphys.identify(tmp_path / "tosses.toml", out)
+    assert [each.names for each in found.open] == [("mass",)]
+    page = text_of(write_identification_page(out))
+    assert "not determined" in page
+    assert "mass has no effect" in page.lower()
+    assert found.open[0].advice in page
