@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from symphys.prediction.residuals import RecordingResiduals, difference
 from symphys.problem import Problem
 from symphys.results.identification import Identification
-from symphys.results.identification.replays import Replay, ReplayedQuantity
+from symphys.results.identification.replays import RecordingReplay, ReplayedQuantity
 from symphys.results.scene import Scene
 from symphys.results.scene_of_problem import make_scene
 from symphys.trajectory import Trajectory, shapes
@@ -27,7 +27,7 @@ POSE = re.compile(r"(?P<body>[^.]+)\.(?P<field>position|orientation)(\[(?P<compo
 
 def worst_replays(
     problem: Problem, residuals: RecordingResiduals, found: Identification
-) -> tuple[tuple[Replay, ...], Scene]:
+) -> tuple[tuple[RecordingReplay, ...], Scene]:
     """The recordings with the largest residuals, and the world of the first of them."""
     names = [name for name, _ in found.worst(MOST)]
     shared = np.array([each.value for each in found.parameters])
@@ -37,7 +37,7 @@ def worst_replays(
     return replays, make_scene(problem, z, replays[0].motion)
 
 
-def _replay(residuals: RecordingResiduals, found: Identification, shared: Array, k: int) -> Replay:
+def _replay(residuals: RecordingResiduals, found: Identification, shared: Array, k: int) -> RecordingReplay:
     predictor = residuals.predictor
     taken, own = predictor.recordings[k], found.own[k]
     motion, last, time = predictor.motion(shared, own, k)
@@ -58,7 +58,7 @@ def _replay(residuals: RecordingResiduals, found: Identification, shared: Array,
     bodies = tuple(dict.fromkeys(body for body, field in poses if field == "position"))
     turned = [poses.get((name, "orientation"), simulated(motion, name, "orientation", time)) for name in bodies]
     n = len(time)
-    return Replay(
+    return RecordingReplay(
         name=taken.name,
         held_back=taken.held_back,
         ratio=float(found.recording_ratio[k]),

@@ -8,7 +8,7 @@ from matplotlib.lines import Line2D
 from symphys.report.figures import style
 from symphys.report.figures.data import TIME, DataFigure, keep
 from symphys.results.identification import HISTORY, Identification
-from symphys.results.identification.replays import Replay
+from symphys.results.identification.replays import RecordingReplay
 from symphys.trajectory import Array
 
 MOST_NAMES = 30
@@ -127,7 +127,7 @@ def draw_course(found: Identification) -> DataFigure | None:
     return figure
 
 
-def draw_replay(replay: Replay) -> DataFigure | None:
+def draw_replay(replay: RecordingReplay) -> DataFigure | None:
     """What was measured and what is simulated, over time."""
     shown = replay.quantities[:MOST_PANELS]
     if not shown:

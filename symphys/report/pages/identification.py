@@ -22,7 +22,7 @@ from symphys.report.scene.animation import animation
 from symphys.report.scene.ghosts import with_ghosts
 from symphys.results.file_names import FIGURES, SCENE
 from symphys.results.identification import Identification, ParameterEstimate, PredictionErrors, read_identification
-from symphys.results.identification.replays import Replay, read_replays
+from symphys.results.identification.replays import RecordingReplay, read_replays
 from symphys.results.scene import Scene, read_scene
 
 INTERVALS = (
@@ -191,7 +191,7 @@ def error_row(kind: str, each: PredictionErrors) -> list[str]:
     return [tag("b", each.name), kind, f"{each.recordings}", *values, show(each.ratio)]
 
 
-def worst(replay: Replay, scene: Scene, curves: Html) -> Html:
+def worst(replay: RecordingReplay, scene: Scene, curves: Html) -> Html:
     """A recording played beside its simulation."""
     motion, both = with_ghosts(replay, scene)
     kind = "held back" if replay.held_back else "fitted to"

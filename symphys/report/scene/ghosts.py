@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from symphys.results.identification.replays import Replay
+from symphys.results.identification.replays import RecordingReplay
 from symphys.results.scene import Scene, SceneBody
 from symphys.trajectory import Array, Trajectory
 
@@ -15,7 +15,7 @@ MEASURED = " measured"
 """Ends the name of what was measured."""
 
 
-def with_ghosts(replay: Replay, scene: Scene) -> tuple[Trajectory, Scene]:
+def with_ghosts(replay: RecordingReplay, scene: Scene) -> tuple[Trajectory, Scene]:
     """The simulated motion and its scene, with a further body for each whose position was measured.
 
     Between samples ghosts go evenly; before the first and after the last they stand.

@@ -47,7 +47,7 @@ class ReplayedQuantity:
 
 
 @dataclass(frozen=True, eq=False)
-class Replay:
+class RecordingReplay:
     """A recording beside its simulation, in the world's units and frame.
 
     Attributes:
@@ -72,7 +72,7 @@ class Replay:
     motion: Trajectory = field(repr=False)
 
 
-def write_replays(folder: Path, replays: Sequence[Replay], scene: Scene) -> None:
+def write_replays(folder: Path, replays: Sequence[RecordingReplay], scene: Scene) -> None:
     """All of its files; the list last."""
     files.make_folder(folder / "replays")
     listed = []
@@ -89,7 +89,7 @@ def write_replays(folder: Path, replays: Sequence[Replay], scene: Scene) -> None
     files.write_json(folder / REPLAYS, {"replays": listed})
 
 
-def read_replays(folder: Path) -> tuple[Replay, ...]:
+def read_replays(folder: Path) -> tuple[RecordingReplay, ...]:
     """Those in a folder; none where there is no list. Raises ReportError."""
     if not (folder / REPLAYS).exists():
         return ()
@@ -99,7 +99,7 @@ def read_replays(folder: Path) -> tuple[Replay, ...]:
     )
 
 
-def _read(folder: Path, k: int, entry: dict[str, object]) -> Replay:
+def _read(folder: Path, k: int, entry: dict[str, object]) -> RecordingReplay:
     path = folder / "replays" / f"{k}-measured.npz"
     arrays = read_archive(path)
     named, bodies = entry.get("quantities"), entry.get("bodies")
@@ -116,7 +116,7 @@ def _read(folder: Path, k: int, entry: dict[str, object]) -> Replay:
         raise ReportError(f"{path.name}: not a measured motion ({values.name(str(error))})") from error
     motion = read_trajectory(folder / "replays" / f"{k}.npz")
     ratio = values.number(entry.get("ratio"))
-    return Replay(
+    return RecordingReplay(
         values.name(entry.get("name")),
         entry.get("held_back") is True,
         ratio,
