@@ -25,7 +25,10 @@ static void run(const phase *calls, V *m, V *b, word k) {
   for (word c = 0; c < calls->count; c++, t += t[1]) FUNCTIONS[t[0]](m, b, t + 2, k);
 }
 
-static left_out *left_of(const program *p, V *m) { return (left_out *)(m + 2 * p->size + p->tape); }
+static left_out *left_of(const program *p, V *m) {
+  uintptr_t end = (uintptr_t)(m + 2 * p->size + p->tape), word_size = sizeof(word);
+  return (left_out *)((end + word_size - 1) / word_size * word_size);
+}
 
 static word length_of(const phase *calls) {
   const word *t = calls->entries;
@@ -130,10 +133,8 @@ static void note(const program *p, left_out *x, int backward) {
     for (unsigned long long left = x->runs[block]; left; left &= left - 1) {
       word k = 64 * block + LOWEST(left);
       const word *call = p->calls.places + 7 * k, *section = p->sections.places + 5 * s;
-      if (inside && k >= section[1]) {
-        for (word t = from; t < to; t++) end_section(p, x, t, s);
-        inside = 0, s++, section += 5;
-      }
+      for (; s < p->sections.count && k >= section[1]; inside = 0, s++, section += 5)
+        for (word t = from; inside && t < to; t++) end_section(p, x, t, s);
       if (s < p->sections.count && !inside && k >= section[0]) {
         for (word t = from; t < to; t++) begin_section(p, x, t, s);
         inside = 1;

@@ -145,7 +145,7 @@ class _Rows:
         }
         calls, sections = len(self._body), len(self._sections)
         seen = (2 + self._program.steps) * len(self._guards) // 8 + 1
-        arena = 64 + seen + calls // 64 + 1 + self._words + 3 * (calls + sections) + 2 * len(self._chains.roots)
+        arena = 1 + 64 + seen + calls // 64 + 1 + self._words + 3 * (calls + sections) + 2 * len(self._chains.roots)
         computes = [k for k, call in enumerate(self._body) if any(place.offset in word for place in call.outputs)]
         return Guarding(
             first=1 + max(computes, default=NONE),

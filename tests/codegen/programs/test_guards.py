@@ -140,3 +140,39 @@ def test_a_guard_that_the_driver_cannot_follow_is_refused() -> None:
         calls = (program.body[0], replace(program.body[1], **change), *program.body[2:])
         with pytest.raises(ProgramError, match=why):
             guarding_of(replace(program, body=calls), tables)
+
+
+def guarded_sections(guard: bool) -> Program:
+    """Two sections of calls that have guards too; z is (x, y, g): x is moved where y > 0, twice where g > 0."""
+    at = MemoryLayout()
+    z, none, out = at.take(3), at.take(1), at.take(1)
+    x, w = ca.SX.sym("x"), ca.SX.sym("w")
+    parts = ca.SX.sym("z", 3)
+    split = ca.Function("split", [parts], [parts[0], parts[1] > 0, parts[2] > 0])
+    move = ca.Function("move", [w, x], [x + w * ca.sin(x)])
+    places = at.take(1), at.take(1), at.take(1)
+    body, now = [FunctionCall(split, (z,), places)], places[0]
+    for _ in range(2):
+        for word in (places[1], places[2]):
+            new = at.take(1)
+            more = {"guard": places[2], "otherwise": (now,), "section": word, "beside": (now,)} if guard else {}
+            both, v = at.take(1), ca.SX.sym("v")
+            body.append(FunctionCall(ca.Function("both", [w, v], [w * v]), (word, places[2]), (both,)))
+            body.append(FunctionCall(move, (both, now), (new,), **more))
+            now = new
+    last = ca.Function("last", [x], [x * x])
+    body.append(FunctionCall(last, (now,), (out,), accumulate=True))
+    return Program(at.size, z, Place(0, 0), 1, {"out": out}, body=tuple(body), zeroed=(none, out))
+
+
+@pytest.mark.parametrize("lanes", [1, 4])
+def test_sections_of_which_nothing_is_left(lanes: int, cache: Cache) -> None:
+    try:
+        kernels = [compile_program(guarded_sections(guard), cache=cache, lanes=lanes) for guard in (True, False)]
+    except KernelUnavailable as error:
+        pytest.skip(str(error))
+    z = np.array([[0.4, a, b] for a in (-1, 1) for b in (-1, 1)] * 3)
+    (a, slope), (b, expected) = (kernel.gradient(z, [1.0]) for kernel in kernels)
+    assert a["out"].tolist() == b["out"].tolist()
+    assert slope.tolist() == expected.tolist()
+    assert len(np.unique(a["out"])) == 3
