@@ -173,6 +173,14 @@ class _Chains:
             return True
         return len(chains) == 1 and self._newest[chains.pop()] == place
 
+    def holds(self, place: Place) -> bool:
+        """Whether a place is part of the newest of its chain, or of no chain."""
+        chain = self.of(place)
+        if chain == NONE:
+            return True
+        newest = self._newest[chain]
+        return newest.offset <= place.offset and place.offset + place.size <= newest.offset + newest.size
+
     def source(self, place: Place) -> tuple[int, int, int]:
         """(chain, offset in it, 0), or (NONE, offset, stride)."""
         chain = self.of(place)
@@ -206,7 +214,8 @@ def _unfollowed(size: int, body: Sequence[FunctionCall]) -> Place | None:
     """A guard whose results are read where they are not the newest."""
     chains, guards = _Chains(size), dict[int, Place]()
     for call in body:
-        for place in call.inputs:
+        copied = [place for place in (call.section, *call.beside) if place is not None]
+        for place in (*call.inputs, *(place for place in copied if not chains.holds(place))):
             if not chains.follows(place):
                 return guards[place.offset] if place.offset in guards else next(iter(guards.values()))
         for place, other in zip(call.outputs, call.otherwise, strict=False):
