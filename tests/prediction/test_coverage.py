@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import runpy
-from pathlib import Path
-from typing import Any
-
 import pytest
+from identify_coverage import A_RATIO, NO_EFFECT, covered, named
 from repeats import thorough
-
-BENCHMARK: dict[str, Any] = runpy.run_path(str(Path(__file__).parents[2] / "benchmarks" / "identify_coverage.py"))
 
 
 @pytest.mark.parametrize(("draws", "least"), [(3, 1), thorough(100, 90)])
 def test_intervals_cover_the_truth_and_are_as_narrow_as_can_be(draws: int, least: int) -> None:
     """90 to 99 of 100, and at most 1.5 times the bound of Cramér and Rao."""
-    found, _ = BENCHMARK["covered"](draws)
+    found, _ = covered(draws)
     assert set(found) == {"friction", "bounce"}
     for count, widest in found.values():
         assert least <= count <= max(draws, 3)
@@ -25,6 +20,6 @@ def test_intervals_cover_the_truth_and_are_as_narrow_as_can_be(draws: int, least
 
 @pytest.mark.parametrize("draws", [2, thorough(20)])
 def test_what_is_open_is_named_in_each_draw(draws: int) -> None:
-    assert BENCHMARK["named"](BENCHMARK["NO_EFFECT"], draws) == {"mass has no effect on what was measured": draws}
+    assert named(NO_EFFECT, draws) == {"mass has no effect on what was measured": draws}
     ratio = "drag and mass appear only as the ratio drag / mass"
-    assert BENCHMARK["named"](BENCHMARK["A_RATIO"], draws) == {ratio: draws}
+    assert named(A_RATIO, draws) == {ratio: draws}
