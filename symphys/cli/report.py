@@ -45,11 +45,20 @@ pages_option = click.option(
     help="How many processes make pages.  [default: one for each processor]",
 )
 def report(folder: Path, pages: str, only_new: bool, jobs: int | None) -> int:
-    """Make the report of a run folder, or of all runs below a folder, again from its files alone."""
+    """Make the report of a run folder, or of all runs below a folder, again from its files alone.
+
+    Pages of identifications are made too.
+    """
     threads.limit()
     from symphys.codegen.toolchain.compiler import processors
-    from symphys.report import wanted_below
+    from symphys.report import identification_folders, wanted_below, write_identification_page
+    from symphys.results.discovery import run_folders
 
+    identified = identification_folders(folder)
+    for each in identified:
+        click.echo(write_identification_page(each))
+    if identified and not run_folders(folder):
+        return 0
     made = make_shown(wanted_below(folder, only_new), pages, jobs or processors())
     printed = [page for page in made.runs if page != made.page]
     if len(printed) > MOST_PRINTED:

@@ -9,13 +9,14 @@ runs below a folder.
 from symphys.report.making.batch import WantedPages, make_pages, outdated, report, wanted_below
 from symphys.report.pages.batch import write_batch_report
 from symphys.report.pages.closed_loop import write_closed_loop_page
-from symphys.report.pages.identification import write_identification_page
+from symphys.report.pages.identification import identification_folders, write_identification_page
 from symphys.report.pages.motion import write_motion, write_motion_page
 from symphys.report.pages.run import write_light_report, write_run_figures, write_run_report
 from symphys.verbs import make_callable
 
 __all__ = [
     "WantedPages",
+    "identification_folders",
     "make_pages",
     "outdated",
     "report",

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import symphys
+from symphys.cli.app import main
 from symphys.report import write_identification_page
 from symphys.report.scene.ghosts import with_ghosts
 from symphys.results.identification import read_identification
@@ -114,3 +115,14 @@ def test_what_is_not_determined_is_named(tmp_path: Path) -> None:
     assert "not determined" in page
     assert "mass has no effect" in page.lower()
     assert found.open[0].advice in page
+
+
+def test_report_makes_it_again(folder: Path) -> None:
+    page = folder / "report.html"
+    before = page.read_text("utf-8")
+    page.unlink()
+    assert symphys.report(folder.parent / folder.name) == page
+    assert page.read_text("utf-8") == before
+    page.unlink()
+    assert main(["report", str(folder)]) == 0
+    assert page.read_text("utf-8") == before

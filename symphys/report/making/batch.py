@@ -12,6 +12,7 @@ from symphys.report.making.page import AUTO, PageFault, attempt, is_light
 from symphys.report.making.pool import make_run_pages
 from symphys.report.pages.batch import PAGE as BATCH_PAGE
 from symphys.report.pages.batch import write_batch_report
+from symphys.report.pages.identification import identification_folders, write_identification_page
 from symphys.report.pages.run import PAGE
 from symphys.results.discovery import run_folders
 from symphys.results.file_names import RESULT
@@ -120,7 +121,8 @@ def report(folder: str | Path, pages: str = AUTO, jobs: int = 1) -> Path:
             ``if __name__ == "__main__":`` around its own work.
 
     Returns:
-        The page of the batch, index.html, which links to those of the runs; of a run folder its own, report.html.
+        The page of the batch, index.html, which links to those of the runs; of a run folder, or of an identification,
+        its own, report.html.
 
     Raises:
         ReportError: there is no such folder, it holds no run folder, or a page cannot be made; all others are then.
@@ -131,6 +133,10 @@ def report(folder: str | Path, pages: str = AUTO, jobs: int = 1) -> Path:
         >>> symphys.report("reports").name
         'index.html'
     """
+    identified = identification_folders(Path(folder))
+    written = [write_identification_page(each) for each in identified]
+    if written and not run_folders(Path(folder)):
+        return written[0]
     made = make_pages(wanted_below(Path(folder)), pages, jobs)
     if made.faults:
         more = f"; and {len(made.faults) - MOST_NAMED} more" if len(made.faults) > MOST_NAMED else ""

@@ -21,7 +21,13 @@ from symphys.report.pages.markup import Html, banner, card, facts, figures, join
 from symphys.report.scene.animation import animation
 from symphys.report.scene.ghosts import with_ghosts
 from symphys.results.file_names import FIGURES, SCENE
-from symphys.results.identification import Identification, ParameterEstimate, PredictionErrors, read_identification
+from symphys.results.identification import (
+    IDENTIFICATION,
+    Identification,
+    ParameterEstimate,
+    PredictionErrors,
+    read_identification,
+)
 from symphys.results.identification.replays import RecordingReplay, read_replays
 from symphys.results.scene import Scene, read_scene
 
@@ -76,6 +82,11 @@ def write_identification_page(folder: Path) -> Path:
     out = folder / "report.html"
     files.write_text(out, page(found.title or found.problem, body, animated=bool(replays)))
     return out
+
+
+def identification_folders(root: Path) -> list[Path]:
+    """The folders at or below one that hold an identification."""
+    return sorted(path.parent for path in root.rglob(IDENTIFICATION))
 
 
 def verdict(found: Identification) -> Html:
