@@ -66,7 +66,7 @@ class StepContext:
     u: Expr
     near: tuple[Expr, ...] = ()
 
-    def near_pairs(self) -> Iterator[tuple[Pair, Expr]]:
+    def pairs_and_near(self) -> Iterator[tuple[Pair, Expr]]:
         """The pairs, and whether they may act."""
         return zip(self.world.pairs, self.near or [ca.SX(1)] * len(self.world.pairs), strict=True)
 

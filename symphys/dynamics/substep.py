@@ -96,7 +96,7 @@ def advance(
     # 4. constraints of contacts (7-13) and of joints (25, 26)
     suppressed = suppressed or [ca.SX(0)] * len(contacts)
     constraints = []
-    for (pair, near), contact, off in zip(context.near_pairs(), contacts, suppressed, strict=True):
+    for (pair, near), contact, off in zip(context.pairs_and_near(), contacts, suppressed, strict=True):
         bodies = bodies_of(pair)
         moving = tuple(trees.motions[i] for i in bodies)
         force, coupled = x[f"{pair.name}.force"], may_couple(world, pair)

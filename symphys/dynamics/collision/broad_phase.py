@@ -75,9 +75,11 @@ class _Sight:
 
 
 def _sight(x: State, body: Body, push: Expr | None, settings: StepSettings) -> _Sight:
+    """Of a body; a frame without mass counts as one of 1 kg, as in ``PredictedMotion``."""
     position, velocity, reaction = (x[f"{body.name}.{field}"] for field in ("position", "velocity", "reaction_force"))
     force = reaction, ca.SX.zeros(3) if push is None else push
-    return _seen(position, velocity, force, body.mass, settings.gravity, settings.scheme.dt)
+    mass = 1.0 if body.massless else body.mass
+    return _seen(position, velocity, force, mass, settings.gravity, settings.scheme.dt)
 
 
 @traced

@@ -49,7 +49,7 @@ def defer_impacts(context: StepContext, x: State, duration: Expr, splits: Sequen
     """
     pairs, world = context.world.pairs, context.world
     contacts = detect_contacts(context, predicted_motions(context, x, duration), duration)
-    near = [each for _, each in context.near_pairs()]
+    near = [each for _, each in context.pairs_and_near()]
     looked_at = list(zip(pairs, near, contacts, strict=True))
     hits = [_hit(context.settings, pair.law, contact, each) for pair, each, contact in looked_at]
     eccentric, sides = eccentric_bodies(world), {k for pair in pairs for k in bodies_of(pair)}
@@ -110,7 +110,8 @@ def _driven(
 ) -> tuple[tuple[Expr], ...]:
     """(whether a pair waits, whether there is a chain, one without room), with a pair that a hit may drive together.
 
-    Its surfaces are apart, and the hit comes before they meet. It waits if they cannot go far into each other.
+    Its surfaces are apart, and the hit comes before they meet. It waits if they cannot go far into each other. Each
+    flag is a tuple of its own, so that it lies by itself and stands for what it was where the pair is far.
     """
     (fast, contact, near), way = sight, 2 * first[1] * duration
     apart = ca.logic_and(contact.gap > TOUCHING * settings.reference * settings.scheme.dt**2, 1 - fast)

@@ -67,7 +67,7 @@ def find_split(context: StepContext, x: State, duration: Expr, share: float) -> 
     contacts = detect_contacts(context, predicted_motions(context, x, duration), duration)
     fast = [
         strikes(context.settings, pair.law, contact, near)
-        for (pair, near), contact in zip(context.near_pairs(), contacts, strict=True)
+        for (pair, near), contact in zip(context.pairs_and_near(), contacts, strict=True)
     ]
     earliest = ca.SX(0), duration
     for contact, closes in zip(contacts, fast, strict=True):
@@ -130,7 +130,7 @@ def resolve_impact(context: StepContext, x: State, split: StepSplit) -> Substep:
     momenta = tuple(Momentum(motion.velocity, motion.momentum_k) for motion in motions)
     trees = prepare_trees(context, motions, momenta, ca.SX(0))
     constraints = []
-    for (pair, near), contact, struck in zip(context.near_pairs(), contacts, split.struck, strict=True):
+    for (pair, near), contact, struck in zip(context.pairs_and_near(), contacts, split.struck, strict=True):
         bodies = bodies_of(pair)
         moving = tuple(trees.motions[i] for i in bodies)
         coupled = may_couple(context.world, pair)

@@ -45,6 +45,18 @@ def test_with_smoothing_all_are_near() -> None:
     assert all(near(world_of(LINE), smoothing=1e-3).values())
 
 
+def test_a_frame_without_mass_brings_nothing_near() -> None:
+    """Its mass divides nothing: reaches are numbers, and what is far stays far."""
+    bodies = [Body.ball(f"b{i}", 0.1, 1.0, position=place) for i, place in enumerate(LINE)]
+    frame = Body.frame("frame", position=(9.0, 0.0, 1.0))
+    bob = Body.ball("bob", 0.1, 1.0, position=(9.0, 0.0, 1.0))
+    along = symphys.Slider("along", ("world", "frame"), axis=(1, 0, 0))
+    up = symphys.Slider("up", ("frame", "bob"), axis=(0, 0, 1))
+    world = make_world([*bodies, frame, bob], [Plane.ground()], Law(0.5, 0.5), joints=[along, up])
+    found = near(world)
+    assert (found["b0-ground"], found["b0-b1"]) == (1, 0)
+
+
 def test_where_there_are_few_pairs_nothing_is_looked_at() -> None:
     world = world_of(LINE[:3])
     context: StepContext = make_context(world, Scheme(), (), ca.SX(0, 1), ca.SX(0))
