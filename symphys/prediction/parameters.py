@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.identification import FitParameters
-from symphys.problem import Problem, Recording, Variable
-from symphys.problem.units import quantity_unit
+from symphys.problem import Problem, Variable
+from symphys.problem.units import formula_units
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -49,15 +49,6 @@ class NumberBlock:
         """Their places among shared or own numbers."""
         return slice(self.first, self.first + self.count)
 
-    @property
-    def of_recordings(self) -> str:
-        """``offset`` or ``scale`` of how motions were measured; else empty."""
-        return self.variable.slots[0].name.rpartition(".")[2] if self.variable.kind == "recording" else ""
-
-    def concerns(self, recording: Recording) -> bool:
-        """Whether it says how a recording was measured."""
-        return any(slot.name.rpartition(".")[0] == recording.table for slot in self.variable.slots)
-
 
 def number_blocks(problem: Problem, start: int) -> tuple[tuple[NumberBlock, ...], tuple[NumberBlock, ...]]:
     """Those of shared variables, then those with a value for each recording; ``start``: where variables begin in z."""
@@ -81,7 +72,8 @@ def fit_numbers(problem: Problem, blocks: Sequence[NumberBlock], guess: Array) -
         labels = axes(variable.name, block.count)
         names += labels
         sets += [slot.name] * len(labels)
-        units += ["rad" if block.turns else quantity_unit(slot.name, world) or ""] * len(labels)
+        unit = formula_units(world, (), [variable]).get(variable.name, "")
+        units += ["rad" if block.turns else unit] * len(labels)
         for key, numbers in numbers_of(block).items():
             columns[key].append(numbers)
     joined = {key: np.concatenate([np.zeros(0), *parts]) for key, parts in columns.items()}

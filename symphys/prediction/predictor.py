@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symphys.prediction.parameters import number_blocks
+from symphys.prediction.recorded_inputs import delays, input_variables, step_means
 from symphys.prediction.rotations import turned
 from symphys.problem import Problem, Recording, Variable, VariableSlot
 from symphys.trajectory import Trajectory
@@ -45,7 +47,7 @@ class PredictedSamples:
 class Predictor:
     """Simulates recordings: what was measured, at the times of the samples.
 
-    The simulation's z has first what recordings set at the start, then the problem's variables.
+    The simulation's z has first what recordings set at the start, then what drives it, then the problem's variables.
 
     Attributes:
         recordings: that are predicted.
@@ -57,17 +59,21 @@ class Predictor:
     def __init__(self, problem: Problem, recordings: Sequence[Recording], threads: int | None = None) -> None:
         """Nothing is compiled before it is asked for; KernelUnavailable then, where nothing can be compiled."""
         self.recordings, self.dt = tuple(recordings), problem.simulation.dt
-        self._given = given_variables(problem, self.recordings)
-        begin = sum(variable.guess.size for variable in self._given)
-        self.shared, self.own = number_blocks(problem, begin)
         last = math.ceil(max(r.time[-1] for r in self.recordings) / self.dt - CLOSE)
         steps = max(last, problem.simulation.steps) + 2
+        self._given = (*given_variables(problem, self.recordings), *input_variables(self.recordings, steps))
+        ends = np.cumsum([0, *(variable.guess.size for variable in self._given)]).tolist()
+        self._parts = [slice(*pair) for pair in pairwise(ends)]
+        self.shared, self.own = number_blocks(problem, ends[-1])
         simulation = replace(problem.simulation, duration=steps * self.dt)
         whole = replace(problem, simulation=simulation, variables=(*self._given, *problem.variables))
         formulas = {m.value.text: m.value for r in self.recordings for m in r.measured}
         self._variables = whole.variables
-        self._motion = QuantitySlopes(symbolic_rollout(whole), formulas, threads=threads)
+        driven = [variable.name for variable in self._given if variable.kind == "control"]
+        self._motion = QuantitySlopes(symbolic_rollout(whole), formulas, threads=threads, by_step=driven)
         self.sizes = self._motion.sizes
+        angles = {m.value.text for r in self.recordings for m in r.measured if m.angle}
+        self._angles = np.concatenate([np.full(size, text in angles) for text, size in self.sizes.items()])
         guess = np.concatenate([variable.guess for variable in whole.variables])
         self.starts = np.array([self._start(each, guess) for each in self.recordings])
 
@@ -76,7 +82,7 @@ class Predictor:
         set_ = [self._set(shared, own[k], k) for k in which]
         lasts = [each.last(self._motion.steps) for each in set_]
         for each, samples in zip(set_, self._motion.values(np.array([e.z for e in set_]), lasts), strict=True):
-            yield PredictedSamples(interpolated(samples, each.at)[0], None, each.scale, each.by_scale)
+            yield PredictedSamples(interpolated(self._whole(samples), each.at)[0], None, each.scale, each.by_scale)
 
     def slopes(self, shared: Array, own: Array, which: Sequence[int]) -> Iterator[PredictedSamples]:
         """The same with derivatives."""
@@ -84,9 +90,16 @@ class Predictor:
         lasts = [each.last(self._motion.steps) for each in set_]
         z, along = np.array([each.z for each in set_]), np.array([each.along for each in set_])
         for each, (samples, slopes) in zip(set_, self._motion.slopes(z, along, lasts), strict=True):
-            values, rates = interpolated(samples, each.at)
+            values, rates = interpolated(self._whole(samples), each.at)
             by = interpolated(slopes, each.at)[0] + rates[:, :, None] * (each.by_offset / self.dt)
             yield PredictedSamples(values, by, each.scale, each.by_scale)
+
+    def _whole(self, samples: Array) -> Array:
+        """(n, m) quantities with angles of joints that do not jump by a turn from step to step."""
+        if not self._angles.any():
+            return samples
+        with np.errstate(invalid="ignore"):  # of what is not finite
+            return np.where(self._angles, np.unwrap(samples, axis=0), samples)
 
     def motion(self, shared: Array, own: Array, k: int) -> tuple[Trajectory, int, Array]:
         """A recording's motion by the exact rollout, how many of its steps were measured, and when."""
@@ -98,7 +111,7 @@ class Predictor:
         """What the simulation of a recording gets, by variable: (components, 1) each."""
         z, found, place = self._set(shared, own, k).z, dict[str, Array](), 0
         for variable in self._variables:
-            found[variable.name] = z[place : place + variable.guess.size].reshape(variable.components, -1)
+            found[variable.name] = z[place : place + variable.guess.size].reshape(variable.knots, -1).T
             place += variable.guess.size
         return found
 
@@ -106,36 +119,37 @@ class Predictor:
         """What the simulation of a recording gets."""
         recording, width = self.recordings[k], len(shared)
         z, along = self.starts[k].copy(), np.zeros((self.starts.shape[1], width + len(own)))
-        measured = {"offset": 0.0, "scale": 1.0}
+        offset, scale = f"{recording.table}.offset", f"{recording.table}.scale"
+        measured = {offset: 0.0, scale: 1.0, **delays(recording)}
         by = {key: np.zeros(width + len(own)) for key in measured}
         both = [(block, shared, 0) for block in self.shared] + [(block, own, width) for block in self.own]
-        for block, numbers, offset in both:
-            columns = offset + np.arange(block.part.start, block.part.stop)
-            if block.of_recordings:
-                if block.concerns(recording):
-                    measured[block.of_recordings] = float(numbers[block.first])
-                    by[block.of_recordings][columns] = 1
+        for block, numbers, first in both:
+            columns = first + np.arange(block.part.start, block.part.stop)
+            if block.variable.kind == "recording":
+                for name in measured.keys() & {slot.name for slot in block.variable.slots}:
+                    measured[name] = float(numbers[block.first])
+                    by[name][columns] = 1
             elif block.turns:
                 z[block.where], along[np.ix_(block.where, columns)] = turned(z[block.where], numbers[block.part])
             else:
                 z[block.where], along[block.where, columns] = numbers[block.part], 1
-        place = 0
-        for variable in self._given:
-            part = slice(place, place + variable.guess.size)
-            place = part.stop
-            if variable.slots[0].name.rpartition(".")[2] in SCALED:
-                along[part] += np.outer(z[part], by["scale"])
-                z[part] *= measured["scale"]
-        at = (recording.time + measured["offset"]) / self.dt
-        return _Set(z, along, at, by["offset"], measured["scale"], by["scale"])
+        for variable, part in zip(self._given, self._parts, strict=True):
+            name = variable.slots[0].name
+            if name in recording.inputs:
+                late, by_late = measured[f"{name}.delay"] + measured[offset], by[f"{name}.delay"] + by[offset]
+                means, slopes = step_means(recording.inputs[name], variable.knots, self.dt, late)
+                z[part], along[part] = means.ravel(), np.outer(slopes, by_late)
+            elif name.rpartition(".")[2] in SCALED:
+                along[part] += np.outer(z[part], by[scale])
+                z[part] *= measured[scale]
+        at = (recording.time + measured[offset]) / self.dt
+        return _Set(z, along, at, by[offset], measured[scale], by[scale])
 
     def _start(self, recording: Recording, guess: Array) -> Array:
         """(n,): z at the guess, with what the recording sets."""
-        z, place = guess.copy(), 0
-        for variable in self._given:
-            name, size = variable.slots[0].name, variable.guess.size
-            z[place : place + size] = recording.start.get(name, variable.guess)
-            place += size
+        z = guess.copy()
+        for variable, part in zip(self._given, self._parts, strict=True):
+            z[part] = recording.start.get(variable.slots[0].name, variable.guess)
         for block in self.own:
             slot = block.variable.slots[0]
             if slot.name in recording.start:

@@ -49,7 +49,8 @@ def _replay(residuals: RecordingResiduals, found: Identification, shared: Array,
             off = -difference(each, predicted)
             quantities.append(ReplayedQuantity(each.name, "rad", off, np.zeros_like(off)))
         else:
-            quantities.append(ReplayedQuantity(each.name, unit, factor * each.values, factor * predicted))
+            measured = predicted - difference(each, predicted) if each.angle else factor * each.values
+            quantities.append(ReplayedQuantity(each.name, unit, measured, factor * predicted))
         if (pose := POSE.fullmatch(each.value.text)) and pose["body"] in motion.body_names:
             key = pose["body"], pose["field"]
             whole = poses.setdefault(key, simulated(motion, *key, time))

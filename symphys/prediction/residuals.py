@@ -20,6 +20,7 @@ from symphys.problem.units import quantity_unit
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Ints = NDArray[np.int64]
+WHOLE_TURN = 2 * np.pi
 LENGTHS = ("m", "m/s", "m/s^2")
 """Units of what a scale of lengths scales."""
 GUESSED, GUESSED_TURN, LEAST = 0.01, 0.02, 1e-9
@@ -145,8 +146,15 @@ def present(measured: Measured) -> Bools:
 
 
 def difference(measured: Measured, predicted: Array) -> Array:
-    """(n, m) predicted less measured; of orientations (n, 3) the rotation vector [rad] from measured to predicted."""
-    return rotation_vectors(measured.values, predicted) if measured.orientation else predicted - measured.values
+    """(n, m) predicted less measured; of orientations (n, 3) the rotation vector [rad] from measured to predicted.
+
+    Angles of joints are known up to whole turns.
+    """
+    if measured.orientation:
+        return rotation_vectors(measured.values, predicted)
+    off = predicted - measured.values
+    with np.errstate(invalid="ignore"):  # of what is not finite
+        return off - WHOLE_TURN * np.round(off / WHOLE_TURN) if measured.angle else off
 
 
 def quantity_names(keys: Sequence[tuple[str, str]]) -> tuple[str, ...]:

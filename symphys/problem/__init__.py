@@ -27,7 +27,7 @@ from symphys.problem.problem import Problem, load_problem, problem_of_tables
 from symphys.problem.quantities import set_quantities
 from symphys.problem.reading.solver_options import require_solvers, validate_options
 from symphys.problem.receding_horizon import PlantSettings, RecedingHorizon
-from symphys.problem.recordings import IdentifySettings, Measured, RecordedFile, Recording
+from symphys.problem.recordings import IdentifySettings, Measured, RecordedFile, RecordedInput, Recording
 from symphys.problem.robot_alone import is_robot, robot_alone
 from symphys.problem.schema.json_schema import json_schema
 from symphys.problem.schema.reference import reference_page
@@ -52,6 +52,7 @@ __all__ = [
     "RandomizedQuantity",
     "RecedingHorizon",
     "RecordedFile",
+    "RecordedInput",
     "Recording",
     "Scenarios",
     "Sensor",

@@ -196,7 +196,8 @@ def named_quantities(
     sets: Mapping[str, Mapping[str, tuple[float, ...]]],
 ) -> dict[str, Quantity]:
     """What variables may set beside the world: numbers of controllers, force laws and phases, clocks of recordings."""
-    clocks = recording_quantities(table.name for table in document.recording)
+    delays = [(name, each.delay) for table in document.recording for name, each in table.input_tables.items()]
+    clocks = recording_quantities((table.name for table in document.recording), delays)
     return weight_quantities(controllers) | force_quantities(document.force) | phase_quantities(sets) | clocks
 
 

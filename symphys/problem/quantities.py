@@ -96,12 +96,14 @@ def weight_quantities(controllers: Iterable[FeedbackController]) -> dict[str, Qu
     return {name: Quantity("weight", value) for controller in controllers for name, value in controller.weights.items()}
 
 
-def recording_quantities(names: Iterable[str]) -> dict[str, Quantity]:
-    """Of each [[recording]] what is added to its times [s], and the factor of its lengths."""
+def recording_quantities(names: Iterable[str], delays: Iterable[tuple[str, float]]) -> dict[str, Quantity]:
+    """Of each [[recording]] what is added to its times [s], and the factor of its lengths; delays of inputs [s]."""
     found = dict[str, Quantity]()
     for name in names:
         found[f"{name}.offset"] = Quantity("recording", np.zeros(1))
         found[f"{name}.scale"] = Quantity("recording", np.ones(1), own_scale=True)
+    for name, delay in delays:
+        found[f"{name}.{DELAY}"] = Quantity("recording", np.array([delay]), own_scale=True)
     return found
 
 
@@ -149,15 +151,18 @@ def unknown(name: str, known: Collection[str]) -> str:
     same_owner = [other for other in known if owner and other.startswith(f"{owner}.")]
     tables = "" if key in COMBINE else ": [contact] and [[pair]] may state it"
     stated = f"; what states no {key} has none to vary{tables}" if key in VARIABLE else ""
-    stated += "; a [[reference]] must state its delay, 0 too, for a variable to set it" if key == DELAY else ""
+    if key == DELAY:
+        stated += "; a [[reference]] must state its delay, 0 too, for a variable to set it; of what a [[recording]] "
+        stated += "drives by its inputs it is knee.command.delay"
     return hint(name, same_owner or known) + stated
 
 
 def set_quantities(problem: ProblemData, variable: Variable) -> str:
     """What a variable sets, as a file writes it; all that a list names gets the same values, which may not be meant."""
     values = {**problem.initial, **problem.parametric.starts(), **problem.parameters, **problem.weights}
-    tables = {recording.table for recording in problem.recordings}
-    values |= {name: each.nominal for name, each in recording_quantities(sorted(tables)).items()}
+    tables = sorted({recording.table for recording in problem.recordings})
+    delays = {name: each.delay for recording in problem.recordings for name, each in recording.inputs.items()}
+    values |= {name: each.nominal for name, each in recording_quantities(tables, delays.items()).items()}
     sizes = {DURATION: 1, **{name: value.size for name, value in values.items()}, **input_sizes(problem.world())}
 
     def text(slot: VariableSlot) -> str:

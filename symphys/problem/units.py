@@ -21,6 +21,7 @@ UNITS = {
     "reaction_force": "N",
     "reaction_torque": "N m",
     "lag": "s",
+    "delay": "s",
     "duration": "s",
     "mass": "kg",
     "radius": "m",
@@ -68,7 +69,7 @@ def formula_units(world: World, names: Iterable[str], variables: Iterable[Variab
     for variable in variables:
         units = {quantity_unit(slot.name, world) for slot in variable.slots}
         if variable.kind == "recording":
-            units = {"s" if slot.name.endswith(".offset") else "" for slot in variable.slots}
+            units = {"" if slot.name.endswith(".scale") else "s" for slot in variable.slots}
         known[variable.name] = units.pop() if len(units) == 1 else None
     known = {"duration": "s"} | known | {"time": "s", ALIVE: ""}
     return {name: unit for name, unit in known.items() if unit is not None}

@@ -36,8 +36,10 @@ def blocks(problem: Problem) -> tuple[VariableBlock, ...]:
     )
 
 
-def start_of(problem: Problem, world: World, inputs: Sequence[str], parameters: Parameters, z: Expr) -> RolloutStart:
-    """The rollout's start as a function of z."""
+def start_of(
+    problem: Problem, world: World, inputs: Sequence[str], parameters: Parameters, z: Expr, beside: Sequence[str] = ()
+) -> RolloutStart:
+    """The rollout's start as a function of z, without the variables ``beside``, inputs that are added elsewhere."""
     starts = problem.parametric.starts()
     initial = {name: ca.MX(ca.DM(value)) for name, value in (problem.initial | starts).items()}
     physical = {name: ca.MX(value) for name, value in zip(parameters.names, parameters.nominal, strict=True)}
@@ -45,7 +47,7 @@ def start_of(problem: Problem, world: World, inputs: Sequence[str], parameters: 
     u = ca.vertcat(ca.MX.zeros(inputs_size(world, inputs) - scheduled.shape[0], steps), scheduled)
     for variable, (first, last) in zip(problem.variables, spans(problem.variables), strict=True):
         part = z[first:last]
-        if variable.kind == "recording":  # of how a motion was measured, not of how it goes
+        if variable.kind == "recording" or variable.name in beside:  # the first is how a motion was measured
             continue
         if variable.kind == "control":
             u = u + _spread_inputs(problem, variable, input_columns(world, inputs), part)

@@ -16,9 +16,11 @@ from symphys.dynamics.tracing.guards import Guard, Part
 from symphys.dynamics.tracing.recording import TracedCall, TracedVector
 from symphys.expression import Formula
 from symphys.model.state_layout import Layout as Columns
+from symphys.model.state_layout import input_columns
 from symphys.problem import ALIVE
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.feedback.controller_calls import Places, control_calls
+from symphys.transcription.formula_names import spans
 from symphys.transcription.formulas.motion_parts import part_arguments
 from symphys.transcription.gradient_probe import combined
 from symphys.transcription.objective import Terms, terms
@@ -35,13 +37,16 @@ class ProgramSamples:
     Stands in for ``Rollout`` where costs, targets and constraints are put together; see its methods.
     """
 
-    def __init__(self, rollout: Rollout) -> None:
-        """Places for z, smoothing, times, parameters, inputs and states."""
-        self.rollout, self.problem, self.steps = rollout, rollout.problem, rollout.steps
+    def __init__(self, rollout: Rollout, by_step: Sequence[str] = ()) -> None:
+        """Places for z, smoothing, times, parameters, inputs and states; ``by_step`` as in ``rollout_program``."""
+        self.rollout, self.problem, self.steps, self.by_step = rollout, rollout.problem, rollout.steps, by_step
         self.layout = MemoryLayout()
         nx, nu, np_ = (int(part.shape[0]) for part in (rollout.x0, rollout.given, rollout.p))
         self.z, self.smoothing = self.layout.take(int(rollout.z.shape[0])), self.layout.take(1)
         self.p, self.given = self.layout.take(np_), self.layout.series(nu, self.steps)
+        controls = {each.name for each in self.problem.variables if each.kind == "control"}
+        alone = not rollout.world.scheduled and controls <= set(by_step)  # nothing else sets inputs: they begin with 0
+        self.begun = self.layout.series(0 if alone else nu, self.steps) if by_step else self.given
         self.u = self.given if rollout.feedback is None else self.layout.series(nu, self.steps)
         self.x = self.layout.series(nx, self.steps + 1)
         self.time = self.layout.series(1, self.steps + 1)
@@ -100,7 +105,11 @@ def dense(function: ca.Function) -> ca.Function:
 
 
 def rollout_program(
-    rollout: Rollout, exact: bool = False, recorded: Mapping[str, Formula] = NOTHING, shift: int = 1
+    rollout: Rollout,
+    exact: bool = False,
+    recorded: Mapping[str, Formula] = NOTHING,
+    shift: int = 1,
+    by_step: Sequence[str] = (),
 ) -> Program:
     """A program of z and smoothing, with all that is asked of a rollout: see ``_epilogue``; and ``alive``.
 
@@ -109,11 +118,13 @@ def rollout_program(
         exact: for smoothing 0 only, whatever is given: it has less to compute.
         recorded: further outputs by name: what formulas are at the end of every step, one after the other.
         shift: 0 for those at the start of every step.
+        by_step: names of variables with a constant knot for each step, which each step reads for itself. Else the
+            prologue writes them all, in a function as long as they are.
     """
-    samples = ProgramSamples(rollout)
+    samples = ProgramSamples(rollout, by_step)
     asked = terms(samples)
     series = {name: samples.recorded(formula, shift) for name, formula in recorded.items()}
-    body = [*control_calls(rollout, samples), *step_calls(samples, exact)]
+    body = [*_knot_calls(samples), *control_calls(rollout, samples), *step_calls(samples, exact)]
     epilogue, outputs = _epilogue(samples, asked)
     alive = _alive(samples)
     if alive is not None:
@@ -220,11 +231,31 @@ def _part(place: Place, columns: slice) -> Place:
     return Place(place.offset + start, stop - start, place.stride)
 
 
+def _knot_calls(samples: ProgramSamples) -> list[FunctionCall]:
+    """The call that adds a step's knots to its other inputs; none without variables whose knots steps read."""
+    if not samples.by_step:
+        return []
+    problem, columns = samples.problem, input_columns(samples.rollout.world, samples.rollout.inputs)
+    begun = ca.SX.sym("begun", samples.begun.size)
+    total = ca.SX(begun) if samples.begun.size else ca.SX.zeros(samples.given.size)
+    knots, places = list[Expr](), list[Place]()
+    for variable, (first, _) in zip(problem.variables, spans(problem.variables), strict=True):
+        if variable.name in samples.by_step:
+            knots.append(ca.SX.sym("knot", variable.components))
+            places.append(Place(samples.z.offset + first, variable.components, variable.components))
+            for slot in variable.slots:
+                for k, component in enumerate(slot.components):
+                    total[columns[slot.name].start + component] += knots[-1][k]
+    function = ca.Function("knots", [begun, *knots], [ca.densify(total)])
+    return [FunctionCall(function, (samples.begun, *places), (samples.given,))]
+
+
 def _prologue(samples: ProgramSamples) -> tuple[FunctionCall, ...]:
     rollout = samples.rollout
-    first = start_of(samples.problem, rollout.world, rollout.inputs, rollout.parameters, rollout.z)
-    results = [ca.densify(ca.vec(part)) for part in (rollout.memory.start(first.x0), first.u, first.p)]
-    u = Place(samples.given.offset, samples.given.size * samples.steps)
+    first = start_of(samples.problem, rollout.world, rollout.inputs, rollout.parameters, rollout.z, samples.by_step)
+    u0: Expr = first.u if samples.begun.size else ca.MX(0, 1)
+    results = [ca.densify(ca.vec(part)) for part in (rollout.memory.start(first.x0), u0, first.p)]
+    u = Place(samples.begun.offset, samples.begun.size * samples.steps)
     function = ca.Function("start", [rollout.z], results).expand()
     start = FunctionCall(function, (samples.z,), (samples.x.still(), u, samples.p))
     if not rollout.problem.free_duration:

@@ -35,12 +35,20 @@ class QuantitySlopes:
     """
 
     def __init__(
-        self, rollout: Rollout, formulas: Mapping[str, Formula], smoothing: float = 0.0, threads: int | None = None
+        self,
+        rollout: Rollout,
+        formulas: Mapping[str, Formula],
+        smoothing: float = 0.0,
+        threads: int | None = None,
+        by_step: Sequence[str] = (),
     ) -> None:
-        """Nothing is compiled before it is asked for; KernelUnavailable then, where nothing can be compiled."""
+        """Nothing is compiled before it is asked for; KernelUnavailable then, where nothing can be compiled.
+
+        ``by_step``: see ``rollout_program``.
+        """
         self.rollout, self.smoothing, self.steps = rollout, smoothing, rollout.steps
         self._threads = processors() if threads is None else threads
-        self._program = rollout_program(rollout, smoothing == 0, formulas, shift=0)
+        self._program = rollout_program(rollout, smoothing == 0, formulas, 0, by_step)
         self.names = tuple(formulas)
         self.sizes = {name: self._program.outputs[name].size // self.steps for name in formulas}
 

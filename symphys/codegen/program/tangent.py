@@ -18,6 +18,8 @@ from symphys.codegen.program.program import Function, FunctionCall, Place, Progr
 
 TANGENT = "tangent"
 """``z.tangent``: of the output ``z`` of a tangent program."""
+TOGETHER = 64
+"""Words that one call copies."""
 Mask = tuple[bool, ...]
 
 
@@ -63,9 +65,7 @@ class _TangentWriter:
         given = Place(parameters.offset, program.parameters.size)
         seeds = Place(given.offset + given.size, self.directions * n)
         self.carried[program.z.still().words(1)] = True
-        begin = [_copied(seeds, self.tangent(program.z))]
-        if given.size:
-            begin.append(_copied(given, program.parameters))
+        begin = [*_copied(seeds, self.tangent(program.z)), *_copied(given, program.parameters)]
         calls = [[self._call(each) for each in phase] for phase in self.phases]
         for name in self.wanted:
             self.read[program.outputs[name].still().words(1)] = True
@@ -131,10 +131,14 @@ def with_derivatives(function: Function, inputs: Mask, outputs: Mask, directions
     return ca.Function(f"{function.name()}_{TANGENT}", [*arguments, *map(ca.vec, seeds)], whole)
 
 
-def _copied(source: Place, target: Place) -> FunctionCall:
-    """A call that copies."""
-    x = ca.SX.sym("x", source.size)
-    return FunctionCall(ca.Function("copied", [x], [x]), (source,), (target,))
+def _copied(source: Place, target: Place) -> list[FunctionCall]:
+    """Calls that copy, most of them of the same function: one for all words would be as long as they are."""
+    calls = []
+    for first in range(0, source.size, TOGETHER):
+        x = ca.SX.sym("x", min(TOGETHER, source.size - first))
+        places = [Place(place.offset + first, x.numel()) for place in (source, target)]
+        calls.append(FunctionCall(ca.Function("copied", [x], [x]), (places[0],), (places[1],)))
+    return calls
 
 
 def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -74,6 +74,9 @@ def type_at(model: type[BaseModel], place: Place) -> Any:
     """The annotation at a place of a model."""
     annotation: Any = model
     for key in place:
+        if get_origin(annotation) is dict:
+            annotation = get_args(annotation)[1]
+            continue
         table = inner_model(annotation)
         if table and isinstance(key, str) and not key.startswith("<"):
             field = table.model_fields.get(key)

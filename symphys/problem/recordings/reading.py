@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.model.state_layout import input_sizes
 from symphys.model.world import World
 from symphys.problem.model import Simulation, Variable
 from symphys.problem.parametric.world import ParametricWorld
@@ -80,12 +81,14 @@ def read_identification(
         simulation.dt,
         longest(parametric, initial, simulation.duration),
         Starts(parametric.joints, initial),
+        input_sizes(nominal),
         frozenset(slot.name for variable in variables for slot in variable.slots if variable.kind == "initial"),
     )
     finder = FileFinder(document.recorded)
     frames = [read_frame(index, table, faults) for index, table in enumerate(document.recording)]
     recordings = read_recordings(document.recording, world, finder, frames, faults)
     check_starts(recordings, variables, faults)
+    check_inputs(document.recording, recordings, variables, faults)
     faults.stop_if_any()
     settings = IdentifySettings() if document.identify is None else IdentifySettings(**document.identify.model_dump())
     new = tuple(finder.found.values())
@@ -119,3 +122,22 @@ def check_starts(recordings: Sequence[Recording], variables: Sequence[Variable],
             if slot.name in given and not variable.each:
                 text = f'recording {given[slot.name]} sets {slot.name} at the start; with each = "recording" that is'
                 faults.add(("variable", index, "sets"), f"{text} where this variable begins, otherwise leave it out")
+
+
+def check_inputs(
+    tables: Sequence[RecordingTable], recordings: Sequence[Recording], variables: Sequence[Variable], faults: Faults
+) -> None:
+    """What recordings drive, no variable sets, and all tables state the same delay of it."""
+    driven = {name: each.table for each in recordings for name in each.inputs}
+    for index, variable in enumerate(variables):
+        for slot in variable.slots:
+            if variable.kind == "control" and slot.name in driven:
+                text = f"recording {driven[slot.name]} drives {slot.name} by its inputs; leave one of the two out"
+                faults.add(("variable", index, "sets"), text)
+    first = dict[str, tuple[str, float]]()
+    for index, table in enumerate(tables):
+        for name, each in table.input_tables.items():
+            other, delay = first.setdefault(name, (table.name, each.delay))
+            if each.delay != delay:
+                text = f"is {delay:g} s in recording {other}; all recordings that drive {name} state the same delay"
+                faults.add(("recording", index, "inputs", name, "delay"), text)

@@ -41,6 +41,11 @@ def table_lines(problem: ProblemData, table: str, own: Sequence[Recording]) -> l
         noise = "estimated" if each.noise is None else ", ".join(f"{value:g}" for value in dict.fromkeys(each.noise))
         lacks = f", {missing:,} of {total:,} samples missing" if missing else ""
         lines.append(f"  {each.name}: noise {noise}{lacks}")
+    for name, driven in own[0].inputs.items():
+        missing, total = sum(other.inputs[name].missing for other in own), sum(counts)
+        lacks = f", {missing:,} of {total:,} rows without it" if missing else ""
+        between = "held" if driven.interpolation == "constant" else "linear"
+        lines.append(f"  driven by {name}, {between} between samples{lacks}")
     if own[0].start:
         lines.append(f"  starts with {', '.join(own[0].start)}")
         depth, which = deepest_start(problem, own)

@@ -28,12 +28,17 @@ from symphys.problem.recordings.csv_file import read_csv
 from symphys.problem.recordings.files import ARRAYS, FileFinder
 from symphys.problem.recordings.magnitude import check_lengths
 from symphys.problem.recordings.npz_file import read_npz
+from symphys.problem.recordings.set_columns import (
+    InputColumns,
+    StartColumns,
+    read_input_columns,
+    read_start_columns,
+)
 from symphys.problem.recordings.splits import held_back, pieces
-from symphys.problem.recordings.start_columns import StartColumns, read_start_columns
 from symphys.problem.recordings.starts import Starts
 from symphys.problem.recordings.times import check_ends, read_times, time_column
 from symphys.problem.recordings.types import Measured, Recording
-from symphys.problem.schema.recording import MeasuredTable, RecordingTable
+from symphys.problem.schema.recording import ColumnsTable, MeasuredTable, RecordingTable
 
 Array = NDArray[np.float64]
 
@@ -49,6 +54,7 @@ class RecordedWorld:
         dt: [s] its time step.
         length: [m] that nothing exceeds by far; see ``longest``.
         starts: of bodies and joints.
+        inputs: how many numbers each force, torque and command has, by name.
         moved: names of initial quantities that variables set.
     """
 
@@ -58,6 +64,7 @@ class RecordedWorld:
     dt: float
     length: float
     starts: Starts
+    inputs: Mapping[str, int]
     moved: frozenset[str]
 
 
@@ -85,6 +92,11 @@ class MeasuredColumns:
     def orientation(self) -> bool:
         """Whether it is a unit quaternion."""
         return self.quantity.rpartition(".")[2] == ORIENTATION and self.value.size == 4
+
+    @property
+    def angle(self) -> bool:
+        """Whether it is the angle of a joint."""
+        return self.quantity.rpartition(".")[2] == "angle"
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,9 +129,11 @@ class RecordingReader:
         self._check_keys()
         measured = [self._measured(k, each) for k, each in enumerate(self.table.measured)]
         start = read_start_columns(self.table, self.world.sample, self.world.units, self.world.starts)
+        inputs = read_input_columns(self.table, self.world.inputs, self.world.units)
         found, known = list[Recording](), list[tuple[str, ...]]()
-        for piece in self._pieces(self._wanted(start)):
-            found.append(self._recording(piece, measured, start))
+        used = [*self.table.measured, *(each.table for each in start), *(each.table for each in inputs)]
+        for piece in self._pieces(self._wanted(used)):
+            found.append(self._recording(piece, measured, start, inputs))
             known.append((piece.name, *piece.aliases))
         check_ends(found, self.world.duration, self.world.dt)
         held = held_back(self.table.held_back, known)
@@ -167,10 +181,9 @@ class RecordingReader:
         noise = np.broadcast_to(np.array(table.noise), residuals).copy()
         return MeasuredColumns(table, formula, quantity, value, unit, noise)
 
-    def _wanted(self, start: Sequence[StartColumns]) -> set[str]:
+    def _wanted(self, tables: Sequence[ColumnsTable]) -> set[str]:
         """The names of all columns that are used."""
         single = {name for name in (time_column(self.table), self.table.split) if name is not None}
-        tables = [*self.table.measured, *(each.table for each in start)]
         return single | {name for table in tables for name in table.columns}
 
     def _pieces(self, wanted: set[str]) -> Iterator[Piece]:
@@ -200,6 +213,8 @@ class RecordingReader:
         columns.require([self.table.split] if self.table.split is not None else [], "split")
         for k, each in enumerate(self.table.measured):
             columns.require(each.columns, ("measured", k, "columns"))
+        for input_name, each_input in self.table.input_tables.items():
+            columns.require(each_input.columns, ("inputs", input_name))
 
     def _columns(self, name: str, wanted: set[str]) -> tuple[RecordedColumns, Array | None]:
         """Columns and first rows of a file, or of the table."""
@@ -211,7 +226,13 @@ class RecordingReader:
         with self.finder.open(name, self.folder) as stream:
             return read_npz(stream, name, wanted, self.table.rows) if arrays else (read_csv(stream, name, wanted), None)
 
-    def _recording(self, piece: Piece, measured: Sequence[MeasuredColumns], start: Sequence[StartColumns]) -> Recording:
+    def _recording(
+        self,
+        piece: Piece,
+        measured: Sequence[MeasuredColumns],
+        start: Sequence[StartColumns],
+        inputs: Sequence[InputColumns],
+    ) -> Recording:
         """One recording, in the units of the engine."""
         columns, first, last = piece.columns, piece.first, piece.last
         time, cut = read_times(columns, first, last, self.table, self.world.duration)
@@ -224,6 +245,7 @@ class RecordingReader:
             time=time,
             measured=tuple(found),
             start=self.world.starts.complete(given) if given else {},
+            inputs={each.name: each.over_time(rows, time, self.frame) for each in inputs},
             weight=self.table.weight,
         )
 
@@ -237,7 +259,7 @@ class RecordingReader:
             check_lengths(values, begins, time, self.world.length, rows.where(0), key)
         values.setflags(write=False)
         name = table.name or " ".join(each.formula.text.split())
-        return Measured(name, each.formula, tuple(table.columns), values, each.noise, each.orientation)
+        return Measured(name, each.formula, tuple(table.columns), values, each.noise, each.orientation, each.angle)
 
 
 def table_columns(table: Mapping[str, Sequence[Any]]) -> RecordedColumns:

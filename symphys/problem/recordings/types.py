@@ -25,6 +25,7 @@ class Measured:
         noise: standard deviations of the residuals, (m,), of an orientation (3,) [rad]; None: to be estimated.
         orientation: whether the value is a unit quaternion w x y z (m = 4), whose residual is the rotation vector (3,)
             [rad] between measured and simulated.
+        angle: whether it is the angle of a joint: residuals are the nearest of those that differ by whole turns.
     """
 
     name: str
@@ -33,11 +34,31 @@ class Measured:
     values: Array = field(repr=False)
     noise: Array | None
     orientation: bool = False
+    angle: bool = False
 
     @property
     def missing(self) -> int:
         """How many of the n samples lack a number."""
         return int(np.isnan(self.values).any(axis=1).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedInput:
+    """A command, force or torque as it was recorded, in SI units and rad, world frame.
+
+    Attributes:
+        time: (k,) [s] of its samples, on the clock of the recording; before the first and after the last they stay.
+        values: (k, m).
+        interpolation: "constant": a sample holds until the next one. "linear": straight lines between samples.
+        delay: [s] so much later it acts, unless a variable sets that.
+        missing: how many rows of the recording lack a number of it.
+    """
+
+    time: Array = field(repr=False)
+    values: Array = field(repr=False)
+    interpolation: Literal["constant", "linear"]
+    delay: float
+    missing: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +72,7 @@ class Recording:
         measured: what was measured, each at all n times.
         start: numbers that the recording sets at the start, by the names of ``Problem.initial``, (3,) or (4,); where a
             variable sets the same quantity, they are its guess for this recording.
+        inputs: what drives the simulation, by names such as ``knee.command``.
         held_back: not fitted to, only predicted.
         weight: factor of its squared residuals.
     """
@@ -60,6 +82,7 @@ class Recording:
     time: Array = field(repr=False)
     measured: tuple[Measured, ...]
     start: dict[str, Array]
+    inputs: dict[str, RecordedInput] = field(default_factory=dict)
     held_back: bool = False
     weight: float = 1.0
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from math import pi
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, PlainValidator, WithJsonSchema
+from pydantic import BeforeValidator, Discriminator, Field, PlainValidator, Tag, WithJsonSchema
 
 from symphys.problem.schema import checks
 from symphys.problem.schema.types import (
     Finite,
     Identifier,
+    Interpolation,
     Label,
     Orientation,
     Positive,
@@ -104,6 +106,41 @@ class MeasuredTable(ColumnsTable):
     )
 
 
+class InputTable(ColumnsTable):
+    """An input that was recorded: the command of a motor, a force or a torque on a body."""
+
+    interpolation: Interpolation = Field(
+        default="constant",
+        description='between samples: "constant", held until the next one, as drives hold their commands, or "linear"',
+    )
+    delay: Finite = Field(
+        default=0.0,
+        description="it acts so much later than recorded [s]; a variable may set knee.command.delay, for all tables",
+    )
+
+
+def leaves(tables: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    """Quantities and what they are set from, as TOML may nest them: { cube = { position = "x" } } is cube.position."""
+    for key, value in tables.items():
+        if isinstance(value, Mapping) and value and not value.keys() & InputTable.model_fields.keys():
+            yield from leaves(value, f"{before}{key}.")
+        else:
+            yield f"{before}{key}", value
+
+
+Inputs = Annotated[
+    dict[
+        str,
+        Annotated[
+            Annotated[Texts, Tag("<columns>")] | Annotated[InputTable, Tag("<table>")],
+            Discriminator(lambda value: "<table>" if isinstance(value, dict | InputTable) else "<columns>"),
+        ],
+    ],
+    BeforeValidator(lambda value: dict(leaves(value)) if isinstance(value, dict) else value),
+]
+"""By the name of an input its columns, or a table of these."""
+
+
 class FrameTable(SchemaTable):
     """Where the origin and the axes of the measurement system lie in the world."""
 
@@ -158,12 +195,24 @@ class RecordingTable(SchemaTable):
         'the units of the same columns in measured, or { "cube.velocity" = { columns = "v", unit = "mm/s" } }. Joints '
         "too: hinge.angle, hinge.rate",
     )
+    inputs: Inputs = Field(
+        default={},
+        description='what drove the motion, recorded beside it: { "knee.command" = "u" }, or { "knee.command" = { '
+        'columns = "u", unit = "deg", interpolation = "linear" } }; also forces and torques on bodies. Before the '
+        "first and after the last sample values stay, and rows without a number are left out",
+    )
     held_back: Held = Field(
         default=False,
         description="recordings that are predicted only, not fitted to: true, a share such as 0.3 (evenly spread), or "
         "a list of numbers from 0 or of names of files",
     )
     weight: Positive = Field(default=1.0, description="factor of the squared residuals")
+
+    @property
+    def input_tables(self) -> dict[str, InputTable]:
+        """``inputs``, with a table for each."""
+        found = self.inputs.items()
+        return {name: each if isinstance(each, InputTable) else InputTable(columns=each) for name, each in found}
 
 
 class RecordedFileTable(SchemaTable):

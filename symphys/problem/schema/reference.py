@@ -83,8 +83,10 @@ def headings(tables: Mapping[str, Schema], schema: Schema) -> dict[str, str]:
 
 
 def definition_of(key: Schema) -> str | None:
-    """The name of the definition that a value, or each item of a list, refers to."""
-    choices = [key, key.get("items", {}), *key.get("oneOf", [])]
+    """The name of the definition that a value refers to, or each item of a list, or each value of a table."""
+    by_name = key.get("additionalProperties") or {}
+    by_name = by_name if isinstance(by_name, dict) else {}
+    choices = [key, key.get("items", {}), *key.get("oneOf", []), *by_name.get("oneOf", [])]
     found = next((choice["$ref"] for choice in choices if "$ref" in choice), None)
     return None if found is None else str(found).removeprefix("#/$defs/")
 
@@ -204,7 +206,8 @@ def type_of(key: Schema, titles: Mapping[str, str]) -> str:
             return f'`"{key["examples"][0]}"`'
         return "name" if "pattern" in key else "text"
     if key.get("type") == "object":
-        return "table"
+        name = definition_of(key)
+        return f"[table](#{anchor(titles[name])})" if name is not None and name in titles else "table"
     if key.get("type") == "boolean":
         return "`true` or `false`"
     return number_type(key)

@@ -1,8 +1,8 @@
-"""Which columns say where a motion begins: the key ``start`` of [[recording]]."""
+"""Which columns set something of the simulation: the keys ``start`` and ``inputs`` of [[recording]]."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +13,8 @@ from pydantic import ValidationError
 from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
 from symphys.problem.recordings.conversion import MeasurementFrame, check_table, convert
 from symphys.problem.recordings.starts import Starts
-from symphys.problem.schema.recording import ColumnsTable, RecordingTable
+from symphys.problem.recordings.types import RecordedInput
+from symphys.problem.schema.recording import ColumnsTable, InputTable, RecordingTable, leaves
 from symphys.suggest import hint, quote
 
 Array = NDArray[np.float64]
@@ -35,6 +36,39 @@ class StartColumns:
         if not np.isfinite(value).all():
             raise RecordingFault(key, f"{rows.where(0)}: the first row lacks a number of {self.quantity}")
         return value
+
+
+@dataclass(frozen=True)
+class InputColumns:
+    """An input that was recorded: its name, its columns with their units, and how many numbers it has."""
+
+    name: str
+    table: InputTable
+    size: int
+
+    def over_time(self, rows: RecordedColumns, time: Array, frame: MeasurementFrame | None) -> RecordedInput:
+        """The input of a recording with times (n,) [s]; RecordingFault where no row has its numbers."""
+        key = ("inputs", self.name)
+        values = convert(rows, self.table.columns, self.table, self.name, self.size, frame, key)[: len(time)]
+        known = np.isfinite(values).all(axis=1)
+        if not known.any():
+            raise RecordingFault(key, f"{rows.where(0)}: no row from this one on has the numbers of {self.name}")
+        return RecordedInput(
+            time[known], values[known], self.table.interpolation, self.table.delay, int(np.sum(~known))
+        )
+
+
+def read_input_columns(table: RecordingTable, sizes: Mapping[str, int], units: Mapping[str, str]) -> list[InputColumns]:
+    """What ``inputs`` says; ``sizes`` of all inputs by name."""
+    found = list[InputColumns]()
+    for name, columns in table.input_tables.items():
+        key = ("inputs", name)
+        if name not in sizes:
+            text = f"a recording cannot drive {quote(name)}, but forces and torques on bodies and commands of motors"
+            raise RecordingFault(key, f"{text}; {hint(name, sizes)}")
+        check_table(columns, units.get(name, ""), name, key)
+        found.append(InputColumns(name, columns, sizes[name]))
+    return found
 
 
 def read_start_columns(
@@ -66,12 +100,3 @@ def read_start_columns(
 def as_columns(table: ColumnsTable) -> ColumnsTable:
     """Its columns and units alone."""
     return ColumnsTable(**{key: getattr(table, key) for key in ColumnsTable.model_fields})
-
-
-def leaves(tables: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, object]]:
-    """Quantities and what they are set from, as TOML may nest them: { cube = { position = "x" } } is cube.position."""
-    for key, value in tables.items():
-        if isinstance(value, Mapping) and "columns" not in value:
-            yield from leaves(value, f"{before}{key}.")
-        else:
-            yield f"{before}{key}", value
