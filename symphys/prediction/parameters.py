@@ -14,6 +14,8 @@ from symphys.problem.units import formula_units
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+DRY = "dry_friction"
+"""What advice calls the friction of a joint, which another recording determines than that of a surface."""
 TURN = 0.1
 """[rad] a sensible change of an orientation."""
 
@@ -67,11 +69,12 @@ def fit_numbers(problem: Problem, blocks: Sequence[NumberBlock], guess: Array) -
     world = problem.world()
     columns: dict[str, list[Array]] = {key: [] for key in ("lower", "upper", "scale", "mean", "deviation")}
     names, sets, units = list[str](), list[str](), list[str]()
+    frictions = {f"{joint.name}.friction" for joint in world.joints}
     for block in blocks:
         variable, slot = block.variable, block.variable.slots[0]
         labels = axes(variable.name, block.count)
         names += labels
-        sets += [slot.name] * len(labels)
+        sets += [DRY if slot.name in frictions else slot.name] * len(labels)
         unit = formula_units(world, (), [variable]).get(variable.name, "")
         units += ["rad" if block.turns else unit] * len(labels)
         for key, numbers in numbers_of(block).items():

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from commanded import DT, SETS, TRUTH, VARIABLES, dense_means, recorded_arm, true_angles
+from commanded import DT, GUESS, SETS, TRUTH, VARIABLES, arm, dense_means, recorded_arm, true_angles
 
 import symphys
 from symphys.prediction.recorded_inputs import step_means
@@ -142,3 +142,13 @@ def test_commands_are_added_to_other_inputs(others: dict[str, Any]) -> None:
         assert found.values.ravel() == pytest.approx(expected, abs=1e-9)
     (plain,) = residuals_of(recorded_arm("linear", runs=1), 1).predictor.values(shared[:5], own[:1], [0])
     assert not others or np.abs(next(predictor.values(shared, own, [0])).values - plain.values).max() > 0.01
+
+
+def test_what_would_determine_a_joints_friction() -> None:
+    """Not a slide, as for a surface."""
+    still = {"name": "still", "rate": 50.0, "table": {"q": [0.0] * 20}}
+    still |= {"measured": [{"value": "knee.angle", "columns": "q", "noise": 0.001}]}
+    problem = symphys.load(arm(GUESS) | {"variable": [VARIABLES[3]], "recording": [still]})
+    (direction,) = symphys.identify(problem, threads=1).open
+    assert direction.text == "friction has no effect on what was measured"
+    assert direction.advice == "Let the joint swing out to rest: its last swings show the dry friction"

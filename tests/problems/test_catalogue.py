@@ -62,6 +62,7 @@ SHIPPED = [
     "sled",
     "spinner",
     "stairs",
+    "table_tennis",
     "three_hops",
     "transport",
     "two_balls",
