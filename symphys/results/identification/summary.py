@@ -113,13 +113,18 @@ def predictions(what: str, errors: Sequence[PredictionErrors]) -> str:
     rows = [
         (
             each.name,
-            f"{each.mean:.4g} ± {each.deviation:.3g} {each.unit}".rstrip(),
+            f"{each.mean:.4g}{spread(each.deviation)} {each.unit}".rstrip(),
             with_unit(each.rmse, each.unit),
             f"{each.ratio:.3g}",
         )
         for each in errors
     ]
     return table((f"{what} ({errors[0].recordings})", "mean error", "rmse", "by noise"), rows) if rows else ""
+
+
+def spread(deviation: float) -> str:
+    """`` ± 0.002``; empty where one recording has none."""
+    return "" if np.isnan(deviation) else f" ± {deviation:.3g}"
 
 
 def worst(found: Identification) -> str:
