@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from symphys.model.joints import Joint, Servo, TorqueMotor, VelocityMotor
+from symphys.model.joints import AffineMotor, Joint, Servo, TorqueMotor, VelocityMotor
 from symphys.model.world import World
 from symphys.problem.model import ALIVE, Variable
 
@@ -56,6 +56,8 @@ def quantity_unit(name: str, world: World) -> str | None:
 def joint_unit(joint: Joint, key: str) -> str | None:
     """Of a quantity of a joint; a command has that of what its motor follows."""
     units = SLIDING if any(not coordinate.turns for coordinate in joint.kind.coordinates) else TURNING
+    if key == "gain" and isinstance(joint.motor, AffineMotor):  # force by command, which has any unit
+        return None
     if key != "command":
         return units.get(key)
     followed = {Servo: "rest", VelocityMotor: "velocity", TorqueMotor: "torque"}

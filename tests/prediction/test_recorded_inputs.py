@@ -144,6 +144,11 @@ def test_commands_are_added_to_other_inputs(others: dict[str, Any]) -> None:
     assert not others or np.abs(next(predictor.values(shared, own, [0])).values - plain.values).max() > 0.01
 
 
+def test_units_of_a_motors_numbers() -> None:
+    """The gain of an affine motor is force by command, whose unit is anything."""
+    assert residuals_of(recorded_arm("constant"), 1).shared.units == ("", "s", "N m s/rad", "N m", "kg m^2")
+
+
 def test_what_would_determine_a_joints_friction() -> None:
     """Not a slide, as for a surface."""
     still = {"name": "still", "rate": 50.0, "table": {"q": [0.0] * 20}}
