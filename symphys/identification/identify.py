@@ -135,7 +135,7 @@ def assessed(
         of_fitted, of_held_back = everything.some(~back), everything.some(back)
         quantities = study(problem, of_fitted)
         errors = prediction_errors(problem, of_fitted), prediction_errors(problem, of_held_back)
-    parameters = estimates(problem, shared, known, drawn)
+    parameters = estimates(problem, outcome, known, drawn)
     last = outcome.state.history[-1]
     return Identification(
         problem=name,

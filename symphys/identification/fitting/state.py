@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from itertools import pairwise
 from typing import Any
@@ -144,12 +144,14 @@ class FitOutcome:
         status, reason: what ended it, and what that means.
         state: there; ``fit`` goes on from it.
         system: the arrow there, of the recordings that were fitted.
+        one_sided: (s,) at a kink, how far from the shared numbers the Jacobian of one side has its minimum; else empty.
     """
 
     status: FitStatus
     reason: str
     state: FitState
     system: ArrowSystem
+    one_sided: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def merit(self) -> float:
