@@ -102,7 +102,7 @@ def identify(
         with clock.of("search"):
             searched, best = search(fitted.problem, fitted.outcome, which, options.fit, options.search, stop)
             if best is not fitted.outcome:
-                again = replace(begin(best.state.shared, best.state.own), horizon=1.0)
+                again = replace(begin(best.state.shared, best.state.own), horizon=1.0, notes=fitted.outcome.state.notes)
                 fitted = fit(problem, options.fit, which, again, monitor, stop)
     return assessed(fitted, which, options, clock, searched, stop, name, title)
 
@@ -154,6 +154,7 @@ def assessed(
         held_back_errors=errors[1],
         recordings=problem.recordings,
         search=searched,
+        starts=outcome.state.notes,
         bootstrap_note=drawn.note,
         doubts=doubts(outcome, parameters, quantities, drawn, known.freedom),
         seconds=clock.seconds,

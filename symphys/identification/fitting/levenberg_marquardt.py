@@ -97,7 +97,7 @@ class RecordingFit:
         """Fit from the guess, or go on from ``start``; ``stop`` is asked and ``monitor`` told after each iteration."""
         began = time.perf_counter()
         state = start or begin(self.problem.shared.guess, self.problem.own.guess)
-        system = self._system(state.shared, state.own)
+        system = self.system(state.shared, state.own)
         if not system.finite:
             return FitOutcome(FitStatus.NOT_FINITE, START.format(names=self._names(system.costs)), state, system)
         if state.history:  # the work of the start is in its history
@@ -118,7 +118,8 @@ class RecordingFit:
             if monitor:
                 monitor(state.history[-1], state)
 
-    def _system(self, shared: Array, own: Array) -> ArrowSystem:
+    def system(self, shared: Array, own: Array) -> ArrowSystem:
+        """The arrow at shared (s,) and own (K, o) numbers, of the recordings that are fitted."""
         self.jacobians += len(self.which)
         evaluated = self.problem.jacobian(shared, own, self.which)
         return assemble(self.problem, evaluated, shared, own, self.which, self.loss, self.weights)
@@ -201,7 +202,7 @@ class RecordingFit:
             refused = "" if math.isfinite(trial) else self._names(recordings)
             better = gain > (WORTH_AT_KINK if kinked else WORTH)
             if better or (kinked and not refused and model.sides <= MOST_SIDES):
-                there = self._system(shared, own)
+                there = self.system(shared, own)
                 if not there.finite:
                     refused = self._names(there.costs)
                 elif better:
