@@ -15,6 +15,7 @@ from symphys.identification.fitting.state import FitOptions, FitState, begin
 from symphys.identification.inference.assessment import doubts, estimates
 from symphys.identification.inference.bootstrap import Bootstrap, bootstrap, no_bootstrap, refitted
 from symphys.identification.inference.identifiability import open_directions
+from symphys.identification.inference.impacts import timed
 from symphys.identification.inference.residual_study import (
     ResidualSamples,
     prediction_errors,
@@ -104,10 +105,11 @@ def identify(
             if best is not fitted.outcome:
                 again = replace(begin(best.state.shared, best.state.own), horizon=1.0, notes=fitted.outcome.state.notes)
                 fitted = fit(problem, options.fit, which, again, monitor, stop)
-    return assessed(fitted, which, options, clock, searched, stop, name, title)
+    return assessed(problem, fitted, which, options, clock, searched, stop, name, title)
 
 
 def assessed(
+    source: RecordedResiduals,
     fitted: FittedRecordings,
     which: Ints,
     options: IdentificationOptions,
@@ -117,19 +119,22 @@ def assessed(
     name: str = "",
     title: str = "",
 ) -> Identification:
-    """The record of a fit of the recordings in ``which``."""
+    """The record of a fit of the recordings in ``which``; ``source`` is the problem with its first noise."""
     problem, outcome, known = fitted.problem, fitted.outcome, fitted.uncertainty
     assert known is not None
     shared, own = outcome.state.shared, outcome.state.own
     others = np.setdiff1d(np.arange(len(own)), which)
     if options.held_back_starts != STARTS[0] and others.size:
         with clock.of("starts"):
+            if options.held_back_starts == STARTS[1]:
+                problem = timed(fitted.problem, source, shared, own)
             own = own_numbers(problem, shared, own, others, options.fit, options.held_back_starts == STARTS[1])
     with clock.of("uncertainty"):
         opened = open_directions(problem, fitted.evaluated, shared, own, which, options.fit.loss, known.information)
     with clock.of("bootstrap"):
         drawn = resampled(fitted, which, options, stop)
     with clock.of("study"):
+        problem = timed(fitted.problem, source, shared, own)
         everything = samples(problem, shared, own, np.arange(len(problem.recordings)))
         back = np.isin(everything.recording, which, invert=True)
         of_fitted, of_held_back = everything.some(~back), everything.some(back)

@@ -46,11 +46,12 @@ def identify(
         threads: that share the simulations; None: one for each processor.
         monitor: is told of each iteration.
         stop: is asked after each iteration whether to stop there.
-        settings: in place of those in [identify]: ``loss="huber"``, ``bootstrap=200``, ``check="cma"``.
+        settings: in place of those in [identify]: ``loss="huber"``, ``bootstrap=200``, ``check="cma"``,
+            ``horizons=(0.3, 0.5, 0.7, 0.85, 1)``, ``held_back_starts="before impact"``.
 
     Returns:
         Estimates with intervals, what is not determined, what is left; see ``Identification``. Own numbers of
-        recordings that are held back are fitted to them, with the shared numbers held.
+        recordings that are held back come from where ``held_back_starts`` says, with the shared numbers held.
 
     Raises:
         ProblemError: the problem file is wrong.
@@ -99,9 +100,10 @@ def options_of(settings: IdentifySettings) -> IdentificationOptions:
     """What is computed."""
     threshold = settings.threshold if settings.loss == "huber" else math.inf
     search = SearchOptions(settings.check_evaluations, seed=settings.seed) if settings.check == "cma" else None
-    fit = FitOptions(settings.iterations, DAMPING, settings.tolerance, threshold=threshold)
-    draws, seed = settings.bootstrap, settings.seed
-    return IdentificationOptions(fit, draws=draws, search=search, held_back_starts="whole", seed=seed)
+    horizons = tuple(map(float, settings.horizons))
+    fit = FitOptions(settings.iterations, DAMPING, settings.tolerance, threshold=threshold, horizons=horizons)
+    draws, starts, seed = settings.bootstrap, settings.held_back_starts, settings.seed
+    return IdentificationOptions(fit, draws=draws, search=search, held_back_starts=starts, seed=seed)
 
 
 def state_key(problem: Problem, settings: IdentifySettings) -> str:

@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.expression import parse
+from symphys.prediction.impacts import impact_times
 from symphys.prediction.parameters import number_blocks
 from symphys.prediction.rotations import turned
 from symphys.problem import Problem, Recording, Variable, VariableSlot
@@ -65,9 +67,12 @@ class Predictor:
         simulation = replace(problem.simulation, duration=steps * self.dt)
         whole = replace(problem, simulation=simulation, variables=(*self._given, *problem.variables))
         formulas = {m.value.text: m.value for r in self.recordings for m in r.measured}
+        velocities = {text: parse(text) for text in (f"{body.name}.velocity" for body in problem.world().bodies)}
         self._variables = whole.variables
-        self._motion = QuantitySlopes(symbolic_rollout(whole), formulas, threads=threads)
-        self.sizes = self._motion.sizes
+        watched = {text: formula for text, formula in velocities.items() if text not in formulas}
+        self._motion = QuantitySlopes(symbolic_rollout(whole), formulas, threads=threads, watched=watched)
+        self.sizes = {text: self._motion.sizes[text] for text in formulas}
+        self._velocities, self._gravity = tuple(velocities), np.asarray(problem.world().gravity, float)
         guess = np.concatenate([variable.guess for variable in whole.variables])
         self.starts = np.array([self._start(each, guess) for each in self.recordings])
 
@@ -87,6 +92,15 @@ class Predictor:
             values, rates = interpolated(samples, each.at)
             by = interpolated(slopes, each.at)[0] + rates[:, :, None] * (each.by_offset / self.dt)
             yield PredictedSamples(values, by, each.scale, each.by_scale)
+
+    def impacts(self, shared: Array, own: Array, which: Sequence[int]) -> Iterator[Array]:
+        """(i,) [s] when the recordings have impacts, on their clocks; see ``impact_times``."""
+        set_ = [self._set(shared, own[k], k) for k in which]
+        lasts = [each.last(self._motion.steps) for each in set_]
+        z = np.array([each.z for each in set_])
+        for each, k, velocity in zip(set_, which, self._motion.values(z, lasts, self._velocities), strict=True):
+            offset = float(each.at[0]) * self.dt - float(self.recordings[k].time[0])
+            yield impact_times(velocity.reshape(len(velocity), -1, 3), self._gravity, self.dt) - offset
 
     def motion(self, shared: Array, own: Array, k: int) -> tuple[Trajectory, int, Array]:
         """A recording's motion by the exact rollout, how many of its steps were measured, and when."""

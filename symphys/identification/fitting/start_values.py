@@ -1,7 +1,7 @@
 """Where shared numbers begin that have no effect at their guess.
 
-Friction so high that balls stick has no effect: the merit has no slope there, and a fit stays. Such a number is tried at
-several values, each the start of a few steps of all numbers; the fit begins at the best.
+Friction so high that balls stick has no effect: the merit has no slope there, and a fit stays. Such a number is tried
+at several values, each the start of a few steps of all numbers; the fit begins at the best.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from symphys.identification.interface import Array, FitParameters, Ints, Recorde
 FACTORS = (0.01, 0.03, 0.1, 0.3, 0.5, 2.0, 4.0, 10.0)
 """Of a guess other than 0."""
 SHARES = (0.1, 0.3, 0.5, 0.7, 0.9)
-"""Of the range between two bounds; of a number at 0 with an open bound, these times ten in scales to both sides."""
+"""Of the range between two bounds; of a number at 0 with an open bound, of ten scales to both sides."""
 STEPS = 4
 """Of all numbers, from each value."""
 WORTH = 4.0
-"""Another start is taken where it makes the merit lower by so many times the merit per residual: two standard errors."""
+"""Another start is taken where it lowers the merit by so many times the merit per residual: two standard errors."""
 
 
 def begin_with_effect(
