@@ -10,7 +10,7 @@ import numpy as np
 
 from symphys.identification.fitting.horizons import PartialRecordings, before_impact, first_share
 from symphys.identification.fitting.levenberg_marquardt import RecordingFit
-from symphys.identification.fitting.noise import RescaledResiduals, noise_factors
+from symphys.identification.fitting.noise import LEAST, RescaledResiduals, noise_factors
 from symphys.identification.fitting.robust_loss import RobustLoss
 from symphys.identification.fitting.start_values import begin_with_effect
 from symphys.identification.fitting.state import FitOptions, FitOutcome, FitState, FitStatus, FitStep, begin
@@ -102,7 +102,7 @@ def fit_part(
         change = noise_factors(scaled, found.evaluated, which, options.loss, found.uncertainty.information)
         if np.all(np.abs(change - 1) < STANDS):
             break
-        factors = factors * change
+        factors = np.maximum(factors * change, LEAST)
         start = replace(start, damping=math.nan, growth=2.0, quiet=0, noise=tuple(map(float, factors)))
     scaled = RescaledResiduals(problem, factors)
     outcome = RecordingFit(scaled, options, which).run(start, monitor, stop)

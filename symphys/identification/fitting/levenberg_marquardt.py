@@ -154,10 +154,7 @@ class RecordingFit:
 
     def left(self, state: FitState, system: ArrowSystem) -> float:
         """Standard errors between the state and where its quadratic model has the minimum."""
-        if not system.cost > 0:
-            return 0.0
-        step = system.step(0.0, *self.free(state, system))
-        return math.sqrt(max(system.expected_fall(*step), 0.0) * self.size / system.cost)
+        return self._errors(system.expected_fall(*system.step(0.0, *self.free(state, system))), system)
 
     def _ended(self, state: FitState, system: ArrowSystem) -> tuple[FitStatus, str] | None:
         last = state.history[-1]
@@ -182,7 +179,7 @@ class RecordingFit:
 
     def _errors(self, fall: float, system: ArrowSystem) -> float:
         """A fall of the merit in standard errors."""
-        return math.sqrt(max(fall, 0.0) * self.size / system.cost) if system.cost > 0 else 0.0
+        return math.sqrt(max(0.0, fall) * self.size / system.cost) if system.cost > 0 else 0.0
 
     def _step(
         self, state: FitState, system: ArrowSystem, began: float

@@ -16,6 +16,7 @@ from symphys.expression.units import unit_of
 from symphys.problem.reading.faults import Faults
 from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
 from symphys.problem.recordings.conversion import (
+    LARGEST,
     LENGTH,
     ORIENTATION,
     PLACED,
@@ -36,6 +37,8 @@ from symphys.problem.recordings.types import Measured, Recording
 from symphys.problem.schema.recording import MeasuredTable, RecordingTable
 
 Array = NDArray[np.float64]
+SMALLEST = 1e-30
+"""Of a noise: squares of what is divided by it are numbers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,6 +221,8 @@ class RecordingReader(RecordedRows):
         if len(table.noise) not in (1, residuals):
             wanted = f"a number or {residuals} numbers" if residuals > 1 else "a number"
             raise RecordingFault((*key, "noise"), f"must be {wanted}, not a list of {len(table.noise)}")
+        if not SMALLEST <= min(table.noise) <= max(table.noise) <= LARGEST:
+            raise RecordingFault((*key, "noise"), f"must be from {SMALLEST:g} to {LARGEST:g}, not {table.noise}")
         noise = np.broadcast_to(np.array(table.noise), residuals).copy()
         return MeasuredColumns(table, formula, quantity, value, unit, noise)
 

@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 TIME = "time"
 LEAST = 2
 """Samples of a recording."""
+MOST = 1e15
+"""Steps: more are not told apart."""
 SLACK = 1e-9
 """Relative, of the end of the simulation."""
 
@@ -108,7 +110,7 @@ def check_ends(recordings: Sequence[Recording], duration: float, dt: float) -> N
 
 def steps_until(end: float, dt: float) -> int:
     """The time steps after which a sample at ``end`` [s] lies within the simulation, at least one."""
-    return max(1, ceil(end / dt * (1 - SLACK)))
+    return max(1, ceil(min(end / dt * (1 - SLACK), MOST)))
 
 
 def steps_apart(time: Array, dt: float) -> float:
