@@ -41,11 +41,12 @@ PROGRESS = 1e-2
 WORTH_AT_KINK = 0.1
 """The same where the sides of a kink are collected: a step that gains less shows one more side."""
 AT_KINK = 1e-2
-"""Standard errors: sides are collected where more are left, and a kink is a minimum where they promise no more."""
+"""Standard errors: sides are collected where more are left, and a kink is a minimum where they promise no more. At most
+as many are left as noise makes, the root of how many numbers there are: more is another minimum, or chaos."""
 NEAR = 0.1
 """Standard errors that may be left where the merit does not fall any more: intervals are no narrower than that."""
 MOST_SIDES = 8
-"""Points whose Jacobians are collected before lambda grows."""
+"""Points whose Jacobians are collected in an iteration."""
 EXACTLY = "the recordings are met exactly"
 BUDGET = "the iterations are used up: raise `iterations`"
 STOPPED = "interrupted: the state goes on from here"
@@ -189,6 +190,7 @@ class RecordingFit:
         Else how the fit ended, and at a kink how far from the shared numbers (s,) one side has its minimum.
         """
         refused, merit, left, kinked = "", system.cost, state.history[-1].left, False
+        kink = AT_KINK < left <= math.sqrt(sum(int(each.sum()) for each in self.free(state, system)))
         model = KinkedModel(system, merit / self.size)
         while state.damping <= state.stiffest:
             shared, own, taken, length = self._moved(state, *self._direction(state, model, kinked))
@@ -198,7 +200,7 @@ class RecordingFit:
             gain = (merit - trial) / expected if expected > 0 and math.isfinite(trial) else -math.inf
             refused = "" if math.isfinite(trial) else self._names(recordings)
             better = gain > (WORTH_AT_KINK if kinked else WORTH)
-            if better or (kinked and not refused and model.sides <= MOST_SIDES):
+            if better or (kinked and not refused):
                 there = self.system(shared, own)
                 if not there.finite:
                     refused = self._names(there.costs)
@@ -211,10 +213,10 @@ class RecordingFit:
                     if open_ <= max(AT_KINK, self.options.tolerance):
                         away = arrow.step()[0] * self.problem.shared.scale
                         return FitStatus.CONVERGED, KINK.format(left=open_, far=left), away
-                    continue
-            elif kinked:
-                model = KinkedModel(system, merit / self.size)
-            kinked = left > AT_KINK
+                    if model.sides <= MOST_SIDES:
+                        continue
+                    kink, model = False, KinkedModel(system, merit / self.size)
+            kinked = kink
             state = replace(state, damping=state.damping * state.growth, growth=2 * state.growth)
         if refused:
             return FitStatus.NOT_FINITE, TRIALS.format(names=refused)
