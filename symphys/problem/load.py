@@ -138,8 +138,7 @@ def build(
     sweep: Sweep | None,
 ) -> ProblemData:
     """The problem; each stage needs the ones before without fault."""
-    document = with_duration(document, faults)
-    simulation, mpc = read_time(document, faults)
+    simulation, mpc = read_time(with_duration(document, faults), faults)
     references, texts = read_references(document, faults)
     given = reference_values(references, ca.DM(0))
     parametric, initial = read_world(document, faults)
