@@ -26,6 +26,8 @@ STATE = "identification_state.json"
 """Of a folder: where an interrupted fit goes on."""
 DAMPING = 1e-6
 """The first of the fit. Of 285 tosses of a cube 25 steps from it bring the merit to 0.055e6; from 1e-3 15 to 0.30e6."""
+CHOICES = {"loss": ("squares", "huber"), "check": ("none", "cma")}
+"""Settings that have one of some values."""
 Monitor = Callable[[FitStep], None]
 
 
@@ -89,10 +91,12 @@ def identify(
 
 
 def with_settings(given: IdentifySettings, settings: dict[str, Any]) -> IdentifySettings:
-    """Those of the file with others in their place; SymphysError names one that there is not."""
+    """Those of the file with others in their place; SymphysError names one that there is not, or has no such value."""
     for name in settings:
         if name not in vars(given):
             raise SymphysError(f"identify has no setting {name!r}; {hint(name, vars(given))}")
+        if name in CHOICES and settings[name] not in CHOICES[name]:
+            raise SymphysError(f"{name} is {settings[name]!r}: {hint(str(settings[name]), CHOICES[name])}")
     return replace(given, **settings)
 
 

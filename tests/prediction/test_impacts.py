@@ -109,6 +109,8 @@ def test_settings_are_checked() -> None:
         symphys.load(dropped(0.4) | {"identify": {"horizons": [0.5, 0.3]}})
     with pytest.raises(symphys.SymphysError, match="held_back_starts"):
         symphys.identify(tables, threads=1, held_back_starts="after impact")
+    with pytest.raises(symphys.SymphysError, match=r"loss is 'hubber'.*huber"):
+        symphys.identify(tables, threads=1, loss="hubber")
     grown = symphys.identify(tables, threads=1, horizons=[0.5, 1])
     assert grown["bounce"].value == pytest.approx(0.7, abs=0.005)
     assert len(np.unique(grown.history[:, 1])) > 3
