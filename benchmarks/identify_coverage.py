@@ -108,7 +108,7 @@ def least_errors(problem: symphys.Problem, found: Identification) -> Array:
 def covered(draws: int, case: Case = BOUNCES) -> tuple[dict[str, tuple[int, float]], Counter[str]]:
     """By number: in how many draws the interval covers the truth, and its widest half by that of the bound.
 
-    And how the fits ended. One stalls where an impact crosses a sample, as its slope jumps there.
+    And how the fits ended.
     """
     inside, widest, ended = Counter[str](), dict.fromkeys(case.truth, 0.0), Counter[str]()
     for seed in range(draws):

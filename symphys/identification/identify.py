@@ -15,6 +15,7 @@ from symphys.identification.fitting.state import FitOptions, FitState, begin
 from symphys.identification.inference.assessment import doubts, estimates
 from symphys.identification.inference.bootstrap import Bootstrap, bootstrap, no_bootstrap, refitted
 from symphys.identification.inference.identifiability import open_directions
+from symphys.identification.inference.impacts import timed
 from symphys.identification.inference.residual_study import (
     ResidualSamples,
     prediction_errors,
@@ -102,12 +103,13 @@ def identify(
         with clock.of("search"):
             searched, best = search(fitted.problem, fitted.outcome, which, options.fit, options.search, stop)
             if best is not fitted.outcome:
-                again = replace(begin(best.state.shared, best.state.own), horizon=1.0)
+                again = replace(begin(best.state.shared, best.state.own), horizon=1.0, notes=fitted.outcome.state.notes)
                 fitted = fit(problem, options.fit, which, again, monitor, stop)
-    return assessed(fitted, which, options, clock, searched, stop, name, title)
+    return assessed(problem, fitted, which, options, clock, searched, stop, name, title)
 
 
 def assessed(
+    source: RecordedResiduals,
     fitted: FittedRecordings,
     which: Ints,
     options: IdentificationOptions,
@@ -117,25 +119,28 @@ def assessed(
     name: str = "",
     title: str = "",
 ) -> Identification:
-    """The record of a fit of the recordings in ``which``."""
+    """The record of a fit of the recordings in ``which``; ``source`` is the problem with its first noise."""
     problem, outcome, known = fitted.problem, fitted.outcome, fitted.uncertainty
     assert known is not None
     shared, own = outcome.state.shared, outcome.state.own
     others = np.setdiff1d(np.arange(len(own)), which)
     if options.held_back_starts != STARTS[0] and others.size:
         with clock.of("starts"):
+            if options.held_back_starts == STARTS[1]:
+                problem = timed(fitted.problem, source, shared, own)
             own = own_numbers(problem, shared, own, others, options.fit, options.held_back_starts == STARTS[1])
     with clock.of("uncertainty"):
         opened = open_directions(problem, fitted.evaluated, shared, own, which, options.fit.loss, known.information)
     with clock.of("bootstrap"):
         drawn = resampled(fitted, which, options, stop)
     with clock.of("study"):
+        problem = timed(fitted.problem, source, shared, own)
         everything = samples(problem, shared, own, np.arange(len(problem.recordings)))
         back = np.isin(everything.recording, which, invert=True)
         of_fitted, of_held_back = everything.some(~back), everything.some(back)
         quantities = study(problem, of_fitted)
         errors = prediction_errors(problem, of_fitted), prediction_errors(problem, of_held_back)
-    parameters = estimates(problem, shared, known, drawn)
+    parameters = estimates(problem, outcome, known, drawn)
     last = outcome.state.history[-1]
     return Identification(
         problem=name,
@@ -154,6 +159,7 @@ def assessed(
         held_back_errors=errors[1],
         recordings=problem.recordings,
         search=searched,
+        starts=outcome.state.notes,
         bootstrap_note=drawn.note,
         doubts=doubts(outcome, parameters, quantities, drawn, known.freedom),
         seconds=clock.seconds,

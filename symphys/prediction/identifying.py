@@ -26,6 +26,8 @@ STATE = "identification_state.json"
 """Of a folder: where an interrupted fit goes on."""
 DAMPING = 1e-6
 """The first of the fit. Of 285 tosses of a cube 25 steps from it bring the merit to 0.055e6; from 1e-3 15 to 0.30e6."""
+CHOICES = {"loss": ("squares", "huber"), "check": ("none", "cma")}
+"""Settings that have one of some values."""
 Monitor = Callable[[FitStep], None]
 
 
@@ -46,11 +48,12 @@ def identify(
         threads: that share the simulations; None: one for each processor.
         monitor: is told of each iteration.
         stop: is asked after each iteration whether to stop there.
-        settings: in place of those in [identify]: ``loss="huber"``, ``bootstrap=200``, ``check="cma"``.
+        settings: in place of those in [identify]: ``loss="huber"``, ``bootstrap=200``, ``check="cma"``,
+            ``horizons=(0.3, 0.5, 0.7, 0.85, 1)``, ``held_back_starts="before impact"``.
 
     Returns:
         Estimates with intervals, what is not determined, what is left; see ``Identification``. Own numbers of
-        recordings that are held back are fitted to them, with the shared numbers held.
+        recordings that are held back come from where ``held_back_starts`` says, with the shared numbers held.
 
     Raises:
         ProblemError: the problem file is wrong.
@@ -88,10 +91,12 @@ def identify(
 
 
 def with_settings(given: IdentifySettings, settings: dict[str, Any]) -> IdentifySettings:
-    """Those of the file with others in their place; SymphysError names one that there is not."""
+    """Those of the file with others in their place; SymphysError names one that there is not, or has no such value."""
     for name in settings:
         if name not in vars(given):
             raise SymphysError(f"identify has no setting {name!r}; {hint(name, vars(given))}")
+        if name in CHOICES and settings[name] not in CHOICES[name]:
+            raise SymphysError(f"{name} is {settings[name]!r}: {hint(str(settings[name]), CHOICES[name])}")
     return replace(given, **settings)
 
 
@@ -99,9 +104,10 @@ def options_of(settings: IdentifySettings) -> IdentificationOptions:
     """What is computed."""
     threshold = settings.threshold if settings.loss == "huber" else math.inf
     search = SearchOptions(settings.check_evaluations, seed=settings.seed) if settings.check == "cma" else None
-    fit = FitOptions(settings.iterations, DAMPING, settings.tolerance, threshold=threshold)
-    draws, seed = settings.bootstrap, settings.seed
-    return IdentificationOptions(fit, draws=draws, search=search, held_back_starts="whole", seed=seed)
+    horizons = tuple(map(float, settings.horizons))
+    fit = FitOptions(settings.iterations, DAMPING, settings.tolerance, threshold=threshold, horizons=horizons)
+    draws, starts, seed = settings.bootstrap, settings.held_back_starts, settings.seed
+    return IdentificationOptions(fit, draws=draws, search=search, held_back_starts=starts, seed=seed)
 
 
 def state_key(problem: Problem, settings: IdentifySettings) -> str:

@@ -10,6 +10,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.expression import parse
+from symphys.prediction.impacts import impact_times
 from symphys.prediction.parameters import number_blocks
 from symphys.prediction.recorded_inputs import delays, input_variables, step_means
 from symphys.prediction.rotations import turned
@@ -68,12 +70,17 @@ class Predictor:
         simulation = replace(problem.simulation, duration=steps * self.dt)
         whole = replace(problem, simulation=simulation, variables=(*self._given, *problem.variables))
         formulas = {m.value.text: m.value for r in self.recordings for m in r.measured}
+        velocities = {text: parse(text) for text in (f"{body.name}.velocity" for body in problem.world().bodies)}
         self._variables = whole.variables
+        watched = {text: formula for text, formula in velocities.items() if text not in formulas}
         driven = [variable.name for variable in self._given if variable.kind == "control"]
-        self._motion = QuantitySlopes(symbolic_rollout(whole), formulas, threads=threads, by_step=driven)
-        self.sizes = self._motion.sizes
+        self._motion = QuantitySlopes(
+            symbolic_rollout(whole), formulas, threads=threads, by_step=driven, watched=watched
+        )
+        self.sizes = {text: self._motion.sizes[text] for text in formulas}
         angles = {m.value.text for r in self.recordings for m in r.measured if m.angle}
         self._angles = np.concatenate([np.full(size, text in angles) for text, size in self.sizes.items()])
+        self._velocities, self._gravity = tuple(velocities), np.asarray(problem.world().gravity, float)
         guess = np.concatenate([variable.guess for variable in whole.variables])
         self.starts = np.array([self._start(each, guess) for each in self.recordings])
 
@@ -100,6 +107,15 @@ class Predictor:
             return samples
         with np.errstate(invalid="ignore"):  # of what is not finite
             return np.where(self._angles, np.unwrap(samples, axis=0), samples)
+
+    def impacts(self, shared: Array, own: Array, which: Sequence[int]) -> Iterator[Array]:
+        """(i,) [s] when the recordings have impacts, on their clocks; see ``impact_times``."""
+        set_ = [self._set(shared, own[k], k) for k in which]
+        lasts = [each.last(self._motion.steps) for each in set_]
+        z = np.array([each.z for each in set_])
+        for each, k, velocity in zip(set_, which, self._motion.values(z, lasts, self._velocities), strict=True):
+            offset = float(each.at[0]) * self.dt - float(self.recordings[k].time[0])
+            yield impact_times(velocity.reshape(len(velocity), -1, 3), self._gravity, self.dt) - offset
 
     def motion(self, shared: Array, own: Array, k: int) -> tuple[Trajectory, int, Array]:
         """A recording's motion by the exact rollout, how many of its steps were measured, and when."""

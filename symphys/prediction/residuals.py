@@ -90,6 +90,10 @@ class RecordingResiduals:
             found.append((self._residuals(int(k), sampled), by[:, : len(shared)], by[:, len(shared) :]))
         return found
 
+    def simulated_impacts(self, shared: Array, own: Array, which: Ints) -> list[Array]:
+        """(i,) [s] instants of the simulated impacts of each recording in ``which``."""
+        return list(self.predictor.impacts(shared, own, which.tolist()))
+
     def _residuals(self, k: int, sampled: PredictedSamples) -> Array:
         taken, parts = self.predictor.recordings[k], []
         for each, kept, place, columns in self._parts(k):

@@ -40,7 +40,7 @@ from symphys.problem.quantities import (
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.reading.messages import report
 from symphys.problem.recordings.kept import recorded_appendix
-from symphys.problem.recordings.reading import read_identification
+from symphys.problem.recordings.reading import read_identification, with_duration
 from symphys.problem.references import read_references, reference_values
 from symphys.problem.schema import Document
 from symphys.problem.sweeps.sweep import Sweep
@@ -138,7 +138,7 @@ def build(
     sweep: Sweep | None,
 ) -> ProblemData:
     """The problem; each stage needs the ones before without fault."""
-    simulation, mpc = read_time(document, faults)
+    simulation, mpc = read_time(with_duration(document, faults), faults)
     references, texts = read_references(document, faults)
     given = reference_values(references, ca.DM(0))
     parametric, initial = read_world(document, faults)

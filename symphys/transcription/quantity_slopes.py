@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from symphys.codegen import Kernel, Program, compile_program, processors
 from symphys.codegen.program.tangent import tangent_name, tangent_program
 from symphys.expression import Formula
-from symphys.transcription.program import rollout_program
+from symphys.transcription.program import NOTHING, rollout_program
 from symphys.transcription.rollout import Rollout
 
 Array = NDArray[np.float64]
@@ -30,6 +30,7 @@ class QuantitySlopes:
 
     Attributes:
         rollout: of a problem.
+        names, watched: of the formulas, and of those that have values alone.
         sizes: by the name of a formula, how many numbers it has.
         steps: of the longest rollout.
     """
@@ -41,6 +42,7 @@ class QuantitySlopes:
         smoothing: float = 0.0,
         threads: int | None = None,
         by_step: Sequence[str] = (),
+        watched: Mapping[str, Formula] = NOTHING,
     ) -> None:
         """Nothing is compiled before it is asked for; KernelUnavailable then, where nothing can be compiled.
 
@@ -48,15 +50,20 @@ class QuantitySlopes:
         """
         self.rollout, self.smoothing, self.steps = rollout, smoothing, rollout.steps
         self._threads = processors() if threads is None else threads
-        self._program = rollout_program(rollout, smoothing == 0, formulas, 0, by_step)
-        self.names = tuple(formulas)
-        self.sizes = {name: self._program.outputs[name].size // self.steps for name in formulas}
+        both = {**watched, **formulas}
+        self._program = rollout_program(rollout, smoothing == 0, both, 0, by_step)
+        self.names, self.watched = tuple(formulas), tuple(watched)
+        self.sizes = {name: self._program.outputs[name].size // self.steps for name in both}
 
-    def values(self, Z: Array, lasts: Sequence[int]) -> Iterator[Array]:
-        """For each row of Z (B, n): (last + 1, m) the quantities, side by side, at the starts of steps 0 .. last."""
+    def values(self, Z: Array, lasts: Sequence[int], names: Sequence[str] | None = None) -> Iterator[Array]:
+        """For each row of Z (B, n): (last + 1, m) the quantities, side by side, at the starts of steps 0 .. last.
+
+        ``names``: of some of them, or of those that are watched; by default all but these.
+        """
+        names = self.names if names is None else names
         for rows, skipped in self._calls(lasts, 1):
             found = self._values.forward(Z[rows], (self.smoothing,), skipped)
-            yield from self._rows(found, self.names, [lasts[row] + 1 for row in rows], 1)
+            yield from self._rows(found, names, [lasts[row] + 1 for row in rows], 1)
 
     def slopes(self, Z: Array, directions: Array, lasts: Sequence[int]) -> Iterator[tuple[Array, Array]]:
         """The same with their derivatives: (last + 1, m) and (last + 1, m, d).

@@ -48,6 +48,16 @@ def test_rollouts_have_their_own_lengths(rollout: Rollout) -> None:
     assert whole[1][0, 0] == pytest.approx(z[1, 2], abs=1e-15), "the first sample is the start"
 
 
+def test_what_is_watched_has_values_beside_the_others(rollout: Rollout) -> None:
+    z, lasts = decision(rollout, 2), [30, 7]
+    made = QuantitySlopes(rollout, {"height": FORMULAS["height"]}, threads=1, watched={"pose": FORMULAS["pose"]})
+    both = list(QuantitySlopes(rollout, FORMULAS, threads=1).values(z, lasts))
+    for row, (height, pose) in enumerate(zip(made.values(z, lasts), made.values(z, lasts, ["pose"]), strict=True)):
+        np.testing.assert_array_equal(np.hstack([height, pose]), both[row])
+    (_, slopes), _ = made.slopes(z, np.ones((2, z.shape[1], 1)), lasts)
+    assert slopes.shape == (31, 1, 1)
+
+
 def test_derivatives_are_those_of_adjoints(rollout: Rollout) -> None:
     made, z = QuantitySlopes(rollout, FORMULAS, threads=1), decision(rollout, 2)
     along = np.random.default_rng(1).normal(size=(2, z.shape[1], 6))

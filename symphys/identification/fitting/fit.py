@@ -10,8 +10,9 @@ import numpy as np
 
 from symphys.identification.fitting.horizons import PartialRecordings, before_impact, first_share
 from symphys.identification.fitting.levenberg_marquardt import RecordingFit
-from symphys.identification.fitting.noise import RescaledResiduals, noise_factors
+from symphys.identification.fitting.noise import LEAST, RescaledResiduals, noise_factors
 from symphys.identification.fitting.robust_loss import RobustLoss
+from symphys.identification.fitting.start_values import begin_with_effect
 from symphys.identification.fitting.state import FitOptions, FitOutcome, FitState, FitStatus, FitStep, begin
 from symphys.identification.inference.uncertainty import Uncertainty, uncertainty
 from symphys.identification.interface import Array, Ints, RecordedResiduals, Rows
@@ -55,7 +56,8 @@ def fit(
 ) -> FittedRecordings:
     """Fit the recordings in ``which``, those not held back by default, and estimate noise that is not given.
 
-    Each share in ``options.horizons`` of the recordings is the start of the next. ``start`` goes on from an interrupted
+    Shared numbers without an effect at their guess begin elsewhere, where that is better. Each share in
+    ``options.horizons`` of the recordings is the start of the next. ``start`` goes on from an interrupted
     fit.
     """
     which = np.flatnonzero(~problem.held_back) if which is None else which
@@ -67,7 +69,7 @@ def fit(
         part = problem if share == 1 else PartialRecordings(problem, first_share(share))
         if start is not None and start.horizon < share:
             start = replace(start, damping=math.nan, growth=2.0, quiet=0)
-        start = replace(start or begin(problem.shared.guess, problem.own.guess), horizon=share)
+        start = replace(start or begin_with_effect(problem, options, which, stop), horizon=share)
         found = fit_part(part, options if last else early, which, start, monitor, stop)
         if last or found.uncertainty is None or found.outcome.status is FitStatus.INTERRUPTED:
             break
@@ -100,7 +102,7 @@ def fit_part(
         change = noise_factors(scaled, found.evaluated, which, options.loss, found.uncertainty.information)
         if np.all(np.abs(change - 1) < STANDS):
             break
-        factors = factors * change
+        factors = np.maximum(factors * change, LEAST)
         start = replace(start, damping=math.nan, growth=2.0, quiet=0, noise=tuple(map(float, factors)))
     scaled = RescaledResiduals(problem, factors)
     outcome = RecordingFit(scaled, options, which).run(start, monitor, stop)

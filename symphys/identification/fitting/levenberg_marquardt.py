@@ -6,7 +6,9 @@ projected into the bounds. lambda follows the gain ratio (Nielsen 1999; Madsen, 
 A trial of which a recording's simulation is not finite is refused, like one that raises the merit.
 
 The fit has converged where the step that is left, undamped, is below ``tolerance`` standard errors: its expected fall
-of the merit is below tolerance^2 times the merit per residual. That needs no unit and no scale.
+of the merit is below tolerance^2 times the merit per residual. That needs no unit and no scale. Where steps bring
+nothing any more, directions that the recordings leave vague have no part in it (``remaining``), and where they are
+refused, the Jacobians of both sides of a kink say whether any direction lowers the merit (``kinks``).
 """
 
 from __future__ import annotations
@@ -19,6 +21,8 @@ from dataclasses import replace
 import numpy as np
 
 from symphys.identification.fitting.arrow import ArrowSystem, assemble, costs
+from symphys.identification.fitting.kinks import KinkedModel
+from symphys.identification.fitting.remaining import DeterminedArrow, number_units
 from symphys.identification.fitting.state import FitOptions, FitOutcome, FitState, FitStatus, FitStep, begin
 from symphys.identification.interface import Array, Bools, FitParameters, IdentificationError, Ints, RecordedResiduals
 
@@ -34,9 +38,28 @@ ROUNDING = 1e-14
 """A fall of the merit by this share of itself cannot be told from rounding."""
 PROGRESS = 1e-2
 """A fall of the merit by this share of itself per residual is progress: that of a tenth of a standard error."""
+WORTH_AT_KINK = 0.1
+"""The same where the sides of a kink are collected: a step that gains less shows one more side."""
+AT_KINK = 1e-2
+"""Standard errors: sides are collected where more are left, and a kink is a minimum where they promise no more. At most
+as many are left as noise makes, the root of how many numbers there are: more is another minimum, or chaos."""
+NEAR = 0.1
+"""Standard errors that may be left where the merit does not fall any more: intervals are no narrower than that."""
+MOST_SIDES = 8
+"""Points whose Jacobians are collected in an iteration."""
 EXACTLY = "the recordings are met exactly"
 BUDGET = "the iterations are used up: raise `iterations`"
 STOPPED = "interrupted: the state goes on from here"
+LEFT = "{left:.1g} standard errors are left"
+VAGUELY = (
+    "{left:.1g} standard errors are left, without {names}, which the recordings do not determine: there the Jacobian "
+    "puts the minimum {far:.2g} standard errors away, where it no longer holds"
+)
+KINK = (
+    "the merit has a kink here, as where an impact falls on a sample; both sides together leave {left:.1g} standard "
+    "errors. The Jacobian of one side alone puts the minimum {far:.2g} standard errors away: the intervals reach there"
+)
+NEARLY = "the merit does not fall any more, and the Jacobian puts its minimum {left:.2g} standard errors away"
 STALLED = (
     "no lower merit was found although the Jacobian promises one, {left:.2g} standard errors away: the merit may have "
     "a kink there (impacts that begin or end within a recording), or the Jacobian is wrong"
@@ -75,7 +98,7 @@ class RecordingFit:
         """Fit from the guess, or go on from ``start``; ``stop`` is asked and ``monitor`` told after each iteration."""
         began = time.perf_counter()
         state = start or begin(self.problem.shared.guess, self.problem.own.guess)
-        system = self._system(state.shared, state.own)
+        system = self.system(state.shared, state.own)
         if not system.finite:
             return FitOutcome(FitStatus.NOT_FINITE, START.format(names=self._names(system.costs)), state, system)
         if state.history:  # the work of the start is in its history
@@ -91,12 +114,13 @@ class RecordingFit:
                 ended = (FitStatus.INTERRUPTED, STOPPED)
             found = ended or self._step(state, system, began)
             if isinstance(found[0], FitStatus):
-                return FitOutcome(*found, state, system)
+                return FitOutcome(found[0], found[1], state, system, *found[2:])
             state, system = found
             if monitor:
                 monitor(state.history[-1], state)
 
-    def _system(self, shared: Array, own: Array) -> ArrowSystem:
+    def system(self, shared: Array, own: Array) -> ArrowSystem:
+        """The arrow at shared (s,) and own (K, o) numbers, of the recordings that are fitted."""
         self.jacobians += len(self.which)
         evaluated = self.problem.jacobian(shared, own, self.which)
         return assemble(self.problem, evaluated, shared, own, self.which, self.loss, self.weights)
@@ -131,56 +155,92 @@ class RecordingFit:
 
     def left(self, state: FitState, system: ArrowSystem) -> float:
         """Standard errors between the state and where its quadratic model has the minimum."""
-        if not system.cost > 0:
-            return 0.0
-        step = system.step(0.0, *self.free(state, system))
-        return math.sqrt(max(system.expected_fall(*step), 0.0) * self.size / system.cost)
+        return self._errors(system.expected_fall(*system.step(0.0, *self.free(state, system))), system)
 
     def _ended(self, state: FitState, system: ArrowSystem) -> tuple[FitStatus, str] | None:
         last = state.history[-1]
         if system.cost <= EXACT * self.size:
             return FitStatus.CONVERGED, EXACTLY
         if last.left <= self.options.tolerance:
-            return FitStatus.CONVERGED, f"{last.left:.1g} standard errors are left"
+            return FitStatus.CONVERGED, LEFT.format(left=last.left)
+        if state.quiet and not (arrow := self._arrow(state, system)).whole:
+            left = self._errors(system.expected_fall(*arrow.step()), system)
+            if left <= self.options.tolerance:
+                return FitStatus.CONVERGED, VAGUELY.format(left=left, names=self._vague(arrow), far=last.left)
         if last.iteration - state.first >= self.options.iterations:
             return FitStatus.BUDGET, BUDGET
         if state.quiet >= (self.options.patience or math.inf):
-            return FitStatus.STALLED, SLOW.format(left=last.left)
+            return self._stalled(SLOW, last.left)
         return None
+
+    def _arrow(self, state: FitState, system: ArrowSystem, damping: float = 0.0) -> DeterminedArrow:
+        """Without what is vague at the state."""
+        numbers = (self.problem.shared, self.problem.own), (state.shared, state.own)
+        return DeterminedArrow(system, number_units(*numbers, self.free(state, system), self.which), damping)
+
+    def _errors(self, fall: float, system: ArrowSystem) -> float:
+        """A fall of the merit in standard errors."""
+        return math.sqrt(max(0.0, fall) * self.size / system.cost) if system.cost > 0 else 0.0
 
     def _step(
         self, state: FitState, system: ArrowSystem, began: float
-    ) -> tuple[FitState, ArrowSystem] | tuple[FitStatus, str]:
-        """One step that lowers the merit, and the system there; lambda grows until there is one."""
-        free = self.free(state, system)
-        refused, merit = "", system.cost
+    ) -> tuple[FitState, ArrowSystem] | tuple[FitStatus, str] | tuple[FitStatus, str, Array]:
+        """One step that lowers the merit, and the system there; lambda grows until there is one.
+
+        Else how the fit ended, and at a kink how far from the shared numbers (s,) one side has its minimum.
+        """
+        refused, merit, left, kinked = "", system.cost, state.history[-1].left, False
+        kink = AT_KINK < left <= math.sqrt(sum(int(each.sum()) for each in self.free(state, system)))
+        model = KinkedModel(system, merit / self.size)
         while state.damping <= state.stiffest:
-            shared, own, step, expected = self._trial(state, system, free)
+            shared, own, taken, length = self._moved(state, *self._direction(state, model, kinked))
             recordings, priors = costs(self.problem, shared, own, self.which, self.loss, self.weights)
             self.simulations += len(self.which)
-            trial = float(recordings.sum()) + priors
+            trial, expected = float(recordings.sum()) + priors, model.expected_fall(*taken)
+            gain = (merit - trial) / expected if expected > 0 and math.isfinite(trial) else -math.inf
             refused = "" if math.isfinite(trial) else self._names(recordings)
-            if expected > 0 and math.isfinite(trial) and (merit - trial) / expected > WORTH:
-                there = self._system(shared, own)
-                if there.finite:
-                    return self._accept(state, there, shared, own, step, (merit - trial) / expected, began), there
-                refused = self._names(there.costs)
+            better = gain > (WORTH_AT_KINK if kinked else WORTH)
+            if better or (kinked and not refused):
+                there = self.system(shared, own)
+                if not there.finite:
+                    refused = self._names(there.costs)
+                elif better:
+                    return self._accept(state, there, shared, own, length, gain, began), there
+                else:
+                    model.add(there, *taken)
+                    arrow = self._arrow(state, system)
+                    open_ = self._errors(model.step(arrow)[2], system)
+                    if open_ <= max(AT_KINK, self.options.tolerance):
+                        away = arrow.step()[0] * self.problem.shared.scale
+                        return FitStatus.CONVERGED, KINK.format(left=open_, far=left), away
+                    if model.sides <= MOST_SIDES:
+                        continue
+                    kink, model = False, KinkedModel(system, merit / self.size)
+            kinked = kink
             state = replace(state, damping=state.damping * state.growth, growth=2 * state.growth)
         if refused:
             return FitStatus.NOT_FINITE, TRIALS.format(names=refused)
-        left = state.history[-1].left
         if left <= math.sqrt(ROUNDING * self.size):
-            return (
-                FitStatus.CONVERGED,
-                f"{left:.1g} standard errors are left, which the merit's last digits do not show",
-            )
-        return FitStatus.STALLED, STALLED.format(left=left)
+            return FitStatus.CONVERGED, LEFT.format(left=left) + ", which the merit's last digits do not show"
+        return self._stalled(STALLED, left)
 
-    def _trial(
-        self, state: FitState, system: ArrowSystem, free: tuple[Bools, Bools]
-    ) -> tuple[Array, Array, float, float]:
-        """The next shared and own numbers, the length of the step in scales, and what the model expects it to gain."""
-        d_shared, d_own = system.step(state.damping, *free)
+    def _direction(self, state: FitState, model: KinkedModel, kinked: bool) -> tuple[Array, Array]:
+        """The next step (s,) and (k, o) in scales: by the sides of a kink, without what is vague, or damped."""
+        if kinked:
+            return model.step(self._arrow(state, model.system, state.damping))[:2]
+        if state.quiet and not (arrow := self._arrow(state, model.system)).whole:
+            return arrow.step()
+        return model.system.step(state.damping, *self.free(state, model.system))
+
+    @staticmethod
+    def _stalled(reason: str, left: float) -> tuple[FitStatus, str]:
+        """Near the minimum of the model that is as good as there."""
+        if left <= NEAR:
+            return FitStatus.CONVERGED, NEARLY.format(left=left)
+        return FitStatus.STALLED, reason.format(left=left)
+
+    def _moved(self, state: FitState, d_shared: Array, d_own: Array) -> tuple[Array, Array, tuple[Array, Array], float]:
+        """The next shared and own numbers after a step in scales within the bounds, the step taken, and its length."""
         shared_of, own_of, which = self.problem.shared, self.problem.own, self.which
         shared = np.clip(state.shared + shared_of.scale * d_shared, shared_of.lower, shared_of.upper)
         own = state.own.copy()
@@ -188,7 +248,7 @@ class RecordingFit:
         own = np.clip(own, own_of.lower, own_of.upper)
         taken = (shared - state.shared) / shared_of.scale, ((own - state.own) / own_of.scale)[which]
         length = math.sqrt(float(np.sum(taken[0] ** 2) + np.sum(taken[1] ** 2)))
-        return shared, own, length, system.expected_fall(*taken)
+        return shared, own, taken, length
 
     def _accept(
         self, state: FitState, system: ArrowSystem, shared: Array, own: Array, step: float, gain: float, began: float
@@ -199,6 +259,12 @@ class RecordingFit:
         mark, quiet = (system.cost, 0) if fell else (state.mark, state.quiet + 1)
         taken = replace(state, shared=shared, own=own, damping=damping, growth=2.0, mark=mark, quiet=quiet)
         return self._recorded(taken, system, step, began)
+
+    def _vague(self, arrow: DeterminedArrow) -> str:
+        """Numbers that take part in a direction that is not determined."""
+        shared = [name for name, vague in zip(self.problem.shared.names, arrow.vague_shared, strict=True) if vague]
+        counts = zip(self.problem.own.names, arrow.vague_own.sum(axis=0), strict=True)
+        return ", ".join([*shared, *(f"{name} of {count} recordings" for name, count in counts if count)])
 
     def _names(self, recordings: Array) -> str:
         """Of those whose costs are not finite."""

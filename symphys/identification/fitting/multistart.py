@@ -1,8 +1,9 @@
 """Whether another minimum is lower: CMA-ES over the shared numbers (Hansen 2016), then fits from what it found.
 
 A candidate is rated by the merit after a few steps of Levenberg-Marquardt of the own numbers, from those of the fit.
-The best candidate, and the best of those that are far from it and from the fit, are starts of fits in full: a valley
-beside the fit's is found even where the search itself returns to the fit.
+A search that comes to rest begins again elsewhere: anywhere between two bounds, otherwise farther and farther from the
+fit. The best candidate, and the best of those that are far from it and from the fit, are starts of fits in full: a
+valley beside the fit's is found even where the searches themselves return to the fit.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 
 from symphys.identification.fitting.levenberg_marquardt import RecordingFit
 from symphys.identification.fitting.state import FitOptions, FitOutcome, begin
-from symphys.identification.interface import Array, IdentificationError, Ints, RecordedResiduals
+from symphys.identification.interface import Array, FitParameters, IdentificationError, Ints, RecordedResiduals
 from symphys.results.identification.parts import GlobalSearch
 
 FAR = 0.5
@@ -32,6 +33,7 @@ class SearchOptions:
         evaluations: candidates at most; each simulates every recording ``own_steps`` times, and its Jacobian.
         sigma: first standard deviation, in scales.
         own_steps: of the own numbers, of each candidate.
+        restarts: searches from elsewhere, after the one from the fit.
         starts: fits in full, from the best candidates.
         seed: of the search.
     """
@@ -39,6 +41,7 @@ class SearchOptions:
     evaluations: int = 200
     sigma: float = 1.0
     own_steps: int = 2
+    restarts: int = 3
     starts: int = 3
     seed: int = 0
 
@@ -49,6 +52,8 @@ class SearchOptions:
         for name in ("evaluations", "own_steps", "starts"):
             if not getattr(self, name) >= 1:
                 raise IdentificationError(f"{name} is {getattr(self, name)}: it must be at least 1")
+        if not self.restarts >= 0:
+            raise IdentificationError(f"restarts is {self.restarts}: it must be at least 0")
 
 
 def search(
@@ -77,8 +82,8 @@ def words(fitted: FitOutcome, best: FitOutcome, lower: bool) -> str:
     """What the search means."""
     if not lower:
         return "CMA-ES, and fits from what it found, came to nothing lower than the fit"
-    share = 1 - best.merit / fitted.merit
-    return f"CMA-ES found a minimum that is {share:.2g} of the merit lower: the fit was in a local one"
+    share = fitted.merit / best.merit if best.merit > 0 else math.inf
+    return f"CMA-ES found a minimum whose merit is lower by a factor of {share:.3g}: the fit was in a local one"
 
 
 def strategy(
@@ -96,29 +101,42 @@ def strategy(
     free = np.flatnonzero(parameters.lower < parameters.upper)
     stream = np.random.default_rng(settings.seed)
     at = (fitted.state.shared / parameters.scale)[free]
+    size = sum(len(problem.rows(int(k)).time) for k in which)
     # One number more, without effect: pycma 4.5 cannot search in a single one.
     bounds = [[*sides(bound[free] / parameters.scale[free]), None] for bound in (parameters.lower, parameters.upper)]
     quiet = {"verbose": -9, "verb_log": 0, "verb_disp": 0, "signals_filename": "", "seed": math.nan}
     given: dict[str, Any] = {"bounds": bounds, "randn": lambda *shape: stream.standard_normal(shape), **quiet}
     found: list[tuple[float, Array]] = []
+    evaluated = 0
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
-        evolution = cma.CMAEvolutionStrategy([*at, 0.0], settings.sigma, given)
-        evaluated = 0
-        while evaluated < settings.evaluations and not evolution.stop() and not (stop and stop()):
-            asked = evolution.ask()
-            merits = []
-            for x in asked:
-                shared = fitted.state.shared.copy()
-                shared[free] = np.asarray(x)[:-1] * parameters.scale[free]
-                shared = np.clip(shared, parameters.lower, parameters.upper)
-                merit = rated(problem, shared, fitted.state.own, which, options, settings.own_steps)
-                merits.append(merit)
-                if math.isfinite(merit):
-                    found.append((merit, shared))
-            evaluated += len(asked)
-            evolution.tell(asked, merits)
+        for restart in range(1 + settings.restarts):
+            given["tolfun"] = max(min([fitted.merit, *(merit for merit, _ in found)]) / max(size, 1), 1e-11)
+            begin_at = at if restart == 0 else elsewhere(parameters, at, free, settings.sigma * 2.0**restart, stream)
+            evolution = cma.CMAEvolutionStrategy([*begin_at, 0.0], settings.sigma, given)
+            while evaluated < settings.evaluations and not evolution.stop() and not (stop and stop()):
+                asked = evolution.ask()
+                merits = []
+                for x in asked:
+                    shared = fitted.state.shared.copy()
+                    shared[free] = np.asarray(x)[:-1] * parameters.scale[free]
+                    shared = np.clip(shared, parameters.lower, parameters.upper)
+                    merit = rated(problem, shared, fitted.state.own, which, options, settings.own_steps)
+                    merits.append(merit)
+                    if math.isfinite(merit):
+                        found.append((merit, shared))
+                evaluated += len(asked)
+                evolution.tell(asked, merits)
     return found
+
+
+def elsewhere(parameters: FitParameters, at: Array, free: Ints, away: float, stream: np.random.Generator) -> Array:
+    """(n,) a start of the free numbers, in scales: anywhere between two bounds, else about ``at`` (n,), so far away."""
+    lower, upper = (bound[free] / parameters.scale[free] for bound in (parameters.lower, parameters.upper))
+    bounded = np.isfinite(lower) & np.isfinite(upper)
+    low, high = np.where(bounded, lower, 0.0), np.where(bounded, upper, 1.0)
+    drawn = low + stream.random(at.shape) * (high - low)
+    return np.clip(np.where(bounded, drawn, at + away * stream.standard_normal(at.shape)), lower, upper)
 
 
 def rated(problem: RecordedResiduals, shared: Array, own: Array, which: Ints, options: FitOptions, steps: int) -> float:

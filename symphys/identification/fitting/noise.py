@@ -80,7 +80,7 @@ def noise_factors(
         enough = (freedom > ENOUGH) & ~problem.noise_known
         change = np.sqrt(squares / (loss.normal_square * np.where(enough, freedom, 1.0)))
         change = np.where(enough, np.maximum(change, LEAST), 1.0)
-        factors = factors * change
+        factors = np.maximum(factors * change, LEAST)
         if np.all(np.abs(change - 1) < LEAST_CHANGE):
             break
     return factors

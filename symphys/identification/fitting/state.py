@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from itertools import pairwise
 from typing import Any
@@ -45,6 +45,7 @@ class FitOptions:
         threshold: of Huber's loss, in units of the noise; inf: least squares.
         horizons: shares of the recordings' time that are fitted one after the other, rising to 1. Where impacts make
             motions chaotic, (0.3, 0.5, 0.7, 0.85, 1) ends at minima that a fit of the whole does not reach.
+        start_values: whether shared numbers without an effect at their guess are tried at other values first.
     """
 
     iterations: int = 100
@@ -53,6 +54,7 @@ class FitOptions:
     patience: int = 10
     threshold: float = math.inf
     horizons: tuple[float, ...] = (1.0,)
+    start_values: bool = True
 
     def __post_init__(self) -> None:
         """IdentificationError names the option and what would be valid."""
@@ -109,6 +111,7 @@ class FitState:
         noise: (q,) factors on the noise of each quantity under which the merit is computed; empty: none.
         horizon: share of the recordings that is fitted.
         first: the iteration at which lambda was last set anew.
+        notes: what is to be said of where the fit began, a sentence each.
     """
 
     shared: Array
@@ -122,6 +125,7 @@ class FitState:
     noise: tuple[float, ...] = ()
     horizon: float = 0.0
     first: int = 0
+    notes: tuple[str, ...] = ()
 
     def plain(self) -> dict[str, Any]:
         """As JSON-able lists and numbers, from which ``revive_state`` makes the same state to the last bit."""
@@ -133,6 +137,7 @@ class FitState:
             **found,
             "history": rows,
             "noise": list(self.noise),
+            "notes": list(self.notes),
         }
 
 
@@ -144,12 +149,14 @@ class FitOutcome:
         status, reason: what ended it, and what that means.
         state: there; ``fit`` goes on from it.
         system: the arrow there, of the recordings that were fitted.
+        one_sided: (s,) at a kink, how far from the shared numbers the Jacobian of one side has its minimum; else empty.
     """
 
     status: FitStatus
     reason: str
     state: FitState
     system: ArrowSystem
+    one_sided: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def merit(self) -> float:
@@ -169,7 +176,8 @@ def revive_state(saved: Mapping[str, Any], problem: RecordedResiduals) -> FitSta
         numbers = {name: kind(saved[name]) for name, kind in NUMBERS.items()}
         history = tuple(FitStep(*row) for row in saved["history"])
         noise = tuple(map(float, saved["noise"]))
-        state = FitState(shared=shared, own=own, history=history, noise=noise, **numbers)
+        notes = tuple(map(str, saved["notes"]))
+        state = FitState(shared=shared, own=own, history=history, noise=noise, notes=notes, **numbers)
     except (KeyError, TypeError, ValueError) as error:
         raise IdentificationError(
             f"the saved fit is damaged or of other recordings ({error!r}): start afresh"

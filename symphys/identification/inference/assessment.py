@@ -9,22 +9,22 @@ import numpy as np
 from symphys.identification.fitting.state import FitOutcome, FitStatus
 from symphys.identification.inference.bootstrap import Bootstrap
 from symphys.identification.inference.uncertainty import Uncertainty
-from symphys.identification.interface import Array, RecordedResiduals
+from symphys.identification.interface import RecordedResiduals
 from symphys.results.identification import ParameterEstimate, QuantityResiduals
 
 NARROW = 1.5
 """Ratio of residuals to a given noise, or of both intervals, above which those of the Jacobian are doubted."""
-NEAR = 0.1
-"""Standard errors that a fit which stalls at a kink may leave without a doubt."""
 BENT = 0.5
 """Difference of a refitted draw from its step, in standard deviations of the draws, above which steps are doubted."""
 
 
 def estimates(
-    problem: RecordedResiduals, shared: Array, known: Uncertainty, drawn: Bootstrap
+    problem: RecordedResiduals, outcome: FitOutcome, known: Uncertainty, drawn: Bootstrap
 ) -> tuple[ParameterEstimate, ...]:
-    """The shared numbers (s,) with both intervals."""
-    parameters, interval = problem.shared, known.interval(shared)
+    """The shared numbers with both intervals; at a kink that of the Jacobian reaches to that of its side."""
+    parameters, shared = problem.shared, outcome.state.shared
+    away = outcome.one_sided if outcome.one_sided.size else np.zeros(len(shared))
+    interval = known.interval(shared) + np.stack([np.minimum(away, 0), np.maximum(away, 0)], axis=1)
     units = parameters.units or ("",) * len(parameters.names)
     return tuple(
         ParameterEstimate(
@@ -58,8 +58,7 @@ def doubts(
 
     ``freedom``: residuals less numbers that were estimated.
     """
-    near = outcome.status is FitStatus.STALLED and outcome.state.history[-1].left <= NEAR
-    found = [] if near or outcome.status is FitStatus.CONVERGED else [f"the fit has not converged: {outcome.reason}"]
+    found = [] if outcome.status is FitStatus.CONVERGED else [f"the fit has not converged: {outcome.reason}"]
     found += [f"{each.name} is at its {each.at_bound} bound, {each.value:.6g}" for each in parameters if each.at_bound]
     if freedom < 1:
         found.append(f"numbers are {1 - freedom} too many for the residuals: nothing is left to judge the fit by")

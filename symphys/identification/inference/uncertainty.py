@@ -6,7 +6,8 @@ has psi^2 and H psi': the sandwich (Huber 1967, White 1980). Residuals are in un
 estimated (``noise``), so no factor is left.
 
 The own numbers are eliminated, recording by recording. Numbers at a bound are held: their intervals are nan, and those
-of the others hold under that condition. A direction without information has the standard error inf.
+of the others hold under that condition. A direction without information has the standard error inf, and so has an own
+number that takes part in a vague one (``remaining``): that of the Jacobian is beyond where the Jacobian holds.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import scipy.stats
 
 from symphys.identification.fitting.arrow import NO_INFORMATION, ArrowSystem, assemble
 from symphys.identification.fitting.levenberg_marquardt import movable
+from symphys.identification.fitting.remaining import DeterminedArrow, number_units
 from symphys.identification.fitting.robust_loss import RobustLoss
 from symphys.identification.interface import Array, Bools, FitParameters, Ints, RecordedResiduals, Rows
 
@@ -160,7 +162,9 @@ def uncertainty(
     covariance[~free_shared, :] = covariance[:, ~free_shared] = np.nan
     error = np.sqrt(np.diagonal(covariance))
     own_error = np.full(own.shape, np.nan)
-    open_own = bread.own_open | np.any((np.abs(bread.gain) > TOUCHED) & open_shared, axis=2)
+    units = number_units((problem.shared, problem.own), (shared, own), (free_shared, free_own), which)
+    vague_own = DeterminedArrow(system, units).vague_own
+    open_own = bread.own_open | vague_own | np.any((np.abs(bread.gain) > TOUCHED) & open_shared, axis=2)
     fitted = np.where(open_own, np.inf, np.sqrt(np.maximum(own_variance, 0))) * problem.own.scale[which]
     own_error[which] = np.where(free_own, fitted, np.nan)
     correlation, known = np.full(covariance.shape, np.nan), np.flatnonzero(np.isfinite(error) & (error > 0))

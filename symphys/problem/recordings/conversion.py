@@ -20,6 +20,8 @@ PLACED = "position"
 TURNED = ("velocity", "angular_velocity", "force", "torque", "contact_force", "reaction_force", "reaction_torque")
 """Fields of vectors in world coordinates, which a frame turns."""
 ORIENTATION = "orientation"
+LARGEST = 1e30
+"""In the unit of the engine: larger numbers mark what is missing in some programs, and have no finite squares."""
 LENGTH = "m"
 """The unit of lengths."""
 OFF = 1e-2
@@ -71,6 +73,11 @@ def convert(
         raise RecordingFault(
             key, f"{columns.where(int(infinite[0][0]))}: the number is not finite, after factor and offset"
         )
+    large = np.argwhere(np.abs(values) > LARGEST)
+    if large.size:
+        row, column = (int(k) for k in large[0])
+        text = f"the number {values[row, column]:g} is no measurement; a missing one is nan, or an empty cell"
+        raise RecordingFault(key, f"{columns.where(row)}: {text}")
     if frame is not None and size == 3 and field in (PLACED, *TURNED):
         values = values @ np.array(rotation.matrix(frame.orientation), float).T
         values += frame.position if field == PLACED else 0.0

@@ -28,9 +28,10 @@ def read_npz(stream: BinaryIO, label: str, wanted: set[str], rows: str | None) -
         RecordingFault: names the array.
     """
     try:
-        with np.load(stream, allow_pickle=False) as file:
-            if not isinstance(file, np.lib.npyio.NpzFile):
-                raise RecordingFault("files", f"{label} holds one array; an NPZ file of arrays by name is wanted")
+        file = np.load(stream, allow_pickle=False)
+        if not isinstance(file, np.lib.npyio.NpzFile):
+            raise RecordingFault("files", f"{label} holds one array; an NPZ file of arrays by name is wanted")
+        with file:
             names = tuple(file.files)
             found = {name: numbers(file[name], name, label) for name in names if name in wanted}
             starts = None if rows is None or rows not in names else numbers(file[rows], rows, label)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,11 +15,13 @@ from symphys.model.world import World
 from symphys.problem.model import Simulation, Variable
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.reading.faults import Faults
+from symphys.problem.recordings.columns import RecordingFault
 from symphys.problem.recordings.conversion import MeasurementFrame
 from symphys.problem.recordings.files import FileFinder
 from symphys.problem.recordings.magnitude import longest
 from symphys.problem.recordings.starts import Starts
-from symphys.problem.recordings.table import RecordedWorld, read_recordings
+from symphys.problem.recordings.table import RecordedRows, RecordedWorld, read_recordings
+from symphys.problem.recordings.times import steps_until
 from symphys.problem.recordings.types import IdentifySettings, RecordedFile, Recording
 from symphys.problem.schema import Document
 from symphys.problem.schema.recording import RecordingTable
@@ -26,6 +29,8 @@ from symphys.problem.tables.shapes import read_orientation
 from symphys.problem.units import formula_units
 
 Array = NDArray[np.float64]
+MOST_STEPS = 100_000
+"""Of a duration that comes from recordings: times in milliseconds, or since 1970, are not simulated by mistake."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +98,32 @@ def read_identification(
     settings = IdentifySettings() if document.identify is None else IdentifySettings(**document.identify.model_dump())
     new = tuple(finder.found.values())
     return Identified(recordings, (*finder.kept.values(), *new), new, settings)
+
+
+def with_duration(document: Document, faults: Faults) -> Document:
+    """The document with a duration: without one in [simulation], whole steps up to the last recorded sample."""
+    if document.simulation.duration is not None:
+        return document
+    place = ("simulation", "duration")
+    if not document.recording:
+        faults.add(place, "this key is required without [[recording]], whose last sample it is otherwise")
+        faults.stop_if_any()
+    ends, dt = list[float](), document.simulation.dt
+    for index, table in enumerate(document.recording):
+        folder = Path(faults.origin(("recording", index)).file).parent
+        try:
+            ends.append(RecordedRows(table, FileFinder(document.recorded), folder).end())
+        except RecordingFault as fault:
+            faults.add(("recording", index, *fault.key), str(fault))
+    faults.stop_if_any()
+    steps = steps_until(max(ends), dt)
+    if steps > MOST_STEPS:
+        text = f"samples go on to {max(ends):.6g} s, {steps:.4g} steps of {dt:g} s"
+        advice = 'take until, clock = "first row", time_factor or rate, or state duration in [simulation]'
+        faults.add(("recording", ends.index(max(ends))), f"{text}; {advice}")
+        faults.stop_if_any()
+    simulation = document.simulation.model_copy(update={"duration": steps * dt})
+    return document.model_copy(update={"simulation": simulation})
 
 
 def read_frame(index: int, table: RecordingTable, faults: Faults) -> MeasurementFrame | None:

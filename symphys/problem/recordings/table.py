@@ -16,6 +16,7 @@ from symphys.expression.units import unit_of
 from symphys.problem.reading.faults import Faults
 from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
 from symphys.problem.recordings.conversion import (
+    LARGEST,
     LENGTH,
     ORIENTATION,
     PLACED,
@@ -41,6 +42,8 @@ from symphys.problem.recordings.types import Measured, Recording
 from symphys.problem.schema.recording import ColumnsTable, MeasuredTable, RecordingTable
 
 Array = NDArray[np.float64]
+SMALLEST = 1e-30
+"""Of a noise: squares of what is divided by it are numbers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,38 +113,19 @@ class Piece:
     last: int
 
 
-class RecordingReader:
-    """Reads one table; a RecordingFault ends that."""
+class RecordedRows:
+    """The rows of the recordings of one table; a RecordingFault ends the reading."""
 
-    def __init__(
-        self,
-        table: RecordingTable,
-        world: RecordedWorld,
-        finder: FileFinder,
-        folder: Path,
-        frame: MeasurementFrame | None,
-    ) -> None:
-        """``folder``: in which files are looked for; ``frame``: of the measurement system."""
-        self.table, self.world, self.finder, self.folder, self.frame = table, world, finder, folder, frame
+    def __init__(self, table: RecordingTable, finder: FileFinder, folder: Path) -> None:
+        """``folder``: in which files are looked for."""
+        self.table, self.finder, self.folder = table, finder, folder
 
-    def read(self) -> list[Recording]:
-        """All recordings of the table."""
+    def end(self) -> float:
+        """[s] the last time of all recordings, on the clock of the simulation."""
         self._check_keys()
-        measured = [self._measured(k, each) for k, each in enumerate(self.table.measured)]
-        start = read_start_columns(self.table, self.world.sample, self.world.units, self.world.starts)
-        inputs = read_input_columns(self.table, self.world.inputs, self.world.units)
-        found, known = list[Recording](), list[tuple[str, ...]]()
-        used = [*self.table.measured, *(each.table for each in start), *(each.table for each in inputs)]
-        for piece in self._pieces(self._wanted(used)):
-            found.append(self._recording(piece, measured, start, inputs))
-            known.append((piece.name, *piece.aliases))
-        check_ends(found, self.world.duration, self.world.dt)
-        held = held_back(self.table.held_back, known)
-        for k, each in enumerate(measured):
-            if all(np.isnan(recording.measured[k].values).all() for recording in found):
-                text = f"no recording has a number of {each.formula.text}"
-                raise RecordingFault(("measured", k, "columns"), text)
-        return [replace(each, held_back=back) for each, back in zip(found, held, strict=True)]
+        times = {name for name in (time_column(self.table), self.table.split) if name is not None}
+        every = self._pieces(times | {name for each in self.table.measured for name in each.columns})
+        return max(float(read_times(each.columns, each.first, each.last, self.table, 1.0)[0][-1]) for each in every)
 
     def _check_keys(self) -> None:
         """Keys that exclude each other."""
@@ -154,37 +138,6 @@ class RecordingReader:
             raise RecordingFault("split", "stands instead of rows; leave one of them out")
         if table.rows is not None and table.table is not None:
             raise RecordingFault("rows", "is for NPZ files; give split, or a [[recording]] for each table")
-
-    def _measured(self, k: int, table: MeasuredTable) -> MeasuredColumns:
-        """The formula of one quantity, tried on the start."""
-        key = ("measured", k)
-        try:
-            formula = parse(table.value)
-            value = np.array(formula.evaluate(self.world.sample), float).ravel()
-        except FormulaError as error:
-            raise RecordingFault((*key, "value"), str(error)) from None
-        text = "".join(table.value.split())
-        quantity = text if formula.names == {text} else ""
-        unit = unit_of(formula, self.world.units)
-        check_table(table, unit, quantity or table.value, key)
-        fields = {name.rpartition(".")[2] for name in formula.names}
-        if self.frame is not None and not quantity and fields & {PLACED, ORIENTATION, *TURNED}:
-            text = "a frame turns whole quantities; measure all components, with nan for those that are missing"
-            raise RecordingFault((*key, "value"), text)
-        found = MeasuredColumns(table, formula, quantity, value, unit, None)
-        residuals = 3 if found.orientation else value.size
-        if table.noise is None:
-            return found
-        if len(table.noise) not in (1, residuals):
-            wanted = f"a number or {residuals} numbers" if residuals > 1 else "a number"
-            raise RecordingFault((*key, "noise"), f"must be {wanted}, not a list of {len(table.noise)}")
-        noise = np.broadcast_to(np.array(table.noise), residuals).copy()
-        return MeasuredColumns(table, formula, quantity, value, unit, noise)
-
-    def _wanted(self, tables: Sequence[ColumnsTable]) -> set[str]:
-        """The names of all columns that are used."""
-        single = {name for name in (time_column(self.table), self.table.split) if name is not None}
-        return single | {name for table in tables for name in table.columns}
 
     def _pieces(self, wanted: set[str]) -> Iterator[Piece]:
         """The rows of every recording."""
@@ -225,6 +178,74 @@ class RecordingReader:
             raise RecordingFault("rows", f"is for NPZ files, and {name} is none; use split")
         with self.finder.open(name, self.folder) as stream:
             return read_npz(stream, name, wanted, self.table.rows) if arrays else (read_csv(stream, name, wanted), None)
+
+
+class RecordingReader(RecordedRows):
+    """Reads one table; a RecordingFault ends that."""
+
+    def __init__(
+        self,
+        table: RecordingTable,
+        world: RecordedWorld,
+        finder: FileFinder,
+        folder: Path,
+        frame: MeasurementFrame | None,
+    ) -> None:
+        """``folder``: in which files are looked for; ``frame``: of the measurement system."""
+        super().__init__(table, finder, folder)
+        self.world, self.frame = world, frame
+
+    def read(self) -> list[Recording]:
+        """All recordings of the table."""
+        self._check_keys()
+        measured = [self._measured(k, each) for k, each in enumerate(self.table.measured)]
+        start = read_start_columns(self.table, self.world.sample, self.world.units, self.world.starts)
+        inputs = read_input_columns(self.table, self.world.inputs, self.world.units)
+        found, known = list[Recording](), list[tuple[str, ...]]()
+        used = [*self.table.measured, *(each.table for each in start), *(each.table for each in inputs)]
+        for piece in self._pieces(self._wanted(used)):
+            found.append(self._recording(piece, measured, start, inputs))
+            known.append((piece.name, *piece.aliases))
+        check_ends(found, self.world.duration, self.world.dt)
+        held = held_back(self.table.held_back, known)
+        for k, each in enumerate(measured):
+            if all(np.isnan(recording.measured[k].values).all() for recording in found):
+                text = f"no recording has a number of {each.formula.text}"
+                raise RecordingFault(("measured", k, "columns"), text)
+        return [replace(each, held_back=back) for each, back in zip(found, held, strict=True)]
+
+    def _measured(self, k: int, table: MeasuredTable) -> MeasuredColumns:
+        """The formula of one quantity, tried on the start."""
+        key = ("measured", k)
+        try:
+            formula = parse(table.value)
+            value = np.array(formula.evaluate(self.world.sample), float).ravel()
+        except FormulaError as error:
+            raise RecordingFault((*key, "value"), str(error)) from None
+        text = "".join(table.value.split())
+        quantity = text if formula.names == {text} else ""
+        unit = unit_of(formula, self.world.units)
+        check_table(table, unit, quantity or table.value, key)
+        fields = {name.rpartition(".")[2] for name in formula.names}
+        if self.frame is not None and not quantity and fields & {PLACED, ORIENTATION, *TURNED}:
+            text = "a frame turns whole quantities; measure all components, with nan for those that are missing"
+            raise RecordingFault((*key, "value"), text)
+        found = MeasuredColumns(table, formula, quantity, value, unit, None)
+        residuals = 3 if found.orientation else value.size
+        if table.noise is None:
+            return found
+        if len(table.noise) not in (1, residuals):
+            wanted = f"a number or {residuals} numbers" if residuals > 1 else "a number"
+            raise RecordingFault((*key, "noise"), f"must be {wanted}, not a list of {len(table.noise)}")
+        if not SMALLEST <= min(table.noise) <= max(table.noise) <= LARGEST:
+            raise RecordingFault((*key, "noise"), f"must be from {SMALLEST:g} to {LARGEST:g}, not {table.noise}")
+        noise = np.broadcast_to(np.array(table.noise), residuals).copy()
+        return MeasuredColumns(table, formula, quantity, value, unit, noise)
+
+    def _wanted(self, tables: Sequence[ColumnsTable]) -> set[str]:
+        """The names of all columns that are used."""
+        single = {name for name in (time_column(self.table), self.table.split) if name is not None}
+        return single | {name for table in tables for name in table.columns}
 
     def _recording(
         self,

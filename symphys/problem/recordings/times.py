@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 TIME = "time"
 LEAST = 2
 """Samples of a recording."""
+MOST = 1e15
+"""Steps: more are not told apart."""
 SLACK = 1e-9
 """Relative, of the end of the simulation."""
 
@@ -99,11 +101,16 @@ def check_ends(recordings: Sequence[Recording], duration: float, dt: float) -> N
     text = f"{longest.source}: samples go on to {end:.6g} s{others}, and the simulation ends at {duration:g} s"
     if min(float(each.time[0]) for each in recordings) > duration:
         raise RecordingFault("clock", f'{text}; take clock = "first row", by which each recording begins at 0 s')
-    needed = ceil(end / dt * (1 - SLACK)) * dt
+    needed = steps_until(end, dt) * dt
     raise RecordingFault(
         "until",
         f"{text}; [simulation] needs duration = {needed:.10g}, or leave later ones out with until = {duration:g}",
     )
+
+
+def steps_until(end: float, dt: float) -> int:
+    """The time steps after which a sample at ``end`` [s] lies within the simulation, at least one."""
+    return max(1, ceil(min(end / dt * (1 - SLACK), MOST)))
 
 
 def steps_apart(time: Array, dt: float) -> float:

@@ -124,6 +124,8 @@ class IdentifySettings:
         iterations: of Levenberg-Marquardt.
         tolerance: converged where a step is below this share of the standard errors.
         bootstrap: fits to recordings that are drawn anew; 0: none.
+        horizons: shares of the recordings' time that are fitted one after the other, rising to 1.
+        held_back_starts: where own numbers of recordings that are held back come from.
         check: "cma": CMA-ES looks for other minima.
         check_evaluations: of all residuals by CMA-ES.
         seed: of the random numbers of both.
@@ -134,6 +136,8 @@ class IdentifySettings:
     iterations: int = 100
     tolerance: float = 1e-4
     bootstrap: int = 0
+    horizons: tuple[float, ...] = (1.0,)
+    held_back_starts: Literal["guess", "before impact", "whole"] = "whole"
     check: Literal["none", "cma"] = "none"
     check_evaluations: int = 1000
     seed: int = 0

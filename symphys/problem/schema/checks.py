@@ -6,6 +6,7 @@ import keyword
 import math
 import re
 from collections.abc import Callable, Collection
+from itertools import pairwise
 from typing import Any, TypeGuard
 
 from pydantic_core import PydanticCustomError
@@ -265,6 +266,15 @@ def positive_numbers(value: object) -> list[float]:
     if not numbers or not all(is_number(number) and number > 0 for number in numbers):
         raise fault(f"must be a number greater than 0, or a list with one for each component, not {shown(value)}")
     return [float(number) for number in numbers]
+
+
+def rising_to_one(value: object) -> list[float]:
+    """Shares above 0 that rise to 1."""
+    if isinstance(value, list) and value and all(map(is_number, value)):
+        shares = [float(share) for share in value]
+        if shares[-1] == 1 and all(0 < a < b for a, b in pairwise([*shares, 2.0])):
+            return shares
+    raise fault(f"must be a list of shares above 0 that rise to 1, such as [0.3, 0.6, 1], not {shown(value)}")
 
 
 def held_back(value: object) -> bool | float | list[int | str]:

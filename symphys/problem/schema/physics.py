@@ -33,7 +33,11 @@ DEFAULT = Scheme()
 class SimulationTable(SchemaTable):
     """How time passes."""
 
-    duration: Positive = Field(description="how long to simulate [s]; a whole number of time steps")
+    duration: Positive | None = Field(
+        default=None,
+        description="how long to simulate [s]; a whole number of time steps; needed unless there are [[recording]] "
+        "tables, up to whose last sample it then goes",
+    )
     dt: Positive = Field(description="time step [s]")
     sweeps: Sweeps = Field(
         default=DEFAULT.sweeps, description="projected Gauss-Seidel sweeps over the contacts in each step"

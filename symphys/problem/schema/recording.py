@@ -238,6 +238,22 @@ class IdentifyTable(SchemaTable):
     bootstrap: Annotated[int, Field(ge=0, le=1000)] = Field(
         default=0, description="fits to recordings drawn anew, whose spread gives a second interval; 0: none"
     )
+    horizons: Annotated[
+        list[float],
+        PlainValidator(checks.rising_to_one),
+        WithJsonSchema(
+            {"type": "array", "items": {"type": "number", "exclusiveMinimum": 0, "maximum": 1}, "minItems": 1}
+        ),
+    ] = Field(
+        default=[1.0],
+        description="shares of the recordings' time that are fitted one after the other, rising to 1: "
+        "[0.3, 0.5, 0.7, 0.85, 1] follows motions with many impacts",
+    )
+    held_back_starts: Literal["guess", "before impact", "whole"] = Field(
+        default="whole",
+        description="where own numbers of recordings that are held back come from, such as their starts: the guess, a "
+        "fit to what was measured before the first impact, or to the whole; shared numbers stay",
+    )
     check: Literal["none", "cma"] = Field(
         default="none", description='"cma": CMA-ES looks for other minima, from the same bounds'
     )

@@ -31,6 +31,7 @@ FIVE = 5
 
 def read_simulation(table: SimulationTable, faults: Faults) -> Simulation:
     """The simulation; notes a step that does not fit."""
+    assert table.duration is not None, "recordings or the file say it"
     check_steps(table.duration, table.dt, faults)
     return Simulation(**{**table.model_dump(), "smoothing": tuple(table.smoothing)})
 

@@ -69,6 +69,7 @@ def write_identification_page(folder: Path) -> Path:
             tag("p", f"Identification · {found.problem}", class_="kicker"),
             tag("h1", found.title or found.problem),
             verdict(found),
+            *(tag("p", f"Start: {each}.") for each in found.starts),
             numbers(found),
             card("Estimates", estimates(found), shown("intervals"), anchor="estimates", note=INTERVALS),
             card("What is not determined", opened(found), anchor="open"),

@@ -54,6 +54,7 @@ class Identification:
             that were held back.
         recordings: (K,) names.
         search: the check against local minima, where there was one.
+        starts: numbers without an effect at their guess, and where the fit began instead, a sentence each.
         bootstrap_note: why there is no bootstrap; else how its steps compare with fits in full.
         doubts: why not to rely on it, a sentence each.
         seconds: wall time by part: "fit", "uncertainty", "bootstrap", "study", "search".
@@ -85,6 +86,7 @@ class Identification:
     held_back_errors: tuple[PredictionErrors, ...]
     recordings: tuple[str, ...]
     search: GlobalSearch | None
+    starts: tuple[str, ...]
     bootstrap_note: str
     doubts: tuple[str, ...]
     seconds: Mapping[str, float]

@@ -25,6 +25,7 @@ def summary(found: Identification) -> str:
         predictions("held back", found.held_back_errors),
         worst(found),
         found.search.text if found.search else "",
+        "\n".join(f"start: {each}" for each in found.starts),
         f"bootstrap: {found.bootstrap_note}" if found.bootstrap_note else "",
         "\n".join(f"doubt: {each}" for each in found.doubts),
     ]

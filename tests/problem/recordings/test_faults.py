@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import pickle
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from recorded import HEIGHT, TABLE, beside, loaded
+from recorded import BALL, HEIGHT, TABLE, beside, loaded
 
 from symphys.errors import ProblemError
 from symphys.problem import Problem
@@ -181,6 +183,51 @@ def test_npz_files(arrays: dict[str, Any], expected: str, tmp_path: Path) -> Non
     assert expected in str(found.value)
 
 
+def test_npz_files_that_are_cut_pickled_or_empty(tmp_path: Path) -> None:
+    """Nothing that is pickled is run; each message names the file and what was expected."""
+    np.savez(tmp_path / "whole.npz", time=[0, 0.1], z=[1.0, 1.0])
+    whole, run = (tmp_path / "whole.npz").read_bytes(), tmp_path / "run"
+    contents = {"cut": whole[: len(whole) // 2], "pickled": pickle.dumps(Touches(run)), "empty": b""}
+    contents["array"] = (lambda out: (np.save(out, [1.0, 2.0]), out.getvalue())[1])(io.BytesIO())
+    for name, content in contents.items():
+        (tmp_path / f"{name}.npz").write_bytes(content)
+        expected = "holds one array" if name == "array" else "cannot be read: it is no NPZ file of numbers"
+        with pytest.raises(ProblemError, match=f"{name}.npz {expected}"):
+            beside(tmp_path, {"files": f"{name}.npz"})
+    np.savez(tmp_path / "objects.npz", time=[0, 0.1], z=np.array([Touches(run), 1.0], object))
+    with pytest.raises(ProblemError, match=r"objects\.npz cannot be read"):
+        beside(tmp_path, {"files": "objects.npz"})
+    assert not run.exists()
+
+
+class Touches:
+    """Makes a file where it is unpickled."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Path.touch, (self.path,)
+
+
+@pytest.mark.parametrize(
+    ("table", "expected"),
+    [
+        (
+            {"table": {**TABLE, "z": [1.0, 1e300, 1.0]}},
+            "row 1 (from 0): the number 1e+300 is no measurement; a missing",
+        ),
+        (
+            {"table": TABLE, "measured": [{**HEIGHT, "noise": 1e-200}]},
+            "noise: must be from 1e-30 to 1e+30, not [1e-200]",
+        ),
+        ({"table": TABLE, "measured": [{**HEIGHT, "noise": 1e200}]}, "noise: must be from 1e-30 to 1e+30"),
+    ],
+)
+def test_numbers_without_finite_squares(table: dict[str, Any], expected: str) -> None:
+    assert expected in message(table)
+
+
 @pytest.mark.parametrize("rows", [[0, 3, 2], [0.5, 2], [0, 5], [1], [-1, 2], [[0, 1]]])
 def test_first_rows(rows: list[Any], tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", time=[0, 0.1, 0.2, 0.3], z=np.ones(4), start=np.array(rows))
@@ -200,10 +247,10 @@ LINES = st.lists(st.lists(CELL, min_size=1, max_size=4).map(",".join), max_size=
 TIMES = st.lists(st.sampled_from([0.0, 0.1, 0.2, 0.3, 5.0, -1.0, NAN, 1e300]), max_size=6)
 
 
-def survives(folder: Path, table: dict[str, Any]) -> Problem | None:
+def survives(folder: Path, table: dict[str, Any], **simulation: float) -> Problem | None:
     """The problem, or None where a ProblemError names what is wrong."""
     try:
-        return beside(folder, table)
+        return beside(folder, table, simulation=simulation or BALL["simulation"])
     except ProblemError as error:
         assert "recording" in str(error)
         return None
@@ -231,6 +278,9 @@ def test_any_csv_file_is_a_problem_or_a_message(
 ) -> None:
     (tmp_path / "a.csv").write_text("\n".join([header, *lines]), encoding="utf-8")
     problem = survives(tmp_path, {"files": "a.csv", **keys})
+    free = survives(tmp_path, {"files": "a.csv", **keys}, dt=0.01)
+    assert free is None or free.simulation.duration >= max(each.time[-1] for each in free.recordings) - 1e-9
+    assert problem is None or free is not None
     for each in problem.recordings if problem else ():
         assert np.all(np.diff(each.time) > 0) and each.time[0] >= 0 and each.time[-1] <= 1
         assert not np.isinf(each.measured[0].values).any() and len(each.measured[0].values) == len(each.time)
