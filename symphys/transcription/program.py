@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
@@ -11,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from symphys.codegen import AdjointDiscount, FunctionCall, MemoryLayout, Place, Program
+from symphys.codegen.program.collection import uncollected
 from symphys.dynamics.functions import trace_step
 from symphys.dynamics.tracing.guards import Guard, Part
 from symphys.dynamics.tracing.recording import TracedCall, TracedVector
@@ -110,6 +110,11 @@ def rollout_program(
         recorded: further outputs by name: what formulas are at the end of every step, one after the other.
         shift: 0 for those at the start of every step.
     """
+    with uncollected():
+        return _rollout_program(rollout, exact, recorded, shift)
+
+
+def _rollout_program(rollout: Rollout, exact: bool, recorded: Mapping[str, Formula], shift: int) -> Program:
     samples = ProgramSamples(rollout)
     asked = terms(samples)
     series = {name: samples.recorded(formula, shift) for name, formula in recorded.items()}
@@ -154,9 +159,9 @@ def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:
             elif slot.name:
                 places[slot] = arguments[slot.name]
         for slot in piece.outputs:
-            places.setdefault(slot, samples.layout.take(slot.size))
-        inputs, outputs = (tuple(places[slot] for slot in slots) for slots in (piece.inputs, piece.outputs))
-        calls.append(_guarded(FunctionCall(piece.function, inputs, outputs), piece, places, zeros))
+            own = samples.layout.take(slot.size)  # also of what lies in the next state: sizes of memories are kept
+            places.setdefault(slot, own)
+        calls.append(_guarded(piece, places, zeros))
     if after.size > columns.size:
         calls.append(_remember(samples, _part(after, slice(columns.size, None))))
     if rollout.termination is not None:
@@ -179,25 +184,28 @@ def _most_zeros(calls: Sequence[TracedCall]) -> int:
     )
 
 
-def _guarded(
-    call: FunctionCall, traced: TracedCall, places: Mapping[TracedVector, Place], zeros: Place | None
-) -> FunctionCall:
-    """The call with its guard and its section, whose vectors lie in ``places``."""
+def _guarded(traced: TracedCall, places: Mapping[TracedVector, Place], zeros: Place | None) -> FunctionCall:
+    """A call with its guard and its section, whose vectors lie in ``places``."""
+    inputs, outputs = (tuple([places[slot] for slot in slots]) for slots in (traced.inputs, traced.outputs))
 
     def part_of(part: Part, size: int) -> Place:
         whole = zeros if part.vector is None else places[part.vector]
         assert whole is not None
+        if part.start == 0 and size == whole.size:
+            return whole
         return Place(whole.offset + part.start, size, whole.stride)
 
-    def stand_ins(guard: Guard) -> tuple[Place | None, ...]:
-        parts = zip(call.outputs, guard.otherwise, strict=True)
-        return tuple(None if part is None else part_of(part, place.size) for place, part in parts)
+    def stood_for(guard: Guard | None) -> tuple[Place | None, tuple[Place | None, ...]]:
+        if guard is None:
+            return None, ()
+        parts = zip(outputs, guard.otherwise, strict=True)
+        return part_of(guard.word, 1), tuple(
+            [None if part is None else part_of(part, place.size) for place, part in parts]
+        )
 
-    if traced.guard is not None:
-        call = replace(call, guard=part_of(traced.guard.word, 1), otherwise=stand_ins(traced.guard))
-    if traced.section is not None:
-        call = replace(call, section=part_of(traced.section.word, 1), beside=stand_ins(traced.section))
-    return call
+    guard, otherwise = stood_for(traced.guard)
+    section, beside = stood_for(traced.section)
+    return FunctionCall(traced.function, inputs, outputs, False, guard, otherwise, section, beside)
 
 
 def _alive(samples: ProgramSamples) -> Place | None:

@@ -13,6 +13,7 @@ from typing import Literal
 from symphys.codegen.emit.plan import plan
 from symphys.codegen.emit.source import SourceFile, sources
 from symphys.codegen.errors import KernelUnavailable, ProgramError
+from symphys.codegen.program.collection import uncollected
 from symphys.codegen.program.program import Program
 from symphys.codegen.runtime.kernel import ProcessorKernel
 from symphys.codegen.runtime.library import Loaded
@@ -48,7 +49,8 @@ def compile_program(
     started = time.perf_counter()
     single = precision == "single"
     names, width = names_of(program, seeded), _width(lanes, single)
-    planned = plan(program, names, width * (4 if single else 8))
+    with uncollected():
+        planned = plan(program, names, width * (4 if single else 8))
     with shared_library(sources(planned, width, single), cache or default_cache()) as built:
         loaded = Loaded(built.path, program, planned, names)
     report = BuildReport(
