@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from types import MappingProxyType
 from typing import Any
 
@@ -11,12 +12,13 @@ import numpy as np
 
 from symphys.codegen import AdjointDiscount, FunctionCall, MemoryLayout, Place, Program
 from symphys.codegen.program.collection import uncollected
+from symphys.codegen.toolchain.identity import identity_of
 from symphys.dynamics.functions import trace_step
 from symphys.dynamics.tracing.guards import Guard, Part
 from symphys.dynamics.tracing.recording import TracedCall, TracedVector
 from symphys.expression import Formula
 from symphys.model.state_layout import Layout as Columns
-from symphys.problem import ALIVE
+from symphys.problem import ALIVE, Problem
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.feedback.controller_calls import Places, control_calls
 from symphys.transcription.formulas.motion_parts import part_arguments
@@ -27,6 +29,8 @@ from symphys.transcription.rollout import Rollout
 Expr = Any
 """casadi MX"""
 NOTHING: Mapping[str, Formula] = MappingProxyType({})
+ASIDE = frozenset({"name", "title", "description", "file", "text", "settings", "solvers", "solver_tables"})
+"""What no program depends on."""
 
 
 class ProgramSamples:
@@ -138,6 +142,12 @@ def _rollout_program(rollout: Rollout, exact: bool, recorded: Mapping[str, Formu
         constants=fixed,
         discounted=AdjointDiscount(samples.x, alive),
     )
+
+
+def program_identity(problem: Problem, exact: bool) -> str | None:
+    """Of the program of a problem's rollout: equal for problems that differ in texts and options of solvers alone."""
+    data = {field.name: getattr(problem, field.name) for field in fields(problem) if field.name not in ASIDE}
+    return identity_of(data, exact)
 
 
 def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:

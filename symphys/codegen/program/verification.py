@@ -7,16 +7,14 @@ fault is named.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symphys.codegen.errors import ProgramError
+from symphys.codegen.program.calls import FunctionCall, Place
 from symphys.codegen.program.spans import Spans
-
-if TYPE_CHECKING:
-    from symphys.codegen.program.program import FunctionCall, Place, Program
 
 Shapes = tuple[tuple[int, ...], tuple[int, ...]]
 """Sizes of the arguments and of the results of a function."""
@@ -25,6 +23,10 @@ AT_ONCE = 4096
 
 Words = NDArray[np.int64]
 NEVER = np.iinfo(np.int64).max
+
+
+Program = Any
+"""What ``program`` defines, which has this check made."""
 
 
 class Verification:

@@ -34,7 +34,7 @@ class Structures:
 
     def of(self, tree: Any) -> Structure:
         """Of a tree."""
-        kind = type(tree)
+        kind: Any = type(tree)
         if kind is TracedMatrix:
             if tree.kept is None:
                 tree.kept = self._leaf(tree.leaf, tree.codes)
