@@ -11,7 +11,6 @@ from typing import Any, Literal
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from symphys.model.world import NOTHING
 from symphys.problem.reading.faults import Faults
@@ -73,6 +72,8 @@ class ReferenceTrajectory:
         slopes = [w**2 * (now - at) for w, at in zip(weights, t.tolist(), strict=True)]
         found = {}
         for name, y in self.columns.items():
+            from scipy.interpolate import CubicSpline  # takes a third of a second: late, for those who have splines
+
             rates = CubicSpline(t, y)(t, 1)
             parts = zip(places, y.tolist(), slopes, rates.tolist(), strict=True)
             found[f"{self.name}.{name}"] = sum(w * value + v * rate for w, value, v, rate in parts)

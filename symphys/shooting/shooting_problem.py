@@ -178,6 +178,27 @@ class Nlp:
     keep: object = None
 
 
+class LaterNlp(Nlp):
+    """An ``Nlp`` that is made when somebody asks for one of its functions: few solvers do."""
+
+    def __init__(self, make: Callable[[], Nlp]) -> None:
+        """``make`` is called once."""
+        object.__setattr__(self, "_make", make)
+
+    def _part(self, name: str) -> Any:
+        made = self.__dict__.get("_made")
+        if made is None:
+            made = self._make()  # type: ignore[attr-defined]
+            object.__setattr__(self, "_made", made)
+        return getattr(made, name)
+
+    expression = property(lambda self: self._part("expression"))
+    value = property(lambda self: self._part("value"))
+    gradient = property(lambda self: self._part("gradient"))
+    jacobian = property(lambda self: self._part("jacobian"))
+    keep = property(lambda self: self._part("keep"))
+
+
 @dataclass(frozen=True)
 class ShootingProblem:
     """Minimise objective(z) within bounds and constraints.

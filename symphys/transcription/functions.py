@@ -7,42 +7,53 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.transcription.objective import Terms
+from symphys.transcription.objective import Terms, terms
 from symphys.transcription.rollout import Rollout
 
 
 class ExpressionFunctions:
     """Each function is made when it is first asked for; see ``symphys.codegen.backends.Functions``."""
 
-    def __init__(self, rollout: Rollout, asked: Terms) -> None:
-        """Nothing is made yet."""
-        self._rollout, self._terms = rollout, asked
-        self._merit = asked.objective + asked.penalties
-        self._common, self._outputs = [asked.objective, asked.errors], asked.outputs
+    def __init__(self, rollout: Rollout, asked: Terms | None = None) -> None:
+        """Nothing is made yet; ``asked``: of the rollout, None: to be made too."""
+        self._rollout, self._asked = rollout, asked
+
+    @cached_property
+    def terms(self) -> Terms:
+        """All that is asked of the rollout, as expressions."""
+        return terms(self._rollout) if self._asked is None else self._asked
+
+    @property
+    def _merit(self) -> Any:
+        return self.terms.objective + self.terms.penalties
+
+    @property
+    def _common(self) -> list[Any]:
+        return [self.terms.objective, self.terms.errors]
 
     @property
     def squares(self) -> Any:
         """(m,) residuals as an expression; None where a cost is no sum of squares, or where there are none."""
-        r = self._terms.residuals
+        r = self.terms.residuals
         return r if r is not None and r.shape[0] else None
 
     @cached_property
     def value(self) -> ca.Function:
         """-> (merit, objective, errors, outputs)."""
-        return self._function("value", [self._merit, *self._common, self._outputs])
+        return self._function("value", [self._merit, *self._common, self.terms.outputs])
 
     @cached_property
     def gradient(self) -> ca.Function:
         """-> (merit, objective, errors, d merit / dz (n,), outputs)."""
         slopes = ca.gradient(self._merit, self._rollout.z)
-        return self._function("gradient", [self._merit, *self._common, slopes, self._outputs])
+        return self._function("gradient", [self._merit, *self._common, slopes, self.terms.outputs])
 
     @cached_property
     def residuals(self) -> ca.Function | None:
         """-> (r, objective, errors, outputs)."""
         if self.squares is None:
             return None
-        return self._function("residuals", [self.squares, *self._common, self._outputs])
+        return self._function("residuals", [self.squares, *self._common, self.terms.outputs])
 
     @cached_property
     def jacobian(self) -> ca.Function | None:
@@ -50,23 +61,23 @@ class ExpressionFunctions:
         if self.squares is None:
             return None
         slopes = ca.jacobian(self.squares, self._rollout.z)
-        return self._function("jacobian", [self.squares, *self._common, slopes, self._outputs])
+        return self._function("jacobian", [self.squares, *self._common, slopes, self.terms.outputs])
 
     @cached_property
     def nlp(self) -> ca.Function:
         """-> (objective, constraints)."""
-        return self._function("nlp", [self._terms.objective, self._terms.constraints])
+        return self._function("nlp", [self.terms.objective, self.terms.constraints])
 
     @cached_property
     def constraint_jacobian(self) -> ca.Function:
         """-> (constraints, their derivative (m, n))."""
-        constraints = self._terms.constraints
+        constraints = self.terms.constraints
         return self._function("constraint_jacobian", [constraints, ca.jacobian(constraints, self._rollout.z)])
 
     @cached_property
     def hessian(self) -> ca.Function:
         """-> the second derivative of the objective (n, n)."""
-        return self._function("hessian", [ca.hessian(self._terms.objective, self._rollout.z)[0]])
+        return self._function("hessian", [ca.hessian(self.terms.objective, self._rollout.z)[0]])
 
     def _function(self, name: str, outputs: list[Any]) -> ca.Function:
         return function_of(self._rollout, name, outputs)

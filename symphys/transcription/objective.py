@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -103,6 +104,36 @@ def terms(rollout: Sampled) -> Terms:
     )
 
 
+def has_squares(problem: Problem) -> bool:
+    """Whether ``Terms.residuals`` are more than none."""
+    return all(cost.squares for cost in problem.costs) and bool(problem.costs or problem.targets or problem.constraints)
+
+
+Bounds = tuple[tuple[str, ...], np.ndarray[Any, np.dtype[np.float64]], np.ndarray[Any, np.dtype[np.float64]]]
+
+
+def bounds(problem: Problem, size_of: Callable[[Formula], int]) -> Bounds:
+    """Names, lower and upper bounds of ``Terms``, without its expressions; ``size_of`` formulas."""
+    names, lower, upper = list[str](), [np.zeros(0)], [np.zeros(0)]
+    steps = problem.simulation.steps
+    for constraint in problem.constraints:
+        size = size_of(constraint.formula)
+        count = 1
+        if constraint.at == "always":
+            first, last = (0, steps) if constraint.during is None else constraint.during.ticks(steps)
+            count = last - first
+        low, high = _bounds(constraint, size, count)
+        names += [constraint.name] * low.size
+        lower.append(low)
+        upper.append(high)
+    return tuple(names), np.concatenate(lower), np.concatenate(upper)
+
+
+def _bounds(constraint: Constraint, size: int, count: int) -> Any:
+    """(size count,) each, of so many values of a constraint."""
+    return (np.tile(np.broadcast_to(bound, (size,)), count) for bound in (constraint.lower, constraint.upper))
+
+
 def goal_error(objective: Any, goal: float) -> Any:
     """Error / tolerance of a goal for the objective: 1 at the goal, below it where the objective is lower."""
     return 1 + (objective - goal) / max(abs(goal), 1e-9)
@@ -168,8 +199,7 @@ class _Limit:
         self.name = constraint.name
         self.value, self.mean = ca.vec(values), _mean(values)
         size = values.shape[0]
-        self.lower = np.tile(np.broadcast_to(constraint.lower, (size,)), count)
-        self.upper = np.tile(np.broadcast_to(constraint.upper, (size,)), count)
+        self.lower, self.upper = _bounds(constraint, size, count)
         violation = self._violation()
         self.penalty = ca.sqrt(constraint.penalty * (rollout.interval if always else 1.0)) * violation
         total: Expr = ca.sum1(violation)

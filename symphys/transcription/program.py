@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields
 from types import MappingProxyType
 from typing import Any
 
@@ -11,13 +11,15 @@ import casadi as ca
 import numpy as np
 
 from symphys.codegen import AdjointDiscount, FunctionCall, MemoryLayout, Place, Program
+from symphys.codegen.program.collection import uncollected
+from symphys.codegen.toolchain.identity import identity_of
 from symphys.dynamics.functions import trace_step
 from symphys.dynamics.tracing.guards import Guard, Part
 from symphys.dynamics.tracing.recording import TracedCall, TracedVector
 from symphys.expression import Formula
 from symphys.model.state_layout import Layout as Columns
 from symphys.model.state_layout import input_columns
-from symphys.problem import ALIVE
+from symphys.problem import ALIVE, Problem
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.feedback.controller_calls import Places, control_calls
 from symphys.transcription.formula_names import spans
@@ -29,6 +31,8 @@ from symphys.transcription.rollout import Rollout
 Expr = Any
 """casadi MX"""
 NOTHING: Mapping[str, Formula] = MappingProxyType({})
+ASIDE = frozenset({"name", "title", "description", "file", "text", "settings", "solvers", "solver_tables"})
+"""What no program depends on."""
 
 
 class ProgramSamples:
@@ -121,6 +125,13 @@ def rollout_program(
         by_step: names of variables with a constant knot for each step, which each step reads for itself. Else the
             prologue writes them all, in a function as long as they are.
     """
+    with uncollected():
+        return _rollout_program(rollout, exact, recorded, shift, by_step)
+
+
+def _rollout_program(
+    rollout: Rollout, exact: bool, recorded: Mapping[str, Formula], shift: int, by_step: Sequence[str]
+) -> Program:
     samples = ProgramSamples(rollout, by_step)
     asked = terms(samples)
     series = {name: samples.recorded(formula, shift) for name, formula in recorded.items()}
@@ -146,6 +157,12 @@ def rollout_program(
     )
 
 
+def program_identity(problem: Problem, exact: bool) -> str | None:
+    """Of the program of a problem's rollout: equal for problems that differ in texts and options of solvers alone."""
+    data = {field.name: getattr(problem, field.name) for field in fields(problem) if field.name not in ASIDE}
+    return identity_of(data, exact)
+
+
 def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:
     """The calls of one time step, from ``x`` and ``u`` to the ``x`` after."""
     rollout = samples.rollout
@@ -165,9 +182,9 @@ def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:
             elif slot.name:
                 places[slot] = arguments[slot.name]
         for slot in piece.outputs:
-            places.setdefault(slot, samples.layout.take(slot.size))
-        inputs, outputs = (tuple(places[slot] for slot in slots) for slots in (piece.inputs, piece.outputs))
-        calls.append(_guarded(FunctionCall(piece.function, inputs, outputs), piece, places, zeros))
+            own = samples.layout.take(slot.size)  # also of what lies in the next state: sizes of memories are kept
+            places.setdefault(slot, own)
+        calls.append(_guarded(piece, places, zeros))
     if after.size > columns.size:
         calls.append(_remember(samples, _part(after, slice(columns.size, None))))
     if rollout.termination is not None:
@@ -190,25 +207,28 @@ def _most_zeros(calls: Sequence[TracedCall]) -> int:
     )
 
 
-def _guarded(
-    call: FunctionCall, traced: TracedCall, places: Mapping[TracedVector, Place], zeros: Place | None
-) -> FunctionCall:
-    """The call with its guard and its section, whose vectors lie in ``places``."""
+def _guarded(traced: TracedCall, places: Mapping[TracedVector, Place], zeros: Place | None) -> FunctionCall:
+    """A call with its guard and its section, whose vectors lie in ``places``."""
+    inputs, outputs = (tuple([places[slot] for slot in slots]) for slots in (traced.inputs, traced.outputs))
 
     def part_of(part: Part, size: int) -> Place:
         whole = zeros if part.vector is None else places[part.vector]
         assert whole is not None
+        if part.start == 0 and size == whole.size:
+            return whole
         return Place(whole.offset + part.start, size, whole.stride)
 
-    def stand_ins(guard: Guard) -> tuple[Place | None, ...]:
-        parts = zip(call.outputs, guard.otherwise, strict=True)
-        return tuple(None if part is None else part_of(part, place.size) for place, part in parts)
+    def stood_for(guard: Guard | None) -> tuple[Place | None, tuple[Place | None, ...]]:
+        if guard is None:
+            return None, ()
+        parts = zip(outputs, guard.otherwise, strict=True)
+        return part_of(guard.word, 1), tuple(
+            [None if part is None else part_of(part, place.size) for place, part in parts]
+        )
 
-    if traced.guard is not None:
-        call = replace(call, guard=part_of(traced.guard.word, 1), otherwise=stand_ins(traced.guard))
-    if traced.section is not None:
-        call = replace(call, section=part_of(traced.section.word, 1), beside=stand_ins(traced.section))
-    return call
+    guard, otherwise = stood_for(traced.guard)
+    section, beside = stood_for(traced.section)
+    return FunctionCall(traced.function, inputs, outputs, False, guard, otherwise, section, beside)
 
 
 def _alive(samples: ProgramSamples) -> Place | None:

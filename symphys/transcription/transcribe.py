@@ -18,8 +18,8 @@ from symphys.transcription.network_rollout import (
     require_small_nets,
     transcribe_large,
 )
-from symphys.transcription.objective import limits, terms
-from symphys.transcription.program import rollout_program
+from symphys.transcription.objective import bounds, has_squares, limits
+from symphys.transcription.program import program_identity, rollout_program
 from symphys.transcription.randomization import with_scenarios
 from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.shared_kernel import inputs_of, shared_backend
@@ -54,24 +54,27 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
         return transcribe_large(problem, exact, backend, threads)
     began = perf_counter()
     rollout = symbolic_rollout(problem)
-    asked = terms(rollout)
-    functions = ExpressionFunctions(rollout, asked)
+    functions = ExpressionFunctions(rollout)
+    names, lower, upper = bounds(problem, lambda formula: int(rollout.compiled(formula).size1_out(0)))
     built = perf_counter() - began
     inputs = () if backend == "casadi" else inputs_of(problem)
     if inputs:
         chosen = shared_backend(problem, inputs, functions.nlp, exact, backend, threads)
     else:
-        chosen = choose(backend, BackendSource(functions, lambda: rollout_program(rollout, exact), exact), threads)
+        source = BackendSource(
+            functions, lambda: rollout_program(rollout, exact), exact, program_identity(problem, exact)
+        )
+        chosen = choose(backend, source, threads)
     staged = cache(lambda: RolloutStages(rollout, backend, threads, exact or not any(problem.simulation.smoothing)))
     shooting = ShootingProblem(
         name=problem.name,
         blocks=blocks(problem),
         evaluator=chosen.evaluator,
         nlp=chosen.nlp,
-        squares=functions.squares is not None,
-        constraint_names=asked.names,
-        constraint_lower=asked.lower,
-        constraint_upper=asked.upper,
+        squares=has_squares(problem),
+        constraint_names=names,
+        constraint_lower=lower,
+        constraint_upper=upper,
         limits=limits(problem),
         smoothing=problem.simulation.smoothing,
         stop_when_met=problem.stop_when_met,
@@ -79,7 +82,7 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
         staged=staged,
         guessed_states=states_of(staged, problem.guess),
     )
-    return Transcription(problem, rollout, asked, functions, shooting, chosen.description, built)
+    return Transcription(problem, rollout, functions, shooting, chosen.description, built)
 
 
 def states_of(staged: Callable[[], StagedProblem] | None, guess: GuessedMotion | None) -> GuessedStates | None:

@@ -40,11 +40,15 @@ class Transcription:
 
     problem: Problem
     rollout: Rollout
-    terms: Terms
     functions: ExpressionFunctions
     shooting: ShootingProblem
     backend: Description
     build_seconds: float
+
+    @property
+    def terms(self) -> Terms:
+        """What is asked of the exact rollout, as expressions; made when first asked for, which takes its time."""
+        return self.functions.terms
 
     def judge(self, z: Array, smoothing: float = 0.0) -> Assessment:
         """How ``z`` does in the exact rollout, or in a smoothed one."""
@@ -86,7 +90,7 @@ class Transcription:
         calls: dict[str, Callable[[], object]] = {"gradient": lambda: evaluator.gradient(z[None], 0.0)}
         if self.shooting.squares:
             calls["jacobian"] = lambda: evaluator.jacobian(z[None], 0.0)
-        elif self.terms.names:
+        elif self.shooting.constraint_names:
             calls["jacobian"] = lambda: (self.shooting.nlp.jacobian or self.functions.constraint_jacobian)(z, 0.0)
         calls["hessian"] = lambda: self.functions.hessian(z, 0.0)
         return {kind: fastest(calls[kind], clock) / one for kind in kinds if kind in calls}

@@ -6,7 +6,7 @@ import numpy as np
 
 from symphys.codegen.backends.calls import BufferedFunction
 from symphys.codegen.backends.interface import Backend, BackendSource, Description, ProblemFunctions
-from symphys.shooting import Array, Nlp, Values
+from symphys.shooting import Array, LaterNlp, Nlp, Values
 
 
 class FunctionEvaluator:
@@ -54,4 +54,4 @@ def squared(r: Array) -> Array:
 def casadi(source: BackendSource, threads: int) -> Backend:
     """The virtual machine; ``threads`` share a batch."""
     evaluator = FunctionEvaluator(source.functions, threads)
-    return Backend(Description("casadi", threads=threads), evaluator, Nlp(source.functions.nlp))
+    return Backend(Description("casadi", threads=threads), evaluator, LaterNlp(lambda: Nlp(source.functions.nlp)))

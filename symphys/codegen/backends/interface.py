@@ -46,11 +46,13 @@ class BackendSource:
         program: makes the program of its rollout: the outputs merit, objective and, where the problem has any, errors,
             constraints, outputs and residuals, of z and the smoothing as its parameters. None: there is none.
         exact: whether that program is for smoothing 0 only.
+        identity: of that program, see ``ProgramSource``; None: not known.
     """
 
     functions: ProblemFunctions
     program: Callable[[], Program] | None = None
     exact: bool = False
+    identity: str | None = None
 
 
 def nothing() -> str:

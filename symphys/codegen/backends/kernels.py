@@ -11,6 +11,7 @@ from symphys.codegen.backends.fastest import FastestKernel
 from symphys.codegen.backends.interface import Description, joined, nothing
 from symphys.codegen.cuda import DeviceKernel, compile_on, find_gpu
 from symphys.codegen.toolchain.compiler import find_compiler
+from symphys.codegen.toolchain.warm_start import ProgramSource, compile_source
 
 BEST = "auto"
 PRECISIONS: dict[str, Literal["double", "single"]] = {
@@ -24,23 +25,37 @@ PRECISIONS: dict[str, Literal["double", "single"]] = {
 ON_DEVICE = ("cuda", "cuda32")
 
 
-def build_kernel(name: str, program: Program, seeded: Sequence[str], threads: int) -> Kernel:
+def build_kernel(name: str, program: Program | ProgramSource, seeded: Sequence[str], threads: int) -> Kernel:
     """The kernel of a program, whose outputs ``seeded`` can be differentiated; KernelUnavailable if that cannot be.
 
     Where there is no GPU for it, it is one for the processor, and the note of its report says why. ``threads`` share
-    the blocks of a batch there. "auto" is the processor's, which takes large batches to a GPU where that is faster.
+    the blocks of a batch there. Of a source those of ``seeded`` that it has. "auto" is the processor's, which takes
+    large batches to a GPU where that is faster.
     """
     note, precision = "", PRECISIONS[name]
     if name in ON_DEVICE:
         try:
-            return compile_on(find_gpu(), program, precision, seeded)
+            return _on_device(program, precision, seeded)
         except KernelUnavailable as error:
             note = f"the processor evaluates: {error}"
-    kernel = compile_program(program, seeded=seeded, threads=threads, precision=precision)
+    if isinstance(program, ProgramSource):
+        kernel = compile_source(program, seeded, threads, precision)
+    else:
+        kernel = compile_program(program, seeded=seeded, threads=threads, precision=precision)
     kernel.report = replace(kernel.report, note=joined(note, kernel.report.note))
     if name == BEST:
-        return FastestKernel(kernel, lambda: compile_on(find_gpu(), program, precision, seeded))
+        return FastestKernel(kernel, lambda: _on_device(program, precision, seeded))
     return kernel
+
+
+def _on_device(
+    program: Program | ProgramSource, precision: Literal["double", "single"], seeded: Sequence[str]
+) -> DeviceKernel:
+    gpu = find_gpu()
+    if isinstance(program, ProgramSource):
+        program = program.make()
+        seeded = [name for name in seeded if name in program.outputs]
+    return compile_on(gpu, program, precision, seeded)
 
 
 def require_kernels(name: str) -> None:

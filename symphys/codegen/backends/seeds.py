@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,12 +38,12 @@ class Seeds:
         return cls(_words(kernel, name, np.eye(m)), (m, n), rows, columns, rows)
 
     @classmethod
-    def compressed(cls, kernel: Kernel, name: str, function: Function, index: int) -> Seeds:
-        """As few lanes as the sparsity lets do; ``function`` gives the same output as its result ``index``."""
+    def compressed(cls, kernel: Kernel, name: str, function: Callable[[], Function], index: int) -> Seeds:
+        """As few lanes as the sparsity lets do; ``function()`` gives the same output as its result ``index``."""
         m, n = kernel.program.outputs[name].size, kernel.program.z.size
         if m <= kernel.report.lanes:
             return cls.whole(kernel, name)
-        sparsity = function.jac_sparsity(index, 0)
+        sparsity = function().jac_sparsity(index, 0)
         shared = sparsity.T.uni_coloring()  # (m, lanes): a nonzero where a row goes into a lane
         row, lane = (np.array(part, dtype=np.int64) for part in (shared.get_triplet()))
         lane_of = np.zeros(m, dtype=np.int64)

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache, partial
 
 import numpy as np
 
 from symphys.codegen import Kernel, KernelUnavailable, ProcessorKernel
 from symphys.codegen.backends.casadi_ import squared
 from symphys.codegen.backends.external import external_nlp
-from symphys.codegen.backends.interface import Backend, BackendSource
+from symphys.codegen.backends.interface import Backend, BackendSource, Function, joined
 from symphys.codegen.backends.kernels import build_kernel, described
 from symphys.codegen.backends.seeds import Seeds
 from symphys.codegen.runtime.kernel import Outputs
-from symphys.shooting import Array, Nlp, Values
+from symphys.codegen.toolchain.warm_start import ProgramSource
+from symphys.shooting import Array, LaterNlp, Nlp, Values
 
 SEEDED = ("merit", "objective", "residuals", "constraints")
 
@@ -21,7 +25,7 @@ SEEDED = ("merit", "objective", "residuals", "constraints")
 class KernelEvaluator:
     """Evaluates with a kernel; see ``Evaluator``."""
 
-    def __init__(self, kernel: Kernel, rows: Seeds | None, exact: bool) -> None:
+    def __init__(self, kernel: Kernel, rows: Callable[[], Seeds] | None, exact: bool) -> None:
         """``rows``: of the residuals, where there are any; ``exact``: for smoothing 0 only."""
         self.kernel, self.rows, self.exact = kernel, rows, exact
         self.steepest = Seeds.whole(kernel, "merit").words[0]
@@ -51,13 +55,14 @@ class KernelEvaluator:
     def jacobian(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
         assert self.rows is not None, "a problem without residuals has no Jacobian"
-        seeds = self.rows.words
+        rows = self.rows()
+        seeds = rows.words
         outputs, slopes = self.kernel.gradient(
             np.repeat(Z, len(seeds), axis=0), np.tile(seeds, (len(Z), 1)), self.parameters(smoothing)
         )
-        first = {name: rows[:: len(seeds)] for name, rows in outputs.items()}
+        first = {name: each[:: len(seeds)] for name, each in outputs.items()}
         r = np.ascontiguousarray(first["residuals"])
-        jacobian = self.rows.spread(slopes.reshape(len(Z), len(seeds), Z.shape[1]))
+        jacobian = rows.spread(slopes.reshape(len(Z), len(seeds), Z.shape[1]))
         return Values(squared(r), *common(first)[1:], residuals=r, jacobian=jacobian)
 
 
@@ -78,21 +83,27 @@ def by_kernel(source: BackendSource, threads: int, name: str) -> Backend:
     if source.program is None:
         raise KernelUnavailable("this problem has no program to compile")
     began = time.perf_counter()
-    program = source.program()
-    kernel = build_kernel(name, program, [name for name in SEEDED if name in program.outputs], threads)
+    kernel = build_kernel(name, ProgramSource(source.program, source.identity), SEEDED, threads)
+    asked = {"residuals": (lambda: source.functions.residuals, 0), "constraints": (lambda: source.functions.nlp, 1)}
     rows = {
-        output: Seeds.compressed(kernel, output, function, index)
-        for output, function, index in (
-            ("residuals", source.functions.residuals, 0),
-            ("constraints", source.functions.nlp, 1),
-        )
-        if output in program.outputs
+        output: cache(partial(Seeds.compressed, kernel, output, *asked[output]))
+        for output in asked
+        if output in kernel.program.outputs
     }
-    nlp, note = Nlp(source.functions.nlp), ""
+    nlp = LaterNlp(lambda: Nlp(source.functions.nlp))
+    told: list[str] = []
     if isinstance(kernel, ProcessorKernel):
-        try:
-            nlp = external_nlp(kernel, source.functions.nlp, rows.get("constraints"))
-        except KernelUnavailable as error:
-            note = f"for ipopt casadi's virtual machine evaluates, which is slower: {error}"
+        nlp = LaterNlp(lambda: _nlp(kernel, source.functions.nlp, rows.get("constraints"), told))
+    found = described(kernel, time.perf_counter() - began)
+    said = found.later
     evaluator = KernelEvaluator(kernel, rows.get("residuals"), source.exact)
-    return Backend(described(kernel, time.perf_counter() - began, note=note), evaluator, nlp)
+    return Backend(replace(found, later=lambda: joined(said(), *told)), evaluator, nlp)
+
+
+def _nlp(kernel: ProcessorKernel, expression: Function, rows: Callable[[], Seeds] | None, told: list[str]) -> Nlp:
+    """Objective and constraints by the kernel, or by the expression, and why is added to ``told``."""
+    try:
+        return external_nlp(kernel, expression, rows and rows())
+    except KernelUnavailable as error:
+        told.append(f"for ipopt casadi's virtual machine evaluates, which is slower: {error}")
+        return Nlp(expression)

@@ -160,18 +160,21 @@ class _Chains:
     def __init__(self, size: int) -> None:
         self.roots: list[tuple[int, int]] = []
         self._newest: list[Place] = []
-        self._chain = np.full(size, NONE, np.int64)
+        self._chain = [NONE] * size
 
     def of(self, place: Place) -> int:
         """The chain whose newest result has this place, all of it or a part; NONE if it is part of none."""
-        return NONE if place.stride or not place.size else int(self._chain[place.offset])
+        return NONE if place.stride or not place.size else self._chain[place.offset]
 
     def follows(self, place: Place) -> bool:
         """Whether what is read there is the newest of its chain as it was written, or part of no chain."""
-        chains = set() if place.stride else set(self._chain[place.offset : place.offset + place.size].tolist())
-        if chains <= {NONE}:
+        if place.stride or not place.size:
             return True
-        return len(chains) == 1 and self._newest[chains.pop()] == place
+        chains = self._chain[place.offset : place.offset + place.size]
+        first = chains[0]
+        if chains.count(first) < place.size:
+            return False
+        return first == NONE or self._newest[first] is place or self._newest[first] == place
 
     def holds(self, place: Place) -> bool:
         """Whether a place is part of the newest of its chain, or of no chain."""
@@ -196,7 +199,7 @@ class _Chains:
             self.roots.append((other.offset, other.stride))
             self._newest.append(other)
         self._newest[chain] = place
-        self._chain[place.offset : place.offset + place.size] = chain
+        self._chain[place.offset : place.offset + place.size] = [chain] * place.size
         return chain
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from symphys.codegen.emit.functions import DistinctFunctions
 from symphys.codegen.emit.guarding import Guarding, guarding_of
 from symphys.codegen.emit.writer import Form
-from symphys.codegen.graph.activity import Activity, CallActivity
+from symphys.codegen.graph.activity import Activity, CallActivity, Words
 from symphys.codegen.graph.adjoint import Mask
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.rewrite import Taped
@@ -32,12 +32,14 @@ class Plan:
         functions: the C functions, in the order of their numbers.
         tables: for each phase the number of calls and their entries.
         tape: words after the program's own, for what adjoints need not compute again.
+        written: (places, 3) offset, size and stride of what each step of the body writes for itself.
         guarding: of calls that may be left out; None: none may.
     """
 
     functions: tuple[tuple[Graph, Form], ...]
     tables: dict[str, tuple[int, Table]]
     tape: int
+    written: Table
     guarding: Guarding | None = None
 
 
@@ -74,7 +76,12 @@ def plan(program: Program, seeded: Sequence[str], word: int = 64) -> Plan:
         "back_body": ([pull.reach.call for pull in pulls[1]], entries["back_body"]),
     }
     tables = {name: (len(rows), _flat(rows)) for name, rows in entries.items()}
-    return Plan(tuple(functions.listed), tables, tape, guarding_of(program, guarded))
+    return Plan(tuple(functions.listed), tables, tape, _written(program), guarding_of(program, guarded))
+
+
+def _written(program: Program) -> Table:
+    places = [place for call in program.body for place in call.outputs if place.stride]
+    return np.array([(place.offset, place.size, place.stride) for place in places], np.int64).reshape(-1, 3)
 
 
 @dataclass
@@ -101,7 +108,7 @@ class _Pull:
     inputs: Mask
     outputs: Mask
 
-    def reads(self, functions: DistinctFunctions) -> list[NDArray[np.int64]]:
+    def reads(self, functions: DistinctFunctions) -> list[Words]:
         """The words of the memory that it reads."""
         used = functions.arguments(self.graph)
         return [words for i, words in enumerate(self.reach.inputs) if i in used]

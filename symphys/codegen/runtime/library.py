@@ -90,8 +90,7 @@ class Loaded:
             setattr(self.data, name, self._list(len(listed), _ranges(listed)))
         for name in TABLES:
             setattr(self.data, name, self._list(*plan.tables[name]))
-        written = [place for call in program.body for place in call.outputs if place.stride]
-        self.data.written = self._list(len(written), strided(written))
+        self.data.written = self._list(len(plan.written), np.append(plan.written, 0))
         if plan.guarding is not None:
             self._guard(plan.guarding)
         if program.discounted is not None:

@@ -291,13 +291,13 @@ def _taken(program: Program, target: Place, backward: Sequence[_Pull], functions
     found, known = np.zeros((target.size, len(backward)), bool), dict[int, NDArray[np.float32]]()
     for i, pull in enumerate(backward):
         reach = pull.reach
-        outputs = np.concatenate([words[0] for words in reach.outputs])
-        inputs = np.concatenate([words[0] for words in reach.inputs])
+        outputs = np.concatenate([place.words(1)[0] for place in reach.call.outputs])
+        inputs = np.concatenate([place.words(1)[0] for place in reach.call.inputs])
         graph = functions.forward(reach.call.function)
         if id(graph) not in known:
             known[id(graph)] = _sparsity(graph)
         on = np.concatenate(
-            [np.full(len(words[0]), mark) for words, mark in zip(reach.outputs, pull.outputs, strict=True)]
+            [np.full(place.size, mark) for place, mark in zip(reach.call.outputs, pull.outputs, strict=True)]
         )
         seeded = useful[:, outputs] * on
         found[:, i] = seeded.any(axis=1)

@@ -13,11 +13,13 @@ from typing import Literal
 from symphys.codegen.emit.plan import plan
 from symphys.codegen.emit.source import SourceFile, sources
 from symphys.codegen.errors import KernelUnavailable, ProgramError
+from symphys.codegen.program.collection import uncollected
 from symphys.codegen.program.program import Program
 from symphys.codegen.runtime.kernel import ProcessorKernel
 from symphys.codegen.runtime.library import Loaded
 from symphys.codegen.toolchain.cache import Cache, default_cache
 from symphys.codegen.toolchain.compiler import Compiler, find_compiler
+from symphys.codegen.toolchain.plans import KeptPlan
 from symphys.codegen.toolchain.processes import ELSEWHERE
 from symphys.codegen.toolchain.processor import processor
 from symphys.codegen.toolchain.report import BuildReport
@@ -45,26 +47,51 @@ def compile_program(
     Raises:
         KernelUnavailable: with one line that says why; the caller falls back.
     """
-    started = time.perf_counter()
     single = precision == "single"
-    names, width = names_of(program, seeded), _width(lanes, single)
-    planned = plan(program, names, width * (4 if single else 8))
-    with shared_library(sources(planned, width, single), cache or default_cache()) as built:
-        loaded = Loaded(built.path, program, planned, names)
+    names, width = names_of(program, seeded), width_of(lanes, single)
+    return compiled(program, names, width, single, cache or default_cache(), threads)[0]
+
+
+def compiled(
+    program: Program, names: tuple[str, ...], width: int, single: bool, cache: Cache, threads: int | None
+) -> tuple[ProcessorKernel, KeptPlan]:
+    """The kernel of a program, and what is to be kept of it; see ``compile_program``."""
+    started = time.perf_counter()
+    with uncollected():
+        planned = plan(program, names, width * (4 if single else 8))
+        parts = sources(planned, width, single)
+    operations = sum(len(graph.nodes) for graph, _ in planned.functions)
+    kept = KeptPlan(program, planned, names, texts_of(parts), len(planned.functions), operations)
+    with shared_library(parts, cache) as built:
+        return kernel_of(built.path, kept, width, single, threads, started, built), kept
+
+
+def kernel_of(
+    path: Path,
+    kept: KeptPlan,
+    width: int,
+    single: bool,
+    threads: int | None,
+    started: float,
+    built: Built | None = None,
+) -> ProcessorKernel:
+    """A kernel from its library; ``built``: how that came there, None: it was kept."""
+    loaded = Loaded(path, kept.program, kept.plan, kept.names)
+    compiler = find_compiler()
     report = BuildReport(
-        compiler=built.compiler.version,
-        flags=built.flags,
+        compiler=compiler.version,
+        flags=compiler.flags(processor()),
         lanes=width,
-        precision=precision,
-        functions=len(planned.functions),
-        operations=sum(len(graph.nodes) for graph, _ in planned.functions),
-        bytes_per_lane=(2 * program.size + planned.tape) * (4 if single else 8),
-        cached=built.cached,
+        precision="single" if single else "double",
+        functions=kept.functions,
+        operations=kept.operations,
+        bytes_per_lane=(2 * kept.program.size + kept.plan.tape) * (4 if single else 8),
+        cached=built is None or built.cached,
         seconds=time.perf_counter() - started,
-        note=built.note,
-        arena=planned.guarding.arena if planned.guarding else 0,
+        note="" if built is None else built.note,
+        arena=kept.plan.guarding.arena if kept.plan.guarding else 0,
     )
-    return ProcessorKernel(program, loaded, report, names, threads)
+    return ProcessorKernel(kept.program, loaded, report, kept.names, threads)
 
 
 def names_of(program: Program, seeded: Sequence[str] | None) -> tuple[str, ...]:
@@ -75,7 +102,8 @@ def names_of(program: Program, seeded: Sequence[str] | None) -> tuple[str, ...]:
     return names
 
 
-def _width(lanes: int | Literal["auto"], single: bool) -> int:
+def width_of(lanes: int | Literal["auto"], single: bool) -> int:
+    """How many lanes a block has."""
     if lanes == "auto":
         return processor().lanes(single)
     if lanes not in range(1, 65) or lanes & (lanes - 1):
@@ -99,8 +127,7 @@ def shared_library(parts: Sequence[SourceFile], cache: Cache) -> Iterator[Built]
     """The library of these sources; what does not go into the cache lasts as long as the context."""
     compiler = find_compiler()
     flags = compiler.flags(processor())
-    texts = [f"{part.fused} {part.text}" for part in parts]
-    key = hashlib.sha256("\0".join([*texts, *compiler.command, compiler.version, *flags]).encode()).hexdigest()[:32]
+    key = library_key(texts_of(parts), compiler, flags)
     if (path := cache.find(key)) is not None:
         yield Built(path, compiler, flags, cached=True)
         return
@@ -109,6 +136,16 @@ def shared_library(parts: Sequence[SourceFile], cache: Cache) -> Iterator[Built]
             found = cache.find(key)  # another process may have built it meanwhile
             path, note = (found, "") if found else _kept(cache, key, compiler.build(parts, flags, Path(folder)))
         yield Built(path, compiler, flags, found is not None, note)
+
+
+def texts_of(parts: Sequence[SourceFile]) -> str:
+    """A checksum of C files."""
+    return hashlib.sha256("\0".join(f"{part.fused} {part.text}" for part in parts).encode()).hexdigest()
+
+
+def library_key(texts: str, compiler: Compiler, flags: Sequence[str]) -> str:
+    """What the library of C files with that checksum is kept under."""
+    return hashlib.sha256("\0".join([texts, *compiler.command, compiler.version, *flags]).encode()).hexdigest()[:32]
 
 
 def _kept(cache: Cache, key: str, path: Path) -> tuple[Path, str]:

@@ -37,6 +37,8 @@ LIMIT = 512 * 2**20
 """Bytes that the kernels may take together; those not used for longest go first."""
 KINDS = (".so", ".cubin")
 """Endings of kernels for processors and for devices."""
+PLANS = ".plan"
+"""Ending of what lies beside kernels, so that a second start need not plan them; see ``warm_start``."""
 LEFT = 3600.0
 """[s] after which an unfinished file, or a lock that nobody holds, belongs to a process that was killed."""
 PATIENCE, TICK = 900.0, 0.05
@@ -57,7 +59,7 @@ class CacheInfo:
 
 @dataclass(frozen=True)
 class Cache:
-    """A folder of kernels, of at most ``limit`` bytes; finds and stores those of one of KINDS, its ``suffix``."""
+    """A folder of kernels, of at most ``limit`` bytes; finds and stores files of one kind, its ``suffix``."""
 
     folder: Path
     limit: int = LIMIT
@@ -142,16 +144,17 @@ class Cache:
 
     def info(self) -> CacheInfo:
         """Count the kernels."""
-        sizes = [size for _, size, _ in self._entries()]
-        return CacheInfo(self.folder, len(sizes), sum(sizes), self.limit)
+        entries = self._entries()
+        kernels = sum(path.suffix in KINDS for _, _, path in entries)
+        return CacheInfo(self.folder, kernels, sum(size for _, size, _ in entries), self.limit)
 
     def clear(self) -> int:
-        """Remove all kernels; returns how many went. Programs that use one go on."""
+        """Remove all kernels, and what lies beside them; returns how many went. Programs that use one go on."""
         gone = 0
         for _, _, path in self._entries():
             with contextlib.suppress(OSError):
                 path.unlink()
-                gone += 1
+                gone += path.suffix in KINDS
         self._sweep(0.0)
         return gone
 
@@ -169,9 +172,9 @@ class Cache:
             return []
 
     def _entries(self) -> list[tuple[float, int, Path]]:
-        """(time of last use, bytes, path) of each kernel, oldest first."""
+        """(time of last use, bytes, path) of each file, oldest first."""
         found = []
-        for path in (path for kind in KINDS for path in self._files(f"*{kind}")):
+        for path in (path for kind in (*KINDS, PLANS) for path in self._files(f"*{kind}")):
             with contextlib.suppress(OSError):
                 status = path.stat()
                 found.append((status.st_mtime, status.st_size, path))

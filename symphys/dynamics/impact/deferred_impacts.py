@@ -63,11 +63,15 @@ def defer_impacts(context: StepContext, x: State, duration: Expr, splits: Sequen
     for j, pair in enumerate(pairs):
         for body in bodies_of(pair):
             touching.setdefault(body, []).append(j)
+    struck = {
+        body: _any(tuple(split.struck[j] for split in splits for j in touching[body]))
+        for body in first
+        if body in eccentric
+    }
     for (pair, each, contact), (fast, meets) in zip(looked_at, hits, strict=True):
         waits = _passes(fast, meets)
         for body in sorted(first.keys() & set(bodies_of(pair))):
-            struck = [split.struck[j] for split in splits for j in touching[body]] if body in eccentric else []
-            waits = _later(waits, fast, contact.time, first[body][0], tuple(struck))
+            waits = _later(waits, fast, contact.time, first[body][0], struck.get(body, ca.SX(0)))
             if (room := _room(world, pair, eccentric)) is not None:
                 before, sight = ((waits,), (chained,), (plastic,)), (fast, contact, each)
                 flags = _driven(context.settings, before, sight, first[body], duration, room)
@@ -132,6 +136,10 @@ def _passes(fast: Expr, meets: Expr) -> Expr:
 
 
 @traced
-def _later(waits: Expr, fast: Expr, time: Expr, first: Expr, struck: tuple[Expr, ...]) -> Expr:
-    before = ca.mmax(ca.vertcat(*struck)) if struck else ca.SX(0)
+def _any(flags: tuple[Expr, ...]) -> Expr:
+    return ca.mmax(ca.vertcat(*flags))
+
+
+@traced
+def _later(waits: Expr, fast: Expr, time: Expr, first: Expr, before: Expr) -> Expr:
     return either(waits, ca.logic_and(fast, ca.logic_or(time > first, before)))

@@ -9,9 +9,9 @@ of that kind, or are used by such calls only, can be left out.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 
@@ -19,22 +19,20 @@ from symphys.dynamics.tracing.recording import TracedCall, TracedVector
 
 Expr = Any
 """casadi SX"""
-Known = tuple[bool, ...]
-"""For each entry of a vector whether it is known to be 0."""
-Pattern = tuple[Known | None, ...]
-"""What is known of each argument of a call; None: nothing."""
+Known = int
+"""Which entries of a vector are known to be 0, as bits."""
+Pattern = tuple[Known, ...]
+"""What is known of each argument of a call."""
 
 
-@dataclass(frozen=True)
-class Part:
+class Part(NamedTuple):
     """Entries ``start`` and after of a vector; of None: zeros."""
 
     vector: TracedVector | None
     start: int = 0
 
 
-@dataclass(frozen=True)
-class Guard:
+class Guard(NamedTuple):
     """When a call may be left out.
 
     Attributes:
@@ -58,7 +56,7 @@ class _Same:
         return Part(None if self.argument is None else inputs[self.argument], self.start)
 
 
-Simplified = tuple[_Same | None, Known | None]
+Simplified = tuple[_Same | None, Known]
 """What a result equals, and where it is 0."""
 
 
@@ -74,9 +72,11 @@ def with_guards(
     """
     search = _Search(calls)
     first = search.needed(guards)
-    found: dict[int, Guard] = {}
+    found, taken = dict[int, Guard](), set(first)
     for word in guards:
-        found |= search.left_out(Part(word), first | found.keys())
+        left = search.left_out(Part(word), taken)
+        found |= left
+        taken |= left.keys()
     order = [k for k in range(len(calls)) if k in first] + [k for k in range(len(calls)) if k not in first]
     apart: dict[int, Guard] = {}
     for vector, entry in sections:
@@ -84,7 +84,7 @@ def with_guards(
         arranged = search.in_one_piece(order, left)
         if arranged is not None:
             order, apart = arranged, apart | left
-    return tuple(replace(calls[k], guard=found.get(k), section=apart.get(k)) for k in order)
+    return tuple([calls[k]._replace(guard=found.get(k), section=apart.get(k)) for k in order])
 
 
 class _Search:
@@ -96,7 +96,8 @@ class _Search:
         self._writer: dict[int, int] = {}
         self._evaluated: dict[tuple[int, Pattern], list[Simplified]] = {}
         for k, call in enumerate(calls):
-            self._writer |= {vector.number: k for vector in call.outputs}
+            for vector in call.outputs:
+                self._writer[vector.number] = k
             for vector in call.inputs:
                 self._readers.setdefault(vector.number, []).append(k)
 
@@ -110,11 +111,13 @@ class _Search:
         heapify(waiting)
         while waiting:
             k = -heappop(waiting)
-            otherwise = None if k in without else self._otherwise(k, found.get(k), left.keys(), standing)
+            otherwise = None if k in without else self._otherwise(k, found.get(k), left, standing)
             if otherwise is None:
                 continue
             left[k] = Guard(word, otherwise)
-            standing |= {part.vector.number for part in otherwise if part is not None and part.vector is not None}
+            for part in otherwise:
+                if part is not None and part.vector is not None:
+                    standing.add(part.vector.number)
             for vector in self._calls[k].inputs:
                 writer = self._writer.get(vector.number)
                 if writer is not None and writer not in looked_at:
@@ -157,26 +160,31 @@ class _Search:
         return found
 
     def _otherwise(
-        self, k: int, found: list[Part | None] | None, left: Collection[int], standing: Collection[int]
+        self, k: int, found: Sequence[Simplified] | None, left: Collection[int], standing: Collection[int]
     ) -> tuple[Part | None, ...] | None:
         """What stands for the results of a call; None if one of them is needed and has to be computed.
 
         ``left`` are the calls that are left out, ``standing`` what stands for their results.
         """
         parts: list[Part | None] = []
-        outputs = self._calls[k].outputs
-        for vector, part in zip(outputs, found or [None] * len(outputs), strict=True):
-            readers = self._readers.get(vector.number, ())
-            needed = bool(vector.name) or vector.number in standing or not all(k in left for k in readers)
-            if needed and (vector.name or part is None):
+        call = self._calls[k]
+        for i, vector in enumerate(call.outputs):
+            needed = bool(vector.name) or vector.number in standing
+            if not needed:
+                for reader in self._readers.get(vector.number, ()):
+                    if reader not in left:
+                        needed = True
+                        break
+            same = found[i][0] if needed and found is not None else None
+            if needed and (vector.name or same is None):
                 return None
-            parts.append(part if needed else None)
+            parts.append(None if same is None else same.of(call.inputs))
         return tuple(parts)
 
-    def _simplified(self, word: TracedVector, start: int) -> dict[int, list[Part | None]]:
+    def _simplified(self, word: TracedVector, start: int) -> dict[int, list[Simplified]]:
         """For each call that reads something known what its results are, as far as they are known; in order."""
-        known: dict[int, Known] = {word.number: tuple(j == start for j in range(word.size))}
-        found: dict[int, list[Part | None]] = {}
+        known: dict[int, Known] = {word.number: 1 << start}
+        found: dict[int, list[Simplified]] = {}
         waiting = list(self._readers.get(word.number, ()))
         heapify(waiting)
         while waiting:
@@ -184,11 +192,10 @@ class _Search:
             if k in found:
                 continue
             call = self._calls[k]
-            zeros = tuple([known.get(vector.number) for vector in call.inputs])
-            found[k] = []
-            for vector, (same, zero) in zip(call.outputs, self._results(call.function, zeros), strict=True):
-                found[k].append(None if same is None else same.of(call.inputs))
-                if zero is not None:
+            zeros = tuple([known.get(vector.number, 0) for vector in call.inputs])
+            found[k] = results = self._results(call.function, zeros)
+            for vector, (_, zero) in zip(call.outputs, results, strict=True):
+                if zero:
                     known[vector.number] = zero
                     for reader in self._readers.get(vector.number, ()):
                         heappush(waiting, reader)
@@ -202,14 +209,13 @@ class _Search:
             for i, known in enumerate(zeros):
                 entries: list[Expr] = ca.SX.sym("a", function.numel_in(i)).nonzeros()
                 homes |= {e.element_hash(): (i, j) for j, e in enumerate(entries)}
-                if known is not None:
-                    entries = [ca.SX(0) if zero else e for zero, e in zip(known, entries, strict=True)]
+                if known:
+                    entries = [ca.SX(0) if known >> j & 1 else e for j, e in enumerate(entries)]
                 arguments.append(ca.densify(ca.vertcat(ca.SX(0, 1), *entries)))
             found = list[Simplified]()
             for result in function.call(arguments):
                 same = [_entry(e, homes) for e in ca.densify(result).nonzeros()]
-                zero = tuple(entry == 0 for entry in same)
-                found.append((_part(same), zero if any(zero) else None))
+                found.append((_part(same), sum(1 << j for j, entry in enumerate(same) if entry == 0)))
             self._evaluated[key] = found
         return self._evaluated[key]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from itertools import count
@@ -30,15 +30,39 @@ Code = float | tuple[int, int]
 """An entry of a matrix: a constant, or (which slot, which place in it)."""
 
 
-@dataclass(frozen=True)
 class TracedMatrix:
     """A matrix between two traced calls, by the codes of its entries, column by column.
 
     Arithmetic with it is traced; functions of casadi are called in traced functions.
+
+    Attributes:
+        leaf: its sparsity.
+        kept: place for what a tracer knows of its codes; see ``structure``.
     """
 
-    leaf: Leaf
-    codes: tuple[Code, ...]
+    __slots__ = ("_codes", "_slots", "kept", "leaf")
+
+    def __init__(self, leaf: Leaf, codes: tuple[Code, ...], slots: Sequence[int] | None = None) -> None:
+        """``slots``: those that the slots of ``codes`` number; None: codes have the slots themselves."""
+        self.leaf, self._codes, self._slots = leaf, codes, slots
+        self.kept: Any = None
+
+    @property
+    def codes(self) -> tuple[Code, ...]:
+        """Of its entries."""
+        slots = self._slots
+        if slots is not None:
+            self._codes = tuple([c if isinstance(c, float) else (slots[c[0]], c[1]) for c in self._codes])
+            self._slots = None
+        return self._codes
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it is the same matrix of the same tracer."""
+        return isinstance(other, TracedMatrix) and (self.leaf, self.codes) == (other.leaf, other.codes)
+
+    def __hash__(self) -> int:
+        """Equal for equal ones."""
+        return hash((self.leaf, self.codes))
 
     @property
     def shape(self) -> tuple[int, int]:

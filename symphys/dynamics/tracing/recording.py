@@ -8,13 +8,12 @@ arguments are recorded once.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import count
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import casadi as ca
 
-from symphys.dynamics.tracing.pytree import Code, TracedMatrix, dismantle, outline, rebuild, slots_of
+from symphys.dynamics.tracing.pytree import TracedMatrix, dismantle, outline, rebuild, slots_of
 from symphys.dynamics.tracing.trace import Tracer
 
 T = TypeVar("T")
@@ -22,8 +21,7 @@ Expr = Any
 """casadi SX"""
 
 
-@dataclass(frozen=True)
-class TracedVector:
+class TracedVector(NamedTuple):
     """Contiguous numbers: a named part of the state, an argument of the step, or a result of a call.
 
     Attributes:
@@ -37,8 +35,7 @@ class TracedVector:
     number: int
 
 
-@dataclass(frozen=True)
-class TracedCall:
+class TracedCall(NamedTuple):
     """A call of an SX function of vectors, which returns vectors; see ``guards`` for when it may be left out."""
 
     function: ca.Function
@@ -59,6 +56,7 @@ class Recorder(Tracer):
         self.sections: list[tuple[TracedVector, int]] = []
         self._slots: list[TracedVector] = []
         self._adopted: list[Expr] = []
+        self._outputs: dict[int, tuple[ca.Function, tuple[int, ...]]] = {}
         self._given: dict[tuple[int, tuple[int, ...]], Sequence[int]] = {}
 
     def argument(self, name: str, symbols: Expr) -> None:
@@ -115,8 +113,8 @@ class Recorder(Tracer):
         """See ``Tracer``; as soon as it repeats itself its calls are copied."""
         before, template = state, list[TracedCall]()
         for _ in range(count):
-            slots = self._alike(before, state)
-            if template and slots is not None:
+            slots = self._alike(before, state) if template else None
+            if slots is not None:
                 before, state = state, self._copy(template, slots, state)
                 template = self.calls[-len(template) :]
             else:
@@ -141,15 +139,8 @@ class Recorder(Tracer):
 
     def _alike(self, before: Any, after: Any) -> dict[int, int] | None:
         """Which slot of ``after`` stands where one of ``before`` stood; None if they do not lie alike."""
-        old, new = self._codes_of(before), self._codes_of(after)
-        slots: dict[int, int] = {}
-        for a, b in zip(old, new, strict=False):
-            if isinstance(a, float) or isinstance(b, float):
-                if a != b:
-                    return None
-            elif a[1] != b[1] or self._size(a) != self._size(b) or slots.setdefault(a[0], b[0]) != b[0]:
-                return None
-        return slots if len(old) == len(new) else None
+        (old, old_slots), (new, new_slots) = map(self._structures.of, (before, after))
+        return dict(zip(old_slots, new_slots, strict=True)) if old == new else None
 
     def _copy(self, template: list[TracedCall], slots: dict[int, int], after: T) -> T:
         """The state one time later: as ``template`` led to ``after``, its copy leads on from there."""
@@ -167,22 +158,19 @@ class Recorder(Tracer):
         new = [c if isinstance(c, float) else (slots.get(c[0], c[0]), c[1]) for c in codes]
         return TracedMatrix(leaf.leaf if isinstance(leaf, TracedMatrix) else outline(leaf), tuple(new))
 
-    def _codes_of(self, tree: Any) -> list[Code]:
-        """The codes of all entries of a tree, in order."""
-        leaves: list[Expr] = []
-        dismantle(tree, leaves)
-        return [c for leaf in leaves for c in (leaf.codes if isinstance(leaf, TracedMatrix) else self._codes(leaf))]
-
-    def _size(self, code: tuple[int, int]) -> int:
-        return self._slots[code[0]].size
-
     def _add(self, name: str, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
-        first = len(self._slots)
-        for k in range(function.n_out()):
-            size = function.numel_out(k)
-            self._slots.append(TracedVector(name, size, self._slot(size)))
-        self.calls.append(TracedCall(function, tuple(self._slots[k] for k in slots), tuple(self._slots[first:])))
-        return range(first, len(self._slots))
+        first, own = len(self._slots), self._slots
+        for size in self._results(function):
+            own.append(TracedVector(name, size, self._slot(size)))
+        self.calls.append(TracedCall(function, tuple([own[k] for k in slots]), tuple(own[first:])))
+        return range(first, len(own))
+
+    def _results(self, function: ca.Function) -> tuple[int, ...]:
+        """The sizes of what a function gives."""
+        known = self._outputs.get(id(function))
+        if known is None or known[0] is not function:
+            known = self._outputs[id(function)] = function, tuple(map(function.numel_out, range(function.n_out())))
+        return known[1]
 
 
 def _side_by_side(values: tuple[Expr, ...]) -> Expr:

@@ -13,7 +13,7 @@ where their entries lie.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -32,6 +32,7 @@ from symphys.dynamics.tracing.pytree import (
     rebuild,
     slots_of,
 )
+from symphys.dynamics.tracing.structure import Blueprint, Structures
 
 T = TypeVar("T")
 Expr = Any
@@ -45,15 +46,15 @@ class Template:
     Attributes:
         function: of the slots in ``used``, returns columns of what has to be computed; None if that is nothing.
         used: which of the slots that the arguments lie in.
-        shape: of the tree that it returns.
+        blueprint: of the tree that it returns.
         matrices: of that tree, in order. A code's slot is one of those that the arguments lie in, or -1, -2 .. for the
             first, the second .. that the function returns.
     """
 
     function: ca.Function | None
     used: tuple[int, ...]
-    shape: Any
-    matrices: tuple[TracedMatrix, ...]
+    blueprint: Blueprint
+    matrices: tuple[tuple[Leaf, tuple[Code, ...]], ...]
 
 
 class Tracer(ABC):
@@ -66,6 +67,7 @@ class Tracer(ABC):
         self._entries: list[list[Expr]] = []
         self._sizes: list[int] = []
         self._homes: dict[int, tuple[int, int]] = {}
+        self._structures = Structures(self._codes, self._sizes)
         self._templates: dict[Hashable, Template] = {}
         self._functions: dict[str, ca.Function] = {}
 
@@ -132,20 +134,11 @@ class Tracer(ABC):
 
     def call(self, function: Callable[..., T], arguments: tuple[Any, ...], named: dict[str, Any]) -> T:
         """``function(*arguments, **named)``."""
-        leaves: list[Expr] = []
-        shape = dismantle((arguments, named), leaves)
-        slots: dict[int, int] = {}
-        known: list[tuple[Code, ...]] = []
-        for leaf in leaves:
-            codes = leaf.codes if isinstance(leaf, TracedMatrix) else self._codes(leaf)
-            known.append(
-                tuple([c if isinstance(c, float) else (slots.setdefault(c[0], len(slots)), c[1]) for c in codes])
-            )
-        key = (function, shape, tuple(known), tuple([self._sizes[slot] for slot in slots]))
-        template = self._templates.get(key)
+        number, slots = self._structures.of_call(arguments, named)
+        template = self._templates.get((function, number))
         if template is None:
-            template = self._templates[key] = self._build(function, shape, known, slots)
-        tree: T = self._fill(template, list(slots))
+            template = self._templates[function, number] = self._build(function, arguments, named, slots)
+        tree: T = self._fill(template, slots)
         return tree
 
     def _codes(self, expression: Expr) -> tuple[Code, ...]:
@@ -156,42 +149,48 @@ class Tracer(ABC):
             self._adopt(ca.vertcat(*fresh))
         return tuple(float(e) if e.is_constant() else self._homes[e.element_hash()] for e in entries)
 
-    def _build(self, function: Callable[..., Any], shape: Any, known: Sequence[Any], slots: Iterable[int]) -> Template:
+    def _build(
+        self, function: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any], slots: Sequence[int]
+    ) -> Template:
         """The template of a function for arguments of this structure."""
+        leaves: list[Expr] = []
+        shape = dismantle((arguments, named), leaves)
+        places = {slot: k for k, slot in enumerate(slots)}
+        codes = (leaf.codes if isinstance(leaf, TracedMatrix) else self._codes(leaf) for leaf in leaves)
+        known = [[c if isinstance(c, float) else (places[c[0]], c[1]) for c in each] for each in codes]
         symbols = [ca.SX.sym("a", self._sizes[slot]) for slot in slots]
         entries: list[list[Expr]] = [symbol.nonzeros() for symbol in symbols]
         outlines: list[Leaf] = []
         leaves_of(shape, outlines)
         expressions = (_argument(symbols, entries, *each) for each in zip(outlines, known, strict=True))
         results: list[Expr] = []
-        arguments, named = rebuild(shape, expressions)
+        inner, inner_named = rebuild(shape, expressions)
         with tracing(None):
-            result_shape = dismantle(function(*arguments, **named), results)
+            result_shape = dismantle(function(*inner, **inner_named), results)
         given = _Given(entries)
         matrices = given.placed(list(map(self.value, results)), slots_of(result_shape))
+        blueprint = Blueprint(result_shape)
         if not given.columns:
-            return Template(None, (), result_shape, matrices)
+            return Template(None, (), blueprint, matrices)
         columns: Any = [ca.vertcat(*column) for column in given.columns.values()]
         if self._reduces:
             columns = ca.cse(columns)
         needed = {symbol.element_hash() for symbol in ca.symvar(ca.vertcat(*columns))}
         used = [k for k, column in enumerate(entries) if any(e.element_hash() in needed for e in column)]
         built = self.shared(ca.Function("piece", [symbols[k] for k in used], columns))
-        return Template(built, tuple(used), result_shape, matrices)
+        return Template(built, tuple(used), blueprint, matrices)
 
     def shared(self, function: ca.Function) -> ca.Function:
         """A function, or an equal one that was there before."""
         return self._functions.setdefault(function.serialize(), function)
 
-    def _fill(self, template: Template, slots: list[int]) -> Any:
+    def _fill(self, template: Template, slots: Sequence[int]) -> Any:
         """The tree that a template stands for, given the slots that its arguments lie in."""
         if template.function is not None:
-            slots = [*slots, *reversed(self._apply(template.function, [slots[k] for k in template.used]))]
-        filled = (
-            TracedMatrix(m.leaf, tuple([c if isinstance(c, float) else (slots[c[0]], c[1]) for c in m.codes]))
-            for m in template.matrices
-        )
-        return rebuild(template.shape, filled)
+            given = self._apply(template.function, [slots[k] for k in template.used])
+            slots = (*slots, *reversed(given))
+        filled = (TracedMatrix(leaf, codes, slots) for leaf, codes in template.matrices)
+        return template.blueprint.tree(filled, slots, self._structures)
 
 
 def _argument(symbols: Sequence[Expr], entries: Sequence[Sequence[Expr]], leaf: Leaf, codes: Sequence[Code]) -> Expr:
@@ -227,8 +226,8 @@ class _Given:
         self.columns: dict[int, list[Expr]] = {}
         self._homes = {e.element_hash(): (k, j) for k, column in enumerate(entries) for j, e in enumerate(column)}
 
-    def placed(self, matrices: Sequence[Expr], slots: Sequence[int]) -> tuple[TracedMatrix, ...]:
-        """The codes of matrices, whose numbers go to their slots if they lie nowhere yet.
+    def placed(self, matrices: Sequence[Expr], slots: Sequence[int]) -> tuple[tuple[Leaf, tuple[Code, ...]], ...]:
+        """Outlines and codes of matrices, whose numbers go to their slots if they lie nowhere yet.
 
         The few numbers of a body, such as its velocities, stay together, also those that are left as they were.
         """
@@ -238,7 +237,7 @@ class _Given:
             by_slot.setdefault(slot, []).append(own)
         anew = {slot: self._together(parts) for slot, parts in by_slot.items()}
         return tuple(
-            TracedMatrix(outline(matrix), tuple([self._code(number, slot, anew[slot]) for number in own]))
+            (outline(matrix), tuple([self._code(number, slot, anew[slot]) for number in own]))
             for matrix, slot, own in zip(matrices, slots, numbers, strict=True)
         )
 

@@ -121,9 +121,7 @@ def transcribe_large(
         output_names=tuple(output.label for output in problem.outputs),
     )
     functions = ExpressionFunctions(context.rollout, context.objectives.terms)
-    return LargeTranscription(
-        problem, context.rollout, context.objectives.terms, functions, shooting, description, built, context=context
-    )
+    return LargeTranscription(problem, context.rollout, functions, shooting, description, built, context=context)
 
 
 def _evaluator(context: RolloutContext, exact: bool, backend: str, threads: int) -> tuple[LargeEvaluator, Description]:

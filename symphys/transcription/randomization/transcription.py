@@ -7,9 +7,10 @@ from time import perf_counter
 
 from symphys.codegen import Kernel, KernelUnavailable, ProgramError, processors
 from symphys.codegen.backends import PRECISIONS, build_kernel, described
+from symphys.codegen.toolchain.warm_start import ProgramSource
 from symphys.problem import Problem
 from symphys.shooting import Nlp
-from symphys.transcription.program import rollout_program
+from symphys.transcription.program import program_identity, rollout_program
 from symphys.transcription.randomization.evaluator import KernelScenarioEvaluator, NominalEvaluator
 from symphys.transcription.randomization.sampler import Sampler
 from symphys.transcription.rollout import symbolic_rollout
@@ -50,5 +51,6 @@ def _evaluator(problem: Problem, exact: bool, backend: str, threads: int) -> Ker
 
 
 def _kernel(sampler: Sampler, exact: bool, backend: str, threads: int) -> Kernel:
-    program = rollout_program(symbolic_rollout(sampler.problem), exact)
-    return build_kernel(backend, program, ("merit",), threads)
+    problem = sampler.problem
+    source = ProgramSource(lambda: rollout_program(symbolic_rollout(problem), exact), program_identity(problem, exact))
+    return build_kernel(backend, source, ("merit",), threads)

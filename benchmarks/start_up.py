@@ -1,0 +1,93 @@
+"""What a user waits for before the first gradient: a first start of a problem, and a second one.
+
+    python benchmarks/start_up.py [NAME ...]
+
+Each start is a process of its own, with a cache of kernels that is empty at first. Seconds are those of processors, of
+Python and of compilers, so that other work on the machine counts little; ``wall`` is the clock's. ``table_robot`` is
+the robot of table_robot.py with a net; other names are those of shipped problems.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from resource import RUSAGE_CHILDREN, RUSAGE_SELF, getrusage
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from typing import Any
+
+NAMES = ("ball_throw", "cart_pole", "hopper_gait", "push_box", "table_robot", "quadruped_walk")
+STEPS = 100
+CHILD = "--child"
+PHASES = ("import", "load", "build and compile", "first value", "first gradient")
+
+
+def spent() -> float:
+    """[s] of processors so far, in this process and in the compilers that it waited for."""
+    return sum(sum(getrusage(who)[:2]) for who in (RUSAGE_SELF, RUSAGE_CHILDREN))
+
+
+def start(name: str) -> dict[str, Any]:
+    """Seconds of each phase of one start."""
+    found: dict[str, Any] = {}
+    began = perf_counter()
+
+    def timed(phase: str, call: Callable[[], Any]) -> Any:
+        before = spent()
+        result = call()
+        found[phase] = spent() - before
+        return result
+
+    def load() -> Any:
+        if name != "table_robot":
+            return symphys.load(name)
+        from table_robot import table_problem
+
+        return table_problem([], STEPS)
+
+    symphys = timed("import", lambda: __import__("symphys"))
+    problem = timed("load", load)
+    rollout = timed("build and compile", lambda: symphys.compile(problem))
+    timed("first value", lambda: rollout.value(rollout.z()))
+    timed("first gradient", lambda: rollout.gradient(rollout.z()))
+    found["wall"] = perf_counter() - began
+    found["memory"] = getrusage(RUSAGE_SELF).ru_maxrss / 1024
+    return found
+
+
+def starts(name: str) -> list[dict[str, Any]]:
+    """A first and a second start, and the MiB of the cache after each."""
+    rows = []
+    with TemporaryDirectory() as folder:
+        for _ in range(2):
+            told = subprocess.run(
+                [sys.executable, __file__, CHILD, name],
+                env={**os.environ, "SYMPHYS_CACHE": folder},
+                capture_output=True,
+                text=True,
+                check=True,
+            ).stdout
+            kept = sum(path.stat().st_size for path in Path(folder).iterdir()) / 2**20
+            rows.append({**json.loads(told.splitlines()[-1]), "cache": kept})
+    return rows
+
+
+def main() -> None:
+    """A row for each start."""
+    print("| problem | start | " + " | ".join(PHASES) + " | all | wall | memory [MiB] | cache [MiB] |")
+    for name in sys.argv[1:] or NAMES:
+        for which, row in zip(("first", "second"), starts(name), strict=True):
+            numbers = [*(row[phase] for phase in PHASES), sum(row[phase] for phase in PHASES), row["wall"]]
+            seconds = " | ".join(f"{number:.2f}" for number in numbers)
+            print(f"| `{name}` | {which} | {seconds} | {row['memory']:.0f} | {row['cache']:.1f} |", flush=True)
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == [CHILD]:
+        print(json.dumps(start(sys.argv[2])))
+    else:
+        main()

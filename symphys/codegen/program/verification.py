@@ -1,0 +1,241 @@
+"""The check of a program: sizes, one writer a word, nothing read before it is written.
+
+Calls are looked at many at a time. Where something is wrong with some of them, each is looked at alone, and the first
+fault is named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.codegen.errors import ProgramError
+from symphys.codegen.program.calls import FunctionCall, Place
+from symphys.codegen.program.spans import Spans
+
+Shapes = tuple[tuple[int, ...], tuple[int, ...]]
+"""Sizes of the arguments and of the results of a function."""
+AT_ONCE = 4096
+"""Calls that are looked at together: more take memory and save nothing."""
+
+Words = NDArray[np.int64]
+NEVER = np.iinfo(np.int64).max
+
+
+Program = Any
+"""What ``program`` defines, which has this check made."""
+
+
+class Verification:
+    """The state of the check: for each word when it was written last, and whether it is scratch."""
+
+    def __init__(self, program: Program) -> None:
+        """Mark the inputs and the zeroed words as written."""
+        self.program = program
+        self.written = np.full(program.size, NEVER)
+        self.scratch = np.zeros(program.size, dtype=bool)
+        self._seen = np.zeros(program.size, np.int64)
+        for name, place in (("z", program.z), ("parameters", program.parameters)):
+            self._begin(name, place)
+        for place in program.zeroed:
+            self._begin("zeroed place", place)
+        for place, values in program.constants:
+            self._begin("constant", place)
+            if len(values) != place.size:
+                raise ProgramError(f"constant: {place} has {place.size} words, but there are {len(values)} values")
+
+    def _begin(self, name: str, place: Place) -> None:
+        words = place.still().words(1)
+        self.inside(name, words)
+        if np.any(self.written[words] != NEVER):
+            raise ProgramError(f"{name}: {span(words)} overlap another input or zeroed place")
+        self.written[words] = -1
+
+    def inside(self, who: str, words: Words) -> None:
+        """Refuse words outside the memory."""
+        if words.size and (words.min() < 0 or words.max() >= self.program.size):
+            raise ProgramError(f"{who}: {span(words)} lie outside the memory of {self.program.size} words")
+
+    def phases(self) -> Iterator[_Phase]:
+        """Prologue, body and epilogue."""
+        program = self.program
+        start, length = len(program.prologue), len(program.body)
+        yield _Phase("prologue", program.prologue, 0, 0)
+        yield _Phase("body", program.body, start, length)
+        yield _Phase("epilogue", program.epilogue, start + program.steps * length, 0)
+
+    def write_all(self, phase: _Phase) -> None:
+        """Take note of what the calls of a phase write, many at a time."""
+        for first, last in phase.runs():
+            if phase.calls[first].accumulate or not self._written_at_once(phase, first, last):
+                for k in range(first, last):
+                    self.write(phase.who(k), phase.calls[k], phase.start + k, phase.period)
+
+    def _written_at_once(self, phase: _Phase, first: int, last: int) -> bool:
+        """Whether calls may write what they write; if so, that is noted."""
+        part = phase.outputs.part(first, last)
+        words, call, step = part.words(self.program.steps if phase.period else 1)
+        if words.size and (words.min() < 0 or words.max() >= self.program.size):
+            return False
+        order = np.arange(words.size)
+        self._seen[words] = order
+        if np.any(self.written[words] != NEVER) or np.any(self._seen[words] != order):
+            return False
+        self.written[words] = phase.start + call + phase.period * step
+        if phase.period:
+            self.scratch[words] = np.repeat(part.stride == 0, _words_of(part, self.program.steps))
+        return True
+
+    def read_all(self, phase: _Phase) -> None:
+        """Refuse what the calls of a phase read before it is complete; many at a time."""
+        for first in range(0, len(phase.calls), AT_ONCE):
+            last = min(first + AT_ONCE, len(phase.calls))
+            if not self._read_at_once(phase, first, last):
+                for k in range(first, last):
+                    self.read(phase.who(k), phase.calls[k], phase.start + k, phase.period)
+
+    def _read_at_once(self, phase: _Phase, first: int, last: int) -> bool:
+        """Whether all that calls read is complete."""
+        words, call, step = phase.inputs.part(first, last).words(self.program.steps if phase.period else 1)
+        if words.size and (words.min() < 0 or words.max() >= self.program.size):
+            return False
+        written, scratch = self.written[words], self.scratch[words]
+        if not phase.period and np.any(scratch):
+            return False
+        when = phase.start + call + np.where(scratch, 0, phase.period * step)
+        return not np.any(written >= when)  # NEVER is later than all
+
+    def cover(self, who: str, place: Place, period: int) -> Words:
+        """The words of a place, all inside the memory."""
+        words = (place if period else place.still()).words(self.program.steps)
+        self.inside(who, words)
+        return words
+
+    def write(self, who: str, call: FunctionCall, time: int, period: int) -> None:
+        """Take note of what a call writes; refuse second writers."""
+        for place in call.outputs:
+            words = self.cover(who, place, period)
+            if call.accumulate:
+                self._add(who, place, words, time, period)
+                continue
+            if len(np.unique(words)) != words.size:
+                raise ProgramError(f"{who}: its steps overwrite each other in {span(words)}")
+            taken = self.written[words] != NEVER
+            if taken.any():
+                raise ProgramError(f"{who}: {span(words[taken])} are written already")
+            self.written[words] = time + period * np.arange(len(words))[:, None]
+            self.scratch[words] = period > 0 and place.stride == 0
+
+    def _add(self, who: str, place: Place, words: Words, time: int, period: int) -> None:
+        if period and place.stride:
+            raise ProgramError(f"{who}: adds to {span(words)} with a stride; write them instead")
+        before = self.written[words]
+        if np.any(before == NEVER):
+            raise ProgramError(f"{who}: adds to {span(words[before == NEVER])}, which nobody wrote or zeroed before")
+        if np.any(before == time):
+            raise ProgramError(f"{who}: two of its results overlap in {span(words[before == time])}")
+        last = time + period * max(self.program.steps - 1, 0)
+        self.written[words] = np.where(self.scratch[words], time, np.maximum(last, before))
+
+    def read(self, who: str, call: FunctionCall, time: int, period: int) -> None:
+        """Refuse what is read before it is complete."""
+        for place in call.inputs:
+            words = self.cover(who, place, period)
+            when = time + period * np.arange(len(words))[:, None]  # without stride: step 0, the first to read
+            self._refuse(who, words, self.written[words] == NEVER, "which nobody writes")
+            scratch = self.scratch[words]
+            if not period:
+                self._refuse(who, words, scratch, "which are scratch of the body")
+            late = np.where(scratch, self.written[words] >= time, self.written[words] >= when)
+            self._refuse(who, words, late, "before they are complete")
+
+    def _refuse(self, who: str, words: Words, bad: NDArray[np.bool_], why: str) -> None:
+        if bad.any():
+            raise ProgramError(f"{who}: reads {span(words[bad])}, {why}")
+
+
+def verify(program: Program) -> Verification:
+    """Check a program; ProgramError names the first fault."""
+    check, shapes = Verification(program), dict[int, Shapes]()
+    phases = list(check.phases())
+    for phase in phases:
+        for k, call in enumerate(phase.calls):
+            known = shapes.get(call.function.__hash__())
+            sizes = tuple([p.size for p in call.inputs]), tuple([p.size for p in call.outputs])
+            if known is None or known != sizes:
+                shapes[call.function.__hash__()] = _signature(phase.who(k), call)
+    for phase in phases:
+        check.write_all(phase)
+    for phase in phases:
+        check.read_all(phase)
+    for name, place in program.outputs.items():
+        words = place.still().words(1)
+        check.inside(f"output {name}", words)
+        check._refuse(f"output {name}", words, check.written[words] == NEVER, "which nobody writes")
+        check._refuse(f"output {name}", words, check.scratch[words], "which are scratch of the body")
+    for name, discounted in () if program.discounted is None else vars(program.discounted).items():
+        if discounted is not None:
+            words = discounted.words(program.steps)
+            check.inside(f"discounted {name}", words)
+            check._refuse(f"discounted {name}", words, check.scratch[words], "which are scratch of the body")
+    return check
+
+
+class _Phase:
+    """Calls that follow one another, the time of the first, and that from one step to the next (0: no body)."""
+
+    def __init__(self, name: str, calls: Sequence[FunctionCall], start: int, period: int) -> None:
+        self.name, self.calls, self.start, self.period = name, calls, start, period
+        self.inputs = Spans.of([call.inputs for call in calls])
+        self.outputs = Spans.of([call.outputs for call in calls])
+
+    def who(self, k: int) -> str:
+        """A call for a message."""
+        return f"{self.name} call {k} ({self.calls[k].function.name()})"
+
+    def runs(self) -> Iterator[tuple[int, int]]:
+        """(first, after the last) of calls that all write, or one that adds."""
+        first = 0
+        for k, call in enumerate(self.calls):
+            if call.accumulate or k - first == AT_ONCE:
+                if k > first:
+                    yield first, k
+                first = k
+            if call.accumulate:
+                yield k, k + 1
+                first = k + 1
+        if len(self.calls) > first:
+            yield first, len(self.calls)
+
+
+def _words_of(part: Spans, steps: int) -> Words:
+    """How many words each place covers."""
+    return part.size * np.where(part.stride != 0, steps, 1)
+
+
+def _signature(who: str, call: FunctionCall) -> Shapes:
+    """The sizes of a call's function, which its places must have."""
+    function = call.function
+    if not function.is_a("SXFunction"):
+        raise ProgramError(f"{who}: is not an SX Function but {function.class_name()}")
+    if function.has_free():
+        raise ProgramError(f"{who}: has free symbols {function.get_free()}")
+    arguments = [function.sparsity_in(i) for i in range(function.n_in())]
+    results = [function.sparsity_out(i) for i in range(function.n_out())]
+    for what, shapes, places in (("argument", arguments, call.inputs), ("result", results, call.outputs)):
+        if len(shapes) != len(places):
+            raise ProgramError(f"{who}: has {len(shapes)} {what}s but {len(places)} places")
+        for i, (shape, place) in enumerate(zip(shapes, places, strict=True)):
+            if not shape.is_dense() or (shape.size2() != 1 and shape.numel() > 0):
+                raise ProgramError(f"{who}: {what} {i} is not a dense column but {shape.dim()}")
+            if shape.numel() != place.size:
+                raise ProgramError(f"{who}: {what} {i} has {shape.numel()} words, its place {place.size}")
+    return tuple(place.size for place in call.inputs), tuple(place.size for place in call.outputs)
+
+
+def span(words: Words) -> str:
+    """Words for a message."""
+    return f"words {words.min()} to {words.max()}" if words.size else "no words"
