@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from thrown import TABLES
 
-from symphys.dynamics.functions import step_function
+from symphys.dynamics.functions import report_function
 from symphys.problem import Problem, problem_of_tables
 from symphys.problem.sweeps.points import combined, swept
 from symphys.problem.sweeps.texts import read_axes
@@ -98,9 +98,9 @@ def test_steps_are_built_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def counted(world: object, *more: object) -> object:
         built.append(world)
-        return step_function(world, *more)  # type: ignore[arg-type]
+        return report_function(world, *more)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("symphys.transcription.rollout.step_function", counted)
+    monkeypatch.setattr("symphys.transcription.simulation.report_function", counted)
     found = points("ball.mass=0.5:0.7:3", "simulation.dt=0.02,0.05", tables={})
     motions = [transcribe(point, backend="casadi").simulate(np.zeros(6)) for point in found]
     assert len(built) == 2  # one for each time step
