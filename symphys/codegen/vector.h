@@ -13,10 +13,17 @@ typedef int64_t N;
 #define LIBM(name) __builtin_##name
 #define MAGNITUDE 0x7fffffffffffffff
 #endif
+#ifdef NUMBERS /* of one lane */
+typedef R V;
+typedef int I; /* a mask: 0 or 1 */
+#define S(x) ((V)(x))
+#define LANE(x, l) (x)
+#else
 typedef R V __attribute__((vector_size(LANES * sizeof(R))));
 typedef N I __attribute__((vector_size(LANES * sizeof(R))));
 #define S(x) ((V){0} + (R)(x))
 #define LANE(x, l) (x)[l]
+#endif
 #define NAN __builtin_nan("")
 #define INFINITY __builtin_inf()
 #define LOWEST(x) __builtin_ctzll(x) /* of the bits that are set */
@@ -27,16 +34,16 @@ typedef N I __attribute__((vector_size(LANES * sizeof(R))));
 #define UNARY(name) \
   static inline __attribute__((unused)) V name##_(V x) { \
     V r; \
-    for (int l = 0; l < LANES; l++) r[l] = LIBM(name)(x[l]); \
+    for (int l = 0; l < LANES; l++) LANE(r, l) = LIBM(name)(LANE(x, l)); \
     return r; \
   }
 #define BINARY(name) \
   static inline __attribute__((unused)) V name##_(V x, V y) { \
     V r; \
-    for (int l = 0; l < LANES; l++) r[l] = LIBM(name)(x[l], y[l]); \
+    for (int l = 0; l < LANES; l++) LANE(r, l) = LIBM(name)(LANE(x, l), LANE(y, l)); \
     return r; \
   }
-UNARY(sqrt) UNARY(floor) UNARY(ceil)
+UNARY(sqrt) UNARY(floor) UNARY(ceil) UNARY(fabs)
 UNARY(exp) UNARY(log) UNARY(sin) UNARY(cos) UNARY(tan) UNARY(asin) UNARY(acos) UNARY(atan) UNARY(erf)
 UNARY(sinh) UNARY(cosh) UNARY(tanh) UNARY(asinh) UNARY(acosh) UNARY(atanh) UNARY(log1p) UNARY(expm1)
 BINARY(pow) BINARY(fmod) BINARY(remainder) BINARY(copysign) BINARY(atan2) BINARY(hypot)

@@ -24,7 +24,7 @@ class FastestKernel(ProcessorKernel):
 
     def __init__(self, kernel: ProcessorKernel, build: Callable[[], DeviceKernel], large: int = LARGE) -> None:
         """``build`` makes the same for a GPU, when a batch of ``large`` rows comes, or raises KernelUnavailable."""
-        super().__init__(kernel.program, kernel.loaded, kernel.report, kernel.seeded, kernel.threads)
+        super().__init__(kernel.program, kernel.widths, kernel.report, kernel.seeded, kernel.threads)
         self._build, self._large, self._sought = build, large, False
         self._device: DeviceKernel | None = None
         self._gains: dict[Kind, float] = {}
@@ -63,10 +63,11 @@ class FastestKernel(ProcessorKernel):
 
     def _expected(self, batch: RolloutBatch) -> float:
         """[s] of the processor, from a block for each thread."""
-        lanes, rows = self.report.lanes, min(batch.rows, self.threads * self.report.lanes)
+        width = self.widths.ready(batch.rows)
+        lanes, rows = width.lanes, min(batch.rows, self.threads * width.lanes)
         blocks = [batch.part(first, min(first + lanes, rows)) for first in range(0, rows, lanes)]
-        tasks = [partial(self.loaded.evaluate, block) for block in blocks]
-        return _seconds(lambda: self._pool.run(tasks, self.threads)) * batch.rows / rows
+        tasks = [partial(width.loaded.evaluate, block) for block in blocks]
+        return _seconds(lambda: width.pool.run(tasks, self.threads)) * batch.rows / rows
 
 
 def _seconds(call: Callable[[], None]) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from symphys.codegen.graph.operations import FORMS, PLAIN
+from symphys.codegen.graph.operations import FORMS, PLAIN, SCALAR
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,7 @@ class Dialect:
 
 VECTORS = Dialect(FORMS)
 NUMBERS = Dialect(PLAIN)
+ONE_LANE = Dialect(SCALAR)
 DEVICE = Dialect(
     PLAIN,
     reads="const V *restrict ",

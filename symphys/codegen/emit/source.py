@@ -6,38 +6,61 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 
+from symphys.codegen.emit.dialect import ONE_LANE, VECTORS, Dialect
 from symphys.codegen.emit.plan import Plan
 from symphys.codegen.emit.writer import write
 
 ROOM = "symphys.codegen"
 DRIVER = ("program.h", "guards.c", "driver.c")
+NUMBERS = "#define NUMBERS\n"
 FILES, SHARE = 4, 400
 """Most files of values and most of adjoints; nodes for which another file is begun."""
 
 
 @dataclass(frozen=True)
 class SourceFile:
-    """A C file, and whether the compiler may fuse products and sums in it."""
+    """A C file.
+
+    Attributes:
+        text: C.
+        fused: whether the compiler may fuse products and sums.
+        small: whether its code is to be short.
+    """
 
     text: str
     fused: bool = False
+    small: bool = False
 
 
-def sources(plan: Plan, lanes: int, single: bool) -> list[SourceFile]:
-    """The C files; each compiles alone. Adjoints are fused; values are not, so that they are casadi's to the bit."""
-    head = f"#define LANES {lanes}\n#define SINGLE {int(single)}\n{resource('vector.h')}"
-    texts = [write(f"f{number}", graph, form) for number, (graph, form) in enumerate(plan.functions)]
+def sources(plan: Plan, lanes: int, single: bool, few: bool = False) -> list[SourceFile]:
+    """The C files; each compiles alone. Adjoints are fused; values are not, so that they are casadi's to the bit.
+
+    ``few``: of fewer lanes than a vector register has.
+    """
+    head = f"#define LANES {lanes}\n#define SINGLE {int(single)}\n"
     found = []
     for backward in (False, True):
         mine = [i for i, (_, form) in enumerate(plan.functions) if form.backward == backward]
         work = [len(plan.functions[i][0].nodes) for i in mine]
-        for group in spread([texts[i] for i in mine], work, FILES):
-            found.append(SourceFile("\n".join([head, *group]), fused=backward))
-    names = [f"f{number}" for number in range(len(texts))]
+        dialect = forms_of(lanes, backward)
+        texts = [write(f"f{i}", *plan.functions[i], dialect) for i in mine]
+        start = head + (NUMBERS if dialect is ONE_LANE else "") + resource("vector.h")
+        for group in spread(texts, work, FILES):
+            found.append(SourceFile("\n".join([start, *group]), fused=backward, small=few))
+    names = [f"f{number}" for number in range(len(plan.functions))]
     declared = "".join(f"void {name}(V *m, V *b, const word *t, word k);\n" for name in names)
     table = ", ".join(names) or "0"
     listed = f"{declared}static void (*const FUNCTIONS[])(V *, V *, const word *, word) = {{{table}}};\n"
-    return [*found, SourceFile(head + listed + "".join(map(resource, (*DRIVER, "phases.c"))))]
+    return [*found, SourceFile(head + resource("vector.h") + listed + "".join(map(resource, (*DRIVER, "phases.c"))))]
+
+
+def forms_of(lanes: int, backward: bool = False) -> Dialect:
+    """How functions are written for blocks of so many lanes.
+
+    Values of one lane are numbers. Adjoints are vectors of one: a compiler fuses the same products as in wide ones,
+    and would not between the branches that it makes of conditions on numbers.
+    """
+    return ONE_LANE if lanes == 1 and not backward else VECTORS
 
 
 def spread(texts: Sequence[str], work: Sequence[int], most: int) -> list[list[str]]:

@@ -53,3 +53,7 @@ PLAIN = (
     }
 )
 """The same for single numbers in plain C, where a mask is 0 or 1."""
+SCALAR = (
+    FORMS | {name: PLAIN[name] for name in ("not", "isnt0", "one", "iez", "select", *COMPARE)} | {"fabs": "fabs_({0})"}
+)
+"""The same for blocks of one lane, in either precision."""

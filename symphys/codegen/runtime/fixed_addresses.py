@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from symphys.codegen.runtime.batch import Array
 from symphys.codegen.runtime.library import BatchData, Loaded, Memory
+from symphys.codegen.runtime.widths import Widths
 
 
 @dataclass(frozen=True)
@@ -44,20 +45,18 @@ class FixedBatch:
     """A small batch that is evaluated again and again: ``run`` reads and writes these arrays, on one thread.
 
     Attributes:
-        loaded: the kernel's library.
+        widths: the kernel's libraries.
         batch: the driver's.
-        memory: of its own.
         z, parameters: (rows, n) and (rows, p), read; 0 at first.
         outputs: (rows, width) all outputs in their order, written.
     """
 
-    loaded: Loaded
+    widths: Widths
     batch: BatchData
-    memory: Memory
     z: Array
     parameters: Array
     outputs: Array
 
     def run(self) -> None:
         """Evaluate."""
-        self.loaded.evaluate(self.batch, self.memory)
+        self.widths.run_part(self.batch)

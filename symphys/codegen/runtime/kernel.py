@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,8 +13,7 @@ from symphys.codegen.program.nan_location import Bad, first_bad
 from symphys.codegen.program.program import Place, Program
 from symphys.codegen.runtime.batch import Array, RolloutBatch
 from symphys.codegen.runtime.fixed_addresses import Fixed, FixedBatch
-from symphys.codegen.runtime.library import Loaded
-from symphys.codegen.runtime.thread_pool import MemoryPool
+from symphys.codegen.runtime.widths import Widths
 from symphys.codegen.toolchain.compiler import processors
 from symphys.codegen.toolchain.report import BuildReport
 
@@ -115,15 +113,12 @@ class ProcessorKernel(Kernel):
     """Blocks of lanes, spread over threads, on whose number results do not depend."""
 
     def __init__(
-        self, program: Program, loaded: Loaded, report: BuildReport, seeded: Sequence[str], threads: int | None
+        self, program: Program, widths: Widths, report: BuildReport, seeded: Sequence[str], threads: int | None
     ) -> None:
         """Use ``compile_program``."""
         super().__init__(program, report, seeded)
-        self.loaded = loaded
+        self.widths = widths
         self.threads = processors() if threads is None else threads
-        real = np.dtype(np.float32 if report.precision == "single" else np.float64)
-        words = report.bytes_per_lane // real.itemsize + -(-8 * report.arena // (report.lanes * real.itemsize))
-        self._pool = MemoryPool(words, report.lanes, real, loaded.prepare)
 
     def fixed(self, seed: ArrayLike = ()) -> Fixed:
         """An evaluation of one z at fixed addresses, with a row for each seed (rows, s), or one row without any."""
@@ -132,21 +127,23 @@ class ProcessorKernel(Kernel):
         batch = self._batch(z, parameters, seeds if seeds.size else None)
         outputs = batch.outputs(self._width())
         gradient = batch.gradient(len(z)) if seeds.size else np.zeros((0, len(z)))
-        return Fixed(self.loaded, batch.part(0, batch.rows), self._pool.new(), z, parameters, outputs, gradient, seeds)
+        width = self.widths.ready(batch.rows)
+        part, memory = batch.part(0, batch.rows), width.pool.new()
+        return Fixed(width.loaded, part, memory, z, parameters, outputs, gradient, seeds)
 
     def fixed_batch(self, rows: int) -> FixedBatch:
         """An evaluation of outputs at fixed addresses, for a small batch: what each call prepares is prepared once."""
         z, parameters = np.zeros((rows, self.program.z.size)), np.zeros((rows, self.program.parameters.size))
         batch = self._batch(z, parameters)
         outputs = batch.outputs(self._width())
-        return FixedBatch(self.loaded, batch.part(0, rows), self._pool.new(), z, parameters, outputs)
+        return FixedBatch(self.widths, batch.part(0, rows), z, parameters, outputs)
 
     def first_bad(self, z: ArrayLike, parameters: ArrayLike = ()) -> Bad | None:
         """The first call of one rollout that gives a value that is not finite; None if all are finite."""
         batch = self._batch(np.ravel(z), np.ravel(parameters))
-        return self._pool.lend(lambda memory: first_bad(self.program, self.loaded, batch, memory))
+        width = self.widths.ready(self.widths.full)
+        return width.pool.lend(lambda memory: first_bad(self.program, width.loaded, batch, memory))
 
     def _run(self, batch: RolloutBatch) -> None:
         """Spread blocks over the threads."""
-        parts = batch.parts(self.report.lanes, self.threads)
-        self._pool.run([partial(self.loaded.evaluate, part) for part in parts], self.threads)
+        self.widths.run(batch, self.threads)

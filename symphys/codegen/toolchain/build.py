@@ -5,18 +5,19 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from symphys.codegen.emit.plan import plan
-from symphys.codegen.emit.source import SourceFile, sources
+from symphys.codegen.emit.source import SourceFile, forms_of, sources
 from symphys.codegen.errors import KernelUnavailable, ProgramError
 from symphys.codegen.program.collection import uncollected
 from symphys.codegen.program.program import Program
 from symphys.codegen.runtime.kernel import ProcessorKernel
 from symphys.codegen.runtime.library import Loaded
+from symphys.codegen.runtime.widths import PATIENCE, Widths, suited
 from symphys.codegen.toolchain.cache import Cache, default_cache
 from symphys.codegen.toolchain.compiler import Compiler, find_compiler
 from symphys.codegen.toolchain.plans import KeptPlan
@@ -33,65 +34,140 @@ def compile_program(
     cache: Cache | None = None,
     seeded: Sequence[str] | None = None,
     threads: int | None = None,
+    rows: int | None = None,
 ) -> ProcessorKernel:
     """Build the kernel of a program, or take it from the cache.
 
     Args:
         program: what to compile.
-        lanes: rollouts in one block, a power of two; "auto": what fills a vector register.
+        lanes: rollouts in one block, a power of two; "auto": what fills a vector register, and fewer for calls of few
+            rows.
         precision: of the arithmetic; arguments and results are double always.
         cache: where kernels are kept; None: the user's.
         seeded: names of the outputs that can be differentiated; None: all.
         threads: how many blocks are computed at once; None: one for each processor.
+        rows: how many rollouts most calls will have. What suits them is compiled at once, and what suits other calls
+            when these have taken as long as compiling takes. None: many.
 
     Raises:
         KernelUnavailable: with one line that says why; the caller falls back.
     """
     single = precision == "single"
-    names, width = names_of(program, seeded), width_of(lanes, single)
-    return compiled(program, names, width, single, cache or default_cache(), threads)[0]
+    width = BlockWidth(width_of(lanes, single), single, several=lanes == "auto")
+    return compiled(program, names_of(program, seeded), width, cache or default_cache(), threads, rows)[0]
+
+
+@dataclass(frozen=True)
+class BlockWidth:
+    """How wide the blocks of a kernel are.
+
+    Attributes:
+        lanes: rollouts in one block.
+        single: whether in single precision.
+        several: whether calls of few rows have libraries of fewer lanes.
+    """
+
+    lanes: int
+    single: bool
+    several: bool = True
+
+    @property
+    def real(self) -> int:
+        """Bytes of a number."""
+        return 4 if self.single else 8
 
 
 def compiled(
-    program: Program, names: tuple[str, ...], width: int, single: bool, cache: Cache, threads: int | None
+    program: Program,
+    names: tuple[str, ...],
+    width: BlockWidth,
+    cache: Cache,
+    threads: int | None,
+    rows: int | None = None,
 ) -> tuple[ProcessorKernel, KeptPlan]:
     """The kernel of a program, and what is to be kept of it; see ``compile_program``."""
     started = time.perf_counter()
     with uncollected():
-        planned = plan(program, names, width * (4 if single else 8))
-        parts = sources(planned, width, single)
+        planned = plan(program, names, width.lanes * width.real)
+        parts = sources(planned, width.lanes, width.single)
     operations = sum(len(graph.nodes) for graph, _ in planned.functions)
     kept = KeptPlan(program, planned, names, texts_of(parts), len(planned.functions), operations)
-    with shared_library(parts, cache) as built:
-        return kernel_of(built.path, kept, width, single, threads, started, built), kept
+    libraries = KeptLibraries(kept, width, cache)
+    lanes = suited(rows, width.lanes) if rows is not None and width.several else width.lanes
+    if lanes != width.lanes:
+        parts = sources(planned, lanes, width.single, few=True)
+    with libraries.built(lanes, parts) as built:
+        first = lanes, libraries.load(built.path)
+        return kernel_of(first, libraries, threads, started, built), kept
 
 
 def kernel_of(
-    path: Path,
-    kept: KeptPlan,
-    width: int,
-    single: bool,
+    first: tuple[int, Loaded],
+    libraries: KeptLibraries,
     threads: int | None,
     started: float,
     built: Built | None = None,
 ) -> ProcessorKernel:
-    """A kernel from its library; ``built``: how that came there, None: it was kept."""
-    loaded = Loaded(path, kept.program, kept.plan, kept.names)
-    compiler = find_compiler()
+    """A kernel that begins with a library of so many lanes; ``built``: how that came there, None: it was kept."""
+    kept, width, compiler = libraries.kept, libraries.width, find_compiler()
     report = BuildReport(
         compiler=compiler.version,
         flags=compiler.flags(processor()),
-        lanes=width,
-        precision="single" if single else "double",
+        lanes=width.lanes,
+        precision="single" if width.single else "double",
         functions=kept.functions,
         operations=kept.operations,
-        bytes_per_lane=(2 * kept.program.size + kept.plan.tape) * (4 if single else 8),
+        bytes_per_lane=(2 * kept.program.size + kept.plan.tape) * width.real,
         cached=built is None or built.cached,
         seconds=time.perf_counter() - started,
         note="" if built is None else built.note,
         arena=kept.plan.guarding.arena if kept.plan.guarding else 0,
     )
-    return ProcessorKernel(kept.program, loaded, report, kept.names, threads)
+    patience = PATIENCE[0] + PATIENCE[1] * kept.operations
+    widths = Widths(width.lanes, first, report.memories, libraries if width.several else None, patience)
+    return ProcessorKernel(kept.program, widths, report, kept.names, threads)
+
+
+@dataclass(frozen=True)
+class KeptLibraries:
+    """The libraries of one plan, which have the same functions and tables and differ in their lanes.
+
+    Attributes:
+        kept: the plan.
+        width: the full one, for which it was planned.
+        cache: where libraries are kept.
+    """
+
+    kept: KeptPlan
+    width: BlockWidth
+    cache: Cache
+
+    def find(self, lanes: int) -> Loaded | None:
+        """See ``widths.Libraries``."""
+        compiler = find_compiler()
+        path = self.cache.find(library_key(self._texts(lanes), compiler, compiler.flags(processor())))
+        return None if path is None else self.load(path)
+
+    def build(self, lanes: int) -> Loaded:
+        """See ``widths.Libraries``."""
+        kept, width = self.kept, self.width
+        with uncollected():
+            planned = plan(kept.program, kept.names, width.lanes * width.real)
+            parts = sources(planned, lanes, width.single, lanes != width.lanes)
+        with self.built(lanes, parts) as built:
+            return self.load(built.path)
+
+    def built(self, lanes: int, parts: Sequence[SourceFile]) -> AbstractContextManager[Built]:
+        """The library of these C files; see ``shared_library``."""
+        return shared_library(parts, self.cache, self._texts(lanes))
+
+    def load(self, path: Path) -> Loaded:
+        """The library of a file."""
+        return Loaded(path, self.kept.program, self.kept.plan, self.kept.names)
+
+    def _texts(self, lanes: int) -> str:
+        """Stands for the C files. Those of other lanes differ from those of all by the lanes and the dialect alone."""
+        return self.kept.texts if lanes == self.width.lanes else f"{self.kept.texts} {lanes} {forms_of(lanes)}"
 
 
 def names_of(program: Program, seeded: Sequence[str] | None) -> tuple[str, ...]:
@@ -123,11 +199,14 @@ class Built:
 
 
 @contextmanager
-def shared_library(parts: Sequence[SourceFile], cache: Cache) -> Iterator[Built]:
-    """The library of these sources; what does not go into the cache lasts as long as the context."""
+def shared_library(parts: Sequence[SourceFile], cache: Cache, texts: str | None = None) -> Iterator[Built]:
+    """The library of these sources; what does not go into the cache lasts as long as the context.
+
+    ``texts``: what stands for the sources; None: their checksum.
+    """
     compiler = find_compiler()
     flags = compiler.flags(processor())
-    key = library_key(texts_of(parts), compiler, flags)
+    key = library_key(texts_of(parts) if texts is None else texts, compiler, flags)
     if (path := cache.find(key)) is not None:
         yield Built(path, compiler, flags, cached=True)
         return
@@ -140,7 +219,7 @@ def shared_library(parts: Sequence[SourceFile], cache: Cache) -> Iterator[Built]
 
 def texts_of(parts: Sequence[SourceFile]) -> str:
     """A checksum of C files."""
-    return hashlib.sha256("\0".join(f"{part.fused} {part.text}" for part in parts).encode()).hexdigest()
+    return hashlib.sha256("\0".join(f"{part.fused} {part.small} {part.text}" for part in parts).encode()).hexdigest()
 
 
 def library_key(texts: str, compiler: Compiler, flags: Sequence[str]) -> str:

@@ -4,6 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from symphys.codegen.runtime.library import Loaded
+from symphys.codegen.runtime.thread_pool import MemoryPool
+
 
 @dataclass(frozen=True)
 class BuildReport:
@@ -34,3 +39,9 @@ class BuildReport:
     seconds: float
     note: str
     arena: int = 0
+
+    def memories(self, lanes: int, loaded: Loaded) -> MemoryPool:
+        """Memories for blocks of so many lanes of a library."""
+        real = np.dtype(np.float32 if self.precision == "single" else np.float64)
+        words = self.bytes_per_lane // real.itemsize + -(-8 * self.arena // (lanes * real.itemsize))
+        return MemoryPool(words, lanes, real, loaded.prepare)

@@ -16,12 +16,10 @@ from typing import Literal
 
 from symphys.codegen.program.program import Program
 from symphys.codegen.runtime.kernel import ProcessorKernel
-from symphys.codegen.toolchain.build import compiled, kernel_of, library_key, temporary_folder, width_of
+from symphys.codegen.toolchain.build import BlockWidth, KeptLibraries, compiled, kernel_of, temporary_folder, width_of
 from symphys.codegen.toolchain.cache import PLANS, Cache, default_cache
-from symphys.codegen.toolchain.compiler import find_compiler
 from symphys.codegen.toolchain.identity import identity_of, package_stamp
 from symphys.codegen.toolchain.plans import KeptPlan
-from symphys.codegen.toolchain.processor import processor
 
 Precision = Literal["double", "single"]
 
@@ -51,33 +49,31 @@ def compile_source(
     See ``compile_program`` for the other arguments.
     """
     started, single = time.perf_counter(), precision == "single"
-    cache, width = cache or default_cache(), width_of("auto", single)
+    cache, width = cache or default_cache(), BlockWidth(width_of("auto", single), single)
     key = None
     if source.identity is not None:
-        key = identity_of(source.identity, package_stamp(), width, precision, tuple(seeded))
+        key = identity_of(source.identity, package_stamp(), width.lanes, precision, tuple(seeded))
     if key is not None and (kept := _found(key[:32], source, cache)) is not None:
-        plan, path = kept
-        return kernel_of(path, plan, width, single, threads, started)
+        libraries = KeptLibraries(kept, width, cache)
+        if (loaded := libraries.find(width.lanes)) is not None:
+            return kernel_of((width.lanes, loaded), libraries, threads, started)
     program = source.make()
     names = tuple(name for name in seeded if name in program.outputs)
-    kernel, plan = compiled(program, names, width, single, cache, threads)
+    kernel, plan = compiled(program, names, width, cache, threads)
     if key is not None:
         _keep(key[:32], plan, cache)
     return kernel
 
 
-def _found(key: str, source: ProgramSource, cache: Cache) -> tuple[KeptPlan, Path] | None:
-    """The plan that is kept, and the library that belongs to it."""
+def _found(key: str, source: ProgramSource, cache: Cache) -> KeptPlan | None:
+    """The plan that is kept."""
     path = replace(cache, suffix=PLANS).find(key)
     if path is None:
         return None
     try:
-        plan = KeptPlan.read(path, source.make)
+        return KeptPlan.read(path, source.make)
     except (OSError, ValueError, KeyError):  # taken away meanwhile
         return None
-    compiler = find_compiler()
-    library = cache.find(library_key(plan.texts, compiler, compiler.flags(processor())))
-    return None if library is None else (plan, library)
 
 
 def _keep(key: str, plan: KeptPlan, cache: Cache) -> None:

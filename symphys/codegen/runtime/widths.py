@@ -1,0 +1,128 @@
+"""The libraries of one program, which differ in the lanes of a block: which one computes a call, and when it is made.
+
+One rollout in a block of 8 lanes wastes 7 of them, so few rows have libraries of their own. All give the same bits.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from math import inf
+from time import perf_counter
+from typing import Protocol
+
+from symphys.codegen.errors import KernelUnavailable
+from symphys.codegen.runtime.batch import RolloutBatch
+from symphys.codegen.runtime.library import BatchData, Loaded
+from symphys.codegen.runtime.thread_pool import MemoryPool
+
+NARROW = (1, 2)
+"""Lanes of the libraries for calls of so many rows."""
+PATIENCE = 2.0, 1e-4
+"""[s], and [s] for each operation of the kernel: about what compiling takes."""
+
+
+class Libraries(Protocol):
+    """Where the libraries of a program come from."""
+
+    def find(self, lanes: int) -> Loaded | None:
+        """The one that was built before, or None."""
+
+    def build(self, lanes: int) -> Loaded:
+        """A new one; KernelUnavailable if that cannot be."""
+
+
+@dataclass(frozen=True)
+class LoadedWidth:
+    """A library, and memories for its blocks."""
+
+    lanes: int
+    loaded: Loaded
+    pool: MemoryPool
+
+
+def suited(rows: int, full: int) -> int:
+    """The lanes that suit a call of so many rows best; ``full``: of a vector register."""
+    return next((lanes for lanes in NARROW if rows <= lanes < full), full)
+
+
+class Widths:
+    """The libraries of one program that are loaded.
+
+    A call runs on the best one that is loaded or kept in the cache. A better one is compiled when calls without it have
+    taken as long as compiling takes. So whoever never needs it does not wait for it.
+    """
+
+    def __init__(
+        self,
+        full: int,
+        first: tuple[int, Loaded],
+        pool: Callable[[int, Loaded], MemoryPool],
+        libraries: Libraries | None,
+        patience: float,
+    ) -> None:
+        """Begin with one library.
+
+        Args:
+            full: lanes of a vector register.
+            first: lanes and library.
+            pool: makes memories for a library of so many lanes.
+            libraries: where others come from; None: there are no others.
+            patience: [s] that calls may take before a library that suits them better is compiled.
+        """
+        self.full, self.patience = full, patience
+        self._pool, self._libraries = pool, libraries
+        self._widths: dict[int, LoadedWidth] = {}
+        self._sought, self._spent = {first[0]}, dict[int, float]()
+        self._lock = threading.Lock()
+        self._add(*first)
+
+    @property
+    def loaded(self) -> dict[int, LoadedWidth]:
+        """By lanes, what is loaded."""
+        return dict(self._widths)
+
+    def ready(self, rows: int) -> LoadedWidth:
+        """What computes a call of so many rows now; nothing is compiled."""
+        lanes = suited(rows, self.full)
+        if lanes not in self._sought and self._libraries is not None:
+            with self._lock:
+                if lanes not in self._sought and (found := self._libraries.find(lanes)) is not None:
+                    self._add(lanes, found)
+                self._sought.add(lanes)
+        there = sorted(self._widths)
+        return self._widths[next((each for each in there if each >= min(rows, self.full)), there[-1])]
+
+    def run(self, batch: RolloutBatch, threads: int) -> None:
+        """Compute a batch, its blocks spread over threads."""
+        width = self.ready(batch.rows)
+        self._timed(width, batch.rows, batch.parts(width.lanes, threads), threads)
+
+    def run_part(self, part: BatchData) -> None:
+        """Compute a part of a batch on this thread."""
+        self._timed(self.ready(part.rows), part.rows, [part], 1)
+
+    def _timed(self, width: LoadedWidth, rows: int, parts: Sequence[BatchData], threads: int) -> None:
+        began = perf_counter()
+        width.pool.run([partial(width.loaded.evaluate, part) for part in parts], threads)
+        if self._libraries is not None and (lanes := suited(rows, self.full)) != width.lanes:
+            self._spent[lanes] = self._spent.get(lanes, 0.0) + perf_counter() - began
+            if self._spent[lanes] >= self.patience:
+                self._build(lanes, self._libraries)
+
+    def _build(self, lanes: int, libraries: Libraries) -> None:
+        """Compile a library, unless another thread does; one that cannot be made is done without."""
+        if not self._lock.acquire(blocking=False):
+            return
+        try:
+            if lanes not in self._widths:
+                self._add(lanes, libraries.build(lanes))
+        except KernelUnavailable:
+            self._spent[lanes] = -inf
+        finally:
+            self._lock.release()
+
+    def _add(self, lanes: int, loaded: Loaded) -> None:
+        self._widths[lanes] = LoadedWidth(lanes, loaded, self._pool(lanes, loaded))
