@@ -24,18 +24,18 @@ class SourceFile:
     Attributes:
         text: C.
         fused: whether the compiler may fuse products and sums.
-        small: whether its code is to be short.
+        narrow: whether it is for fewer lanes than a vector register has.
     """
 
     text: str
     fused: bool = False
-    small: bool = False
+    narrow: bool = False
 
 
-def sources(plan: Plan, lanes: int, single: bool, few: bool = False) -> list[SourceFile]:
+def sources(plan: Plan, lanes: int, single: bool, narrow: bool = False) -> list[SourceFile]:
     """The C files; each compiles alone. Adjoints are fused; values are not, so that they are casadi's to the bit.
 
-    ``few``: of fewer lanes than a vector register has.
+    ``narrow``: of fewer lanes than a vector register has.
     """
     head = f"#define LANES {lanes}\n#define SINGLE {int(single)}\n"
     found = []
@@ -46,7 +46,7 @@ def sources(plan: Plan, lanes: int, single: bool, few: bool = False) -> list[Sou
         texts = [write(f"f{i}", *plan.functions[i], dialect) for i in mine]
         start = head + (NUMBERS if dialect is ONE_LANE else "") + resource("vector.h")
         for group in spread(texts, work, FILES):
-            found.append(SourceFile("\n".join([start, *group]), fused=backward, small=few))
+            found.append(SourceFile("\n".join([start, *group]), fused=backward, narrow=narrow))
     names = [f"f{number}" for number in range(len(plan.functions))]
     declared = "".join(f"void {name}(V *m, V *b, const word *t, word k);\n" for name in names)
     table = ", ".join(names) or "0"

@@ -95,7 +95,7 @@ def compiled(
     libraries = KeptLibraries(kept, width, cache)
     lanes = suited(rows, width.lanes) if rows is not None and width.several else width.lanes
     if lanes != width.lanes:
-        parts = sources(planned, lanes, width.single, few=True)
+        parts = sources(planned, lanes, width.single, narrow=True)
     with libraries.built(lanes, parts) as built:
         first = lanes, libraries.load(built.path)
         return kernel_of(first, libraries, threads, started, built), kept
@@ -219,7 +219,7 @@ def shared_library(parts: Sequence[SourceFile], cache: Cache, texts: str | None 
 
 def texts_of(parts: Sequence[SourceFile]) -> str:
     """A checksum of C files."""
-    return hashlib.sha256("\0".join(f"{part.fused} {part.small} {part.text}" for part in parts).encode()).hexdigest()
+    return hashlib.sha256("\0".join(f"{part.fused} {part.narrow} {part.text}" for part in parts).encode()).hexdigest()
 
 
 def library_key(texts: str, compiler: Compiler, flags: Sequence[str]) -> str:

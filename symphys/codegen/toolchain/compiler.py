@@ -19,8 +19,8 @@ from symphys.codegen.toolchain.processor import Processor
 
 FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-fvisibility=hidden", "-fno-math-errno", "-fno-trapping-math", "-w")
 """No -ffast-math: a NaN stays one, and sums keep their order."""
-SMALL = ("-Os",)
-"""More flags of functions for one rollout alone, whose time goes into fetching code: 5 % less for a robot."""
+NARROW = ("-fno-tree-vectorize", "-fno-tree-slp-vectorize")
+"""More flags where a lane is a number, or a vector is short: packing several into one takes longer."""
 LIMIT = 600.0
 """Seconds that a compiler may take for one file: far more than any kernel needs; one that hangs is stopped."""
 ANSWER = 60.0
@@ -53,8 +53,8 @@ class Compiler:
             file = target.with_suffix(".c")
             _write(file, source.text)
             fusing = f"-ffp-contract={'fast' if source.fused else 'off'}"
-            size = SMALL if source.small else ()
-            commands.append([*self.command, *flags, *size, fusing, "-c", str(file), "-o", str(target)])
+            extra = NARROW if source.narrow else ()
+            commands.append([*self.command, *flags, *extra, fusing, "-c", str(file), "-o", str(target)])
         run_all(commands, LIMIT, processors(), folder)
         library = folder / "kernel.so"
         run([*self.command, *flags, "-shared", *map(str, objects), "-o", str(library), "-lm"], LIMIT, folder)
