@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from worlds import problem_of
 
-from symphys.codegen import Kernel, compile_program
+from symphys.codegen import compile_program
 from symphys.transcription import rollout_program
 from symphys.transcription.rollout import symbolic_rollout
 
@@ -68,17 +68,19 @@ class Here:
     def __init__(self, scene: str, dt: float) -> None:
         """Compile."""
         rollout = symbolic_rollout(problem_of(text(scene, dt)))
-        self.kernel: Kernel = compile_program(rollout_program(rollout, exact=True), threads=1)
+        program = rollout_program(rollout, exact=True)
+        self.kernel, self.alone = (compile_program(program, threads=1, rows=rows) for rows in (None, 1))
         self.z, self.steps = starts(scene)[1].ravel(), round(duration(scene) / dt)
 
     def places(self) -> Array:
         """(balls, 3) at the end."""
-        return self.kernel.forward(self.z, [0.0])["residuals"][0].reshape(-1, 3)
+        return self.alone.forward(self.z, [0.0])["residuals"][0].reshape(-1, 3)
 
     def rate(self, batch: int) -> float:
         """Steps of the scene in a second; in a batch each begins with other velocities."""
         Z = self.z + (SPREAD if batch > 1 else 0) * np.random.default_rng(1).standard_normal((batch, len(self.z)))
-        return batch * self.steps / fastest(lambda: self.kernel.forward(Z, [0.0]))
+        kernel = self.alone if batch == 1 else self.kernel
+        return batch * self.steps / fastest(lambda: kernel.forward(Z, [0.0]))
 
 
 def there(scene: str, dt: float) -> tuple[mujoco.MjModel, mujoco.MjData]:

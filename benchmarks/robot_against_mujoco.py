@@ -55,7 +55,7 @@ class Candidate:
 def here(scene: JointedScene, sweeps: int, batch: int) -> Candidate:
     """This engine."""
     world = scene.world()
-    kernel = Rolling(world, Scheme(dt=DT, sweeps=sweeps, cuts=0), STEPS).kernel
+    kernel = Rolling(world, Scheme(dt=DT, sweeps=sweeps, cuts=0), STEPS, rows=batch).kernel
     states = scene.states(world)[:batch]
     seed = np.zeros(states.shape[1])
     seed[0] = 1.0

@@ -23,7 +23,7 @@ WORDS = 2_000_000
 
 
 class Rolling:
-    """Rollouts of one world under one scheme, eight states at a time in one thread."""
+    """Rollouts of one world under one scheme in one thread."""
 
     def __init__(
         self,
@@ -33,6 +33,7 @@ class Rolling:
         start: tuple[int, Callable[[Expr], Expr]] | None = None,
         end: Callable[[Expr], Expr] | None = None,
         seeded: Sequence[str] | None = None,
+        rows: int | None = None,
     ) -> None:
         """Say what is rolled out; it is compiled when first needed.
 
@@ -43,16 +44,17 @@ class Rolling:
             start: the size of z, and the state at the start as an expression of z; None: z is that state.
             end: what is asked of the state at the end; None: all of it.
             seeded: ("end",) or None: it can be differentiated; (): it cannot, which compiles faster.
+            rows: see ``compile_program``.
         """
         self.columns = Columns(world)
         self.world, self.scheme, self.steps = world, scheme, steps
         self.size, self.start = start or (self.columns.size, lambda z: z)
-        self.end, self.seeded = end or (lambda x: x), seeded
+        self.end, self.seeded, self.rows = end or (lambda x: x), seeded, rows
 
     @cached_property
     def kernel(self) -> Kernel:
         """The compiled rollout."""
-        return compile_program(self._program(), seeded=self.seeded, threads=1)
+        return compile_program(self._program(), seeded=self.seeded, threads=1, rows=self.rows)
 
     def ends(self, Z: Array) -> Array:
         """(batch, m) what is asked of the ends of rollouts from (batch, n)."""

@@ -10,6 +10,8 @@ static int LOWEST(unsigned long long bits) {
 }
 #endif
 
+#define SOON 2 /* steps to come of which lists have all that is needed, backwards: fewer lists, and few calls more */
+
 typedef struct {
   word forward, backward;   /* whether the lists of a direction have what is on */
   char *on, *needed, *seen; /* by guard: in the lists, needed in a step; by step and guard: needed */
@@ -174,8 +176,9 @@ static void run_left(const program *p, const left_out *x, word table, V *m, V *b
   }
 }
 
-/* Lists have all that is needed, and may have more: what has no effect may run. So those of before stay in for a while. */
-static void take_in(const program *p, left_out *x, const char *needed) {
+/* Lists have all that is needed, and may have more: what has no effect may run. So what is there stays for a while, and
+   what ``soon`` steps before this one needed comes in. */
+static void take_in(const program *p, left_out *x, const char *needed, word soon) {
   word guards = p->guards.count, missing = 0, wanted = 0, both = 0;
   for (word i = 0; i < guards; i++) {
     missing += needed[i] && !x->on[i];
@@ -184,7 +187,10 @@ static void take_in(const program *p, left_out *x, const char *needed) {
   }
   if (!missing) return;
   int keep = both <= wanted + wanted / 8 + 1;
-  for (word i = 0; i < guards; i++) x->on[i] = needed[i] || (keep && x->on[i]);
+  for (word i = 0; i < guards; i++) {
+    x->on[i] = needed[i] || (keep && x->on[i]);
+    for (word j = 1; j <= soon; j++) x->on[i] |= needed[i - j * guards];
+  }
   x->forward = x->backward = 0;
 }
 
@@ -194,7 +200,7 @@ static void step_left(const program *p, V *m, word k, int gradient) {
   char *needed = gradient ? x->seen + k * p->guards.count : x->needed;
   run(&first, m, 0, k);
   for (word i = 0; i < p->guards.count; i++) needed[i] = (char)any(m + p->guards.places[i]);
-  take_in(p, x, needed);
+  take_in(p, x, needed, 0);
   if (!x->forward) note(p, x, 0);
   x->forward = 1;
   run_left(p, x, 0, m, 0, k);
@@ -202,7 +208,7 @@ static void step_left(const program *p, V *m, word k, int gradient) {
 
 static void back_left(const program *p, V *m, V *b, word k) {
   left_out *x = left_of(p, m);
-  take_in(p, x, x->seen + k * p->guards.count);
+  take_in(p, x, x->seen + k * p->guards.count, k < SOON ? k : SOON);
   if (!x->backward) note(p, x, 1);
   x->backward = 1;
   run_left(p, x, 1, m, 0, k);

@@ -49,7 +49,7 @@ class Plant:
         self._state, self._time = slice(0, nx), 2 * nx
         self._kernel: ProcessorKernel | None = None
         with suppress(KernelUnavailable):
-            self._kernel = compile_program(step_program(arguments, True, False), threads=1)
+            self._kernel = compile_program(step_program(arguments, True, False), threads=1, rows=1)
 
     def step(self, x: Array, u: Array, time: float) -> Array:
         """(nx,) the state a step after x (nx,), with the inputs u (m,) at a time [s]."""
