@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from symphys.codegen.errors import ProgramError
 from symphys.codegen.program.program import Place
-from symphys.codegen.runtime.library import BatchData, RowSource
+from symphys.codegen.runtime.library import INPUTS, RESULTS, BatchData, RowSource
 
 Array = NDArray[np.float64]
 CHUNKS = 4
@@ -68,13 +68,19 @@ class RolloutBatch:
 
     def part(self, start: int, end: int) -> BatchData:
         """The rows from start to end; the arrays must outlive it."""
-        data = BatchData(end - start)
-        for name, array in self.inputs.items():
-            stride = array.shape[1] if array.ndim == 2 else 0
-            setattr(data, name, RowSource(array.ctypes.data + 8 * start * stride, stride))
-        for name, array in self.results.items():
-            setattr(data, name, array.ctypes.data + start * array[:1].nbytes)
+        sources = [_rows(self.inputs.get(name), start) for name in INPUTS]
+        results = [_address(self.results.get(name), start) for name in RESULTS]
         place = self.place
-        data.offset, data.size, data.stride, data.count = place.offset, place.size, place.stride, self.count
-        data.discount, data.skipped = self.discount, self.skipped
-        return data
+        numbers = place.offset, place.size, place.stride, self.count, self.discount, self.skipped
+        return BatchData(end - start, *sources, *results, *numbers)
+
+
+def _rows(array: Array | None, start: int) -> RowSource:
+    if array is None:
+        return RowSource(None, 0)
+    stride = array.shape[1] if array.ndim == 2 else 0
+    return RowSource(array.ctypes.data + 8 * start * stride, stride)
+
+
+def _address(array: Array | None, start: int) -> int | None:
+    return None if array is None else array.ctypes.data + start * array.strides[0]

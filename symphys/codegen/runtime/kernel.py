@@ -29,6 +29,7 @@ class Kernel(ABC):
     def __init__(self, program: Program, report: BuildReport, seeded: Sequence[str]) -> None:
         """``seeded``: names of the outputs that are differentiated."""
         self.program, self.report, self.seeded = program, report, tuple(seeded)
+        self._slices = program.output_slices()
 
     def forward(self, Z: ArrayLike, parameters: ArrayLike = (), skipped: int = 0) -> Outputs:
         """The outputs of rollouts.
@@ -99,10 +100,10 @@ class Kernel(ABC):
         return sum(self.program.outputs[name].size for name in self.seeded)
 
     def _width(self) -> int:
-        return sum(place.size for place in self.program.outputs.values())
+        return max((part.stop for part in self._slices.values()), default=0)
 
     def _named(self, outputs: Array) -> Outputs:
-        return {name: outputs[:, part] for name, part in self.program.output_slices().items()}
+        return {name: outputs[:, part] for name, part in self._slices.items()}
 
     @abstractmethod
     def _run(self, batch: RolloutBatch) -> None:

@@ -15,6 +15,8 @@ from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.program.program import Place, Program
 
 TABLES = ("prologue", "body", "epilogue", "again", "back_body", "back_prologue", "back_epilogue")
+INPUTS, RESULTS = ("z", "parameters", "seed"), ("outputs", "gradient", "trajectory")
+"""Of a batch, as the driver's ``batch`` lists them."""
 WORD = ctypes.c_int64
 Memory = Any
 """(words, lanes) float64 or float32, aligned: the values, the tape and the adjoints"""
@@ -60,8 +62,8 @@ class BatchData(ctypes.Structure):
 
     _fields_ = (
         ("rows", WORD),
-        *((name, RowSource) for name in ("z", "parameters", "seed")),
-        *((name, ctypes.c_void_p) for name in ("outputs", "gradient", "trajectory")),
+        *((name, RowSource) for name in INPUTS),
+        *((name, ctypes.c_void_p) for name in RESULTS),
         *((name, WORD) for name in ("offset", "size", "stride", "count")),
         ("discount", ctypes.c_double),
         ("skipped", WORD),

@@ -43,6 +43,10 @@ class LoadedWidth:
     pool: MemoryPool
 
 
+Choice = tuple[LoadedWidth, int]
+"""What computes a call, and the lanes that would suit it better; 0: none."""
+
+
 def suited(rows: int, full: int) -> int:
     """The lanes that suit a call of so many rows best; ``full``: of a vector register."""
     return next((lanes for lanes in NARROW if rows <= lanes < full), full)
@@ -75,6 +79,7 @@ class Widths:
         self.full, self.patience = full, patience
         self._pool, self._libraries = pool, libraries
         self._widths: dict[int, LoadedWidth] = {}
+        self._choices: dict[int, Choice] = {}
         self._sought, self._spent = {first[0]}, dict[int, float]()
         self._lock = threading.Lock()
         self._add(*first)
@@ -86,31 +91,44 @@ class Widths:
 
     def ready(self, rows: int) -> LoadedWidth:
         """What computes a call of so many rows now; nothing is compiled."""
-        lanes = suited(rows, self.full)
-        if lanes not in self._sought and self._libraries is not None:
-            with self._lock:
-                if lanes not in self._sought and (found := self._libraries.find(lanes)) is not None:
-                    self._add(lanes, found)
-                self._sought.add(lanes)
-        there = sorted(self._widths)
-        return self._widths[next((each for each in there if each >= min(rows, self.full)), there[-1])]
+        return self._chosen(rows)[0]
 
     def run(self, batch: RolloutBatch, threads: int) -> None:
         """Compute a batch, its blocks spread over threads."""
-        width = self.ready(batch.rows)
-        self._timed(width, batch.rows, batch.parts(width.lanes, threads), threads)
+        width, missing = self._chosen(batch.rows)
+        self._timed(width, missing, batch.parts(width.lanes, threads), threads)
 
     def run_part(self, part: BatchData) -> None:
         """Compute a part of a batch on this thread."""
-        self._timed(self.ready(part.rows), part.rows, [part], 1)
+        self._timed(*self._chosen(part.rows), [part], 1)
 
-    def _timed(self, width: LoadedWidth, rows: int, parts: Sequence[BatchData], threads: int) -> None:
+    def _chosen(self, rows: int) -> Choice:
+        """What computes calls of so many rows, and the lanes that would suit them better; 0: none."""
+        if (choice := self._choices.get(rows)) is not None:
+            return choice
+        lanes = suited(rows, self.full)
+        if self._libraries is not None:
+            self._seek(lanes, self._libraries)
+        there = sorted(self._widths)
+        width = self._widths[next((each for each in there if each >= min(rows, self.full)), there[-1])]
+        missing = 0 if self._libraries is None or width.lanes == lanes else lanes
+        self._choices[rows] = width, missing
+        return width, missing
+
+    def _timed(self, width: LoadedWidth, missing: int, parts: Sequence[BatchData], threads: int) -> None:
         began = perf_counter()
         width.pool.run([partial(width.loaded.evaluate, part) for part in parts], threads)
-        if self._libraries is not None and (lanes := suited(rows, self.full)) != width.lanes:
-            self._spent[lanes] = self._spent.get(lanes, 0.0) + perf_counter() - began
-            if self._spent[lanes] >= self.patience:
-                self._build(lanes, self._libraries)
+        if missing and self._libraries is not None:
+            self._spent[missing] = self._spent.get(missing, 0.0) + perf_counter() - began
+            if self._spent[missing] >= self.patience:
+                self._build(missing, self._libraries)
+
+    def _seek(self, lanes: int, libraries: Libraries) -> None:
+        """Load a library that was built before; it is looked for once."""
+        with self._lock:
+            if lanes not in self._sought and (found := libraries.find(lanes)) is not None:
+                self._add(lanes, found)
+            self._sought.add(lanes)
 
     def _build(self, lanes: int, libraries: Libraries) -> None:
         """Compile a library, unless another thread does; one that cannot be made is done without."""
@@ -119,6 +137,7 @@ class Widths:
         try:
             if lanes not in self._widths:
                 self._add(lanes, libraries.build(lanes))
+            self._choices.clear()
         except KernelUnavailable:
             self._spent[lanes] = -inf
         finally:
@@ -126,3 +145,4 @@ class Widths:
 
     def _add(self, lanes: int, loaded: Loaded) -> None:
         self._widths[lanes] = LoadedWidth(lanes, loaded, self._pool(lanes, loaded))
+        self._choices.clear()
