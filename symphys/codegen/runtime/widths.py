@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from math import inf
@@ -28,7 +29,7 @@ class Libraries(Protocol):
     """Where the libraries of a program come from."""
 
     def find(self, lanes: int) -> Loaded | None:
-        """The one that was built before, or None."""
+        """The one that was built before, or None; KernelUnavailable if it cannot be loaded."""
 
     def build(self, lanes: int) -> Loaded:
         """A new one; KernelUnavailable if that cannot be."""
@@ -107,7 +108,7 @@ class Widths:
         if (choice := self._choices.get(rows)) is not None:
             return choice
         lanes = suited(rows, self.full)
-        if self._libraries is not None:
+        if self._libraries is not None and lanes not in self._sought:
             self._seek(lanes, self._libraries)
         there = sorted(self._widths)
         width = self._widths[next((each for each in there if each >= min(rows, self.full)), there[-1])]
@@ -126,9 +127,12 @@ class Widths:
     def _seek(self, lanes: int, libraries: Libraries) -> None:
         """Load a library that was built before; it is looked for once."""
         with self._lock:
-            if lanes not in self._sought and (found := libraries.find(lanes)) is not None:
-                self._add(lanes, found)
+            if lanes in self._sought:
+                return
             self._sought.add(lanes)
+            with suppress(KernelUnavailable):
+                if (found := libraries.find(lanes)) is not None:
+                    self._add(lanes, found)
 
     def _build(self, lanes: int, libraries: Libraries) -> None:
         """Compile a library, unless another thread does; one that cannot be made is done without."""

@@ -158,7 +158,10 @@ def test_a_plan_that_was_kept_has_all_widths(own: Cache, monkeypatch: pytest.Mon
 
 
 @pytest.mark.usefixtures("at_once")
-def test_a_library_that_cannot_be_made_is_done_without(own: Cache, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("found", [False, True])
+def test_a_library_that_cannot_be_made_is_done_without(
+    found: bool, own: Cache, monkeypatch: pytest.MonkeyPatch
+) -> None:
     kernel = compile_program(programs.pendulum(), cache=own, threads=1)
     tried = []
 
@@ -167,10 +170,12 @@ def test_a_library_that_cannot_be_made_is_done_without(own: Cache, monkeypatch: 
         raise KernelUnavailable("the disk is full")
 
     monkeypatch.setattr(build.KeptLibraries, "build", refuse)
+    if found:
+        monkeypatch.setattr(build.KeptLibraries, "find", refuse)
     z = draw(kernel.program, 1)
     merits = [kernel.forward(z, [1.0])["merit"][0, 0] for _ in range(3)]
     assert merits[0] == merits[1] == merits[2]
-    assert (loaded(kernel), len(tried)) == ([kernel.report.lanes], 1)
+    assert (loaded(kernel), len(tried)) == ([kernel.report.lanes], 1 + found)
 
 
 @pytest.mark.usefixtures("at_once")
