@@ -56,6 +56,11 @@ class Guarding:
         """Rows of a kind; of calls without the last."""
         return len(self.rows[name]) // WIDTHS[name] - (name == "calls")
 
+    def mark_redirected(self, moves: NDArray[np.bool_]) -> None:
+        """Mark the strides in the tables that the driver replaces by that of a chain which moves with the step."""
+        positions, chains = self.rows["reads"].reshape(-1, 2).T
+        moves[positions + 1] |= self.rows["chains"].reshape(-1, 2)[chains, 1] != 0
+
 
 def guarding_of(program: Program, tables: Mapping[str, tuple[Sequence[FunctionCall], Entries]]) -> Guarding | None:
     """Of a program; None if it has neither guards nor sections.

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.codegen.emit.functions import DistinctFunctions
-from symphys.codegen.emit.guarding import Guarding, guarding_of
+from symphys.codegen.emit.guarding import TABLES, Guarding, guarding_of
 from symphys.codegen.emit.writer import Form
 from symphys.codegen.graph.activity import Activity, CallActivity, Words
 from symphys.codegen.graph.adjoint import Mask
@@ -41,6 +41,28 @@ class Plan:
     tape: int
     written: Table
     guarding: Guarding | None = None
+
+    def moving(self) -> list[set[int]]:
+        """For each function, which of its places move with the step in any of its calls."""
+        found: list[set[int]] = [set() for _ in self.functions]
+        order = [*TABLES, *(name for name in self.tables if name not in TABLES)]
+        words = np.concatenate([self.tables[name][1] for name in order])
+        moves = words != 0
+        if self.guarding is not None:
+            self.guarding.mark_redirected(moves)
+        starts: dict[int, list[int]] = {}
+        begin = 0
+        for count, table in (self.tables[name] for name in order):
+            entries, at = table.tolist(), 0
+            for _ in range(count):
+                starts.setdefault(entries[at], []).append(begin + at)
+                at += entries[at + 1]
+            begin += len(table)
+        for number, calls in starts.items():
+            places = np.arange((words[calls[0] + 1] - 2) // 2)
+            strides = moves[np.array(calls)[:, None] + 3 + 2 * places]
+            found[number] = set(np.flatnonzero(strides.any(axis=0)).tolist())
+        return found
 
 
 def plan(program: Program, seeded: Sequence[str], word: int = 64) -> Plan:

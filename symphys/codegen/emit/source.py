@@ -38,12 +38,12 @@ def sources(plan: Plan, lanes: int, single: bool, narrow: bool = False) -> list[
     ``narrow``: of fewer lanes than a vector register has.
     """
     head = f"#define LANES {lanes}\n#define SINGLE {int(single)}\n"
-    found = []
+    found, moving = [], plan.moving()
     for backward in (False, True):
         mine = [i for i, (_, form) in enumerate(plan.functions) if form.backward == backward]
         work = [len(plan.functions[i][0].nodes) for i in mine]
         dialect = forms_of(lanes, backward)
-        texts = [write(f"f{i}", *plan.functions[i], dialect) for i in mine]
+        texts = [write(f"f{i}", *plan.functions[i], dialect, moving[i]) for i in mine]
         start = head + (NUMBERS if dialect is ONE_LANE else "") + resource("vector.h")
         for group in spread(texts, work, FILES):
             found.append(SourceFile("\n".join([start, *group]), fused=backward, narrow=narrow))

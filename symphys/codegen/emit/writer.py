@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from symphys.codegen.emit.dialect import VECTORS, Dialect
@@ -32,8 +32,13 @@ class Form:
     shared: bool = False
 
 
-def write(name: str, graph: Graph, form: Form, dialect: Dialect = VECTORS) -> str:
-    """The C function ``name(m, b, t, k)``: memory, adjoint memory, places as (offset, stride) pairs, step."""
+def write(
+    name: str, graph: Graph, form: Form, dialect: Dialect = VECTORS, moving: Collection[int] | None = None
+) -> str:
+    """The C function ``name(m, b, t, k)``: memory, adjoint memory, places as (offset, stride) pairs, step.
+
+    ``moving``: the places that may have a stride; None: all.
+    """
     pieces = _cut(graph, dialect)
     pointers = _pointers(graph, form, dialect)
     parameters = ", ".join(f"{kind}{pointer}" for kind, pointer, _ in pointers) + ", V *restrict w"
@@ -47,7 +52,7 @@ def write(name: str, graph: Graph, form: Form, dialect: Dialect = VECTORS) -> st
             ]
         head = f"{dialect.inline if len(pieces) == 1 else dialect.apart} {name}_{i}({parameters})"
         text.append("\n  ".join([f"{head} {{", "(void)w;", *lines]) + "\n}\n")
-    return "".join([*text, _entry(name, pointers, len(pieces), len(pieces[0].slots), dialect)])
+    return "".join([*text, _entry(name, pointers, pieces, dialect, moving)])
 
 
 @dataclass
@@ -133,11 +138,19 @@ def _pointers(graph: Graph, form: Form, dialect: Dialect) -> list[tuple[str, str
     return [*primal, *seeds, *((kind, f"o{i}", memory) for i in range(len(graph.results)))]
 
 
-def _entry(name: str, pointers: Sequence[tuple[str, str, str]], pieces: int, slots: int, dialect: Dialect) -> str:
-    places = [f"{memory} + t[{2 * i}] + k * t[{2 * i + 1}]" for i, (_, _, memory) in enumerate(pointers)]
+def _entry(
+    name: str,
+    pointers: Sequence[tuple[str, str, str]],
+    pieces: Sequence[_Piece],
+    dialect: Dialect,
+    moving: Collection[int] | None,
+) -> str:
+    steps = [f" + k * t[{2 * i + 1}]" if moving is None or i in moving else "" for i in range(len(pointers))]
+    places = [f"{memory} + t[{2 * i}]{steps[i]}" for i, (_, _, memory) in enumerate(pointers)]
+    slots = len(pieces[0].slots)
     arguments = ", ".join([*places, "w" if slots else "0"])
     lines = [f"V w[{slots}];"] if slots else []
-    lines += [f"{name}_{i}({arguments});" for i in range(pieces)]
+    lines += [f"{name}_{i}({arguments});" for i in range(len(pieces))]
     head = f"{dialect.entry} {name}(V *m, V *b, const word *t, word k) {{"
     return "\n  ".join([head, "(void)b;", *lines]) + "\n}\n"
 
