@@ -27,6 +27,7 @@ from symphys.transcription.formula_names import (
     varied_parameters,
 )
 from symphys.transcription.formulas.motion_parts import part_arguments
+from symphys.transcription.objective import plain_sums
 from symphys.transcription.termination import termination_function
 
 T = TypeVar("T")
@@ -221,6 +222,10 @@ class Rollout:
         if not self.moves(formula):
             return before
         return ca.horzcat(before, self.after_steps(formula))
+
+    def sums(self, samples: Expr, scale: Any = None) -> tuple[Expr, Expr]:
+        """See ``Sampled.sums``."""
+        return plain_sums(samples, scale)
 
     def _mapped(self, formula: Formula, x: Expr, ticks: Any) -> Expr:
         stage = self.compiled(formula).map(self.steps)
