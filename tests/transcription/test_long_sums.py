@@ -1,4 +1,4 @@
-"""Sums over long motions are short calls: bits, gradients, and a program whose functions are no longer for more steps."""
+"""Sums over long motions are short calls: bits, gradients, and functions that are no longer for more steps."""
 
 from __future__ import annotations
 
