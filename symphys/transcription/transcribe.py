@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import cache
 from time import perf_counter
 
-from symphys.codegen.backends import BEST, BackendSource, choose
+from symphys.codegen.backends import BEST, Backend, BackendSource, choose
 from symphys.problem import GuessedMotion, Problem
 from symphys.shooting import GuessedStates, ShootingProblem, StagedProblem
 from symphys.transcription.decision_variables import blocks
@@ -64,14 +64,7 @@ def transcribe(
     functions = ExpressionFunctions(rollout)
     names, lower, upper = bounds(problem, lambda formula: int(rollout.compiled(formula).size1_out(0)))
     built = perf_counter() - began
-    inputs = () if backend == "casadi" else inputs_of(problem)
-    if inputs:
-        chosen = shared_backend(problem, inputs, functions.nlp, exact, backend, threads)
-    else:
-        source = BackendSource(
-            functions, lambda: rollout_program(rollout, exact), exact, program_identity(problem, exact)
-        )
-        chosen = choose(backend, source, threads)
+    chosen = _evaluating(rollout, functions, exact, backend, threads)
     staged = cache(lambda: RolloutStages(rollout, backend, threads, exact or not any(problem.simulation.smoothing)))
     shooting = ShootingProblem(
         name=problem.name,
@@ -90,6 +83,18 @@ def transcribe(
         guessed_states=states_of(staged, problem.guess),
     )
     return Transcription(problem, rollout, functions, shooting, chosen.description, built)
+
+
+def _evaluating(
+    rollout: Rollout, functions: ExpressionFunctions, exact: bool, backend: str, threads: int | None
+) -> Backend:
+    """What evaluates a rollout; problems of a sweep share a kernel."""
+    problem = rollout.problem
+    inputs = () if backend == "casadi" else inputs_of(problem)
+    if inputs:
+        return shared_backend(problem, inputs, functions.nlp, exact, backend, threads)
+    source = BackendSource(functions, lambda: rollout_program(rollout, exact), exact, program_identity(problem, exact))
+    return choose(backend, source, threads)
 
 
 def states_of(staged: Callable[[], StagedProblem] | None, guess: GuessedMotion | None) -> GuessedStates | None:
