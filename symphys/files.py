@@ -168,16 +168,6 @@ def modified(path: Path) -> int | None:
         return None
 
 
-def date(path: Path, time: int | None) -> None:
-    """Give a file the time [ns] of what it was made from; nothing where that cannot be.
-
-    A file is up to date where the two times are equal. Which is later says nothing once a clock was set.
-    """
-    if time is not None:
-        with contextlib.suppress(OSError):
-            os.utime(path, ns=(time, time))
-
-
 def check_regular(path: Path) -> None:
     """Raise OSError, whose text says what is valid, if reading a path could wait for ever; the path is not opened."""
     kind = SPECIAL.get(stat.S_IFMT(path.stat().st_mode))

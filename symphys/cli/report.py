@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import click
 
 from symphys import threads
+from symphys.findings.writing import several
 
 if TYPE_CHECKING:
     from symphys.report import WantedPages
@@ -37,29 +38,36 @@ pages_option = click.option(
 @click.command()
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 @pages_option
-@click.option("--new", "only_new", is_flag=True, help="Of runs make only pages that are missing or out of date.")
+@click.option("--all", "remake", is_flag=True, help="Make all pages, also where nothing that they show has changed.")
+@click.option("--new", is_flag=True, hidden=True, help="Make only pages that are missing or out of date: the default.")
 @click.option(
     "--jobs",
     type=click.IntRange(1, MOST_JOBS),
     default=None,
     help="How many processes make pages.  [default: one for each processor]",
 )
-def report(folder: Path, pages: str, only_new: bool, jobs: int | None) -> int:
-    """Make the report of a run folder, or of all runs below a folder, again from its files alone.
+def report(folder: Path, pages: str, remake: bool, new: bool, jobs: int | None) -> int:
+    """Make the report of a run folder, or of all runs below a folder, from its files alone.
 
-    Pages of identifications are made too.
+    A page is made where it is missing, or where a file that it shows or what draws it has changed since. Pages of
+    identifications are made too.
     """
+    if remake and new:
+        raise click.UsageError("--all makes all pages, --new those that are out of date; give one of them")
     threads.limit()
     from symphys.codegen.toolchain.compiler import processors
-    from symphys.report import identification_folders, wanted_below, write_identification_page
+    from symphys.report import identification_folders, outdated, wanted_below, write_identification_page
     from symphys.results.discovery import run_folders
 
     identified = identification_folders(folder)
     for each in identified:
-        click.echo(write_identification_page(each))
+        if remake or outdated(each, ("full",)):
+            click.echo(write_identification_page(each))
     if identified and not run_folders(folder):
         return 0
-    made = make_shown(wanted_below(folder, only_new), pages, jobs or processors())
+    made = make_shown(wanted_below(folder, pages, remake), pages, jobs or processors())
+    if made.kept:
+        click.echo(f"{several(made.kept, 'page')} of runs up to date; --all makes all again", err=True)
     printed = [page for page in made.runs if page != made.page]
     if len(printed) > MOST_PRINTED:
         kind = ", light ones; --pages full makes full ones" if made.light else ""
@@ -81,7 +89,7 @@ def make_shown(wanted: WantedPages, kind: str, jobs: int, silent: bool = False) 
         with nullcontext() if silent else shown(progress):
             made = make_pages(wanted, kind, jobs, progress.tell)
     except KeyboardInterrupt:
-        again = shlex.join(["symphys", "report", str(wanted.root), "--new"])
+        again = shlex.join(["symphys", "report", str(wanted.root)])
         click.echo(f"symphys: {progress.over} of {progress.runs} pages were made; `{again}` makes the others", err=True)
         raise
     for fault in made.faults[:MOST_NAMED]:

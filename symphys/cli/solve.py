@@ -249,6 +249,8 @@ def time_line(total: float, parts: Mapping[str, float]) -> str:
 def write_reports(jobs: list[Job], out: Path, pages: str, processes: int, silent: bool) -> MadePages:
     """Make the pages of the runs that are new, and that of the batch; ``silent``: say only which cannot be made."""
     from symphys.report import WantedPages, outdated
+    from symphys.results.file_names import RESULT
 
-    new = dict.fromkeys(job.folder.path for job in jobs if outdated(job.folder.path))
+    over = dict.fromkeys(job.folder.path for job in jobs if (job.folder.path / RESULT).exists())
+    new = [folder for folder in over if outdated(folder)]
     return make_shown(WantedPages(out, tuple(new)), pages, processes, silent)

@@ -31,7 +31,8 @@ def roll_out(step: ca.Function, steps: int, x0: Expr, u: Expr, p: Expr, smoothin
         >>> x[Layout(world)["ball.position"], :].shape  # expressions, in any casadi problem
         (3, 101)
     """
-    horizon = step.mapaccum(f"{step.name()}_{steps}", steps)
+    whole = {"base": -1}  # all steps side by side: nested groups of steps take longer to build and to differentiate
+    horizon = step.mapaccum(f"{step.name()}_{steps}", steps, whole)
     outputs: Any = horizon(x0, u, ca.repmat(p, 1, steps), ca.repmat(ca.MX(smoothing), 1, steps))
     outputs = outputs if isinstance(outputs, tuple) else (outputs,)
     return (ca.horzcat(x0, outputs[0]), *outputs[1:])

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.codegen import processors
+from symphys.codegen.backends.calls import BufferedFunction
 from symphys.shooting import Evaluator
 from symphys.transcription.objective import Terms
 from symphys.transcription.rollout import Rollout
@@ -44,23 +47,36 @@ class ExpressionProbe:
     """
 
     def __init__(self, rollout: Rollout, asked: Terms, evaluator: Evaluator) -> None:
-        """Build the functions."""
-        number = combined(asked.means)
-        self._evaluator = evaluator
-        self._value = _exact(rollout, "probe", number)
-        self._gradient = _exact(rollout, "probe_gradient", ca.gradient(number, rollout.z))
+        """Functions are built when they are asked for."""
+        self._rollout, self._number = rollout, combined(asked.means)
+        self._evaluator: Evaluator | None = evaluator
+        self._calls: dict[int, BufferedFunction] = {}
+        self._slopes: dict[bytes, Array] = {}
 
     def values(self, Z: Array) -> Array:
-        """See ``Probe``."""
-        known = self._evaluator.value(Z, 0.0).probe
-        return np.array([float(self._value(z)) for z in Z]) if known is None else known
+        """See ``Probe``; the virtual machine's on all processors."""
+        known = None if self._evaluator is None else self._evaluator.value(Z, 0.0).probe
+        if known is not None:
+            return known
+        self._evaluator = None
+        if len(Z) not in self._calls:
+            self._calls[len(Z)] = BufferedFunction(self._value, len(Z), processors())
+        return self._calls[len(Z)](Z, 0.0)[0][:, 0]
 
     def gradient(self, z: Array) -> Array:
-        """See ``Probe``."""
-        return np.array(self._gradient(z)).ravel()
+        """See ``Probe``; that of the last z is kept."""
+        key = np.asarray(z, np.float64).tobytes()
+        if key not in self._slopes:
+            self._slopes = {key: np.array(self._gradient(z, 0.0)).ravel()}
+        return self._slopes[key].copy()
 
+    @cached_property
+    def _value(self) -> ca.Function:
+        return self._function("probe", self._number)
 
-def _exact(rollout: Rollout, name: str, output: Expr) -> ca.Function:
-    z = ca.MX.sym("z", rollout.z.shape[0])
-    smooth = ca.Function(name, [rollout.z, rollout.smoothing], [ca.densify(output)])
-    return ca.Function(name, [z], [smooth(z, 0)])
+    @cached_property
+    def _gradient(self) -> ca.Function:
+        return self._function("probe_gradient", ca.gradient(self._number, self._rollout.z))
+
+    def _function(self, name: str, output: Expr) -> ca.Function:
+        return ca.Function(name, [self._rollout.z, self._rollout.smoothing], [ca.densify(output)])

@@ -41,6 +41,9 @@ class Sampled(Protocol):
     def over_steps(self, formula: Formula) -> Expr:
         """(m, N or 2N) samples whose mean is the time average."""
 
+    def sums(self, samples: Expr, scale: Any = None) -> tuple[Expr, Expr]:
+        """(m,) the sum of the columns; the sum of the squares of scale times each number, None without a scale."""
+
 
 @dataclass(frozen=True)
 class Terms:
@@ -148,6 +151,11 @@ def _stack(parts: list[Expr]) -> Expr:
     return ca.vertcat(ca.MX(0, 1), *(ca.vec(part) for part in parts))
 
 
+def plain_sums(samples: Expr, scale: Any = None) -> tuple[Expr, Expr]:
+    """See ``Sampled.sums``."""
+    return ca.sum2(samples), None if scale is None else ca.sumsqr(scale * ca.vec(samples))
+
+
 def _mean(samples: Expr) -> Expr:
     """(m,): the mean of the columns."""
     return ca.sum2(samples) / samples.shape[1]
@@ -176,10 +184,12 @@ def _cost(rollout: Sampled, cost: Cost) -> _Cost:
         weight = cost.weight * rollout.interval * steps / samples.shape[1]
     else:
         samples, weight = rollout.at(cost.formula, cost.at), cost.weight
-    if cost.squares:
-        residual = ca.sqrt(weight) * ca.vec(samples)
-        return _Cost(ca.sumsqr(residual), residual, _mean(samples))
-    return _Cost(weight * ca.sum2(samples), None, _mean(samples))
+    scale = ca.sqrt(weight) if cost.squares else None
+    total, squares = rollout.sums(samples, scale)
+    mean = total / samples.shape[1]
+    if scale is None:
+        return _Cost(weight * total, None, mean)
+    return _Cost(squares, scale * ca.vec(samples), mean)
 
 
 def _miss(target: Target, value: Expr) -> Expr:

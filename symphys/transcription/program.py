@@ -23,9 +23,10 @@ from symphys.problem import ALIVE, Problem
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.feedback.controller_calls import Places, control_calls
 from symphys.transcription.formula_names import spans
+from symphys.transcription.formulas.long_sums import LONG, sums_in_calls
 from symphys.transcription.formulas.motion_parts import part_arguments
 from symphys.transcription.gradient_probe import combined
-from symphys.transcription.objective import Terms, terms
+from symphys.transcription.objective import Terms, plain_sums, terms
 from symphys.transcription.rollout import Rollout
 
 Expr = Any
@@ -50,12 +51,14 @@ class ProgramSamples:
         self.p, self.given = self.layout.take(np_), self.layout.series(nu, self.steps)
         controls = {each.name for each in self.problem.variables if each.kind == "control"}
         alone = not rollout.world.scheduled and controls <= set(by_step)  # nothing else sets inputs: they begin with 0
-        self.begun = self.layout.series(0 if alone else nu, self.steps) if by_step else self.given
+        self.begun = self.layout.series(0 if alone else nu, self.steps) if by_step or alone else self.given
         self.u = self.given if rollout.feedback is None else self.layout.series(nu, self.steps)
         self.x = self.layout.series(nx, self.steps + 1)
         self.time = self.layout.series(1, self.steps + 1)
         self.calls: list[FunctionCall] = []
+        self.sum_calls: list[FunctionCall] = []
         self.symbols: dict[Place, Expr] = {}
+        self._series_of: dict[int, tuple[Expr, list[Place]]] = {}
 
     @property
     def interval(self) -> Expr:
@@ -85,7 +88,21 @@ class ProgramSamples:
     def over_steps(self, formula: Formula) -> Expr:
         """(m, N or 2N): see ``Rollout.over_steps``."""
         before = self._series(formula, 0)
-        return ca.horzcat(before, self.after_steps(formula)) if self.rollout.moves(formula) else before
+        if not self.rollout.moves(formula):
+            return before
+        after = self.after_steps(formula)
+        return self._known(ca.horzcat(before, after), [*self._places(before), *self._places(after)])
+
+    def sums(self, samples: Expr, scale: Any = None) -> tuple[Expr, Expr]:
+        """See ``Sampled.sums``; of many samples in calls."""
+        places, fixed = self._places(samples), scale is None or not isinstance(scale, ca.MX)
+        if not places or samples.numel() < LONG or not fixed:
+            return plain_sums(samples, scale)
+        rows = int(samples.shape[0])
+        calls, total = sums_in_calls(self.layout, places, rows, None if scale is None else float(scale))
+        self.sum_calls += calls
+        symbol = self.symbol(total)
+        return symbol[:rows], None if scale is None else symbol[rows]
 
     def recorded(self, formula: Formula, shift: int = 1) -> Place:
         """The formula's values of all steps, one after the other: at their starts (0) or at their ends (1)."""
@@ -98,7 +115,16 @@ class ProgramSamples:
 
     def _series(self, formula: Formula, shift: int) -> Expr:
         whole = self.recorded(formula, shift)
-        return ca.reshape(self.symbol(whole), whole.size // self.steps, self.steps)
+        return self._known(ca.reshape(self.symbol(whole), whole.size // self.steps, self.steps), [whole])
+
+    def _known(self, samples: Expr, places: list[Place]) -> Expr:
+        """The samples, of which it is known from now on where they lie."""
+        self._series_of[samples.__hash__()] = samples, places
+        return samples
+
+    def _places(self, samples: Expr) -> list[Place]:
+        """Where samples lie, one series after the other; nothing if that is not known."""
+        return self._series_of.get(samples.__hash__(), (None, []))[1]
 
 
 def dense(function: ca.Function) -> ca.Function:
@@ -151,7 +177,7 @@ def _rollout_program(
         outputs=outputs,
         prologue=_prologue(samples),
         body=(*body, *samples.calls),
-        epilogue=(epilogue,),
+        epilogue=(*samples.sum_calls, epilogue),
         constants=fixed,
         discounted=AdjointDiscount(samples.x, alive),
     )
@@ -252,8 +278,11 @@ def _part(place: Place, columns: slice) -> Place:
 
 
 def _knot_calls(samples: ProgramSamples) -> list[FunctionCall]:
-    """The call that adds a step's knots to its other inputs; none without variables whose knots steps read."""
-    if not samples.by_step:
+    """The call that adds a step's knots to its other inputs, which are 0 where nothing else sets them.
+
+    There is none where the prologue writes inputs as they are, and none without inputs.
+    """
+    if samples.begun == samples.given or not samples.given.size:
         return []
     problem, columns = samples.problem, input_columns(samples.rollout.world, samples.rollout.inputs)
     begun = ca.SX.sym("begun", samples.begun.size)
@@ -299,6 +328,8 @@ def _epilogue(samples: ProgramSamples, asked: Terms) -> tuple[FunctionCall, dict
     if asked.residuals is not None:
         parts["residuals"] = asked.residuals
     parts = {name: ca.densify(part) for name, part in parts.items() if part.shape[0]}
-    function = ca.Function("aims", list(samples.symbols.values()), list(parts.values())).expand()
+    read = {symbol.__hash__() for symbol in ca.symvar(ca.veccat(*parts.values()))}
+    symbols = {place: symbol for place, symbol in samples.symbols.items() if symbol.__hash__() in read}
+    function = ca.Function("aims", list(symbols.values()), list(parts.values())).expand()
     outputs = {name: samples.layout.take(int(part.shape[0])) for name, part in parts.items()}
-    return FunctionCall(function, tuple(samples.symbols), tuple(outputs.values())), outputs
+    return FunctionCall(function, tuple(symbols), tuple(outputs.values())), outputs

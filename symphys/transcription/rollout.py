@@ -10,11 +10,11 @@ from typing import Any, TypeVar
 import casadi as ca
 import numpy as np
 
-from symphys.dynamics.functions import step_function
+from symphys.dynamics.functions import InlineSteps, report_function, step_function
 from symphys.dynamics.horizon import roll_out
-from symphys.dynamics.kept import kept
+from symphys.dynamics.kept import kept, structure
 from symphys.expression import Formula
-from symphys.model.world import World
+from symphys.model.world import Scheme, World
 from symphys.problem import Problem
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.feedback.controllers import Control
@@ -27,6 +27,7 @@ from symphys.transcription.formula_names import (
     varied_parameters,
 )
 from symphys.transcription.formulas.motion_parts import part_arguments
+from symphys.transcription.objective import plain_sums
 from symphys.transcription.termination import termination_function
 
 T = TypeVar("T")
@@ -49,6 +50,7 @@ class Rollout:
         x0: (nx,) initial state.
         given: (nu, N) inputs as variables give them; controllers add to them. Shares of phases are last.
         p: (np,).
+        like: a rollout of an equal world under another scheme, whose steps this one's have parts in common with.
     """
 
     problem: Problem
@@ -61,6 +63,7 @@ class Rollout:
     x0: Expr
     given: Expr
     p: Expr
+    like: Rollout | None = None
 
     @property
     def controls(self) -> int:
@@ -74,14 +77,39 @@ class Rollout:
     @cached_property
     def step(self) -> ca.Function:
         """One step (x, u, p, smoothing) -> x_next; built when first asked for, since one expression takes its time."""
-        return self.remembering(self.built(step_function))
+        if self._shares:
+            return self.remembering(self.built(step_function))
+        steps, scheme = self._inline
+        return self.remembering(steps.step(scheme))
+
+    @cached_property
+    def report(self) -> ca.Function:
+        """The step with all that happens in it; see ``report_function``."""
+        if self._shares:
+            return self.remembering(self.built(report_function))
+        steps, scheme = self._inline
+        return self.remembering(steps.report(scheme))
+
+    @property
+    def _inline(self) -> tuple[InlineSteps, Scheme]:
+        """The steps of this world, and the scheme of this rollout in their symbols."""
+        first = self.like or self
+        return first._steps, first.parameters.scheme(self.problem.simulation)
+
+    @cached_property
+    def _steps(self) -> InlineSteps:
+        return InlineSteps(self.world, self.inputs, self.parameters.symbols)
+
+    @property
+    def _shares(self) -> bool:
+        """Whether problems of a sweep share what is built."""
+        return bool(self.problem.varied) and not self.problem.free_duration and not self.world.scheduled
 
     def built(self, make: Callable[..., T], *more: Hashable) -> T:
         """What a function makes of the world; problems of a sweep share it, as far as their worlds are equal."""
         scheme = self.parameters.scheme(self.problem.simulation)
         arguments = (self.world, scheme, self.inputs, self.parameters.symbols)
-        shared = self.problem.varied and not self.problem.free_duration and not self.world.scheduled
-        return kept(make, *arguments, *more) if shared else make(*arguments, *more)
+        return kept(make, *arguments, *more) if self._shares else make(*arguments, *more)
 
     def remembering(self, step: ca.Function) -> ca.Function:
         """A function (x, u, p, smoothing) -> (x_next, ...) of the world's state, for states with memory."""
@@ -195,6 +223,10 @@ class Rollout:
             return before
         return ca.horzcat(before, self.after_steps(formula))
 
+    def sums(self, samples: Expr, scale: Any = None) -> tuple[Expr, Expr]:
+        """See ``Sampled.sums``."""
+        return plain_sums(samples, scale)
+
     def _mapped(self, formula: Formula, x: Expr, ticks: Any) -> Expr:
         stage = self.compiled(formula).map(self.steps)
         p, z = ca.repmat(self.p, 1, self.steps), self.z
@@ -213,8 +245,11 @@ class Rollout:
         return any(variable.name in formula.names for variable in self.problem.variables)
 
 
-def symbolic_rollout(problem: Problem, inputs: tuple[str, ...] | None = None) -> Rollout:
-    """The rollout of a problem over its horizon; ``inputs`` may name more than the problem itself makes use of."""
+def symbolic_rollout(problem: Problem, inputs: tuple[str, ...] | None = None, like: Rollout | None = None) -> Rollout:
+    """The rollout of a problem over its horizon; ``inputs`` may name more than the problem itself makes use of.
+
+    ``like``: a rollout of the problem under another scheme. Where their worlds are equal, steps are built together.
+    """
     parameters = varied_parameters(problem)
     scheduled = tuple((share.name, share.symbol) for share in parameters.phases.shares)
     inputs = (*(input_names(problem) if inputs is None else inputs), *(name for name, _ in scheduled))
@@ -222,7 +257,16 @@ def symbolic_rollout(problem: Problem, inputs: tuple[str, ...] | None = None) ->
     z = ca.MX.sym("z", sum(v.guess.size for v in problem.variables))
     smoothing = ca.MX.sym("smoothing")
     start, memory = start_of(problem, world, inputs, parameters, z), memory_of(problem, world)
-    return Rollout(problem, world, inputs, parameters, memory, z, smoothing, memory.start(start.x0), start.u, start.p)
+    made = Rollout(problem, world, inputs, parameters, memory, z, smoothing, memory.start(start.x0), start.u, start.p)
+    if like is None or not same_worlds(made, like):
+        return made
+    return replace(made, like=like.like or like)
+
+
+def same_worlds(one: Rollout, other: Rollout) -> bool:
+    """Whether the steps of two rollouts are equal functions, but for their schemes."""
+    first, second = (structure(each.world, each.parameters.symbols) for each in (one, other))
+    return first == second and one.inputs == other.inputs
 
 
 def call(function: ca.Function, *arguments: Expr) -> list[Expr]:

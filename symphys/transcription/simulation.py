@@ -10,7 +10,6 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.dynamics.functions import report_function
 from symphys.dynamics.observation import reading_function
 from symphys.model.joints import Joint
 from symphys.model.state_layout import GIVEN, Layout, input_columns
@@ -33,8 +32,7 @@ class Record:
 
 def recorder(rollout: Rollout) -> ca.Function:
     """(z, smoothing) -> (x, u, given, p, forces, gaps, residual, crowded, ambiguous, paradox) of the whole horizon."""
-    step = rollout.built(report_function)
-    x, u, happened = rollout.rolled(rollout.remembering(step))
+    x, u, happened = rollout.rolled(rollout.report)
     return ca.Function("record", [rollout.z, rollout.smoothing], [x, u, rollout.given, rollout.p, *happened])
 
 
@@ -54,7 +52,7 @@ def simulate(rollout: Rollout, record: Callable[..., Any], z: Array, smoothing: 
 
 def motion_of(rollout: Rollout, time: Array, x: Array, u: Array, p: Array) -> Trajectory:
     """The motion of states (K + 1, nx) that were simulated step by step, with inputs (K, m), at times (K + 1,)."""
-    report, steps = rollout.remembering(rollout.built(report_function)), len(u)
+    report, steps = rollout.report, len(u)
     if rollout.feedback is not None:
         pairs = zip(x, u, time, strict=False)
         u = np.array([np.array(rollout.feedback(state, given, p, now)).ravel() for state, given, now in pairs])

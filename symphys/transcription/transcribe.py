@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import cache
 from time import perf_counter
 
-from symphys.codegen.backends import BEST, BackendSource, choose
+from symphys.codegen.backends import BEST, Backend, BackendSource, choose
 from symphys.problem import GuessedMotion, Problem
 from symphys.shooting import GuessedStates, ShootingProblem, StagedProblem
 from symphys.transcription.decision_variables import blocks
@@ -21,14 +21,20 @@ from symphys.transcription.network_rollout import (
 from symphys.transcription.objective import bounds, has_squares, limits
 from symphys.transcription.program import program_identity, rollout_program
 from symphys.transcription.randomization import with_scenarios
-from symphys.transcription.rollout import symbolic_rollout
+from symphys.transcription.rollout import Rollout, symbolic_rollout
 from symphys.transcription.shared_kernel import inputs_of, shared_backend
 from symphys.transcription.staged.guessed_states import guessed_states
 from symphys.transcription.staged.staged_problem import RolloutStages
 from symphys.transcription.transcription import Transcription
 
 
-def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threads: int | None = None) -> Transcription:
+def transcribe(
+    problem: Problem,
+    exact: bool = False,
+    backend: str = BEST,
+    threads: int | None = None,
+    like: Rollout | None = None,
+) -> Transcription:
     """Build everything that solving, judging and recording this problem needs.
 
     Args:
@@ -36,6 +42,7 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
         exact: whether smoothing 0 is all that will be asked for; kernels then leave the smoothing out.
         backend: what evaluates it, a name of ``symphys.codegen.backends.NAMES``.
         threads: that share a batch; None: one for each processor.
+        like: the rollout of the problem under another scheme; what steps of both have in common is built once.
 
     Example:
         >>> import symphys
@@ -47,24 +54,17 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
         problem = replace(problem, varied=frozenset())  # their kernels are made in other ways
     if problem.scenarios is not None:
         require_small_nets(problem, "a problem with scenarios")
-        plain = transcribe(replace(problem, scenarios=None), exact, "casadi", threads)
+        plain = transcribe(replace(problem, scenarios=None), exact, "casadi", threads, like)
         return with_scenarios(plain, problem, exact, backend, threads)
     if has_large_nets(problem):
         require_fixed_duration(problem)
         return transcribe_large(problem, exact, backend, threads)
     began = perf_counter()
-    rollout = symbolic_rollout(problem)
+    rollout = symbolic_rollout(problem, like=like)
     functions = ExpressionFunctions(rollout)
     names, lower, upper = bounds(problem, lambda formula: int(rollout.compiled(formula).size1_out(0)))
     built = perf_counter() - began
-    inputs = () if backend == "casadi" else inputs_of(problem)
-    if inputs:
-        chosen = shared_backend(problem, inputs, functions.nlp, exact, backend, threads)
-    else:
-        source = BackendSource(
-            functions, lambda: rollout_program(rollout, exact), exact, program_identity(problem, exact)
-        )
-        chosen = choose(backend, source, threads)
+    chosen = _evaluating(rollout, functions, exact, backend, threads)
     staged = cache(lambda: RolloutStages(rollout, backend, threads, exact or not any(problem.simulation.smoothing)))
     shooting = ShootingProblem(
         name=problem.name,
@@ -83,6 +83,18 @@ def transcribe(problem: Problem, exact: bool = False, backend: str = BEST, threa
         guessed_states=states_of(staged, problem.guess),
     )
     return Transcription(problem, rollout, functions, shooting, chosen.description, built)
+
+
+def _evaluating(
+    rollout: Rollout, functions: ExpressionFunctions, exact: bool, backend: str, threads: int | None
+) -> Backend:
+    """What evaluates a rollout; problems of a sweep share a kernel."""
+    problem = rollout.problem
+    inputs = () if backend == "casadi" else inputs_of(problem)
+    if inputs:
+        return shared_backend(problem, inputs, functions.nlp, exact, backend, threads)
+    source = BackendSource(functions, lambda: rollout_program(rollout, exact), exact, program_identity(problem, exact))
+    return choose(backend, source, threads)
 
 
 def states_of(staged: Callable[[], StagedProblem] | None, guess: GuessedMotion | None) -> GuessedStates | None:

@@ -75,7 +75,8 @@ class Transcription:
         simulation, duration = self.problem.simulation, float(record.arrays.time[-1])
         timed = replace(simulation, duration=duration, dt=duration / simulation.steps)
         problem = replace(self.problem, simulation=timed)
-        return replace(self, problem=problem, rollout=replace(self.rollout, problem=problem))
+        rollout = replace(self.rollout, problem=problem, like=self.rollout.like or self.rollout)
+        return replace(self, problem=problem, rollout=rollout)
 
     def prices(
         self, kinds: Iterable[str] = ("gradient", "jacobian"), clock: Callable[[], float] = perf_counter

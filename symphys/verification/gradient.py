@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -47,27 +47,27 @@ def compare_gradient(transcription: Transcription, z: Array) -> list[dict[str, A
 def _compare_block(value: Values, block: VariableBlock, z: Array, slope: Array) -> dict[str, Any]:
     norm = float(np.linalg.norm(slope[block.start : block.stop])) or 1.0
     directions = _directions(block, block.stop - block.start, z.size)
-    middle, at = _best(lambda d, step: _mismatch(value, z, slope, d, step), directions)
+    middle, at = _best(lambda steps: _mismatches(value, z, slope, directions, steps))
     found = {"variable": block.name, "scale": float(np.linalg.norm(slope[block.start : block.stop]))}
     found |= {"error": middle / norm, "step": at, "jump": 0.0}
     if middle > NOTICED * norm:
-        sides, near = _best(lambda d, step: _mismatch_beside(value, z, slope, d, step), directions)
+        sides, near = _best(lambda steps: _mismatches_beside(value, z, slope, directions, steps))
         if sides < middle:
-            jumps = [2 * near * _mismatch(value, z, slope, d, near) for d in directions]
+            jumps = 2 * near * _mismatches(value, z, slope, directions, (near,))
             found |= {"error": sides / norm, "step": near, "jump": max_or_nan(jumps) / norm}
     return found
 
 
-def _best(mismatch: Callable[[Array, float], float], directions: Array) -> tuple[float, float]:
+def _best(mismatches: Callable[[Sequence[float]], Array]) -> tuple[float, float]:
     """(error, step): the least error of all steps, the worst of all directions; NaN if no step gives a number."""
-    errors = [max_or_nan(mismatch(d, step) for d in directions) for step in DIFFERENCE_STEPS]
+    errors = [max_or_nan(row) for row in mismatches(DIFFERENCE_STEPS)]
     known = [pair for pair in zip(errors, DIFFERENCE_STEPS, strict=True) if not np.isnan(pair[0])]
     return min(known, default=(np.nan, np.nan))
 
 
-def max_or_nan(numbers: Any) -> float:
+def max_or_nan(numbers: Array) -> float:
     """The largest; NaN if one is."""
-    return float(np.max(np.fromiter(numbers, float), initial=0.0))
+    return float(np.max(numbers, initial=0.0))
 
 
 def _directions(block: VariableBlock, size: int, n: int) -> Array:
@@ -81,15 +81,29 @@ def _directions(block: VariableBlock, size: int, n: int) -> Array:
     return whole
 
 
-def _mismatch(value: Values, z: Array, slope: Array, direction: Array, step: float) -> float:
-    high, low = value(z + step * np.outer([1, -1], direction))
-    return float(abs((high - low) / (2 * step) - slope @ direction) / np.linalg.norm(direction))
+def _mismatches(value: Values, z: Array, slope: Array, directions: Array, steps: Sequence[float]) -> Array:
+    """(steps, k): of each step along each direction."""
+    high, low = np.moveaxis(_beside(value, z, directions, steps, (1, -1)), -1, 0)
+    sizes, known = np.array(steps)[:, None], directions @ slope
+    found: Array = abs((high - low) / (2 * sizes) - known) / np.linalg.norm(directions, axis=1)
+    return found
 
 
-def _mismatch_beside(value: Values, z: Array, slope: Array, direction: Array, step: float) -> float:
-    """The larger error of either side's derivative at z, from three points beside it: of second order."""
-    errors = []
-    for side in (step, -step):
-        one, two, three = value(z + side * np.outer([1, 2, 3], direction))
-        errors.append(abs((8 * two - 5 * one - 3 * three) / (2 * side) - float(slope @ direction)))
-    return float(max(errors) / np.linalg.norm(direction))
+def _mismatches_beside(value: Values, z: Array, slope: Array, directions: Array, steps: Sequence[float]) -> Array:
+    """(steps, k): the larger error of either side's derivative at z, from three points beside it: of second order."""
+    points = _beside(value, z, directions, steps, (1, 2, 3, -1, -2, -3))
+    sizes, known, errors = np.array(steps)[:, None], directions @ slope, list[Array]()
+    for side, (one, two, three) in (
+        (1, np.moveaxis(points[..., :3], -1, 0)),
+        (-1, np.moveaxis(points[..., 3:], -1, 0)),
+    ):
+        errors.append(abs((8 * two - 5 * one - 3 * three) / (2 * side * sizes) - known))
+    larger: Array = np.maximum(*errors) / np.linalg.norm(directions, axis=1)
+    return larger
+
+
+def _beside(value: Values, z: Array, directions: Array, steps: Sequence[float], places: Sequence[int]) -> Array:
+    """(steps, k, places): values at z and so many steps from it along each direction, all in one batch."""
+    offsets = np.multiply.outer(np.multiply.outer(np.array(steps), places), directions)
+    points = z + np.moveaxis(offsets, 2, 1)
+    return value(points.reshape(-1, z.size)).reshape(points.shape[:-1])

@@ -28,6 +28,13 @@ def test_importing_is_cheap() -> None:
     assert done.stdout.strip() == "[]"
 
 
+def test_a_start_loads_no_scipy() -> None:
+    """Loading and compiling a problem need none of it, and it takes a third of a second."""
+    code = "import sys, symphys; symphys.compile(symphys.load('ball_throw')); print('scipy' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
+
+
 EXAMPLES = (
     "CompiledRollout", "Heightfield", "Problem", "Slider", "Solution", "Trajectory", "cache", "check",
     "compile", "compile_step", "doctor", "export", "initial_state", "load", "load_problem", "new", "read",

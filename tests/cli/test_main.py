@@ -336,8 +336,12 @@ def test_no_report_leaves_pages_out_and_report_makes_them_later(run: Run, throw:
     assert code == 0 and "no report; `symphys report reports` makes one" in out
     page = Path("reports/throw/least_squares-seed0/report.html")
     assert not page.exists() and not Path("reports/index.html").exists()
-    assert run("report", "reports", "--new", "--jobs", "1")[1].split() == [str(page), "reports/index.html"]
-    assert run("report", "reports", "--new", "--jobs", "1")[1].split() == ["reports/index.html"]
+    both = [str(page), "reports/index.html"]
+    assert run("report", "reports", "--jobs", "1")[1].split() == both
+    _, out, err = run("report", "reports", "--new", "--jobs", "1")
+    assert out.split() == ["reports/index.html"] and "1 page of runs up to date" in err
+    assert run("report", "reports", "--all", "--jobs", "1")[1].split() == both
+    assert run("report", "reports", "--all", "--new")[0] == 2
 
 
 @pytest.mark.usefixtures("whole_report")
@@ -350,6 +354,6 @@ def test_a_page_that_cannot_be_made_is_named_and_exits_1(run: Run, throw: Path) 
     assert code == 1 and "2/2" in out and "report: reports/index.html" in out
     assert f"symphys: {places[0]} could not be made: " in err
     assert places[1].read_text(encoding="utf-8").endswith("</html>\n") and Path("reports/index.html").is_file()
-    code, out, err = run("report", "reports", "--pages", "light", "--jobs", "1")
+    code, out, err = run("report", "reports", "--pages", "light", "--jobs", "1", "--all")
     assert code == 1 and out.split() == [str(places[1]), "reports/index.html"] and str(places[0]) in err
     assert run("report", "reports", "--pages", "small")[0] == 2

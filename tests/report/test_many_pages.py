@@ -6,6 +6,8 @@ import multiprocessing
 import os
 import shutil
 import signal
+import subprocess
+import sys
 from collections import deque
 from pathlib import Path
 
@@ -15,8 +17,9 @@ import symphys.report
 from symphys.report import WantedPages, make_pages, outdated, wanted_below
 from symphys.report.making import batch as making
 from symphys.report.making import page as single
-from symphys.report.making import pool
-from symphys.report.making.page import MOST_FULL, PageFault, is_light
+from symphys.report.making import pool, stamps
+from symphys.report.making.page import MOST_FULL, PageFault, fitting_kinds, is_light
+from symphys.report.making.stamps import read_stamp
 from symphys.results.text_files import ReportError
 
 PAGE = "report.html"
@@ -140,12 +143,85 @@ def test_which_pages_are_light() -> None:
 def test_only_what_is_new(runs: list[Path], tmp_path: Path) -> None:
     (tmp_path / "nothing").mkdir()
     root = runs[0].parents[1]
-    make_pages(WantedPages(root, tuple(runs[:4]), batch=False), "light")
-    os.utime(runs[1] / "result.json", (2**31, 2**31))
-    (runs[5] / "result.json").unlink()
-    assert [folder for folder in runs if outdated(folder)] == [runs[1], runs[4]]
-    wanted = wanted_below(root, only_new=True)
-    assert wanted.runs == (runs[1], runs[4]) and wanted.batch
-    assert not wanted_below(runs[0], only_new=True).batch
+    make_pages(WantedPages(root, tuple(runs[:5]), batch=False), "light")
+    os.utime(runs[0] / "result.json", (2**31, 2**31))
+    (runs[1] / "log.txt").write_text("another line", "utf-8")
+    (runs[2] / "trace.csv").unlink()
+    page = runs[3] / PAGE
+    page.write_text(page.read_text("utf-8").replace("made-from", "made-by"), "utf-8")
+    assert [folder for folder in runs if outdated(folder)] == [runs[1], runs[2], runs[3], runs[5]]
+    wanted = wanted_below(root, "light")
+    assert wanted.runs == (runs[1], runs[2], runs[3], runs[5]) and wanted.batch and wanted.kept == 2
+    assert wanted_below(root, "light", remake=True).runs == tuple(runs)
+    assert not wanted_below(runs[0], "light").batch
     with pytest.raises(ReportError, match="no run folder"):
         wanted_below(tmp_path / "nothing")
+
+
+def test_a_page_that_is_kept_is_the_page_that_would_be_made(runs: list[Path]) -> None:
+    """Of a batch that was made a second time no byte has changed, and nothing was written."""
+    root = runs[0].parents[1]
+    make_pages(wanted_below(root, "light"), "light")
+    pages = {page: (page.read_bytes(), page.stat().st_ino) for page in sorted(root.rglob("*.html"))}
+    assert len(pages) == 7
+    again = make_pages(wanted_below(root, "light"), "light")
+    assert again.runs == () and again.kept == 6 and again.page == root / "index.html"
+    assert {page: (page.read_bytes(), page.stat().st_ino) for page in pages} == pages
+    make_pages(wanted_below(root, "light", remake=True), "light")
+    assert {page: page.read_bytes() for page in pages} == {page: content for page, (content, _) in pages.items()}
+    assert not any(page.stat().st_ino == number for page, (_, number) in pages.items())
+
+
+def test_the_page_of_the_batch_follows_what_it_shows(runs: list[Path]) -> None:
+    """A run that changes, comes, goes, or loses its page, which it would link to."""
+    root = runs[0].parents[1]
+    index = make_pages(wanted_below(root, "light"), "light").page
+
+    def follows() -> bool:
+        before = index.stat().st_ino
+        page = make_pages(WantedPages(root, tuple(f for f in wanted_below(root, "light").runs if f not in lost))).page
+        return page.stat().st_ino != before
+
+    lost: list[Path] = []
+    assert not follows()
+    result = runs[0] / "result.json"
+    result.write_text(result.read_text("utf-8").replace('"seed": 0', '"seed": 70'), "utf-8")
+    assert follows() and ">70<" in index.read_text("utf-8")
+    shutil.copytree(runs[1], runs[1].with_name("gradient-seed9"))
+    assert follows() and "gradient-seed9" in index.read_text("utf-8")
+    shutil.rmtree(runs[1].with_name("gradient-seed9"))
+    assert follows() and "gradient-seed9" not in index.read_text("utf-8")
+    lost.append(runs[2])
+    (runs[2] / PAGE).unlink()
+    assert follows() and "gradient-seed2/report.html" not in index.read_text("utf-8")
+    (root / "figures").joinpath(next(iter(read_stamp(index).figures)) + ".svg").unlink()  # type: ignore[union-attr]
+    assert follows() and not follows()
+
+
+def test_the_kind_that_is_asked_for(runs: list[Path]) -> None:
+    """A light page is no full one; full ones do where pages may be light."""
+    make_pages(WantedPages(runs[0], (runs[0],), batch=False), "light")
+    make_pages(WantedPages(runs[1], (runs[1],), batch=False), "full")
+    assert wanted_below(runs[0]).runs == (runs[0],) and wanted_below(runs[0], "light").runs == ()
+    assert wanted_below(runs[1]).runs == () and wanted_below(runs[1], "light").runs == (runs[1],)
+    assert fitting_kinds("auto", MOST_FULL + 1) == ("full", "light")
+    (runs[1] / "figures" / "convergence.csv").unlink()
+    assert wanted_below(runs[1]).runs == (runs[1],)
+
+
+def test_other_code_makes_pages_again(runs: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    make_pages(WantedPages(runs[0], (runs[0],), batch=False), "light")
+    assert not outdated(runs[0])
+    monkeypatch.setattr(stamps, "drawing_digest", lambda: "of other code")
+    assert outdated(runs[0])
+
+
+def test_what_draws_is_known_to_stamps() -> None:
+    """All modules of the package that reporting loads are among those whose change makes pages again."""
+    code = "import sys, symphys.report; print(*(name for name in sys.modules if name.startswith('symphys.')))"
+    loaded = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
+    known = {name.removesuffix(".py") for name in stamps.DRAWING}
+    assert {name.split(".")[1] for name in loaded} <= known
+    assert stamps.sources(stamps.PACKAGE / "report") and all(
+        (stamps.PACKAGE / each).exists() for each in stamps.DRAWING
+    )

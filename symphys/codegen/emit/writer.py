@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
 
 from symphys.codegen.emit.dialect import VECTORS, Dialect
 from symphys.codegen.graph.graph import Graph
@@ -11,6 +12,9 @@ from symphys.codegen.graph.operations import MASKS
 
 LONGEST = 500
 """Statements in one C function, and copies of what is given: a compiler's time grows faster than its length."""
+
+MANY = 8
+"""Words in a row that are one constant are written by a loop: inputs that nothing sets fill thousands of them."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +67,7 @@ class _Piece:
         nodes: what it computes, in order.
         slots: the values that a later piece than their own reads, and their words in the buffer between pieces.
         dialect: how it is written.
-        targets: for a node, the words of results that it is.
+        targets: for a node, the words of results that it is; a loop's head comes before the words that it fills.
     """
 
     nodes: list[int]
@@ -118,11 +122,25 @@ def _cut(graph: Graph, dialect: Dialect) -> list[_Piece]:
     pieces = [_Piece(run, slots, dialect) for run in runs]
     copied = 0
     for r, result in enumerate(graph.results):
-        for word, x in enumerate(result):
+        for x, first, count in _runs(graph, result):
             if x not in home and (copied := copied + 1) % LONGEST == 0:
                 pieces.append(_Piece([], slots, dialect))
-            pieces[home.get(x, -1)].targets.setdefault(x, []).append(dialect.word.format(f"o{r}", word))
+            target = dialect.word.format(f"o{r}", first if count == 1 else "j")
+            loop = f"for (int j = {first}; j < {first + count}; j++) " if count > 1 else ""
+            pieces[home.get(x, -1)].targets.setdefault(x, []).append(f"{loop}{target}")
     return pieces
+
+
+def _runs(graph: Graph, result: Sequence[int]) -> Iterator[tuple[int, int, int]]:
+    """(value, first word, number of words) of a result; words are together where one constant fills many of them."""
+    first = 0
+    for x, words in groupby(result):
+        count = len(list(words))
+        if graph.nodes[x].op == "const" and count >= MANY:
+            yield x, first, count
+        else:
+            yield from ((x, word, 1) for word in range(first, first + count))
+        first += count
 
 
 def _type(op: str) -> str:

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from symphys import files
 from symphys.interrupts import Interrupts
-from symphys.report.making.page import AUTO, PageFault, attempt, is_light
+from symphys.report.making.page import AUTO, PageFault, attempt, fitting_kinds, is_light
 from symphys.report.making.pool import make_run_pages
-from symphys.report.pages.batch import PAGE as BATCH_PAGE
+from symphys.report.making.stamps import BATCH_PAGE, FULL, LIGHT, batch_digest, folder_digest, is_current
 from symphys.report.pages.batch import write_batch_report
 from symphys.report.pages.identification import identification_folders, write_identification_page
 from symphys.report.pages.run import PAGE
 from symphys.results.discovery import run_folders
-from symphys.results.file_names import RESULT
 from symphys.results.text_files import ReportError
 
 MOST_NAMED = 3
@@ -30,21 +28,22 @@ class MadePages:
 
     Attributes:
         page: that of the batch; of a single run folder its own. It is not new where ``faults`` names it.
-        runs: the pages of runs, in their order.
+        runs: the pages of runs that were made, in their order.
         light: whether these pages are light.
         faults: the pages that could not be made.
+        kept: how many pages of runs are as they were, since nothing that they show has changed.
     """
 
     page: Path
     runs: tuple[Path, ...]
     light: bool
     faults: tuple[PageFault, ...]
+    kept: int = 0
 
 
-def outdated(folder: Path) -> bool:
-    """Whether the page of a run folder is missing, or of another result, whose time it has; not without a result."""
-    source = files.modified(folder / RESULT)
-    return source is not None and files.modified(folder / PAGE) != source
+def outdated(folder: Path, kinds: Iterable[str] = (FULL, LIGHT)) -> bool:
+    """Whether the page of a run folder is missing, of no such kind, or made from other files or by other code."""
+    return not is_current(folder / PAGE, folder_digest(folder), kinds)
 
 
 @dataclass(frozen=True)
@@ -53,22 +52,31 @@ class WantedPages:
 
     Attributes:
         root: the folder of the batch.
-        runs: run folders at or below it.
-        batch: whether the page of the batch is made too.
+        runs: run folders at or below it whose pages are made.
+        batch: whether there is a page of the batch.
+        remake: whether that is made although nothing that it shows has changed.
+        kept: how many pages of runs stay as they are.
     """
 
     root: Path
     runs: tuple[Path, ...]
     batch: bool = True
+    remake: bool = False
+    kept: int = 0
 
 
-def wanted_below(root: Path, only_new: bool = False) -> WantedPages:
-    """All pages at or below a folder; ``only_new``: of runs those that are ``outdated``. ReportError without a run."""
+def wanted_below(root: Path, kind: str = AUTO, remake: bool = False) -> WantedPages:
+    """The pages at or below a folder that are missing or ``outdated``; all of them with ``remake``.
+
+    Raises:
+        ReportError: there is no such folder or no such kind, or there is no run in it.
+    """
     below = run_folders(root)
     if not below:
         raise ReportError(f"{root}: no run folder at or below it; `symphys solve --out` writes them")
-    runs = [folder for folder in below if outdated(folder)] if only_new else below
-    return WantedPages(root, tuple(runs), below != [root])
+    kinds = fitting_kinds(kind, len(below))
+    runs = [folder for folder in below if remake or outdated(folder, kinds)]
+    return WantedPages(root, tuple(runs), below != [root], remake, len(below) - len(runs))
 
 
 def make_pages(wanted: WantedPages, kind: str = AUTO, jobs: int = 1, tell: Told = lambda _: None) -> MadePages:
@@ -101,17 +109,22 @@ def make_pages(wanted: WantedPages, kind: str = AUTO, jobs: int = 1, tell: Told 
     found = [faults[folder] for folder in wanted.runs if folder in faults]
     tell(len(wanted.runs))
     if not wanted.batch:
-        return MadePages(wanted.root / PAGE, made, light, tuple(found))
+        return MadePages(wanted.root / PAGE, made, light, tuple(found), wanted.kept)
+    index = wanted.root / BATCH_PAGE
+    if not wanted.remake and is_current(index, batch_digest(wanted.root)):
+        return MadePages(index, made, light, tuple(found), wanted.kept)
     with Interrupts().listening() as interrupted:
-        if fault := attempt(wanted.root / BATCH_PAGE, lambda: write_batch_report(wanted.root)):
+        if fault := attempt(index, lambda: write_batch_report(wanted.root)):
             found.append(fault)
     if interrupted():
         raise KeyboardInterrupt
-    return MadePages(wanted.root / BATCH_PAGE, made, light, tuple(found))
+    return MadePages(index, made, light, tuple(found), wanted.kept)
 
 
-def report(folder: str | Path, pages: str = AUTO, jobs: int = 1) -> Path:
-    """Make the report of a run folder, or of all runs below a folder, again. Also called as ``symphys.report``.
+def report(folder: str | Path, pages: str = AUTO, jobs: int = 1, remake: bool = False) -> Path:
+    """Make the report of a run folder, or of all runs below a folder. Also called as ``symphys.report``.
+
+    Pages are made that are missing, or made from other files or by other code than there are now.
 
     Args:
         folder: what ``solve`` or ``solve_all`` with a ``folder``, or ``symphys solve --out``, has written.
@@ -119,6 +132,7 @@ def report(folder: str | Path, pages: str = AUTO, jobs: int = 1) -> Path:
             takes a twentieth of the time and a tenth of the space; "auto" is light for more than 50 runs.
         jobs: how many processes make the pages. A script that asks for several needs
             ``if __name__ == "__main__":`` around its own work.
+        remake: make all pages, whatever they were made from.
 
     Returns:
         The page of the batch, index.html, which links to those of the runs; of a run folder, or of an identification,
@@ -134,10 +148,12 @@ def report(folder: str | Path, pages: str = AUTO, jobs: int = 1) -> Path:
         'index.html'
     """
     identified = identification_folders(Path(folder))
-    written = [write_identification_page(each) for each in identified]
-    if written and not run_folders(Path(folder)):
-        return written[0]
-    made = make_pages(wanted_below(Path(folder)), pages, jobs)
+    for each in identified:
+        if remake or outdated(each, (FULL,)):
+            write_identification_page(each)
+    if identified and not run_folders(Path(folder)):
+        return identified[0] / PAGE
+    made = make_pages(wanted_below(Path(folder), pages, remake), pages, jobs)
     if made.faults:
         more = f"; and {len(made.faults) - MOST_NAMED} more" if len(made.faults) > MOST_NAMED else ""
         raise ReportError("; ".join(map(str, made.faults[:MOST_NAMED])) + more)

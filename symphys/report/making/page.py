@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from symphys import files
+from symphys.report.making.stamps import FULL, LIGHT
 from symphys.report.pages.run import PAGE, write_light_report, write_run_report
 from symphys.results.text_files import ReportError
 
-AUTO, FULL, LIGHT = KINDS = ("auto", "full", "light")
+AUTO = "auto"
+KINDS = (AUTO, FULL, LIGHT)
 MOST_FULL = 50
 """With "auto", so many pages made at once are full at most; of more all are light."""
 
@@ -32,6 +34,13 @@ def is_light(kind: str, count: int) -> bool:
     if kind not in KINDS:
         raise ReportError(f"there are no pages of the kind {kind!r}; there are {', '.join(KINDS)}")
     return kind == LIGHT or (kind == AUTO and count > MOST_FULL)
+
+
+def fitting_kinds(kind: str, count: int) -> tuple[str, ...]:
+    """Which kinds a page may be that is not to be made again, of ``count`` at once; a full one is never too much."""
+    if kind == AUTO:
+        return (FULL, LIGHT) if is_light(kind, count) else (FULL,)
+    return (LIGHT,) if is_light(kind, count) else (FULL,)
 
 
 def make_run_page(folder: Path, light: bool) -> PageFault | None:

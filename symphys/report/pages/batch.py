@@ -12,6 +12,7 @@ from symphys.report.figures import style
 from symphys.report.figures.checks import MOST_CHECKS, MOST_DOTS, draw_checks, ratios
 from symphys.report.figures.convergence import draw_convergence
 from symphys.report.figures.style import Picture, write_figures
+from symphys.report.making.stamps import BATCH_PAGE, FULL, Stamp, batch_digest
 from symphys.report.pages import comparison
 from symphys.report.pages.brief import BriefReader, with_trace
 from symphys.report.pages.comparison import page_links
@@ -29,7 +30,7 @@ from symphys.results.text_files import ReportError
 from symphys.results.trajectories import POSES, read_trajectory
 from symphys.trajectory import Trajectory
 
-PAGE = "index.html"
+PAGE = BATCH_PAGE
 CLOSEST = "run that came closest"
 ROWS_MARK = 'class="rows"'
 MOST_STUDIES = 20
@@ -51,6 +52,7 @@ def write_batch_report(batch_dir: Path) -> Path:
     Raises:
         ReportError: there is no such folder, it holds no run folder, or it cannot be written to.
     """
+    digest = batch_digest(batch_dir)  # before files are read: what changes meanwhile is seen next time
     runs, broken = read_all(batch_dir, BriefReader(batch_dir))
     if not runs and not broken:
         raise ReportError(f"{batch_dir}: no run folder at or below it; `symphys solve --out` writes them")
@@ -66,7 +68,7 @@ def write_batch_report(batch_dir: Path) -> Path:
         tag("footer", "Made by symphys from the run folders alone; make it again with “symphys report”."),
     ]
     animated, rows = (any(mark in part for part in parts) for mark in ("<canvas", ROWS_MARK))
-    files.write_text(batch_dir / PAGE, page(title, join(parts), animated, rows))
+    files.write_text(batch_dir / PAGE, page(title, join(parts), animated, rows, Stamp(FULL, digest)))
     return batch_dir / PAGE
 
 

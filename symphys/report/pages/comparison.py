@@ -11,13 +11,13 @@ from symphys.findings import writing
 from symphys.findings.verdict import BEST_FOUND, DOUBTED
 from symphys.findings.writing import show
 from symphys.report.figures import style
+from symphys.report.making.stamps import RUN_PAGE
 from symphys.report.pages import words
 from symphys.report.pages.markup import ICONS, Html, banner, card, dot, join, pill, table, tag
 from symphys.results.discovery import Entry, Study, middle
 from symphys.results.result import CheckRecord, smoothed
 from symphys.results.run import Run
 
-RUN_PAGE = "report.html"
 MOST_BROKEN = 50
 MOST_NAMED = 4
 MOST_CHIPS = 40

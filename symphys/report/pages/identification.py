@@ -17,6 +17,7 @@ from symphys.report.figures.identification import (
     draw_replay,
     draw_residuals,
 )
+from symphys.report.making.stamps import FULL, RUN_PAGE, Stamp, folder_digest
 from symphys.report.pages.markup import Html, banner, card, facts, figures, join, page, pill, stats, table, tag
 from symphys.report.scene.animation import animation
 from symphys.report.scene.ghosts import with_ghosts
@@ -46,6 +47,7 @@ def write_identification_page(folder: Path) -> Path:
     Raises:
         ReportError: a file cannot be read or written.
     """
+    digest = folder_digest(folder)
     found, replays = read_identification(folder), read_replays(folder)
     scene = read_scene(folder / SCENE) if replays else Scene()
     drawn = {
@@ -80,8 +82,8 @@ def write_identification_page(folder: Path) -> Path:
             card("The fit", shown("course"), setting(found), anchor="fit"),
         ]
     )
-    out = folder / "report.html"
-    files.write_text(out, page(found.title or found.problem, body, animated=bool(replays)))
+    out, stamp = folder / RUN_PAGE, Stamp(FULL, digest)
+    files.write_text(out, page(found.title or found.problem, body, animated=bool(replays), stamp=stamp))
     return out
 
 

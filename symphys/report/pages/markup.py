@@ -14,6 +14,7 @@ from urllib.parse import quote
 from symphys.report.charts.chart import Chart
 from symphys.report.charts.packed import pack, pack_json
 from symphys.report.figures.style import Picture
+from symphys.report.making.stamps import Stamp
 from symphys.results.file_names import FIGURES
 
 VOID = frozenset({"br", "img", "input", "link", "meta"})
@@ -23,6 +24,8 @@ CHARTS, ROWS = ("numbers.js", "charts.js"), ("numbers.js", "rows.js")
 UNPACK = "unpack.js"
 PACKED = "packed"
 """Class of what ``unpack.js`` unpacks."""
+LINKED = re.compile(rf'href="{FIGURES}/([^"]+)\.svg"')
+"""A link to a figure as a file, by its name as it stands in links."""
 ICONS = {"good": "✓", "fair": "!", "bad": "✕", "unknown": "?"}
 
 
@@ -135,21 +138,22 @@ def fold(title: str, text: str) -> Html:
     return tag("details", tag("summary", title), tag("pre", text)) if text.strip() else Html("")
 
 
-def page(title: str, body: Part, animated: bool = False, rows: bool = False) -> str:
+def page(title: str, body: Part, animated: bool = False, rows: bool = False, stamp: Stamp | None = None) -> str:
     """The whole document: no part of it is loaded from elsewhere, and no script but our own may run.
 
-    ``animated``: whether it plays a motion; ``rows``: whether it has a table that is shown a page at a time.
+    ``animated``: whether it plays a motion; ``rows``: whether it has a table that is shown a page at a time; ``stamp``:
+    what it was made from.
     """
     script = read_static(*(SCRIPTS if animated else ()), *(ROWS if rows else ()))
     scripts = tag("script", Html(script)) if script else Html("")
-    return document(title, body, scripts, [script] if script else [])
+    return document(title, body, scripts, [script] if script else [], stamp)
 
 
-def light_page(title: str, body: Part, animated: bool) -> str:
+def light_page(title: str, body: Part, animated: bool, stamp: Stamp | None = None) -> str:
     """The same with its scripts compressed, among them what draws charts."""
     first, then, packed = light_scripts(animated)
     held = tag("script", Html(packed), type="text/plain", class_=PACKED, id="scripts")
-    return document(title, body, join([held, tag("script", Html(first))]), [first, then])
+    return document(title, body, join([held, tag("script", Html(first))]), [first, then], stamp)
 
 
 @cache
@@ -170,7 +174,7 @@ def read_static(*names: str) -> str:
     return "".join((HERE / name).read_text(encoding="utf-8") for name in names)
 
 
-def document(title: str, body: Part, scripts: Html, allowed: Sequence[str]) -> str:
+def document(title: str, body: Part, scripts: Html, allowed: Sequence[str], stamp: Stamp | None = None) -> str:
     """Head and body; ``allowed``: the texts of the scripts that may run."""
     digests = [base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii") for script in allowed]
     sources = " ".join(f"'sha256-{digest}'" for digest in digests) or "'none'"
@@ -178,6 +182,7 @@ def document(title: str, body: Part, scripts: Html, allowed: Sequence[str]) -> s
     head = tag(
         "head",
         tag("meta", charset="utf-8"),
+        tag("meta", name="made-from", content=str(stamp.beside(LINKED.findall(body)))) if stamp else "",
         tag("meta", http_equiv="Content-Security-Policy", content=policy),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
         tag("title", title),

@@ -18,6 +18,7 @@ from symphys.report.figures.states import MOST_BODIES, controlled_bodies, draw_c
 from symphys.report.figures.style import Picture, write_figures
 from symphys.report.figures.variables import draw_variables
 from symphys.report.figures.verification import draw_energy, draw_growth
+from symphys.report.making.stamps import FULL, LIGHT, RUN_PAGE, Stamp, folder_digest
 from symphys.report.pages import sections
 from symphys.report.pages.joints import gait_card, joint_card, joint_pictures
 from symphys.report.pages.markup import Drawn, Html, card, figures, join, light_page, page, tag
@@ -27,7 +28,7 @@ from symphys.report.scene.motion import draw_motion
 from symphys.results import text_files as tables
 from symphys.results.discovery import is_run
 from symphys.results.drawable import OVERSIZED, drawable, oversized
-from symphys.results.file_names import CONFIG, FIGURES, GUESS, PROBLEM, RESULT, SCENE, TRAJECTORY
+from symphys.results.file_names import CONFIG, FIGURES, GUESS, PROBLEM, SCENE, TRAJECTORY
 from symphys.results.result import smoothed
 from symphys.results.run import Run, read_run
 from symphys.results.scene import Scene, read_scene
@@ -35,7 +36,7 @@ from symphys.results.text_files import ReportError
 from symphys.results.trajectories import POSES, read_trajectory
 from symphys.trajectory import Trajectory
 
-PAGE = "report.html"
+PAGE = RUN_PAGE
 LOG = "log.txt"
 
 
@@ -52,7 +53,7 @@ class RecordedMotion:
 def write_run_report(run_dir: Path) -> Path:
     """Write report.html, and figures as SVG and CSV, into a run folder, from its files alone.
 
-    The page has the time of the result that it shows.
+    The page says what it was made from, so that it need not be made again while that is the same.
 
     Args:
         run_dir: a run folder, finished or not; what is missing is said in the page.
@@ -63,12 +64,11 @@ def write_run_report(run_dir: Path) -> Path:
     Raises:
         ReportError: there is no such folder, it is no run folder, or it cannot be written to.
     """
-    shown = files.modified(run_dir / RESULT)
+    digest = folder_digest(run_dir)  # before files are read: what changes meanwhile is seen next time
     run, recording, pictures = drawn(run_dir)
     write_figures(run_dir / FIGURES, pictures.values())
-    body = join([build(run, recording, pictures), sections.FOOTER])
-    files.write_text(run_dir / PAGE, page(title_of(run), body, animated=recording.trajectory is not None))
-    files.date(run_dir / PAGE, shown)
+    body, animated = join([build(run, recording, pictures), sections.FOOTER]), recording.trajectory is not None
+    files.write_text(run_dir / PAGE, page(title_of(run), body, animated, stamp=Stamp(FULL, digest)))
     return run_dir / PAGE
 
 
@@ -77,14 +77,13 @@ def write_light_report(run_dir: Path) -> Path:
 
     It takes some 20 ms, and 50 kB on disk. Arguments, result and errors are those of ``write_run_report``.
     """
-    shown = files.modified(run_dir / RESULT)
+    digest = folder_digest(run_dir)
     run, recording = read_recorded(run_dir)
     charts: dict[str, Drawn] = {chart.name: chart for chart in run_charts(drawable(run), recording.trajectory)}
     if recording.trajectory is not None:
         charts |= {chart.name: chart for chart in motion_charts(recording.trajectory, recording.scene)}
-    body = join([build(run, recording, charts), sections.LIGHT])
-    files.write_text(run_dir / PAGE, light_page(title_of(run), body, animated=recording.trajectory is not None))
-    files.date(run_dir / PAGE, shown)
+    body, animated = join([build(run, recording, charts), sections.LIGHT]), recording.trajectory is not None
+    files.write_text(run_dir / PAGE, light_page(title_of(run), body, animated, Stamp(LIGHT, digest)))
     return run_dir / PAGE
 
 

@@ -20,7 +20,7 @@ from symphys.transcription.decision_variables import start_of
 from symphys.transcription.feedback.controller_calls import control_calls
 from symphys.transcription.formulas.motion_parts import part_arguments
 from symphys.transcription.gradient_probe import combined
-from symphys.transcription.objective import terms
+from symphys.transcription.objective import plain_sums, terms
 from symphys.transcription.program import dense, step_calls
 from symphys.transcription.rollout import Rollout
 
@@ -54,6 +54,10 @@ class FormulaSamples:
     def after_steps(self, formula: Formula) -> Expr:
         """See ``Sampled``."""
         return self._series(formula, 1)
+
+    def sums(self, samples: Expr, scale: Any = None) -> tuple[Expr, Expr]:
+        """See ``Sampled``."""
+        return plain_sums(samples, scale)
 
     def over_steps(self, formula: Formula) -> Expr:
         """See ``Sampled``."""

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from symphys.codegen import KernelUnavailable, ProgramError, processors
 from symphys.codegen.backends import BEST, PRECISIONS, Description, described
 from symphys.codegen.cuda import DeviceKernel
-from symphys.dynamics.functions import report_function
 from symphys.problem import Problem
 from symphys.shooting import Nlp, ShootingProblem
 from symphys.transcription.decision_variables import blocks
@@ -90,9 +89,7 @@ class LargeTranscription(Transcription):
 
     def _happened(self, motion: ForwardPass, smoothing: float) -> list[Any]:
         """What ``recorder`` gives, of the first robot."""
-        rollout, steps = self.rollout, self.rollout.steps
-        scheme = rollout.problem.simulation.scheme()
-        step = rollout.remembering(report_function(rollout.world, scheme, rollout.inputs, rollout.parameters.symbols))
+        step, steps = self.rollout.report, self.rollout.steps
         x, u, given, p = motion.x[:, 0].T, motion.u[:, 0].T, motion.given[:, 0].T, motion.p[0]
         _, *happened = step.map(steps)(x[:, :-1], u, np.tile(p[:, None], steps), smoothing)
         return [x, u, given, p[:, None], *happened]

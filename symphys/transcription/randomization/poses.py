@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from symphys.dynamics.observation import gap_function
 from symphys.model.joints.start import placed_frames, spanning_tree, subtree
@@ -13,6 +14,9 @@ from symphys.model.state_layout import GIVEN, initial_state
 from symphys.problem import Problem, RandomizedPose, VariableSlot
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.transcription.randomization.numbers import hidden
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
 State = dict[str, Array]
@@ -94,6 +98,8 @@ def turn_all(bodies: tuple[str, ...], vectors: Array, state: State) -> None:
 
 def turn(bodies: list[str], pivot: Array, vectors: Array, state: State) -> None:
     """Turn bodies about points (count, 3), in place."""
+    from scipy.spatial.transform import Rotation  # late: most problems need none of scipy
+
     by = Rotation.from_rotvec(vectors)
     for body in bodies:
         state[f"{body}.position"] = pivot + by.apply(state[f"{body}.position"] - pivot)
@@ -102,4 +108,6 @@ def turn(bodies: list[str], pivot: Array, vectors: Array, state: State) -> None:
 
 def rotations(q: Array) -> Rotation:
     """From quaternions w x y z."""
+    from scipy.spatial.transform import Rotation
+
     return Rotation.from_quat(np.roll(q, -1, axis=-1))

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-import scipy.sparse
 from numpy.typing import NDArray
 
 from symphys.codegen.backends import BEST
@@ -276,7 +275,9 @@ class RolloutStages:
             knots, places = sums.knots_of(blocks.constants)
             u.add(rows, (places[:, 0] * m + places[:, 1])[None, None], knots)
         by_state, by_input = x.matrix(first, (self.steps + 1) * n), u.matrix(first, self.steps * m)
-        return np.concatenate(values), by_state, by_input, scipy.sparse.csr_array(np.concatenate(by_s))
+        from scipy.sparse import csr_array  # late: most solvers take no problem step by step
+
+        return np.concatenate(values), by_state, by_input, csr_array(np.concatenate(by_s))
 
     def _sloped(self, motion: StagedMotion, after: Array, sums: bool) -> list[SlopedTerm]:
         """Sums or all other terms with their slopes, from the states of a motion to the states ``after`` (N, nx)."""
@@ -322,8 +323,10 @@ class _Entries:
 
     def matrix(self, rows: int, columns: int) -> Any:
         """(rows, columns) scipy.sparse.csr_array."""
+        from scipy.sparse import csr_array
+
         places = np.concatenate(self.rows), np.concatenate(self.columns)
-        return scipy.sparse.csr_array((np.concatenate(self.values), places), shape=(rows, columns))
+        return csr_array((np.concatenate(self.values), places), shape=(rows, columns))
 
 
 def _input_weights(rollout: Rollout, named: Indices, statics: Indices) -> tuple[Any, tuple[Indices, Indices]]:
@@ -331,6 +334,8 @@ def _input_weights(rollout: Rollout, named: Indices, statics: Indices) -> tuple[
 
     The inputs of a step are those of the rollout, then the named knots that begin to act there.
     """
+    from scipy.sparse import csr_array
+
     m, steps = rollout.controls, rollout.steps
     u = ca.vec(rollout.given[:m, :])
     slope = ca.DM(ca.Function("u", [rollout.z], [ca.jacobian(u, rollout.z)])(0))
@@ -348,7 +353,7 @@ def _input_weights(rollout: Rollout, named: Indices, statics: Indices) -> tuple[
     rows = np.concatenate([rows // max(m, 1) * inputs + rows % max(m, 1), at[:, 0] * inputs + at[:, 1]])
     columns = np.concatenate([columns, named[which]])
     values = np.concatenate([np.array(slope.nonzeros()), np.ones(len(which))])
-    return scipy.sparse.csr_array((values, (rows, columns)), shape=(steps * inputs, int(slope.shape[1]))), (which, at)
+    return csr_array((values, (rows, columns)), shape=(steps * inputs, int(slope.shape[1]))), (which, at)
 
 
 def _limit(limit: Constraint, term: StageTerm, dt: float) -> tuple[Array, Array, Array]:

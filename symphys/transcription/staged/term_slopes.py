@@ -9,9 +9,7 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-import scipy.sparse
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from symphys.transcription.staged.stage_functions import ReadingFunction, reading
 from symphys.transcription.staged.stage_terms import StageSymbols, StageTerm
@@ -167,7 +165,10 @@ def square_roots(second: Array, components: Sequence[Indices]) -> Array:
 def _components(pattern: Pattern) -> list[Indices]:
     """Which entries a second derivative ties together."""
     size = pattern.shape[0]
-    graph = scipy.sparse.csr_array((np.ones(len(pattern.rows)), (pattern.rows, pattern.places)), shape=(size, size))
+    from scipy.sparse import csr_array  # late: most solvers take no problem step by step
+    from scipy.sparse.csgraph import connected_components
+
+    graph = csr_array((np.ones(len(pattern.rows)), (pattern.rows, pattern.places)), shape=(size, size))
     count, labels = connected_components(graph, directed=False)
     return [np.flatnonzero(labels == i) for i in range(count)]
 

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from operations import ARGUMENTS, PAIRS, SMOOTH, alone, build, every_operation, long_function
 
 from symphys.codegen import Cache, compile_program
+from symphys.codegen.emit.writer import Form, write
 from symphys.codegen.graph.adjoint import adjoint_graph
 from symphys.codegen.graph.instructions import graph_of
 from symphys.codegen.graph.rewrite import taped
@@ -55,6 +56,21 @@ def test_every_operation_alone(cache: Cache) -> None:
 def test_every_operation_alone_in_single_precision(cache: Cache) -> None:
     ops = range(len(SMOOTH) + len(PAIRS))
     compare([build([(op, 0, 4)]) for op in ops], cache, np.array([[-1.3, 0.3, 0.1, 1.0, 0.7]]), "single")
+
+
+def test_constants_in_a_row_are_written_by_a_loop(cache: Cache) -> None:
+    """Zeros and others, beside and between what is computed; a thousand more of them make no longer text."""
+
+    def function(count: int) -> ca.Function:
+        a, b = (ca.SX.sym(name, size) for name, size in zip("ab", ARGUMENTS, strict=True))
+        rows = [ca.DM.zeros(count), a, 2.5 * ca.DM.ones(count), b * a[0], ca.DM.zeros(3), ca.DM.zeros(count)]
+        return ca.Function("rows", [a, b], [ca.densify(ca.vertcat(*rows))])
+
+    def lines(count: int) -> list[str]:
+        return write("f", graph_of(function(count)), Form(primal=2, adds=False)).splitlines()
+
+    compare([function(20)], cache, np.array([[0.3, -0.2, 1.0, 0.5, 2.0], [0.1, 0.7, -2.0, 0.5, -3.0]]))
+    assert len(lines(1020)) == len(lines(20)) and sum("for (" in line for line in lines(20)) == 3
 
 
 def test_a_long_function_is_cut(cache: Cache) -> None:

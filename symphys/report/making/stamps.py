@@ -1,0 +1,151 @@
+"""What a page was made from, as a checksum that it carries: a page is made again only where that has changed.
+
+A stamp takes in the folder's path, the content of its files, and the sources and versions of what draws pages. Clocks
+are no part of it, so copies, restored backups and clocks that are wrong keep no stale page alive.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import stat
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from urllib.parse import unquote
+
+import matplotlib as mpl
+import numpy as np
+
+from symphys.results.discovery import run_folders
+from symphys.results.file_names import FIGURES
+
+FULL, LIGHT = "full", "light"
+RUN_PAGE, BATCH_PAGE = "report.html", "index.html"
+OWN_PAGES = frozenset({RUN_PAGE, BATCH_PAGE})
+"""What lies in a folder and is made from it."""
+PACKAGE = Path(__file__).parents[2]
+DRAWING = (
+    "errors.py",
+    "files.py",
+    "findings",
+    "interrupts.py",
+    "json_values.py",
+    "model",
+    "report",
+    "results",
+    "suggest.py",
+    "trajectory.py",
+    "verbs.py",
+    "version.py",
+)
+"""Modules and rooms of the package whose code takes part in a page."""
+SOURCES = (".py", ".js", ".css")
+HEAD = 4096
+"""[bytes] of a page that hold its stamp."""
+STAMP = re.compile(rb'<meta name="made-from" content="(full|light) ([0-9a-f]{64})((?: [^" ]+)*)">')
+
+
+@dataclass(frozen=True)
+class Stamp:
+    """What a page says of itself.
+
+    Attributes:
+        kind: "full" or "light".
+        digest: of what it was made from.
+        figures: names of the pictures that lie beside it as files, as they stand in links.
+    """
+
+    kind: str
+    digest: str
+    figures: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        """As it stands in the page."""
+        return " ".join([self.kind, self.digest, *self.figures])
+
+    def beside(self, figures: Iterable[str]) -> Stamp:
+        """The same of a page with these figures."""
+        return replace(self, figures=tuple(figures))
+
+
+def is_current(page: Path, digest: str, kinds: Iterable[str] = (FULL,)) -> bool:
+    """Whether a page is there, of one of these kinds, made from this, and its figures lie beside it."""
+    found = read_stamp(page)
+    if found is None or found.digest != digest or found.kind not in kinds:
+        return False
+    beside = page.parent / FIGURES
+    return all((beside / f"{unquote(name)}.{kind}").is_file() for name in found.figures for kind in ("svg", "csv"))
+
+
+def read_stamp(page: Path) -> Stamp | None:
+    """The stamp of a page; None where there is no page, or none with a stamp."""
+    try:
+        if not stat.S_ISREG(page.stat().st_mode):
+            return None
+        with page.open("rb") as file:
+            found = STAMP.search(file.read(HEAD))
+    except OSError:
+        return None
+    if found is None:
+        return None
+    kind, digest, names = (part.decode("ascii", "replace") for part in found.groups())
+    return Stamp(kind, digest, tuple(names.split()))
+
+
+def folder_digest(folder: Path) -> str:
+    """Of a folder's path, of the names and contents of the files in it but its pages, and of the drawing code."""
+    found = hashlib.sha256(f"{drawing_digest()} {folder.resolve()}".encode(errors="surrogateescape"))
+    try:
+        with os.scandir(folder) as inside:
+            names = sorted(each.name for each in inside if each.name[0] != "." and each.name not in OWN_PAGES)
+    except OSError as error:
+        names = []
+        found.update(f"\0unread {error.errno}".encode())
+    for path in (folder / name for name in names):
+        if not path.is_dir():
+            found.update(f"\0{path.name}\0{file_digest(path)}".encode(errors="surrogateescape"))
+    return found.hexdigest()
+
+
+def file_digest(path: Path) -> str:
+    """Of a file's content; of what is no file, or cannot be read, only that."""
+    try:
+        mode = path.stat().st_mode
+        if not stat.S_ISREG(mode):
+            return f"of kind {stat.S_IFMT(mode)}"
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        return f"unread {error.errno}"
+
+
+def batch_digest(root: Path) -> str:
+    """Of a batch: of its run folders, and of which have a page that it links to.
+
+    Raises:
+        ReportError: there is no such folder.
+    """
+    found = hashlib.sha256(f"{drawing_digest()} {root.resolve()}".encode(errors="surrogateescape"))
+    for folder in run_folders(root):
+        linked = (folder / RUN_PAGE).is_file()
+        place = folder.relative_to(root)
+        found.update(f"\0{place}\0{linked} {folder_digest(folder)}".encode(errors="surrogateescape"))
+    return found.hexdigest()
+
+
+@cache
+def drawing_digest() -> str:
+    """Of the sources that take part in a page, and of the versions of Python, matplotlib and numpy."""
+    found = hashlib.sha256(f"{sys.version} {mpl.__version__} {np.__version__}".encode())
+    for path in sorted(each for name in DRAWING for each in sources(PACKAGE / name)):
+        found.update(f"\0{path.relative_to(PACKAGE)}\0{file_digest(path)}".encode())
+    return found.hexdigest()
+
+
+def sources(path: Path) -> list[Path]:
+    """A module, or those of a room and what its pages hold."""
+    return [path] if path.is_file() else [each for each in path.rglob("*") if each.suffix in SOURCES]
