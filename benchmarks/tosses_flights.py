@@ -13,7 +13,7 @@ from tosses_data import CUBE, RATE, Tossed, Tosses, flights, joined
 from tosses_symphys import CUBE_NUMBERS, ELBOW_NUMBERS, GRAVITY, cube_tables, elbow_tables, recording, write
 
 import symphys
-from symphys.results.identification import Identification
+from symphys.results.identification import Identification, read_identification
 
 Array = NDArray[np.float64]
 Tables = dict[str, Any]
@@ -21,7 +21,7 @@ NOISE = {
     "cube": {"position": 1e-4, "orientation": 5e-4},
     "elbow": {"position": 4e-4, "orientation": 4e-3, "angle": 7e-3},
 }
-"""[m], [rad]: what fits leave, as estimated; samples are not independent, so that intervals are those of a bootstrap."""
+"""[m], [rad]: about what fits leave. Samples are not independent, so that intervals are those of a bootstrap."""
 LEAST = 5
 """Frames that a flight must have, so that its start is told from noise."""
 
@@ -59,7 +59,7 @@ def flights_problem(tossed: Tossed, parts: list[Tosses], path: Path) -> Tables:
         each["noise"] = NOISE[tossed.name][each["columns"]]
     held_back = list(range(len(flying[0]), len(tosses)))
     tables |= {"world": {"gravity": [0, 0, -GRAVITY]}, "simulation": {"dt": 1 / RATE}}
-    return tables | {"variable": variables, "recording": [columns | {"held_back": held_back}]}
+    return tables | {"variable": variables, "recording": [columns | {"held_back": held_back or False}]}
 
 
 def starts(tossed: Tossed, parts: list[Tosses], found: Identification) -> list[dict[str, Array]]:
@@ -81,12 +81,18 @@ def fly(tossed: Tossed, parts: list[Tosses], path: Path, **settings: Any) -> Ide
     return symphys.identify(symphys.load(flights_problem(tossed, parts, path)), loss="huber", **settings)
 
 
+def flights_of(tossed: Tossed, folder: Path) -> Identification:
+    """What ``starts_of`` has kept of the flights."""
+    return read_identification(folder / f"{tossed.name}_flights")
+
+
 def starts_of(tossed: Tossed, parts: list[Tosses], folder: Path) -> list[dict[str, Array]]:
-    """``starts`` of all flights, kept in a folder."""
+    """``starts`` of all flights, kept in a folder beside what else the flights say."""
     path = folder / f"{tossed.name}_starts.npz"
     if not path.exists():
-        found = starts(tossed, parts, fly(tossed, parts, (folder / f"{tossed.name}_flights.npz").absolute()))
-        columns = {f"{k}/{name}": values for k, each in enumerate(found) for name, values in each.items()}
+        found = fly(tossed, parts, (folder / f"{tossed.name}_flights.npz").absolute(), bootstrap=1000)
+        found.write(folder / f"{tossed.name}_flights")
+        columns = {f"{k}/{name}": a for k, each in enumerate(starts(tossed, parts, found)) for name, a in each.items()}
         np.savez(path, **columns)  # type: ignore[arg-type]
     with np.load(path) as kept:
         names = [name.split("/", 1) for name in kept.files]

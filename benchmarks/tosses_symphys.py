@@ -201,6 +201,14 @@ class Simulator:
             found_errors.append(tuple(parts))
         return found_errors
 
+    def motions(self, values: Mapping[str, float]) -> list[tuple[Array, Array]]:
+        """Of each toss the positions (n, 3) [m] and orientations (n, 4) of its frames."""
+        found = self.residuals(values)
+        shared = np.array([(self._guess | dict(values))[name] for name in found.shared.names])
+        K = len(self.tosses)
+        sampled = found.predictor.values(shared, np.zeros((K, 0)), list(range(K)))
+        return [(each.values[:, :3], each.values[:, 3:7]) for each in sampled]
+
     def errors(self, values: Mapping[str, float]) -> Array:
         """(K, m) of the published measure."""
         return mean_errors(self.tossed, self.tosses, self.frames(values))
