@@ -3,7 +3,7 @@
     python benchmarks/identify_speed.py FOLDER [--tosses 285] [--small 30]
 
 FOLDER has cube_fit.npz; see docs/results/tosses.md. Shared numbers of the cube, its contacts and gravity are fitted to
-the first half second of each toss, and each toss has a start of its own: 12 numbers. The fit is ``symphys.identify``,
+the first 40 frames of each toss, and each toss has a start of its own: 12 numbers. The fit is ``symphys.identify``,
 by exact derivatives and elimination of each start. Then ``scipy.optimize.least_squares`` gets the same residuals from
 the same guess, with two-point differences: dense, for the first tosses, and with the sparsity of the arrow, so that all
 starts are moved in 12 evaluations. Both count until they reach the merit at which the fit ended.
@@ -23,15 +23,15 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.sparse import lil_matrix
 from tosses_data import CUBE, RATE, Tosses, read
-from tosses_symphys import CUBE_NUMBERS, CUBE_SETS, GRAVITY, Options, recording, tables_of, write
+from tosses_symphys import CUBE_NUMBERS, GRAVITY, Options, assigned, recording, tables_of, write
 
 import symphys
 from symphys.identification import FitOptions, fit
 from symphys.prediction.residuals import RecordingResiduals, residuals_of
 
 Array = NDArray[np.float64]
-FRAMES, MARGIN = 74, 1.01
-"""Of each toss, half a second; and how near to the merit of the fit counts as the same."""
+FRAMES, MARGIN = 40, 1.01
+"""Of each toss, the flight and the first impacts; and how near to the merit of the fit counts as the same."""
 STARTS = ("position", "orientation", "velocity", "angular_velocity")
 NOISE = {"position": 0.0005, "orientation": 0.005}
 """[m], [rad]."""
@@ -48,10 +48,7 @@ def problem_of(tosses: Tosses, path: Path) -> symphys.Problem:
     columns = recording(CUBE, path, STARTS)
     for each in columns["measured"]:
         each["noise"] = NOISE[each["columns"]]
-    variables: list[dict[str, Any]] = []
-    for each in CUBE_NUMBERS:
-        sets = CUBE_SETS[each.name]
-        variables.append({"name": each.name, "sets": sets if len(sets) > 1 else sets[0], "scale": each.scale})
+    variables: list[dict[str, Any]] = [{"name": f"v{k}", "sets": sets} for k, sets in enumerate(assigned(CUBE, guess))]
     variables.append({"name": "g", "sets": "gravity[2]", "guess": -GRAVITY, "scale": 0.1})
     variables += [{"name": f"start_{key}", "sets": f"cube.{key}", "each": "recording"} for key in STARTS]
     return symphys.load(tables_of(CUBE, guess, Options()) | {"variable": variables, "recording": [columns]})

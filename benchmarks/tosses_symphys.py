@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -42,19 +43,20 @@ axis, and its centre of mass [m]."""
 ELBOW_NUMBERS = (
     *LAW,
     Number("edge", 0.003, 0.3),
-    Number("share", 0.35, 0.1),
+    Number("share", 0.48, 0.1),
     Number("inertia", 1.0, 0.1),
     Number("height", 0.0, 0.0005, factor=False),
-    Number("hinge_friction", 4e-4, 0.5),
-    Number("hinge_damping", 2e-5, 0.5),
+    Number("hinge_friction", 6.6e-4, 0.3),
+    Number("hinge_damping", 8e-5, 0.5),
 )
 """Of the elbow: the share of its mass that link 2 has, both inertias by those of homogeneous boxes, its hinge [N m]."""
 
 
 def cube_tables(numbers: Mapping[str, float]) -> Tables:
     """A cube above a table; its frame lies in the middle, and its centre of mass beside it."""
-    size, m = [numbers["size"]] * 3, [numbers[f"moment{k}"] for k in range(3)]
-    body = {"name": "cube", "shape": {"box": {"size": size, "edge": numbers["edge"]}}, "mass": MASS}
+    m = [numbers[f"moment{k}"] for k in range(3)]
+    box = {"size": [numbers["size"]] * 3} | ({"edge": numbers["edge"]} if numbers["edge"] else {})
+    body = {"name": "cube", "shape": {"box": box}, "mass": MASS}
     body |= {"inertia": [sum(m) - m[k] for k in range(3)], "position": [0, 0, 0.5]}
     return {"body": [body], "site": [{"name": "origin", "body": "cube"}]}
 
@@ -80,20 +82,22 @@ def elbow_tables(numbers: Mapping[str, float]) -> Tables:
     return {"body": bodies, "joint": [hinge], "site": [{"name": "origin", "body": "one"}]}
 
 
-SETS: dict[str, list[str]] = {
-    **{name: [f"contact.{name}"] for name in ("friction", "restitution", "torsion", "rolling", "frequency", "damping")},
-    "height": ["ground.offset"],
-    "hinge_friction": ["hinge.friction"],
-    "hinge_damping": ["hinge.damping"],
-    "gravity": ["gravity[2]"],
-}
-"""By number, what of a problem it sets."""
-CUBE_SETS = SETS | {
-    "edge": ["cube.edge"],
-    "size": [f"cube.size[{k}]" for k in range(3)],
-    **{f"moment{k}": [f"cube.second_moments[{k}]"] for k in range(3)},
-    **{f"com{k}": [f"cube.centre_of_mass[{k}]"] for k in range(3)},
-}
+def assigned(tossed: Tossed, numbers: Mapping[str, float], without: Sequence[str] = ()) -> dict[str, list[float]]:
+    """What of a problem variables set, and to which values; an edge of 0 is none."""
+    law = [*(each.name for each in LAW), RESTITUTION.name]
+    found = {f"contact.{name}": [numbers[name]] for name in law if name in numbers and name not in without}
+    found["ground.offset"] = [numbers["height"]]
+    names = ("cube",) if tossed is CUBE else ("one", "two")
+    if numbers["edge"]:
+        found |= {f"{name}.edge": [numbers["edge"]] for name in names}
+    if tossed is CUBE:
+        moments, com = ([numbers[f"{key}{k}"] for k in range(3)] for key in ("moment", "com"))
+        return found | {"cube.size": [numbers["size"]] * 3, "cube.second_moments": moments, "cube.centre_of_mass": com}
+    for name, share in zip(names, (1 - numbers["share"], numbers["share"]), strict=True):
+        mass = 2 * MASS * share
+        found[f"{name}.mass"] = [mass]
+        found[f"{name}.second_moments"] = [numbers["inertia"] * mass / 12 * (2 * half) ** 2 for half in tossed.halves]
+    return found | {f"hinge.{key}": [numbers[f"hinge_{key}"]] for key in ("friction", "damping")}
 
 
 @dataclass(frozen=True)
@@ -163,50 +167,39 @@ class Simulator:
     threads: int = 1
 
     def __post_init__(self) -> None:
-        """Build and compile nothing yet."""
+        """Write the file; what is compiled is compiled at the first simulation."""
         write(self.path, self.tosses, self.first)
-        guess = {each.name: each.guess for each in self.numbers} | dict(self.fixed)
-        sets = CUBE_SETS if self.tossed is CUBE else SETS
-        self.varied = [each.name for each in self.numbers if each.name in sets]
-        self._problems: dict[tuple[float, ...], RecordingResiduals] = {}
-        self._guess = guess
+        self.guess = {each.name: each.guess for each in self.numbers} | dict(self.fixed)
 
-    def residuals(self, values: Mapping[str, float]) -> RecordingResiduals:
-        """Of the problem with these values; those that no variable can set are in its file."""
-        values = self._guess | dict(values)
-        sets = CUBE_SETS if self.tossed is CUBE else SETS
-        key = tuple(value for name, value in values.items() if name not in self.varied)
-        if key not in self._problems:
-            self._problems.clear()
-            tables = tables_of(self.tossed, values, self.options)
-            absent = {f"contact.{name}" for name in self.options.without}
-            variables = []
-            for name in self.varied:
-                if not absent & set(sets[name]):
-                    variables.append({"name": name, "sets": sets[name] if len(sets[name]) > 1 else sets[name][0]})
-            tables |= {"variable": variables, "recording": [recording(self.tossed, self.path, list(self.first))]}
-            self._problems[key] = residuals_of(symphys.load(tables), self.threads)
-        return self._problems[key]
+    @cached_property
+    def residuals(self) -> RecordingResiduals:
+        """Of the problem."""
+        tables = tables_of(self.tossed, self.guess, self.options)
+        variables = [{"name": f"v{k}", "sets": sets} for k, sets in enumerate(self._assigned({}))]
+        tables |= {"variable": variables, "recording": [recording(self.tossed, self.path, list(self.first))]}
+        return residuals_of(symphys.load(tables), self.threads)
+
+    def _assigned(self, values: Mapping[str, float]) -> dict[str, list[float]]:
+        return assigned(self.tossed, self.guess | dict(values), self.options.without)
+
+    def shared(self, values: Mapping[str, float]) -> Array:
+        """(s,): what the variables of the problem are, in their order."""
+        return np.concatenate(list(self._assigned(values).values()))
 
     def frames(self, values: Mapping[str, float]) -> list[tuple[Array, ...]]:
         """Of each toss the errors of its frames [m], [rad], [rad]."""
-        found = self.residuals(values)
-        shared = np.array([(self._guess | dict(values))[name] for name in found.shared.names])
-        K = len(self.tosses)
-        found_errors = []
-        for residuals in found.residuals(shared, np.zeros((K, 0)), np.arange(K)):
+        K, found = len(self.tosses), list[tuple[Array, ...]]()
+        for residuals in self.residuals.residuals(self.shared(values), np.zeros((K, 0)), np.arange(K)):
             n = len(residuals) // (7 if "angle" in self.tossed.measures else 6)
             parts = [np.linalg.norm(residuals[3 * n * k : 3 * n * (k + 1)].reshape(n, 3), axis=1) for k in (0, 1)]
             parts += [np.abs(residuals[6 * n :])] * ("angle" in self.tossed.measures)
-            found_errors.append(tuple(parts))
-        return found_errors
+            found.append(tuple(parts))
+        return found
 
     def motions(self, values: Mapping[str, float]) -> list[tuple[Array, Array]]:
         """Of each toss the positions (n, 3) [m] and orientations (n, 4) of its frames."""
-        found = self.residuals(values)
-        shared = np.array([(self._guess | dict(values))[name] for name in found.shared.names])
         K = len(self.tosses)
-        sampled = found.predictor.values(shared, np.zeros((K, 0)), list(range(K)))
+        sampled = self.residuals.predictor.values(self.shared(values), np.zeros((K, 0)), list(range(K)))
         return [(each.values[:, :3], each.values[:, 3:7]) for each in sampled]
 
     def errors(self, values: Mapping[str, float]) -> Array:
