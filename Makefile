@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 QUICK := $(addprefix tests/,house model expression findings problem solvers dynamics)
 
-.PHONY: help demo demo-walk test test-quick test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-mpc bench-table1 bench-gpu bench-walk bench-lessons stress bench-pipelines bench-runs bench-gaits bench-imports bench-idto profiles gallery clean
+.PHONY: help demo demo-walk test test-quick test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-mpc bench-table1 bench-gpu bench-walk bench-lessons stress bench-pipelines bench-runs bench-gaits bench-imports bench-idto bench-tosses profiles gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
@@ -125,6 +125,11 @@ bench-gpu: $(VENV)/.benching  ## the same on a GPU, with the floors; without one
 
 bench-idto: $(VENV)/.installed  ## tasks of IDTO by iLQR: iterations, seconds, the answers at half the time step
 	$(BIN)/python benchmarks/idto_tasks.py
+
+bench-tosses: $(VENV)/.benching  ## recorded tosses of a cube and an elbow against MuJoCo, from DATA=FOLDER; two hours of a processor
+	$(BIN)/python benchmarks/identify_speed.py $(DATA)
+	$(BIN)/python benchmarks/tosses.py $(DATA)
+	$(BIN)/python benchmarks/tosses.py $(DATA) --study flights,ablations,splits,limits --evaluations 200
 
 gallery: $(VENV)/.installed  ## make the figures of the README again
 	$(BIN)/symphys solve ball_throw bank_shot sled basket knock putt cart_pole --solver gradient,least_squares,ipopt,cma --out build/gallery

@@ -58,7 +58,8 @@ def number_blocks(problem: Problem, start: int) -> tuple[tuple[NumberBlock, ...]
     for variable in problem.variables:
         blocks = found[variable.each]
         first = blocks[-1].part.stop if blocks else 0
-        recorded = variable.each and any(variable.slots[0].name in each.start for each in problem.recordings)
+        name = variable.slots[0].name
+        recorded = variable.each and any(name in {**each.start, **each.coordinates} for each in problem.recordings)
         blocks.append(NumberBlock(variable, first, start + np.arange(variable.guess.size), recorded))
         start += variable.guess.size
     return tuple(found[False]), tuple(found[True])

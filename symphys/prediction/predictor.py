@@ -82,7 +82,9 @@ class Predictor:
         self._angles = np.concatenate([np.full(size, text in angles) for text, size in self.sizes.items()])
         self._velocities, self._gravity = tuple(velocities), np.asarray(problem.world().gravity, float)
         guess = np.concatenate([variable.guess for variable in whole.variables])
+        self._nominal = problem.parametric.starts()
         self.starts = np.array([self._start(each, guess) for each in self.recordings])
+        self._recorded = np.array([self._coordinates(each) for each in self.recordings])
 
     def values(self, shared: Array, own: Array, which: Sequence[int]) -> Iterator[PredictedSamples]:
         """The recordings at shared (s,) and own (K, o) numbers."""
@@ -149,6 +151,7 @@ class Predictor:
                 z[block.where], along[np.ix_(block.where, columns)] = turned(z[block.where], numbers[block.part])
             else:
                 z[block.where], along[block.where, columns] = numbers[block.part], 1
+                z[block.where] -= self._recorded[k, block.where]
         for variable, part in zip(self._given, self._parts, strict=True):
             name = variable.slots[0].name
             if name in recording.inputs:
@@ -168,14 +171,25 @@ class Predictor:
             z[part] = recording.start.get(variable.slots[0].name, variable.guess)
         for block in self.own:
             slot = block.variable.slots[0]
-            if slot.name in recording.start:
+            if slot.name in recording.coordinates:
+                z[block.where] = self._nominal[slot.name][list(slot.components)]
+            elif slot.name in recording.start:
                 z[block.where] = recording.start[slot.name][list(slot.components)]
         return z
+
+    def _coordinates(self, recording: Recording) -> Array:
+        """(n,): by how much what own numbers set of joints is less in z, which begins at recorded coordinates."""
+        by = np.zeros(self.starts.shape[1])
+        for block in self.own:
+            slot = block.variable.slots[0]
+            if slot.name in recording.coordinates:
+                by[block.where] = (recording.coordinates[slot.name] - self._nominal[slot.name])[list(slot.components)]
+        return by
 
     def guesses(self, own: bool) -> Array:
         """(s,) or (K, o): where numbers begin."""
         blocks = self.own if own else self.shared
-        starts = self.starts if own else self.starts[0]
+        starts = self.starts + self._recorded if own else self.starts[0]
         found = np.zeros((*starts.shape[:-1], blocks[-1].part.stop if blocks else 0))
         for block in blocks:
             if not block.turns:

@@ -21,6 +21,7 @@ from symphys.problem.model import (
     Variable,
     VariableSlot,
 )
+from symphys.problem.parametric.carried import carried
 from symphys.problem.parametric.reposition import placing, reposition
 from symphys.problem.parametric.starts import begin
 from symphys.problem.problem import Problem, load_problem, problem_of_tables
@@ -62,6 +63,7 @@ __all__ = [
     "Variable",
     "VariableSlot",
     "begin",
+    "carried",
     "is_robot",
     "json_schema",
     "load_problem",

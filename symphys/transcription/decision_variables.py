@@ -11,7 +11,7 @@ import numpy as np
 
 from symphys.model.state_layout import initial_state, input_columns, inputs_size
 from symphys.model.world import World
-from symphys.problem import Problem, Variable, begin, placing, reposition
+from symphys.problem import Problem, Variable, begin, carried, placing, reposition
 from symphys.shooting import VariableBlock
 from symphys.transcription.formula_names import Parameters, spans
 
@@ -45,8 +45,12 @@ def start_of(
     physical = {name: ca.MX(value) for name, value in zip(parameters.names, parameters.nominal, strict=True)}
     steps, scheduled = problem.simulation.steps, parameters.phases.at(ca.DM(np.arange(problem.simulation.steps)).T)
     u = ca.vertcat(ca.MX.zeros(inputs_size(world, inputs) - scheduled.shape[0], steps), scheduled)
-    for variable, (first, last) in zip(problem.variables, spans(problem.variables), strict=True):
-        part = z[first:last]
+    places = zip(problem.variables, spans(problem.variables), strict=True)
+    parts = [(variable, z[first:last]) for variable, (first, last) in places]
+    measured = initial
+    for variable, part in sorted(parts, key=lambda each: each[0].each):
+        if variable.each and measured is initial:
+            initial = dict(measured)
         if variable.kind == "recording" or variable.name in beside:  # the first is how a motion was measured
             continue
         if variable.kind == "control":
@@ -57,11 +61,19 @@ def start_of(
             values[slot.name] = _replace(values[slot.name], slot.components, part)
     varied = {slot.name for variable in problem.variables for slot in variable.slots}
     initial |= {name: _unit(initial[name]) for name in varied if name.endswith(".orientation")}
+    if measured is not initial:
+        initial = carried(problem.parametric, own_bodies(problem), measured, initial)
     begun = {name: initial.pop(name) for name in starts}
     initial = begin(problem.parametric, {name: begun[name] for name in starts if name in varied}, initial)
-    places = {name: physical[name] for name in placing(sorted(varied & physical.keys()))}
-    initial = reposition(problem.parametric, places, initial)
+    placed = {name: physical[name] for name in placing(sorted(varied & physical.keys()))}
+    initial = reposition(problem.parametric, placed, initial)
     return RolloutStart(initial_state(world, initial), u, ca.vertcat(ca.MX(0, 1), *physical.values()))
+
+
+def own_bodies(problem: Problem) -> list[str]:
+    """The bodies whose starts variables set for each recording."""
+    slots = [slot.name for variable in problem.variables if variable.each for slot in variable.slots]
+    return list(dict.fromkeys(name.rpartition(".")[0] for name in slots if name in problem.initial))
 
 
 def _replace(value: Expr, components: Sequence[int], part: Expr) -> Expr:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.maths import rotation
 from symphys.model.joints.frames import WORLD
 from symphys.model.joints.start import moved_to_start, moved_to_zero, placed_frames, spanning_tree
+from symphys.problem.parametric.carried import follow
 from symphys.problem.parametric.joints import ParametricJoint
 
 Array = NDArray[np.float64]
@@ -66,10 +67,19 @@ class Starts:
         rates = {self.of_joints[name].joint.name: value for name, value in bent.items() if self.of_joints[name].rate}
         for joint, base, body in self._outwards([*own], group):
             if base != WORLD:
-                follow(body, base, before, state)
+                moved = follow(body, base, casadi_state(before), casadi_state(state))
+                state |= {name: np.array(value).ravel() for name, value in moved.items()}
             if joint.name in rates:
                 turn_on(joint, body, rates[joint.name], state)
         return {f"{body}.{field}": state[f"{body}.{field}"] for body in group for field in FIELDS}
+
+    def coordinates(self, given: Mapping[str, Array]) -> dict[str, Array]:
+        """Of joints what a recording sets, by the names with which variables set it: ``hinge.start`` [rad] or [m]."""
+        found = {}
+        for name, each in self.of_joints.items():
+            if name in given:
+                found[f"{each.joint.name}.{'start_rate' if each.rate else 'start'}"] = given[name]
+        return found
 
     def _bent(self, bent: Mapping[str, float]) -> State:
         """The file's start with other coordinates of joints."""
@@ -110,24 +120,6 @@ class Starts:
             queue.append(root)
 
 
-def follow(body: str, base: str, before: State, state: State) -> None:
-    """Move a body, in place, as one rigid body with its base, which lay elsewhere before."""
-    turn = quaternion_product(state[f"{base}.orientation"], conjugate(before[f"{base}.orientation"]))
-    axes = np.array(rotation.matrix(turn), float)
-    arm = axes @ (before[f"{body}.position"] - before[f"{base}.position"])
-    state[f"{body}.position"] = state[f"{base}.position"] + arm
-    orientation = quaternion_product(turn, before[f"{body}.orientation"])
-    state[f"{body}.orientation"] = orientation / np.linalg.norm(orientation)
-    spin = state[f"{base}.angular_velocity"]
-    own = before[f"{body}.angular_velocity"] - before[f"{base}.angular_velocity"]
-    slide = before[f"{body}.velocity"] - before[f"{base}.velocity"]
-    slide = slide - np.cross(
-        before[f"{base}.angular_velocity"], before[f"{body}.position"] - before[f"{base}.position"]
-    )
-    state[f"{body}.angular_velocity"] = spin + axes @ own
-    state[f"{body}.velocity"] = state[f"{base}.velocity"] + np.cross(spin, arm) + axes @ slide
-
-
 def turn_on(joint: ParametricJoint, body: str, rate: float, state: State) -> None:
     """Give a body, in place, the rate of its joint; what the file's start has of it is replaced."""
     coordinate = joint.kind.coordinates[0]
@@ -146,18 +138,13 @@ def turn_on(joint: ParametricJoint, body: str, rate: float, state: State) -> Non
         state[f"{body}.velocity"] = still + sign * rate * axis
 
 
+def casadi_state(state: State) -> dict[str, ca.DM]:
+    """The same numbers."""
+    return {name: ca.DM(value) for name, value in state.items()}
+
+
 def motion_of(name: str, state: State) -> tuple[Array, Array, Array]:
     """(3,) [rad/s], (3,) [m/s] and (3,) [m]: spin, velocity and place of a body, or of the world."""
     if name == WORLD:
         return np.zeros(3), np.zeros(3), np.zeros(3)
     return state[f"{name}.angular_velocity"], state[f"{name}.velocity"], state[f"{name}.position"]
-
-
-def conjugate(q: Array) -> Array:
-    """(4,): the quaternion that turns back."""
-    return np.array([q[0], -q[1], -q[2], -q[3]])
-
-
-def quaternion_product(p: Array, q: Array) -> Array:
-    """(4,): p q, which turns by q first."""
-    return np.array(rotation.multiply(p, q), float).ravel()

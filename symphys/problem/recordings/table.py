@@ -266,6 +266,7 @@ class RecordingReader(RecordedRows):
             time=time,
             measured=tuple(found),
             start=self.world.starts.complete(given) if given else {},
+            coordinates=self.world.starts.coordinates(given),
             inputs={each.name: each.over_time(rows, time, self.frame) for each in inputs},
             weight=self.table.weight,
         )

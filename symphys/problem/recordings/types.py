@@ -72,6 +72,8 @@ class Recording:
         measured: what was measured, each at all n times.
         start: numbers that the recording sets at the start, by the names of ``Problem.initial``, (3,) or (4,); where a
             variable sets the same quantity, they are its guess for this recording.
+        coordinates: what it sets of joints, which is in ``start`` too, by names such as ``hinge.start`` [rad] or [m],
+            ``hinge.start_rate``, (1,) each; where a variable sets the same, they are its guess for this recording.
         inputs: what drives the simulation, by names such as ``knee.command``.
         held_back: not fitted to, only predicted.
         weight: factor of its squared residuals.
@@ -82,6 +84,7 @@ class Recording:
     time: Array = field(repr=False)
     measured: tuple[Measured, ...]
     start: dict[str, Array]
+    coordinates: dict[str, Array] = field(default_factory=dict)
     inputs: dict[str, RecordedInput] = field(default_factory=dict)
     held_back: bool = False
     weight: float = 1.0
