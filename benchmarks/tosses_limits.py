@@ -122,35 +122,30 @@ def split(folder: Path, work: Path, found: Mapping[str, float], name: str, evalu
 
 
 def limits(folder: Path, work: Path, found: Mapping[str, float], evaluations: int) -> dict[str, Any]:
-    """How far errors of starts alone move simulated tosses of the check file, and what a fit to it would reach."""
+    """How far errors of starts alone move simulated tosses, and what a fit to the check file itself would reach."""
     tosses, first = from_flights(folder, work)
-    check, flown = tosses["check"], first["check"]
-    errors = flights_of(CUBE, work).own_error[-len(check) :]
+    numbers = refined(found, {}, ())
+
+    def starting(part: str, which: Array, start: Mapping[str, Array], name: str) -> tuple[Tosses, Simulator]:
+        path, some = (work / f"limits_{name}.npz").absolute(), tosses[part].only(which)
+        return some, Simulator(CUBE, some, numbers, path, {key: values[which] for key, values in start.items()})
+
+    errors = flights_of(CUBE, work).own_error[: len(tosses["fit"])]
     names = ("position", "orientation", "velocity", "angular_velocity")
     parts = {name: errors[:, 3 * k : 3 * k + 3] for k, name in enumerate(names)}
     known = np.flatnonzero(np.isfinite(errors).all(axis=1))
-    numbers = refined(found, {}, ())
-
-    def starting(which: Array, start: Mapping[str, Array], name: str) -> Simulator:
-        path = (work / f"limits_{name}.npz").absolute()
-        begun = {key: values[which] for key, values in start.items()}
-        return Simulator(CUBE, check.only(which), numbers, path, begun)
-
-    everything = np.arange(len(check))
-    exact, measured = starting(everything, flown, "flown"), starting(everything, check.first(), "measured")
-    moved = [
-        apart(
-            check.only(known),
-            starting(known, flown, "known"),
-            starting(known, moved_starts(flown, parts, seed), "moved"),
-            found,
-        )
-        for seed in range(5)
-    ]
+    moved = []
+    for seed in range(5):
+        some, one = starting("fit", known, first["fit"], "known")
+        other = starting("fit", known, moved_starts(first["fit"], parts, seed), "moved")[1]
+        moved.append(apart(some, one, other, found))
+    every = np.arange(len(tosses["check"]))
+    check, exact = starting("check", every, first["check"], "flown")
+    measured = starting("check", every, tosses["check"].first(), "measured")[1]
     best, _ = search(numbers, exact.errors, evaluations)
     return {
-        "starts as measured": apart(check, exact, measured, found).tolist(),
-        "starts of flights": np.concatenate(moved).tolist(),
+        "starts as measured against starts of flights": apart(check, exact, measured, found).tolist(),
+        "starts of flights, moved by their errors": np.concatenate(moved).tolist(),
         "tosses with known errors of their start": len(known),
         "fitted to the fit file": exact.errors(found).tolist(),
         "fitted to the check file itself": exact.errors(best).tolist(),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,17 +37,17 @@ class NumberBlock:
     where: Ints
     recorded: bool = False
 
-    @property
+    @cached_property
     def turns(self) -> bool:
         """Whether they are a rotation vector (3,) [rad], in the body's frame, from where an orientation begins."""
         return self.variable.slots[0].name.endswith(".orientation") and self.variable.components == 4
 
-    @property
+    @cached_property
     def count(self) -> int:
         """How many they are."""
         return 3 if self.turns else len(self.where)
 
-    @property
+    @cached_property
     def part(self) -> slice:
         """Their places among shared or own numbers."""
         return slice(self.first, self.first + self.count)

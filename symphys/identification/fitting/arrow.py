@@ -109,11 +109,25 @@ class ArrowSystem:
             shared[free_shared] = -damped_solution(square, side, damping, np.ones_like(size) if damping else size)
         return shared, -(solved[:, :, self.s] + solved[:, :, : self.s] @ shared)
 
+    def own_step(self, shared: Array, damping: Array, free_own: Bools) -> Array:
+        """(K, o): the step of the own numbers beside a step (s,) of the shared ones, with a damping (K,) of each."""
+        s, mask = self.s, free_own.astype(float)
+        square = self.blocks[:, s:, s:] * mask[:, :, None] * mask[:, None, :]
+        side = (self.own_gradient + np.einsum("ksi,s->ki", self.blocks[:, :s, s:], shared)) * mask
+        added = np.where(free_own, damping[:, None], 1.0)
+        return -np.asarray(
+            np.linalg.solve(square + added[:, :, None] * np.eye(square.shape[1]), side[:, :, None])[:, :, 0]
+        )
+
+    def expected_falls(self, shared: Array, own: Array) -> Array:
+        """(K,): by how much the quadratic models lower the costs of recordings with a step (s,), (K, o)."""
+        both = np.concatenate([np.broadcast_to(shared, (len(own), self.s)), own], axis=1)
+        return -2 * np.sum(both * self.gradients, axis=1) - np.einsum("ki,kij,kj->k", both, self.blocks, both)
+
     def expected_fall(self, shared: Array, own: Array) -> float:
         """By how much the quadratic model lowers the cost with a step (s,), (K, o)."""
-        both = np.concatenate([np.broadcast_to(shared, (len(own), self.s)), own], axis=1)
-        bent = float(np.einsum("ki,kij,kj->", both, self.blocks, both)) + float(shared**2 @ self.prior_block)
-        return -2 * float(np.sum(both * self.gradients)) - 2 * float(shared @ self.prior_gradient) - bent
+        priors = 2 * float(shared @ self.prior_gradient) + float(shared**2 @ self.prior_block)
+        return float(self.expected_falls(shared, own).sum()) - priors
 
 
 def damped_solution(square: Array, side: Array, damping: float, size: Array) -> Array:

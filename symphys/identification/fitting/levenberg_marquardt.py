@@ -38,6 +38,8 @@ ROUNDING = 1e-14
 """A fall of the merit by this share of itself cannot be told from rounding."""
 PROGRESS = 1e-2
 """A fall of the merit by this share of itself per residual is progress: that of a tenth of a standard error."""
+HOPELESS = 1e-2
+"""Of the fall that the model promises: where so many steps as patience lasts bring less, it is another merit."""
 WORTH_AT_KINK = 0.1
 """The same where the sides of a kink are collected: a step that gains less shows one more side."""
 AT_KINK = 1e-2
@@ -45,6 +47,10 @@ AT_KINK = 1e-2
 as many are left as noise makes, the root of how many numbers there are: more is another minimum, or chaos."""
 NEAR = 0.1
 """Standard errors that may be left where the merit does not fall any more: intervals are no narrower than that."""
+SHORTER = (1e-4, 1e-2, 1.0, 1e2, 1e6)
+"""Damping of own numbers, by the largest diagonal of a recording, where the whole step makes that recording worse."""
+MODELLED = 0.05
+"""Share of its cost by which a recording may end above its model."""
 MOST_SIDES = 8
 """Points whose Jacobians are collected in an iteration."""
 EXACTLY = "the recordings are met exactly"
@@ -171,7 +177,18 @@ class RecordingFit:
             return FitStatus.BUDGET, BUDGET
         if state.quiet >= (self.options.patience or math.inf):
             return self._stalled(SLOW, last.left)
+        if self._hopeless(state, last.left):
+            left = self._errors(system.expected_fall(*self._arrow(state, system).step()), system)
+            if self._hopeless(state, left):
+                return self._stalled(SLOW, left)
         return None
+
+    def _hopeless(self, state: FitState, left: float) -> bool:
+        """Whether the last steps have brought next to nothing of the fall that goes with so many standard errors."""
+        patience, last = self.options.patience, state.history[-1]
+        if not patience or last.iteration - state.first < patience:
+            return False
+        return state.history[-1 - patience].merit - last.merit < HOPELESS * left**2 * last.merit / self.size
 
     def _arrow(self, state: FitState, system: ArrowSystem, damping: float = 0.0) -> DeterminedArrow:
         """Without what is vague at the state."""
@@ -190,12 +207,15 @@ class RecordingFit:
         Else how the fit ended, and at a kink how far from the shared numbers (s,) one side has its minimum.
         """
         refused, merit, left, kinked = "", system.cost, state.history[-1].left, False
-        kink = AT_KINK < left <= math.sqrt(sum(int(each.sum()) for each in self.free(state, system)))
+        near = left <= math.sqrt(sum(int(each.sum()) for each in self.free(state, system)))
+        kink = near and left > AT_KINK
         model = KinkedModel(system, merit / self.size)
         while state.damping <= state.stiffest:
             shared, own, taken, length = self._moved(state, *self._direction(state, model, kinked))
             recordings, priors = costs(self.problem, shared, own, self.which, self.loss, self.weights)
             self.simulations += len(self.which)
+            if not near:
+                own, taken, recordings = self._retried(state, system, shared, own, taken, recordings)
             trial, expected = float(recordings.sum()) + priors, model.expected_fall(*taken)
             gain = (merit - trial) / expected if expected > 0 and math.isfinite(trial) else -math.inf
             refused = "" if math.isfinite(trial) else self._names(recordings)
@@ -224,6 +244,37 @@ class RecordingFit:
             return FitStatus.CONVERGED, LEFT.format(left=left) + ", which the merit's last digits do not show"
         return self._stalled(STALLED, left)
 
+    def _retried(
+        self, state: FitState, system: ArrowSystem, shared: Array, own: Array, taken: tuple[Array, Array], costs_: Array
+    ) -> tuple[Array, tuple[Array, Array], Array]:
+        """Own numbers, step and costs (k,), with shorter steps of recordings that the whole step makes worse.
+
+        Own numbers of a recording have no effect on others, so that one that leaves its model need not hold up all.
+        """
+        free, d_shared = self.free(state, system)[1], taken[0]
+        stiff = np.einsum("kii->ki", system.blocks[:, system.s :, system.s :]).max(axis=1, initial=0.0)
+        own, best = own.copy(), costs_.copy()
+        for share in SHORTER:
+            excess = best - system.costs + system.expected_falls(d_shared, self._step_of(state, own))
+            off = ~(excess <= MODELLED * np.maximum(system.costs, best)) | ((best > system.costs) & (excess > 0))
+            some = np.flatnonzero(off)
+            if not some.size or not system.blocks.shape[1] > system.s:
+                break
+            steps = system.own_step(d_shared, state.damping + share * stiff, free)
+            tried = self._moved(state, d_shared, steps)[1]
+            trial = own.copy()
+            trial[self.which[some]] = tried[self.which[some]]
+            found, _ = costs(self.problem, shared, trial, self.which[some], self.loss, self.weights[some])
+            self.simulations += len(some)
+            lower = some[found < best[some]]
+            own[self.which[lower]] = trial[self.which[lower]]
+            best[lower] = found[np.isin(some, lower)]
+        return own, (d_shared, self._step_of(state, own)), best
+
+    def _step_of(self, state: FitState, own: Array) -> Array:
+        """(k, o): the step to own numbers (K, o), in scales."""
+        return np.asarray(((own - state.own) / self.problem.own.scale)[self.which])
+
     def _direction(self, state: FitState, model: KinkedModel, kinked: bool) -> tuple[Array, Array]:
         """The next step (s,) and (k, o) in scales: by the sides of a kink, without what is vague, or damped."""
         if kinked:
@@ -246,7 +297,7 @@ class RecordingFit:
         own = state.own.copy()
         own[which] += own_of.scale[which] * d_own
         own = np.clip(own, own_of.lower, own_of.upper)
-        taken = (shared - state.shared) / shared_of.scale, ((own - state.own) / own_of.scale)[which]
+        taken = (shared - state.shared) / shared_of.scale, self._step_of(state, own)
         length = math.sqrt(float(np.sum(taken[0] ** 2) + np.sum(taken[1] ** 2)))
         return shared, own, taken, length
 
