@@ -15,7 +15,7 @@ from symphys.codegen.emit.tables import Recipe, Table, table_of
 from symphys.codegen.emit.writer import Form
 from symphys.codegen.graph.adjoint import Mask
 from symphys.codegen.graph.graph import Graph
-from symphys.codegen.graph.reach import Phase, Reach
+from symphys.codegen.graph.reach import KnownCalls, Reach
 from symphys.codegen.graph.rewrite import Taped
 from symphys.codegen.program.phase_calls import PhaseCalls, grouped, rows_of
 from symphys.codegen.program.program import Function, Place, Program
@@ -80,7 +80,7 @@ def plan(program: Program, seeded: Sequence[str], word: int = 64) -> Plan:
     """
     functions = DistinctFunctions()
     parts = [_Part(calls, steps) for calls, steps in zip(program.phases, (1, program.steps, 1), strict=True)]
-    reach = Reach(program.size, [Phase(part.calls, part.steps, part.dependence(functions)) for part in parts])
+    reach = Reach(program.size, [KnownCalls(part.calls, part.steps, part.dependence(functions)) for part in parts])
     outputs = [_words_of(program.outputs[name]) for name in seeded]
     active = reach.forwards(_words_of(program.z)) & reach.backwards(np.concatenate([np.zeros(0, np.int64), *outputs]))
     for part in parts:

@@ -46,7 +46,7 @@ class Lists:
 
 
 @dataclass(frozen=True)
-class Phase:
+class KnownCalls:
     """Calls with what is known of their functions.
 
     Attributes:
@@ -78,7 +78,7 @@ class _Places:
 class Reach:
     """The calls of all phases as a graph of words, places and calls."""
 
-    def __init__(self, size: int, phases: Sequence[Phase]) -> None:
+    def __init__(self, size: int, phases: Sequence[KnownCalls]) -> None:
         """``size`` words of memory."""
         inputs = [(phase.calls.inputs, phase.steps) for phase in phases]
         outputs = [(phase.calls.outputs, phase.steps) for phase in phases]
