@@ -12,7 +12,7 @@ from symphys.dynamics.articulated.forward_kinematics import FinalPose
 from symphys.dynamics.collision import Contact
 from symphys.dynamics.collision.contact_geometry import Displacement
 from symphys.dynamics.contact.constraint import ZERO, ContactConstraint, ContactImpulse
-from symphys.dynamics.contact.coupling import may_couple
+from symphys.dynamics.contact.coupling import which_couple
 from symphys.dynamics.contact.load_distribution import distribute_loads
 from symphys.dynamics.contact.preparation import Conditions, prepare
 from symphys.dynamics.context import State, StepContext
@@ -96,10 +96,11 @@ def advance(
     # 4. constraints of contacts (7-13) and of joints (25, 26)
     suppressed = suppressed or [ca.SX(0)] * len(contacts)
     constraints = []
-    for (pair, near), contact, off in zip(context.pairs_and_near(), contacts, suppressed, strict=True):
+    couple = which_couple(world)
+    for (pair, near), contact, off, coupled in zip(context.pairs_and_near(), contacts, suppressed, couple, strict=True):
         bodies = bodies_of(pair)
         moving = tuple(trees.motions[i] for i in bodies)
-        force, coupled = x[f"{pair.name}.force"], may_couple(world, pair)
+        force = x[f"{pair.name}.force"]
         conditions = Conditions(off, plastic, force, trees.same(bodies), coupled, near)
         constraint = prepare(context.settings, pair.law, contact, moving, duration, conditions)
         constraints.append(trees.placed(bodies, constraint))

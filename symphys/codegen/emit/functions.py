@@ -34,12 +34,16 @@ class DistinctFunctions:
 
     def entry(self, graph: Graph, form: Form, places: Sequence[Place]) -> list[int]:
         """The table entry of a call: number, length, then offset and stride of each place."""
+        pairs = [x for place in places for x in (place.offset, place.stride)]
+        return [self.number(graph, form), 2 + len(pairs), *pairs]
+
+    def number(self, graph: Graph, form: Form) -> int:
+        """The number of a function, a new one where it is met first."""
         key = (self._identity(graph), form)
         if key not in self._numbers:
             self._numbers[key] = len(self.listed)
             self.listed.append((graph, form))
-        pairs = [x for place in places for x in (place.offset, place.stride)]
-        return [self._numbers[key], 2 + len(pairs), *pairs]
+        return self._numbers[key]
 
     def forward(self, function: Function) -> Graph:
         """The graph of a function."""

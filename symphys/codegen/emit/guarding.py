@@ -12,17 +12,17 @@ then.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.codegen.emit.tables import Table
 from symphys.codegen.errors import ProgramError
 from symphys.codegen.program.program import FunctionCall, Place, Program
 
 Words = NDArray[np.int64]
-Entries = Sequence[Sequence[int]]
 NONE = -1
 TABLES = ("body", "again", "back_body")
 WIDTHS = {"guards": 1, "groups": 1, "calls": 7, "reads": 2, "writes": 2, "chains": 2, "sections": 5, "copies": 5}
@@ -62,12 +62,12 @@ class Guarding:
         moves[positions + 1] |= self.rows["chains"].reshape(-1, 2)[chains, 1] != 0
 
 
-def guarding_of(program: Program, tables: Mapping[str, tuple[Sequence[FunctionCall], Entries]]) -> Guarding | None:
+def guarding_of(program: Program, tables: Mapping[str, Table]) -> Guarding | None:
     """Of a program; None if it has neither guards nor sections.
 
     Args:
         program: whose body has calls with guards.
-        tables: for each of ``TABLES`` the calls and their entries.
+        tables: for each of ``TABLES`` the entries.
     """
     body = _followed(program)
     if not any(call.guard or call.section for call in body):
@@ -85,38 +85,54 @@ class _Rows:
         self._program, self._body, self._guards = program, body, guards
         self._chains = _Chains(program.size)
         self._starts = np.full((len(body) + 1, WIDTHS["calls"]), NONE, np.int64)
-        self._reads: list[tuple[int, int]] = []
+        self._reads: Words = np.zeros((0, 2), np.int64)
         self._writes: list[tuple[int, int]] = []
         self._copies: list[tuple[int, ...]] = []
         self._sections: list[tuple[int, ...]] = []
         self._words = 0
 
-    def lay(self, tables: Mapping[str, tuple[Sequence[FunctionCall], Entries]]) -> None:
-        """Go through the calls as they follow one another, with their entries in all tables."""
-        numbers = {id(call): k for k, call in enumerate(self._program.body)}
-        entries: list[list[tuple[int, Sequence[int]]]] = [[] for _ in self._body]
-        for table, name in enumerate(TABLES):
-            for call, entry in zip(*tables[name], strict=True):
-                entries[numbers[id(call)]].append((self._words, entry))
-                self._starts[numbers[id(call)], table] = self._words
-                self._words += len(entry)
+    def lay(self, tables: Mapping[str, Table]) -> None:
+        """Go through the calls as they follow one another, then through their entries in all tables."""
+        before: list[tuple[int, int]] = []
         for k, call in enumerate(self._body):
-            self._section(k, call)
-            places = {place.offset: chain for place in call.inputs if (chain := self._chains.of(place)) != NONE}
-            forward = [each for each in entries[k] if each[0] == self._starts[k, 0]]
-            self._starts[k, 3] = len(self._reads)
-            self._read(forward, places)
-            self._starts[k, 4] = len(self._reads)
-            self._read([each for each in entries[k] if each not in forward], places)
-            self._starts[k, 5:] = len(self._writes), len(self._copies)
-            self._write(call)
-        self._starts[-1, 3:] = len(self._reads), len(self._reads), len(self._writes), len(self._copies)
+            if call.section is not None:
+                self._section(k, call)
+            before.append((len(self._writes), len(self._copies)))
+            if call.guard is not None or call.section is not None:
+                self._write(call)
+        self._starts[:-1, 5:] = np.array(before, np.int64).reshape(-1, 2)
+        self._starts[-1, 5:] = len(self._writes), len(self._copies)
+        chain = np.array(self._chains.of_words(), np.int64)
+        found = [np.zeros((3, 0), np.int64)]
+        for number, name in enumerate(TABLES):
+            starts = tables[name].start_of(len(self._body))
+            self._starts[:-1, number] = np.where(starts == NONE, NONE, starts + self._words)
+            found += self._read(tables[name], chain)
+            if number == 0:
+                forward = sum(each.shape[1] for each in found)
+            self._words += len(tables[name].words)
+        self._put(np.concatenate(found, axis=1), forward)
 
-    def _read(self, entries: Sequence[tuple[int, Sequence[int]]], places: Mapping[int, int]) -> None:
-        for start, entry in entries:
-            for i in range(2, len(entry), 2):
-                if entry[i] in places:
-                    self._reads.append((start + i, places[entry[i]]))
+    def _read(self, table: Table, chain: Words) -> Iterator[Words]:
+        """(3, reads) call, position and chain where entries have a place of a chain."""
+        inputs = self._program.phases[1].inputs
+        whole = np.where((inputs.stride == 0) & (inputs.size > 0), chain[inputs.offset % max(len(chain), 1)], NONE)
+        for rows, (_, columns) in zip(table.rows, table.recipes, strict=True):
+            calls, at = table.calls[rows], table.starts[rows] + self._words
+            for k, (side, i) in enumerate(columns):
+                if side == "in":
+                    own = whole[inputs.starts[calls] + i]
+                    on = own != NONE
+                    yield np.stack([calls[on], at[on] + 2 + 2 * k, own[on]])
+
+    def _put(self, found: Words, forward: int) -> None:
+        """Reads by their calls; of each call those of the first ``forward`` first."""
+        counts = [np.bincount(each, minlength=len(self._body)) for each in (found[0, :forward], found[0, forward:])]
+        ends = np.cumsum(counts[0] + counts[1])
+        self._starts[:-1, 3] = ends - counts[0] - counts[1]
+        self._starts[:-1, 4] = ends - counts[1]
+        self._starts[-1, 3:5] = found.shape[1]
+        self._reads = found[1:, np.lexsort((found[1], found[0]))].T
 
     def _write(self, call: FunctionCall) -> None:
         for place, other in zip(call.outputs, call.beside, strict=False):
@@ -127,8 +143,9 @@ class _Rows:
                 self._writes.append((self._chains.extend(place, other), place.offset))
 
     def _section(self, k: int, call: FunctionCall) -> None:
+        assert call.section is not None
         before = self._body[k - 1].section if k else None
-        if call.section is not None and call.section != before:
+        if call.section is not before and call.section != before:
             end = next((j for j in range(k, len(self._body)) if self._body[j].section != call.section), len(self._body))
             self._sections.append((k, end, *self._chains.source(call.section)))
 
@@ -148,12 +165,12 @@ class _Rows:
             "sections": self._sections,
             "copies": self._copies,
         }
-        calls, sections = len(self._body), len(self._sections)
+        calls, sections, outputs = len(self._body), len(self._sections), self._program.phases[1].outputs
         seen = (2 + self._program.steps) * len(self._guards) // 8 + 1
         arena = 1 + 64 + seen + calls // 64 + 1 + self._words + 3 * (calls + sections) + 2 * len(self._chains.roots)
-        computes = [k for k, call in enumerate(self._body) if any(place.offset in word for place in call.outputs)]
+        computes = outputs.call[np.isin(outputs.offset, np.array(self._guards, np.int64))]
         return Guarding(
-            first=1 + max(computes, default=NONE),
+            first=1 + int(computes.max(initial=NONE)),
             rows={name: np.array(each, np.int64).ravel() for name, each in rows.items()},
             arena=arena + 3 * (6 * sections + 4 * len(self._copies)),
         )
@@ -166,6 +183,10 @@ class _Chains:
         self.roots: list[tuple[int, int]] = []
         self._newest: list[Place] = []
         self._chain = [NONE] * size
+
+    def of_words(self) -> list[int]:
+        """For each word the chain that it is part of; a word is written once."""
+        return self._chain
 
     def of(self, place: Place) -> int:
         """The chain whose newest result has this place, all of it or a part; NONE if it is part of none."""

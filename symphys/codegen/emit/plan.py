@@ -4,21 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symphys.codegen.emit.functions import DistinctFunctions
 from symphys.codegen.emit.guarding import TABLES, Guarding, guarding_of
+from symphys.codegen.emit.tables import Recipe, Table, table_of
 from symphys.codegen.emit.writer import Form
-from symphys.codegen.graph.activity import Activity, CallActivity, Words
 from symphys.codegen.graph.adjoint import Mask
 from symphys.codegen.graph.graph import Graph
+from symphys.codegen.graph.reach import KnownCalls, Reach
 from symphys.codegen.graph.rewrite import Taped
-from symphys.codegen.program.program import FunctionCall, Place, Program
+from symphys.codegen.program.phase_calls import PhaseCalls, grouped, rows_of
+from symphys.codegen.program.program import Function, Place, Program
+from symphys.codegen.program.spans import Spans
 
-Table = NDArray[np.int64]
-Entries = list[list[int]]
+Words = NDArray[np.int64]
+NONE = -1
+TAPE = ("tape", 0)
 FAST_MEMORY = 12 * 2**20
 """[bytes] of a block beyond which reading a tape costs more than computing its values again: 16 spheres in a heap, 32
 MiB with a tape, took 8.5 times the rollout for a gradient, and 4.6 without; 8 spheres, 8 MiB, took 3.6 with one."""
@@ -37,9 +42,9 @@ class Plan:
     """
 
     functions: tuple[tuple[Graph, Form], ...]
-    tables: dict[str, tuple[int, Table]]
+    tables: dict[str, tuple[int, Words]]
     tape: int
-    written: Table
+    written: Words
     guarding: Guarding | None = None
 
     def moving(self) -> list[set[int]]:
@@ -74,137 +79,173 @@ def plan(program: Program, seeded: Sequence[str], word: int = 64) -> Plan:
         word: bytes of one word of a whole block: lanes times the size of a number.
     """
     functions = DistinctFunctions()
-    prologue, body, epilogue = phases = (
-        _reaches(program.prologue, 1, functions),
-        _reaches(program.body, program.steps, functions),
-        _reaches(program.epilogue, 1, functions),
-    )
-    activity = Activity(program, phases, [program.outputs[name] for name in seeded])
-    pulls = [[pull for reach in reversed(phase) if (pull := _pull(reach, activity, functions))] for phase in phases]
-    again = _again(program, body, pulls[1], functions)
-    tape = _put_on_tape(program, pulls[1], again, functions, FAST_MEMORY // word)
-    entries: dict[str, Entries] = {
-        "prologue": [_push(reach.call, functions) for reach in prologue],
-        "body": [_push(reach.call, functions) for reach in body],
-        "epilogue": [_push(reach.call, functions) for reach in epilogue],
-        "again": [_push(reach.call, functions, reach.tape) for reach in again],
-        "back_prologue": [pull.entry(functions) for pull in pulls[0]],
-        "back_body": [pull.entry(functions) for pull in pulls[1]],
-        "back_epilogue": [pull.entry(functions) for pull in pulls[2]],
-    }
-    guarded = {
-        "body": ([reach.call for reach in body], entries["body"]),
-        "again": ([reach.call for reach in again], entries["again"]),
-        "back_body": ([pull.reach.call for pull in pulls[1]], entries["back_body"]),
-    }
-    tables = {name: (len(rows), _flat(rows)) for name, rows in entries.items()}
-    return Plan(tuple(functions.listed), tables, tape, _written(program), guarding_of(program, guarded))
+    parts = [_Part(calls, steps) for calls, steps in zip(program.phases, (1, program.steps, 1), strict=True)]
+    reach = Reach(program.size, [KnownCalls(part.calls, part.steps, part.dependence(functions)) for part in parts])
+    outputs = [_words_of(program.outputs[name]) for name in seeded]
+    active = reach.forwards(_words_of(program.z)) & reach.backwards(np.concatenate([np.zeros(0, np.int64), *outputs]))
+    for part in parts:
+        part.find_adjoints(active, functions)
+    body = parts[1]
+    again = _again(program, body, reach, functions)
+    tape = _put_on_tape(program, body, again, functions, FAST_MEMORY // word)
+    tables = {name: part.pushes(functions) for name, part in zip(("prologue", "body", "epilogue"), parts, strict=True)}
+    tables["again"] = body.pushes(functions, np.flatnonzero(again))
+    for name, part in zip(("prologue", "body", "epilogue"), parts, strict=True):
+        tables[f"back_{name}"] = part.pulls(functions)
+    guarding = guarding_of(program, {name: tables[name] for name in TABLES})
+    filled = {name: (len(table.calls), table.filled()) for name, table in tables.items()}
+    return Plan(tuple(functions.listed), filled, tape, _written(program), guarding)
 
 
-def _written(program: Program) -> Table:
-    places = [place for call in program.body for place in call.outputs if place.stride]
-    return np.array([(place.offset, place.size, place.stride) for place in places], np.int64).reshape(-1, 3)
+def _written(program: Program) -> Words:
+    places = program.phases[1].outputs
+    own = places.stride != 0
+    return np.stack([places.offset[own], places.size[own], places.stride[own]], axis=1)
 
 
-@dataclass
-class _Tape:
-    """A place for values that a call's adjoint needs, and the functions that write and read it."""
+class _Kind(NamedTuple):
+    """Calls of one function whose adjoints are with respect to the same arguments and results."""
 
-    functions: Taped
-    place: Place
-
-
-@dataclass
-class _Reach(CallActivity):
-    """A call and, once that is known, its tape."""
-
-    tape: _Tape | None = None
-
-
-@dataclass(frozen=True)
-class _Pull:
-    """The adjoint of a call, with respect to the marked arguments and results."""
-
-    reach: _Reach
-    graph: Graph
+    function: Function
     inputs: Mask
     outputs: Mask
-
-    def reads(self, functions: DistinctFunctions) -> list[Words]:
-        """The words of the memory that it reads."""
-        used = functions.arguments(self.graph)
-        return [words for i, words in enumerate(self.reach.inputs) if i in used]
-
-    def entry(self, functions: DistinctFunctions) -> list[int]:
-        """Its table entry."""
-        call, tape = self.reach.call, self.reach.tape
-        primal = [*call.inputs, *([tape.place] if tape else [])]
-        form = Form(primal=len(primal), adds=True, backward=True, clears=not call.accumulate)
-        places = [*primal, *_marked(call.outputs, self.outputs), *_marked(call.inputs, self.inputs)]
-        return functions.entry(tape.functions.adjoint if tape else self.graph, form, places)
+    graph: Graph
 
 
-def _reaches(calls: Sequence[FunctionCall], steps: int, functions: DistinctFunctions) -> list[_Reach]:
-    return [_Reach.of(call, steps, functions.dependence(call.function)) for call in calls]
+class _Part:
+    """A phase, and once they are known its adjoints and their tapes.
+
+    Attributes:
+        calls: of the phase.
+        steps: in which they are made.
+        kinds: of adjoints.
+        kind: (calls,) which adjoint each call has; -1: none.
+        tape: (calls,) where its tape begins; -1: it has none.
+        taped: for each kind its functions with a tape.
+    """
+
+    def __init__(self, calls: PhaseCalls, steps: int) -> None:
+        self.calls, self.steps = calls, steps
+        self.kinds: list[_Kind] = []
+        self.kind = np.full(len(calls), NONE, np.int64)
+        self.tape = np.full(len(calls), NONE, np.int64)
+        self.taped: dict[int, Taped] = {}
+
+    def dependence(self, functions: DistinctFunctions) -> list[NDArray[np.bool_]]:
+        """Of each function which words of its results depend on which arguments."""
+        none = (np.zeros((0, function.n_in()), bool) for function in self.calls.functions)
+        each = map(functions.dependence, self.calls.functions)
+        return [np.concatenate([nothing, *found]) for nothing, found in zip(none, each, strict=True)]
+
+    def find_adjoints(self, active: NDArray[np.bool_], functions: DistinctFunctions) -> None:
+        """Of the calls that have active arguments and results, given which words of the memory are active."""
+        before = np.concatenate([[0], np.cumsum(active)])
+        marks = [_any(before, spans, self.steps) for spans in (self.calls.inputs, self.calls.outputs)]
+        found: list[tuple[int, Words, Function, Mask, Mask]] = []
+        for number, calls in self.calls.by_function():
+            reads, gives = marks[0][rows_of(self.calls.inputs, calls)], marks[1][rows_of(self.calls.outputs, calls)]
+            for mine in _alike(np.concatenate([reads, gives], axis=1)):
+                masks: tuple[Mask, Mask] = tuple(reads[mine[0]].tolist()), tuple(gives[mine[0]].tolist())
+                if any(masks[0]) and any(masks[1]):
+                    found.append((int(calls[mine[-1]]), calls[mine], self.calls.functions[number], *masks))
+        for _, calls, function, inputs, outputs in sorted(found, key=lambda each: -each[0]):
+            self.kind[calls] = len(self.kinds)
+            self.kinds.append(_Kind(function, inputs, outputs, functions.adjoint(function, inputs, outputs)))
+
+    def pushes(self, functions: DistinctFunctions, calls: Words | None = None) -> Table:
+        """The table of calls; None: of all, without tapes."""
+        count, again = len(self.calls.functions), calls is not None
+        chosen = np.arange(len(self.calls)) if calls is None else calls
+        plain = 2 * self.calls.number[chosen] + self.calls.accumulate[chosen]
+        taped = (self.tape[chosen] != NONE) & again
+
+        def recipe(kind: int) -> Recipe:
+            number, adds = divmod(kind, 2)
+            pair = self.taped[number - count] if number >= count else None
+            function = self.kinds[number - count].function if pair else self.calls.functions[number]
+            columns = [*_columns("in", [True] * function.n_in()), *_columns("out", [True] * function.n_out())]
+            form = Form(primal=function.n_in(), adds=bool(adds))
+            graph = pair.forward if pair else functions.forward(function)
+            return Recipe(functions.number(graph, form), (*columns, *([TAPE] if pair else [])))
+
+        kinds = np.where(taped, 2 * (count + self.kind[chosen]), plain)
+        return table_of(self.calls, chosen, kinds, recipe, self.tape)
+
+    def pulls(self, functions: DistinctFunctions) -> Table:
+        """The table of adjoints."""
+        chosen = np.flatnonzero(self.kind != NONE)[::-1]
+
+        def recipe(number: int) -> Recipe:
+            kind, adds, taped = self.kinds[number // 4], number // 2 % 2, number % 2
+            primal = [*_columns("in", [True] * kind.function.n_in()), *([TAPE] if taped else [])]
+            form = Form(primal=len(primal), adds=True, backward=True, clears=not adds)
+            marked = [*_columns("out", kind.outputs), *_columns("in", kind.inputs)]
+            graph = self.taped[number // 4].adjoint if taped else kind.graph
+            return Recipe(functions.number(graph, form), (*primal, *marked))
+
+        kinds = 4 * self.kind[chosen] + 2 * self.calls.accumulate[chosen] + (self.tape[chosen] != NONE)
+        return table_of(self.calls, chosen, kinds, recipe, self.tape)
 
 
-def _push(call: FunctionCall, functions: DistinctFunctions, tape: _Tape | None = None) -> list[int]:
-    form = Form(primal=len(call.inputs), adds=call.accumulate)
-    graph = tape.functions.forward if tape else functions.forward(call.function)
-    return functions.entry(graph, form, [*call.inputs, *call.outputs, *([tape.place] if tape else [])])
+def _columns(side: str, mask: Sequence[bool]) -> list[tuple[str, int]]:
+    return [(side, i) for i, on in enumerate(mask) if on]
 
 
-def _pull(reach: _Reach, activity: Activity, functions: DistinctFunctions) -> _Pull | None:
-    inputs, outputs = activity.marks(reach.inputs), activity.marks(reach.outputs)
-    if not any(inputs) or not any(outputs):
-        return None
-    return _Pull(reach, functions.adjoint(reach.call.function, inputs, outputs), inputs, outputs)
+def _alike(marks: NDArray[np.bool_]) -> list[Words]:
+    """Rows that are equal, in order."""
+    bits = np.ascontiguousarray(np.packbits(marks, axis=1))
+    if not bits.size:
+        return [np.arange(len(marks))]
+    _, whose = np.unique(bits.view(np.dtype((np.void, bits.shape[1]))).ravel(), return_inverse=True)
+    return grouped(whose.ravel(), int(whose.max()) + 1)
 
 
-def _again(
-    program: Program, body: Sequence[_Reach], pulls: Sequence[_Pull], functions: DistinctFunctions
-) -> list[_Reach]:
-    """The calls that must be run again before the adjoints of a step: those whose scratch is read."""
-    scratch = program.scratch()
-    needed = np.zeros(program.size, dtype=bool)
-    for pull in pulls:
-        for words in pull.reads(functions):
-            needed[words] = True
-    for call in program.body:
-        if call.section is not None:
-            needed[call.section.offset] = True
-    needed &= scratch
-    chosen = []
-    for reach in reversed(body):
-        if any(needed[words].any() for words in reach.outputs):
-            chosen.append(reach)
-            for words in reach.inputs:
-                needed[words] |= scratch[words]
-    return chosen[::-1]
+def _any(before: Words, spans: Spans, steps: int) -> NDArray[np.bool_]:
+    """(places,) whether one of its words is active at any step; ``before`` each word so many are."""
+    found: NDArray[np.bool_] = before[spans.offset + spans.size] > before[spans.offset]
+    if steps == 1:
+        return found
+    moving = np.flatnonzero(spans.stride)
+    each, whose = np.unique(np.stack([spans.offset, spans.size, spans.stride])[:, moving], axis=1, return_inverse=True)
+    on = np.zeros(each.shape[1], bool)
+    for k in range(steps):
+        first = each[0] + k * each[2]
+        on |= before[first + each[1]] > before[first]
+    found[moving] = on[whose.ravel()]
+    return found
+
+
+def _again(program: Program, body: _Part, reach: Reach, functions: DistinctFunctions) -> NDArray[np.bool_]:
+    """(calls,) which must be run again before the adjoints of a step: those whose scratch is read."""
+    spans = body.calls.inputs
+    used = [[i for i in range(kind.function.n_in()) if i in functions.arguments(kind.graph)] for kind in body.kinds]
+    read = [np.zeros(0, np.int64)]
+    for kind, calls in enumerate(grouped(body.kind + 1, len(body.kinds) + 1)[1:]):
+        read.append((spans.starts[calls][:, None] + np.array(used[kind], np.int64)).ravel())
+    sections = {call.section.offset for call in program.body if call.section is not None}
+    return reach.producers(np.concatenate(read), np.array(sorted(sections), np.int64), program.scratch(), phase=1)
 
 
 def _put_on_tape(
-    program: Program, pulls: Sequence[_Pull], again: Sequence[_Reach], functions: DistinctFunctions, room: int
+    program: Program, body: _Part, again: NDArray[np.bool_], functions: DistinctFunctions, room: int
 ) -> int:
     """Give the calls that are run again a tape if all then still fits into ``room`` words; returns its words."""
-    end = program.size
-    repeated = {id(reach) for reach in again if not reach.call.accumulate}
-    for pull in pulls:
-        if id(pull.reach) not in repeated:
-            continue
-        if pair := functions.taped(functions.forward(pull.reach.call.function), pull.graph):
-            pull.reach.tape = _Tape(pair, Place(end, pair.size))
-            end += pair.size
-    if program.size + end <= room:
-        return end - program.size
-    for pull in pulls:
-        pull.reach.tape = None
-    return 0
+    if 2 * program.size > room:
+        return 0
+    pulled = np.flatnonzero(again & (body.kind != NONE) & ~body.calls.accumulate)[::-1]
+    sizes = np.zeros(len(body.kinds), np.int64)
+    for number in np.unique(body.kind[pulled]).tolist():
+        kind = body.kinds[number]
+        if pair := functions.taped(functions.forward(kind.function), kind.graph):
+            body.taped[number], sizes[number] = pair, pair.size
+    own = sizes[body.kind[pulled]]
+    if 2 * program.size + int(own.sum()) > room:
+        return 0
+    on = own > 0
+    body.tape[pulled[on]] = (program.size + np.cumsum(own) - own)[on]
+    return int(own.sum())
 
 
-def _marked(places: Sequence[Place], marks: Mask) -> list[Place]:
-    return [place for place, on in zip(places, marks, strict=True) if on]
-
-
-def _flat(rows: Entries) -> Table:
-    return np.array([x for row in rows for x in row] or [0], dtype=np.int64)
+def _words_of(place: Place) -> Words:
+    found: Words = place.still().words(1)[0]
+    return found

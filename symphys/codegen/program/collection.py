@@ -17,4 +17,7 @@ def uncollected() -> Iterator[None]:
     try:
         yield
     finally:
+        if not gc.get_freeze_count():  # what was made counts as old: else all of it would be looked through at once
+            gc.freeze()
+            gc.unfreeze()
         gc.enable()

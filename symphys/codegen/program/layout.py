@@ -14,7 +14,9 @@ class MemoryLayout:
 
     def take(self, size: int) -> Place:
         """Words for a vector."""
-        return self.series(size, 1).still()
+        place = Place(self.size, size)
+        self.size += size
+        return place
 
     def series(self, size: int, count: int) -> Place:
         """Words for ``count`` vectors one after the other, with the stride that leads from each to the next."""

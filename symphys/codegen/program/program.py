@@ -9,12 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symphys.codegen.errors import ProgramError
 from symphys.codegen.program.calls import AdjointDiscount, Function, FunctionCall, Place
+from symphys.codegen.program.phase_calls import PhaseCalls
+from symphys.codegen.program.spans import stretches
 from symphys.codegen.program.verification import verify
 
 __all__ = ["AdjointDiscount", "Function", "FunctionCall", "Place", "Program"]
@@ -62,13 +65,16 @@ class Program:
         """All calls, each once."""
         return (*self.prologue, *self.body, *self.epilogue)
 
+    @cached_property
+    def phases(self) -> tuple[PhaseCalls, PhaseCalls, PhaseCalls]:
+        """Prologue, body and epilogue as arrays."""
+        return PhaseCalls(self.prologue), PhaseCalls(self.body), PhaseCalls(self.epilogue)
+
     def scratch(self) -> NDArray[np.bool_]:
         """(size,) which words hold for one step of the body only."""
-        flags = np.zeros(self.size, dtype=bool)
-        for call in self.body:
-            for place in call.outputs:
-                if not call.accumulate and not place.stride:
-                    flags[place.offset : place.offset + place.size] = True
+        flags, body = np.zeros(self.size, dtype=bool), self.phases[1]
+        written = (body.outputs.stride == 0) & ~body.accumulate[body.outputs.call]
+        flags[stretches(body.outputs.offset[written], body.outputs.size[written])] = True
         return flags
 
     def output_slices(self) -> dict[str, slice]:

@@ -6,7 +6,7 @@ fault is named.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from symphys.codegen.errors import ProgramError
 from symphys.codegen.program.calls import FunctionCall, Place
+from symphys.codegen.program.phase_calls import PhaseCalls, rows_of
 from symphys.codegen.program.spans import Spans
 
-Shapes = tuple[tuple[int, ...], tuple[int, ...]]
-"""Sizes of the arguments and of the results of a function."""
 AT_ONCE = 4096
 """Calls that are looked at together: more take memory and save nothing."""
 
@@ -63,9 +62,10 @@ class Verification:
         """Prologue, body and epilogue."""
         program = self.program
         start, length = len(program.prologue), len(program.body)
-        yield _Phase("prologue", program.prologue, 0, 0)
-        yield _Phase("body", program.body, start, length)
-        yield _Phase("epilogue", program.epilogue, start + program.steps * length, 0)
+        prologue, body, epilogue = program.phases
+        yield _Phase("prologue", prologue, 0, 0)
+        yield _Phase("body", body, start, length)
+        yield _Phase("epilogue", epilogue, start + program.steps * length, 0)
 
     def write_all(self, phase: _Phase) -> None:
         """Take note of what the calls of a phase write, many at a time."""
@@ -159,14 +159,10 @@ class Verification:
 
 def verify(program: Program) -> Verification:
     """Check a program; ProgramError names the first fault."""
-    check, shapes = Verification(program), dict[int, Shapes]()
+    check = Verification(program)
     phases = list(check.phases())
     for phase in phases:
-        for k, call in enumerate(phase.calls):
-            known = shapes.get(call.function.__hash__())
-            sizes = tuple([p.size for p in call.inputs]), tuple([p.size for p in call.outputs])
-            if known is None or known != sizes:
-                shapes[call.function.__hash__()] = _signature(phase.who(k), call)
+        phase.check_sizes()
     for phase in phases:
         check.write_all(phase)
     for phase in phases:
@@ -187,10 +183,25 @@ def verify(program: Program) -> Verification:
 class _Phase:
     """Calls that follow one another, the time of the first, and that from one step to the next (0: no body)."""
 
-    def __init__(self, name: str, calls: Sequence[FunctionCall], start: int, period: int) -> None:
-        self.name, self.calls, self.start, self.period = name, calls, start, period
-        self.inputs = Spans.of([call.inputs for call in calls])
-        self.outputs = Spans.of([call.outputs for call in calls])
+    def __init__(self, name: str, phase: PhaseCalls, start: int, period: int) -> None:
+        self.name, self.calls, self.start, self.period = name, phase.calls, start, period
+        self.phase, self.inputs, self.outputs = phase, phase.inputs, phase.outputs
+
+    def check_sizes(self) -> None:
+        """Refuse calls whose places do not have the sizes of their function; the others of each are like the first."""
+        doubtful: list[int] = []
+        for number, calls in self.phase.by_function():
+            function, unlike = self.phase.functions[number], np.zeros(len(calls), bool)
+            arguments = [function.numel_in(i) for i in range(function.n_in())]
+            results = [function.numel_out(i) for i in range(function.n_out())]
+            for spans, sizes in ((self.inputs, arguments), (self.outputs, results)):
+                counts = spans.starts[calls + 1] - spans.starts[calls]
+                alike = calls[counts == len(sizes)]
+                unlike |= counts != len(sizes)
+                unlike[counts == len(sizes)] |= (spans.size[rows_of(spans, alike)] != np.array(sizes)).any(axis=1)
+            doubtful += [int(calls[0]), *calls[unlike].tolist()]
+        for k in sorted(doubtful):
+            _signature(self.who(k), self.calls[k])
 
     def who(self, k: int) -> str:
         """A call for a message."""
@@ -199,16 +210,11 @@ class _Phase:
     def runs(self) -> Iterator[tuple[int, int]]:
         """(first, after the last) of calls that all write, or one that adds."""
         first = 0
-        for k, call in enumerate(self.calls):
-            if call.accumulate or k - first == AT_ONCE:
-                if k > first:
-                    yield first, k
-                first = k
-            if call.accumulate:
+        for k in [*np.flatnonzero(self.phase.accumulate).tolist(), len(self.calls)]:
+            yield from ((start, min(start + AT_ONCE, k)) for start in range(first, k, AT_ONCE))
+            if k < len(self.calls):
                 yield k, k + 1
-                first = k + 1
-        if len(self.calls) > first:
-            yield first, len(self.calls)
+            first = k + 1
 
 
 def _words_of(part: Spans, steps: int) -> Words:
@@ -216,8 +222,8 @@ def _words_of(part: Spans, steps: int) -> Words:
     return part.size * np.where(part.stride != 0, steps, 1)
 
 
-def _signature(who: str, call: FunctionCall) -> Shapes:
-    """The sizes of a call's function, which its places must have."""
+def _signature(who: str, call: FunctionCall) -> None:
+    """Refuse a call whose places do not have the sizes that its function has."""
     function = call.function
     if not function.is_a("SXFunction"):
         raise ProgramError(f"{who}: is not an SX Function but {function.class_name()}")
@@ -233,7 +239,6 @@ def _signature(who: str, call: FunctionCall) -> Shapes:
                 raise ProgramError(f"{who}: {what} {i} is not a dense column but {shape.dim()}")
             if shape.numel() != place.size:
                 raise ProgramError(f"{who}: {what} {i} has {shape.numel()} words, its place {place.size}")
-    return tuple(place.size for place in call.inputs), tuple(place.size for place in call.outputs)
 
 
 def span(words: Words) -> str:

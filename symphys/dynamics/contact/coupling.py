@@ -56,6 +56,19 @@ def _across(a: Expr, n: Expr) -> Expr:
     return a - n * ca.dot(n, a)
 
 
+def which_couple(world: World) -> list[bool]:
+    """``may_couple`` of all pairs; equal ones are looked at once."""
+    known: dict[Any, bool] = {}
+    found = []
+    for pair in world.pairs:
+        sides = tuple((side.body, side.shape) for side in (pair.first, pair.second))
+        key = id(pair.law), sides
+        if key not in known:
+            known[key] = may_couple(world, pair)
+        found.append(known[key])
+    return found
+
+
 def may_couple(world: World, pair: Pair) -> bool:
     """Whether friction at a contact may act strongly on its normal velocity; certain to be so nowhere, if False.
 

@@ -11,7 +11,7 @@ import casadi as ca
 from symphys.dynamics.collision import Contact
 from symphys.dynamics.contact.body_term import Motions, at_touch, body_terms
 from symphys.dynamics.contact.constraint import UNREACHED, ZERO, ContactConstraint, ContactImpulse
-from symphys.dynamics.contact.coupling import coupling_of, may_couple
+from symphys.dynamics.contact.coupling import coupling_of, which_couple
 from symphys.dynamics.contact.effective_mass import (
     delassus_column,
     effective_masses,
@@ -130,10 +130,12 @@ def resolve_impact(context: StepContext, x: State, split: StepSplit) -> Substep:
     momenta = tuple(Momentum(motion.velocity, motion.momentum_k) for motion in motions)
     trees = prepare_trees(context, motions, momenta, ca.SX(0))
     constraints = []
-    for (pair, near), contact, struck in zip(context.pairs_and_near(), contacts, split.struck, strict=True):
+    couple = which_couple(context.world)
+    for (pair, near), contact, struck, coupled in zip(
+        context.pairs_and_near(), contacts, split.struck, couple, strict=True
+    ):
         bodies = bodies_of(pair)
         moving = tuple(trees.motions[i] for i in bodies)
-        coupled = may_couple(context.world, pair)
         arguments = pair.law, contact, moving, struck, split.impact, trees.same(bodies), coupled, near
         constraints.append(trees.placed(bodies, _constraint(context.settings, *arguments)))
     locks = locks_at(context, trees)

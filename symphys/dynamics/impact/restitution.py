@@ -22,7 +22,7 @@ from symphys.dynamics.context import StepContext
 from symphys.dynamics.joints.assembly import KinematicTrees, momenta_of
 from symphys.dynamics.motion import PredictedMotion, apply, inverse_inertia
 from symphys.dynamics.pgs import iterate
-from symphys.dynamics.tracing.decorator import traced
+from symphys.dynamics.tracing.decorator import gathered, traced
 from symphys.dynamics.unknowns import (
     AnyImpulse,
     GeneralizedVelocities,
@@ -57,7 +57,8 @@ def rebound(
         return iterate(context.world, scheme.sweeps, constraints, start, motions)
     dead = tuple(replace(each, constraint=_without_rebound(each.constraint)) for each in constraints)
     plastic = iterate(context.world, scheme.sweeps, dead, start, motions)
-    newton = iterate(context.world, scheme.sweeps, constraints, plastic, motions)
+    between = replace(plastic, momenta=gathered(plastic.momenta)) if context.near else plastic
+    newton = iterate(context.world, scheme.sweeps, constraints, between, motions)
     sums: tuple[Expr, Expr, Expr] = (ca.SX(0), ca.SX(0), ca.SX(0))
     bodies = (momenta_of(context, trees, solution.momenta) for solution in (start, plastic, newton))
     for motion, *momenta in zip(motions, *bodies, strict=True):

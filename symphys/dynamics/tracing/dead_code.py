@@ -43,15 +43,16 @@ class _Trimming:
 
     def calls(self) -> tuple[TracedCall, ...]:
         """Those of which something is read."""
-        return tuple(
-            self._trimmed(call, needed)
-            for call, needed in zip(self._calls, reversed(self._needed_by_call), strict=True)
-            if any(self._used[slot.number] for slot in call.outputs)
-        )
+        found, used = list[TracedCall](), self._used
+        for call, needed in zip(self._calls, reversed(self._needed_by_call), strict=True):
+            given = tuple([used[slot.number] for slot in call.outputs])
+            if any(given):
+                found.append(self._trimmed(call, needed, given))
+        return tuple(found)
 
     def _needed(self, call: TracedCall, kept: tuple[Words, ...]) -> tuple[Words, ...]:
         """The words of its inputs that a call needs for what is read of it."""
-        key = call.function.__hash__(), kept
+        key = id(call.function), kept
         if key not in self._needs:
             symbols: list[Expr] = [ca.SX.sym("a", slot.size) for slot in call.inputs]
             found = _symbols_of(_results(call.function, symbols, kept))
@@ -61,24 +62,27 @@ class _Trimming:
             )
         return self._needs[key]
 
-    def _trimmed(self, call: TracedCall, needed: Sequence[Words]) -> TracedCall:
-        inputs = tuple([self._closer(slot) for slot, words in zip(call.inputs, needed, strict=True) if words])
-        outputs = tuple([self._closer(slot) for slot in call.outputs if self._used[slot.number]])
-        return TracedCall(self._function(call, needed), inputs, outputs)
+    def _trimmed(self, call: TracedCall, needed: Sequence[Words], given: tuple[Words, ...]) -> TracedCall:
+        closer, known = self._closer, self._vectors
+        inputs = [
+            known.get(slot.number) or closer(slot) for slot, words in zip(call.inputs, needed, strict=True) if words
+        ]
+        outputs = [closer(slot) for slot, words in zip(call.outputs, given, strict=True) if words]
+        return TracedCall(self._function(call, needed, given), tuple(inputs), tuple(outputs))
 
     def _closer(self, slot: TracedVector) -> TracedVector:
-        if slot.name:
-            return slot
         found = self._vectors.get(slot.number)
         if found is None:
             size = self._used[slot.number].bit_count()
-            found = self._vectors[slot.number] = TracedVector(slot.name, size, slot.number)
+            found = slot if slot.name or size == slot.size else TracedVector(slot.name, size, slot.number)
+            self._vectors[slot.number] = found
         return found
 
-    def _function(self, call: TracedCall, needs: Sequence[Words]) -> ca.Function:
+    def _function(self, call: TracedCall, needs: Sequence[Words], given: tuple[Words, ...]) -> ca.Function:
         """The function from what is kept of the inputs to what is kept of the outputs."""
-        kept, given = (tuple([self._used[slot.number] for slot in slots]) for slots in (call.inputs, call.outputs))
-        key = call.function.__hash__(), kept, given
+        used = self._used
+        kept = tuple([used[slot.number] for slot in call.inputs])
+        key = id(call.function), kept, given
         if key not in self._functions:
             symbols, columns = [], []
             for slot, words, needed in zip(call.inputs, kept, needs, strict=True):

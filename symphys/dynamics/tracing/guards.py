@@ -203,7 +203,7 @@ class _Search:
 
     def _results(self, function: ca.Function, zeros: Pattern) -> list[Simplified]:
         """What is known of each result."""
-        key = function.__hash__(), zeros
+        key = id(function), zeros
         if key not in self._evaluated:
             homes, arguments = dict[int, tuple[int, int]](), list[Expr]()
             for i, known in enumerate(zeros):

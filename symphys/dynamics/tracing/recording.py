@@ -132,10 +132,11 @@ class Recorder(Tracer):
         self._homes |= {entry.element_hash(): (given, k) for k, entry in enumerate(column.nonzeros())}
 
     def _apply(self, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
-        key = function.__hash__(), tuple(slots)
-        if key not in self._given:
-            self._given[key] = self._add("", function, slots)
-        return self._given[key]
+        key = id(function), tuple(slots)
+        given = self._given.get(key)
+        if given is None:
+            given = self._given[key] = self._add("", function, slots)
+        return given
 
     def _alike(self, before: Any, after: Any) -> dict[int, int] | None:
         """Which slot of ``after`` stands where one of ``before`` stood; None if they do not lie alike."""

@@ -18,7 +18,7 @@ Expr = Any
 """casadi SX"""
 Structure = tuple[int, tuple[int, ...]]
 """The number of a tree's structure, and the slots that its entries lie in, in order."""
-MOST_KEPT = 50_000
+MOST_KEPT = 300_000
 """Branches that are kept: more would take memory for what no call takes again."""
 
 

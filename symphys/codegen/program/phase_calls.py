@@ -1,0 +1,68 @@
+"""The calls of a phase as arrays, so that what is asked of each call is asked of all at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.codegen.program.calls import Function, FunctionCall
+from symphys.codegen.program.spans import Spans
+
+Words = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+
+class PhaseCalls:
+    """Calls that follow one another.
+
+    Attributes:
+        calls: as they are.
+        functions: each once, in the order in which they are called first.
+        number: (calls,) whose function is whose.
+        inputs, outputs: the places.
+        accumulate: (calls,) which add.
+    """
+
+    def __init__(self, calls: Sequence[FunctionCall]) -> None:
+        """Look at each call once."""
+        self.calls = calls
+        self.functions: list[Function] = []
+        by_address, by_hash, numbers = dict[int, int](), dict[int, int](), list[int]()
+        for call in calls:
+            number = by_address.get(id(call.function))
+            if number is None:
+                number = by_hash.setdefault(call.function.__hash__(), len(self.functions))
+                by_address[id(call.function)] = number
+                if number == len(self.functions):
+                    self.functions.append(call.function)
+            numbers.append(number)
+        self.number: Words = np.array(numbers, np.int64)
+        self.inputs = Spans.of([call.inputs for call in calls])
+        self.outputs = Spans.of([call.outputs for call in calls])
+        self.accumulate: Flags = np.array([call.accumulate for call in calls], bool)
+
+    def __len__(self) -> int:
+        """How many."""
+        return len(self.calls)
+
+    def by_function(self) -> Iterator[tuple[int, Words]]:
+        """The number of each function, and its calls in order."""
+        yield from enumerate(grouped(self.number, len(self.functions)))
+
+
+def grouped(numbers: Words, count: int) -> list[Words]:
+    """For each number from 0 to ``count`` where it is found, in order."""
+    order = np.argsort(numbers, kind="stable")
+    ends = np.cumsum(np.bincount(numbers, minlength=count))
+    return np.split(order, ends[:-1]) if count else []
+
+
+def rows_of(spans: Spans, calls: Words) -> Words:
+    """(calls, places): where the places of calls of one function lie among those of all."""
+    if not len(calls):
+        return np.zeros((0, 0), np.int64)
+    count = int(spans.starts[calls[0] + 1] - spans.starts[calls[0]])
+    rows: Words = spans.starts[calls][:, None] + np.arange(count)
+    return rows
