@@ -106,8 +106,8 @@ def study(folder: Path, out: Path, what: str, evaluations: int) -> None:
             )
     else:
         got = kept(out / "cube_limits.json", lambda: limits(folder, work, found, evaluations))
-        for name, errors in got.items():
-            print(f"| {name} | {mean_and_spread(errors) if isinstance(errors, list) else errors} |")
+        for name in (name for name, each in got.items() if isinstance(each, list)):
+            print(f"| {name} | {mean_and_spread(got[name])} |")
 
 
 def main() -> None:
