@@ -75,6 +75,10 @@ START = "the simulation of {names} is not finite at the guess: look at its start
 TRIALS = "the simulation of {names} is not finite at any step from the best point: bound the numbers"
 
 
+Step = tuple[Array, Array]
+"""Of the shared (s,) and the own (k, o) numbers, in scales."""
+
+
 class RecordingFit:
     """Levenberg-Marquardt on some recordings of a problem."""
 
@@ -245,15 +249,15 @@ class RecordingFit:
         return self._stalled(STALLED, left)
 
     def _retried(
-        self, state: FitState, system: ArrowSystem, shared: Array, own: Array, taken: tuple[Array, Array], costs_: Array
-    ) -> tuple[Array, tuple[Array, Array], Array]:
-        """Own numbers, step and costs (k,), with shorter steps of recordings that the whole step makes worse.
+        self, state: FitState, system: ArrowSystem, shared: Array, own: Array, taken: Step, reached: Array
+    ) -> tuple[Array, Step, Array]:
+        """Own numbers, step and costs (k,), with shorter steps of recordings that the whole step made worse.
 
         Own numbers of a recording have no effect on others, so that one that leaves its model need not hold up all.
         """
         free, d_shared = self.free(state, system)[1], taken[0]
         stiff = np.einsum("kii->ki", system.blocks[:, system.s :, system.s :]).max(axis=1, initial=0.0)
-        own, best = own.copy(), costs_.copy()
+        own, best = own.copy(), reached.copy()
         for share in SHORTER:
             excess = best - system.costs + system.expected_falls(d_shared, self._step_of(state, own))
             off = ~(excess <= MODELLED * np.maximum(system.costs, best)) | ((best > system.costs) & (excess > 0))
@@ -290,7 +294,7 @@ class RecordingFit:
             return FitStatus.CONVERGED, NEARLY.format(left=left)
         return FitStatus.STALLED, reason.format(left=left)
 
-    def _moved(self, state: FitState, d_shared: Array, d_own: Array) -> tuple[Array, Array, tuple[Array, Array], float]:
+    def _moved(self, state: FitState, d_shared: Array, d_own: Array) -> tuple[Array, Array, Step, float]:
         """The next shared and own numbers after a step in scales within the bounds, the step taken, and its length."""
         shared_of, own_of, which = self.problem.shared, self.problem.own, self.which
         shared = np.clip(state.shared + shared_of.scale * d_shared, shared_of.lower, shared_of.upper)
