@@ -115,14 +115,14 @@ class ArrowSystem:
         square = self.blocks[:, s:, s:] * mask[:, :, None] * mask[:, None, :]
         side = (self.own_gradient + np.einsum("ksi,s->ki", self.blocks[:, :s, s:], shared)) * mask
         added = np.where(free_own, damping[:, None], 1.0)
-        return -np.asarray(
-            np.linalg.solve(square + added[:, :, None] * np.eye(square.shape[1]), side[:, :, None])[:, :, 0]
-        )
+        square = square + added[:, :, None] * np.eye(square.shape[1])
+        return -np.asarray(np.linalg.solve(square, side[:, :, None])[:, :, 0])
 
     def expected_falls(self, shared: Array, own: Array) -> Array:
         """(K,): by how much the quadratic models lower the costs of recordings with a step (s,), (K, o)."""
         both = np.concatenate([np.broadcast_to(shared, (len(own), self.s)), own], axis=1)
-        return -2 * np.sum(both * self.gradients, axis=1) - np.einsum("ki,kij,kj->k", both, self.blocks, both)
+        bent = np.einsum("ki,kij,kj->k", both, self.blocks, both)
+        return np.asarray(-2 * np.sum(both * self.gradients, axis=1) - bent)
 
     def expected_fall(self, shared: Array, own: Array) -> float:
         """By how much the quadratic model lowers the cost with a step (s,), (K, o)."""
