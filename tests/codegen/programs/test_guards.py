@@ -73,12 +73,13 @@ def test_values_and_gradients_are_the_same_to_the_last_bit(heap_program: Program
     assert np.array_equal(gradients, expected)
 
 
-def test_most_calls_of_a_heap_are_guarded(heap_program: Program) -> None:
+def test_most_calls_of_a_heap_are_guarded(heap_program: Program, request: pytest.FixtureRequest) -> None:
+    """Sections are what steps without an impact leave out; soft contacts have none."""
     guarding = plan(heap_program, ["merit"]).guarding
     assert guarding is not None
     guarded = sum(call.guard is not None for call in heap_program.body)
     assert guarded > 0.8 * len(heap_program.body)
-    assert guarding.count("sections") > 0
+    assert (guarding.count("sections") > 0) == ("soft" not in request.node.name)
 
 
 def test_plain_c_leaves_out_the_same(tmp_path: Path, cache: Cache) -> None:
