@@ -9,6 +9,7 @@ the robot of table_robot.py with a net; other names are those of shipped problem
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import subprocess
@@ -78,8 +79,11 @@ def starts(name: str) -> list[dict[str, Any]]:
 
 def main() -> None:
     """A row for each start."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", metavar="NAME", nargs="*", default=NAMES)
+    names = parser.parse_args().names
     print("| problem | start | " + " | ".join(PHASES) + " | all | wall | memory [MiB] | cache [MiB] |")
-    for name in sys.argv[1:] or NAMES:
+    for name in names:
         for which, row in zip(("first", "second"), starts(name), strict=True):
             numbers = [*(row[phase] for phase in PHASES), sum(row[phase] for phase in PHASES), row["wall"]]
             seconds = " | ".join(f"{number:.2f}" for number in numbers)
