@@ -58,3 +58,21 @@ def test_one_recording_astray_does_not_hold_up_the_others() -> None:
     assert outcome.state.own[:2, 0] == pytest.approx(others.state.own[:2, 0], abs=1e-4)
     assert outcome.state.shared == pytest.approx(others.state.shared, abs=1e-4)
     assert outcome.state.own[2, 0] == pytest.approx(2.2, abs=1e-4)
+
+
+def test_a_fit_ends_whose_jacobian_promises_what_no_step_brings(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A part of the Jacobian is not that of the residuals, as where these are rough; steps on bring next to nothing."""
+    problem = recordings(TRUTHS["oscillator"], 9)
+    true, stray = problem.jacobian, np.abs(np.random.default_rng(0).standard_normal((40, 2)))
+
+    def promising(shared: np.ndarray, own: np.ndarray, which: np.ndarray) -> list[tuple[np.ndarray, ...]]:
+        rows = true(shared, own, which)
+        return [(r, a + 10 * np.sign(r)[:, None] * stray * np.sqrt(np.mean(a**2)), b) for r, a, b in rows]
+
+    problem.jacobian = promising
+    ended = RecordingFit(problem, FitOptions()).run()
+    monkeypatch.setattr("symphys.identification.fitting.levenberg_marquardt.HOPELESS", 0.0)
+    on = RecordingFit(problem, FitOptions()).run()
+    assert ended.status is on.status is FitStatus.STALLED and ended.state.history[-1].left > 1
+    assert len(ended.state.history) < len(on.state.history) - 4
+    assert ended.state.history[-1].merit < 1.001 * on.state.history[-1].merit
