@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ def unit_quaternion(given: Orientation) -> Array:
         if unknown:
             raise ValueError(f"has no {', '.join(unknown)}; valid: {', '.join(ANGLES)}")
         return roll_pitch_yaw(*(given.get(key, 0.0) for key in ANGLES))
-    length = float(np.linalg.norm(given))
+    length = hypot(*given)  # squares of large numbers overflow
     if not 1e-6 < length < 1e6:
         raise ValueError("a quaternion must not be zero; [1, 0, 0, 0] is no rotation")
     return np.array(given, float) / length

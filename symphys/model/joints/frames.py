@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,7 +104,7 @@ def unit(axis: Vector) -> Array:
     """(3,) of length 1; ValueError for one that is none."""
     if len(axis) != 3:
         raise ValueError(f"an axis has three numbers, not {len(axis)}; [0, 0, 1] points up")
-    length = float(np.linalg.norm(axis))
+    length = hypot(*axis)  # squares of large numbers overflow
     if not 1e-12 < length < np.inf:
         raise ValueError("an axis must not be zero; [0, 0, 1] points up")
     return np.array(axis) / length

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import hypot
 from typing import Any
 
 import numpy as np
@@ -92,9 +93,8 @@ class Placement:
         if table.point is not None:
             update["point"] = self.point(table.point)
         if table.offset is not None:
-            length = float(np.linalg.norm(table.normal)) or 1.0
-            along = float(np.dot(update["normal"], self.include.position)) / length
-            update["offset"] = table.offset + along
+            unit = np.array(update["normal"]) / (hypot(*table.normal) or 1.0)
+            update["offset"] = table.offset + float(unit @ np.array(self.include.position))
         return table.model_copy(update=update)
 
     def joint(self, place: Place, table: JointTable) -> SchemaTable:

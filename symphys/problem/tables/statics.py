@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import isfinite
+from math import hypot, isfinite
 from typing import Any
 
 import casadi as ca
@@ -42,7 +42,7 @@ def read_ground(table: GroundTable) -> ParametricStatic:
 def read_plane(index: int, table: PlaneTable, faults: Faults) -> ParametricStatic:
     """One plane."""
     place = ("plane", index)
-    length = float(np.linalg.norm(table.normal))
+    length = hypot(*table.normal)  # squares of large numbers overflow
     if not (isfinite(length) and length > 1e-12):
         faults.add((*place, "normal"), "must not be zero; [0, 0, 1] points up")
         length = 1.0
