@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 
-from symphys.codegen.emit.dialect import ONE_LANE, VECTORS, Dialect
+from symphys.codegen.emit.dialect import ONE_LANE, TEAM, VECTORS, Dialect
 from symphys.codegen.emit.plan import Plan
 from symphys.codegen.emit.writer import write
 
 ROOM = "symphys.codegen"
 DRIVER = ("program.h", "guards.c", "driver.c")
 NUMBERS = "#define NUMBERS\n"
+UNALIGNED = "typedef V U __attribute__((aligned(sizeof(R)), may_alias));\n"
 FILES, SHARE = 4, 400
 """Most files of values and most of adjoints; nodes for which another file is begun."""
 
@@ -39,12 +40,16 @@ def sources(plan: Plan, lanes: int, single: bool, narrow: bool = False) -> list[
     """
     head = f"#define LANES {lanes}\n#define SINGLE {int(single)}\n"
     found, moving = [], plan.moving()
-    for backward in (False, True):
-        mine = [i for i, (_, form) in enumerate(plan.functions) if form.backward == backward]
+    shapes = plan.shapes or [None] * len(plan.functions)
+    kinds: dict[tuple[bool, int], list[int]] = {}
+    for i, ((_, form), shape) in enumerate(zip(plan.functions, shapes, strict=True)):
+        kinds.setdefault((form.backward, shape.lanes if shape else 1), []).append(i)
+    for (backward, calls), mine in sorted(kinds.items()):
         work = [len(plan.functions[i][0].nodes) for i in mine]
-        dialect = forms_of(lanes, backward)
-        texts = [write(f"f{i}", *plan.functions[i], dialect, moving[i]) for i in mine]
-        start = head + (NUMBERS if dialect is ONE_LANE else "") + resource("vector.h")
+        dialect = TEAM if calls > 1 else forms_of(lanes, backward)
+        texts = [write(f"f{i}", *plan.functions[i], dialect, moving[i], shapes[i]) for i in mine]
+        start = (_team(calls, single) if calls > 1 else head) + (NUMBERS if dialect is ONE_LANE else "")
+        start += resource("vector.h") + (UNALIGNED if calls > 1 else "")
         for group in spread(texts, work, FILES):
             found.append(SourceFile("\n".join([start, *group]), fused=backward, narrow=narrow))
     names = [f"f{number}" for number in range(len(plan.functions))]
@@ -52,6 +57,15 @@ def sources(plan: Plan, lanes: int, single: bool, narrow: bool = False) -> list[
     table = ", ".join(names) or "0"
     listed = f"{declared}static void (*const FUNCTIONS[])(V *, V *, const word *, word) = {{{table}}};\n"
     return [*found, SourceFile(head + resource("vector.h") + listed + "".join(map(resource, (*DRIVER, "phases.c"))))]
+
+
+def _team(calls: int, single: bool) -> str:
+    """Defines what a function needs for several calls at once."""
+    each = ", ".join(["x_"] * calls)
+    return (
+        f"#define LANES {calls}\n#define SINGLE {int(single)}\n"
+        f"#define ALL(x) ({{ const R x_ = (x); (V){{{each}}}; }})\n"
+    )
 
 
 def forms_of(lanes: int, backward: bool = False) -> Dialect:

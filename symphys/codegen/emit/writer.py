@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from itertools import groupby
 
 from symphys.codegen.emit.dialect import VECTORS, Dialect
+from symphys.codegen.emit.shapes import Reach, Shape, TeamReach
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.operations import MASKS
 
@@ -37,21 +38,27 @@ class Form:
 
 
 def write(
-    name: str, graph: Graph, form: Form, dialect: Dialect = VECTORS, moving: Collection[int] | None = None
+    name: str,
+    graph: Graph,
+    form: Form,
+    dialect: Dialect = VECTORS,
+    moving: Collection[int] | None = None,
+    shape: Shape | None = None,
 ) -> str:
     """The C function ``name(m, b, t, k)``: memory, adjoint memory, places as (offset, stride) pairs, step.
 
-    ``moving``: the places that may have a stride; None: all.
+    ``moving``: the pairs that may have a stride; None: all. ``shape``: of a function for one rollout alone.
     """
-    pieces = _cut(graph, dialect)
-    pointers = _pointers(graph, form, dialect)
+    words = Reach(dialect.word) if shape is None else TeamReach(shape, len(graph.sizes), form.backward)
+    pieces = _cut(graph, dialect, words)
+    pointers = _pointers(graph, form, dialect, words)
     parameters = ", ".join(f"{kind}{pointer}" for kind, pointer, _ in pointers) + ", V *restrict w"
     text = []
     for i, piece in enumerate(pieces):
         lines = piece.statements(graph, form)
         if piece is pieces[-1] and form.clears:
             lines += [
-                f"for (int j = 0; j < {graph.sizes[a]}; j++) {dialect.word.format(f'i{a}', 'j')} = S(0.0);"
+                f"for (int j = 0; j < {graph.sizes[a]}; j++) {words.clear(f'i{a}', 'j')}"
                 for a in range(form.primal, len(graph.sizes))
             ]
         head = f"{dialect.inline if len(pieces) == 1 else dialect.apart} {name}_{i}({parameters})"
@@ -67,13 +74,15 @@ class _Piece:
         nodes: what it computes, in order.
         slots: the values that a later piece than their own reads, and their words in the buffer between pieces.
         dialect: how it is written.
-        targets: for a node, the words of results that it is; a loop's head comes before the words that it fills.
+        words: how the words of places are.
+        targets: for a node, the words of results that it is: the head of a loop or nothing, the result, the word.
     """
 
     nodes: list[int]
     slots: dict[int, int]
     dialect: Dialect
-    targets: dict[int, list[str]] = field(default_factory=dict)
+    words: Reach
+    targets: dict[int, list[tuple[str, str, int | str]]] = field(default_factory=dict)
 
     def statements(self, graph: Graph, form: Form) -> list[str]:
         """Its C statements."""
@@ -99,7 +108,7 @@ class _Piece:
             return literal(node.value)
         if x not in names:
             given = node.op == "input"
-            source = self.dialect.word.format(f"i{node.at[0]}", node.at[1]) if given else f"w[{self.slots[x]}]"
+            source = self.words.load(f"i{node.at[0]}", node.at[1]) if given else f"w[{self.slots[x]}]"
             names[x] = f"v{x}"
             value = f"ALL({source})" if given and form.shared and node.at[0] < form.primal else source
             lines.append(f"const {_type(node.op)} v{x} = ({_type(node.op)}){value};")
@@ -109,25 +118,25 @@ class _Piece:
         node = graph.nodes[x]
         if adds and node.op == "const" and float.fromhex(node.value) == 0:
             return
-        for target in self.targets.get(x, ()):
-            yield f"{target} {'+=' if adds else '='} {value};"
+        for loop, name, word in self.targets.get(x, ()):
+            yield loop + self.words.store(name, word, value, adds)
 
 
-def _cut(graph: Graph, dialect: Dialect) -> list[_Piece]:
+def _cut(graph: Graph, dialect: Dialect, words: Reach) -> list[_Piece]:
     order = [x for x in graph.needed() if graph.nodes[x].op not in ("const", "input")]
     runs = [order[i : i + LONGEST] for i in range(0, len(order), LONGEST)] or [[]]
     home = {x: i for i, run in enumerate(runs) for x in run}
     crossing = sorted({y for x in order for y in graph.nodes[x].operands if home.get(y, home[x]) != home[x]})
     slots = {x: slot for slot, x in enumerate(crossing)}
-    pieces = [_Piece(run, slots, dialect) for run in runs]
+    pieces = [_Piece(run, slots, dialect, words) for run in runs]
     copied = 0
     for r, result in enumerate(graph.results):
         for x, first, count in _runs(graph, result):
             if x not in home and (copied := copied + 1) % LONGEST == 0:
-                pieces.append(_Piece([], slots, dialect))
-            target = dialect.word.format(f"o{r}", first if count == 1 else "j")
+                pieces.append(_Piece([], slots, dialect, words))
+            target: int | str = first if count == 1 else "j"
             loop = f"for (int j = {first}; j < {first + count}; j++) " if count > 1 else ""
-            pieces[home.get(x, -1)].targets.setdefault(x, []).append(f"{loop}{target}")
+            pieces[home.get(x, -1)].targets.setdefault(x, []).append((loop, f"o{r}", target))
     return pieces
 
 
@@ -147,13 +156,14 @@ def _type(op: str) -> str:
     return "I" if op in MASKS else "V"
 
 
-def _pointers(graph: Graph, form: Form, dialect: Dialect) -> list[tuple[str, str, str]]:
+def _pointers(graph: Graph, form: Form, dialect: Dialect, words: Reach) -> list[tuple[str, str, str]]:
     """(type, name, memory) of every argument and result; adjoints of arguments may coincide, all others may not."""
     kind, memory = ("const R *", "(const R *)m") if form.shared else (dialect.reads, "m")
     primal = [(kind, f"i{i}", memory) for i in range(form.primal)]
     seeds = [(dialect.writes, f"i{i}", "b") for i in range(form.primal, len(graph.sizes))]
     kind, memory = (dialect.shares, "b") if form.backward else (dialect.writes, "m")
-    return [*primal, *seeds, *((kind, f"o{i}", memory) for i in range(len(graph.results)))]
+    places = [*primal, *seeds, *((kind, f"o{i}", memory) for i in range(len(graph.results)))]
+    return [(kind, pointer, memory) for kind, name, memory in places for pointer in words.pointers(name)]
 
 
 def _entry(
@@ -169,7 +179,7 @@ def _entry(
     arguments = ", ".join([*places, "w" if slots else "0"])
     lines = [f"V w[{slots}];"] if slots else []
     lines += [f"{name}_{i}({arguments});" for i in range(len(pieces))]
-    head = f"{dialect.entry} {name}(V *m, V *b, const word *t, word k) {{"
+    head = f"{dialect.entry} {name}({dialect.memory}m, {dialect.memory}b, const word *t, word k) {{"
     return "\n  ".join([head, "(void)b;", *lines]) + "\n}\n"
 
 

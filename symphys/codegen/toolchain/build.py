@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from symphys.codegen.emit.plan import plan
+from symphys.codegen.emit.alone import alone
+from symphys.codegen.emit.plan import Plan, plan
 from symphys.codegen.emit.source import SourceFile, forms_of, sources
 from symphys.codegen.errors import KernelUnavailable, ProgramError
 from symphys.codegen.program.collection import uncollected
@@ -90,14 +91,15 @@ def compiled(
     with uncollected():
         planned = plan(program, names, width.lanes * width.real)
         parts = sources(planned, width.lanes, width.single)
+        own = alone(planned) if width.several and width.lanes > 1 else None
     operations = sum(len(graph.nodes) for graph, _ in planned.functions)
-    kept = KeptPlan(program, planned, names, texts_of(parts), len(planned.functions), operations)
+    kept = KeptPlan(program, planned, names, texts_of(parts), len(planned.functions), operations, own)
     libraries = KeptLibraries(kept, width, cache)
     lanes = suited(rows, width.lanes) if rows is not None and width.several else width.lanes
     if lanes != width.lanes:
-        parts = sources(planned, lanes, width.single, narrow=True)
+        parts = sources(own if lanes == 1 and own else planned, lanes, width.single, narrow=True)
     with libraries.built(lanes, parts) as built:
-        first = lanes, libraries.load(built.path)
+        first = lanes, libraries.load(built.path, lanes)
         return kernel_of(first, libraries, threads, started, built), kept
 
 
@@ -146,28 +148,34 @@ class KeptLibraries:
         """See ``widths.Libraries``."""
         compiler = find_compiler()
         path = self.cache.find(library_key(self._texts(lanes), compiler, compiler.flags(processor())))
-        return None if path is None else self.load(path)
+        return None if path is None else self.load(path, lanes)
 
     def build(self, lanes: int) -> Loaded:
         """See ``widths.Libraries``."""
         kept, width = self.kept, self.width
         with uncollected():
             planned = plan(kept.program, kept.names, width.lanes * width.real)
+            planned = (alone(planned) if lanes == 1 and kept.alone else None) or planned
             parts = sources(planned, lanes, width.single, lanes != width.lanes)
         with self.built(lanes, parts) as built:
-            return self.load(built.path)
+            return self.load(built.path, lanes)
 
     def built(self, lanes: int, parts: Sequence[SourceFile]) -> AbstractContextManager[Built]:
         """The library of these C files; see ``shared_library``."""
         return shared_library(parts, self.cache, self._texts(lanes))
 
-    def load(self, path: Path) -> Loaded:
+    def load(self, path: Path, lanes: int) -> Loaded:
         """The library of a file."""
-        return Loaded(path, self.kept.program, self.kept.plan, self.kept.names)
+        return Loaded(path, self.kept.program, self._plan(lanes), self.kept.names)
+
+    def _plan(self, lanes: int) -> Plan:
+        return self.kept.alone if lanes == 1 and self.kept.alone else self.kept.plan
 
     def _texts(self, lanes: int) -> str:
-        """Stands for the C files. Those of other lanes differ from those of all by the lanes and the dialect alone."""
-        return self.kept.texts if lanes == self.width.lanes else f"{self.kept.texts} {lanes} {forms_of(lanes)}"
+        """Stands for the C files. Those of other lanes differ by the lanes, the dialect and what stands side by side."""
+        if lanes == self.width.lanes:
+            return self.kept.texts
+        return f"{self.kept.texts} {lanes} {forms_of(lanes)} {self._plan(lanes).signature}"
 
 
 def names_of(program: Program, seeded: Sequence[str] | None) -> tuple[str, ...]:
