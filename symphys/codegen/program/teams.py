@@ -41,7 +41,7 @@ class Teamed:
 def teamed(program: Program) -> Teamed:
     """Look for teams; bodies with guards or sections, whose order means something, stay as they are."""
     body = program.phases[1]
-    if not 1 < len(body) <= MOST or any(call.guard or call.section for call in program.body):
+    if program.in_order or not 1 < len(body) <= MOST or any(call.guard or call.section for call in program.body):
         return Teamed(program)
     before = _before(program, body)
     if before is None:
@@ -50,7 +50,7 @@ def teamed(program: Program) -> Teamed:
     if not found:
         return Teamed(program)
     order, teams = _ordered(before, found)
-    return Teamed(replace(program, body=tuple(program.body[c] for c in order)), teams)
+    return Teamed(replace(program, body=tuple(program.body[c] for c in order), in_order=True), teams)
 
 
 def _before(program: Program, body: PhaseCalls) -> list[list[int]] | None:
