@@ -61,7 +61,7 @@ def write(
                 f"for (int j = 0; j < {graph.sizes[a]}; j++) {words.clear(f'i{a}', 'j')}"
                 for a in range(form.primal, len(graph.sizes))
             ]
-        head = f"{dialect.inline if len(pieces) == 1 else dialect.apart} {name}_{i}({parameters})"
+        head = f"{dialect.inline} {name}_{i}({parameters})"
         text.append("\n  ".join([f"{head} {{", "(void)w;", *lines]) + "\n}\n")
     return "".join([*text, _entry(name, pointers, pieces, dialect, moving)])
 
@@ -173,14 +173,21 @@ def _entry(
     dialect: Dialect,
     moving: Collection[int] | None,
 ) -> str:
+    """The function itself; pieces of one that is cut are called apart, and each finds the places that it needs."""
     steps = [f" + k * t[{2 * i + 1}]" if moving is None or i in moving else "" for i in range(len(pointers))]
     places = [f"{memory} + t[{2 * i}]{steps[i]}" for i, (_, _, memory) in enumerate(pointers)]
     slots = len(pieces[0].slots)
     arguments = ", ".join([*places, "w" if slots else "0"])
-    lines = [f"V w[{slots}];"] if slots else []
-    lines += [f"{name}_{i}({arguments});" for i in range(len(pieces))]
-    head = f"{dialect.entry} {name}({dialect.memory}m, {dialect.memory}b, const word *t, word k) {{"
-    return "\n  ".join([head, "(void)b;", *lines]) + "\n}\n"
+    given = f"{dialect.memory}m, {dialect.memory}b, const word *t, word k"
+    lines, apart = [f"V w[{slots}];"] if slots else [], []
+    if len(pieces) == 1:
+        lines.append(f"{name}_0({arguments});")
+    for i in range(len(pieces)) if len(pieces) > 1 else ():
+        lines.append(f"{name}_{i}_({'m, b, t, k, ' + ('w' if slots else '0')});")
+        head = f"{dialect.apart} {name}_{i}_({given}, V *restrict w) {{"
+        apart.append("\n  ".join([head, "(void)b;", f"{name}_{i}({arguments});"]) + "\n}\n")
+    head = f"{dialect.entry} {name}({given}) {{"
+    return "".join(apart) + "\n  ".join([head, "(void)b;", *lines]) + "\n}\n"
 
 
 def literal(value: str) -> str:
