@@ -17,8 +17,10 @@ from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.toolchain.processes import ADVICE, ELSEWHERE, run, run_all
 from symphys.codegen.toolchain.processor import Processor
 
-FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-fvisibility=hidden", "-fno-math-errno", "-fno-trapping-math")
-FLAGS += ("-ffp-contract=off", "-w")
+FLAGS = (
+    *("-std=gnu11", "-O2", "-fPIC", "-fvisibility=hidden", "-w"),
+    *("-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off"),
+)
 """No -ffast-math: a NaN stays one, and sums keep their order. Products are fused where the C says so."""
 STRAIGHT = (
     *("-fno-tree-fre", "-fno-tree-pre", "-fno-gcse", "-fno-code-hoisting", "-fno-tree-vrp", "-fno-tree-pta"),
