@@ -101,9 +101,7 @@ class _Layout:
     def _broken(self) -> set[int]:
         """Families of which a place of a call has some words, besides others."""
         body, broken = self._program.phases[1], set[int]()
-        places = np.concatenate(
-            [np.stack([spans.offset, spans.size]) for spans in (body.inputs, body.outputs)], axis=1
-        )
+        places = np.concatenate([np.stack([spans.offset, spans.size]) for spans in (body.inputs, body.outputs)], axis=1)
         for offset, size in np.unique(places[:, places[1] > 0], axis=1).T.tolist():
             own, lanes = self._family[offset : offset + size], self._lane[offset : offset + size]
             if (own != own[0]).any() or (own[0] != NONE and (lanes != lanes[0]).any()):

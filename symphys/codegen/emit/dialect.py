@@ -21,6 +21,7 @@ class Dialect:
         inline: how a function begins that its only caller takes in; ``apart``: one that it does not.
         entry: how a function begins that the driver calls.
         memory: type of the memories.
+        fuses: whether adjoints have fused products, written out: all compilers give the same bits, at any level.
     """
 
     forms: Mapping[str, str]
@@ -32,10 +33,11 @@ class Dialect:
     apart: str = "static NOINLINE void"
     entry: str = "void"
     memory: str = "V *"
+    fuses: bool = True
 
 
 VECTORS = Dialect(FORMS)
-NUMBERS = Dialect(PLAIN)
+NUMBERS = Dialect(PLAIN, fuses=False)
 ONE_LANE = Dialect(SCALAR)
 TEAM = Dialect(FORMS, reads="const R *", writes="R *restrict ", shares="R *", memory="R *")
 """Several calls of one rollout at once: lanes are calls, and memories are those of one lane."""
@@ -46,5 +48,6 @@ DEVICE = Dialect(
     inline="static __device__ __forceinline__ void",
     apart="static __device__ __noinline__ void",
     entry='extern "C" __device__ void',
+    fuses=False,
 )
 """Memories are interleaved: LANES apart lie the words of one thread."""

@@ -47,9 +47,14 @@ class Reach:
         """The value of a word."""
         return self._word.format(name, word)
 
-    def store(self, name: str, word: int | str, value: str, adds: bool = False) -> str:
-        """Write a word, or add to it."""
-        return f"{self.load(name, word)} {'+=' if adds else '='} {value};"
+    def store(self, name: str, word: int | str, value: str) -> str:
+        """Write a word."""
+        return f"{self.load(name, word)} = {value};"
+
+    def add(self, name: str, word: int | str, value: str) -> str:
+        """Add to a word; ``value`` may say where what is there comes in, as {}."""
+        to = self.load(name, word)
+        return f"{to} = {value.format(to)};" if "{}" in value else f"{to} += {value};"
 
     def clear(self, name: str, word: str) -> str:
         """Zero a word, in all lanes."""
@@ -60,7 +65,7 @@ class TeamReach(Reach):
     """The same for one rollout alone, where words may lie apart and lanes are calls.
 
     Results that several lanes add to are added to lane by lane, in the order of the calls: with whole vectors, of which
-    one lane is kept, so that the compiler fuses the same products as where lanes have words of their own.
+    one lane is kept.
     """
 
     def __init__(self, shape: Shape, arguments: int, backward: bool) -> None:
@@ -90,21 +95,31 @@ class TeamReach(Reach):
             return f"ALL({name}[{at}])"
         if kind == BESIDE:
             return f"*(const U *)({name} + {at})"
-        return f"(V){{{', '.join(f'{pointer}[{at}]' for pointer in self.pointers(name))}}}"
+        return f"((V){{{', '.join(f'{pointer}[{at}]' for pointer in self.pointers(name))}}})"
 
-    def store(self, name: str, word: int | str, value: str, adds: bool = False) -> str:
-        """Write a word, or add to it."""
-        kind, at, sign = self._access[name].kind, self._index(name, word), "+=" if adds else "="
+    def store(self, name: str, word: int | str, value: str) -> str:
+        """Write a word."""
+        kind, at = self._access[name].kind, self._index(name, word)
         if self.single:
-            return f"{name}[{at}] {sign} {value};"
+            return f"{name}[{at}] = {value};"
         if kind == BESIDE:
-            return f"*(U *)({name} + {at}) {sign} {value};"
+            return f"*(U *)({name} + {at}) = {value};"
+        parts = " ".join(f"{name}_{lane}[{at}] = x[{lane}];" for lane in range(self._lanes))
+        return f"{{ const V x = {value}; {parts} }}"
+
+    def add(self, name: str, word: int | str, value: str) -> str:
+        """Add to a word; ``value`` may say where what is there comes in, as {}."""
+        kind, at = self._access[name].kind, self._index(name, word)
+        if self.single:
+            return super().add(name, word, value)
+        sum_ = value if "{}" in value else f"{{}} + {value}"
+        if kind == BESIDE:
+            to = f"*(U *)({name} + {at})"
+            return f"{to} = {sum_.format(to)};"
         if kind == EACH:
-            sum_ = f"{self.load(name, word)} + {value}" if adds else value
-            parts = " ".join(f"{name}_{lane}[{at}] = x[{lane}];" for lane in range(self._lanes))
-            return f"{{ const V x = {sum_}; {parts} }}"
-        pointer = (lambda lane: name) if kind == ALL else (lambda lane: f"{name}_{lane}")
-        parts = " ".join(f"x = ALL({pointer(k)}[{at}]) + {value}; {pointer(k)}[{at}] = x[{k}];" for k in self._turn)
+            return self.store(name, word, sum_.format(self.load(name, word)))
+        to = [f"{name}[{at}]" if kind == ALL else f"{name}_{lane}[{at}]" for lane in range(self._lanes)]
+        parts = " ".join(f"x = {sum_.format(f'ALL({to[k]})')}; {to[k]} = x[{k}];" for k in self._turn)
         return f"{{ V x; {parts} }}"
 
     def clear(self, name: str, word: str) -> str:

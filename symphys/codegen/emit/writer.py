@@ -10,6 +10,7 @@ from symphys.codegen.emit.dialect import VECTORS, Dialect
 from symphys.codegen.emit.shapes import Reach, Shape, TeamReach
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.operations import MASKS
+from symphys.codegen.graph.rewrite import fused_results, with_fused_products
 
 LONGEST = 500
 """Statements in one C function, and copies of what is given: a compiler's time grows faster than its length."""
@@ -49,8 +50,12 @@ def write(
 
     ``moving``: the pairs that may have a stride; None: all. ``shape``: of a function for one rollout alone.
     """
+    fused: set[int] = set()
+    if form.backward and dialect.fuses:
+        graph = with_fused_products(graph, form.adds)
+        fused = fused_results(graph) if form.adds else fused
     words = Reach(dialect.word) if shape is None else TeamReach(shape, len(graph.sizes), form.backward)
-    pieces = _cut(graph, dialect, words)
+    pieces = _cut(graph, dialect, words, fused)
     pointers = _pointers(graph, form, dialect, words)
     parameters = ", ".join(f"{kind}{pointer}" for kind, pointer, _ in pointers) + ", V *restrict w"
     text = []
@@ -75,6 +80,7 @@ class _Piece:
         slots: the values that a later piece than their own reads, and their words in the buffer between pieces.
         dialect: how it is written.
         words: how the words of places are.
+        fused: products that are added to results in one rounding.
         targets: for a node, the words of results that it is: the head of a loop or nothing, the result, the word.
     """
 
@@ -82,6 +88,7 @@ class _Piece:
     slots: dict[int, int]
     dialect: Dialect
     words: Reach
+    fused: set[int]
     targets: dict[int, list[tuple[str, str, int | str]]] = field(default_factory=dict)
 
     def statements(self, graph: Graph, form: Form) -> list[str]:
@@ -91,6 +98,10 @@ class _Piece:
         for x in self.nodes:
             node = graph.nodes[x]
             operands = [self._use(graph, y, names, lines, form) for y in node.operands]
+            if x in self.fused:
+                product = f"FMA({operands[0]}, {operands[1]}, {{}})"
+                lines += (loop + self.words.add(name, word, product) for loop, name, word in self.targets[x])
+                continue
             lines.append(f"const {_type(node.op)} v{x} = {self.dialect.forms[node.op].format(*operands)};")
             names[x] = f"v{x}"
             if x in self.slots:
@@ -119,21 +130,21 @@ class _Piece:
         if adds and node.op == "const" and float.fromhex(node.value) == 0:
             return
         for loop, name, word in self.targets.get(x, ()):
-            yield loop + self.words.store(name, word, value, adds)
+            yield loop + (self.words.add if adds else self.words.store)(name, word, value)
 
 
-def _cut(graph: Graph, dialect: Dialect, words: Reach) -> list[_Piece]:
+def _cut(graph: Graph, dialect: Dialect, words: Reach, fused: set[int]) -> list[_Piece]:
     order = [x for x in graph.needed() if graph.nodes[x].op not in ("const", "input")]
     runs = [order[i : i + LONGEST] for i in range(0, len(order), LONGEST)] or [[]]
     home = {x: i for i, run in enumerate(runs) for x in run}
     crossing = sorted({y for x in order for y in graph.nodes[x].operands if home.get(y, home[x]) != home[x]})
     slots = {x: slot for slot, x in enumerate(crossing)}
-    pieces = [_Piece(run, slots, dialect, words) for run in runs]
+    pieces = [_Piece(run, slots, dialect, words, fused) for run in runs]
     copied = 0
     for r, result in enumerate(graph.results):
         for x, first, count in _runs(graph, result):
             if x not in home and (copied := copied + 1) % LONGEST == 0:
-                pieces.append(_Piece([], slots, dialect, words))
+                pieces.append(_Piece([], slots, dialect, words, fused))
             target: int | str = first if count == 1 else "j"
             loop = f"for (int j = {first}; j < {first + count}; j++) " if count > 1 else ""
             pieces[home.get(x, -1)].targets.setdefault(x, []).append((loop, f"o{r}", target))

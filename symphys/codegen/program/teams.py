@@ -150,7 +150,9 @@ def _limbs(sets: Sequence[Sequence[int]], before: Sequence[Sequence[int]], limbs
     return limb
 
 
-def _ordered(before: Sequence[Sequence[int]], found: Sequence[Sequence[int]]) -> tuple[list[int], tuple[tuple[int, int], ...]]:
+def _ordered(
+    before: Sequence[Sequence[int]], found: Sequence[Sequence[int]]
+) -> tuple[list[int], tuple[tuple[int, int], ...]]:
     """Calls in their order as far as teams allow, and where the teams begin."""
     whose = list(range(len(before)))
     members = {c: [c] for c in whose}

@@ -172,7 +172,7 @@ class KeptLibraries:
         return self.kept.alone if lanes == 1 and self.kept.alone else self.kept.plan
 
     def _texts(self, lanes: int) -> str:
-        """Stands for the C files. Those of other lanes differ by the lanes, the dialect and what stands side by side."""
+        """Stands for the C files. Others differ by the lanes, the dialect and what stands side by side."""
         if lanes == self.width.lanes:
             return self.kept.texts
         return f"{self.kept.texts} {lanes} {forms_of(lanes)} {self._plan(lanes).signature}"
@@ -227,7 +227,9 @@ def shared_library(parts: Sequence[SourceFile], cache: Cache, texts: str | None 
 
 def texts_of(parts: Sequence[SourceFile]) -> str:
     """A checksum of C files."""
-    return hashlib.sha256("\0".join(f"{part.fused} {part.narrow} {part.text}" for part in parts).encode()).hexdigest()
+    return hashlib.sha256(
+        "\0".join(f"{part.narrow} {part.straight} {part.text}" for part in parts).encode()
+    ).hexdigest()
 
 
 def library_key(texts: str, compiler: Compiler, flags: Sequence[str]) -> str:
