@@ -141,21 +141,26 @@ def _project_run(
     projections: tuple[tuple[VelocityConstraint, tuple[int, ...]], ...], states: AllVelocities, old: list[AnyImpulse]
 ) -> tuple[AllVelocities, list[AnyImpulse]]:
     """One constraint after the other: each with the places of its bodies among the states."""
-    momenta, given = list(states), []
+    momenta, given = list(states), list[AnyImpulse]()
     while len(given) < len(projections):
-        first = len(given)
-        follow = takewhile(lambda each: getattr(each[0], "pushed", None) is not None, projections[first + 1 :])
-        turn = [constraint for constraint, _ in (projections[first], *follow)]
-        if len(turn) > 1:  # a run of several is on one tree
-            momenta[0], news = project_in_turn(turn, momenta[0], old[first : first + len(turn)])
+        first, after = len(given), projections[len(given) + 1 :]
+        turn = [each for each, _ in (projections[first], *takewhile(lambda each: _pushed(each[0]), after))]
+        velocities = momenta[0]
+        if len(turn) > 1 and isinstance(velocities, GeneralizedVelocities):  # all on one tree
+            coordinates = [each for each in turn if isinstance(each, CoordinateConstraint)]
+            momenta[0], news = project_in_turn(coordinates, velocities, old[first : first + len(turn)])
             given += news
             continue
         constraint, places = projections[first]
-        after, new = constraint.project(tuple(momenta[i] for i in places), old[first])
+        moved, new = constraint.project(tuple(momenta[i] for i in places), old[first])
         given.append(new)
-        for i, moved in zip(places, after, strict=True):
-            momenta[i] = moved
+        for i, momentum in zip(places, moved, strict=True):
+            momenta[i] = momentum
     return tuple(momenta), given
+
+
+def _pushed(constraint: VelocityConstraint) -> bool:
+    return isinstance(constraint, CoordinateConstraint) and constraint.pushed is not None
 
 
 @traced

@@ -118,8 +118,8 @@ class TeamReach(Reach):
             return f"{to} = {sum_.format(to)};"
         if kind == EACH:
             return self.store(name, word, sum_.format(self.load(name, word)))
-        to = [f"{name}[{at}]" if kind == ALL else f"{name}_{lane}[{at}]" for lane in range(self._lanes)]
-        parts = " ".join(f"x = {sum_.format(f'ALL({to[k]})')}; {to[k]} = x[{k}];" for k in self._turn)
+        words = [f"{name}[{at}]" if kind == ALL else f"{name}_{lane}[{at}]" for lane in range(self._lanes)]
+        parts = " ".join(f"x = {sum_.format(f'ALL({words[k]})')}; {words[k]} = x[{k}];" for k in self._turn)
         return f"{{ V x; {parts} }}"
 
     def clear(self, name: str, word: str) -> str:

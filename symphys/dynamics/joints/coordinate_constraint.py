@@ -133,9 +133,10 @@ def project_in_turn(
     Each takes the rate from the velocities before the last change, and what that did to it from ``pushed``. So two
     projections are under way at a time: a processor that waits for results does not wait for one after the other.
     """
-    before, change, given = velocities, None, []
+    before, given = velocities, list[JointImpulse]()
+    change: Expr = None
     for constraint, impulse in zip(constraints, old, strict=True):
-        less = None if change is None else constraint.pushed * change
+        less: Expr = None if change is None else constraint.pushed * change
         new, change = constraint.answer(constraint.rate((before,)), impulse.numbers, less)
         before = velocities
         (velocities, *_) = constraint.apply((velocities,), JointImpulse(change))
