@@ -32,7 +32,7 @@ class Shape(NamedTuple):
     accesses: tuple[Access, ...]
 
 
-class Reach:
+class PlaceWords:
     """C for the words of a function's places: ``i3`` is the fourth argument, ``o0`` the first result."""
 
     def __init__(self, word: str) -> None:
@@ -61,7 +61,7 @@ class Reach:
         return self.store(name, word, "S(0.0)")
 
 
-class TeamReach(Reach):
+class TeamWords(PlaceWords):
     """The same for one rollout alone, where words may lie apart and lanes are calls.
 
     Results that several lanes add to are added to lane by lane, in the order of the calls: with whole vectors, of which

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from itertools import groupby
 
 from symphys.codegen.emit.dialect import VECTORS, Dialect
-from symphys.codegen.emit.shapes import Reach, Shape, TeamReach
+from symphys.codegen.emit.shapes import PlaceWords, Shape, TeamWords
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.operations import MASKS
 from symphys.codegen.graph.rewrite import fused_results, with_fused_products
@@ -54,7 +54,7 @@ def write(
     if form.backward and dialect.fuses:
         graph = with_fused_products(graph, form.adds)
         fused = fused_results(graph) if form.adds else fused
-    words = Reach(dialect.word) if shape is None else TeamReach(shape, len(graph.sizes), form.backward)
+    words = PlaceWords(dialect.word) if shape is None else TeamWords(shape, len(graph.sizes), form.backward)
     pieces = _cut(graph, dialect, words, fused)
     pointers = _pointers(graph, form, dialect, words)
     parameters = ", ".join(f"{kind}{pointer}" for kind, pointer, _ in pointers) + ", V *restrict w"
@@ -87,7 +87,7 @@ class _Piece:
     nodes: list[int]
     slots: dict[int, int]
     dialect: Dialect
-    words: Reach
+    words: PlaceWords
     fused: set[int]
     targets: dict[int, list[tuple[str, str, int | str]]] = field(default_factory=dict)
 
@@ -133,7 +133,7 @@ class _Piece:
             yield loop + (self.words.add if adds else self.words.store)(name, word, value)
 
 
-def _cut(graph: Graph, dialect: Dialect, words: Reach, fused: set[int]) -> list[_Piece]:
+def _cut(graph: Graph, dialect: Dialect, words: PlaceWords, fused: set[int]) -> list[_Piece]:
     order = [x for x in graph.needed() if graph.nodes[x].op not in ("const", "input")]
     runs = [order[i : i + LONGEST] for i in range(0, len(order), LONGEST)] or [[]]
     home = {x: i for i, run in enumerate(runs) for x in run}
@@ -167,7 +167,7 @@ def _type(op: str) -> str:
     return "I" if op in MASKS else "V"
 
 
-def _pointers(graph: Graph, form: Form, dialect: Dialect, words: Reach) -> list[tuple[str, str, str]]:
+def _pointers(graph: Graph, form: Form, dialect: Dialect, words: PlaceWords) -> list[tuple[str, str, str]]:
     """(type, name, memory) of every argument and result; adjoints of arguments may coincide, all others may not."""
     kind, memory = ("const R *", "(const R *)m") if form.shared else (dialect.reads, "m")
     primal = [(kind, f"i{i}", memory) for i in range(form.primal)]
