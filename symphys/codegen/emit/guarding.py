@@ -26,6 +26,7 @@ Words = NDArray[np.int64]
 NONE = -1
 TABLES = ("body", "again", "back_body")
 WIDTHS = {"guards": 1, "groups": 1, "calls": 7, "reads": 2, "writes": 2, "chains": 2, "sections": 5, "copies": 5}
+WIDTHS |= {"late": 2, "parents": 1}
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,9 @@ class Guarding:
             - writes: chain, offset;
             - chains: offset and stride where each begins;
             - sections: first call, the one after the last; chain of its word, offset in it, 0; or -1, offset, stride;
-            - copies: offset; chain of the source, offset in it, 0; or -1, offset, stride; size.
+            - copies: offset; chain of the source, offset in it, 0; or -1, offset, stride; size;
+            - late: of the first calls those that have a guard themselves, which are the last of them; its number;
+            - parents: of each guard that such a call computes the number of this call's guard; of others -1.
         arena: words of 8 bytes that the driver needs for itself.
     """
 
@@ -165,15 +168,33 @@ class _Rows:
             "sections": self._sections,
             "copies": self._copies,
         }
-        calls, sections, outputs = len(self._body), len(self._sections), self._program.phases[1].outputs
+        computes = self._program.phases[1].outputs
+        first = 1 + int(computes.call[np.isin(computes.offset, np.array(self._guards, np.int64))].max(initial=NONE))
+        rows |= self._late(first, word)
+        calls, sections = len(self._body), len(self._sections)
         seen = (2 + self._program.steps) * len(self._guards) // 8 + 1
         arena = 1 + 64 + seen + calls // 64 + 1 + self._words + 3 * (calls + sections) + 2 * len(self._chains.roots)
-        computes = outputs.call[np.isin(outputs.offset, np.array(self._guards, np.int64))]
         return Guarding(
-            first=1 + int(computes.max(initial=NONE)),
+            first=first,
             rows={name: np.array(each, np.int64).ravel() for name, each in rows.items()},
             arena=arena + 3 * (6 * sections + 4 * len(self._copies)),
         )
+
+    def _late(self, first: int, word: Mapping[int, int]) -> dict[str, list[tuple[int, ...]]]:
+        """The rows of those calls of the first that have a guard, and of the guards that they compute."""
+        late, parents = list[tuple[int, ...]](), [(NONE,)] * len(self._guards)
+        for k, call in enumerate(self._body[:first]):
+            if call.guard is None:
+                if late:
+                    raise ProgramError(f"{call.function.name()}: it comes after calls with guards that compute others")
+                continue
+            parent = word[call.guard.offset]
+            late.append((k, parent))
+            for place in call.outputs:
+                if place.offset not in word or place.size != 1:
+                    raise ProgramError(f"{call.function.name()}: with a guard it computes more than guards")
+                parents[word[place.offset]] = (parent,)
+        return {"late": late, "parents": parents}
 
 
 class _Chains:
