@@ -26,6 +26,7 @@ typedef N I __attribute__((vector_size(LANES * sizeof(R))));
 #endif
 #define NAN __builtin_nan("")
 #define INFINITY __builtin_inf()
+#define PREFETCH(place) __builtin_prefetch(place)
 #define LOWEST(x) __builtin_ctzll(x) /* of the bits that are set */
 #define NOINLINE __attribute__((noinline, unused))
 #define API __attribute__((visibility("default")))
