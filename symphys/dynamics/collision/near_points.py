@@ -86,7 +86,7 @@ class Reach:
 
 
 def can_measure(body: Body) -> bool:
-    """Whether points of a body are measured: its numbers are known, and one of its shapes is no ball about its centre."""
+    """Whether points of a body are measured: its numbers are known, and it is no ball about its centre."""
     sizes = [(shape.centre, shape.sizes, shape.orientation) for shape in body.shapes]
     if body.massless or all(shape.central for shape in body.shapes):
         return False

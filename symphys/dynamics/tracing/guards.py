@@ -229,7 +229,7 @@ class _Search:
         return tuple(parts)
 
     def _disregards(self, k: int, number: int, found: Mapping[int, Sequence[Simplified]]) -> bool:
-        """Whether the results of a call are the same, whatever is in a vector that it reads, with zeros in its place."""
+        """Whether the results of a call are the same whatever is in a vector that it reads, and with zeros there."""
         if k not in found:
             return False
         call = self._calls[k]
