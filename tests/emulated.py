@@ -96,6 +96,11 @@ class Held(NDArrayOperatorsMixin):
     def __getitem__(self, key: Any) -> Any:
         return held(self.array[key])
 
+    def __setitem__(self, key: Any, value: Any) -> None:
+        if isinstance(value, np.ndarray):
+            raise TypeError("an array of a device and one of numpy's")
+        self.array[key] = unheld(value)
+
     def __getattr__(self, name: str) -> Any:
         found = getattr(self.array, name)
         return (lambda *given, **named: held(found(*given, **named))) if callable(found) else held(found)

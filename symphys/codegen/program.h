@@ -1,6 +1,6 @@
 /* A program's data. A phase is entries: number of the function, length, then (offset, stride) of each place. */
 #ifdef WARPS
-typedef struct { word levels; const word *spans, *entries; } phase; /* spans: (first, calls) by level and warp */
+typedef struct { word levels; const word *spans, *entries; } phase; /* spans: (first, end) by level and warp */
 #else
 typedef struct { word count; const word *entries; } phase;
 #endif

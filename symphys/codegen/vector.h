@@ -6,11 +6,15 @@ typedef int64_t word;
 typedef float R;
 typedef int32_t N;
 #define LIBM(name) __builtin_##name##f
+#define X86(bits) __builtin_ia32_vfmaddps##bits
+#define FULL 16 /* numbers in the widest register */
 #define MAGNITUDE 0x7fffffff
 #else
 typedef double R;
 typedef int64_t N;
 #define LIBM(name) __builtin_##name
+#define X86(bits) __builtin_ia32_vfmaddpd##bits
+#define FULL 8
 #define MAGNITUDE 0x7fffffffffffffff
 #endif
 #ifdef NUMBERS /* of one lane */
@@ -23,6 +27,25 @@ typedef R V __attribute__((vector_size(LANES * sizeof(R))));
 typedef N I __attribute__((vector_size(LANES * sizeof(R))));
 #define S(x) ((V){0} + (R)(x))
 #define LANE(x, l) (x)[l]
+#endif
+/* x * y + z in one rounding, where the processor has that: without it compilers would call the C library. */
+#if !defined(__FMA__) && !defined(__FP_FAST_FMA)
+#define FMA(x, y, z) ((x) * (y) + (z))
+#elif defined(NUMBERS)
+#define FMA(x, y, z) LIBM(fma)(x, y, z)
+#elif defined(__AVX512F__) && !defined(__clang__) && LANES == FULL
+#define FMA(x, y, z) X86(512_mask)(x, y, z, -1, 4)
+#elif defined(__FMA__) && !defined(__clang__) && 2 * LANES == FULL
+#define FMA(x, y, z) X86(256)(x, y, z)
+#elif defined(__FMA__) && !defined(__clang__) && 4 * LANES == FULL
+#define FMA(x, y, z) X86()(x, y, z)
+#else
+#define FMA(x, y, z) fma_(x, y, z)
+static inline __attribute__((unused)) V fma_(V x, V y, V z) {
+  V r;
+  for (int l = 0; l < LANES; l++) LANE(r, l) = LIBM(fma)(LANE(x, l), LANE(y, l), LANE(z, l));
+  return r;
+}
 #endif
 #define NAN __builtin_nan("")
 #define INFINITY __builtin_inf()

@@ -16,8 +16,8 @@ from repeats import thorough
 from symphys.errors import ProblemError
 from symphys.problem import load_problem
 from symphys.transcription import Transcription, transcribe
-from symphys.transcription.network_rollout import LargeEvaluator, LargeTranscription, require_small_nets
-from symphys.transcription.network_rollout import forward_backward as passes
+from symphys.transcription.network_rollout import LargeEvaluator, LargeTranscription, net_values, require_small_nets
+from symphys.transcription.network_rollout import evaluator as evaluators
 from symphys.transcription.network_rollout import partition as split
 from symphys.verification import examine
 from symphys.verification.gradient import compare_gradient
@@ -221,14 +221,15 @@ def points(context: Transcription) -> Array:
 @problems(HOPS[0], *LIFTS[1:], ASKED)
 @pytest.mark.parametrize("smoothing", [0.0, 0.05])
 def test_values_and_gradients(both: tuple[Transcription, LargeTranscription], smoothing: float) -> None:
-    """To rounding, which impacts amplify, whatever the length of segments."""
+    """To rounding, which impacts amplify, whatever the length of segments, and how much is computed again."""
     within, beside = both
     Z = points(within)
     a = within.shooting.evaluator.gradient(Z, smoothing)
     assert a.gradient is not None
-    for words in (10, passes.SEGMENT_WORDS):
+    for columns, kept in ((1, 1), (4, 150), (net_values.SEGMENT_COLUMNS, evaluators.KEPT_NUMBERS)):
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(passes, "SEGMENT_WORDS", words)
+            patch.setattr(net_values, "SEGMENT_COLUMNS", columns)
+            patch.setattr(evaluators, "KEPT_NUMBERS", kept)
             b = beside.shooting.evaluator.gradient(Z, smoothing)
         assert b.gradient is not None
         assert np.allclose(a.merit, b.merit, rtol=1e-12)

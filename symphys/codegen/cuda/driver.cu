@@ -27,10 +27,31 @@ static __device__ word row_of(const job *x) {
 
 static __device__ bool inside(const job *x) { return (word)blockIdx.x * LANES + threadIdx.x < x->rows; }
 
+/* Where a word is 0 for all robots of the block, the calls after this entry are without effect. What stands for their
+   results is copied, and their adjoints are passed on to that. */
+static __device__ bool left_out(const word *t, V *m, V *b, word k) {
+  if (__any_sync(0xffffffffu, m[t[3] * LANES] != S(0.0))) return false;
+  for (const word *c = t + 4; c < t + t[1]; c += 4)
+    for (word w = 0; w < c[3]; w++) {
+      const word to = (c[0] + w) * LANES, from = (c[1] + k * c[2] + w) * LANES;
+      if (!b) m[to] = m[from];
+      else {
+        if (c[1] >= 0) b[from] += b[to];
+        b[to] = S(0.0);
+      }
+    }
+  return true;
+}
+
 static __device__ __noinline__ void run(const phase *calls, V *m, V *b, word k) {
   for (word level = 0; level < calls->levels; level++) {
-    const word *span = calls->spans + 2 * (level * WARPS + threadIdx.y), *t = calls->entries + span[0];
-    for (word c = 0; c < span[1]; c++, t += t[1]) call(t[0], m, b, t + 2, k);
+    const word *span = calls->spans + 2 * (level * WARPS + threadIdx.y);
+    const word *t = calls->entries + span[0], *end = calls->entries + span[1];
+    while (t < end)
+      if (t[0] >= 0) {
+        call(t[0], m, b, t + 2, k);
+        t += t[1];
+      } else t += left_out(t, m, b, k) ? t[2] : t[1];
     __syncthreads();
   }
 }

@@ -3,18 +3,24 @@
 The calls of a robot's step form a graph: legs do not touch each other, nor do contacts of different bodies. A block of
 the device has several warps, each with a thread for every robot of the block; a warp takes its share of a level, then
 all wait. Every word sees its calls in the order of the program, so that numbers do not depend on the count of warps.
+
+Before calls with a section or a guard stands an entry that leaves them out where that word is 0 for all robots of the
+block (``alternatives.py``).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.codegen.cuda.alternatives import NONE, Alternative, Span, of_adjoint, of_call
+from symphys.codegen.emit.guarding import TABLES as GUARDED
 from symphys.codegen.emit.plan import Plan
-from symphys.codegen.program.program import Program
+from symphys.codegen.program.program import FunctionCall, Program
 from symphys.codegen.runtime.library import TABLES
 
 Words = NDArray[np.int64]
@@ -22,6 +28,8 @@ LOOPED = ("body", "again", "back_body")
 """Phases of every step."""
 CALL = 40
 """What a call costs besides its operations, in operations: a jump, its table entry."""
+LEFT_OUT = -1
+"""In place of the number of a function."""
 
 
 @dataclass(frozen=True)
@@ -29,8 +37,9 @@ class Schedule:
     """A phase for a number of warps.
 
     Attributes:
-        spans: (levels, warps, 2) for each warp where its calls begin among ``entries``, and how many they are.
-        entries: of the calls: number, length, then offset and stride of each place.
+        spans: (levels, warps, 2) for each warp where its calls begin and end among ``entries``.
+        entries: of the calls: number, length, then offset and stride of each place. Before calls that may be left out:
+            LEFT_OUT, length, words from there to what comes after these calls, word of the guard, copies.
         work, longest: operations of all calls, and of the warps that the others wait for, one level after the other.
         words: that are read and written.
     """
@@ -44,20 +53,26 @@ class Schedule:
 
 @dataclass(frozen=True)
 class _Call:
-    """What a call touches at step 0, and where it goes from there."""
+    """What a call touches at step 0, where it goes from there, and when it may be left out."""
 
-    entry: Words
+    entry: list[int]
     cost: int
     reads: Words
     writes: Words
-    places: tuple[tuple[int, int, int], ...]
-    """(offset, stride, size)"""
+    places: tuple[Span, ...]
+    alternatives: Sequence[Alternative | None]
+    """By its section and by its guard."""
+
+    def word(self, depth: int) -> int:
+        """Of these."""
+        found = self.alternatives[depth]
+        return NONE if found is None else found.word
 
 
 def schedules(planned: Plan, program: Program, warps: int) -> dict[str, Schedule]:
     """Of all phases of a planned program."""
     return {
-        phase: _schedule(list(_calls(planned, program.size, phase)), 2 * program.size + planned.tape, steps, warps)
+        phase: _schedule(list(_calls(planned, program, phase)), 2 * program.size + planned.tape, steps, warps)
         for phase, steps in {name: program.steps if name in LOOPED else 1 for name in TABLES}.items()
     }
 
@@ -68,42 +83,67 @@ def _schedule(calls: Sequence[_Call], memory: int, steps: int, warps: int) -> Sc
     spans, entries, start = [], [], 0
     for share in shares:
         for own in share:
-            spans.append((start, len(own)))
-            entries += [call.entry for call in own]
-            start += sum(len(call.entry) for call in own)
+            words = _entries(own)
+            spans.append((start, start + len(words)))
+            entries += words
+            start += len(words)
     return Schedule(
         spans=np.array(spans, np.int64).reshape(len(levels), warps, 2),
-        entries=np.concatenate(entries) if entries else np.zeros(0, np.int64),
+        entries=np.array(entries, np.int64),
         work=sum(call.cost for call in calls),
         longest=sum(max(sum(call.cost for call in own) for own in share) for share in shares),
         words=sum(len(call.reads) + len(call.writes) for call in calls),
     )
 
 
-def _calls(planned: Plan, size: int, phase: str) -> Iterator[_Call]:
+def _entries(calls: Sequence[_Call], depth: int = 0) -> list[int]:
+    """The entries of a warp's calls of a level; those that are left out together follow one another."""
+    if depth == 2:
+        return [x for call in calls for x in call.entry]
+    found = list[int]()
+    for word, group in groupby(sorted(calls, key=lambda call: call.word(depth)), lambda call: call.word(depth)):
+        same = list(group)
+        entries = _entries(same, depth + 1)
+        others = [other for call in same if (other := call.alternatives[depth]) is not None]
+        if others:
+            copies = [x for other in others for copy in other.copies for x in copy]
+            length = 4 + len(copies)
+            found += [LEFT_OUT, length, length + len(entries), word, *copies]
+        found += entries
+    return found
+
+
+def _calls(planned: Plan, program: Program, phase: str) -> Iterator[_Call]:
     count, table = planned.tables[phase]
+    guarded: list[FunctionCall | None] = [None] * count
+    if planned.guarding is not None and phase in GUARDED:
+        first = planned.guarding.first  # those before compute guards
+        guarded = [program.body[k] if k >= first else None for k in planned.guarding.calls_of(phase).tolist()]
     costs = {}
-    at = 0
-    for _ in range(count):
+    at, far = 0, program.size + planned.tape
+    for call in guarded:
         number, length = int(table[at]), int(table[at + 1])
         graph, form = planned.functions[number]
         pairs = table[at + 2 : at + length].reshape(-1, 2).tolist()
         sizes = [*graph.sizes, *map(len, graph.results)]
-        arguments, far = len(graph.sizes), size + planned.tape
-        places = []
-        for i, ((offset, stride), words) in enumerate(zip(pairs, sizes, strict=True)):
-            backward = form.backward if i >= arguments else i >= form.primal
-            places.append((offset + far * backward, stride, words))
-        covered = [np.arange(offset, offset + words) for offset, _, words in places]
-        cleared = covered[form.primal : arguments] if form.clears else []
+        spans = [Span(offset, stride, size) for (offset, stride), size in zip(pairs, sizes, strict=True)]
+        own, given = spans[: form.primal], spans[form.primal : len(graph.sizes)]
+        results = spans[len(graph.sizes) :]
+        alternatives: Sequence[Alternative | None] = (None, None)
+        if call is not None:
+            alternatives = of_adjoint(call, given, results) if form.backward else of_call(call)
+        also = [span for other in alternatives if other is not None for span in other.reads]
+        if form.backward:
+            given, results = ([span._replace(offset=span.offset + far) for span in each] for each in (given, results))
         if number not in costs:
             costs[number] = CALL + sum(graph.nodes[x].op not in ("const", "input") for x in graph.needed())
         yield _Call(
-            entry=table[at : at + length],
+            entry=table[at : at + length].tolist(),
             cost=costs[number],
-            reads=_joined([*covered[:arguments], *(covered[arguments:] if form.adds else [])]),
-            writes=_joined([*covered[arguments:], *cleared]),
-            places=tuple(places),
+            reads=_words([*own, *given, *also, *(results if form.adds else [])]),
+            writes=_words([*results, *(given if form.clears else [])]),
+            places=(*own, *given, *also, *results),
+            alternatives=alternatives,
         )
         at += length
 
@@ -138,15 +178,16 @@ def _apart(calls: Sequence[_Call], words: int, steps: int) -> bool:
 
 
 def _shared(level: Sequence[_Call], warps: int) -> list[list[_Call]]:
-    """The calls of a level among warps, the dearest first, each to the one with the least so far."""
+    """The calls of a level among warps, each to the one with the least so far: those that always run, dearest first."""
     shares: list[list[_Call]] = [[] for _ in range(warps)]
     loads = [0] * warps
-    for call in sorted(level, key=lambda call: -call.cost):
+    for call in sorted(level, key=lambda call: (any(call.alternatives), -call.cost)):
         least = loads.index(min(loads))
         shares[least].append(call)
         loads[least] += call.cost
     return shares
 
 
-def _joined(parts: Sequence[Words]) -> Words:
-    return np.concatenate(parts) if parts else np.zeros(0, np.int64)
+def _words(spans: Sequence[Span]) -> Words:
+    """That these have at step 0, one after the other."""
+    return np.concatenate([np.zeros(0, np.int64), *(np.arange(span.offset, span.offset + span.size) for span in spans)])

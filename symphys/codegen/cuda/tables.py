@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.codegen.cuda.device import Device
-from symphys.codegen.cuda.schedule import Schedule
+from symphys.codegen.cuda.schedule import LEFT_OUT, Schedule
 from symphys.codegen.emit.plan import Plan
 from symphys.codegen.program.program import Program
 from symphys.codegen.runtime.library import WORD, List, RowSource, data_places, program_fields, strided
@@ -88,10 +88,10 @@ class Tables:
 
 
 def interleaved(entries: Words, lanes: int) -> Words:
-    """Entries whose offsets and strides count the words of all lanes."""
+    """Entries whose offsets and strides count the words of all lanes; those of what is copied count robots' words."""
     found, at = entries.copy(), 0
     while at < len(found):
         length = int(found[at + 1])
-        found[at + 2 : at + length] *= lanes
+        found[at + 2 : at + length] *= 1 if found[at] == LEFT_OUT else lanes
         at += length
     return found

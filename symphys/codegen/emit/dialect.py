@@ -20,6 +20,7 @@ class Dialect:
         word: a word of a place, by the place's name and the number of the word.
         inline: how a function begins that its only caller takes in; ``apart``: one that it does not.
         entry: how a function begins that the driver calls.
+        fuses: whether adjoints have fused products, written out: all compilers give the same bits, at any level.
     """
 
     forms: Mapping[str, str]
@@ -30,10 +31,11 @@ class Dialect:
     inline: str = "static inline void"
     apart: str = "static NOINLINE void"
     entry: str = "void"
+    fuses: bool = True
 
 
 VECTORS = Dialect(FORMS)
-NUMBERS = Dialect(PLAIN)
+NUMBERS = Dialect(PLAIN, fuses=False)
 ONE_LANE = Dialect(SCALAR)
 DEVICE = Dialect(
     PLAIN,
@@ -42,5 +44,6 @@ DEVICE = Dialect(
     inline="static __device__ __forceinline__ void",
     apart="static __device__ __noinline__ void",
     entry='extern "C" __device__ void',
+    fuses=False,
 )
 """Memories are interleaved: LANES apart lie the words of one thread."""

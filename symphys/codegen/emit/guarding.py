@@ -62,6 +62,12 @@ class Guarding:
         """Rows of a kind; of calls without the last."""
         return len(self.rows[name]) // WIDTHS[name] - (name == "calls")
 
+    def calls_of(self, table: str) -> Words:
+        """The numbers of the calls that one of ``TABLES`` has, in its order."""
+        starts = self.rows["calls"].reshape(-1, WIDTHS["calls"])[:-1, TABLES.index(table)]
+        order = np.argsort(starts, kind="stable")
+        return order[np.count_nonzero(starts == NONE) :]
+
     def mark_redirected(self, moves: NDArray[np.bool_]) -> None:
         """Mark the strides in the tables that the driver replaces by that of a chain which moves with the step."""
         positions, chains = self.rows["reads"].reshape(-1, 2).T

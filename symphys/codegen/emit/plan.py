@@ -70,13 +70,14 @@ class Plan:
         return found
 
 
-def plan(program: Program, seeded: Sequence[str], word: int = 64) -> Plan:
+def plan(program: Program, seeded: Sequence[str], word: int = 64, noted: bool = True) -> Plan:
     """Plan the forward pass and the gradient with respect to z of the seeded outputs.
 
     Args:
         program: what to compute.
         seeded: names of the outputs that are differentiated.
         word: bytes of one word of a whole block: lanes times the size of a number.
+        noted: whether the driver notes which guards are 0 in a step; otherwise they are computed again backwards.
     """
     functions = DistinctFunctions()
     parts = [_Part(calls, steps) for calls, steps in zip(program.phases, (1, program.steps, 1), strict=True)]
@@ -86,7 +87,7 @@ def plan(program: Program, seeded: Sequence[str], word: int = 64) -> Plan:
     for part in parts:
         part.find_adjoints(active, functions)
     body = parts[1]
-    again = _again(program, body, reach, functions)
+    again = _again(program, body, reach, functions, noted)
     tape = _put_on_tape(program, body, again, functions, FAST_MEMORY // word)
     tables = {name: part.pushes(functions) for name, part in zip(("prologue", "body", "epilogue"), parts, strict=True)}
     tables["again"] = body.pushes(functions, np.flatnonzero(again))
@@ -215,15 +216,17 @@ def _any(before: Words, spans: Spans, steps: int) -> NDArray[np.bool_]:
     return found
 
 
-def _again(program: Program, body: _Part, reach: Reach, functions: DistinctFunctions) -> NDArray[np.bool_]:
+def _again(program: Program, body: _Part, reach: Reach, functions: DistinctFunctions, noted: bool) -> NDArray[np.bool_]:
     """(calls,) which must be run again before the adjoints of a step: those whose scratch is read."""
     spans = body.calls.inputs
     used = [[i for i in range(kind.function.n_in()) if i in functions.arguments(kind.graph)] for kind in body.kinds]
     read = [np.zeros(0, np.int64)]
     for kind, calls in enumerate(grouped(body.kind + 1, len(body.kinds) + 1)[1:]):
         read.append((spans.starts[calls][:, None] + np.array(used[kind], np.int64)).ravel())
-    sections = {call.section.offset for call in program.body if call.section is not None}
-    return reach.producers(np.concatenate(read), np.array(sorted(sections), np.int64), program.scratch(), phase=1)
+    words = {call.section.offset for call in program.body if call.section is not None}
+    if not noted:
+        words |= {call.guard.offset for call in program.body if call.guard is not None}
+    return reach.producers(np.concatenate(read), np.array(sorted(words), np.int64), program.scratch(), phase=1)
 
 
 def _put_on_tape(

@@ -23,44 +23,40 @@ class SourceFile:
 
     Attributes:
         text: C.
-        fused: whether the compiler may fuse products and sums.
         narrow: whether it is for fewer lanes than a vector register has.
+        straight: whether functions are straight lines of values, each computed once.
     """
 
     text: str
-    fused: bool = False
     narrow: bool = False
+    straight: bool = True
 
 
 def sources(plan: Plan, lanes: int, single: bool, narrow: bool = False) -> list[SourceFile]:
-    """The C files; each compiles alone. Adjoints are fused; values are not, so that they are casadi's to the bit.
+    """The C files; each compiles alone. Values have no fused products, so that they are casadi's to the bit.
 
     ``narrow``: of fewer lanes than a vector register has.
     """
     head = f"#define LANES {lanes}\n#define SINGLE {int(single)}\n"
-    found, moving = [], plan.moving()
+    found, moving, dialect = [], plan.moving(), forms_of(lanes)
     for backward in (False, True):
         mine = [i for i, (_, form) in enumerate(plan.functions) if form.backward == backward]
         work = [len(plan.functions[i][0].nodes) for i in mine]
-        dialect = forms_of(lanes, backward)
         texts = [write(f"f{i}", *plan.functions[i], dialect, moving[i]) for i in mine]
         start = head + (NUMBERS if dialect is ONE_LANE else "") + resource("vector.h")
         for group in spread(texts, work, FILES):
-            found.append(SourceFile("\n".join([start, *group]), fused=backward, narrow=narrow))
+            found.append(SourceFile("\n".join([start, *group]), narrow=narrow))
     names = [f"f{number}" for number in range(len(plan.functions))]
     declared = "".join(f"void {name}(V *m, V *b, const word *t, word k);\n" for name in names)
     table = ", ".join(names) or "0"
     listed = f"{declared}static void (*const FUNCTIONS[])(V *, V *, const word *, word) = {{{table}}};\n"
-    return [*found, SourceFile(head + resource("vector.h") + listed + "".join(map(resource, (*DRIVER, "phases.c"))))]
+    driver = head + resource("vector.h") + listed + "".join(map(resource, (*DRIVER, "phases.c")))
+    return [*found, SourceFile(driver, straight=False)]
 
 
-def forms_of(lanes: int, backward: bool = False) -> Dialect:
-    """How functions are written for blocks of so many lanes.
-
-    Values of one lane are numbers. Adjoints are vectors of one: a compiler fuses the same products as in wide ones,
-    and would not between the branches that it makes of conditions on numbers.
-    """
-    return ONE_LANE if lanes == 1 and not backward else VECTORS
+def forms_of(lanes: int) -> Dialect:
+    """How functions are written for blocks of so many lanes: one lane is numbers."""
+    return ONE_LANE if lanes == 1 else VECTORS
 
 
 def spread(texts: Sequence[str], work: Sequence[int], most: int) -> list[list[str]]:

@@ -9,6 +9,7 @@ from itertools import groupby
 from symphys.codegen.emit.dialect import VECTORS, Dialect
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.operations import MASKS
+from symphys.codegen.graph.rewrite import fused_results, with_fused_products
 
 LONGEST = 500
 """Statements in one C function, and copies of what is given: a compiler's time grows faster than its length."""
@@ -43,7 +44,11 @@ def write(
 
     ``moving``: the places that may have a stride; None: all.
     """
-    pieces = _cut(graph, dialect)
+    fused: set[int] = set()
+    if form.backward and dialect.fuses:
+        graph = with_fused_products(graph, form.adds)
+        fused = fused_results(graph) if form.adds else fused
+    pieces = _cut(graph, dialect, fused)
     pointers = _pointers(graph, form, dialect)
     parameters = ", ".join(f"{kind}{pointer}" for kind, pointer, _ in pointers) + ", V *restrict w"
     text = []
@@ -67,12 +72,14 @@ class _Piece:
         nodes: what it computes, in order.
         slots: the values that a later piece than their own reads, and their words in the buffer between pieces.
         dialect: how it is written.
+        fused: products that are added to results in one rounding.
         targets: for a node, the words of results that it is; a loop's head comes before the words that it fills.
     """
 
     nodes: list[int]
     slots: dict[int, int]
     dialect: Dialect
+    fused: set[int]
     targets: dict[int, list[str]] = field(default_factory=dict)
 
     def statements(self, graph: Graph, form: Form) -> list[str]:
@@ -82,6 +89,9 @@ class _Piece:
         for x in self.nodes:
             node = graph.nodes[x]
             operands = [self._use(graph, y, names, lines, form) for y in node.operands]
+            if x in self.fused:
+                lines += (f"{to} = FMA({operands[0]}, {operands[1]}, {to});" for to in self.targets[x])
+                continue
             lines.append(f"const {_type(node.op)} v{x} = {self.dialect.forms[node.op].format(*operands)};")
             names[x] = f"v{x}"
             if x in self.slots:
@@ -113,18 +123,18 @@ class _Piece:
             yield f"{target} {'+=' if adds else '='} {value};"
 
 
-def _cut(graph: Graph, dialect: Dialect) -> list[_Piece]:
+def _cut(graph: Graph, dialect: Dialect, fused: set[int]) -> list[_Piece]:
     order = [x for x in graph.needed() if graph.nodes[x].op not in ("const", "input")]
     runs = [order[i : i + LONGEST] for i in range(0, len(order), LONGEST)] or [[]]
     home = {x: i for i, run in enumerate(runs) for x in run}
     crossing = sorted({y for x in order for y in graph.nodes[x].operands if home.get(y, home[x]) != home[x]})
     slots = {x: slot for slot, x in enumerate(crossing)}
-    pieces = [_Piece(run, slots, dialect) for run in runs]
+    pieces = [_Piece(run, slots, dialect, fused) for run in runs]
     copied = 0
     for r, result in enumerate(graph.results):
         for x, first, count in _runs(graph, result):
             if x not in home and (copied := copied + 1) % LONGEST == 0:
-                pieces.append(_Piece([], slots, dialect))
+                pieces.append(_Piece([], slots, dialect, fused))
             target = dialect.word.format(f"o{r}", first if count == 1 else "j")
             loop = f"for (int j = {first}; j < {first + count}; j++) " if count > 1 else ""
             pieces[home.get(x, -1)].targets.setdefault(x, []).append(f"{loop}{target}")

@@ -35,6 +35,9 @@ FORMS = (
         "iez": "(V)({0} & (I){1})",
         "select": "(V)(({0} & (I){1}) | (~{0} & (I){2}))",
         "fabs": "(V)((I){0} & MAGNITUDE)",
+        "fma": "FMA({0}, {1}, {2})",
+        "fms": "FMA({0}, {1}, -{2})",
+        "fnma": "FMA(-{0}, {1}, {2})",
     }
 )
 """C expressions of operands {0}, {1}, {2}, for vectors."""

@@ -44,6 +44,36 @@ def with_reciprocals(graph: Graph, forward: Graph) -> Graph:
     return new
 
 
+def with_fused_products(graph: Graph, adds: bool) -> Graph:
+    """Products that are only added or subtracted become one rounding with their sums: fma, fms and fnma.
+
+    Nodes keep their numbers. ``adds``: results are added to what is there, so that products among them are fused there.
+    """
+    needed = graph.needed()
+    products = {x for x in needed if graph.nodes[x].op == "mul"}
+    for x in needed:
+        if graph.nodes[x].op not in ("add", "sub"):
+            products.difference_update(graph.nodes[x].operands)
+    if not adds:
+        products.difference_update(x for result in graph.results for x in result)
+    nodes = list(graph.nodes)
+    for x in needed:
+        if nodes[x].op in ("add", "sub"):
+            first, second = nodes[x].operands
+            kinds = ("fma", "fma") if nodes[x].op == "add" else ("fms", "fnma")
+            if first in products:
+                nodes[x] = Node(kinds[0], (*nodes[first].operands, second))
+            elif second in products:
+                nodes[x] = Node(kinds[1], (*nodes[second].operands, first))
+    return Graph(graph.sizes, nodes, graph.results)
+
+
+def fused_results(graph: Graph) -> set[int]:
+    """Products that nothing but results has, after ``with_fused_products``: where they are added it is one rounding."""
+    used = {y for x in graph.needed() for y in graph.nodes[x].operands}
+    return {x for result in graph.results for x in result if graph.nodes[x].op == "mul" and x not in used}
+
+
 def _found_in(graph: Graph, other: Graph) -> dict[int, int]:
     """The nodes that another graph has too, and their numbers there."""
     found: dict[int, int] = {}

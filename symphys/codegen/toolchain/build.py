@@ -219,7 +219,9 @@ def shared_library(parts: Sequence[SourceFile], cache: Cache, texts: str | None 
 
 def texts_of(parts: Sequence[SourceFile]) -> str:
     """A checksum of C files."""
-    return hashlib.sha256("\0".join(f"{part.fused} {part.narrow} {part.text}" for part in parts).encode()).hexdigest()
+    return hashlib.sha256(
+        "\0".join(f"{part.narrow} {part.straight} {part.text}" for part in parts).encode()
+    ).hexdigest()
 
 
 def library_key(texts: str, compiler: Compiler, flags: Sequence[str]) -> str:

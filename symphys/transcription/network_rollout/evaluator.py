@@ -20,6 +20,7 @@ from symphys.transcription.network_rollout.forward_backward import (
     objective_arguments,
 )
 from symphys.transcription.network_rollout.layers import Layers
+from symphys.transcription.network_rollout.net_values import KEPT_NUMBERS
 
 Array = NDArray[np.float64]
 LEAST_ROBOTS = 8
@@ -69,14 +70,14 @@ class LargeEvaluator(WithoutResiduals):
             smoothing: [m/s].
             gradient: whether derivatives are wanted.
         """
-        nets = self._nets(weights)
         count = max(1, min(self.threads, len(Z) // LEAST_ROBOTS))
-        parts = np.array_split(Z, count)
+        nets = self._nets(weights, len(Z) // count)
+        parts, room = np.array_split(Z, count), KEPT_NUMBERS // count if gradient else 0
         if count == 1:
-            found = [self._part(nets, parts[0], smoothing, gradient)]
+            found = [self._part(nets, parts[0], smoothing, room)]
         else:
             with ThreadPoolExecutor(count) as pool:
-                found = list(pool.map(lambda part: self._part(nets, part, smoothing, gradient), parts))
+                found = list(pool.map(lambda part: self._part(nets, part, smoothing, room), parts))
         common = Shared(*stacked(found))
         if not gradient:
             return common
@@ -84,25 +85,25 @@ class LargeEvaluator(WithoutResiduals):
         sums = zip(*(part.weights for part in found if part.weights is not None), strict=True)
         return replace(common, small=small, weights=tuple(np.sum(own, axis=0) for own in sums))
 
-    def forward_pass(self, z: Array, smoothing: float) -> ForwardPass:
-        """The motion of one decision vector."""
+    def forward_pass(self, z: Array, smoothing: float, room: int = 0) -> ForwardPass:
+        """The motion of one decision vector; ``room``: see ``values_of``."""
         parts = self.context.partition
-        return forward(self.context, self.batch_step, self.nets_at(z), z[None, parts.small], smoothing)
+        return forward(self.context, self.batch_step, self.nets_at(z), z[None, parts.small], smoothing, room)
 
     def nets_at(self, z: Array) -> list[Layers]:
         """The nets of one decision vector."""
-        return self._nets([own.at(z) for own in self.context.partition.weights])
+        return self._nets([own.at(z) for own in self.context.partition.weights], 1)
 
-    def _nets(self, weights: Sequence[Array]) -> list[Layers]:
+    def _nets(self, weights: Sequence[Array], robots: int) -> list[Layers]:
         return [
-            Layers(law, own, self.real, self.device)
+            Layers(law, own, robots, self.real, self.device)
             for law, own in zip(self.context.partition.laws, weights, strict=True)
         ]
 
-    def _part(self, nets: Sequence[Layers], Z: Array, smoothing: float, gradient: bool) -> Shared:
-        motion = forward(self.context, self.batch_step, nets, Z, smoothing)
+    def _part(self, nets: Sequence[Layers], Z: Array, smoothing: float, room: int) -> Shared:
+        motion = forward(self.context, self.batch_step, nets, Z, smoothing, room)
         values = Shared(*self._values(motion))
-        if not gradient:
+        if not room:
             return values
         small, weights = BackwardPass(
             self.context, self.batch_step, nets, motion, smoothing, self.context.objectives.slopes
@@ -170,7 +171,7 @@ class LargeProbe:
     def gradient(self, z: Array) -> Array:
         """See ``Probe``."""
         evaluator = self._evaluator
-        nets, motion = evaluator.nets_at(z), evaluator.forward_pass(z, 0.0)
+        nets, motion = evaluator.nets_at(z), evaluator.forward_pass(z, 0.0, KEPT_NUMBERS)
         slopes = self._context.objectives.probe_slopes
         small, weights = BackwardPass(self._context, evaluator.batch_step, nets, motion, 0.0, slopes).run()
         return self._context.partition.joined(small[0], weights)

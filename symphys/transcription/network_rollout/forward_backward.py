@@ -1,15 +1,14 @@
 """Forwards and backwards through time, for robots that share the weights of their nets.
 
-Forwards, states and what is sensed are kept; backwards, a segment of time after the other, the nets' values are
-computed again for a whole segment at once, steps are differentiated one by one, and the gradient of the weights is one
-product a layer and segment. So memory holds states, and the values of a net for one segment.
+Forwards, states and what is sensed are kept, and values of nets while there is room. Backwards, a segment of time after
+the other, other values are computed again for a whole segment at once, steps are differentiated one by one, and the
+gradient of the weights is one product a layer and segment.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -17,10 +16,9 @@ from numpy.typing import NDArray
 
 from symphys.transcription.network_rollout.context import BatchStep, RolloutContext
 from symphys.transcription.network_rollout.layers import Layers
+from symphys.transcription.network_rollout.net_values import NetValues, values_of
 
 Array = NDArray[np.float64]
-SEGMENT_WORDS = 24_000_000
-"""About as many numbers are kept of nets for a segment."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +26,7 @@ class ForwardPass:
     """What a pass forwards leaves, for B robots.
 
     Attributes:
+        rows: (N + 1, B, m) what each step is computed from: x, given, p, the times of the step, z.
         z: (B, s) what robots do not share.
         x: (N + 1, B, nx) states.
         given: (N, B, nu) inputs before small controllers add to them.
@@ -35,8 +34,10 @@ class ForwardPass:
         sensed: (N + 1, B, o) what large nets sense.
         asked: (N, B, a) values of formulas along the way.
         u: (N, B, nu) inputs.
+        values: of each net.
     """
 
+    rows: Array
     z: Array
     x: Array
     given: Array
@@ -44,41 +45,51 @@ class ForwardPass:
     sensed: Array
     asked: Array
     u: Array
+    values: Sequence[NetValues]
 
 
 def forward(
-    context: RolloutContext, batch_step: BatchStep, nets: Sequence[Layers], Z: Array, smoothing: float
+    context: RolloutContext,
+    batch_step: BatchStep,
+    nets: Sequence[Layers],
+    Z: Array,
+    smoothing: float,
+    room: int = 0,
 ) -> ForwardPass:
-    """Roll out robots (B, s) that share these nets."""
+    """Roll out robots (B, s) that share these nets; ``room``: see ``values_of``."""
     steps, dt = context.rollout.steps, context.rollout.dt
     starts = [[np.array(part).ravel() for part in context.start(z)] for z in Z]
     x0, given, p, sensed0 = (np.array([start[i] for start in starts]) for i in range(4))
+    nx, nu = x0.shape[1], context.rollout.given.shape[0]
+    rows = np.empty((steps + 1, len(Z), nx + nu + p.shape[1] + 2 + Z.shape[1]))
+    parts = np.split(rows, np.cumsum([nx, nu, p.shape[1], 2]), axis=2)
     motion = ForwardPass(
+        rows=rows,
         z=Z,
-        x=np.empty((steps + 1, *x0.shape)),
-        given=given.reshape(len(Z), steps, -1).swapaxes(0, 1).copy(),
+        x=parts[0],
+        given=parts[1][:steps],
         p=p,
         sensed=np.empty((steps + 1, *sensed0.shape)),
         asked=np.empty((steps, len(Z), batch_step.sizes.get("asked", 0))),
-        u=np.empty((steps, len(Z), context.rollout.given.shape[0])),
+        u=np.empty((steps, len(Z), nu)),
+        values=values_of(nets, len(Z), steps, room),
     )
-    motion.x[0], motion.sensed[0] = x0, sensed0
+    motion.x[0], motion.sensed[0], parts[2][:], parts[4][:] = x0, sensed0, p, Z
+    motion.given[:] = given.reshape(len(Z), steps, nu).swapaxes(0, 1)
+    parts[3][:] = dt * np.stack([np.arange(steps + 1), np.arange(1, steps + 2)], axis=1)[:, None]
+    beside = list(zip(nets, motion.values, context.columns, context.partition.places, strict=True))
     for k in range(steps):
-        for net, columns, place in zip(nets, context.columns, context.partition.places, strict=True):
-            values = net.forward(motion.sensed[k][:, columns])
+        for net, own, columns, place in beside:
+            values = own.at(k)
+            net.set(values[0], motion.sensed[k][:, columns])
+            net.forward(values)
             motion.given[k] += net.outputs(values) @ place.T
-        found = batch_step.forward(rows(motion, k, dt), [smoothing])
+        found = batch_step.forward(rows[k], [smoothing])
         motion.x[k + 1], motion.u[k] = found["after"], found["inputs"]
         motion.sensed[k + 1] = found["sensed"]
         if "asked" in found:
             motion.asked[k] = found["asked"]
     return motion
-
-
-def rows(motion: ForwardPass, k: int, dt: float) -> Array:
-    """(B, m) what the step from k is computed from."""
-    times = np.broadcast_to([k * dt, (k + 1) * dt], (len(motion.z), 2))
-    return np.concatenate([motion.x[k], motion.given[k], motion.p, times, motion.z], axis=1)
 
 
 def objective_arguments(context: RolloutContext, motion: ForwardPass, b: int) -> list[Array]:
@@ -118,6 +129,10 @@ class BackwardPass:
         self.at_u: dict[int, Array] = {}
         self.asked = np.zeros_like(motion.asked)
         self.weights = [np.zeros(net.net.sizes["weights"]) for net in nets]
+        self.adjoints = [
+            [net.room(width, len(motion.z) * own.length) for width in (*net.widths[1:], net.widths[-1])]
+            for net, own in zip(nets, motion.values, strict=True)
+        ]
         for b in range(len(motion.z)):
             self.start_robot(b, slopes)
 
@@ -138,12 +153,11 @@ class BackwardPass:
     def run(self) -> tuple[Array, list[Array]]:
         """(B, s) the gradients of what robots do not share, and for each net that of the shared weights, summed."""
         steps, robots = len(self.motion.given), len(self.motion.z)
-        width = sum(layer.outputs for net in self.nets for layer in net.layers)
-        length = max(1, min(steps, SEGMENT_WORDS // max(1, 2 * robots * width)))
+        length = max((own.length for own in self.motion.values), default=steps)
         x, sensed = self.at_x.get(steps, np.zeros_like(self.motion.x[0])), np.zeros_like(self.motion.sensed[0])
         given = np.zeros_like(self.motion.given)
-        for end in range(steps, 0, -length):
-            x, sensed = self.segment(max(0, end - length), end, x, sensed, given)
+        for number in reversed(range(-(-steps // length))):
+            x, sensed = self.segment(number, min(steps, number * length + length), x, sensed, given)
         flat = given.swapaxes(0, 1).reshape(robots, -1)
         for b in range(robots):
             parts = [self.motion.x[0, b], self.motion.given[:, b].ravel(), self.motion.p[b], self.motion.sensed[0, b]]
@@ -151,27 +165,23 @@ class BackwardPass:
             self.z[b] += np.array(self.context.pull(self.motion.z[b], *parts, *seeds)).ravel()
         return self.z, self.weights
 
-    def segment(self, first: int, end: int, x: Array, sensed: Array, given: Array) -> tuple[Array, Array]:
-        """From step ``end`` back to ``first``: adjoints of the state and of what is sensed there."""
-        kept = [
-            net.forward(self.motion.sensed[first:end][:, :, columns])
-            for net, columns in zip(self.nets, self.context.columns, strict=True)
-        ]
-        deltas: list[list[Any]] = [[] for _ in self.nets]
-        adjoints: list[list[Any]] = [[] for _ in self.nets]
+    def segment(self, number: int, end: int, x: Array, sensed: Array, given: Array) -> tuple[Array, Array]:
+        """From step ``end`` back to the first of a segment: adjoints of the state and of what is sensed there."""
+        first, robots = number * self.motion.values[0].length, len(x)
+        values = [own.again(number) for own in self.motion.values]
         for k in range(end - 1, first - 1, -1):
             x, given[k], sensed = self.step(k, x, sensed)
-            for i, (net, columns, place) in enumerate(
-                zip(self.nets, self.context.columns, self.context.partition.places, strict=True)
+            now = slice((k - first) * robots, (k - first + 1) * robots)
+            for net, own, room, columns, place in zip(
+                self.nets, values, self.adjoints, self.context.columns, self.context.partition.places, strict=True
             ):
-                output = given[k] @ place
-                back, delta = net.pull([value[k - first] for value in kept[i]], output)
-                sensed[:, columns] += back
-                deltas[i].append(delta)
-                adjoints[i].append(output)
-        for i, net in enumerate(self.nets):
-            stacked = [np.stack(layer[::-1]) for layer in zip(*deltas[i], strict=True)]
-            self.weights[i] += net.gradient(kept[i], stacked, np.stack(adjoints[i][::-1]))
+                *deltas, output = (array[:, now] for array in room)
+                net.set(output, given[k] @ place)
+                sensed[:, columns] += net.pull([value[:, now] for value in own], output, deltas)
+        used = slice(0, (end - first) * robots)
+        for i, (net, own, room) in enumerate(zip(self.nets, values, self.adjoints, strict=True)):
+            *deltas, output = (array[:, used] for array in room)
+            self.weights[i] += net.gradient(own, deltas, output)
         return x, sensed
 
     def step(self, k: int, x: Array, sensed: Array) -> tuple[Array, Array, Array]:
@@ -179,7 +189,7 @@ class BackwardPass:
         parts = {"after": x, "sensed": sensed, "asked": self.asked[k]}
         parts["inputs"] = self.at_u.get(k, np.zeros_like(self.motion.u[0]))
         seeds = np.concatenate([parts[name] for name in self.batch_step.seeded], axis=1)
-        _, slopes = self.batch_step.gradient(rows(self.motion, k, self.context.rollout.dt), seeds, self.smoothing)
+        _, slopes = self.batch_step.gradient(self.motion.rows[k], seeds, self.smoothing)
         sizes = [self.motion.x.shape[2], self.motion.given.shape[2], self.motion.p.shape[1], 2, self.motion.z.shape[1]]
         before, given, p, _, z = np.split(slopes, np.cumsum(sizes)[:-1], axis=1)
         self.p += p
@@ -204,10 +214,12 @@ def back(
     blank = {name: np.zeros((count, size)) for name, size in batch_step.sizes.items()}
     for k in reversed(range(len(motion.u))):
         seeds = np.concatenate([(blank | {"after": x})[name] for name in batch_step.seeded], axis=1)
-        _, slopes = batch_step.gradient(np.tile(rows(motion, k, dt)[:1], (count, 1)), seeds, [smoothing])
+        _, slopes = batch_step.gradient(np.tile(motion.rows[k, :1], (count, 1)), seeds, [smoothing])
         given, sensed = slopes[:, nx : nx + nu], np.zeros((count, motion.sensed.shape[2]))
         for net, columns, place in zip(nets, context.columns, context.partition.places, strict=True):
-            sensed[:, columns] += net.pull(net.forward(motion.sensed[k][:1, columns]), given @ place)[0]
+            output, values = net.put((given @ place).T), net.sense(motion.sensed[k][:1, columns])
+            deltas = [net.room(width, count) for width in net.widths[1:]]
+            sensed[:, columns] += net.pull(values, output, deltas)
         through = sense(motion.x[k, 0], motion.p[0], k * dt, motion.sensed[k, 0], sensed.T)[0]
         x = slopes[:, :nx] + np.array(through).T
         yield x.T

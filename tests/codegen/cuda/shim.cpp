@@ -1,4 +1,5 @@
-/* Runs a block's fibers in turns, each up to the next __syncthreads, in either order. */
+/* Runs a block's fibers in turns, each up to the next barrier or vote, in either order. A barrier waits for the whole
+   block, a vote for a warp: threads of the same y. */
 #include <ucontext.h>
 
 #include <cstdlib>
@@ -9,10 +10,12 @@ Index threadIdx, blockIdx;
 
 namespace {
 const size_t STACK = 1 << 18;
+enum State { READY, AT_BARRIER, AT_VOTE, DONE };
 struct Fiber {
   ucontext_t context;
   Index index;
-  bool done;
+  State state;
+  bool vote; /* its own, then that of its warp */
   std::vector<char> stack;
 };
 ucontext_t scheduler;
@@ -22,35 +25,61 @@ const void *job;
 
 void run() {
   kernel(job);
-  running->done = true;
+  running->state = DONE;
+}
+
+void wait(State state) {
+  running->state = state;
+  swapcontext(&running->context, &scheduler);
+}
+
+/* Makes ready all of these that wait for the same, once all do; whether it did. */
+bool released(Fiber *fibers, unsigned count, State state) {
+  bool vote = false;
+  for (unsigned i = 0; i < count; i++) {
+    if (fibers[i].state != state) return false;
+    vote |= fibers[i].vote;
+  }
+  for (unsigned i = 0; i < count; i++) fibers[i].state = READY, fibers[i].vote = vote;
+  return true;
 }
 }  // namespace
 
-void __syncthreads() { swapcontext(&running->context, &scheduler); }
+void __syncthreads() { wait(AT_BARRIER); }
 
+int __any_sync(unsigned, int predicate) {
+  Fiber *self = running;
+  self->vote = predicate;
+  wait(AT_VOTE);
+  return self->vote;
+}
+
+/* 1 where threads wait for different things, or one has left the kernel while others wait. */
 extern "C" int launch(void (*what)(const void *), unsigned blocks, unsigned x, unsigned y, const void *how, int backwards) {
   kernel = what, job = how;
-  std::vector<Fiber> fibers(x * y);
+  const unsigned count = x * y;
+  std::vector<Fiber> fibers(count);
   for (blockIdx.x = 0; blockIdx.x < blocks; blockIdx.x++) {
-    for (unsigned i = 0; i < x * y; i++) {
+    for (unsigned i = 0; i < count; i++) {
       Fiber &fiber = fibers[i];
-      fiber.index = {i % x, i / x}, fiber.done = false, fiber.stack.resize(STACK);
+      fiber.index = {i % x, i / x}, fiber.state = READY, fiber.stack.resize(STACK);
       getcontext(&fiber.context);
       fiber.context.uc_stack.ss_sp = fiber.stack.data(), fiber.context.uc_stack.ss_size = STACK;
       fiber.context.uc_link = &scheduler;
       makecontext(&fiber.context, run, 0);
     }
-    for (unsigned left = x * y; left;) {
+    for (;;) {
       unsigned finished = 0;
-      for (unsigned k = 0; k < x * y; k++) {
-        running = &fibers[backwards ? x * y - 1 - k : k];
-        if (running->done) return 1; /* it left the kernel while others still wait */
+      for (unsigned k = 0; k < count; k++) {
+        running = &fibers[backwards ? count - 1 - k : k];
         threadIdx = running->index;
-        swapcontext(&scheduler, &running->context);
-        finished += running->done;
+        if (running->state == READY) swapcontext(&scheduler, &running->context);
+        finished += running->state == DONE;
       }
-      if (finished && finished != x * y) return 1;
-      left -= finished;
+      if (finished == count) break;
+      bool some = released(fibers.data(), count, AT_BARRIER);
+      for (unsigned warp = 0; warp < y; warp++) some |= released(&fibers[warp * x], x, AT_VOTE);
+      if (!some) return 1;
     }
   }
   return 0;

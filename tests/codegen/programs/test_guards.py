@@ -6,19 +6,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import casadi as ca
 import numpy as np
 import pytest
-from heaps import heap
+from guarded import guarded_sections, halving, program_of, whole
 from plain_c import plain
 from repeats import thorough
 
-import symphys
 from symphys.codegen import (
     Cache,
-    FunctionCall,
     KernelUnavailable,
-    MemoryLayout,
     Place,
     Program,
     ProgramError,
@@ -26,27 +22,6 @@ from symphys.codegen import (
 )
 from symphys.codegen.emit.guarding import guarding_of
 from symphys.codegen.emit.plan import plan
-from symphys.transcription import rollout_program
-from symphys.transcription.rollout import symbolic_rollout
-
-HEAPS = {
-    "spheres": heap(["sphere"] * 6),
-    "capsules": heap(["capsule"] * 5, law="friction = 0.4\ntorsion = 0.01\nrolling = 0.005"),
-    "a box": heap(["box", *["sphere"] * 5], restitution=0.0),
-    "soft": heap(["sphere"] * 6, law="friction = 0.4\nfrequency = 30", restitution=0.0),
-}
-
-
-def program_of(name: str, folder: Path, exact: bool = True) -> Program:
-    path = folder / "heap.toml"
-    path.write_text(HEAPS[name], "utf-8")
-    return rollout_program(symbolic_rollout(symphys.load(path)), exact)
-
-
-def whole(program: Program) -> Program:
-    """The same without guards and sections."""
-    bare: dict[str, Any] = {"guard": None, "otherwise": (), "section": None, "beside": ()}
-    return replace(program, body=tuple(replace(call, **bare) for call in program.body))
 
 
 @pytest.fixture(params=["spheres", thorough("capsules"), "a box", thorough("soft")])
@@ -96,27 +71,6 @@ def test_plain_c_leaves_out_the_same(tmp_path: Path, cache: Cache) -> None:
     assert gradient == pytest.approx(expected.ravel(), rel=1e-9, abs=1e-9)
 
 
-def halving(guard: bool, older: bool = False) -> Program:
-    """x is moved by z where it is above 1; otherwise by nothing."""
-    at = MemoryLayout()
-    z, word, moved, more, out = at.take(1), at.take(1), at.take(1), at.take(1), at.take(1)
-    x, g, y = ca.SX.sym("x"), ca.SX.sym("g"), ca.SX.sym("y")
-    above = ca.Function("above", [x], [x > 1])
-    move = ca.Function("move", [g, x], [x + g * x * x])
-    last = ca.Function("last", [x, y], [x + y])
-    guarded = {"guard": word, "otherwise": (z,)} if guard else {}
-    chained = {"guard": word, "otherwise": (moved,)} if guard else {}
-    body = (
-        FunctionCall(above, (z,), (word,)),
-        FunctionCall(move, (word, z), (moved,), **guarded),
-        FunctionCall(move, (word, moved), (more,), **chained),
-        FunctionCall(last, (more, moved if older else z), (out,)),
-    )
-    end = Place(at.take(1).offset, 1)
-    keep = FunctionCall(ca.Function("keep", [x], [x]), (out,), (end,), accumulate=True)
-    return Program(at.size, z, Place(0, 0), 1, {"end": end}, body=(*body, keep), zeroed=(end,))
-
-
 @pytest.mark.parametrize("older", [False, True])
 def test_a_guard_of_which_an_older_result_is_read_is_given_up(older: bool, cache: Cache) -> None:
     try:
@@ -141,29 +95,6 @@ def test_a_guard_that_the_driver_cannot_follow_is_refused() -> None:
         calls = (program.body[0], replace(program.body[1], **change), *program.body[2:])
         with pytest.raises(ProgramError, match=why):
             guarding_of(replace(program, body=calls), tables)
-
-
-def guarded_sections(guard: bool) -> Program:
-    """Two sections of calls that have guards too; z is (x, y, g): x is moved where y > 0, twice where g > 0."""
-    at = MemoryLayout()
-    z, none, out = at.take(3), at.take(1), at.take(1)
-    x, w = ca.SX.sym("x"), ca.SX.sym("w")
-    parts = ca.SX.sym("z", 3)
-    split = ca.Function("split", [parts], [parts[0], parts[1] > 0, parts[2] > 0])
-    move = ca.Function("move", [w, x], [x + w * ca.sin(x)])
-    places = at.take(1), at.take(1), at.take(1)
-    body, now = [FunctionCall(split, (z,), places)], places[0]
-    for _ in range(2):
-        for word in (places[1], places[2]):
-            new = at.take(1)
-            more = {"guard": places[2], "otherwise": (now,), "section": word, "beside": (now,)} if guard else {}
-            both, v = at.take(1), ca.SX.sym("v")
-            body.append(FunctionCall(ca.Function("both", [w, v], [w * v]), (word, places[2]), (both,)))
-            body.append(FunctionCall(move, (both, now), (new,), **more))
-            now = new
-    last = ca.Function("last", [x], [x * x])
-    body.append(FunctionCall(last, (now,), (out,), accumulate=True))
-    return Program(at.size, z, Place(0, 0), 1, {"out": out}, body=tuple(body), zeroed=(none, out))
 
 
 @pytest.mark.parametrize("lanes", [1, 4])
