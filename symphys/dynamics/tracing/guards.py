@@ -21,6 +21,8 @@ from symphys.dynamics.tracing.recording import TracedCall, TracedVector
 
 Expr = Any
 """casadi SX"""
+MANY = 80
+"""Arguments of a call that is not looked into: it puts together what many bodies or pairs have."""
 Known = int
 """Which entries of a vector are known to be 0, as bits."""
 Pattern = tuple[Known, ...]
@@ -233,6 +235,8 @@ class _Search:
         if k not in found:
             return False
         call = self._calls[k]
+        if call.outputs[0].name or len(call.inputs) > MANY:
+            return False
         key = id(call.function), self._zeros[k]
         if key not in self._disregarded:
             self._disregarded[key] = _Disregarded(call.function, self._zeros[k])
@@ -254,7 +258,7 @@ class _Search:
                 continue
             call = self._calls[k]
             self._zeros[k] = zeros = tuple([known.get(vector.number, 0) for vector in call.inputs])
-            found[k] = results = self._results(call.function, zeros)
+            found[k] = results = self._results(call, zeros)
             for vector, (_, zero) in zip(call.outputs, results, strict=True):
                 if zero:
                     known[vector.number] = zero
@@ -265,8 +269,11 @@ class _Search:
     def _gives(self, k: int, numbers: Collection[int]) -> bool:
         return any(vector.number in numbers for vector in self._calls[k].outputs)
 
-    def _results(self, function: ca.Function, zeros: Pattern) -> list[Simplified]:
-        """What is known of each result."""
+    def _results(self, call: TracedCall, zeros: Pattern) -> list[Simplified]:
+        """What is known of each result; nothing of what is needed anyway, nor where few of many arguments are known."""
+        function = call.function
+        if call.outputs[0].name or len(zeros) > max(MANY, 2 * sum(map(bool, zeros))):
+            return [(None, 0)] * len(call.outputs)
         key = id(function), zeros
         if key not in self._evaluated:
             homes, results = _with_zeros(function, zeros)
