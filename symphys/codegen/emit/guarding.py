@@ -210,7 +210,7 @@ class _Rows:
 
     def _late(self, first: int, word: Mapping[int, int]) -> dict[str, list[tuple[int, ...]]]:
         """The rows of those calls of the first that have a guard, and of the guards that they compute."""
-        late, parents = list[tuple[int, ...]](), [(NONE,)] * len(self._guards)
+        late, parents = list[tuple[int, ...]](), list[tuple[int, ...]]([(NONE,)] * len(self._guards))
         for k, call in enumerate(self._body[:first]):
             if call.guard is None:
                 if late:

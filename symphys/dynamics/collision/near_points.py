@@ -59,6 +59,7 @@ class Sight:
 
     def turned(self, vector: Sequence[float]) -> Expr:
         """(3,): a vector of the body's frame in the world's."""
+        assert self.rotation is not None
         return ca.mtimes(self.rotation, ca.vertcat(*vector))
 
     def axes(self, shape: SolidShape) -> list[Expr]:
@@ -119,12 +120,11 @@ def near_points(
         reach: of the step.
         smoothing: all are near where it is above 0.
     """
-    if tuple(map(type, shapes)) not in RULES:
-        shapes, bodies = (shapes[1], shapes[0]), (bodies[1], bodies[0])
-    first, second = bodies
-    assert first is not None
-    ahead = reach.of_points(first, second, (_arm(shapes[0]), _arm(shapes[1])))
-    gaps = RULES[type(shapes[0]), type(shapes[1])](*shapes, *bodies)
+    (one, other), (a, b) = shapes, bodies
+    assert a is not None
+    ahead = reach.of_points(a, b, (_arm(one), _arm(other)))
+    rule = RULES.get((type(one), type(other)))
+    gaps = rule(one, other, a, b) if rule else RULES[type(other), type(one)](other, one, b, a)
     return tuple((ca.logic_and(near, ca.logic_or(gap < ahead, smoothing > 0)),) for gap in gaps)
 
 

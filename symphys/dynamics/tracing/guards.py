@@ -76,13 +76,14 @@ def with_guards(
     """
     search = _Search(calls)
     first, found = search.needed(guards), dict[int, Guard]()
-    own, implied = search.implied(guards), dict[int, list[int]]()
+    own, implied, taken = search.implied(guards), dict[int, list[int]](), set(first)
     for word in sorted(guards, key=lambda each: bool(own[each.number])):
         weaker = {k for number in own[word.number] for k in implied[number]}
-        kept = first - search.writers(own[word.number])
-        left = search.left_out(Part(word), found.keys() | kept, weaker, [found[k] for k in weaker])
+        taken -= search.writers(own[word.number])
+        left = search.left_out(Part(word), taken, weaker, [found[k] for k in weaker])
         implied[word.number] = list(left)
         found |= left
+        taken |= left.keys()
     late = [k for k in range(len(calls)) if k in first and k in found]
     early = [k for k in range(len(calls)) if k in first and k not in found]
     order = [*early, *late, *(k for k in range(len(calls)) if k not in first)]
@@ -315,8 +316,10 @@ class _Disregarded:
                 kept = [not known >> j & 1 for j in range(self._function.numel_in(i))]
                 given.append(random.uniform(0.5, 1.5, len(kept)) * kept)
             others = [*given[:argument], 0 * given[argument], *given[argument + 1 :]]
-            results = [np.array(ca.vertcat(*self._function.call(list(map(ca.DM, each))))) for each in (given, others)]
-            self._found[argument] = np.array_equal(*results)
+            one, other = (
+                np.array(ca.vertcat(*self._function.call(list(map(ca.DM, each))))) for each in (given, others)
+            )
+            self._found[argument] = np.array_equal(one, other)
         return self._found[argument]
 
 
