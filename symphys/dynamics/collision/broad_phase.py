@@ -16,7 +16,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from symphys.dynamics.collision.near_points import Reach, Sight, can_measure, measured, near_points
+from symphys.dynamics.collision.near_points import Travel, Sight, can_measure, measured, near_points
 from symphys.dynamics.context import State, StepContext, StepSettings
 from symphys.dynamics.motion import inertia_matrix
 from symphys.dynamics.tracing.decorator import guard, traced
@@ -47,7 +47,7 @@ def near_pairs(context: StepContext, x: State) -> tuple[Expr, ...]:
     held = {index for joint in world.joints for index in joint.bodies}
     bodies = [_sight(x, body, context, can_measure(body)) for body in world.bodies]
     fastest = _fastest(tuple(_most(sight, _arm(body)) for sight, body in zip(bodies, world.bodies, strict=True)))
-    reach, found = Reach(settings.scheme.dt, fastest), dict[tuple[Side, Side], list[Expr]]()
+    reach, found = Travel(settings.scheme.dt, fastest), dict[tuple[Side, Side], list[Expr]]()
     for (first, second), count in points.items():
         radii = _radius(world, first, held), _radius(world, second, held)
         if first.body is None or radii[0] is None or radii[1] is None:
@@ -132,13 +132,13 @@ def _fastest(speeds: Sequence[Expr]) -> Expr:
 
 
 @traced
-def _near(a: Sight, b: Sight, radii: float, reach: Reach, settings: StepSettings) -> Expr:
+def _near(a: Sight, b: Sight, radii: float, reach: Travel, settings: StepSettings) -> Expr:
     ahead = reach.of_centres(a, b)
     return ca.logic_or(length(a.position - b.position) < radii + ahead, settings.smoothing > 0)
 
 
 @traced
-def _near_plane(a: Sight, plane: tuple[Any, Any], radius: float, reach: Reach, settings: StepSettings) -> Expr:
+def _near_plane(a: Sight, plane: tuple[Any, Any], radius: float, reach: Travel, settings: StepSettings) -> Expr:
     normal, offset = plane
     height = ca.dot(ca.vertcat(*normal), a.position) - offset
     return ca.logic_or(height < radius + reach.of_centres(a, None), settings.smoothing > 0)

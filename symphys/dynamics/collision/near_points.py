@@ -68,7 +68,7 @@ class Sight:
 
 
 @dataclass(frozen=True)
-class Reach:
+class Travel:
     """How far surfaces come towards each other within a step of ``dt`` [s]; ``fastest``: what may strike them [m/s]."""
 
     dt: Expr
@@ -108,7 +108,7 @@ def near_points(
     shapes: tuple[Surface, Surface],
     bodies: tuple[Sight, Sight | None],
     near: Expr,
-    reach: Reach,
+    reach: Travel,
     smoothing: Expr,
 ) -> tuple[tuple[Expr], ...]:
     """For each point of a pair 1 if it may act within the step; each lies by itself.
