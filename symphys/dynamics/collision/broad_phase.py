@@ -16,7 +16,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from symphys.dynamics.collision.near_points import Travel, Sight, can_measure, measured, near_points
+from symphys.dynamics.collision.near_points import Sight, Travel, can_measure, measured, near_points
 from symphys.dynamics.context import State, StepContext, StepSettings
 from symphys.dynamics.motion import inertia_matrix
 from symphys.dynamics.tracing.decorator import guard, traced
