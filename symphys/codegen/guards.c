@@ -2,6 +2,9 @@
    the adjoints and stays from one evaluation to the next: ``prepare`` begins it. */
 #include <string.h>
 
+#ifndef CALL
+#define CALL(t, m, b, k) FUNCTIONS[(t)[0]](m, b, (t) + 2, k)
+#endif
 #ifndef LOWEST
 static int LOWEST(unsigned long long bits) {
   int lowest = 0;
@@ -24,7 +27,7 @@ typedef struct {
 
 static void run(const phase *calls, V *m, V *b, word k) {
   const word *t = calls->entries;
-  for (word c = 0; c < calls->count; c++, t += t[1]) FUNCTIONS[t[0]](m, b, t + 2, k);
+  for (word c = 0; c < calls->count; c++, t += t[1]) CALL(t, m, b, k);
 }
 
 static left_out *left_of(const program *p, V *m) {
@@ -171,7 +174,7 @@ static void run_left(const program *p, const left_out *x, word table, V *m, V *b
   const word **items = x->items[table] + x->starts[table], *copied = x->copied + 4 * table * p->copies.count;
   for (word i = 0; i < x->counts[table]; i++) {
     const word *t = items[i];
-    if (t[0] >= 0) FUNCTIONS[t[0]](m, b, t + 2, k);
+    if (t[0] >= 0) CALL(t, m, b, k);
     else if (!any(m + t[1] + k * t[2])) skip(x, copied, t, m, b, k), i += t[3];
   }
 }
