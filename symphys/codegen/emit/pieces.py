@@ -36,7 +36,7 @@ class Form:
 
 
 @dataclass
-class Piece:
+class GraphPiece:
     """A run of nodes that becomes one C function.
 
     Attributes:
@@ -61,7 +61,7 @@ class Cut:
     """A graph, with fused products where it may have some, and its pieces."""
 
     graph: Graph
-    pieces: list[Piece]
+    pieces: list[GraphPiece]
 
 
 def pieces_of(graph: Graph, form: Form, fuses: bool) -> Cut:
@@ -73,18 +73,18 @@ def pieces_of(graph: Graph, form: Form, fuses: bool) -> Cut:
     return Cut(graph, _cut(graph, fused))
 
 
-def _cut(graph: Graph, fused: set[int]) -> list[Piece]:
+def _cut(graph: Graph, fused: set[int]) -> list[GraphPiece]:
     order = [x for x in graph.needed() if graph.nodes[x].op not in ("const", "input")]
     runs = [order[i : i + LONGEST] for i in range(0, len(order), LONGEST)] or [[]]
     home = {x: i for i, run in enumerate(runs) for x in run}
     crossing = sorted({y for x in order for y in graph.nodes[x].operands if home.get(y, home[x]) != home[x]})
     slots = {x: slot for slot, x in enumerate(crossing)}
-    pieces = [Piece(run, slots, fused) for run in runs]
+    pieces = [GraphPiece(run, slots, fused) for run in runs]
     copied = 0
     for r, result in enumerate(graph.results):
         for x, first, count in _runs(graph, result):
             if x not in home and (copied := copied + 1) % LONGEST == 0:
-                pieces.append(Piece([], slots, fused))
+                pieces.append(GraphPiece([], slots, fused))
             pieces[home.get(x, -1)].targets.setdefault(x, []).append((r, first, count))
     return pieces
 

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 from symphys.codegen.emit.dialect import VECTORS, Dialect
-from symphys.codegen.emit.pieces import Form, Piece, pieces_of
+from symphys.codegen.emit.pieces import Form, GraphPiece, pieces_of
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.operations import MASKS
 
@@ -39,7 +39,7 @@ def write(
 class _Written:
     """A piece in C."""
 
-    piece: Piece
+    piece: GraphPiece
     dialect: Dialect
 
     def statements(self, graph: Graph, form: Form) -> list[str]:

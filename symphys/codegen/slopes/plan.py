@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.codegen.emit.functions import DistinctFunctions
-from symphys.codegen.emit.writer import Form
+from symphys.codegen.emit.pieces import Form
 from symphys.codegen.errors import ProgramError
 from symphys.codegen.graph.activity import Activity, CallActivity
 from symphys.codegen.graph.adjoint import Mask
