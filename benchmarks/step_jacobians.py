@@ -1,11 +1,12 @@
 """Jacobians of a step by state and inputs: milliseconds of CPU time a step, one thread; MuJoCo's, and the plain way.
 
-    python benchmarks/step_jacobians.py [--turns 9] [--crocoddyl PYTHON]
+    python benchmarks/step_jacobians.py [--turns 9] [--crocoddyl PYTHON] [--only table]
 
 Ours are exact, of the whole step with its controllers, in the robot's coordinates: ``LinearizedStep``. The plain way is
 the gradient kernel with a lane for each row. MuJoCo's are ``mjd_transitionFD``, finite differences of the same robot by
 our exporter, by positions, velocities, activations and controls. Crocoddyl's are analytic, of the same file, with every
 foot held to the ground as a given contact: nothing is discovered there (``given_contacts.py`` says how to install it).
+The box is that of ``against_mujoco.py``: 16 spheres, most pairs of which are too far apart to act.
 Ways take turns; the fastest turn counts.
 """
 
@@ -20,9 +21,11 @@ from time import process_time
 from typing import Any
 
 import numpy as np
+from against_mujoco import text
 from mujoco_runs import mujoco
 from numpy.typing import NDArray
 from table_robot import table_problem
+from worlds import problem_of
 
 from symphys.codegen import compile_program
 from symphys.export import mjcf
@@ -37,6 +40,11 @@ Array = NDArray[np.float64]
 STEPS, SETTLED, TURNS = 32, 0.3, 9
 """Steps of a call; [s] after which MuJoCo's are counted."""
 Call = Callable[[], Any]
+PROBLEMS: dict[str, Callable[[], Problem]] = {
+    "table": lambda: table_problem([], STEPS),
+    "walk": lambda: load_problem(find("quadruped_walk")),
+    "box": lambda: problem_of(text("box", 0.01)),
+}
 
 
 def main() -> None:
@@ -44,8 +52,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--turns", type=int, default=TURNS)
     parser.add_argument("--crocoddyl", type=Path, metavar="PYTHON", help="the Python of an environment that has it")
-    turns, crocoddyl = vars(parser.parse_args()).values()
-    for problem in (table_problem([], STEPS), load_problem(find("quadruped_walk"))):
+    parser.add_argument("--only", choices=PROBLEMS, help="one of the problems")
+    turns, crocoddyl, only = vars(parser.parse_args()).values()
+    for name in PROBLEMS if only is None else (only,):
+        problem = PROBLEMS[name]()
         calls = {**ours(problem), **theirs(problem)}
         best = dict.fromkeys(calls, np.inf)
         for _ in range(turns):
@@ -54,8 +64,8 @@ def main() -> None:
                 call()
                 best[way] = min(best[way], (process_time() - began) / STEPS)
         for way, seconds in best.items():
-            print(f"{problem.name:<16} {way:<44} {1e3 * seconds:7.3f} ms a step", flush=True)
-        if crocoddyl is not None:
+            print(f"{name:<16} {way:<44} {1e3 * seconds:7.3f} ms a step", flush=True)
+        if crocoddyl is not None and name != "box":
             with_contacts_given(problem, crocoddyl)
 
 

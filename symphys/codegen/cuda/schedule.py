@@ -5,19 +5,18 @@ the device has several warps, each with a thread for every robot of the block; a
 all wait. Every word sees its calls in the order of the program, so that numbers do not depend on the count of warps.
 
 Before calls with a section or a guard stands an entry that leaves them out where that word is 0 for all robots of the
-block (``alternatives.py``).
+block (``emit/alternatives.py``).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.codegen.cuda.alternatives import NONE, Alternative, Span, of_adjoint, of_call
+from symphys.codegen.emit.alternatives import ALWAYS, Alternatives, Span, entries_of, of_adjoint, of_call, word_of
 from symphys.codegen.emit.guarding import TABLES as GUARDED
 from symphys.codegen.emit.plan import Plan
 from symphys.codegen.program.program import FunctionCall, Program
@@ -28,8 +27,6 @@ LOOPED = ("body", "again", "back_body")
 """Phases of every step."""
 CALL = 40
 """What a call costs besides its operations, in operations: a jump, its table entry."""
-LEFT_OUT = -1
-"""In place of the number of a function."""
 
 
 @dataclass(frozen=True)
@@ -38,8 +35,7 @@ class Schedule:
 
     Attributes:
         spans: (levels, warps, 2) for each warp where its calls begin and end among ``entries``.
-        entries: of the calls: number, length, then offset and stride of each place. Before calls that may be left out:
-            LEFT_OUT, length, words from there to what comes after these calls, word of the guard, copies.
+        entries: of the calls: number, length, then offset and stride of each place; see ``entries_of``.
         work, longest: operations of all calls, and of the warps that the others wait for, one level after the other.
         words: that are read and written.
     """
@@ -60,13 +56,7 @@ class _Call:
     reads: Words
     writes: Words
     places: tuple[Span, ...]
-    alternatives: Sequence[Alternative | None]
-    """By its section and by its guard."""
-
-    def word(self, depth: int) -> int:
-        """Of these."""
-        found = self.alternatives[depth]
-        return NONE if found is None else found.word
+    alternatives: Alternatives
 
 
 def schedules(planned: Plan, program: Program, warps: int) -> dict[str, Schedule]:
@@ -96,21 +86,10 @@ def _schedule(calls: Sequence[_Call], memory: int, steps: int, warps: int) -> Sc
     )
 
 
-def _entries(calls: Sequence[_Call], depth: int = 0) -> list[int]:
+def _entries(calls: Sequence[_Call]) -> list[int]:
     """The entries of a warp's calls of a level; those that are left out together follow one another."""
-    if depth == 2:
-        return [x for call in calls for x in call.entry]
-    found = list[int]()
-    for word, group in groupby(sorted(calls, key=lambda call: call.word(depth)), lambda call: call.word(depth)):
-        same = list(group)
-        entries = _entries(same, depth + 1)
-        others = [other for call in same if (other := call.alternatives[depth]) is not None]
-        if others:
-            copies = [x for other in others for copy in other.copies for x in copy]
-            length = 4 + len(copies)
-            found += [LEFT_OUT, length, length + len(entries), word, *copies]
-        found += entries
-    return found
+    together = sorted(calls, key=lambda call: tuple(map(word_of, call.alternatives)))
+    return entries_of([(call.entry, call.alternatives) for call in together])
 
 
 def _calls(planned: Plan, program: Program, phase: str) -> Iterator[_Call]:
@@ -129,7 +108,7 @@ def _calls(planned: Plan, program: Program, phase: str) -> Iterator[_Call]:
         spans = [Span(offset, stride, size) for (offset, stride), size in zip(pairs, sizes, strict=True)]
         own, given = spans[: form.primal], spans[form.primal : len(graph.sizes)]
         results = spans[len(graph.sizes) :]
-        alternatives: Sequence[Alternative | None] = (None, None)
+        alternatives = ALWAYS
         if call is not None:
             alternatives = of_adjoint(call, given, results) if form.backward else of_call(call)
         also = [span for other in alternatives if other is not None for span in other.reads]

@@ -29,12 +29,14 @@ WORD = ctypes.c_int64
 POINTER = ctypes.c_void_p
 SHARED = "#define ALL(x) ((R)(x) - (V){0})\n"
 """A number of the memory in all lanes: unlike the S of a constant it needs no sum."""
+ITEM = 40
+"""Bytes of what is done for a block of rows: the driver's ``item``."""
 PARTS = 4
 """Of a batch for each thread; see ``RolloutBatch``."""
 
 
 class _Block(ctypes.Structure):
-    _fields_ = (("count", WORD), ("entries", POINTER), ("rows", POINTER), ("left", WORD), ("words", POINTER))
+    _fields_ = (("taken", POINTER), ("rows", POINTER), ("left", WORD), ("words", POINTER))
 
 
 class _Slopes(ctypes.Structure):
@@ -42,8 +44,11 @@ class _Slopes(ctypes.Structure):
         *((name, WORD) for name in ("size", "tape", "adjoints", "height", "width", "result")),
         *((name, WORD) for name in ("z", "z_size", "parameters", "parameters_size")),
         ("seeds", POINTER),
-        ("calls", WORD),
+        ("length", WORD),
         ("entries", POINTER),
+        *((name, WORD) for name in ("pulls", "items")),
+        *((name, POINTER) for name in ("back", "calls", "copies", "uses", "cells")),
+        ("cell_count", WORD),
         ("blocks", WORD),
         ("rows", POINTER),
         *((name, WORD) for name in ("kept", "reads")),
@@ -73,7 +78,8 @@ class SlopeKernel:
         self._evaluate.argtypes, self._evaluate.restype = (POINTER, POINTER, POINTER), None
         self._kept: list[Any] = []
         self._data = self._slopes(planned, report.lanes)
-        words = program.size + planned.tape + self._data.kept + planned.adjoints
+        listed = (ITEM * self._data.items + self._data.cell_count) // (8 * report.lanes) + 1
+        words = program.size + planned.tape + self._data.kept + planned.adjoints + listed
         self._pool = MemoryPool(words, report.lanes, np.float64)
 
     def jacobians(self, Z: ArrayLike, parameters: ArrayLike, columns: int | None = None) -> Array:
@@ -119,20 +125,25 @@ class SlopeKernel:
         blocks = (_Block * max(len(planned.blocks), 1))()
         for block, plan in zip(blocks, planned.blocks, strict=False):
             numbers = [*plan.rows, *[-1] * (lanes - len(plan.rows))]
-            block.count, block.entries, block.rows = len(plan.entries), self._flat(plan.entries), self._words(numbers)
+            block.taken, block.rows = self._put(plan.taken), self._words(numbers)
             block.left, block.words = len(plan.left), self._flat(plan.left)
         self._kept.append(blocks)
-        program = self.program
+        program, back = self.program, planned.backward
         z, parameters, height = program.z, program.parameters, program.outputs[self.output].size
         return _Slopes(
             *(program.size, planned.tape, planned.adjoints, height, z.size, planned.result),
             *(z.offset, z.size, parameters.offset, parameters.size),
             self._words(planned.seeds),
             len(planned.forward),
-            self._flat(planned.forward),
+            self._words(planned.forward),
+            len(back.calls) - 1,
+            len(back.calls) + len(back.copies) + len(back.uses),
+            self._words(back.entries),
+            *map(self._flat, (back.calls, back.copies, back.uses, back.cells)),
+            len(back.cells),
             len(planned.blocks),
             ctypes.addressof(blocks),
-            sum(count for _, count in planned.read),
+            sum(count for _, count, *_ in planned.read),
             len(planned.read),
             self._flat(planned.read),
         )
@@ -141,9 +152,11 @@ class SlopeKernel:
         return self._words([x for row in entries for x in row])
 
     def _words(self, values: list[int]) -> int:
-        words = np.array(values or [0], np.int64)
-        self._kept.append(words)
-        return int(words.ctypes.data)
+        return self._put(np.array(values or [0], np.int64))
+
+    def _put(self, values: NDArray[Any]) -> int:
+        self._kept.append(values)
+        return int(values.ctypes.data)
 
 
 def compile_slopes(

@@ -1,6 +1,7 @@
 """Calls of one function that follow each other, such as sweeps, as fewer calls that do several at once.
 
-Sweeps all read the same places, and the adjoint of each adds to the same words. One call of several adds once.
+Sweeps all read the same places, and the adjoint of each adds to the same words. One call of several adds once. Calls
+that may be left out stay by themselves.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ def merged(program: Program) -> list[FunctionCall]:
     known: dict[tuple[object, ...], Function] = {}
     for _, group in groupby(calls, key=lambda call: call.function.__hash__()):
         same = list(group)
-        if same[0].function.n_instructions() < SMALLEST or not _chained(same):
+        left_out = any(call.guard or call.section for call in same)
+        if left_out or same[0].function.n_instructions() < SMALLEST or not _chained(same):
             found += same
             continue
         for first in range(0, len(same), AT_ONCE):

@@ -14,7 +14,8 @@ from repeats import thorough
 
 from symphys.codegen import Cache, FunctionCall, MemoryLayout, Place, Program, compile_program
 from symphys.codegen.cuda import compile_on
-from symphys.codegen.cuda.schedule import LEFT_OUT, schedules
+from symphys.codegen.cuda.schedule import schedules
+from symphys.codegen.emit.alternatives import LEFT_OUT
 from symphys.codegen.emit.plan import FAST_MEMORY, plan
 
 pytestmark = needs_compiler
