@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import json
 import os
-import pickle
 import subprocess
 import sys
 import tempfile
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 from symphys.codegen.emit.source import SourceFile
@@ -39,7 +39,12 @@ class Background:
             failed: called with why there is none.
         """
         self._done, self._failed = done, failed
-        self._process = _begun(pickle.dumps((list(parts), texts, cache)))
+        given = {
+            "parts": [asdict(part) for part in parts],
+            "texts": texts,
+            "cache": {"folder": str(cache.folder), "limit": cache.limit},
+        }
+        self._process = _begun(json.dumps(given).encode())
         self._thread = threading.Thread(target=self._run, name="symphys-compiler", daemon=True)
         self._thread.start()
 

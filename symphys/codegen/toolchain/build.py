@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import pickle
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
@@ -250,7 +249,9 @@ def shared_library(parts: Sequence[SourceFile], cache: Cache, texts: str | None 
 
 def compile_for(given: IO[bytes]) -> None:
     """Keep the library of a ``Background``, and print where it is, or why there is none."""
-    parts, texts, cache = pickle.load(given)
+    asked = json.load(given)
+    parts, texts = [SourceFile(**part) for part in asked["parts"]], asked["texts"]
+    cache = Cache(Path(asked["cache"]["folder"]), asked["cache"]["limit"])
     try:
         with shared_library(parts, cache, texts) as built:
             said = {"error": built.note} if built.note else {"path": str(built.path)}
