@@ -21,6 +21,8 @@ WORD_BITS = 21
 """Of an operand, for the word; the others are for the place."""
 KEPT, CONSTANTS, PLACES = 0, 1, 2
 """Places of an operand: values that the function keeps, constants, and from here on those of the call."""
+MOST_KEPT = 4096
+"""Values that a function keeps at once: they lie on the stack of a thread."""
 OWN = ("end", "copy", "add_to", "fill")
 NUMBERS = {name: number for number, name in enumerate((*OWN, *FORMS))}
 MASKED = {"not": "I", "and": "II", "or": "II", "one": "I", "iez": "IV", "select": "IVV"}
@@ -116,6 +118,8 @@ class _Encoder:
                 if graph.sizes[a]:
                     words.extend((NUMBERS["fill"], (PLACES + a) << WORD_BITS, zero, graph.sizes[a]))
         words.append(NUMBERS["end"])
+        if self.kept > MOST_KEPT:
+            raise KernelUnavailable("a function keeps too many values to be interpreted")
         words[start + 1] = max(self.kept, 1)
 
     def _ends(self, graph: Graph) -> dict[int, int]:
